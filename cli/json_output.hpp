@@ -1,0 +1,89 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace liestat::cli {
+
+/// A JSON object that is filled field by field, in the order in which the fields are set. What is not finite becomes
+/// null. The library behind it is compiled in one unit only.
+class JsonObject {
+ public:
+  JsonObject();
+  JsonObject(const JsonObject& other);
+  JsonObject(JsonObject&& other) noexcept;
+  JsonObject& operator=(const JsonObject& other);
+  JsonObject& operator=(JsonObject&& other) noexcept;
+  ~JsonObject();
+
+  JsonObject& set(std::string_view key, std::nullptr_t);
+  JsonObject& set(std::string_view key, double value);
+  JsonObject& set(std::string_view key, std::string_view value);
+  JsonObject& set(std::string_view key, const char* value) { return set(key, std::string_view(value)); }
+  JsonObject& set(std::string_view key, const std::string& value) { return set(key, std::string_view(value)); }
+  /// A column vector becomes a list, any other matrix a list of its rows.
+  template <class Derived>
+  JsonObject& set(std::string_view key, const Eigen::MatrixBase<Derived>& value) {
+    return setMatrix(key, value.template cast<double>(), Derived::ColsAtCompileTime == 1);
+  }
+  JsonObject& set(std::string_view key, const std::vector<double>& values);
+  JsonObject& set(std::string_view key, const std::vector<std::string>& values);
+  JsonObject& set(std::string_view key, const JsonObject& value);
+  JsonObject& set(std::string_view key, const std::vector<JsonObject>& values);
+  /// bool and the integers; a template, because a conversion among them would be ambiguous.
+  template <class T>
+  requires std::integral<T> JsonObject& set(std::string_view key, T value) {
+    if constexpr (std::same_as<T, bool>) {
+      return setBool(key, value);
+    } else if constexpr (std::unsigned_integral<T>) {
+      return setUnsigned(key, value);
+    } else {
+      return setSigned(key, value);
+    }
+  }
+  /// A value or null.
+  template <class T>
+  JsonObject& set(std::string_view key, const std::optional<T>& value) {
+    return value ? set(key, *value) : set(key, nullptr);
+  }
+
+  /// The object as text, one field a line; lists of plain values and flat objects inside lists stand on one line.
+  std::string str() const;
+
+  /// For what the above cannot say.
+  const nlohmann::ordered_json& json() const { return *json_; }
+
+ private:
+  JsonObject& setBool(std::string_view key, bool value);
+  JsonObject& setSigned(std::string_view key, std::int64_t value);
+  JsonObject& setUnsigned(std::string_view key, std::uint64_t value);
+  JsonObject& setMatrix(std::string_view key, const Eigen::Ref<const Eigen::MatrixXd>& value, bool is_vector);
+
+  std::unique_ptr<nlohmann::ordered_json> json_;
+};
+
+/// The version of the fields' names and meanings; grows when one of them changes.
+inline constexpr int schema_version = 1;
+
+/// What every JSON file of the program begins with: schema_version, program, version, command_line, and the seed if
+/// there is one.
+JsonObject jsonEnvelope(std::string_view command_line, std::optional<std::uint64_t> seed = std::nullopt);
+
+/// The command line as one could type it again in a shell.
+std::string commandLine(int argc, const char* const* argv);
+
+/// Writes the object to a file, as writeOutput does. Throws InputError.
+void writeJson(const std::string& path, const JsonObject& object);
+
+/// The program's version.
+std::string_view programVersion();
+
+}  // namespace liestat::cli

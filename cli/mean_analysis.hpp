@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cli/measures.hpp>
+#include <stats/status.hpp>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// A feature of any kind as files and people see it.
+struct FeatureValue {
+  std::optional<Eigen::Vector4d> quaternion_xyzw = {};  ///< w is not negative
+  std::optional<Eigen::Vector3d> rotation_vector = {};  ///< rad
+  std::optional<Eigen::Vector3d> translation = {};      ///< m
+  std::optional<Eigen::Vector3d> point = {};            ///< m
+  std::optional<Eigen::Vector3d> direction = {};
+};
+
+/// The measure farthest from the mean in one part of the tangent vector.
+struct LargestResidual {
+  double value = 0;  ///< rad or m
+  std::size_t line = 0;
+};
+
+/// The measures in two charts: the principal one (about the origin) and the one about the mean. Columns are measures,
+/// rows coordinates in the tangent's order.
+struct ChartScatter {
+  Eigen::MatrixXd principal, centred;
+  Eigen::VectorXd mean;                            ///< in the principal chart
+  Eigen::MatrixXd mean_covariance, dispersion;     ///< carried to the principal chart; empty without a covariance
+  Eigen::VectorXd barycentre, barycentre_centred;  ///< the plain mean of the coordinates of the principal chart
+  Eigen::MatrixXd barycentre_covariance, barycentre_covariance_centred;
+};
+
+/// All that is known about a mean.
+struct MeanAnalysis {
+  FeatureValue mean;
+  /// Of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
+  Status status = Status::ok;
+  std::string reason = {};  ///< in words, where status is not ok
+  bool converged = false;
+  int iterations = 0;
+  double residual = 0;  ///< norm of the last step
+  double tolerance = 0;
+
+  Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
+  Status covariance_status = Status::ok;
+  std::string covariance_from = {};                               ///< residuals or noise
+  Eigen::MatrixXd dispersion;                                     ///< of the measures about the mean
+  std::vector<LargestResidual> largest = {};                      ///< one for each of tangentParts()
+  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< of directions: what the coordinates belong to
+
+  std::string unique = "not_certified";  ///< unique, ambiguous or not_certified
+  std::string proof = {};                ///< in words
+  std::vector<FeatureValue> rivals = {};
+  double r_star = 0;
+  std::size_t cells = 0;
+  double cut_locus_mass = 0;  ///< fraction of the measures near the cut locus of the mean
+
+  /// Sum of the measures' squared Mahalanobis distances, where their noise is known, and what is expected.
+  double fit = 0;
+  double fit_dof = 0;  ///< 0: there is none
+  double fit_p = 1;    ///< probability of so large a sum
+
+  std::optional<ChartScatter> charts = {};
+  std::vector<std::string> notes = {};
+};
+
+/// How much is computed.
+struct AnalysisOptions {
+  bool certify = true;     ///< branch and bound where the cheap certificates fail
+  std::size_t budget = 0;  ///< its cells; 0: a million, of very many measures as many as take some seconds
+  int threads = 0;         ///< 0: all
+  bool charts = false;     ///< for a report
+};
+
+/// Mean, covariance, dispersion and uniqueness of the measures. The same bits for any number of threads.
+MeanAnalysis analyseMean(const Measures& measures, const AnalysisOptions& options);
+
+}  // namespace liestat::cli

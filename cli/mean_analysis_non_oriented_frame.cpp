@@ -1,0 +1,7 @@
+#include <cli/mean_analysis_impl.hpp>
+
+namespace liestat::cli::detail {
+
+template MeanAnalysis analyse<NonOrientedFrame3d>(const Measures&, const AnalysisOptions&);
+
+}  // namespace liestat::cli::detail

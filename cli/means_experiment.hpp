@@ -1,0 +1,93 @@
+#pragma once
+
+#include <stats/maha.hpp>
+#include <stats/validation.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
+/// same draws, so that their accuracies can be compared trial by trial.
+
+enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, direction };
+inline constexpr std::array all_features{
+    Feature::point,    Feature::rotation, Feature::frame, Feature::semi_oriented_frame, Feature::non_oriented_frame,
+    Feature::direction};
+
+/// How the measures' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²), μ ~
+/// U(0,1).
+enum class Noise { iid, isd, idd, exp };
+inline constexpr std::array all_noises{Noise::iid, Noise::isd, Noise::idd, Noise::exp};
+
+enum class Criterion { lsq, wlsq, maha };
+inline constexpr std::array all_criteria{Criterion::lsq, Criterion::wlsq, Criterion::maha};
+
+/// The names of the program's options and JSON fields.
+std::string name(Feature feature);
+std::string name(Noise noise);
+std::string name(Criterion criterion);
+std::string name(CovarianceAt at);
+
+/// A way to estimate a mean and its covariance, of those that a trial compares.
+struct Method {
+  Criterion criterion;
+  bool corrected;    ///< the library's formula, else the report's
+  bool known_noise;  ///< covariance from the known noise, else from the residuals
+};
+
+inline constexpr std::array methods{Method{Criterion::lsq, true, true},   Method{Criterion::lsq, false, true},
+                                    Method{Criterion::lsq, true, false},  Method{Criterion::lsq, false, false},
+                                    Method{Criterion::wlsq, true, true},  Method{Criterion::wlsq, false, true},
+                                    Method{Criterion::wlsq, true, false}, Method{Criterion::wlsq, false, false},
+                                    Method{Criterion::maha, true, true},  Method{Criterion::maha, false, true}};
+
+/// The index of a method in `methods`.
+std::size_t methodIndex(const Method& method);
+
+/// A flag for each of `methods`.
+using MethodMask = std::array<bool, methods.size()>;
+
+/// One experiment.
+struct MeansExperiment {
+  Feature feature = Feature::rotation;
+  Noise noise = Noise::iid;
+  std::size_t n = 20;
+  /// Multiplies the standard deviations of the report: of points (1, 5, 10) m, of rotations (0.3, 0.6, 0.9) rad, of
+  /// directions (0.3, 0.6) rad; of frames the rotation's only.
+  double spread = 1;
+  /// The frame in which the noise is Gaussian and in which MAHA takes its covariances.
+  CovarianceAt covariance_at = CovarianceAt::estimated;
+  std::size_t trials = 1000;
+  std::uint64_t seed = 1;
+  MethodMask wanted = [] {
+    MethodMask all{};
+    all.fill(true);
+    return all;
+  }();
+  MahaMethod maha_method = MahaMethod::newton;
+  bool maha_likelihood = false;
+  /// Also branch and bound: the global minimum of LSQ and WLSQ is certified, not only the better of two starts.
+  bool certify = false;
+};
+
+/// Where the numbers of a report of run() stand: its `extra` statistics are logarithms of ratios of errors.
+enum ExtraIndex : std::size_t { log_ratio_rotation, log_ratio_translation };
+
+/// Number of degrees of freedom of a feature.
+int degreesOfFreedom(Feature feature);
+
+/// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
+/// each of `methods` that is wanted, in their order; its law is χ²_k for known noise and Hotelling's for residuals. The
+/// ratios compare a method's error with MAHA's of the same trial (the corrected one; the report's for the report's LSQ
+/// and WLSQ), and the report's MAHA with the corrected one; they are absent where that is not wanted. `progress(trials
+/// done, all)` is called from any thread, never twice at the same time.
+std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
+                                  const std::function<void(std::size_t, std::size_t)>& progress = {});
+
+}  // namespace liestat::cli

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace liestat::cli {
+
+/// How a series is drawn.
+enum class Style {
+  lines,         ///< through x, y; a NaN breaks the line, so one series may hold several curves
+  points,        ///< at x, y
+  linespoints,   ///< both
+  errorbars,     ///< a point at x, y with a bar from low to high
+  boxes,         ///< histogram bars at x of height y; `width` where they are not as wide as their distance
+  filled_curve,  ///< the area between low and high over x
+};
+
+/// Data of one name. Lists that the style does not use stay empty, the others have the same length.
+struct Series {
+  std::string name = {};  ///< for the legend and the CSV; series without a name are not in the legend
+  Style style = Style::lines;
+  std::vector<double> x = {};
+  std::vector<double> y = {};
+  std::vector<double> low = {};
+  std::vector<double> high = {};
+  std::vector<double> width = {};
+  std::optional<std::size_t> colour = {};  ///< the number of the palette's colour; series of one colour belong together
+  bool dashed = false;
+};
+
+/// One axis of a panel.
+struct Axis {
+  std::string label = {};
+  std::optional<double> low = {};  ///< else from the data
+  std::optional<double> high = {};
+  bool logarithmic = false;
+};
+
+/// A dotted line across the panel.
+struct ReferenceLine {
+  enum class Direction { horizontal, vertical };
+  Direction direction = Direction::horizontal;
+  double at = 0;
+};
+
+/// One pair of axes with what is drawn in it, the first series at the back.
+struct Panel {
+  std::string title = {};
+  Axis x = {};
+  Axis y = {};
+  std::vector<Series> series = {};
+  std::vector<ReferenceLine> references = {};
+  bool equal_aspect = false;  ///< a unit is as long on both axes
+};
+
+/// A figure of one panel or several.
+struct Plot {
+  std::string name;          ///< of its files: letters, digits and `_`; others are replaced
+  std::string caption = {};  ///< plain text below the figure
+  std::vector<Panel> panels = {};
+  std::size_t columns = 2;  ///< panels in a row, if there are several
+};
+
+/// Points of the ellipse (x − c)ᵀ Σ⁻¹ (x − c) = chi2, as a series of lines.
+Series ellipse(std::string name, const Eigen::Vector2d& centre, const Eigen::Matrix2d& covariance, double chi2);
+
+/// A histogram as a series of boxes. `density` scales it to a total area of one; what is not finite or outside is left
+/// out, and counts in the total.
+Series histogram(std::string name, const std::vector<double>& values, double low, double high, std::size_t bins,
+                 bool density);
+
+/// A directory with an index.html that needs nothing else, and beside it for each plot the CSV with all of its data,
+/// the gnuplot script and the SVG. Without gnuplot the page says so and keeps tables and CSV.
+class Report {
+ public:
+  /// Makes the directory; throws InputError where that is not possible.
+  Report(std::string directory, std::string title);
+
+  /// A heading.
+  void section(std::string_view title);
+  /// Plain text.
+  void paragraph(std::string_view text);
+  /// Text as it is typed, for command lines.
+  void code(std::string_view text);
+  /// Columns whose cells are all numbers are set to the right.
+  void table(const std::vector<std::string>& headers, const std::vector<std::vector<std::string>>& rows,
+             std::string_view caption = {});
+  /// Draws at once and writes the plot's files. Of very many points only a part is drawn, and the caption says so.
+  void plot(const Plot& plot);
+
+  /// Writes index.html and returns its path.
+  std::string write();
+
+  /// False once a plot could not be drawn because there is no gnuplot.
+  bool has_gnuplot() const { return has_gnuplot_; }
+
+ private:
+  std::string path(const std::string& file) const;
+  std::string uniqueName(std::string_view name);
+
+  std::string directory_;
+  std::string title_;
+  std::string body_;
+  std::vector<std::string> names_;
+  bool has_gnuplot_ = true;
+};
+
+}  // namespace liestat::cli

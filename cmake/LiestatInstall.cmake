@@ -1,0 +1,39 @@
+# Installs the headers as <prefix>/include/liestat/<room>/…, a CMake package and a pkg-config file. Nothing in them
+# depends on the architecture, so both live under share/ and the installed tree may be moved.
+include(CMakePackageConfigHelpers)
+
+foreach(room lie stats fusion)
+  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${room})
+    install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp")
+  endif()
+endforeach()
+
+set(liestat_package_dir ${CMAKE_INSTALL_DATADIR}/cmake/liestat)
+install(TARGETS liestat EXPORT liestatTargets)
+install(EXPORT liestatTargets NAMESPACE liestat:: DESTINATION ${liestat_package_dir})
+configure_package_config_file(cmake/liestatConfig.cmake.in ${PROJECT_BINARY_DIR}/liestatConfig.cmake
+                              INSTALL_DESTINATION ${liestat_package_dir})
+# Before 1.0 a minor version may change the interface.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/liestatConfigVersion.cmake COMPATIBILITY SameMinorVersion
+                                 ARCH_INDEPENDENT)
+install(FILES ${PROJECT_BINARY_DIR}/liestatConfig.cmake ${PROJECT_BINARY_DIR}/liestatConfigVersion.cmake
+        DESTINATION ${liestat_package_dir})
+
+# The prefix is written relative to the file's own directory, so that the tree may be moved.
+set(liestat_pc_dir ${CMAKE_INSTALL_DATADIR}/pkgconfig)
+if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}" OR IS_ABSOLUTE "${CMAKE_INSTALL_DATADIR}")
+  set(LIESTAT_PC_PREFIX ${CMAKE_INSTALL_PREFIX})
+  set(LIESTAT_PC_INCLUDEDIR ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+else()
+  file(RELATIVE_PATH liestat_pc_up /${liestat_pc_dir} /)
+  string(REGEX REPLACE "/$" "" liestat_pc_up "${liestat_pc_up}")
+  set(LIESTAT_PC_PREFIX "\${pcfiledir}/${liestat_pc_up}")
+  set(LIESTAT_PC_INCLUDEDIR "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
+configure_file(cmake/liestat.pc.in ${PROJECT_BINARY_DIR}/liestat.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/liestat.pc DESTINATION ${liestat_pc_dir})
+
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+if(TARGET liestat_program)
+  install(TARGETS liestat_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()

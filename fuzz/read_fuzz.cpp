@@ -1,0 +1,63 @@
+// Any text, in any format: features that keep their promises, or an InputError of one line. Anything else is a finding.
+//
+//   build/sanitize/fuzz/read_fuzz -max_total_time=120 new_corpus fuzz/corpus/read
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "cli/input_error.hpp"
+#include "cli/reading.hpp"
+
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+template <class List>
+bool isAbsentOrFull(const List& list, std::size_t n) {
+  return list.empty() || list.size() == n;
+}
+
+void check(const liestat::cli::FeatureFile& file) {
+  using liestat::cli::FeatureKind;
+  const std::size_t n = file.size();
+  const bool rotates = file.kind == FeatureKind::rotation || file.kind == FeatureKind::frame;
+  require(n > 0);
+  require(file.rotations.size() == (rotates ? n : 0));
+  require(file.vectors.size() == (file.kind == FeatureKind::rotation ? 0 : n));
+  require(isAbsentOrFull(file.weights, n) && isAbsentOrFull(file.times, n) && isAbsentOrFull(file.covariances, n));
+  require(file.n_normalised <= n);
+  for (const auto& rotation : file.rotations) require(std::abs(rotation.norm() - 1) < 1e-14);
+  for (const auto& vector : file.vectors) {
+    require(vector.allFinite());
+    if (file.kind == FeatureKind::direction) require(std::abs(vector.norm() - 1) < 1e-14);
+  }
+  for (const double weight : file.weights) require(weight > 0 && std::isfinite(weight));
+  for (const double time : file.times) require(std::isfinite(time));
+  for (const auto& covariance : file.covariances) require(covariance.allFinite() && covariance(0, 0) > 0);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using liestat::cli::Format;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  for (const Format format : {Format::automatic, Format::csv, Format::tum, Format::euroc, Format::kitti}) {
+    try {
+      check(liestat::cli::readFeatures(text, "fuzz", {.format = format}));
+    } catch (const liestat::cli::InputError& error) {
+      require(std::string_view(error.what()).find('\n') == std::string_view::npos);
+    }
+  }
+  try {
+    (void)liestat::cli::parseTable(text, "fuzz", {"x"}, {"y"});
+  } catch (const liestat::cli::InputError& error) {
+    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
+  }
+  return 0;
+}

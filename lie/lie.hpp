@@ -1,0 +1,13 @@
+// Every manifold of the room lie/; one line each.
+#pragma once
+
+#include <lie/frame2.hpp>
+#include <lie/frame3.hpp>
+#include <lie/non_oriented_frame3.hpp>
+#include <lie/rn.hpp>
+#include <lie/s2.hpp>
+#include <lie/se2.hpp>
+#include <lie/se3.hpp>
+#include <lie/semi_oriented_frame3.hpp>
+#include <lie/so2.hpp>
+#include <lie/so3.hpp>

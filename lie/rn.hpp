@@ -1,0 +1,77 @@
+// R^n: fixed-size Eigen vectors as manifolds, under the group of translations. Points, and anything flat.
+//
+// Storage        an Eigen column vector as it is; no wrapper
+// Tangent        the difference, in the unit of the coordinates
+// Action         of Translation<S, N>: p + t
+// Metric         Euclidean
+#pragma once
+
+#include <lie/manifold.hpp>
+
+#include <limits>
+
+namespace liestat {
+
+/// The additive group of R^N: a vector with the interface of a group.
+template <class Scalar_, int N_>
+class Translation {
+ public:
+  using Scalar = Scalar_;
+  static constexpr int DoF = N_, num_parameters = N_, N = N_ + 1, Dim = N_;
+  using Tangent = Eigen::Matrix<Scalar, DoF, 1>;
+  using Square = Eigen::Matrix<Scalar, DoF, DoF>;
+  using Params = Tangent;
+
+  /// The identity: zero.
+  Translation() : v_(Tangent::Zero()) {}
+  explicit Translation(const Tangent& v) : v_(v) {}
+  const Tangent& params() const { return v_; }
+  const Scalar* data() const { return v_.data(); }
+  Scalar* data() { return v_.data(); }
+  template <class S>
+  Translation<S, N_> cast() const {
+    return Translation<S, N_>(v_.template cast<S>());
+  }
+  Translation operator*(const Translation& other) const { return Translation(v_ + other.v_); }
+  Translation inverse() const { return Translation(-v_); }
+  static Translation exp(const Tangent& v) { return Translation(v); }
+  Tangent log() const { return v_; }
+  Square Adj() const { return Square::Identity(); }
+  static Square ad(const Tangent&) { return Square::Zero(); }
+  static Square leftJacobian(const Tangent&) { return Square::Identity(); }
+  static Square leftJacobianInverse(const Tangent&) { return Square::Identity(); }
+  static Square rightJacobian(const Tangent&) { return Square::Identity(); }
+  static Square rightJacobianInverse(const Tangent&) { return Square::Identity(); }
+
+ private:
+  Tangent v_;
+};
+
+/// Fixed-size column vectors; dynamic sizes and integers are not manifolds.
+template <class S, int N, int O>
+  requires(N > 0 && !std::is_integral_v<S>)
+struct ManifoldTraits<Eigen::Matrix<S, N, 1, O, N, 1>>
+    : TrivialIsotropy<Eigen::Matrix<S, N, 1, O, N, 1>, Translation<S, N>> {
+  using M = Eigen::Matrix<S, N, 1, O, N, 1>;
+  using Base = TrivialIsotropy<M, Translation<S, N>>;
+  using typename Base::Group, typename Base::Tangent, typename Base::Square;
+
+  static M origin() { return M::Zero(); }
+  static M act(const Group& f, const M& x) { return x + f.params(); }
+  static Group placement(const M& x) { return Group(x); }
+  static M expOrigin(const Tangent& v) { return v; }
+  static Tangent logOrigin(const M& x) { return x; }
+  static Square dexpOrigin(const Tangent&) { return Square::Identity(); }
+  static Square dlogOrigin(const M&) { return Square::Identity(); }
+
+  static Tangent metricWeights() { return Tangent::Ones(); }
+  static S injectivityRadius() { return std::numeric_limits<S>::infinity(); }
+  static S maxSectionalCurvature() { return S(0); }
+  static Square hessianHalfSquaredDistance(const Tangent&) { return Square::Identity(); }
+  static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
+  static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
+  static detail::VolumeElement<S, N> logVolume(const Tangent&) { return {}; }
+  static constexpr bool covariance_models_coincide = true;
+};
+
+}  // namespace liestat

@@ -1,0 +1,176 @@
+// SE2: rigid motions of the plane as a Lie group; the exponential is the motion on a circle.
+//
+// Storage        cos sin tx ty (Sophus' layout)
+// Tangent        (translation m, angle rad), body frame: x·Exp(v)
+// Matrix form    3×3 homogeneous matrix
+// Action         on points of R^2: R p + t
+// Identity       (1, 0, 0, 0)
+// Metric         none that is bi-invariant: means by groupMean or MAHA, or Frame2 for Riemannian statistics
+// Bad input      NaN in, NaN out
+#pragma once
+
+#include <lie/so2.hpp>
+
+namespace liestat {
+namespace detail {
+
+/// Mathematics of SE(2) on (cos, sin, tx, ty); tangent (υ, θ).
+template <class S>
+struct Se2Math {
+  using Scalar = S;
+  using Rotation = So2Math<S>;
+  static constexpr int DoF = 3, num_parameters = 4, N = 3, Dim = 2;
+  using Params = Eigen::Matrix<S, 4, 1>;
+  using Tangent = Eigen::Matrix<S, 3, 1>;
+  using Point = Eigen::Matrix<S, 2, 1>;
+  using MatrixType = Eigen::Matrix<S, 3, 3>;
+  using Square = Eigen::Matrix<S, 3, 3>;
+  using Vector2 = Eigen::Matrix<S, 2, 1>;
+  using Matrix2 = Eigen::Matrix<S, 2, 2>;
+  using Angle = Eigen::Matrix<S, 1, 1>;
+
+  static Params join(const Vector2& z, const Vector2& t) { return Params(z[0], z[1], t[0], t[1]); }
+  static Vector2 complex(const Params& p) { return p.template head<2>(); }
+  static Vector2 translation(const Params& p) { return p.template tail<2>(); }
+  /// a I + b J, J the quarter-turn.
+  static Matrix2 similarity(const S& a, const S& b) {
+    Matrix2 m;
+    m << a, -b, b, a;
+    return m;
+  }
+
+  static Params identity() { return Params(S(1), S(0), S(0), S(0)); }
+  static Params product(const Params& a, const Params& b) {
+    return join(Rotation::product(complex(a), complex(b)), Rotation::act(complex(a), translation(b)) + translation(a));
+  }
+  static Params inverse(const Params& p) {
+    const Vector2 z = Rotation::inverse(complex(p));
+    return join(z, -Rotation::act(z, translation(p)));
+  }
+  static Params normalized(const Params& p) { return join(Rotation::normalized(complex(p)), translation(p)); }
+  static Point act(const Params& p, const Point& x) { return Rotation::act(complex(p), x) + translation(p); }
+
+  /// V(θ): translation of exp is V υ.
+  static Matrix2 translationJacobian(const S& theta) {
+    const HalfAngle<S> h = halfAngle(S(theta * theta));
+    return similarity(h.sinc * h.cos, S(0.5) * theta * h.sinc * h.sinc);
+  }
+  static Matrix2 translationJacobianInverse(const S& theta) {
+    const HalfAngle<S> h = halfAngle(S(theta * theta));
+    return similarity(h.cos / h.sinc, S(-0.5) * theta);
+  }
+  static Params exp(const Tangent& v) {
+    return join(Rotation::exp(Angle(v[2])), translationJacobian(v[2]) * v.template head<2>());
+  }
+  static Tangent log(const Params& p) {
+    const S theta = Rotation::log(complex(p))[0];
+    const Vector2 u = translationJacobianInverse(theta) * translation(p);
+    return Tangent(u[0], u[1], theta);
+  }
+  static MatrixType matrix(const Params& p) {
+    MatrixType m = MatrixType::Identity();
+    m.template topLeftCorner<2, 2>() = Rotation::matrix(complex(p));
+    m.template topRightCorner<2, 1>() = translation(p);
+    return m;
+  }
+  static MatrixType hat(const Tangent& v) {
+    MatrixType m = MatrixType::Zero();
+    m.template topLeftCorner<2, 2>() = Rotation::hat(Angle(v[2]));
+    m.template topRightCorner<2, 1>() = v.template head<2>();
+    return m;
+  }
+  static Tangent vee(const MatrixType& m) { return Tangent(m(0, 2), m(1, 2), m(1, 0)); }
+  static Square blocks(const Matrix2& translation, const Vector2& coupling, const S& rotation) {
+    Square m;
+    m << translation, coupling, S(0), S(0), rotation;
+    return m;
+  }
+  static Square Adj(const Params& p) { return blocks(Rotation::matrix(complex(p)), Vector2(p[3], -p[2]), S(1)); }
+  static Square ad(const Tangent& v) { return blocks(similarity(S(0), v[2]), Vector2(v[1], -v[0]), S(0)); }
+  /// Last column of the left Jacobian: (Σ_{k≥1} (θJ)^{k-1}/(k+1)!)·(-Jυ).
+  static Vector2 coupling(const Tangent& v) {
+    const S t = v[2] * v[2], s = halfAngle(t).sinc;
+    return similarity(S(0.5) * s * s, v[2] * beta3(t)) * Vector2(v[1], -v[0]);
+  }
+  static Square leftJacobian(const Tangent& v) { return blocks(translationJacobian(v[2]), coupling(v), S(1)); }
+  static Square leftJacobianInverse(const Tangent& v) {
+    const Matrix2 inverse = translationJacobianInverse(v[2]);
+    return blocks(inverse, -inverse * coupling(v), S(1));
+  }
+};
+
+/// Accessors shared by the group SE2 and by Frame2, which has the same storage.
+template <class Derived, class Base>
+class PlanarPoseAccess : public Base {
+ public:
+  using Base::data;
+  using typename Base::Scalar;
+
+  /// The rotation, viewed in place.
+  Eigen::Map<const SO2<Scalar>> so2() const { return Eigen::Map<const SO2<Scalar>>(data()); }
+  /// The translation (m), viewed in place.
+  Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> translation() const {
+    return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(data() + 2);
+  }
+  auto translation() {
+    using Vector = Eigen::Matrix<Scalar, 2, 1>;
+    constexpr bool read_only = std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>;
+    return Eigen::Map<std::conditional_t<read_only, const Vector, Vector>>(data() + 2);
+  }
+};
+
+}  // namespace detail
+
+/// Interface of SE2 over owned or viewed memory.
+template <class Derived>
+class SE2Base : public detail::PlanarPoseAccess<Derived, detail::GroupBase<Derived>> {};
+
+template <class Scalar_, int Options_ = 0>
+class SE2;
+
+using SE2d = SE2<double>;
+using SE2f = SE2<float>;
+
+}  // namespace liestat
+
+LIESTAT_TRAITS(SE2, liestat::detail::Se2Math)
+
+namespace liestat {
+
+/// A rigid motion of the plane; see the header comment.
+template <class Scalar_, int Options_>
+class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
+  LIESTAT_OWNER(SE2, SE2Base);
+
+ public:
+  using Vector2 = Eigen::Matrix<Scalar_, 2, 1>;
+
+  template <class D>
+  SE2(const SO2Base<D>& rotation, const Vector2& translation)
+      : storage_(Shell::Math::join(rotation.params(), translation)) {}
+  /// From an angle (rad) and a translation (m).
+  SE2(const Scalar_& angle, const Vector2& translation) : SE2(SO2<Scalar_>(angle), translation) {}
+  /// From a homogeneous matrix, rotation part orthogonal up to rounding.
+  explicit SE2(const Eigen::Matrix<Scalar_, 3, 3>& T)
+      : SE2(SO2<Scalar_>(Eigen::Matrix<Scalar_, 2, 2>(T.template topLeftCorner<2, 2>())),
+            Vector2(T.template topRightCorner<2, 1>())) {}
+};
+
+/// SE(2) is homogeneous under itself, not Metric.
+template <class S, int O>
+struct ManifoldTraits<SE2<S, O>> : GroupManifold<SE2<S, O>> {
+  /// log det of the left Jacobian, 2 log(sin(θ/2)/(θ/2)), with its gradient and Hessian.
+  static detail::VolumeElement<S, 3> logVolume(const Eigen::Matrix<S, 3, 1>& z) {
+    using std::log;
+    const S t = z[2] * z[2], c = S(-2) * detail::cotangentExcess(t);
+    detail::VolumeElement<S, 3> v;
+    v.value = S(2) * log(detail::halfAngle(t).sinc);
+    v.gradient[2] = c * z[2];
+    v.hessian(2, 2) = c - S(2) * detail::cotangentExcessSlope(t) * t;
+    return v;
+  }
+};
+
+}  // namespace liestat
+
+LIESTAT_MAPS(SE2, liestat::SE2Base)

@@ -1,0 +1,220 @@
+// SE3: rigid motions of R^3 as a Lie group; the exponential is the screw motion.
+//
+// Storage        qx qy qz qw tx ty tz (Sophus' layout)
+// Tangent        (translation m, rotation rad), body frame: x·Exp(v)
+// Matrix form    4×4 homogeneous matrix; hat(v) = [[ω]× υ; 0 0]
+// Action         on points of R^3: R p + t
+// Identity       (0, 0, 0, 1, 0, 0, 0)
+// Metric         none that is bi-invariant: means by groupMean or MAHA. For Riemannian statistics of poses use Frame3.
+// Bad input      NaN in, NaN out; quaternions are normalised on construction
+#pragma once
+
+#include <lie/so3.hpp>
+
+namespace liestat {
+namespace detail {
+
+/// Mathematics of SE(3) on (quaternion, translation); tangent (υ, ω).
+template <class S>
+struct Se3Math {
+  using Scalar = S;
+  using Rotation = So3Math<S>;
+  static constexpr int DoF = 6, num_parameters = 7, N = 4, Dim = 3;
+  using Params = Eigen::Matrix<S, 7, 1>;
+  using Tangent = Eigen::Matrix<S, 6, 1>;
+  using Point = Eigen::Matrix<S, 3, 1>;
+  using MatrixType = Eigen::Matrix<S, 4, 4>;
+  using Square = Eigen::Matrix<S, 6, 6>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  using Vector4 = Eigen::Matrix<S, 4, 1>;
+  using Matrix3 = Eigen::Matrix<S, 3, 3>;
+
+  static Params join(const Vector4& q, const Vector3& t) {
+    Params p;
+    p << q, t;
+    return p;
+  }
+  static Vector4 quaternion(const Params& p) { return p.template head<4>(); }
+  static Vector3 translation(const Params& p) { return p.template tail<3>(); }
+
+  static Params identity() { return join(Rotation::identity(), Vector3::Zero()); }
+  static Params product(const Params& a, const Params& b) {
+    return join(Rotation::product(quaternion(a), quaternion(b)),
+                Rotation::act(quaternion(a), translation(b)) + translation(a));
+  }
+  static Params inverse(const Params& p) {
+    const Vector4 q = Rotation::inverse(quaternion(p));
+    return join(q, -Rotation::act(q, translation(p)));
+  }
+  static Params normalized(const Params& p) { return join(Rotation::normalized(quaternion(p)), translation(p)); }
+  static Point act(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x) + translation(p); }
+
+  static Params exp(const Tangent& v) {
+    const Vector3 omega = v.template tail<3>(), upsilon = v.template head<3>();
+    return join(Rotation::exp(omega), Rotation::leftJacobian(omega) * upsilon);
+  }
+  static Tangent log(const Params& p) {
+    const Vector3 omega = Rotation::log(quaternion(p));
+    Tangent v;
+    v << Rotation::leftJacobianInverse(omega) * translation(p), omega;
+    return v;
+  }
+
+  static MatrixType matrix(const Params& p) {
+    MatrixType m = MatrixType::Identity();
+    m.template topLeftCorner<3, 3>() = Rotation::matrix(quaternion(p));
+    m.template topRightCorner<3, 1>() = translation(p);
+    return m;
+  }
+  static MatrixType hat(const Tangent& v) {
+    MatrixType m = MatrixType::Zero();
+    m.template topLeftCorner<3, 3>() = skew(v.template tail<3>());
+    m.template topRightCorner<3, 1>() = v.template head<3>();
+    return m;
+  }
+  static Tangent vee(const MatrixType& m) {
+    Tangent v;
+    v << m.template topRightCorner<3, 1>(), Rotation::vee(m.template topLeftCorner<3, 3>());
+    return v;
+  }
+  static Square blocks(const Matrix3& diagonal, const Matrix3& coupling) {
+    Square m;
+    m << diagonal, coupling, Matrix3::Zero(), diagonal;
+    return m;
+  }
+  static Square Adj(const Params& p) {
+    const Matrix3 R = Rotation::matrix(quaternion(p));
+    return blocks(R, skew(translation(p)) * R);
+  }
+  static Square ad(const Tangent& v) { return blocks(skew(v.template tail<3>()), skew(v.template head<3>())); }
+
+  /// Off-diagonal block of the left Jacobian (Barfoot 2017, eq. 7.86), with the triple products reduced: for d = φ·ρ
+  /// they are [φ][ρ][φ] = -d[φ] and [φ]²[ρ] + [ρ][φ]² = -|φ|²[ρ] - d[φ].
+  static Matrix3 coupling(const Vector3& rho, const Vector3& phi) {
+    const S t = phi.dot(phi), d = phi.dot(rho);
+    const S b3 = beta3(t), s = halfAngle(t).sinc, b5 = S(-2) * d * beta5(t);
+    const Vector3 axial = (S(0.5) * s * s) * rho + (d * (S(2) * beta4(t) - b3)) * phi;
+    const Vector3 b = b3 * rho + (S(0.5) * b5) * phi;
+    Matrix3 m = b * phi.transpose() + phi * b.transpose() + skew(axial);
+    m.diagonal().array() -= S(2) * d * b3 + b5 * t;
+    return m;
+  }
+  static Square leftJacobian(const Tangent& v) {
+    const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
+    return blocks(Rotation::leftJacobian(phi), coupling(rho, phi));
+  }
+  static Square leftJacobianInverse(const Tangent& v) {
+    const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
+    const Matrix3 inverse = Rotation::leftJacobianInverse(phi);
+    return blocks(inverse, -inverse * coupling(rho, phi) * inverse);
+  }
+};
+
+}  // namespace detail
+
+template <class Scalar_, int Options_ = 0>
+class SE3;
+
+namespace detail {
+
+/// Accessors shared by the group SE3 and by the frames, which have the same storage.
+template <class Derived, class Base>
+class PoseAccess : public Base {
+ public:
+  using Base::data;
+  using typename Base::Scalar;
+
+  /// The rotation, viewed in place.
+  Eigen::Map<const SO3<Scalar>> so3() const { return Eigen::Map<const SO3<Scalar>>(data()); }
+  Eigen::Map<std::conditional_t<std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>,
+                                const SO3<Scalar>, SO3<Scalar>>>
+  so3() {
+    return decltype(so3())(data());
+  }
+  /// The translation (m), viewed in place.
+  Eigen::Map<const Eigen::Matrix<Scalar, 3, 1>> translation() const {
+    return Eigen::Map<const Eigen::Matrix<Scalar, 3, 1>>(data() + 4);
+  }
+  auto translation() {
+    using Vector = Eigen::Matrix<Scalar, 3, 1>;
+    constexpr bool read_only = std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>;
+    return Eigen::Map<std::conditional_t<read_only, const Vector, Vector>>(data() + 4);
+  }
+  Eigen::Map<const Eigen::Quaternion<Scalar>> unit_quaternion() const {
+    return Eigen::Map<const Eigen::Quaternion<Scalar>>(data());
+  }
+  Eigen::Matrix<Scalar, 3, 3> rotationMatrix() const { return so3().matrix(); }
+};
+
+}  // namespace detail
+
+/// Interface of SE3 over owned or viewed memory.
+template <class Derived>
+class SE3Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
+  using Base = detail::GroupBase<Derived>;
+
+ public:
+  using typename Base::Scalar;
+  using Base::operator*;
+
+  /// The first three rows of matrix().
+  Eigen::Matrix<Scalar, 3, 4> matrix3x4() const { return this->matrix().template topRows<3>(); }
+};
+
+using SE3d = SE3<double>;
+using SE3f = SE3<float>;
+
+}  // namespace liestat
+
+LIESTAT_TRAITS(SE3, liestat::detail::Se3Math)
+
+namespace liestat {
+
+/// A rigid motion of R^3; see the header comment.
+template <class Scalar_, int Options_>
+class SE3 : public SE3Base<SE3<Scalar_, Options_>> {
+  LIESTAT_OWNER(SE3, SE3Base);
+
+ public:
+  using Vector3 = Eigen::Matrix<Scalar_, 3, 1>;
+  using Matrix3 = Eigen::Matrix<Scalar_, 3, 3>;
+  using Matrix4 = Eigen::Matrix<Scalar_, 4, 4>;
+
+  template <class D>
+  SE3(const SO3Base<D>& rotation, const Vector3& translation)
+      : storage_(Shell::Math::join(rotation.params(), translation)) {}
+  template <class D>
+  SE3(const Eigen::QuaternionBase<D>& q, const Vector3& translation) : SE3(SO3<Scalar_>(q), translation) {}
+  SE3(const Matrix3& R, const Vector3& translation) : SE3(SO3<Scalar_>(R), translation) {}
+  /// From a homogeneous matrix, rotation part orthogonal up to rounding.
+  explicit SE3(const Matrix4& T)
+      : SE3(SO3<Scalar_>(Matrix3(T.template topLeftCorner<3, 3>())), Vector3(T.template topRightCorner<3, 1>())) {}
+  /// Translations along the axes, m.
+  static SE3 trans(const Vector3& t) { return SE3(SO3<Scalar_>(), t); }
+  static SE3 trans(const Scalar_& x, const Scalar_& y, const Scalar_& z) { return trans(Vector3(x, y, z)); }
+  static SE3 transX(const Scalar_& x) { return trans(x, Scalar_(0), Scalar_(0)); }
+  static SE3 transY(const Scalar_& y) { return trans(Scalar_(0), y, Scalar_(0)); }
+  static SE3 transZ(const Scalar_& z) { return trans(Scalar_(0), Scalar_(0), z); }
+  /// Rotations about the axes, rad.
+  static SE3 rotX(const Scalar_& a) { return SE3(SO3<Scalar_>::rotX(a), Vector3::Zero()); }
+  static SE3 rotY(const Scalar_& a) { return SE3(SO3<Scalar_>::rotY(a), Vector3::Zero()); }
+  static SE3 rotZ(const Scalar_& a) { return SE3(SO3<Scalar_>::rotZ(a), Vector3::Zero()); }
+};
+
+/// SE(3) is homogeneous under itself; it is not Metric (no invariant Riemannian metric has exp as its geodesics).
+template <class S, int O>
+struct ManifoldTraits<SE3<S, O>> : GroupManifold<SE3<S, O>> {
+  /// log det of the left Jacobian: twice the rotation's.
+  static detail::VolumeElement<S, 6> logVolume(const Eigen::Matrix<S, 6, 1>& z) {
+    const detail::VolumeElement<S, 3> rotation = detail::So3Math<S>::logVolume(z.template tail<3>());
+    detail::VolumeElement<S, 6> v;
+    v.value = S(2) * rotation.value;
+    v.gradient.template tail<3>() = S(2) * rotation.gradient;
+    v.hessian.template bottomRightCorner<3, 3>() = S(2) * rotation.hessian;
+    return v;
+  }
+};
+
+}  // namespace liestat
+
+LIESTAT_MAPS(SE3, liestat::SE3Base)

@@ -1,0 +1,235 @@
+// SO3: rotations of R^3, as unit quaternions.
+//
+// Storage        x y z w (Eigen's and Sophus' layout); q and -q are the same rotation
+// Tangent        rotation vector, rad, body frame: x·Exp(v)
+// Matrix form    3×3 rotation matrix; hat(v) is the cross-product matrix [v]
+// Action         on points of R^3
+// Identity       (0, 0, 0, 1)
+// Metric         distance = rotation angle, bi-invariant, sectional curvature 1/4, injectivity radius pi
+// Bad input      NaN in, NaN out; constructors from quaternions normalise; fitToSO3 and checkedFrom… are for data
+#pragma once
+
+#include <lie/detail/group_base.hpp>
+#include <lie/manifold.hpp>
+
+#include <optional>
+
+namespace liestat {
+namespace detail {
+
+/// Mathematics of SO(3) on quaternions (x, y, z, w).
+template <class S>
+struct So3Math {
+  using Scalar = S;
+  static constexpr int DoF = 3, num_parameters = 4, N = 3, Dim = 3;
+  using Params = Eigen::Matrix<S, 4, 1>;
+  using Tangent = Eigen::Matrix<S, 3, 1>;
+  using Point = Eigen::Matrix<S, 3, 1>;
+  using MatrixType = Eigen::Matrix<S, 3, 3>;
+
+  static Params identity() { return Params(S(0), S(0), S(0), S(1)); }
+
+  static Params product(const Params& a, const Params& b) {
+    const Eigen::Quaternion<S> q = Eigen::Map<const Eigen::Quaternion<S>>(a.data()) *  //
+                                   Eigen::Map<const Eigen::Quaternion<S>>(b.data());
+    if constexpr (is_single_precision<S>) {
+      // One Newton step of 1/|q|: keeps long chains on the sphere without a square root.
+      return q.coeffs() * (S(0.5) * (S(3) - q.coeffs().dot(q.coeffs())));
+    } else {
+      return q.coeffs();
+    }
+  }
+  static Params inverse(const Params& q) { return Params(-q[0], -q[1], -q[2], q[3]); }
+  static Params normalized(const Params& q) {
+    using std::sqrt;
+    return q / sqrt(q.dot(q));
+  }
+
+  static Point act(const Params& q, const Point& p) {
+    const Eigen::Matrix<S, 3, 1> u = q.template head<3>();
+    const Eigen::Matrix<S, 3, 1> t = S(2) * u.cross(p);
+    return p + q[3] * t + u.cross(t);
+  }
+  static MatrixType matrix(const Params& q) {
+    return Eigen::Map<const Eigen::Quaternion<S>>(q.data()).toRotationMatrix();
+  }
+
+  static Params exp(const Tangent& v) {
+    const HalfAngle<S> h = halfAngle(S(v.dot(v)));
+    const S s = S(0.5) * h.sinc;
+    return Params(s * v[0], s * v[1], s * v[2], h.cos);
+  }
+  static Tangent log(const Params& q) {
+    const Eigen::Matrix<S, 3, 1> u = q.template head<3>();
+    const S n2 = u.dot(u);
+    const S sign = select(q[3] < S(0), S(-1), S(1));
+    return (S(2) * sign * arctangentOverSine(n2, S(sign * q[3]))) * u;
+  }
+
+  static MatrixType hat(const Tangent& v) { return skew(v); }
+  static Tangent vee(const MatrixType& m) { return Tangent(m(2, 1), m(0, 2), m(1, 0)); }
+  static MatrixType Adj(const Params& q) { return matrix(q); }
+  static MatrixType ad(const Tangent& v) { return skew(v); }
+
+  static MatrixType leftJacobian(const Tangent& v) {
+    const S t = v.dot(v);
+    const S s = halfAngle(t).sinc;
+    return rotationPolynomial(v, S(1), S(S(0.5) * s * s), beta3(t));
+  }
+  static MatrixType leftJacobianInverse(const Tangent& v) {
+    return rotationPolynomial(v, S(1), S(-0.5), cotangentExcess(S(v.dot(v))));
+  }
+  /// log det of the exponential's Jacobian, 2 log(sin(θ/2)/(θ/2)), with its gradient and Hessian (means.md,
+  /// section 4.3).
+  static VolumeElement<S, 3> logVolume(const Tangent& v) {
+    using std::log;
+    const S t = v.dot(v), c = S(-2) * cotangentExcess(t);
+    return {S(2) * log(halfAngle(t).sinc), c * v,
+            c * MatrixType::Identity() - S(2) * cotangentExcessSlope(t) * v * v.transpose()};
+  }
+  /// Derivative of rightJacobianInverse(v)·a with respect to v, a constant (means.md 4.2, M(z, v)); a row of
+  /// leftJacobianInverse follows with the sign of the first-order term changed.
+  static MatrixType inverseJacobianSlope(const Tangent& v, const Tangent& a, const S& sign) {
+    const S t = v.dot(v);
+    const S c = cotangentExcess(t);
+    const Tangent va = v.cross(a);
+    return S(-0.5) * sign * skew(a) - c * (skew(va) + rotationProduct(v, a)) +
+           cotangentExcessSlope(t) * v.cross(va) * v.transpose();
+  }
+
+ private:
+  /// [v][a] = a vᵀ - (v·a) I
+  static MatrixType rotationProduct(const Tangent& v, const Tangent& a) {
+    MatrixType m = a * v.transpose();
+    m.diagonal().array() -= S(v.dot(a));
+    return m;
+  }
+};
+
+}  // namespace detail
+
+/// Interface of SO3 over owned or viewed memory.
+template <class Derived>
+class SO3Base : public detail::GroupBase<Derived> {
+  using Base = detail::GroupBase<Derived>;
+
+ public:
+  using typename Base::Scalar, typename Base::Plain, typename Base::Math;
+  using Quaternion = Eigen::Quaternion<Scalar>;
+  using Base::operator*;
+
+  /// The quaternion, viewed in place.
+  Eigen::Map<const Quaternion> unit_quaternion() const { return Eigen::Map<const Quaternion>(this->data()); }
+  /// Replaces the rotation by that of a quaternion of any positive norm.
+  void setQuaternion(const Quaternion& q) { this->derived().mutableStorage() = Math::normalized(q.coeffs()); }
+  /// Same as matrix().
+  Eigen::Matrix<Scalar, 3, 3> rotationMatrix() const { return this->matrix(); }
+  /// Angle of the rotation about the x axis that is closest to this one, rad in (-pi, pi].
+  Scalar angleX() const { return closestAngle(0); }
+  Scalar angleY() const { return closestAngle(1); }
+  Scalar angleZ() const { return closestAngle(2); }
+
+ private:
+  Scalar closestAngle(int axis) const {
+    const Eigen::Matrix<Scalar, 3, 3> R = this->matrix();
+    const int j = (axis + 1) % 3, k = (axis + 2) % 3;
+    using std::atan2;
+    return atan2(Scalar(R(k, j) - R(j, k)), Scalar(R(j, j) + R(k, k)));
+  }
+};
+
+/// A rotation of R^3; see the header comment.
+template <class Scalar_, int Options_ = 0>
+class SO3;
+
+using SO3d = SO3<double>;
+using SO3f = SO3<float>;
+
+}  // namespace liestat
+
+LIESTAT_TRAITS(SO3, liestat::detail::So3Math)
+
+namespace liestat {
+
+template <class Scalar_, int Options_>
+class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
+  LIESTAT_OWNER(SO3, SO3Base);
+
+ public:
+  using Quaternion = Eigen::Quaternion<Scalar_>;
+  using Matrix3 = Eigen::Matrix<Scalar_, 3, 3>;
+  using Tangent = Eigen::Matrix<Scalar_, 3, 1>;
+
+  /// From a quaternion of any positive norm, which is normalised; a zero quaternion gives NaN.
+  template <class D>
+  explicit SO3(const Eigen::QuaternionBase<D>& q) : storage_(Shell::Math::normalized(q.coeffs())) {}
+  /// From a rotation matrix, orthogonal up to rounding; largest of the four pivots, so exact near half-turns.
+  explicit SO3(const Matrix3& R) : storage_(fromMatrix(R)) {}
+  /// From a rotation matrix read from data: nothing if |RᵀR - I| exceeds the tolerance or det R < 0 or NaN.
+  static std::optional<SO3> checkedFromMatrix(const Matrix3& R, Scalar_ tolerance = Scalar_(1e-6)) {
+    const Scalar_ defect = (R.transpose() * R - Matrix3::Identity()).norm();
+    if (!(defect <= tolerance) || !(R.determinant() > Scalar_(0))) return std::nullopt;
+    return SO3(R);
+  }
+  /// From a quaternion read from data: nothing if its norm differs from one by more than the tolerance, or NaN.
+  static std::optional<SO3> checkedFromQuaternion(const Quaternion& q, Scalar_ tolerance = Scalar_(1e-3)) {
+    using std::abs;
+    if (!(abs(q.norm() - Scalar_(1)) <= tolerance)) return std::nullopt;
+    return SO3(q);
+  }
+  /// Rotations about the axes, angle in rad; rotX(a) equals exp((a, 0, 0)) to the bit.
+  static SO3 rotX(const Scalar_& a) { return Shell::exp(Tangent(a, Scalar_(0), Scalar_(0))); }
+  static SO3 rotY(const Scalar_& a) { return Shell::exp(Tangent(Scalar_(0), a, Scalar_(0))); }
+  static SO3 rotZ(const Scalar_& a) { return Shell::exp(Tangent(Scalar_(0), Scalar_(0), a)); }
+
+ private:
+  /// Quaternion from the row of 4 q qᵀ with the largest diagonal entry.
+  static typename Shell::Params fromMatrix(const Matrix3& R) {
+    using detail::select;
+    using P = typename Shell::Params;
+    const Scalar_ one(1);
+    const Scalar_ xx = R(0, 0), yy = R(1, 1), zz = R(2, 2);
+    const P x(one + xx - yy - zz, R(1, 0) + R(0, 1), R(0, 2) + R(2, 0), R(2, 1) - R(1, 2));
+    const P y(R(1, 0) + R(0, 1), one + yy - xx - zz, R(2, 1) + R(1, 2), R(0, 2) - R(2, 0));
+    const P z(R(0, 2) + R(2, 0), R(2, 1) + R(1, 2), one + zz - xx - yy, R(1, 0) - R(0, 1));
+    const P w(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1), one + xx + yy + zz);
+    P best;
+    for (int i = 0; i < 4; ++i) {
+      Scalar_ v = x[i], pivot = x[0];
+      v = select(y[1] > pivot, y[i], v), pivot = select(y[1] > pivot, y[1], pivot);
+      v = select(z[2] > pivot, z[i], v), pivot = select(z[2] > pivot, z[2], pivot);
+      v = select(w[3] > pivot, w[i], v);
+      best[i] = v;
+    }
+    return Shell::Math::normalized(best);
+  }
+};
+
+/// SO(3) is a Riemannian manifold under its own bi-invariant metric.
+template <class S, int O>
+struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
+  using Math = detail::So3Math<S>;
+  using Tangent = Eigen::Matrix<S, 3, 1>;
+  using Square = Eigen::Matrix<S, 3, 3>;
+
+  static Tangent metricWeights() { return Tangent::Ones(); }
+  static S injectivityRadius() { return S(EIGEN_PI); }
+  static S maxSectionalCurvature() { return S(0.25); }
+  /// n nᵀ + (θ/2)cot(θ/2)(I - n nᵀ), exact (means.md, section 3).
+  static Square hessianHalfSquaredDistance(const Tangent& z) {
+    return detail::rotationPolynomial(z, S(1), S(0), detail::cotangentExcess(S(z.dot(z))));
+  }
+  /// ∂(J_r⁻ᵀ(z) a)/∂z
+  static Square dlogFeatureTransposed(const Tangent& z, const Tangent& a) {
+    return Math::inverseJacobianSlope(z, a, S(-1));
+  }
+  /// ∂(-J_l⁻ᵀ(z) a)/∂z
+  static Square dlogBaseTransposed(const Tangent& z, const Tangent& a) {
+    return -Math::inverseJacobianSlope(z, a, S(1));
+  }
+  static detail::VolumeElement<S, 3> logVolume(const Tangent& z) { return Math::logVolume(z); }
+};
+
+}  // namespace liestat
+
+LIESTAT_MAPS(SO3, liestat::SO3Base)

@@ -1,0 +1,87 @@
+// Covariances of a mean (LSQ, WLSQ), from known noise or from residuals, and of data about a feature.
+//
+// All of them are H⁻¹ (…) H⁻¹ with the exact Hessian: the central limit theorem for Fréchet means (means.md, section
+// 3). The report's printed formulas, for comparison, are in stats/printed.hpp. Matrices are in the local frame at the
+// mean.
+#pragma once
+
+#include <stats/mean.hpp>
+
+namespace liestat {
+
+/// What a covariance from residuals assumes of the weights.
+enum class ResidualNoise {
+  scaled,  ///< Cov(z_i) = Σ/p_i with one unknown Σ: exact small-sample law (Hotelling)
+  any      ///< any independent noise: consistent for many data only
+};
+
+namespace detail {
+
+/// H⁻¹ W S W H⁻¹; NaN where H is not positive definite.
+template <Metric M>
+SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
+  const Eigen::LLT<SquareOf<M>> factor(result.hessian);
+  if (factor.info() != Eigen::Success) {
+    return SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  }
+  const SquareOf<M> G = factor.solve(SquareOf<M>(ManifoldTraits<M>::metricWeights().asDiagonal()));
+  return G * S * G.transpose();
+}
+
+}  // namespace detail
+
+/// Covariance of the mean when the noise is known: V_i is the covariance of z_i = log(mean, x_i), that is of the noise
+/// in the frame of the estimate (for x_i = exp(x, e_i), Cov(e_i)). H⁻¹ (Σ p_i² V_i) H⁻¹. Squared distances follow χ²_k.
+template <Metric M, std::ranges::random_access_range V>
+SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, const V& noise) {
+  eigen_assert(std::ranges::size(noise) == result.n);
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (const SquareOf<M>& v : noise) sum += v;
+  return detail::sandwich(result, sum);
+}
+template <Metric M, std::ranges::random_access_range W, std::ranges::random_access_range V>
+SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, const W& weights, const V& noise) {
+  eigen_assert(std::ranges::size(noise) == result.n && std::ranges::size(weights) == result.n);
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (std::size_t i = 0; i < result.n; ++i) {
+    const auto k = static_cast<std::ptrdiff_t>(i);
+    const ScalarOf<M> p = ScalarOf<M>(weights[k]);
+    sum += p * p * noise[k];
+  }
+  return detail::sandwich(result, sum);
+}
+/// The same when every measure has the covariance V.
+template <Metric M>
+SquareOf<M> covarianceFromCommonNoise(const MeanResult<M>& result, const SquareOf<M>& V) {
+  return detail::sandwich(result, SquareOf<M>(ScalarOf<M>(result.n) * V));
+}
+
+/// Covariance of the mean when the noise is unknown, from the residuals. Squared distances follow Hotelling's law
+/// (stats/inference.hpp), not χ². Rank min(n - 1, k): with fewer than k + 1 measures it is singular. NaN for one
+/// measure.
+template <Metric M>
+SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result, ResidualNoise noise = ResidualNoise::scaled) {
+  using S = ScalarOf<M>;
+  const S n = S(result.n);
+  if (result.n < 2) return SquareOf<M>::Constant(std::numeric_limits<S>::quiet_NaN());
+  if (noise == ResidualNoise::any) {
+    return detail::sandwich(result, SquareOf<M>(result.squared_weight_scatter * (n / (n - S(1)))));
+  }
+  return detail::sandwich(result, SquareOf<M>(result.scatter * (S(result.sum_of_weights) / (n - S(1)))));
+}
+
+/// Empirical covariance of the data about a given feature y, (1/n) Σ log(y, x_i) log(y, x_i)ᵀ: eq. (1) of the report in
+/// the local frame at y. principalChartCovariance converts it to the report's chart.
+template <std::ranges::random_access_range R, Homogeneous M = std::ranges::range_value_t<R>>
+SquareOf<M> empiricalCovariance(const R& samples, const M& y) {
+  using T = ManifoldTraits<M>;
+  const typename T::Group to_y = T::placement(y).inverse();
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (const M& x : samples) {
+    const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
+    sum += z * z.transpose();
+  }
+  return sum / ScalarOf<M>(std::ranges::size(samples));
+}
+
+}  // namespace liestat

@@ -1,0 +1,101 @@
+// groupMean: the exponential barycentre of a Lie group, Σ p_i Log(ȳ⁻¹ x_i) = 0. Equivariant under translations from
+// both sides and under inversion, which no Riemannian mean of poses is (means.md, section 5.5). It is not a Fréchet
+// mean.
+#pragma once
+
+#include <stats/mean.hpp>
+
+#include <Eigen/LU>
+
+namespace liestat {
+
+/// What groupMean() returns. Matrices are in the body frame at the mean.
+template <LieGroup G>
+struct GroupMeanResult {
+  G mean;
+  Status status = Status::too_few;
+  bool converged = false;
+  int iterations = 0;
+  double residual = 0, tolerance = 0;
+  std::size_t n = 0;
+  double sum_of_weights = 0;
+  SquareOf<G> scatter = SquareOf<G>::Zero();   ///< Σ p_i z_i z_iᵀ
+  SquareOf<G> jacobian = SquareOf<G>::Zero();  ///< Σ p_i J_l⁻¹(z_i): minus the derivative of Σ p_i z_i
+
+  /// Σ p_i z_i z_iᵀ / Σ p_i
+  SquareOf<G> dispersion() const { return scatter / ScalarOf<G>(sum_of_weights); }
+  /// Covariance of the barycentre from the residuals, A⁻¹ (Σ p_i z_i z_iᵀ) A⁻ᵀ Σp_i/(n-1), A the jacobian; NaN for one
+  /// measure.
+  SquareOf<G> covarianceFromResiduals() const {
+    using S = ScalarOf<G>;
+    if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
+    const SquareOf<G> inverse = jacobian.inverse();
+    return inverse * scatter * inverse.transpose() * (S(sum_of_weights) / (S(n) - S(1)));
+  }
+};
+
+namespace detail {
+
+template <LieGroup G>
+struct GroupMeanSums {
+  TangentOf<G> sum = TangentOf<G>::Zero();
+  SquareOf<G> jacobian = SquareOf<G>::Zero(), scatter = SquareOf<G>::Zero();
+  double weight = 0;
+
+  void operator+=(const GroupMeanSums& other) {
+    sum += other.sum;
+    jacobian += other.jacobian;
+    scatter += other.scatter;
+    weight += other.weight;
+  }
+};
+
+template <LieGroup G, Executor E, class R, class W>
+GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W& weights,
+                                   const std::optional<G>& start) {
+  using S = ScalarOf<G>;
+  GroupMeanResult<G> result;
+  result.n = std::ranges::size(samples);
+  if (result.n == 0) return result;
+  result.status = Status::not_converged;
+  G y = start ? *start : startOfMean<G>(samples, weights);
+  result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
+  for (int i = 0; i < 100 && !result.converged; ++i) {
+    const G to_mean = y.inverse();
+    const auto sums = sumOverData<GroupMeanSums<G>>(executor, result.n, [&](std::size_t k, GroupMeanSums<G>& s) {
+      const S p = S(weights[k]);
+      const TangentOf<G> z = (to_mean * samples[static_cast<std::ptrdiff_t>(k)]).log();
+      s.sum += p * z;
+      s.jacobian += p * G::leftJacobianInverse(z);
+      s.scatter += p * z * z.transpose();
+      s.weight += weights[k];
+    });
+    result.scatter = sums.scatter;
+    result.jacobian = sums.jacobian;
+    result.sum_of_weights = sums.weight;
+    const TangentOf<G> step = sums.jacobian.partialPivLu().solve(sums.sum);
+    result.residual = static_cast<double>(step.norm());
+    if (!std::isfinite(result.residual)) break;
+    ++result.iterations;
+    y = y * G::exp(step);
+    result.converged = result.residual <= result.tolerance;
+  }
+  result.mean = y;
+  if (result.converged) result.status = Status::ok;
+  return result;
+}
+
+}  // namespace detail
+
+/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few.
+template <std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
+GroupMeanResult<G> groupMean(const R& samples, const std::optional<G>& start = {}) {
+  return detail::groupBarycentre<G>(SerialExecutor{}, samples, detail::UnitWeights{}, start);
+}
+template <std::ranges::random_access_range R, std::ranges::random_access_range W,
+          LieGroup G = std::ranges::range_value_t<R>>
+GroupMeanResult<G> groupMean(const R& samples, const W& weights, const std::optional<G>& start = {}) {
+  return detail::groupBarycentre<G>(SerialExecutor{}, samples, weights, start);
+}
+
+}  // namespace liestat

@@ -1,0 +1,35 @@
+// How an estimate ended. Estimators never throw on data: they return a result that says what happened.
+#pragma once
+
+namespace liestat {
+
+/// The state of an estimate. Only `ok` may be used without a further look.
+enum class Status {
+  ok,             ///< converged
+  not_converged,  ///< the iteration ended elsewhere: the budget ran out, or the data are not finite
+  ambiguous,      ///< another feature explains the data as well
+  ill_defined,    ///< the criterion has no smooth minimum; a covariance would be wrong and is withheld
+  too_few,        ///< fewer measures than the estimate needs
+  not_applicable  ///< the question has no answer for these data
+};
+
+/// The name used in files and messages.
+constexpr const char* name(Status status) {
+  switch (status) {
+    case Status::ok:
+      return "ok";
+    case Status::not_converged:
+      return "not_converged";
+    case Status::ambiguous:
+      return "ambiguous";
+    case Status::ill_defined:
+      return "ill_defined";
+    case Status::too_few:
+      return "too_few";
+    case Status::not_applicable:
+      return "not_applicable";
+  }
+  return "unknown";
+}
+
+}  // namespace liestat

@@ -1,0 +1,215 @@
+#include "cli/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cli/gnuplot.hpp"
+#include "cli/temporary_directory.hpp"
+
+namespace liestat::cli {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+bool hasGnuplot() { return runProgram({"gnuplot", "--version"}, ".").found; }
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+/// A figure with every style, as the program's own reports use them.
+Plot everyStyle() {
+  Series band{.name = "99 % band", .style = Style::filled_curve, .colour = 6};
+  Series index{.name = "LSQ", .style = Style::errorbars};
+  Series curve{.name = "WLSQ", .style = Style::linespoints, .dashed = true};
+  for (const double n : {5.0, 10.0, 20.0, 50.0, 100.0}) {
+    for (Series* series : {&band, &index, &curve}) series->x.push_back(n);
+    band.low.push_back(2.85);
+    band.high.push_back(3.15);
+    index.y.push_back(3 + 1 / n);
+    index.low.push_back(2.9 + 1 / n);
+    index.high.push_back(3.1 + 1 / n);
+    curve.y.push_back(3 - 1 / n);
+  }
+  std::vector<double> values;
+  for (int i = 0; i < 1000; ++i) values.push_back(-std::log((i + 0.5) / 1000));
+  Series density{.name = "density", .style = Style::lines};
+  for (int i = 0; i <= 50; ++i) {
+    density.x.push_back(0.1 * i);
+    density.y.push_back(std::exp(-0.1 * i));
+  }
+  const Eigen::Matrix2d covariance{{1, 0.5}, {0.5, 0.41}};
+  Series points{.name = "measures", .style = Style::points, .x = {0, 1, nan, 2}, .y = {1, 0, 1, 0.5}};
+  const Panel left{.title = "Index",
+                   .x = {.label = "n", .logarithmic = true},
+                   .y = {.label = "index"},
+                   .series = {band, index, curve},
+                   .references = {{ReferenceLine::Direction::horizontal, 3}}};
+  const Panel middle{.title = "Histogram",
+                     .x = {.label = "µ²", .low = 0.0},
+                     .y = {.label = "density"},
+                     .series = {histogram("trials", values, 0, 5, 20, true), density},
+                     .references = {{ReferenceLine::Direction::vertical, 3}}};
+  const Panel right{.title = "Chart",
+                    .x = {.label = "r_x"},
+                    .y = {.label = "r_y"},
+                    .series = {points, ellipse("χ² = 6", {0.5, 0}, covariance, 6)},
+                    .equal_aspect = true};
+  const Panel empty{.title = "Empty",
+                    .series = {Series{.name = "nothing", .x = {nan}, .y = {1}}, Series{.name = "none"}}};
+  return {.name = "every style", .caption = "One of each.", .panels = {left, middle, right, empty}};
+}
+
+TEST(Report, PageHoldsTextTablesAndPlots) {
+  const TemporaryDirectory directory;
+  const std::string path = directory / "deep/report";
+  Report report(path, "Means <of> rotations & more");
+  report.section("Result");
+  report.paragraph("1 < 2 & \"quoted\"");
+  report.code("liestat mean 'f.csv'");
+  report.table({"criterion", "index"}, {{"lsq", "3.01"}, {"<b>", "n/a"}}, "A caption.");
+  report.plot(everyStyle());
+  report.plot(everyStyle());
+  EXPECT_EQ(report.write(), path + "/index.html");
+
+  const std::string page = contentOf(path + "/index.html");
+  EXPECT_TRUE(contains(page, "<title>Means &lt;of&gt; rotations &amp; more</title>"));
+  EXPECT_TRUE(contains(page, "<p>1 &lt; 2 &amp; &quot;quoted&quot;</p>"));
+  EXPECT_TRUE(contains(page, "<td class=\"number\">3.01</td>"));
+  EXPECT_TRUE(contains(page, "<td>&lt;b&gt;</td>"));
+  EXPECT_TRUE(contains(page, "<a href=\"every_style.csv\">"));
+  EXPECT_TRUE(contains(page, "<a href=\"every_style_2.csv\">")) << "no plot overwrites another";
+  EXPECT_FALSE(contains(page, "src=")) << "the page needs nothing else";
+  const std::string csv = contentOf(path + "/every_style.csv");
+  EXPECT_EQ(csv.substr(0, 80), "panel,series,x,y,low,high,width\nIndex,99 % band,5,,2.85,3.15,\nIndex,99 % band,10");
+  if (!hasGnuplot()) GTEST_SKIP() << "skipped what follows: gnuplot is not installed";
+  EXPECT_TRUE(report.has_gnuplot());
+  EXPECT_EQ(count(page, "<svg"), 2U);
+  EXPECT_EQ(count(page, "class=\"notice\""), 0U);
+  EXPECT_TRUE(contains(page, "no finite data"));
+  EXPECT_EQ(count(page, "id='every_style_gpPt6'"), 1U) << "identifiers differ between the drawings";
+  EXPECT_EQ(count(page, "id='gpPt6'"), 0U);
+}
+
+TEST(Report, TextsAreNeverCommands) {
+  const TemporaryDirectory directory;
+  const std::string path = directory / "report";
+  const std::vector<std::string> texts = {"'; system('touch pwned') # \" `touch pwned` @x \\\n!touch pwned",
+                                          "'';system(\"touch pwned\")#'",
+                                          "\";system(\"touch pwned\")#",
+                                          "\nsystem(\"touch pwned\")",
+                                          "`touch pwned`",
+                                          "'"};
+  Report report(path, texts[0]);
+  for (const std::string& text : texts) {
+    Panel panel{.title = text, .x = {.label = text}, .y = {.label = text}};
+    panel.series = {Series{.name = text, .x = {1, 2}, .y = {1, 2}},
+                    Series{.name = "|touch pwned", .x = {1, 2}, .y = {2, 1}}};
+    report.plot({.name = "-e ../" + text, .panels = {panel}});
+  }
+  report.write();
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path())) {
+    EXPECT_NE(entry.path().filename(), "pwned");
+    EXPECT_NE(entry.path().filename().string().front(), '-');
+  }
+  const std::string page = contentOf(path + "/index.html");
+  if (!hasGnuplot()) GTEST_SKIP() << "skipped what follows: gnuplot is not installed";
+  EXPECT_EQ(count(page, "<svg"), texts.size()) << page.substr(page.find("class=\"notice\""), 400);
+}
+
+TEST(Report, WithoutGnuplotItSaysSoAndKeepsTheData) {
+  const TemporaryDirectory directory;
+  const char* old = std::getenv("PATH");
+  const std::string saved = old == nullptr ? "" : old;
+  ::setenv("PATH", directory.path().c_str(), 1);
+  Report report(directory / "report", "No gnuplot");
+  report.plot(everyStyle());
+  ::setenv("PATH", saved.c_str(), 1);
+  EXPECT_FALSE(report.has_gnuplot());
+  const std::string page = contentOf(report.write());
+  EXPECT_TRUE(contains(page, "gnuplot is not installed, so this plot was not drawn"));
+  EXPECT_FALSE(contains(page, "<svg"));
+  EXPECT_TRUE(std::filesystem::exists(directory / "report/every_style.csv"));
+}
+
+TEST(Report, NothingFinite) {
+  const TemporaryDirectory directory;
+  Report report(directory / "report", "Nothing");
+  report.plot({.name = "a", .panels = {Panel{.series = {Series{.x = {nan}, .y = {1}}}}}});
+  report.plot({.name = "b", .panels = {Panel{.y = {.logarithmic = true}, .series = {Series{.x = {1}, .y = {-1}}}}}});
+  report.plot({.name = "c"});
+  EXPECT_EQ(count(contentOf(report.write()), "There is nothing finite to draw."), 3U);
+}
+
+TEST(Report, OddButFiniteDataIsDrawn) {
+  if (!hasGnuplot()) GTEST_SKIP() << "skipped: gnuplot is not installed";
+  const TemporaryDirectory directory;
+  Report report(directory / "report", "Odd");
+  const Series point{.name = "one", .style = Style::points, .x = {2}, .y = {3}};
+  const Series constant{.name = "constant", .x = {1, 2, 3}, .y = {1e-300, 1e-300, 1e-300}};
+  const Series mixed{.name = "mixed", .x = {1, 2, 3, 4}, .y = {-1, nan, 10, 1e5}};
+  report.plot({.name = "a", .panels = {Panel{.series = {point}}}});
+  report.plot({.name = "b", .panels = {Panel{.series = {constant}}}});
+  report.plot({.name = "c",
+               .panels = {Panel{.x = {.logarithmic = true}, .y = {.logarithmic = true}, .series = {mixed, point}}}});
+  report.plot({.name = "d",
+               .panels = {Panel{.x = {.low = 10.0, .high = 20.0}, .y = {.low = 0.0, .high = 1.0}, .series = {point}}}});
+  const std::string page = contentOf(report.write());
+  EXPECT_EQ(count(page, "<svg"), 4U) << page.substr(page.find("class=\"notice\""), 300);
+}
+
+TEST(Report, OfAMillionPointsAPartIsDrawn) {
+  Series cloud{.style = Style::points, .x = std::vector<double>(1000000, 1.0), .y = std::vector<double>(1000000, 2.0)};
+  const Plot plot{.name = "cloud", .panels = {Panel{.series = {cloud}}}};
+  EXPECT_TRUE(contains(plotScript(plot, "cloud"), "every 200::1 "));
+}
+
+TEST(Report, DirectoriesThatCannotBeMade) {
+  const TemporaryDirectory directory;
+  const std::string file = directory.write("file", "");
+  EXPECT_EQ(errorOf([&] { Report report(file, "x"); }).substr(0, file.size()), file);
+  EXPECT_EQ(errorOf([&] { Report report(file + "/below", "x"); }).substr(0, file.size()), file);
+}
+
+TEST(Ellipse, LiesAtTheDistanceAskedFor) {
+  const Eigen::Matrix2d covariance{{2, 0.7}, {0.7, 0.5}};
+  const Eigen::Vector2d centre(1, -2);
+  const Series series = ellipse("e", centre, covariance, 6);
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    const Eigen::Vector2d d = Eigen::Vector2d(series.x[i], series.y[i]) - centre;
+    EXPECT_NEAR(d.dot(covariance.inverse() * d), 6, 1e-12);
+  }
+  EXPECT_TRUE(std::isnan(ellipse("none", centre, -covariance, 6).x[0]));
+}
+
+TEST(Histogram, CountsAndDensity) {
+  const std::vector<double> values = {0, 0.5, 1, 1.5, 2, 3, -1, nan};
+  const Series counts = histogram("h", values, 0, 2, 2, false);
+  EXPECT_EQ(counts.x, (std::vector<double>{0.5, 1.5}));
+  EXPECT_EQ(counts.y, (std::vector<double>{2, 3})) << "the upper end belongs to the last bin";
+  EXPECT_EQ(histogram("h", {0.5, 1.5, 1.6, 1.7}, 0, 2, 2, true).y, (std::vector<double>{0.25, 0.75}));
+}
+
+TEST(RunProgram, SaysWhatHappened) {
+  EXPECT_FALSE(runProgram({"no-such-program-here"}, ".").found);
+  const ProgramResult failed = runProgram({"ls", "/no such; directory"}, "/");
+  EXPECT_TRUE(failed.found);
+  EXPECT_NE(failed.status, 0);
+  EXPECT_TRUE(contains(failed.errors, "/no such; directory"));
+  EXPECT_EQ(runProgram({"true"}, "/").status, 0);
+}
+
+}  // namespace
+}  // namespace liestat::cli

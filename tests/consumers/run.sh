@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Builds and runs one tiny program in each way that a user can take liestat: in place, by add_subdirectory, by
+# find_package and by pkg-config from an installed tree. Usage: run.sh [WORK_DIRECTORY]; CXX and CMAKE are obeyed.
+# Without pkg-config its part is left out, and said to be: nothing else of liestat needs it.
+set -euo pipefail
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+root=$(cd "$here/../.." && pwd)
+CXX=${CXX:-c++}
+CMAKE=${CMAKE:-cmake}
+export CXX
+# CMake would ask for make, which a machine that builds with Ninja need not have.
+if [ -z "${CMAKE_GENERATOR:-}" ] && command -v ninja >/dev/null; then export CMAKE_GENERATOR=Ninja; fi
+if [ $# -gt 0 ]; then
+  mkdir -p "$1"
+  work=$(cd "$1" && pwd)
+else
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+fi
+rm -rf "$work/build" "$work/prefix" "$work/moved"
+mkdir -p "$work/build"
+
+# Output is of interest only when something fails.
+quietly() {
+  "$@" >"$work/log" 2>&1 || {
+    cat "$work/log"
+    echo "consumers: failed: $*" >&2
+    exit 1
+  }
+}
+
+built_and_ran() {
+  "$1" >"$work/log" || {
+    cat "$work/log"
+    echo "consumers: $2: the program failed" >&2
+    exit 1
+  }
+  echo "consumers: $2: built and ran"
+}
+
+cd "$work/build"
+eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/usr/include/eigen3}")
+
+# shellcheck disable=SC2086 # several flags in one variable
+quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
+built_and_ran ./in_place "in place"
+
+quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
+quietly "$CMAKE" --build add_subdirectory
+built_and_ran ./add_subdirectory/consumer "add_subdirectory"
+
+quietly "$CMAKE" -S "$root" -B liestat -DCMAKE_INSTALL_PREFIX="$work/prefix" -DLIESTAT_BUILD_CLI=OFF \
+  -DLIESTAT_BUILD_TESTS=OFF -DLIESTAT_BUILD_BENCHMARKS=OFF -DLIESTAT_BUILD_EXAMPLES=OFF
+quietly "$CMAKE" --install liestat
+# An installed tree that is moved must keep working: nothing in it may name the place it was installed to.
+mv "$work/prefix" "$work/moved"
+
+quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved"
+quietly "$CMAKE" --build find_package
+built_and_ran ./find_package/consumer "find_package"
+
+if ! command -v pkg-config >/dev/null; then
+  echo "consumers: pkg-config: SKIPPED, it is not installed"
+  exit 0
+fi
+export PKG_CONFIG_PATH="$work/moved/share/pkgconfig${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}"
+flags=$(pkg-config --cflags liestat)
+# shellcheck disable=SC2086
+quietly $CXX -std=c++20 $flags "$here/main.cpp" -o by_pkg_config
+built_and_ran ./by_pkg_config "pkg-config"

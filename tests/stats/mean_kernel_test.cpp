@@ -1,0 +1,205 @@
+// stats/detail/rotation_sums.hpp against the manifolds' own operations: the same sums, for every decade of the angle.
+#include <lie/lie.hpp>
+#include <stats/mean.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <type_traits>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+
+constexpr double eps = std::numeric_limits<double>::epsilon();
+
+template <class M>
+class MeanKernel : public testing::Test {
+ protected:
+  static constexpr int DoF = ManifoldTraits<M>::DoF;
+  using Tangent = TangentOf<M>;
+
+  Tangent normal(double sigma = 1) {
+    Tangent v;
+    for (int i = 0; i < DoF; ++i) v[i] = sigma * gauss_(engine_);
+    return v;
+  }
+  /// Features at the rotation angle from y, their translations as far.
+  std::vector<M> ring(const M& y, double angle, std::size_t n) {
+    std::vector<M> features;
+    for (std::size_t i = 0; i < n; ++i) {
+      Tangent v = normal();
+      v.template tail<3>() *= angle / v.template tail<3>().norm();
+      if constexpr (DoF == 6) v.template head<3>() *= angle;
+      features.push_back(exp(y, v));
+      // q and -q are the same rotation.
+      if (i % 2) flip(features.back());
+    }
+    return features;
+  }
+  static void flip(M& x) {
+    for (int i = 0; i < 4; ++i) x.data()[i] = -x.data()[i];
+  }
+  std::vector<double> weights(std::size_t n) {
+    std::vector<double> p;
+    for (std::size_t i = 0; i < n; ++i) p.push_back(0.1 + std::abs(gauss_(engine_)));
+    return p;
+  }
+
+  /// Both ways of the same range of features; the packs must have taken it if by_packs.
+  template <class W>
+  void compare(const std::vector<M>& features, const W& p, const M& y, double tolerance) {
+    const ChunkRange all{0, features.size()};
+    detail::MeanPass<M> general, packs, packs_alone;
+    detail::addTerms<true>(features, p, y, all, general);
+    ASSERT_TRUE(detail::addTermsByPacks<true>(features, p, y, all, packs));
+    ASSERT_TRUE(detail::addTermsByPacks<false>(features, p, y, all, packs_alone));
+    // Vectors of length one and shorter, n of them: rounding grows with the sum of the weights, and tiny residuals
+    // have the rounding of the quaternions that they come from. The scale of a square is the largest residual's.
+    const double weight = general.sums.weight, length = general.scatter.largest, near = tolerance * weight;
+    EXPECT_NEAR(packs.sums.weight, weight, 4 * eps * weight);
+    EXPECT_NEAR(packs.sums.cost, general.sums.cost, near * (length + eps) * (1 + length));
+    EXPECT_LE((packs.sums.gradient - general.sums.gradient).norm(), near * (1 + length));
+    EXPECT_LE((packs.sums.hessian - general.sums.hessian).norm(), near);
+    EXPECT_LE((packs.scatter.scatter - general.scatter.scatter).norm(), near * (length + eps) * (1 + length));
+    EXPECT_LE((packs.scatter.squared - general.scatter.squared).norm(), 3 * near * (length + eps) * (1 + length));
+    EXPECT_NEAR(packs.scatter.largest, length, tolerance * (1 + length));
+    if (std::isfinite(general.scatter.smallest_gap)) {
+      EXPECT_NEAR(packs.scatter.smallest_gap, general.scatter.smallest_gap, 2 * tolerance);
+    }
+    // Fused multiplications may differ, so not the same bits.
+    EXPECT_LE((packs_alone.sums.gradient - packs.sums.gradient).norm(), near * (1 + length));
+    EXPECT_LE((packs_alone.sums.hessian - packs.sums.hessian).norm(), 3e-7 * weight);
+    EXPECT_NEAR(packs_alone.sums.cost, packs.sums.cost, near * (length + eps) * (1 + length));
+  }
+
+  std::mt19937_64 engine_{7};
+  std::normal_distribution<double> gauss_;
+};
+
+using Manifolds = testing::Types<SO3d, Frame3d, SemiOrientedFrame3d, NonOrientedFrame3d>;
+TYPED_TEST_SUITE(MeanKernel, Manifolds);
+
+TYPED_TEST(MeanKernel, agrees_at_every_decade_of_the_angle) {
+  using T = ManifoldTraits<TypeParam>;
+  const TypeParam y = T::expOrigin(this->normal(0.7));
+  std::vector<double> angles;
+  for (double a = 1e-12; a < 2; a *= 10) angles.push_back(a), angles.push_back(3 * a);
+  for (const double a : {0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.1}) angles.push_back(a);
+  for (double d = 0.1; d > 1e-9; d /= 10) angles.push_back(std::numbers::pi - d);
+  for (const double angle : angles) {
+    SCOPED_TRACE(angle);
+    // Around the number that a register holds and the size of a block, so that each remainder is met.
+    for (const std::size_t n : {1, 2, 3, 7, 64, 65, 200}) {
+      const auto features = this->ring(y, angle, n);
+      this->compare(features, detail::UnitWeights{}, y, 20 * eps);
+      this->compare(features, this->weights(n), y, 20 * eps);
+    }
+  }
+}
+
+TYPED_TEST(MeanKernel, agrees_far_from_the_mean) {
+  using T = ManifoldTraits<TypeParam>;
+  std::vector<TypeParam> features;
+  for (int i = 0; i < 1000; ++i) features.push_back(T::expOrigin(this->normal(1.5)));
+  const TypeParam y = T::expOrigin(this->normal());
+  this->compare(features, detail::UnitWeights{}, y, 40 * eps);
+  this->compare(features, this->weights(features.size()), y, 40 * eps);
+}
+
+TYPED_TEST(MeanKernel, rescales_quaternions_that_are_unit_in_single_precision_only) {
+  using T = ManifoldTraits<TypeParam>;
+  const TypeParam y = T::expOrigin(this->normal(0.7));
+  auto features = this->ring(y, 0.7, 100);
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    for (int c = 0; c < 4; ++c) features[i].data()[c] *= 1 + (i % 2 ? 1e-7 : -2e-7);
+  }
+  // 5/16 of the third power of the excess of |q|² is left.
+  this->compare(features, detail::UnitWeights{}, y, 40 * eps);
+}
+
+TYPED_TEST(MeanKernel, leaves_quaternions_far_from_unit_to_the_general_formulas) {
+  using T = ManifoldTraits<TypeParam>;
+  const TypeParam y = T::expOrigin(this->normal(0.7));
+  auto features = this->ring(y, 0.7, 100);
+  for (int c = 0; c < 4; ++c) features[50].data()[c] *= 1.001;
+  detail::MeanPass<TypeParam> pass;
+  EXPECT_FALSE(detail::addTermsByPacks<true>(features, detail::UnitWeights{}, y, {0, features.size()}, pass));
+  EXPECT_TRUE(detail::addTermsByPacks<true>(features, detail::UnitWeights{}, y, {0, 50}, pass));
+}
+
+TYPED_TEST(MeanKernel, not_a_number_in_not_a_number_out) {
+  using T = ManifoldTraits<TypeParam>;
+  const TypeParam y = T::expOrigin(this->normal(0.7));
+  for (int parameter = 0; parameter < TypeParam::num_parameters; ++parameter) {
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      auto features = this->ring(y, 0.7, 100);
+      features[70].data()[parameter] = bad;
+      const auto result = mean(features, {.start = y});
+      EXPECT_FALSE(result.converged) << parameter << ' ' << bad;
+      EXPECT_EQ(result.status, Status::not_converged);
+      EXPECT_FALSE(std::isfinite(result.cost));
+    }
+  }
+  auto p = this->weights(100);
+  p[3] = std::numeric_limits<double>::quiet_NaN();
+  const auto features = this->ring(y, 0.7, 100);
+  EXPECT_FALSE(mean(features, p, {.start = y}).converged);
+}
+
+TYPED_TEST(MeanKernel, the_mean_is_a_zero_of_the_general_gradient) {
+  using T = ManifoldTraits<TypeParam>;
+  const TypeParam centre = T::expOrigin(this->normal(0.7));
+  for (const double sigma : {1e-9, 1e-4, 0.1, 0.3}) {
+    std::vector<TypeParam> features;
+    for (int i = 0; i < 3000; ++i) features.push_back(exp(centre, this->normal(sigma)));
+    for (const MeanMethod method : {MeanMethod::newton, MeanMethod::fixed_point}) {
+      const auto result = mean(features, {.method = method});
+      ASSERT_EQ(result.status, Status::ok) << sigma;
+      detail::MeanPass<TypeParam> pass;
+      detail::addTerms<true>(features, detail::UnitWeights{}, result.mean, {0, features.size()}, pass);
+      EXPECT_LE(pass.sums.gradient.norm() / 3000, method == MeanMethod::newton ? 20 * eps : 1e-12) << sigma;
+      // Sums of the last pass belong to a point within the last step of the mean.
+      // Residuals have the rounding of unit quaternions, however short they are.
+      EXPECT_LE((result.scatter - pass.scatter.scatter).norm(),
+                1e-12 * pass.scatter.scatter.norm() + 3000 * 20 * eps * sigma);
+      EXPECT_LE((result.hessian - pass.sums.hessian).norm(), 1e-12 * pass.sums.hessian.norm());
+    }
+  }
+}
+
+template <class Polynomials>
+void comparePolynomials(const Polynomials& polynomials, int steps) {
+  double lanes[detail::pack_size];
+  const auto at = [&](const auto& coefficients, double x) {
+    detail::storePack(lanes, detail::evaluate(coefficients, detail::Pack{} + x));
+    return lanes[0];
+  };
+  for (int i = 0; i <= steps; ++i) {
+    const long double phi = std::numbers::pi_v<long double> / 2 * i / 1000, s = std::sin(phi), w = std::cos(phi);
+    // By the half angle, 1 - cos φ keeps its digits.
+    const long double h = std::sin(phi / 2);
+    const double x = static_cast<double>(2 * h * h / polynomials.range - 1);
+    const long double f = i == 0 ? 2 : 2 * phi / s;
+    EXPECT_NEAR(at(polynomials.log, x), static_cast<double>(f), 6 * eps) << phi;
+    // The closed form of g loses digits with the square of the angle.
+    if (i < 20) continue;
+    const double g = static_cast<double>((1 - w * f / 2) / (s * s));
+    EXPECT_NEAR(at(polynomials.exact_hessian, x), g, 4 * eps) << phi;
+    EXPECT_NEAR(at(polynomials.newton_hessian, x), g, 1e-7) << phi;
+  }
+}
+TEST(RotationPolynomials, agree_with_long_double_closed_forms) {
+  comparePolynomials(detail::any_rotation, 1000);
+  comparePolynomials(detail::small_rotation, 500);
+}
+
+static_assert(detail::HasRotationSums<SO3d> && detail::HasRotationSums<NonOrientedFrame3d>);
+static_assert(!detail::HasRotationSums<SO3f> && !detail::HasRotationSums<S2d> && !detail::HasRotationSums<SE3d> &&
+              !detail::HasRotationSums<Eigen::Vector3d>);
+
+}  // namespace
