@@ -5,9 +5,13 @@
 #include <lie/frame3.hpp>
 #include <lie/non_oriented_frame3.hpp>
 #include <lie/rn.hpp>
+#include <lie/rxso2.hpp>
+#include <lie/rxso3.hpp>
 #include <lie/s2.hpp>
 #include <lie/se2.hpp>
 #include <lie/se3.hpp>
 #include <lie/semi_oriented_frame3.hpp>
+#include <lie/sim2.hpp>
+#include <lie/sim3.hpp>
 #include <lie/so2.hpp>
 #include <lie/so3.hpp>

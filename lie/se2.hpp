@@ -50,6 +50,9 @@ struct Se2Math {
   static Params normalized(const Params& p) { return join(Rotation::normalized(complex(p)), translation(p)); }
   static Point act(const Params& p, const Point& x) { return Rotation::act(complex(p), x) + translation(p); }
 
+  static Point linear(const Params& p, const Point& x) { return Rotation::act(complex(p), x); }
+  static Point rotate(const Params& p, const Point& x) { return Rotation::act(complex(p), x); }
+
   /// V(θ): translation of exp is V υ.
   static Matrix2 translationJacobian(const S& theta) {
     const HalfAngle<S> h = halfAngle(S(theta * theta));
@@ -97,33 +100,53 @@ struct Se2Math {
     const Matrix2 inverse = translationJacobianInverse(v[2]);
     return blocks(inverse, -inverse * coupling(v), S(1));
   }
+  static Eigen::Matrix<S, 4, 3> productJacobian(const Params& p) {
+    Eigen::Matrix<S, 4, 3> J;
+    J << Matrix2::Zero(), Rotation::productJacobian(complex(p)), Rotation::matrix(complex(p)), Vector2::Zero();
+    return J;
+  }
+  static Eigen::Matrix<S, 3, 4> quotientJacobian(const Params& p) { return productJacobian(p).transpose(); }
+  template <class Generator>
+  static Params sampleUniform(Generator& generator) {
+    const Vector2 z = Rotation::sampleUniform(generator);
+    return join(z, uniformInCube<S, 2>(generator));
+  }
 };
 
 /// Accessors shared by the group SE2 and by Frame2, which has the same storage.
 template <class Derived, class Base>
-class PlanarPoseAccess : public Base {
+class PlanarPoseAccess : public TranslationAccess<Derived, Base, 2, 2> {
  public:
   using Base::data;
   using typename Base::Scalar;
 
   /// The rotation, viewed in place.
   Eigen::Map<const SO2<Scalar>> so2() const { return Eigen::Map<const SO2<Scalar>>(data()); }
-  /// The translation (m), viewed in place.
-  Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> translation() const {
-    return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(data() + 2);
+  PartView<Derived, SO2<Scalar>> so2() { return PartView<Derived, SO2<Scalar>>(data()); }
+  /// The complex number (cos, sin), viewed in place.
+  Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> unit_complex() const {
+    return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(data());
   }
-  auto translation() {
-    using Vector = Eigen::Matrix<Scalar, 2, 1>;
-    constexpr bool read_only = std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>;
-    return Eigen::Map<std::conditional_t<read_only, const Vector, Vector>>(data() + 2);
-  }
+  Eigen::Matrix<Scalar, 2, 2> rotationMatrix() const { return so2().matrix(); }
 };
 
 }  // namespace detail
 
 /// Interface of SE2 over owned or viewed memory.
 template <class Derived>
-class SE2Base : public detail::PlanarPoseAccess<Derived, detail::GroupBase<Derived>> {};
+class SE2Base : public detail::PlanarPoseAccess<Derived, detail::GroupBase<Derived>> {
+  using Base = detail::GroupBase<Derived>;
+
+ public:
+  using typename Base::Scalar;
+  using Base::operator*;
+
+  /// The first two rows of matrix().
+  Eigen::Matrix<Scalar, 2, 3> matrix2x3() const { return this->matrix().template topRows<2>(); }
+  /// Replaces the rotation, from a complex number of any positive norm or a rotation matrix.
+  void setComplex(const Eigen::Matrix<Scalar, 2, 1>& z) { this->so2().setComplex(z); }
+  void setRotationMatrix(const Eigen::Matrix<Scalar, 2, 2>& R) { this->so2() = SO2<Scalar>(R); }
+};
 
 template <class Scalar_, int Options_ = 0>
 class SE2;
@@ -154,6 +177,16 @@ class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
   explicit SE2(const Eigen::Matrix<Scalar_, 3, 3>& T)
       : SE2(SO2<Scalar_>(Eigen::Matrix<Scalar_, 2, 2>(T.template topLeftCorner<2, 2>())),
             Vector2(T.template topRightCorner<2, 1>())) {}
+  SE2(const Eigen::Matrix<Scalar_, 2, 2>& R, const Vector2& translation) : SE2(SO2<Scalar_>(R), translation) {}
+  /// Translations along the axes, m.
+  static SE2 trans(const Vector2& t) { return SE2(SO2<Scalar_>(), t); }
+  static SE2 trans(const Scalar_& x, const Scalar_& y) { return trans(Vector2(x, y)); }
+  static SE2 transX(const Scalar_& x) { return trans(x, Scalar_(0)); }
+  static SE2 transY(const Scalar_& y) { return trans(Scalar_(0), y); }
+  /// Rotation about the origin, rad.
+  static SE2 rot(const Scalar_& angle) { return SE2(angle, Vector2::Zero()); }
+  /// From any matrix with a translation in its last column: its rotation is the nearest.
+  static SE2 fitToSE2(const Eigen::Matrix<Scalar_, 3, 3>& T) { return SE2(T); }
 };
 
 /// SE(2) is homogeneous under itself, not Metric.

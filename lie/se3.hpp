@@ -48,6 +48,8 @@ struct Se3Math {
   }
   static Params normalized(const Params& p) { return join(Rotation::normalized(quaternion(p)), translation(p)); }
   static Point act(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x) + translation(p); }
+  static Point linear(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x); }
+  static Point rotate(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x); }
 
   static Params exp(const Tangent& v) {
     const Vector3 omega = v.template tail<3>(), upsilon = v.template head<3>();
@@ -108,6 +110,23 @@ struct Se3Math {
     const Matrix3 inverse = Rotation::leftJacobianInverse(phi);
     return blocks(inverse, -inverse * coupling(rho, phi) * inverse);
   }
+  static Eigen::Matrix<S, 7, 6> productJacobian(const Params& p) {
+    Eigen::Matrix<S, 7, 6> J;
+    J << Eigen::Matrix<S, 4, 3>::Zero(), Rotation::productJacobian(quaternion(p)),  //
+        Rotation::matrix(quaternion(p)), Matrix3::Zero();
+    return J;
+  }
+  static Eigen::Matrix<S, 6, 7> quotientJacobian(const Params& p) {
+    Eigen::Matrix<S, 6, 7> J;
+    J << Eigen::Matrix<S, 3, 4>::Zero(), Rotation::matrix(quaternion(p)).transpose(),  //
+        Rotation::quotientJacobian(quaternion(p)), Matrix3::Zero();
+    return J;
+  }
+  template <class Generator>
+  static Params sampleUniform(Generator& generator) {
+    const Vector4 q = Rotation::sampleUniform(generator);
+    return join(q, uniformInCube<S, 3>(generator));
+  }
 };
 
 }  // namespace detail
@@ -119,27 +138,14 @@ namespace detail {
 
 /// Accessors shared by the group SE3 and by the frames, which have the same storage.
 template <class Derived, class Base>
-class PoseAccess : public Base {
+class PoseAccess : public TranslationAccess<Derived, Base, 3, 4> {
  public:
   using Base::data;
   using typename Base::Scalar;
 
   /// The rotation, viewed in place.
   Eigen::Map<const SO3<Scalar>> so3() const { return Eigen::Map<const SO3<Scalar>>(data()); }
-  Eigen::Map<std::conditional_t<std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>,
-                                const SO3<Scalar>, SO3<Scalar>>>
-  so3() {
-    return decltype(so3())(data());
-  }
-  /// The translation (m), viewed in place.
-  Eigen::Map<const Eigen::Matrix<Scalar, 3, 1>> translation() const {
-    return Eigen::Map<const Eigen::Matrix<Scalar, 3, 1>>(data() + 4);
-  }
-  auto translation() {
-    using Vector = Eigen::Matrix<Scalar, 3, 1>;
-    constexpr bool read_only = std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>;
-    return Eigen::Map<std::conditional_t<read_only, const Vector, Vector>>(data() + 4);
-  }
+  PartView<Derived, SO3<Scalar>> so3() { return PartView<Derived, SO3<Scalar>>(data()); }
   Eigen::Map<const Eigen::Quaternion<Scalar>> unit_quaternion() const {
     return Eigen::Map<const Eigen::Quaternion<Scalar>>(data());
   }
@@ -159,6 +165,12 @@ class SE3Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
 
   /// The first three rows of matrix().
   Eigen::Matrix<Scalar, 3, 4> matrix3x4() const { return this->matrix().template topRows<3>(); }
+  Scalar angleX() const { return this->so3().angleX(); }
+  Scalar angleY() const { return this->so3().angleY(); }
+  Scalar angleZ() const { return this->so3().angleZ(); }
+  /// Replaces the rotation, from a quaternion of any positive norm or a rotation matrix.
+  void setQuaternion(const Eigen::Quaternion<Scalar>& q) { this->so3().setQuaternion(q); }
+  void setRotationMatrix(const Eigen::Matrix<Scalar, 3, 3>& R) { this->so3() = SO3<Scalar>(R); }
 };
 
 using SE3d = SE3<double>;
@@ -189,6 +201,10 @@ class SE3 : public SE3Base<SE3<Scalar_, Options_>> {
   /// From a homogeneous matrix, rotation part orthogonal up to rounding.
   explicit SE3(const Matrix4& T)
       : SE3(SO3<Scalar_>(Matrix3(T.template topLeftCorner<3, 3>())), Vector3(T.template topRightCorner<3, 1>())) {}
+  /// From any matrix with a translation in its last column: its rotation is the nearest.
+  static SE3 fitToSE3(const Matrix4& T) {
+    return SE3(SO3<Scalar_>::fitToSO3(T.template topLeftCorner<3, 3>()), Vector3(T.template topRightCorner<3, 1>()));
+  }
   /// Translations along the axes, m.
   static SE3 trans(const Vector3& t) { return SE3(SO3<Scalar_>(), t); }
   static SE3 trans(const Scalar_& x, const Scalar_& y, const Scalar_& z) { return trans(Vector3(x, y, z)); }

@@ -43,6 +43,8 @@ struct So2Math {
   static Point act(const Params& z, const Point& p) {
     return Point(z[0] * p[0] - z[1] * p[1], z[1] * p[0] + z[0] * p[1]);
   }
+  static Point linear(const Params& z, const Point& p) { return act(z, p); }
+  static Point rotate(const Params& z, const Point& p) { return act(z, p); }
   static MatrixType matrix(const Params& z) {
     MatrixType m;
     m << z[0], -z[1], z[1], z[0];
@@ -66,6 +68,13 @@ struct So2Math {
   static Square ad(const Tangent&) { return Square::Zero(); }
   static Square leftJacobian(const Tangent&) { return Square::Identity(); }
   static Square leftJacobianInverse(const Tangent&) { return Square::Identity(); }
+  /// ∂(z·exp(d))/∂d and ∂log(z⁻¹x)/∂x at x = z, on parameters.
+  static Params productJacobian(const Params& z) { return Params(-z[1], z[0]); }
+  static Eigen::Matrix<S, 1, 2> quotientJacobian(const Params& z) { return productJacobian(z).transpose(); }
+  template <class Generator>
+  static Params sampleUniform(Generator& generator) {
+    return uniformOnCircle<S>(generator);
+  }
 };
 
 }  // namespace detail
@@ -76,8 +85,9 @@ class SO2Base : public detail::GroupBase<Derived> {
   using Base = detail::GroupBase<Derived>;
 
  public:
-  using Base::exp;
-  using typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
+  using Base::exp, Base::hat;
+  using typename Base::Math, typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
+  using typename Base::Transformation;
   using Base::operator*;
   /// The complex number (cos, sin), viewed in place.
   Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> unit_complex() const {
@@ -85,6 +95,9 @@ class SO2Base : public detail::GroupBase<Derived> {
   }
   /// Rotation by an angle, rad.
   static Plain exp(const Scalar& angle) { return Base::exp(Tangent(angle)); }
+  static Transformation hat(const Scalar& angle) { return Base::hat(Tangent(angle)); }
+  /// Replaces the rotation by that of a complex number of any positive norm.
+  void setComplex(const Eigen::Matrix<Scalar, 2, 1>& z) { this->derived().mutableStorage() = Math::normalized(z); }
   /// The angle in (-pi, pi], rad.
   Scalar angle() const { return this->log()[0]; }
   Eigen::Matrix<Scalar, 2, 2> rotationMatrix() const { return this->matrix(); }
@@ -113,8 +126,24 @@ class SO2 : public SO2Base<SO2<Scalar_, Options_>> {
   /// From a complex number of any positive norm, which is normalised.
   SO2(const Scalar_& real, const Scalar_& imag)
       : storage_(Shell::Math::normalized(typename Shell::Params(real, imag))) {}
-  /// From a rotation matrix, orthogonal up to rounding.
-  explicit SO2(const Eigen::Matrix<Scalar_, 2, 2>& R) : SO2(R(0, 0) + R(1, 1), R(1, 0) - R(0, 1)) {}
+  /// From a complex number as a vector (cos, sin) of any positive norm, or from a rotation matrix, orthogonal up to
+  /// rounding.
+  template <class D>
+    requires(D::RowsAtCompileTime == 2 && (D::ColsAtCompileTime == 1 || D::ColsAtCompileTime == 2))
+  explicit SO2(const Eigen::MatrixBase<D>& m) : storage_(fromMatrix(m)) {}
+  /// The rotation nearest to any matrix, in the Frobenius norm; NaN for multiples of a reflection, which have none.
+  static SO2 fitToSO2(const Eigen::Matrix<Scalar_, 2, 2>& M) { return SO2(M); }
+
+ private:
+  template <class D>
+  static typename Shell::Params fromMatrix(const Eigen::MatrixBase<D>& m) {
+    using Params = typename Shell::Params;
+    if constexpr (D::ColsAtCompileTime == 1) {
+      return Shell::Math::normalized(Params(m));
+    } else {
+      return Shell::Math::normalized(Params(m(0, 0) + m(1, 1), m(1, 0) - m(0, 1)));
+    }
+  }
 };
 
 /// SO(2) under its bi-invariant, flat metric.

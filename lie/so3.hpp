@@ -10,6 +10,7 @@
 #pragma once
 
 #include <lie/detail/group_base.hpp>
+#include <lie/detail/nearest_rotation.hpp>
 #include <lie/manifold.hpp>
 
 #include <optional>
@@ -50,6 +51,8 @@ struct So3Math {
     const Eigen::Matrix<S, 3, 1> t = S(2) * u.cross(p);
     return p + q[3] * t + u.cross(t);
   }
+  static Point linear(const Params& q, const Point& p) { return act(q, p); }
+  static Point rotate(const Params& q, const Point& p) { return act(q, p); }
   static MatrixType matrix(const Params& q) {
     return Eigen::Map<const Eigen::Quaternion<S>>(q.data()).toRotationMatrix();
   }
@@ -78,6 +81,21 @@ struct So3Math {
   }
   static MatrixType leftJacobianInverse(const Tangent& v) {
     return rotationPolynomial(v, S(1), S(-0.5), cotangentExcess(S(v.dot(v))));
+  }
+  /// ∂(q·exp(d))/∂d on parameters: half of d's product with q.
+  static Eigen::Matrix<S, 4, 3> productJacobian(const Params& q) {
+    Eigen::Matrix<S, 4, 3> J;
+    J << q[3], -q[2], q[1],  //
+        q[2], q[3], -q[0],   //
+        -q[1], q[0], q[3],   //
+        -q[0], -q[1], -q[2];
+    return S(0.5) * J;
+  }
+  /// ∂log(q⁻¹x)/∂x at x = q; its columns are orthogonal.
+  static Eigen::Matrix<S, 3, 4> quotientJacobian(const Params& q) { return S(4) * productJacobian(q).transpose(); }
+  template <class Generator>
+  static Params sampleUniform(Generator& generator) {
+    return uniformQuaternion<S>(generator);
   }
   /// log det of the exponential's Jacobian, 2 log(sin(θ/2)/(θ/2)), with its gradient and Hessian (means.md,
   /// section 4.3).
@@ -114,9 +132,24 @@ class SO3Base : public detail::GroupBase<Derived> {
   using Base = detail::GroupBase<Derived>;
 
  public:
-  using typename Base::Scalar, typename Base::Plain, typename Base::Math;
+  using typename Base::Scalar, typename Base::Plain, typename Base::Math, typename Base::Tangent;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Base::operator*;
+
+  /// A rotation vector and its norm (rad).
+  struct TangentAndTheta {
+    Tangent tangent;
+    Scalar theta;
+  };
+  TangentAndTheta logAndTheta() const {
+    const Tangent v = this->log();
+    return {v, detail::norm(v)};
+  }
+  /// exp(v); *theta becomes the norm of v.
+  static Plain expAndTheta(const Tangent& v, Scalar* theta) {
+    *theta = detail::norm(v);
+    return Base::exp(v);
+  }
 
   /// The quaternion, viewed in place.
   Eigen::Map<const Quaternion> unit_quaternion() const { return Eigen::Map<const Quaternion>(this->data()); }
@@ -164,7 +197,9 @@ class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
   template <class D>
   explicit SO3(const Eigen::QuaternionBase<D>& q) : storage_(Shell::Math::normalized(q.coeffs())) {}
   /// From a rotation matrix, orthogonal up to rounding; largest of the four pivots, so exact near half-turns.
-  explicit SO3(const Matrix3& R) : storage_(fromMatrix(R)) {}
+  explicit SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
+  /// The rotation nearest to any matrix in the Frobenius norm, of positive determinant or not.
+  static SO3 fitToSO3(const Matrix3& M) { return fromParams(detail::nearestQuaternion<Scalar_>(M)); }
   /// From a rotation matrix read from data: nothing if |RᵀR - I| exceeds the tolerance or det R < 0 or NaN.
   static std::optional<SO3> checkedFromMatrix(const Matrix3& R, Scalar_ tolerance = Scalar_(1e-6)) {
     const Scalar_ defect = (R.transpose() * R - Matrix3::Identity()).norm();
@@ -181,28 +216,6 @@ class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
   static SO3 rotX(const Scalar_& a) { return Shell::exp(Tangent(a, Scalar_(0), Scalar_(0))); }
   static SO3 rotY(const Scalar_& a) { return Shell::exp(Tangent(Scalar_(0), a, Scalar_(0))); }
   static SO3 rotZ(const Scalar_& a) { return Shell::exp(Tangent(Scalar_(0), Scalar_(0), a)); }
-
- private:
-  /// Quaternion from the row of 4 q qᵀ with the largest diagonal entry.
-  static typename Shell::Params fromMatrix(const Matrix3& R) {
-    using detail::select;
-    using P = typename Shell::Params;
-    const Scalar_ one(1);
-    const Scalar_ xx = R(0, 0), yy = R(1, 1), zz = R(2, 2);
-    const P x(one + xx - yy - zz, R(1, 0) + R(0, 1), R(0, 2) + R(2, 0), R(2, 1) - R(1, 2));
-    const P y(R(1, 0) + R(0, 1), one + yy - xx - zz, R(2, 1) + R(1, 2), R(0, 2) - R(2, 0));
-    const P z(R(0, 2) + R(2, 0), R(2, 1) + R(1, 2), one + zz - xx - yy, R(1, 0) - R(0, 1));
-    const P w(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1), one + xx + yy + zz);
-    P best;
-    for (int i = 0; i < 4; ++i) {
-      Scalar_ v = x[i], pivot = x[0];
-      v = select(y[1] > pivot, y[i], v), pivot = select(y[1] > pivot, y[1], pivot);
-      v = select(z[2] > pivot, z[i], v), pivot = select(z[2] > pivot, z[2], pivot);
-      v = select(w[3] > pivot, w[i], v);
-      best[i] = v;
-    }
-    return Shell::Math::normalized(best);
-  }
 };
 
 /// SO(3) is a Riemannian manifold under its own bi-invariant metric.

@@ -6,7 +6,8 @@
 //
 // Inputs are made of tangent vectors, whose angles are swept by decades from 1e-12 to the cut locus less 1e-12 (less
 // 1e-5 in float), for it is at these ends that formulas fail. A coordinate counts as an angle when a whole turn along
-// it comes back to the origin; the others are lengths.
+// it comes back to the origin, as a logarithm (of a scale) when matrices grow exponentially along it, in which case it
+// is swept to ±1; the others are lengths.
 //
 // Jacobians are compared with central differences of fourth order at the step h = eps^(1/5), where rounding, of some
 // eps/h, and truncation, of some h^4, are of one size.
@@ -287,9 +288,11 @@ class ContractBench : public ContractRecorder {
     const Scalar turn = Scalar(2 * EIGEN_PI);
     for (int i = 0; i < T::DoF; ++i) {
       angular_.push_back(T::logOrigin(T::expOrigin(Tangent(turn * Tangent::Unit(i)))).norm() < Scalar(1e-3));
+      logarithmic_.push_back(growsExponentially(T::placement(T::expOrigin(Tangent(Scalar(10) * Tangent::Unit(i))))));
     }
     for (int i = 0; i < Group::DoF; ++i) {
       group_angular_.push_back(Group::exp(GroupTangent(turn * GroupTangent::Unit(i))).log().norm() < Scalar(1e-3));
+      group_logarithmic_.push_back(growsExponentially(Group::exp(GroupTangent(Scalar(10) * GroupTangent::Unit(i)))));
     }
     has_angle_ = std::find(angular_.begin(), angular_.end(), true) != angular_.end();
     cut_ = has_angle_ ? EIGEN_PI : std::numeric_limits<double>::infinity();
@@ -307,21 +310,21 @@ class ContractBench : public ContractRecorder {
   static EIGEN_DONT_INLINE Group transformation(const Vector& v) { return Group::exp(groupTangent(v)); }
 
   /// Tangent vectors over all decades of the angle below a limit; what is returned is representable in Scalar.
-  std::vector<Vector> sweep(double limit) { return sweep(angular_, limit); }
+  std::vector<Vector> sweep(double limit) { return sweep(angular_, logarithmic_, limit); }
   /// The same inside the domain where logOrigin inverts expOrigin.
-  std::vector<Vector> sweepDomain() { return sweep(angular_, cut_); }
+  std::vector<Vector> sweepDomain() { return sweep(cut_); }
   /// The same over all angles to pi, with pi itself.
   std::vector<Vector> sweepAll() {
-    std::vector<Vector> all = sweep(angular_, has_angle_ ? EIGEN_PI : cut_);
-    if (has_angle_) all.push_back(rounded(randomTangent(rng_, angular_, EIGEN_PI, options_.length)));
+    std::vector<Vector> all = sweep(has_angle_ ? EIGEN_PI : cut_);
+    if (has_angle_) all.push_back(draw(angular_, logarithmic_, EIGEN_PI, options_.length));
     return all;
   }
-  std::vector<Vector> sweepGroup() { return sweep(group_angular_, groupHasAngle() ? EIGEN_PI : infinity()); }
-  /// A tangent vector well inside the domain of every placement.
-  Vector generic() { return rounded(randomTangent(rng_, angular_, rng_.uniform(0.1, 2.8), options_.length)); }
-  Vector genericGroup() {
-    return rounded(randomTangent(rng_, group_angular_, rng_.uniform(0.1, 3.0), options_.length));
+  std::vector<Vector> sweepGroup() {
+    return sweep(group_angular_, group_logarithmic_, groupHasAngle() ? EIGEN_PI : infinity());
   }
+  /// A tangent vector well inside the domain of every placement.
+  Vector generic() { return draw(angular_, logarithmic_, rng_.uniform(0.1, 2.8), options_.length); }
+  Vector genericGroup() { return draw(group_angular_, group_logarithmic_, rng_.uniform(0.1, 3.0), options_.length); }
 
   /// How far from its cut locus the point p is, seen from the origin.
   double room(const M& p) const {
@@ -342,13 +345,28 @@ class ContractBench : public ContractRecorder {
   bool groupHasAngle() const {
     return std::find(group_angular_.begin(), group_angular_.end(), true) != group_angular_.end();
   }
-  static Vector rounded(const Vector& v) { return v.cast<Scalar>().template cast<double>(); }
-  std::vector<Vector> sweep(const std::vector<bool>& angular, double limit) {
+  /// Whether a transformation that is ten units from the identity along a coordinate is e^10 in size, and not ten.
+  static bool growsExponentially(const Group& f) {
+    if constexpr (requires { f.matrix(); }) {
+      return f.matrix().norm() > Scalar(1e3);
+    } else {
+      return f.Adj().norm() > Scalar(1e3);
+    }
+  }
+  Vector draw(const std::vector<bool>& angular, const std::vector<bool>& logarithmic, double angle, double length) {
+    Vector v = randomTangent(rng_, angular, angle, length);
+    for (std::size_t i = 0; i < logarithmic.size(); ++i) {
+      double& x = v[static_cast<Eigen::Index>(i)];
+      if (logarithmic[i]) x /= 1 + std::abs(x);
+    }
+    return v.cast<Scalar>().template cast<double>();
+  }
+  std::vector<Vector> sweep(const std::vector<bool>& angular, const std::vector<bool>& logarithmic, double limit) {
     std::vector<Vector> result{Vector::Zero(static_cast<Eigen::Index>(angular.size()))};
     const double lengths[] = {1, 0, 10, 1e-3};
     for (const double angle : sweptAngles(limit, eps)) {
       for (int i = 0; i < options_.samples; ++i) {
-        result.push_back(rounded(randomTangent(rng_, angular, angle, options_.length * lengths[i % 4])));
+        result.push_back(draw(angular, logarithmic, angle, options_.length * lengths[i % 4]));
       }
     }
     return result;
@@ -356,7 +374,7 @@ class ContractBench : public ContractRecorder {
 
   ContractOptions options_;
   ContractRng rng_;
-  std::vector<bool> angular_, group_angular_;
+  std::vector<bool> angular_, group_angular_, logarithmic_, group_logarithmic_;
   bool has_angle_ = false;
   double cut_ = 0;
 };

@@ -1,17 +1,42 @@
-// The interface that every group shares, over the stateless mathematics of its own header.
+// The interface that every group shares, over the stateless mathematics of its own header. Names are Sophus'.
 #pragma once
 
 #include <lie/detail/shell.hpp>
+#include <lie/detail/uniform.hpp>
 
 #include <ostream>
+#include <type_traits>
 
 namespace liestat::detail {
 
-/// Members of every group G with tangent dimension DoF. Tangent order: translation first, then rotation. Perturbations
-/// are on the right: x·Exp(v).
+/// What Eigen makes of an operation between two scalars: double and Jet give Jet.
+template <class A, class B>
+using CommonScalar = typename Eigen::ScalarBinaryOpTraits<A, B>::ReturnType;
+
+/// Two types, owned or viewed, of one group, with scalars that go together.
+template <class A, class B>
+concept SameGroup =
+    std::is_same_v<typename ShellTraits<A>::template Rebind<float>, typename ShellTraits<B>::template Rebind<float>>;
+
+/// The vector in another scalar type: a copy, or itself if it is of that type.
+template <class S, class D>
+inline decltype(auto) promoted(const Eigen::MatrixBase<D>& v) {
+  if constexpr (std::is_same_v<S, typename D::Scalar>) {
+    return (v.derived());
+  } else {
+    return v.template cast<S>().eval();
+  }
+}
+
+/// Members of every group G with tangent dimension DoF. Tangent order: translation first, then rotation, then
+/// logarithm of the scale. Perturbations are on the right: x·Exp(v).
 template <class Derived>
 class GroupBase : public Shell<Derived> {
   using Base = Shell<Derived>;
+  template <class S>
+  using Rebind = typename ShellTraits<Derived>::template Rebind<S>;
+  template <class S>
+  using MathOf = typename ShellTraits<Rebind<S>>::Math;
 
  public:
   using Base::DoF, Base::num_parameters, Base::params;
@@ -22,24 +47,54 @@ class GroupBase : public Shell<Derived> {
   static constexpr int N = Math::N;      ///< rows of matrix()
   static constexpr int Dim = Math::Dim;  ///< dimension of the points that the group acts on
   using Point = Eigen::Matrix<Scalar, Dim, 1>;
+  using HomogeneousPoint = Eigen::Matrix<Scalar, Dim + 1, 1>;
+  using Line = Eigen::ParametrizedLine<Scalar, Dim>;
+  using Hyperplane = Eigen::Hyperplane<Scalar, Dim>;
 
-  /// Group product; no square root is taken: call normalize() after long chains of products.
+  /// Group product, also between scalars that Eigen lets meet (double and Jet). No square root is taken: call
+  /// normalize() after long chains of products in double.
   template <class Other>
-  Plain operator*(
-      const GroupBase<Other>& other) const requires std::is_same_v<typename ShellTraits<Other>::Math, Math> {
-    return Plain::fromParams(Math::product(params(), other.params()));
+    requires SameGroup<Derived, Other>
+  auto operator*(const GroupBase<Other>& other) const {
+    using S = CommonScalar<Scalar, typename ShellTraits<Other>::Scalar>;
+    return Rebind<S>::fromParams(MathOf<S>::product(promoted<S>(params()), promoted<S>(other.params())));
   }
   template <class Other>
-  Derived& operator*=(const GroupBase<Other>& other) {
-    this->derived().mutableStorage() = Math::product(params(), other.params());
+  requires SameGroup<Derived, Other> Derived& operator*=(const GroupBase<Other>& other) {
+    this->derived().mutableStorage() = Math::product(params(), promoted<Scalar>(other.params()));
     return this->derived();
   }
   /// Action on a point of R^Dim.
   template <class D>
-  Point operator*(const Eigen::MatrixBase<D>& point) const
-      requires(D::RowsAtCompileTime == Dim && D::ColsAtCompileTime == 1) {
-    return Math::act(params(), Point(point));
+    requires(D::RowsAtCompileTime == Dim && D::ColsAtCompileTime == 1)
+  auto operator*(const Eigen::MatrixBase<D>& point) const {
+    using S = CommonScalar<Scalar, typename D::Scalar>;
+    return Eigen::Matrix<S, Dim, 1>(MathOf<S>::act(promoted<S>(params()), promoted<S>(point)));
   }
+  /// Action on a homogeneous point (w p, w): the last coordinate stays.
+  template <class D>
+    requires(D::RowsAtCompileTime == Dim + 1 && D::ColsAtCompileTime == 1)
+  auto operator*(const Eigen::MatrixBase<D>& point) const {
+    using S = CommonScalar<Scalar, typename D::Scalar>;
+    const auto& p = promoted<S>(params());
+    Eigen::Matrix<S, Dim + 1, 1> result = promoted<S>(point);
+    result.template head<Dim>() = MathOf<S>::linear(p, Eigen::Matrix<S, Dim, 1>(result.template head<Dim>()));
+    if constexpr (requires { MathOf<S>::translation(p); }) {
+      result.template head<Dim>() += result[Dim] * MathOf<S>::translation(p);
+    }
+    return result;
+  }
+  /// Action on a line o + t d: the origin moves as a point, the direction is turned and keeps its norm.
+  Line operator*(const Line& line) const {
+    return Line(*this * line.origin(), Math::rotate(params(), Point(line.direction())));
+  }
+  /// Action on a hyperplane {p : n·p + c = 0}: x lies on it if and only if *this * x lies on the result; the normal is
+  /// turned and keeps its norm.
+  Hyperplane operator*(const Hyperplane& plane) const {
+    const Point normal = Math::rotate(params(), Point(plane.normal()));
+    return Hyperplane(normal, scaleOf() * plane.offset() - normal.dot(*this * Point(Point::Zero())));
+  }
+
   Plain inverse() const { return Plain::fromParams(Math::inverse(params())); }
   /// Tangent vector v with exp(v) = *this, rotation angle in [0, pi].
   Tangent log() const { return Math::log(params()); }
@@ -52,6 +107,8 @@ class GroupBase : public Shell<Derived> {
   static Adjoint ad(const Tangent& v) { return Math::ad(v); }
   static Transformation hat(const Tangent& v) { return Math::hat(v); }
   static Tangent vee(const Transformation& m) { return Math::vee(m); }
+  /// The i-th basis vector of the algebra, hat(e_i).
+  static Transformation generator(int i) { return Math::hat(Tangent::Unit(i)); }
   static Tangent lieBracket(const Tangent& a, const Tangent& b) { return Math::ad(a) * b; }
   /// Exp(v + d) = Exp(leftJacobian(v) d + O(d²))·Exp(v).
   static Adjoint leftJacobian(const Tangent& v) { return Math::leftJacobian(v); }
@@ -63,6 +120,48 @@ class GroupBase : public Shell<Derived> {
   static Adjoint rightJacobianInverse(const Tangent& v) { return Math::leftJacobianInverse(Tangent(-v)); }
   /// Projects the parameters back on their constraint (unit quaternion or complex number).
   void normalize() { this->derived().mutableStorage() = Math::normalized(params()); }
+
+  using ParameterJacobian = Eigen::Matrix<Scalar, num_parameters, DoF>;
+  /// (*this · Exp(d)).params() = params() + Dx_this_mul_exp_x_at_0() d + O(d²)
+  ParameterJacobian Dx_this_mul_exp_x_at_0() const { return Math::productJacobian(params()); }
+  /// Log(this⁻¹ · x) = Dx_log_this_inv_by_x_at_this() (x.params() - params()) + O(·²), for x on the group.
+  Eigen::Matrix<Scalar, DoF, num_parameters> Dx_log_this_inv_by_x_at_this() const {
+    return Math::quotientJacobian(params());
+  }
+  /// Exp(v + d).params() = Exp(v).params() + Dx_exp_x(v) d + O(d²)
+  static ParameterJacobian Dx_exp_x(const Tangent& v) { return Math::productJacobian(Math::exp(v)) * rightJacobian(v); }
+  static ParameterJacobian Dx_exp_x_at_0() { return Math::productJacobian(Math::identity()); }
+  /// Exp(d)·p = p + Dx_exp_x_times_point_at_0(p) d + O(d²)
+  static Eigen::Matrix<Scalar, Dim, DoF> Dx_exp_x_times_point_at_0(const Point& p) {
+    Eigen::Matrix<Scalar, Dim, DoF> J;
+    for (int i = 0; i < DoF; ++i) {
+      const Transformation G = generator(i);
+      J.col(i) = G.template topLeftCorner<Dim, Dim>() * p;
+      if constexpr (N > Dim) J.col(i) += G.template block<Dim, 1>(0, translation_column);
+    }
+    return J;
+  }
+  /// Exp(d).matrix() = I + Σ d_i Dxi_exp_x_matrix_at_0(i) + O(d²)
+  static Transformation Dxi_exp_x_matrix_at_0(int i) { return generator(i); }
+
+  /// A random element: rotation uniform, translation uniform in [-1, 1]^Dim (m), log2 of the scale uniform in [-1, 1].
+  /// Any generator of the standard library's kind (result_type, min(), max(), operator()).
+  template <class Generator>
+  static Plain sampleUniform(Generator& generator) {
+    return Plain::fromParams(Math::sampleUniform(generator));
+  }
+
+ private:
+  /// Column of matrix() that moves points; the last but for groups that carry more than one vector.
+  static constexpr int translation_column = Dim;
+
+  Scalar scaleOf() const {
+    if constexpr (requires { Math::scale(params()); }) {
+      return Math::scale(params());
+    } else {
+      return Scalar(1);
+    }
+  }
 };
 
 template <class Derived>

@@ -8,7 +8,12 @@
 
 #include <lie/detail/trig.hpp>
 
+#include <type_traits>
+
 namespace liestat::detail {
+
+/// Tag of the constructors that take parameters as they are.
+struct RawParams {};
 
 /// Scalar, Plain (the owning type), Storage and Pointer of a type of the library or of a view of it.
 template <class Derived>
@@ -44,6 +49,23 @@ class Shell {
   Derived& derived() { return static_cast<Derived&>(*this); }
 };
 
+/// A view of T over parameters of Derived: read-only where Derived is a view of const memory.
+template <class Derived, class T>
+using PartView = Eigen::Map<
+    std::conditional_t<std::is_const_v<std::remove_pointer_t<typename ShellTraits<Derived>::Pointer>>, const T, T>>;
+
+/// The translation of a motion, stored behind the parameters of its linear part.
+template <class Derived, class Base, int Dim, int offset>
+class TranslationAccess : public Base {
+  using Vector = Eigen::Matrix<typename Base::Scalar, Dim, 1>;
+
+ public:
+  using Base::data;
+  /// The translation (m), viewed in place.
+  Eigen::Map<const Vector> translation() const { return Eigen::Map<const Vector>(data() + offset); }
+  PartView<Derived, Vector> translation() { return PartView<Derived, Vector>(data() + offset); }
+};
+
 }  // namespace liestat::detail
 
 /// Inside a class template Type<Scalar_, Options_> derived from Base: storage, default construction (the identity or
@@ -67,14 +89,13 @@ class Shell {
   }                                                                                                       \
   /** Takes parameters as they are, in the order of params(); the caller vouches for their constraint. */ \
   static Type fromParams(const typename Shell::Params& params) {                                          \
-    Type value;                                                                                           \
-    value.storage_ = params;                                                                              \
-    return value;                                                                                         \
+    return Type(::liestat::detail::RawParams{}, params);                                                  \
   }                                                                                                       \
   const Storage& storage() const { return storage_; }                                                     \
   Storage& mutableStorage() { return storage_; }                                                          \
                                                                                                           \
  private:                                                                                                 \
+  Type(::liestat::detail::RawParams, const typename Shell::Params& params) : storage_(params) {}          \
   Storage storage_
 
 /// At global scope, after the class template: its traits and the views Eigen::Map<Type<S>> and Eigen::Map<const

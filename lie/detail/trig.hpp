@@ -173,6 +173,20 @@ inline S arctangentOverSine(const S& y2, const S& x) {
       });
 }
 
+/// |v|; zero, with derivative zero, at zero.
+template <class Derived>
+inline typename Derived::Scalar norm(const Eigen::MatrixBase<Derived>& v) {
+  using S = typename Derived::Scalar;
+  const S squared = v.dot(v);
+  return branch(
+      squared > S(0),
+      [&] {
+        using std::sqrt;
+        return S(sqrt(squared));
+      },
+      [] { return S(0); });
+}
+
 /// The cross-product matrix [v]: [v] w = v × w.
 template <class Derived>
 inline Eigen::Matrix<typename Derived::Scalar, 3, 3> skew(const Eigen::MatrixBase<Derived>& v) {

@@ -1,165 +1,20 @@
-// Accuracy of exp, log and the Jacobians at every decade of the angle, against references in 50 digits which share no
-// formula with the library: power series of matrices, and for the logarithm atan2 and a linear solve.
+// Accuracy of exp, log and the Jacobians at every decade of the angle, against references in 50 digits.
 //
 // The measure: Frobenius norm of the error, for a tangent whose translation has norm one, relative where the result is
 // larger than one; the reference is evaluated at the rounded input. The bar: 4e-15, for inverse Jacobians 6e-15, and
 // 2e-6 in float. The worst errors are printed.
 
-#include <lie/lie.hpp>
-
-#include <boost/multiprecision/cpp_bin_float.hpp>
-#include <gtest/gtest.h>
+#include <support/high_precision.hpp>
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <map>
 #include <random>
-#include <string>
-#include <type_traits>
-#include <utility>
 #include <vector>
 
 namespace {
 
-using Real = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<50>, boost::multiprecision::et_off>;
-
-/// A small matrix of 50-digit numbers. Not Eigen's: its expressions over this scalar would cost minutes to compile.
-struct Matrix {
-  int rows, cols;
-  std::vector<Real> a;
-  Matrix(int r, int c) : rows(r), cols(c), a(static_cast<std::size_t>(r * c), Real(0)) {}
-  template <class D>
-  explicit Matrix(const Eigen::MatrixBase<D>& m) : Matrix(static_cast<int>(m.rows()), static_cast<int>(m.cols())) {
-    for (int i = 0; i < rows; ++i) {
-      for (int j = 0; j < cols; ++j) at(i, j) = Real(static_cast<double>(m(i, j)));
-    }
-  }
-  Real& at(int i, int j) { return a[static_cast<std::size_t>(i * cols + j)]; }
-  const Real& at(int i, int j) const { return a[static_cast<std::size_t>(i * cols + j)]; }
-};
-
-Matrix identity(int n) {
-  Matrix m(n, n);
-  for (int i = 0; i < n; ++i) m.at(i, i) = 1;
-  return m;
-}
-
-Matrix operator*(const Matrix& x, const Matrix& y) {
-  Matrix z(x.rows, y.cols);
-  for (int i = 0; i < x.rows; ++i) {
-    for (int k = 0; k < x.cols; ++k) {
-      if (x.at(i, k) == 0) continue;
-      for (int j = 0; j < y.cols; ++j) z.at(i, j) += x.at(i, k) * y.at(k, j);
-    }
-  }
-  return z;
-}
-
-Real norm(const Matrix& m) {
-  Real sum = 0;
-  for (const auto& x : m.a) sum += x * x;
-  return sqrt(sum);
-}
-
-/// Σ A^k/(k + offset)!: the exponential with offset 0, the left Jacobian from ad with offset 1.
-Matrix series(const Matrix& A, int offset) {
-  Matrix term = identity(A.rows), sum = term;
-  // Angles go to pi: terms decrease from the fifth on, and are below 1e-40 by the 60th.
-  for (int k = 1; k < 90 && (k < 5 || norm(term) > 1e-40); ++k) {
-    term = term * A;
-    for (auto& x : term.a) x /= k + offset;
-    for (std::size_t i = 0; i < sum.a.size(); ++i) sum.a[i] += term.a[i];
-  }
-  return sum;
-}
-
-/// A⁻¹ by Gauss and Jordan with pivots.
-Matrix inverse(Matrix A) {
-  const int n = A.rows;
-  Matrix B = identity(n);
-  for (int k = 0; k < n; ++k) {
-    int pivot = k;
-    for (int i = k + 1; i < n; ++i) {
-      if (abs(A.at(i, k)) > abs(A.at(pivot, k))) pivot = i;
-    }
-    for (int j = 0; j < n; ++j) {
-      std::swap(A.at(k, j), A.at(pivot, j));
-      std::swap(B.at(k, j), B.at(pivot, j));
-    }
-    const Real p = A.at(k, k);
-    for (int j = 0; j < n; ++j) A.at(k, j) /= p, B.at(k, j) /= p;
-    for (int i = 0; i < n; ++i) {
-      const Real f = A.at(i, k);
-      if (i == k || f == 0) continue;
-      for (int j = 0; j < n; ++j) A.at(i, j) -= f * A.at(k, j), B.at(i, j) -= f * B.at(k, j);
-    }
-  }
-  return B;
-}
-
-/// Frobenius norm of the error, relative where the reference is larger than one.
-template <class D>
-double error(const Eigen::MatrixBase<D>& value, const Matrix& reference) {
-  Matrix d(value);
-  for (std::size_t i = 0; i < d.a.size(); ++i) d.a[i] -= reference.a[i];
-  const Real size = norm(reference);
-  return static_cast<double>(norm(d) / (size > 1 ? size : Real(1)));
-}
-
-Matrix column(const std::vector<Real>& v) {
-  Matrix m(static_cast<int>(v.size()), 1);
-  m.a = v;
-  return m;
-}
-
-/// Rotation vector of a quaternion (x, y, z, w) of any norm and sign; angle in [0, pi].
-std::vector<Real> quaternionLog(const Matrix& q) {
-  const Real n = sqrt(q.a[0] * q.a[0] + q.a[1] * q.a[1] + q.a[2] * q.a[2]);
-  if (n == 0) return {0, 0, 0};
-  const Real sign = q.a[3] < 0 ? -1 : 1, f = sign * 2 * atan2(n, sign * q.a[3]) / n;
-  return {f * q.a[0], f * q.a[1], f * q.a[2]};
-}
-
-Matrix crossMatrix(const std::vector<Real>& v) {
-  Matrix m(3, 3);
-  m.at(0, 1) = -v[2], m.at(0, 2) = v[1], m.at(1, 2) = -v[0];
-  m.at(1, 0) = v[2], m.at(2, 0) = -v[1], m.at(2, 1) = v[0];
-  return m;
-}
-
-Matrix rows(const Matrix& m, int first, int count) {
-  Matrix r(count, 1);
-  for (int i = 0; i < count; ++i) r.a[static_cast<std::size_t>(i)] = m.a[static_cast<std::size_t>(first + i)];
-  return r;
-}
-
-/// Logarithms from the parameters.
-template <class S>
-Matrix referenceLog(const liestat::SO2<S>& x) {
-  const Matrix p(x.params());
-  return column({atan2(p.a[1], p.a[0])});
-}
-template <class S>
-Matrix referenceLog(const liestat::SO3<S>& x) {
-  return column(quaternionLog(Matrix(x.params())));
-}
-template <class S>
-Matrix referenceLog(const liestat::SE2<S>& x) {
-  const Matrix p(x.params());
-  const Real theta = atan2(p.a[1], p.a[0]);
-  Matrix hat(2, 2);
-  hat.at(0, 1) = -theta, hat.at(1, 0) = theta;
-  const Matrix u = inverse(series(hat, 1)) * rows(p, 2, 2);
-  return column({u.a[0], u.a[1], theta});
-}
-template <class S>
-Matrix referenceLog(const liestat::SE3<S>& x) {
-  const Matrix p(x.params());
-  const auto omega = quaternionLog(p);
-  const Matrix u = inverse(series(crossMatrix(omega), 1)) * rows(p, 4, 3);
-  return column({u.a[0], u.a[1], u.a[2], omega[0], omega[1], omega[2]});
-}
+using namespace liestat_test;
+using liestat_test::referenceLog;
 
 /// Exponential and logarithm of the manifolds, as parameters and from parameters.
 template <class S>
@@ -205,79 +60,6 @@ template <class S>
 Matrix referenceLog(const liestat::Frame2<S>& x) {
   const Matrix p(x.params());
   return column({p.a[2], p.a[3], atan2(p.a[1], p.a[0])});
-}
-
-template <class S>
-constexpr bool is_float = std::is_same_v<S, float>;
-
-template <class S>
-struct Bar {
-  static constexpr double value = is_float<S> ? 2e-6 : 4e-15;
-  static constexpr double inverse_jacobian = is_float<S> ? 2e-6 : 6e-15;
-};
-
-/// Every decade from 1e-12 to pi - 1e-12 (float: pi - 1e-5).
-template <class S>
-std::vector<double> sweptAngles() {
-  std::vector<double> angles{0};
-  for (int k = 12; k >= 1; --k) angles.push_back(std::pow(10, -k));
-  // Both sides of where series end and closed forms begin, should they.
-  for (const double a : {0.2, 0.22, 0.23, 0.3, 0.5, 0.7, 1.0, 1.4, 1.57, 1.6, 2.0, 2.5, 2.9, 3.0}) angles.push_back(a);
-  for (int k = 1; k <= (is_float<S> ? 5 : 12); ++k) angles.push_back(EIGEN_PI - std::pow(10, -k));
-  return angles;
-}
-
-/// Worst error of each operation, and where.
-struct Worst {
-  double error = 0, angle = 0;
-  void see(double e, double at) {
-    if (!(e <= error)) error = e, angle = at;
-  }
-};
-using Table = std::map<std::string, Worst>;
-
-void print(const char* name, const char* scalar, const Table& table) {
-  for (const auto& [operation, worst] : table) {
-    std::printf("%-8s %-7s %-22s %9.2e at %.12g\n", name, scalar, operation.c_str(), worst.error, worst.angle);
-  }
-}
-
-/// Directions: the axes and random ones; a rotation part of a given angle and a translation of norm one.
-template <class S, int N>
-std::vector<Eigen::Matrix<S, N, 1>> tangents(double angle, int translation) {
-  std::mt19937 generator(7);
-  const auto draw = [&] { return static_cast<double>(generator()) * 0x1p-31 - 1; };
-  std::vector<Eigen::Matrix<S, N, 1>> result;
-  for (int i = 0; i < 5; ++i) {
-    Eigen::Matrix<double, N, 1> v;
-    for (int k = 0; k < N; ++k) v[k] = draw();
-    const int r = N - translation;
-    if (i < r) v.tail(r) = Eigen::VectorXd::Unit(r, i);
-    if (translation > 0) v.head(translation).normalize();
-    v.tail(r) *= angle / v.tail(r).norm();
-    result.push_back(v.template cast<S>());
-  }
-  return result;
-}
-
-template <class G>
-void sweepGroup(Table& worst, const std::vector<double>& angles, int translation) {
-  using S = typename G::Scalar;
-  for (const double angle : angles) {
-    for (const auto& v : tangents<S, G::DoF>(angle, translation)) {
-      const G x = G::exp(v);
-      worst["exp"].see(error(x.matrix(), series(Matrix(G::hat(v)), 0)), angle);
-      worst["log"].see(error(x.log(), referenceLog(x)), angle);
-      const Matrix ad(G::ad(v));
-      Matrix minus_ad = ad;
-      for (auto& a : minus_ad.a) a = -a;
-      const Matrix left = series(ad, 1), right = series(minus_ad, 1);
-      worst["leftJacobian"].see(error(G::leftJacobian(v), left), angle);
-      worst["rightJacobian"].see(error(G::rightJacobian(v), right), angle);
-      worst["leftJacobianInverse"].see(error(G::leftJacobianInverse(v), inverse(left)), angle);
-      worst["rightJacobianInverse"].see(error(G::rightJacobianInverse(v), inverse(right)), angle);
-    }
-  }
 }
 
 template <class M>

@@ -24,6 +24,10 @@ LIESTAT_INSTANTIATE_ALL(SO2)
 LIESTAT_INSTANTIATE_ALL(SO3)
 LIESTAT_INSTANTIATE_ALL(SE2)
 LIESTAT_INSTANTIATE_ALL(SE3)
+LIESTAT_INSTANTIATE_ALL(RxSO2)
+LIESTAT_INSTANTIATE_ALL(RxSO3)
+LIESTAT_INSTANTIATE_ALL(Sim2)
+LIESTAT_INSTANTIATE_ALL(Sim3)
 LIESTAT_INSTANTIATE_ALL(S2)
 LIESTAT_INSTANTIATE_ALL(Frame2)
 LIESTAT_INSTANTIATE_ALL(Frame3)
@@ -42,6 +46,9 @@ static_assert(LieGroup<SO3f> && LieGroup<SO3<Jet3>> && LieGroup<SE3<Jet3>>);
 static_assert(!LieGroup<S2d> && !LieGroup<Frame3d> && !LieGroup<Eigen::Vector3d>);
 
 static_assert(Homogeneous<SE2d> && Homogeneous<SE3d> && Homogeneous<SE3<Jet3>>);
+static_assert(LieGroup<RxSO2d> && LieGroup<RxSO3d> && LieGroup<Sim2d> && LieGroup<Sim3f> && LieGroup<Sim3<Jet3>>);
+static_assert(Metric<RxSO2d> && Metric<RxSO3d> && Homogeneous<Sim2d> && Homogeneous<Sim3d>);
+static_assert(!Metric<Sim2d> && !Metric<Sim3d>);
 static_assert(!Metric<SE2d> && !Metric<SE3d>, "no invariant metric has the screw motions as geodesics");
 static_assert(Metric<Eigen::Vector3d> && Metric<Eigen::Matrix<float, 7, 1>> && Metric<SO2d> && Metric<SO3d>);
 static_assert(Metric<S2d> && Metric<Frame2d> && Metric<Frame3d> && Metric<Frame3<Jet3>>);
