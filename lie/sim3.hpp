@@ -107,8 +107,8 @@ struct Sim3Math {
     const Vector3 upsilon = v.template head<3>(), omega = v.template segment<3>(3);
     const S t = omega.dot(omega);
     const auto w = similarityIntegrals<Axial<S>>(v[6], t);
-    return blocks(w.phi.matrix(omega), similarityCoupling(v[6], t).matrix(omega, upsilon),
-                  -w.psi.apply(omega, upsilon), Linear::Rotation::leftJacobian(omega), S(1));
+    return blocks(w.phi.matrix(omega), similarityCoupling(v[6], t).matrix(omega, upsilon), -w.psi.apply(omega, upsilon),
+                  Linear::Rotation::leftJacobian(omega), S(1));
   }
   static Square leftJacobianInverse(const Tangent& v) {
     const Vector3 upsilon = v.template head<3>(), omega = v.template segment<3>(3);

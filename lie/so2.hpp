@@ -94,8 +94,12 @@ class SO2Base : public detail::GroupBase<Derived> {
     return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(this->data());
   }
   /// Rotation by an angle, rad.
-  static Plain exp(const Scalar& angle) { return Base::exp(Tangent(angle)); }
-  static Transformation hat(const Scalar& angle) { return Base::hat(Tangent(angle)); }
+  template <class Angle>
+    requires(std::is_same_v<Angle, Scalar> || std::is_arithmetic_v<Angle>)
+  static Plain exp(const Angle& angle) { return Base::exp(Tangent(Scalar(angle))); }
+  template <class Angle>
+    requires(std::is_same_v<Angle, Scalar> || std::is_arithmetic_v<Angle>)
+  static Transformation hat(const Angle& angle) { return Base::hat(Tangent(Scalar(angle))); }
   /// Replaces the rotation by that of a complex number of any positive norm.
   void setComplex(const Eigen::Matrix<Scalar, 2, 1>& z) { this->derived().mutableStorage() = Math::normalized(z); }
   /// The angle in (-pi, pi], rad.

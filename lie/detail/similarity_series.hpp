@@ -168,8 +168,7 @@ struct CouplingForm {
     const Eigen::Matrix<S, 3, 1> w = omega.cross(upsilon);
     // [ω][υ] = υ ωᵀ - d, [υ][ω] = ω υᵀ - d, [ω]²[υ] = (ω × υ) ωᵀ - d [ω], [ω]² = ω ωᵀ - t.
     Eigen::Matrix<S, 3, 3> m = (wv * upsilon + wwv * w + (dww * d) * omega) * omega.transpose() +
-                               (vw * omega) * upsilon.transpose() +
-                               skew(v * upsilon + (d * (dw - wwv)) * omega);
+                               (vw * omega) * upsilon.transpose() + skew(v * upsilon + (d * (dw - wwv)) * omega);
     m.diagonal().array() -= d * (wv + vw + dww * t);
     return m;
   }

@@ -1,5 +1,5 @@
-// References in 50 digits which share no formula with the library (power series of matrices, and for the logarithm atan2
-// and a linear solve), and the sweeps in which the library is compared with them.
+// References in 50 digits which share no formula with the library (power series of matrices, and for the logarithm
+// atan2 and a linear solve), and the sweeps in which the library is compared with them.
 #pragma once
 
 #include <lie/lie.hpp>

@@ -1,5 +1,5 @@
-// Every operation of a group differentiates through ceres::Jet, at zero, at tiny angles, in general and near pi, and the
-// derivatives agree with the analytic Jacobians.
+// Every operation of a group differentiates through ceres::Jet, at zero, at tiny angles, in general and near pi, and
+// the derivatives agree with the analytic Jacobians.
 #pragma once
 
 #include <lie/lie.hpp>
