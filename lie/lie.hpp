@@ -9,6 +9,7 @@
 #include <lie/rxso3.hpp>
 #include <lie/s2.hpp>
 #include <lie/se2.hpp>
+#include <lie/se23.hpp>
 #include <lie/se3.hpp>
 #include <lie/semi_oriented_frame3.hpp>
 #include <lie/sim2.hpp>

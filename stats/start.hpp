@@ -99,23 +99,21 @@ M startOfMean(const R& samples, const W& weights) {
     return sum / weight;
   } else if constexpr (!Quotient<M> && requires(const M& x) { x.unit_quaternion(); }) {  // rotations, poses of R^3
     detail::QuaternionMoments<S> rotations;
-    constexpr bool is_pose = requires(const M& x) { x.translation(); };
-    Eigen::Matrix<S, 3, 1> translation = Eigen::Matrix<S, 3, 1>::Zero();
+    // What follows the quaternion are vectors: translation, velocity.
+    constexpr int vectors = M::num_parameters - 4;
+    Eigen::Matrix<S, vectors, 1> translation = Eigen::Matrix<S, vectors, 1>::Zero();
     S weight(0);
     for (std::size_t i = 0; i < n; ++i) {
       const M& x = sample(i);
       const S p = S(weights[i]);
       rotations.add(x.params().template head<4>(), p);
       weight += p;
-      if constexpr (is_pose) translation += p * x.translation();
+      translation += p * x.params().template tail<vectors>();
     }
-    if constexpr (is_pose) {
-      typename M::Params params;
-      params << rotations.mean(), translation / weight;
-      return M::fromParams(params);
-    } else {
-      return M::fromParams(rotations.mean());
-    }
+    typename M::Params params;
+    params.template head<4>() = rotations.mean();
+    if constexpr (vectors > 0) params.template tail<vectors>() = translation / weight;
+    return M::fromParams(params);
   } else if constexpr (
       requires(const M& x) { x.so2(); } || requires(const M& x) { x.unit_complex(); }) {
     typename M::Params sum = M::Params::Zero();

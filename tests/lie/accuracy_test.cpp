@@ -76,16 +76,6 @@ void sweepManifold(Table& worst, const std::vector<double>& angles, int translat
 }
 
 template <class S>
-void expectWithinBar(const char* name, const Table& worst) {
-  print(name, is_float<S> ? "float" : "double", worst);
-  for (const auto& [operation, w] : worst) {
-    const bool is_inverse = operation.find("Inverse") != std::string::npos;
-    EXPECT_LE(w.error, is_inverse ? Bar<S>::inverse_jacobian : Bar<S>::value)
-        << name << (is_float<S> ? " float " : " double ") << operation << " at angle " << w.angle;
-  }
-}
-
-template <class S>
 void checkAll(const std::vector<double>& angles) {
   Table so2, so3, se2, se3, s2, frame2, frame3;
   sweepGroup<liestat::SO2<S>>(so2, angles, 0);

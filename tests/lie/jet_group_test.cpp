@@ -11,6 +11,7 @@ TEST(Jet, SO2) { checkGroup<liestat::SO2>(0); }
 TEST(Jet, SO3) { checkGroup<liestat::SO3>(0); }
 TEST(Jet, SE2) { checkGroup<liestat::SE2>(2); }
 TEST(Jet, SE3) { checkGroup<liestat::SE3>(3); }
+TEST(Jet, SE23) { checkGroup<liestat::SE23>(3, {}, 3); }
 
 TEST(Jet, RotationMatrices) {
   using Jet = ceres::Jet<double, 3>;

@@ -28,6 +28,7 @@ LIESTAT_INSTANTIATE_ALL(RxSO2)
 LIESTAT_INSTANTIATE_ALL(RxSO3)
 LIESTAT_INSTANTIATE_ALL(Sim2)
 LIESTAT_INSTANTIATE_ALL(Sim3)
+LIESTAT_INSTANTIATE_ALL(SE23)
 LIESTAT_INSTANTIATE_ALL(S2)
 LIESTAT_INSTANTIATE_ALL(Frame2)
 LIESTAT_INSTANTIATE_ALL(Frame3)
@@ -43,6 +44,7 @@ using namespace liestat;
 
 static_assert(LieGroup<SO2d> && LieGroup<SO3d> && LieGroup<SE2d> && LieGroup<SE3d> && LieGroup<Translation<double, 3>>);
 static_assert(LieGroup<SO3f> && LieGroup<SO3<Jet3>> && LieGroup<SE3<Jet3>>);
+static_assert(LieGroup<SE23d> && LieGroup<SE23<Jet3>> && Homogeneous<SE23f> && !Metric<SE23d>);
 static_assert(!LieGroup<S2d> && !LieGroup<Frame3d> && !LieGroup<Eigen::Vector3d>);
 
 static_assert(Homogeneous<SE2d> && Homogeneous<SE3d> && Homogeneous<SE3<Jet3>>);
@@ -62,6 +64,7 @@ static_assert(!Homogeneous<Eigen::RowVector3d> && !Homogeneous<Eigen::Matrix3d> 
 // Parameters are all there is in memory: arrays of them are arrays of scalars, as Sophus and Ceres have them.
 static_assert(sizeof(SO2d) == 2 * sizeof(double) && sizeof(SO3d) == 4 * sizeof(double));
 static_assert(sizeof(SE2f) == 4 * sizeof(float) && sizeof(SE3d) == 7 * sizeof(double));
+static_assert(sizeof(SE23d) == 10 * sizeof(double));
 static_assert(sizeof(S2d) == 3 * sizeof(double) && sizeof(Frame3f) == 7 * sizeof(float));
 
 TEST(Types, ThePosesShareTheirMemoryLayout) {

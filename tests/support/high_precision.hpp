@@ -156,6 +156,14 @@ Matrix referenceLog(const liestat::SE3<S>& x) {
   const Matrix u = inverse(series(crossMatrix(omega), 1)) * rows(p, 4, 3);
   return column({u.a[0], u.a[1], u.a[2], omega[0], omega[1], omega[2]});
 }
+template <class S>
+Matrix referenceLog(const liestat::SE23<S>& x) {
+  const Matrix p(x.params());
+  const auto omega = quaternionLog(p);
+  const Matrix V = inverse(series(crossMatrix(omega), 1));
+  const Matrix u = V * rows(p, 4, 3), w = V * rows(p, 7, 3);
+  return column({u.a[0], u.a[1], u.a[2], omega[0], omega[1], omega[2], w.a[0], w.a[1], w.a[2]});
+}
 
 template <class S>
 Matrix referenceLog(const liestat::RxSO2<S>& x) {
@@ -262,6 +270,17 @@ template <class G>
 void sweepGroup(Table& worst, const std::vector<double>& angles, int translation) {
   for (const double angle : angles) {
     sweepGroup<G>(worst, angle, tangents<typename G::Scalar, G::DoF>(angle, translation));
+  }
+}
+
+/// Prints the table and holds it against the bar.
+template <class S>
+void expectWithinBar(const char* name, const Table& worst) {
+  print(name, is_float<S> ? "float" : "double", worst);
+  for (const auto& [operation, w] : worst) {
+    const bool is_inverse = operation.find("Inverse") != std::string::npos;
+    EXPECT_LE(w.error, is_inverse ? Bar<S>::inverse_jacobian : Bar<S>::value)
+        << name << (is_float<S> ? " float " : " double ") << operation << " at angle " << w.angle;
   }
 }
 

@@ -12,16 +12,17 @@
 
 namespace liestat_test {
 
-/// Tangents have `translation` coordinates first; for groups with a scale, its logarithm last takes the given values.
+/// Tangents have `translation` coordinates first, then `rotation` ones (unless told, all the others); for groups with a
+/// scale, its logarithm last takes the given values.
 template <template <class, int> class Type>
-void checkGroup(int translation, std::initializer_list<double> scales = {}) {
+void checkGroup(int translation, std::initializer_list<double> scales = {}, int rotation = 0) {
   using G = Type<double, 0>;
   constexpr int n = G::DoF;
   using Jet = ceres::Jet<double, n>;
   using J = Type<Jet, 0>;
   std::vector<std::pair<double, typename G::Tangent>> inputs;
   for (const double angle : swept_angles) {
-    if (scales.size() == 0) inputs.push_back({angle, tangent<n>(angle, translation)});
+    if (scales.size() == 0) inputs.push_back({angle, tangent<n>(angle, translation, rotation)});
     for (const double sigma : scales) {
       typename G::Tangent v;
       v << tangent<n - 1>(angle, translation), sigma;
@@ -29,7 +30,7 @@ void checkGroup(int translation, std::initializer_list<double> scales = {}) {
     }
   }
   for (const auto& [angle, v] : inputs) {
-    const typename G::Tangent u = tangent<n>(1.1, translation);
+    const typename G::Tangent u = tangent<n>(1.1, translation, rotation);
     const G x = G::exp(v);
     const J x_jet = x.template cast<Jet>();
     const JetVector<n> d = variable<n>(G::Tangent::Zero()), w = variable<n>(v);

@@ -55,12 +55,14 @@ inline const std::vector<double> swept_angles = {
     0,   1e-15, 1e-12,           1e-9,           1e-6, 1e-3, 0.1, 0.22, 0.23, 0.7, 1.5, 1.6, 2.2, 3.0,
     3.1, 3.14,  EIGEN_PI - 1e-6, EIGEN_PI - 1e-9};
 
-/// A tangent vector whose last coordinates (all but `translation`) have the norm `angle`.
+/// A tangent vector whose `rotation` coordinates after the first `translation` (unless told: all the others) have the
+/// norm `angle`.
 template <int N>
-Eigen::Matrix<double, N, 1> tangent(double angle, int translation) {
+Eigen::Matrix<double, N, 1> tangent(double angle, int translation, int rotation = 0) {
   Eigen::Matrix<double, N, 1> v;
-  for (int i = 0; i < N; ++i) v[i] = 0.4 - 0.3 * i + 0.11 * i * i;
-  v.tail(N - translation) *= angle / v.tail(N - translation).norm();
+  for (int i = 0; i < N; ++i) v[i] = 0.4 - 0.3 * (i % 6) + 0.11 * (i % 6) * (i % 6) - 0.07 * (i / 6);
+  if (rotation == 0) rotation = N - translation;
+  v.segment(translation, rotation) *= angle / v.segment(translation, rotation).norm();
   return v;
 }
 
