@@ -157,6 +157,14 @@ class SO3Base : public detail::GroupBase<Derived> {
   void setQuaternion(const Quaternion& q) { this->derived().mutableStorage() = Math::normalized(q.coeffs()); }
   /// Same as matrix().
   Eigen::Matrix<Scalar, 3, 3> rotationMatrix() const { return this->matrix(); }
+  /// The angle in [0, pi] (rad) and the axis; the axis is x where there is no rotation.
+  Eigen::AngleAxis<Scalar> angleAxis() const {
+    const Tangent v = this->log();
+    const Scalar angle = detail::norm(v);
+    const auto turns = angle > Scalar(0);
+    const Tangent u = v / detail::select(turns, angle, Scalar(1));
+    return Eigen::AngleAxis<Scalar>(angle, Tangent(detail::select(turns, u[0], Scalar(1)), u[1], u[2]));
+  }
   /// Angle of the rotation about the x axis that is closest to this one, rad in (-pi, pi].
   Scalar angleX() const { return closestAngle(0); }
   Scalar angleY() const { return closestAngle(1); }
@@ -196,6 +204,8 @@ class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
   /// From a quaternion of any positive norm, which is normalised; a zero quaternion gives NaN.
   template <class D>
   explicit SO3(const Eigen::QuaternionBase<D>& q) : storage_(Shell::Math::normalized(q.coeffs())) {}
+  /// From an angle (rad) about an axis of norm one.
+  explicit SO3(const Eigen::AngleAxis<Scalar_>& a) : SO3(Shell::exp(Tangent(a.angle() * a.axis()))) {}
   /// From a rotation matrix, orthogonal up to rounding; largest of the four pivots, so exact near half-turns.
   explicit SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
   /// The rotation nearest to any matrix in the Frobenius norm, of positive determinant or not.

@@ -113,8 +113,9 @@ TYPED_TEST(SophusApi, DerivativesOnParameters) {
   for (int i = 0; i < G::DoF; ++i) {
     const typename G::Tangent e = h * G::Tangent::Unit(i);
     EXPECT_LE(((G::exp(v + e).params() - G::exp(v - e).params()) / (2 * h) - G::Dx_exp_x(v).col(i)).norm(), tolerance);
-    EXPECT_LE((((x * G::exp(e)).params() - (x * G::exp(-e)).params()) / (2 * h) - x.Dx_this_mul_exp_x_at_0().col(i)).norm(),
-              tolerance);
+    EXPECT_LE(
+        (((x * G::exp(e)).params() - (x * G::exp(-e)).params()) / (2 * h) - x.Dx_this_mul_exp_x_at_0().col(i)).norm(),
+        tolerance);
     EXPECT_LE(((G::exp(e) * p - G::exp(-e) * p) / (2 * h) - G::Dx_exp_x_times_point_at_0(p).col(i)).norm(), tolerance);
     EXPECT_LE(((G::exp(e).matrix() - G::exp(-e).matrix()) / (2 * h) - G::Dxi_exp_x_matrix_at_0(i)).norm(), tolerance);
   }
