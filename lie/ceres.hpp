@@ -80,8 +80,8 @@ auto parameterJacobian(const M& x) {
 /// Plus(x, d) = exp(x, d) and Minus(y, x) = log(x, y); Jacobians are exact. Plus and Minus return false, which ends a
 /// step of the solver, where the result is not finite.
 template <Homogeneous M>
-  requires std::is_same_v<ScalarOf<M>, double>
-class CeresManifold final : public ceres::Manifold {
+  requires std::is_same_v < ScalarOf<M>,
+double > class CeresManifold final : public ceres::Manifold {
   using T = ManifoldTraits<M>;
   using Block = detail::ParameterBlock<M>;
   static constexpr int ambient = Block::size;

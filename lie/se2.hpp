@@ -63,7 +63,8 @@ struct Se2Math {
     return similarity(h.cos / h.sinc, S(-0.5) * theta);
   }
   static Params exp(const Tangent& v) {
-    return join(Rotation::exp(Angle(v[2])), translationJacobian(v[2]) * v.template head<2>());
+    const Vector2 z = Rotation::exp(Angle(v[2]));
+    return join(z, translationJacobian(v[2]) * v.template head<2>());
   }
   static Tangent log(const Params& p) {
     const S theta = Rotation::log(complex(p))[0];

@@ -31,7 +31,8 @@ struct Se3Math {
 
   static Params join(const Vector4& q, const Vector3& t) {
     Params p;
-    p << q, t;
+    p.template head<4>() = q;
+    p.template tail<3>() = t;
     return p;
   }
   static Vector4 quaternion(const Params& p) { return p.template head<4>(); }
@@ -53,12 +54,12 @@ struct Se3Math {
 
   static Params exp(const Tangent& v) {
     const Vector3 omega = v.template tail<3>(), upsilon = v.template head<3>();
-    return join(Rotation::exp(omega), Rotation::leftJacobian(omega) * upsilon);
+    return join(Rotation::exp(omega), Rotation::leftJacobianTimes(omega, upsilon));
   }
   static Tangent log(const Params& p) {
     const Vector3 omega = Rotation::log(quaternion(p));
     Tangent v;
-    v << Rotation::leftJacobianInverse(omega) * translation(p), omega;
+    v << Rotation::leftJacobianInverseTimes(omega, translation(p)), omega;
     return v;
   }
 
@@ -81,7 +82,10 @@ struct Se3Math {
   }
   static Square blocks(const Matrix3& diagonal, const Matrix3& coupling) {
     Square m;
-    m << diagonal, coupling, Matrix3::Zero(), diagonal;
+    m.template topLeftCorner<3, 3>() = diagonal;
+    m.template topRightCorner<3, 3>() = coupling;
+    m.template bottomLeftCorner<3, 3>().setZero();
+    m.template bottomRightCorner<3, 3>() = diagonal;
     return m;
   }
   static Square Adj(const Params& p) {
@@ -105,10 +109,19 @@ struct Se3Math {
     const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
     return blocks(Rotation::leftJacobian(phi), coupling(rho, phi));
   }
+  /// Off-diagonal block of the inverse: ad(υ, ω) acts as the dual number [ω] + ε[υ], so it is the derivative of
+  /// So3Math::leftJacobianInverse at φ in the direction ρ.
+  static Matrix3 inverseCoupling(const Vector3& rho, const Vector3& phi) {
+    const S t = phi.dot(phi), d = phi.dot(rho);
+    const S c = cotangentExcess(t), slope = d * cotangentExcessSlope(t);
+    const Vector3 b = c * rho + (S(0.5) * slope) * phi;
+    Matrix3 m = b * phi.transpose() + phi * b.transpose() + skew(S(-0.5) * rho);
+    m.diagonal().array() -= S(2) * c * d + slope * t;
+    return m;
+  }
   static Square leftJacobianInverse(const Tangent& v) {
     const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
-    const Matrix3 inverse = Rotation::leftJacobianInverse(phi);
-    return blocks(inverse, -inverse * coupling(rho, phi) * inverse);
+    return blocks(Rotation::leftJacobianInverse(phi), inverseCoupling(rho, phi));
   }
   static Eigen::Matrix<S, 7, 6> productJacobian(const Params& p) {
     Eigen::Matrix<S, 7, 6> J;

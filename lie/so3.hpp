@@ -9,6 +9,7 @@
 // Bad input      NaN in, NaN out; constructors from quaternions normalise; fitToSO3 and checkedFrom… are for data
 #pragma once
 
+#include <lie/detail/arccosine.hpp>
 #include <lie/detail/group_base.hpp>
 #include <lie/detail/nearest_rotation.hpp>
 #include <lie/manifold.hpp>
@@ -63,10 +64,11 @@ struct So3Math {
     return Params(s * v[0], s * v[1], s * v[2], h.cos);
   }
   static Tangent log(const Params& q) {
-    const Eigen::Matrix<S, 3, 1> u = q.template head<3>();
-    const S n2 = u.dot(u);
-    const S sign = select(q[3] < S(0), S(-1), S(1));
-    return (S(2) * sign * arctangentOverSine(n2, S(sign * q[3]))) * u;
+    using std::sqrt;
+    // Of any norm: products leave it a little off one.
+    const S inverse_norm = S(1) / sqrt(q.dot(q));
+    const S signed_inverse = select(q[3] < S(0), S(-inverse_norm), inverse_norm);
+    return (arccosineRatio(S(q[3] * signed_inverse)) * signed_inverse) * q.template head<3>();
   }
 
   static MatrixType hat(const Tangent& v) { return skew(v); }
@@ -74,6 +76,16 @@ struct So3Math {
   static MatrixType Adj(const Params& q) { return matrix(q); }
   static MatrixType ad(const Tangent& v) { return skew(v); }
 
+  /// leftJacobian(v)·a and leftJacobianInverse(v)·a, without the matrices.
+  static Tangent leftJacobianTimes(const Tangent& v, const Tangent& a) {
+    const S t = v.dot(v), s = halfAngle(t).sinc;
+    const Tangent va = v.cross(a);
+    return a + (S(0.5) * s * s) * va + beta3(t) * v.cross(va);
+  }
+  static Tangent leftJacobianInverseTimes(const Tangent& v, const Tangent& a) {
+    const Tangent va = v.cross(a);
+    return a - S(0.5) * va + cotangentExcess(S(v.dot(v))) * v.cross(va);
+  }
   static MatrixType leftJacobian(const Tangent& v) {
     const S t = v.dot(v);
     const S s = halfAngle(t).sinc;

@@ -10,7 +10,7 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
+#include <cstddef>
 #include <type_traits>
 
 namespace liestat::detail {
@@ -45,13 +45,37 @@ constexpr std::array<double, N> factorialSeries(int offset, Factor factor) {
   return coefficients;
 }
 
-/// Sum of c[k] x^k over the terms that the scalar's precision can see.
-template <class S, int SingleTerms, std::size_t N>
-inline S horner(const std::array<double, N>& c, const S& x) {
-  constexpr int terms = is_single_precision<S> ? SingleTerms : static_cast<int>(N);
-  S sum = S(c[terms - 1]);
-  for (int k = terms - 2; k >= 0; --k) sum = sum * x + S(c[static_cast<std::size_t>(k)]);
-  return sum;
+/// A number of the type S: of scalars by conversion, of the compilers' vectors in every lane.
+template <class S>
+inline S constant(double c) {
+  if constexpr (std::is_constructible_v<S, double>) {
+    return S(c);
+  } else {
+    return S{} + c;
+  }
+}
+
+/// Σ c_k x^k over the first `terms` coefficients, even and odd powers apart: two chains of operations that don't wait
+/// for one another.
+template <std::size_t terms, class S, std::size_t N>
+inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
+  static_assert(terms >= 2 && terms <= N);
+  const S x2 = x * x;
+  constexpr std::size_t last_even = (terms - 1) / 2 * 2, last_odd = (terms / 2) * 2 - 1;
+  S even = constant<S>(c[last_even]), odd = constant<S>(c[last_odd]);
+  for (std::size_t k = last_even; k >= 2; k -= 2) even = even * x2 + constant<S>(c[k - 2]);
+  for (std::size_t k = last_odd; k >= 3; k -= 2) odd = odd * x2 + constant<S>(c[k - 2]);
+  return odd * x + even;
+}
+template <class S, std::size_t N>
+inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
+  return evaluatePolynomial<N>(c, x);
+}
+
+/// Of a power series as many terms as the scalar's precision can see.
+template <class S, std::size_t SingleTerms, std::size_t N>
+inline S series(const std::array<double, N>& c, const S& x) {
+  return evaluatePolynomial < is_single_precision<S> ? SingleTerms : N > (c, x);
 }
 
 /// Largest squared angle of the polynomial range: a little above pi^2.
@@ -78,7 +102,7 @@ inline HalfAngle<S> halfAngle(const S& t) {
       t < S(polynomial_range),
       [&] {
         const S x = t * S(0.25);
-        return HalfAngle<S>{horner<S, 8>(sine_series, x), horner<S, 8>(cosine_series, x)};
+        return HalfAngle<S>{series<S, 8>(sine_series, x), series<S, 8>(cosine_series, x)};
       },
       [&] {
         using std::cos, std::sin, std::sqrt;
@@ -91,7 +115,7 @@ inline HalfAngle<S> halfAngle(const S& t) {
 template <class S>
 inline S halfExcess(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return horner<S, 7>(half_excess_series, S(t * S(0.25))); },
+      t < S(polynomial_range), [&] { return series<S, 7>(half_excess_series, S(t * S(0.25))); },
       [&] {
         const HalfAngle<S> a = halfAngle(t);
         return S((a.sinc - a.cos) / (t * S(0.25)));
@@ -102,7 +126,7 @@ inline S halfExcess(const S& t) {
 template <class S>
 inline S halfExcessSlope(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return horner<S, 7>(half_excess_slope_series, S(t * S(0.25))); },
+      t < S(polynomial_range), [&] { return series<S, 7>(half_excess_slope_series, S(t * S(0.25))); },
       [&] {
         const HalfAngle<S> a = halfAngle(t);
         return S((a.sinc - S(3) * halfExcess(t)) / (t * S(0.5)));
@@ -113,7 +137,7 @@ inline S halfExcessSlope(const S& t) {
 template <class S>
 inline S beta3(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return horner<S, 9>(beta3_series, t); },
+      t < S(polynomial_range), [&] { return series<S, 9>(beta3_series, t); },
       [&] {
         const HalfAngle<S> a = halfAngle(t);
         return S((S(1) - a.sinc * a.cos) / t);
@@ -124,7 +148,7 @@ inline S beta3(const S& t) {
 template <class S>
 inline S beta4(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return horner<S, 9>(beta4_series, t); },
+      t < S(polynomial_range), [&] { return series<S, 9>(beta4_series, t); },
       [&] {
         const HalfAngle<S> a = halfAngle(t);
         return S((S(1) - a.sinc * a.sinc) / (S(2) * t));
@@ -135,7 +159,7 @@ inline S beta4(const S& t) {
 template <class S>
 inline S beta5(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return horner<S, 9>(beta5_series, t); },
+      t < S(polynomial_range), [&] { return series<S, 9>(beta5_series, t); },
       [&] {
         const HalfAngle<S> a = halfAngle(t);
         const S cos_theta = S(2) * a.cos * a.cos - S(1);
@@ -165,7 +189,7 @@ inline S arctangentOverSine(const S& y2, const S& x) {
   using std::abs;
   // x·|x|, for the series is that of x > 0 alone.
   return branch(
-      y2 < S(0.0125) * x * abs(x), [&] { return S(horner<S, 5>(arctangent_series, S(y2 / (x * x))) / x); },
+      y2 < S(0.0125) * x * abs(x), [&] { return S(series<S, 5>(arctangent_series, S(y2 / (x * x))) / x); },
       [&] {
         using std::atan2, std::sqrt;
         const S y = sqrt(y2);

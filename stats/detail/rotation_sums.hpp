@@ -6,6 +6,7 @@
 // atan2, square root, division or branch.
 #pragma once
 
+#include <lie/detail/arccosine.hpp>
 #include <lie/frame3.hpp>
 
 #include <array>
@@ -53,52 +54,6 @@ inline double largestOf(const Pack& v) {
 inline Pack absolute(const Pack& v) { return v < 0.0 ? -v : v; }
 inline Pack larger(const Pack& a, const Pack& b) { return a > b ? a : b; }
 
-/// Half of f, or g, from σ = (1-w)/2 in [0, ½]: φ/sin φ = Σ c_n σⁿ for w = cos φ, c_{n+1}/c_n = (2n+2)/(2n+3), and
-/// minus the derivative of that with respect to w.
-constexpr long double arccosineSeries(long double sigma, bool slope) {
-  long double c = 1, power = 1, sum = slope ? 0 : 1;
-  for (int n = 0; n < 72; ++n) {
-    c *= static_cast<long double>(2 * n + 2) / static_cast<long double>(2 * n + 3);
-    if (slope) sum += static_cast<long double>(n + 1) / 2 * c * power;
-    power *= sigma;
-    if (!slope) sum += c * power;
-  }
-  return sum;
-}
-
-/// The polynomial that interpolates the series at Chebyshev's points of 0 <= σ <= range, in x = 2σ/range - 1; lowest
-/// power first.
-template <std::size_t N>
-constexpr std::array<double, N> arccosinePolynomial(bool slope, long double factor, long double range) {
-  std::array<long double, N> value{}, node{};
-  for (std::size_t i = 0; i < N; ++i) {
-    const long double angle = 3.141592653589793238462643383279502884L * static_cast<long double>(2 * i + 1) / (2 * N);
-    long double term = 1, cosine = 1;
-    for (int k = 1; k < 24; ++k) {
-      term *= -angle * angle / static_cast<long double>((2 * k - 1) * (2 * k));
-      cosine += term;
-    }
-    node[i] = cosine;
-    value[i] = factor * arccosineSeries(range * (1 + cosine) / 2, slope);
-  }
-  std::array<long double, N> sum{}, T{}, T_next{}, t{}, t_next{};
-  T[0] = 1;                                                           // T_j by its powers of x
-  T_next[1] = 1;                                                      // T_{j+1}
-  for (std::size_t i = 0; i < N; ++i) t[i] = 1, t_next[i] = node[i];  // their values at the nodes
-  for (std::size_t j = 0; j < N; ++j) {
-    long double a = 0;
-    for (std::size_t i = 0; i < N; ++i) a += value[i] * t[i] * (j == 0 ? 1 : 2) / N;
-    for (std::size_t k = 0; k < N; ++k) sum[k] += a * T[k];
-    const auto T_j = T, t_j = t;
-    T = T_next, t = t_next;
-    for (std::size_t k = 0; k < N; ++k) T_next[k] = (k > 0 ? 2 * T[k - 1] : 0) - T_j[k];
-    for (std::size_t i = 0; i < N; ++i) t_next[i] = 2 * node[i] * t[i] - t_j[i];
-  }
-  std::array<double, N> c{};
-  for (std::size_t k = 0; k < N; ++k) c[k] = static_cast<double>(sum[k]);
-  return c;
-}
-
 /// f and g on w >= 1 - 2 range: log and exact_hessian reach the rounding of double; newton_hessian, good to eight
 /// digits, is for steps whose Hessian nobody sees.
 template <std::size_t Log, std::size_t Exact, std::size_t Newton>
@@ -113,17 +68,6 @@ inline constexpr RotationPolynomials<21, 22, 11> any_rotation{0.5};
 /// For angles up to a right angle, cos(π/4) = 0.7071…
 inline constexpr RotationPolynomials<13, 13, 7> small_rotation{0.1465};
 inline constexpr double small_rotation_cosine = 0.7072;
-
-/// Σ c_k x^k, even and odd powers apart: two chains that don't wait for one another.
-template <std::size_t N>
-inline Pack evaluate(const std::array<double, N>& c, const Pack& x) {
-  const Pack x2 = x * x;
-  constexpr std::size_t last_even = (N - 1) / 2 * 2, last_odd = (N / 2) * 2 - 1;
-  Pack even = Pack{} + c[last_even], odd = Pack{} + c[last_odd];
-  for (std::size_t k = last_even; k >= 2; k -= 2) even = even * x2 + c[k - 2];
-  for (std::size_t k = last_odd; k >= 3; k -= 2) odd = odd * x2 + c[k - 2];
-  return odd * x + even;
-}
 
 /// Manifolds whose sums are made here: SO3, Frame3 and the quotients of Frame3, in double.
 template <class M>
@@ -264,14 +208,14 @@ class RotationSums {
       const Pack scale = 1.0 - excess * (0.5 - 0.375 * excess);
       defect = larger(absolute(excess), defect);
       const Pack variable = (1.0 - scale * absolute(q[3])) * (1 / polynomials.range) - 1.0;
-      const Pack f = scale * evaluate(polynomials.log, variable);
+      const Pack f = scale * evaluatePolynomial(polynomials.log, variable);
       const Pack sign_f = q[3] < 0.0 ? -f : f;
       const Pack p = Weighted ? loadPack(data[4] + j) : Pack{} + 1.0;
       Pack g = scale * scale;
       if constexpr (Scatter) {
-        g *= evaluate(polynomials.exact_hessian, variable);
+        g *= evaluatePolynomial(polynomials.exact_hessian, variable);
       } else {
-        g *= evaluate(polynomials.newton_hessian, variable);
+        g *= evaluatePolynomial(polynomials.newton_hessian, variable);
       }
       if constexpr (Weighted) g *= p;
       const Pack gx = g * q[0], gy = g * q[1];

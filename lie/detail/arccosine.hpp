@@ -1,0 +1,67 @@
+// The logarithm of a unit quaternion without an inverse trigonometric function: with w the absolute value of its real
+// part and u its vector part, the rotation vector is ±f(w) u, f(w) = 2 acos(w)/√(1-w²), which is analytic on [0, 1]; its
+// nearest singularity lies at -1. One polynomial holds from no rotation to the half-turn, without a branch.
+#pragma once
+
+#include <lie/detail/trig.hpp>
+
+#include <array>
+#include <cstddef>
+
+namespace liestat::detail {
+
+/// Half of f, or g, from σ = (1-w)/2 in [0, ½]: φ/sin φ = Σ c_n σⁿ for w = cos φ, c_{n+1}/c_n = (2n+2)/(2n+3), and
+/// minus the derivative of that with respect to w.
+constexpr long double arccosineSeries(long double sigma, bool slope) {
+  long double c = 1, power = 1, sum = slope ? 0 : 1;
+  for (int n = 0; n < 72; ++n) {
+    c *= static_cast<long double>(2 * n + 2) / static_cast<long double>(2 * n + 3);
+    if (slope) sum += static_cast<long double>(n + 1) / 2 * c * power;
+    power *= sigma;
+    if (!slope) sum += c * power;
+  }
+  return sum;
+}
+
+/// The polynomial that interpolates the series at Chebyshev's points of 0 <= σ <= range, in x = 2σ/range - 1; lowest
+/// power first.
+template <std::size_t N>
+constexpr std::array<double, N> arccosinePolynomial(bool slope, long double factor, long double range) {
+  std::array<long double, N> value{}, node{};
+  for (std::size_t i = 0; i < N; ++i) {
+    const long double angle = 3.141592653589793238462643383279502884L * static_cast<long double>(2 * i + 1) / (2 * N);
+    long double term = 1, cosine = 1;
+    for (int k = 1; k < 24; ++k) {
+      term *= -angle * angle / static_cast<long double>((2 * k - 1) * (2 * k));
+      cosine += term;
+    }
+    node[i] = cosine;
+    value[i] = factor * arccosineSeries(range * (1 + cosine) / 2, slope);
+  }
+  std::array<long double, N> sum{}, T{}, T_next{}, t{}, t_next{};
+  T[0] = 1;                                                           // T_j by its powers of x
+  T_next[1] = 1;                                                      // T_{j+1}
+  for (std::size_t i = 0; i < N; ++i) t[i] = 1, t_next[i] = node[i];  // their values at the nodes
+  for (std::size_t j = 0; j < N; ++j) {
+    long double a = 0;
+    for (std::size_t i = 0; i < N; ++i) a += value[i] * t[i] * (j == 0 ? 1 : 2) / N;
+    for (std::size_t k = 0; k < N; ++k) sum[k] += a * T[k];
+    const auto T_j = T, t_j = t;
+    T = T_next, t = t_next;
+    for (std::size_t k = 0; k < N; ++k) T_next[k] = (k > 0 ? 2 * T[k - 1] : 0) - T_j[k];
+    for (std::size_t i = 0; i < N; ++i) t_next[i] = 2 * node[i] * t[i] - t_j[i];
+  }
+  std::array<double, N> c{};
+  for (std::size_t k = 0; k < N; ++k) c[k] = static_cast<double>(sum[k]);
+  return c;
+}
+
+/// f(w) for w in [0, 1], and a little beyond.
+template <class S>
+inline S arccosineRatio(const S& w) {
+  // The series converge with the distance from -1: a digit in every 0.76 terms.
+  static constexpr auto coefficients = arccosinePolynomial<is_single_precision<S> ? 11 : 21>(false, 2, 0.5L);
+  return evaluatePolynomial(coefficients, S(S(1) - S(2) * w));
+}
+
+}  // namespace liestat::detail
