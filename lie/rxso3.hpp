@@ -32,8 +32,7 @@ struct RxSo3Math {
   static Params identity() { return Rotation::identity(); }
   /// Product of quaternions, its scale kept in the admitted range.
   static Params product(const Params& a, const Params& b) {
-    const Params q =
-        (Eigen::Map<const Eigen::Quaternion<S>>(a.data()) * Eigen::Map<const Eigen::Quaternion<S>>(b.data())).coeffs();
+    const Params q = Rotation::quaternionProduct(a, b);
     return saturated(q, S(q.dot(q)), ScaleRange<S>::least);
   }
   static Params inverse(const Params& q) { return Rotation::inverse(q) / q.dot(q); }

@@ -86,7 +86,10 @@ struct Se2Math {
   static Tangent vee(const MatrixType& m) { return Tangent(m(0, 2), m(1, 2), m(1, 0)); }
   static Square blocks(const Matrix2& translation, const Vector2& coupling, const S& rotation) {
     Square m;
-    m << translation, coupling, S(0), S(0), rotation;
+    m.template topLeftCorner<2, 2>() = translation;
+    m.template topRightCorner<2, 1>() = coupling;
+    m(2, 0) = m(2, 1) = S(0);
+    m(2, 2) = rotation;
     return m;
   }
   static Square Adj(const Params& p) { return blocks(Rotation::matrix(complex(p)), Vector2(p[3], -p[2]), S(1)); }

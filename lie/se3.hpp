@@ -31,12 +31,12 @@ struct Se3Math {
 
   static Params join(const Vector4& q, const Vector3& t) {
     Params p;
-    p.template head<4>() = q;
-    p.template tail<3>() = t;
+    for (int i = 0; i < 4; ++i) p[i] = q[i];
+    for (int i = 0; i < 3; ++i) p[i + 4] = t[i];
     return p;
   }
-  static Vector4 quaternion(const Params& p) { return p.template head<4>(); }
-  static Vector3 translation(const Params& p) { return p.template tail<3>(); }
+  static Vector4 quaternion(const Params& p) { return Vector4(p[0], p[1], p[2], p[3]); }
+  static Vector3 translation(const Params& p) { return three<4>(p); }
 
   static Params identity() { return join(Rotation::identity(), Vector3::Zero()); }
   static Params product(const Params& a, const Params& b) {
@@ -53,20 +53,22 @@ struct Se3Math {
   static Point rotate(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x); }
 
   static Params exp(const Tangent& v) {
-    const Vector3 omega = v.template tail<3>(), upsilon = v.template head<3>();
+    const Vector3 omega = three<3>(v), upsilon = three<0>(v);
     return join(Rotation::exp(omega), Rotation::leftJacobianTimes(omega, upsilon));
   }
   static Tangent log(const Params& p) {
     const Vector3 omega = Rotation::log(quaternion(p));
     Tangent v;
-    v << Rotation::leftJacobianInverseTimes(omega, translation(p)), omega;
+    v.template head<3>() = Rotation::leftJacobianInverseTimes(omega, translation(p));
+    v.template tail<3>() = omega;
     return v;
   }
 
   static MatrixType matrix(const Params& p) {
-    MatrixType m = MatrixType::Identity();
+    MatrixType m;
     m.template topLeftCorner<3, 3>() = Rotation::matrix(quaternion(p));
     m.template topRightCorner<3, 1>() = translation(p);
+    m.row(3) = Vector4::Unit(3).transpose();
     return m;
   }
   static MatrixType hat(const Tangent& v) {
@@ -81,33 +83,38 @@ struct Se3Math {
     return v;
   }
   static Square blocks(const Matrix3& diagonal, const Matrix3& coupling) {
+    // Entry by entry: Eigen's copies in packets wait for the entries that were stored one by one.
     Square m;
-    m.template topLeftCorner<3, 3>() = diagonal;
-    m.template topRightCorner<3, 3>() = coupling;
-    m.template bottomLeftCorner<3, 3>().setZero();
-    m.template bottomRightCorner<3, 3>() = diagonal;
+    for (int j = 0; j < 3; ++j) {
+      for (int i = 0; i < 3; ++i) {
+        m(i, j) = m(i + 3, j + 3) = diagonal(i, j);
+        m(i + 3, j) = S(0);
+        m(i, j + 3) = coupling(i, j);
+      }
+    }
     return m;
   }
   static Square Adj(const Params& p) {
     const Matrix3 R = Rotation::matrix(quaternion(p));
-    return blocks(R, skew(translation(p)) * R);
+    return blocks(R, skewTimes(translation(p), R));
   }
-  static Square ad(const Tangent& v) { return blocks(skew(v.template tail<3>()), skew(v.template head<3>())); }
+  static Square ad(const Tangent& v) { return blocks(skew(three<3>(v)), skew(three<0>(v))); }
 
   /// Off-diagonal block of the left Jacobian (Barfoot 2017, eq. 7.86), with the triple products reduced: for d = φ·ρ
   /// they are [φ][ρ][φ] = -d[φ] and [φ]²[ρ] + [ρ][φ]² = -|φ|²[ρ] - d[φ].
   static Matrix3 coupling(const Vector3& rho, const Vector3& phi) {
-    const S t = phi.dot(phi), d = phi.dot(rho);
-    const S b3 = beta3(t), s = halfAngle(t).sinc, b5 = S(-2) * d * beta5(t);
-    const Vector3 axial = (S(0.5) * s * s) * rho + (d * (S(2) * beta4(t) - b3)) * phi;
-    const Vector3 b = b3 * rho + (S(0.5) * b5) * phi;
-    Matrix3 m = b * phi.transpose() + phi * b.transpose() + skew(axial);
-    m.diagonal().array() -= S(2) * d * b3 + b5 * t;
-    return m;
+    return coupling(rho, phi, jacobianCoefficients(S(phi.dot(phi))));
+  }
+  static Matrix3 coupling(const Vector3& rho, const Vector3& phi, const JacobianCoefficients<S>& c) {
+    const S t = phi.dot(phi), d = phi.dot(rho), s = c.half_sinc, b5 = S(-2) * d * c.beta5;
+    const Vector3 axial = (S(0.5) * s * s) * rho + (d * (S(2) * c.beta4 - c.beta3)) * phi;
+    const Vector3 b = c.beta3 * rho + (S(0.5) * b5) * phi;
+    return symmetricPlusSkew(b, phi, S(-S(2) * d * c.beta3 - b5 * t), axial);
   }
   static Square leftJacobian(const Tangent& v) {
-    const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
-    return blocks(Rotation::leftJacobian(phi), coupling(rho, phi));
+    const Vector3 rho = three<0>(v), phi = three<3>(v);
+    const JacobianCoefficients<S> c = jacobianCoefficients(S(phi.dot(phi)));
+    return blocks(rotationPolynomial(phi, S(1), S(S(0.5) * c.half_sinc * c.half_sinc), c.beta3), coupling(rho, phi, c));
   }
   /// Off-diagonal block of the inverse: ad(υ, ω) acts as the dual number [ω] + ε[υ], so it is the derivative of
   /// So3Math::leftJacobianInverse at φ in the direction ρ.
@@ -115,12 +122,10 @@ struct Se3Math {
     const S t = phi.dot(phi), d = phi.dot(rho);
     const S c = cotangentExcess(t), slope = d * cotangentExcessSlope(t);
     const Vector3 b = c * rho + (S(0.5) * slope) * phi;
-    Matrix3 m = b * phi.transpose() + phi * b.transpose() + skew(S(-0.5) * rho);
-    m.diagonal().array() -= S(2) * c * d + slope * t;
-    return m;
+    return symmetricPlusSkew(b, phi, S(-S(2) * c * d - slope * t), Vector3(S(-0.5) * rho));
   }
   static Square leftJacobianInverse(const Tangent& v) {
-    const Vector3 rho = v.template head<3>(), phi = v.template tail<3>();
+    const Vector3 rho = three<0>(v), phi = three<3>(v);
     return blocks(Rotation::leftJacobianInverse(phi), inverseCoupling(rho, phi));
   }
   static Eigen::Matrix<S, 7, 6> productJacobian(const Params& p) {

@@ -31,14 +31,26 @@ struct So3Math {
 
   static Params identity() { return Params(S(0), S(0), S(0), S(1)); }
 
+  /// The quaternions' product, not renormalised.
+  static Params quaternionProduct(const Params& a, const Params& b) {
+#if defined(EIGEN_VECTORIZE_SSE) && !defined(EIGEN_VECTORIZE_AVX)
+    // Eigen's own kernel is the faster one with two lanes; with four its result has to be copied, which costs more.
+    return (Eigen::Map<const Eigen::Quaternion<S>>(a.data()) * Eigen::Map<const Eigen::Quaternion<S>>(b.data()))
+        .coeffs();
+#else
+    return Params(a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],  //
+                  a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2],  //
+                  a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0],  //
+                  a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]);
+#endif
+  }
   static Params product(const Params& a, const Params& b) {
-    const Eigen::Quaternion<S> q = Eigen::Map<const Eigen::Quaternion<S>>(a.data()) *  //
-                                   Eigen::Map<const Eigen::Quaternion<S>>(b.data());
+    const Params q = quaternionProduct(a, b);
     if constexpr (is_single_precision<S>) {
       // One Newton step of 1/|q|: keeps long chains on the sphere without a square root.
-      return q.coeffs() * (S(0.5) * (S(3) - q.coeffs().dot(q.coeffs())));
+      return q * (S(0.5) * (S(3) - q.dot(q)));
     } else {
-      return q.coeffs();
+      return q;
     }
   }
   static Params inverse(const Params& q) { return Params(-q[0], -q[1], -q[2], q[3]); }

@@ -1,6 +1,6 @@
 // The logarithm of a unit quaternion without an inverse trigonometric function: with w the absolute value of its real
-// part and u its vector part, the rotation vector is ±f(w) u, f(w) = 2 acos(w)/√(1-w²), which is analytic on [0, 1]; its
-// nearest singularity lies at -1. One polynomial holds from no rotation to the half-turn, without a branch.
+// part and u its vector part, the rotation vector is ±f(w) u, f(w) = 2 acos(w)/√(1-w²), which is analytic on [0, 1];
+// its nearest singularity lies at -1. One polynomial holds from no rotation to the half-turn, without a branch.
 #pragma once
 
 #include <lie/detail/trig.hpp>
@@ -60,7 +60,7 @@ constexpr std::array<double, N> arccosinePolynomial(bool slope, long double fact
 template <class S>
 inline S arccosineRatio(const S& w) {
   // The series converge with the distance from -1: a digit in every 0.76 terms.
-  static constexpr auto coefficients = arccosinePolynomial<is_single_precision<S> ? 11 : 21>(false, 2, 0.5L);
+  static constexpr auto coefficients = arccosinePolynomial < is_single_precision<S> ? 11 : 21 > (false, 2, 0.5L);
   return evaluatePolynomial(coefficients, S(S(1) - S(2) * w));
 }
 

@@ -55,17 +55,24 @@ inline S constant(double c) {
   }
 }
 
-/// Σ c_k x^k over the first `terms` coefficients, even and odd powers apart: two chains of operations that don't wait
-/// for one another.
+/// c[first] + c[first + 4] x4 + c[first + 8] x4² + … up to the last index below `terms`.
+template <std::size_t first, std::size_t terms, class S, std::size_t N>
+inline S everyFourth(const std::array<double, N>& c, const S& x4) {
+  constexpr std::size_t last = first + (terms - 1 - first) / 4 * 4;
+  S sum = constant<S>(c[last]);
+  for (std::size_t k = last; k > first; k -= 4) sum = sum * x4 + constant<S>(c[k - 4]);
+  return sum;
+}
+
+/// Σ c_k x^k over the first `terms` coefficients, in four chains of operations that don't wait for one another:
+/// Horner's single chain takes four times as long as its multiplications.
 template <std::size_t terms, class S, std::size_t N>
 inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
-  static_assert(terms >= 2 && terms <= N);
-  const S x2 = x * x;
-  constexpr std::size_t last_even = (terms - 1) / 2 * 2, last_odd = (terms / 2) * 2 - 1;
-  S even = constant<S>(c[last_even]), odd = constant<S>(c[last_odd]);
-  for (std::size_t k = last_even; k >= 2; k -= 2) even = even * x2 + constant<S>(c[k - 2]);
-  for (std::size_t k = last_odd; k >= 3; k -= 2) odd = odd * x2 + constant<S>(c[k - 2]);
-  return odd * x + even;
+  static_assert(terms >= 4 && terms <= N);
+  const S x2 = x * x, x4 = x2 * x2;
+  const S low = everyFourth<0, terms>(c, x4) + everyFourth<1, terms>(c, x4) * x;
+  const S high = everyFourth<2, terms>(c, x4) + everyFourth<3, terms>(c, x4) * x;
+  return low + high * x2;
 }
 template <class S, std::size_t N>
 inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
@@ -167,6 +174,24 @@ inline S beta5(const S& t) {
       });
 }
 
+/// The coefficients of the left Jacobian and of its derivative, from t = theta^2, behind one branch.
+template <class S>
+struct JacobianCoefficients {
+  S half_sinc, beta3, beta4, beta5;
+};
+template <class S>
+inline JacobianCoefficients<S> jacobianCoefficients(const S& t) {
+  return branch(
+      t < S(polynomial_range),
+      [&] {
+        return JacobianCoefficients<S>{series<S, 8>(sine_series, S(t * S(0.25))), series<S, 9>(beta3_series, t),
+                                       series<S, 9>(beta4_series, t), series<S, 9>(beta5_series, t)};
+      },
+      [&] {
+        return JacobianCoefficients<S>{halfAngle(t).sinc, beta3(t), beta4(t), beta5(t)};
+      });
+}
+
 /// (1 - (theta/2) cot(theta/2))/theta^2, from t = theta^2: 1/12 at zero, 1/pi^2 at pi, a pole at 2 pi.
 template <class S>
 inline S cotangentExcess(const S& t) {
@@ -211,12 +236,42 @@ inline typename Derived::Scalar norm(const Eigen::MatrixBase<Derived>& v) {
       [] { return S(0); });
 }
 
+/// Three coefficients from `first` on, one by one: a copy in packets would wait for stores of another alignment.
+template <int first, class Derived>
+inline Eigen::Matrix<typename Derived::Scalar, 3, 1> three(const Eigen::MatrixBase<Derived>& v) {
+  return Eigen::Matrix<typename Derived::Scalar, 3, 1>(v[first], v[first + 1], v[first + 2]);
+}
+
 /// The cross-product matrix [v]: [v] w = v × w.
 template <class Derived>
 inline Eigen::Matrix<typename Derived::Scalar, 3, 3> skew(const Eigen::MatrixBase<Derived>& v) {
   using S = typename Derived::Scalar;
   Eigen::Matrix<S, 3, 3> m;
   m << S(0), -v[2], v[1], v[2], S(0), -v[0], -v[1], v[0], S(0);
+  return m;
+}
+
+/// [v] M for a 3×3 matrix.
+template <class S>
+inline Eigen::Matrix<S, 3, 3> skewTimes(const Eigen::Matrix<S, 3, 1>& v, const Eigen::Matrix<S, 3, 3>& M) {
+  Eigen::Matrix<S, 3, 3> m;
+  for (int j = 0; j < 3; ++j) {
+    m(0, j) = v[1] * M(2, j) - v[2] * M(1, j);
+    m(1, j) = v[2] * M(0, j) - v[0] * M(2, j);
+    m(2, j) = v[0] * M(1, j) - v[1] * M(0, j);
+  }
+  return m;
+}
+
+/// a bᵀ + b aᵀ + s I + [v]
+template <class S>
+inline Eigen::Matrix<S, 3, 3> symmetricPlusSkew(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b,
+                                                const S& s, const Eigen::Matrix<S, 3, 1>& v) {
+  const S xy = a[0] * b[1] + a[1] * b[0], xz = a[0] * b[2] + a[2] * b[0], yz = a[1] * b[2] + a[2] * b[1];
+  Eigen::Matrix<S, 3, 3> m;
+  m << S(2) * a[0] * b[0] + s, xy - v[2], xz + v[1],  //
+      xy + v[2], S(2) * a[1] * b[1] + s, yz - v[0],   //
+      xz - v[1], yz + v[0], S(2) * a[2] * b[2] + s;
   return m;
 }
 

@@ -21,10 +21,10 @@ struct Convention {
   EulerAxes axes;
   const char* name;
 };
-const Convention conventions[] = {
-    {EulerAxes::xyz, "xyz"}, {EulerAxes::xzy, "xzy"}, {EulerAxes::yxz, "yxz"}, {EulerAxes::yzx, "yzx"},
-    {EulerAxes::zxy, "zxy"}, {EulerAxes::zyx, "zyx"}, {EulerAxes::xyx, "xyx"}, {EulerAxes::xzx, "xzx"},
-    {EulerAxes::yxy, "yxy"}, {EulerAxes::yzy, "yzy"}, {EulerAxes::zxz, "zxz"}, {EulerAxes::zyz, "zyz"}};
+const Convention conventions[] = {{EulerAxes::xyz, "xyz"}, {EulerAxes::xzy, "xzy"}, {EulerAxes::yxz, "yxz"},
+                                  {EulerAxes::yzx, "yzx"}, {EulerAxes::zxy, "zxy"}, {EulerAxes::zyx, "zyx"},
+                                  {EulerAxes::xyx, "xyx"}, {EulerAxes::xzx, "xzx"}, {EulerAxes::yxy, "yxy"},
+                                  {EulerAxes::yzy, "yzy"}, {EulerAxes::zxz, "zxz"}, {EulerAxes::zyz, "zyz"}};
 
 /// By the names alone: the product of the three matrices.
 Eigen::Matrix3d product(const std::string& name, const Eigen::Vector3d& angles) {
