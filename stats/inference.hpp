@@ -17,11 +17,13 @@
 #endif
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/special_functions/beta.hpp>
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop
 #endif
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace liestat {
@@ -106,6 +108,16 @@ inline double chiSquaredQuantile(double probability, double k) {
 /// rounding of 1 - tail. NaN outside [0, 1] or for k ≤ 0.
 inline double chiSquaredThreshold(double tail, double k) {
   return k > 0 ? detail::lawThreshold(detail::ChiSquaredLaw(k), tail) : detail::not_a_number;
+}
+
+/// P(of n independent events of the given probability at least `count` happen), exact. NaN for a probability outside
+/// [0, 1].
+inline double binomialSurvival(std::size_t count, std::size_t n, double probability) {
+  if (!(probability >= 0 && probability <= 1)) return detail::not_a_number;
+  if (count == 0) return 1;
+  if (count > n) return 0;
+  return boost::math::ibeta(static_cast<double>(count), static_cast<double>(n - count + 1), probability,
+                            detail::QuietPolicy());
 }
 
 /// The number of standard errors that a standard normal variable exceeds, on either side, with the given probability:

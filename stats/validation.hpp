@@ -79,8 +79,17 @@ struct ValidationOptions {
 struct ValidationTolerance {
   double index = 0;             ///< relative deviation of the validation index
   double ks = 0;                ///< Kolmogorov-Smirnov distance between the true law of mu2 and the reference law
-  double failure_fraction = 0;  ///< failed trials, as a fraction of all
+  double failure_fraction = 0;  ///< probability that a trial fails
+  /// How much more often than due, 0.1 %, mu2 may exceed the 99.9 % quantile of the law. A covariance of first order is
+  /// far too small now and then, where the second order exceeds the least noise of a datum; where that noise can be as
+  /// small as it likes, P(mu2 > m) falls as slowly as 1/m and mu2 has no mean that an index could be compared with. So
+  /// with a tolerance here a distance beyond the quantile counts in the index as the law's mean of those, however far
+  /// off it is, and it is the number of them that is judged. Zero: none of this, all distances count as they are.
+  double tail = 0;
 };
+
+/// What ValidationTolerance::tail is about.
+inline constexpr double tail_level = 0.999;
 
 /// Observed frequency of mu2 ≤ the quantile of the reference law at `level`.
 struct Coverage {
@@ -129,13 +138,19 @@ struct ValidationReport {
   /// Number of distances N.
   std::size_t size() const { return mu2.size(); }
 
+  /// Number of distances beyond the law's quantile at tail_level.
+  std::size_t tailCount() const {
+    return static_cast<std::size_t>(mu2.end() - std::upper_bound(mu2.begin(), mu2.end(), law.quantile(tail_level)));
+  }
+
   /// The verdict. With probability 1 - false_alarm at least, an estimator passes whose distances follow the reference
-  /// law up to the tolerance. It fails if
-  /// - more than tolerance.failure_fraction of the trials failed, or none succeeded;
-  /// - the index is out of bounds at false_alarm/2. The bound is exact, not a normal approximation: N·I is χ² with kN
-  ///   degrees of freedom, and distances that should follow Hotelling's law are first carried over to χ²_k, rank by
-  ///   rank, because their own mean may have no variance;
-  /// - the Kolmogorov-Smirnov statistic is out of bounds at false_alarm/2.
+  /// law up to the tolerance. It fails if none of the trials succeeded, or at an equal share of false_alarm each if
+  /// - more trials failed than a probability tolerance.failure_fraction of failing explains (zero: none may);
+  /// - the index is out of bounds. The bound is exact, not a normal approximation: N·I is χ² with kN degrees of
+  ///   freedom. Distances that should follow Hotelling's law are first carried over to χ²_k, rank by rank, because
+  ///   their own mean may have no variance;
+  /// - the Kolmogorov-Smirnov statistic is out of bounds;
+  /// - more distances are beyond the law's 99.9 % quantile than 0.1 % + tolerance.tail explains, if tail is not zero.
   bool passed(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
     return reasonToFail(false_alarm, tolerance).empty();
   }
@@ -143,28 +158,35 @@ struct ValidationReport {
   /// Why passed() is false, in a few words; empty where it is true.
   std::string reasonToFail(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
     if (size() == 0) return "no trial succeeded";
-    if (static_cast<double>(failures) > tolerance.failure_fraction * static_cast<double>(trials)) {
+    const double share = false_alarm / (2 + (tolerance.failure_fraction > 0) + (tolerance.tail > 0));
+    // Written so that NaN (a law that does not exist) fails.
+    if (!(binomialSurvival(failures, trials, std::min(1., tolerance.failure_fraction)) >= share)) {
       return "too many trials failed";
     }
-    // Written so that NaN (a law that does not exist) fails.
-    if (!(indexPValue(tolerance.index) >= false_alarm / 2)) {
-      return equivalent_chi2_sum > static_cast<double>(dof) * static_cast<double>(size())
+    const bool bounded = tolerance.tail > 0;
+    if (!(indexPValue(tolerance.index, bounded) >= share)) {
+      return chi2Sum(bounded) > static_cast<double>(dof) * static_cast<double>(size())
                  ? "the index is too large: covariances are too small"
                  : "the index is too small: covariances are too large";
     }
-    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= false_alarm / 2)) {
+    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= share)) {
       return "the distances do not follow the law";
+    }
+    if (bounded && !(binomialSurvival(tailCount(), size(), std::min(1., 1 - tail_level + tolerance.tail)) >= share)) {
+      return "too many distances are far beyond the law";
     }
     return {};
   }
 
   /// Two-sided p-value of the index when its expectation is anywhere within law.mean()·(1 ± tolerance) (for Hotelling's
-  /// law: of the equivalent χ² index). tolerance ≥ 0.
-  double indexPValue(double tolerance = 0) const {
+  /// law: of the equivalent χ² index). tolerance ≥ 0. `bounded`: a distance beyond the law's quantile at tail_level
+  /// counts as the law's mean of those. Under the law that leaves the index its expectation and takes away variance, so
+  /// the p-value errs to the careful side.
+  double indexPValue(double tolerance = 0, bool bounded = false) const {
     if (size() == 0 || !(tolerance >= 0)) return detail::not_a_number;
-    const double sum_dof = static_cast<double>(dof) * static_cast<double>(size());
-    const double above = chiSquaredSurvival(equivalent_chi2_sum / (1 + tolerance), sum_dof);
-    const double below = tolerance < 1 ? chiSquaredCdf(equivalent_chi2_sum / (1 - tolerance), sum_dof) : 1;
+    const double sum = chi2Sum(bounded), sum_dof = static_cast<double>(dof) * static_cast<double>(size());
+    const double above = chiSquaredSurvival(sum / (1 + tolerance), sum_dof);
+    const double below = tolerance < 1 ? chiSquaredCdf(sum / (1 - tolerance), sum_dof) : 1;
     if (std::isnan(above) || std::isnan(below)) return detail::not_a_number;
     return std::min(1., 2 * std::min(above, below));
   }
@@ -215,6 +237,19 @@ struct ValidationReport {
          << "plot $bins using 1:2 with boxes title '" << size() << " trials', $bins using 1:3 with lines lw 2 title '"
          << law.name() << "'\n";
     os << text.str();
+  }
+
+ private:
+  /// The sum of the equivalent χ² distances that the index is judged by.
+  double chi2Sum(bool bounded) const {
+    if (!bounded) return equivalent_chi2_sum;
+    double sum = 0;
+    const std::size_t inside = size() - tailCount();
+    for (std::size_t i = 0; i < inside; ++i) sum += law.equivalentChiSquared(mu2[i]);
+    // E[X | X > q] of X ~ χ²_k is k P(χ²_{k+2} > q)/P(χ²_k > q).
+    const double q = chiSquaredQuantile(tail_level, dof);
+    const double beyond = dof * chiSquaredSurvival(q, dof + 2) / (1 - tail_level);
+    return sum + beyond * static_cast<double>(size() - inside);
   }
 };
 

@@ -69,6 +69,32 @@ TEST(ChiSquared, endsAndBadArguments) {
   }
 }
 
+TEST(Binomial, survivalIsTheSumOfItsTerms) {
+  for (const double p : {0.002, 0.3, 0.97}) {
+    for (const std::size_t n : {1u, 7u, 40u}) {
+      double term = std::pow(1 - p, n), below = 0;
+      for (std::size_t count = 0; count <= n; ++count) {
+        EXPECT_NEAR(binomialSurvival(count, n, p), 1 - below, 1e-13) << count << " of " << n << " at " << p;
+        below += term;
+        term *= p / (1 - p) * static_cast<double>(n - count) / static_cast<double>(count + 1);
+      }
+    }
+  }
+  // Where it is tiny: p^n.
+  EXPECT_NEAR(binomialSurvival(30, 30, 0.01) / 1e-60, 1, 1e-12);
+}
+
+TEST(Binomial, endsAndBadArguments) {
+  EXPECT_EQ(binomialSurvival(0, 10, 0), 1);
+  EXPECT_EQ(binomialSurvival(1, 10, 0), 0);
+  EXPECT_EQ(binomialSurvival(10, 10, 1), 1);
+  EXPECT_EQ(binomialSurvival(11, 10, 1), 0);
+  EXPECT_EQ(binomialSurvival(0, 0, 0.5), 1);
+  for (const double p : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_TRUE(std::isnan(binomialSurvival(1, 10, p)));
+  }
+}
+
 TEST(Hotelling, ofOneDimensionIsStudentSquared) {
   // n = 2: Cauchy, P(t² ≤ x) = 2/pi atan(sqrt x); n = 3: P(t² ≤ x) = sqrt(x / (2 + x)).
   const double pi = 3.14159265358979323846;

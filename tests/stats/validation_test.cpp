@@ -251,7 +251,73 @@ TEST(Validation, countsFailuresOfEveryKind) {
   EXPECT_NEAR(report.index, 3, 4.5 * report.index_se_expected);
   EXPECT_EQ(report.reasonToFail(), "too many trials failed");
   EXPECT_TRUE(report.passed(1e-5, {.failure_fraction = 0.5})) << report;
-  EXPECT_FALSE(report.passed(1e-5, {.failure_fraction = 0.499}));
+  EXPECT_FALSE(report.passed(1e-5, {.failure_fraction = 0.42})) << "5.1 standard errors";
+}
+
+TEST(Validation, failuresAreJudgedByTheirProbabilityAndNotByTheirFraction) {
+  const auto withFailures = [](std::uint64_t failures, std::size_t trials) {
+    return validate(serial, {.trials = trials, .seed = 5}, ReferenceLaw::chiSquared(3),
+                    [=](CounterRng& rng, std::uint64_t number) {
+                      return TrialOutcome{.mu2 = rng.normalVector<3>().squaredNorm(), .failed = number < failures};
+                    });
+  };
+  // One failure in 50 is ten times the allowed fraction, and happens in a tenth of the runs.
+  EXPECT_TRUE(withFailures(1, 50).passed(1e-5, {.failure_fraction = 0.002}));
+  EXPECT_FALSE(withFailures(5, 50).passed(1e-5, {.failure_fraction = 0.002}));  // probability 6e-8
+  EXPECT_FALSE(withFailures(1, 50).passed());
+  EXPECT_FALSE(withFailures(400, 20000).passed(1e-5, {.failure_fraction = 0.015})) << "5.8 standard errors";
+}
+
+/// χ²_3, and in one trial of 300 a tail that falls as 1/m: the distance to a truth that the second order of the noise
+/// moved by about as much as a datum's deviation, if the square of the latter is uniform down to zero.
+TrialOutcome tailedTrial(CounterRng& rng, std::uint64_t) {
+  const double chi = rng.normalVector<3>().squaredNorm();
+  return {.mu2 = rng.uniform() < 1. / 300 ? 16 / rng.uniform() : chi};
+}
+
+TEST(Validation, aTailWithoutMeanIsCountedAndNotAveraged) {
+  const auto law = ReferenceLaw::chiSquared(3);
+  const ValidationTolerance averaged{.index = 0.06, .ks = 0.03};
+  const ValidationTolerance counted{.index = 0.06, .ks = 0.03, .tail = 0.004};
+  // Any number of trials, at a level at which a false alarm can be counted: 300 runs, bound 5 standard errors.
+  for (const std::size_t trials : {1u, 10u, 50u, 200u, 1000u}) {
+    double averaged_failed = 0, counted_failed = 0;
+    for (std::uint64_t seed = 0; seed < 300; ++seed) {
+      const auto report = validate(serial, {.trials = trials, .seed = seed}, law, tailedTrial);
+      averaged_failed += !report.passed(0.01, averaged);
+      counted_failed += !report.passed(0.01, counted);
+    }
+    EXPECT_LT(counted_failed / 300, 0.01 + 5 * std::sqrt(0.01 * 0.99 / 300)) << trials;
+    if (trials == 200) {
+      EXPECT_GT(averaged_failed / 300, 0.1);
+    }
+  }
+  // What is counted is judged: thrice as many fail, as does a wrong covariance of all.
+  const auto report = [&](double share, double factor) {
+    return validate(serial, {.trials = 20000, .seed = 2}, law, [=](CounterRng& rng, std::uint64_t) {
+      const double chi = factor * rng.normalVector<3>().squaredNorm();
+      return TrialOutcome{.mu2 = rng.uniform() < share ? 16 / rng.uniform() : chi};
+    });
+  };
+  EXPECT_EQ(report(0.004, 1).reasonToFail(1e-5, counted), "");
+  EXPECT_EQ(report(0.01, 1).reasonToFail(1e-5, counted), "too many distances are far beyond the law");
+  EXPECT_EQ(report(0, 1.15).reasonToFail(1e-5, counted), "the index is too large: covariances are too small");
+  EXPECT_EQ(report(0, 0.88).reasonToFail(1e-5, counted), "the index is too small: covariances are too large");
+}
+
+TEST(Validation, theBoundedIndexKeepsTheLawsExpectation) {
+  for (const bool residuals : {false, true}) {
+    const ReferenceLaw law = residuals ? ReferenceLaw::hotelling(3, 5) : ReferenceLaw::chiSquared(3);
+    const std::size_t trials = 100000;
+    const auto report = validate(serial, {.trials = trials, .seed = 3}, law, [&](CounterRng& rng, std::uint64_t) {
+      const double chi = rng.normalVector<3>().squaredNorm(), other = rng.normalVector<2>().squaredNorm();
+      return TrialOutcome{.mu2 = residuals ? 3 * (4. / 2) * (chi / 3) / (other / 2) : chi};
+    });
+    EXPECT_GT(report.indexPValue(0, true), 1e-3);
+    EXPECT_NEAR(static_cast<double>(report.tailCount()), 100, 4.5 * 10);
+    // Were the distances beyond cut off at the quantile, 0.06 % of the index would be missing: 0.2 standard errors.
+    EXPECT_NEAR(std::log10(report.indexPValue(0, true) / report.indexPValue()), 0, 0.3);
+  }
 }
 
 TEST(Validation, anEstimatorThatAlwaysFailsGivesAReport) {
