@@ -63,6 +63,7 @@ JsonObject toJson(const MeansRow& row) {
   o.set("n", e.n).set("spread", e.spread).set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
   o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
   o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+  o.set("tail", static_cast<double>(r.tailCount()) / static_cast<double>(r.size()));
   o.set("iterations", r.mean_iterations).set("failures", r.failures);
   o.set("ratio_rotation", row.ratio(log_ratio_rotation))
       .set("ratio_rotation_logsd", row.logDeviation(log_ratio_rotation));
