@@ -81,9 +81,9 @@ struct ManifoldTraits<S2<S, O>> {
     const auto& p = x.params();
     const S s2 = p[0] * p[0] + p[1] * p[1];
     // 1 + z without cancellation near the antipode: s²/(1 - z) below the equator.
-    const bool lower = p[2] < S(0);
+    const auto lower = p[2] < S(0);
     const S w = select(lower, S(s2 / (S(1) - select(lower, p[2], S(0)))), S(S(1) + p[2]));
-    const bool antipode = !(s2 + w * w > S(0));
+    const auto antipode = !(s2 + w * w > S(0));
     Eigen::Matrix<S, 4, 1> q(select(antipode, S(1), S(-p[1])), p[0], S(0), w);
     return Group::fromParams(detail::So3Math<S>::normalized(q));
   }
@@ -97,7 +97,7 @@ struct ManifoldTraits<S2<S, O>> {
     using detail::select;
     const auto& p = x.params();
     const S s2 = p[0] * p[0] + p[1] * p[1];
-    const bool antipode = s2 == S(0) && p[2] < S(0);
+    const auto antipode = s2 == S(0) && p[2] < S(0);
     const S f = detail::arctangentOverSine(select(antipode, S(1), s2), select(antipode, S(0), S(p[2])));
     return Tangent(select(antipode, S(EIGEN_PI), S(f * p[0])), f * p[1]);
   }
@@ -133,7 +133,7 @@ struct ManifoldTraits<S2<S, O>> {
     const auto& p = x.params();
     const S s2 = p[0] * p[0] + p[1] * p[1];
     // As in placement: 1 + z without cancellation.
-    const bool lower = p[2] < S(0);
+    const auto lower = p[2] < S(0);
     const S inverse = select(lower, S((S(1) - p[2]) / select(s2 > S(0), s2, S(1))),  //
                              S(S(1) / (S(1) + select(lower, S(0), S(p[2])))));
     Eigen::Matrix<S, 3, 2> m;
