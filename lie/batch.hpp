@@ -1,5 +1,5 @@
-// Several elements of a manifold at a time, one in each lane of the processor's vector registers: SO3<Batch<double>> and
-// the others, from the same source as their scalars (needs xsimd 8.1 or newer).
+// Several elements of a manifold at a time, one in each lane of the processor's vector registers: SO3<Batch<double>>
+// and the others, from the same source as their scalars (needs xsimd 8.1 or newer).
 //
 //   using liestat::Batch;
 //   const auto pose = liestat::loadBatch(poses.data());   // SE3<Batch<double>>, from Batch<double>::size poses
@@ -39,7 +39,15 @@ struct Eigen::NumTraits<xsimd::batch<T, A>> : Eigen::GenericNumTraits<T> {
   using NonInteger = Real;
   using Nested = Real;
   using Literal = Real;
-  enum { IsComplex = 0, IsInteger = 0, IsSigned = 1, RequireInitialization = 1, ReadCost = 1, AddCost = 1, MulCost = 1 };
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 1,
+    ReadCost = 1,
+    AddCost = 1,
+    MulCost = 1
+  };
 };
 
 namespace liestat {
@@ -51,7 +59,8 @@ inline constexpr bool is_single_precision<xsimd::batch<float, A>> = true;
 /// Lane by lane, a where the mask holds, else b: of batches, of Eigen's matrices of them, and of structures that hold
 /// nothing else.
 template <class T, class A>
-xsimd::batch<T, A> blend(const xsimd::batch_bool<T, A>& mask, const xsimd::batch<T, A>& a, const xsimd::batch<T, A>& b) {
+xsimd::batch<T, A> blend(const xsimd::batch_bool<T, A>& mask, const xsimd::batch<T, A>& a,
+                         const xsimd::batch<T, A>& b) {
   return xsimd::select(mask, a, b);
 }
 template <class T, class A, int R, int C, int O>
@@ -63,14 +72,14 @@ Eigen::Matrix<xsimd::batch<T, A>, R, C, O> blend(const xsimd::batch_bool<T, A>& 
   return result;
 }
 template <class T, class A, class Aggregate>
-  requires std::is_aggregate_v<Aggregate>
-Aggregate blend(const xsimd::batch_bool<T, A>& mask, const Aggregate& a, const Aggregate& b) {
-  using Batches = std::array<xsimd::batch<T, A>, sizeof(Aggregate) / sizeof(xsimd::batch<T, A>)>;
-  const auto x = std::bit_cast<Batches>(a), y = std::bit_cast<Batches>(b);
-  Batches result;
-  for (std::size_t i = 0; i < result.size(); ++i) result[i] = xsimd::select(mask, x[i], y[i]);
-  return std::bit_cast<Aggregate>(result);
-}
+  requires std::is_aggregate_v<Aggregate> Aggregate blend(const xsimd::batch_bool<T, A>& mask, const Aggregate& a,
+                                                          const Aggregate& b) {
+    using Batches = std::array<xsimd::batch<T, A>, sizeof(Aggregate) / sizeof(xsimd::batch<T, A>)>;
+    const auto x = std::bit_cast<Batches>(a), y = std::bit_cast<Batches>(b);
+    Batches result;
+    for (std::size_t i = 0; i < result.size(); ++i) result[i] = xsimd::select(mask, x[i], y[i]);
+    return std::bit_cast<Aggregate>(result);
+  }
 
 /// Found through the closures, which are of this namespace, where a template calls branch() with a mask of lanes.
 template <class T, class A, class F, class G>
@@ -133,18 +142,47 @@ void storeBatch(const BatchOf<M>& batch, M* elements, std::size_t count = batch_
   detail::storeRows<S, M::num_parameters>(batch.data(), elements->data(), count);
 }
 
+namespace detail {
+
+/// out[i] = f(in[i]) for rows of In and Out numbers, f of a column of batches. Rows are turned into columns a block at
+/// a time: a vector that is read right after its lanes were stored one by one would wait for them.
+template <class S, int In, int Out, class F>
+void overBatches(const S* in, S* out, std::size_t n, const F& f) {
+  constexpr std::size_t lanes = Batch<S>::size, block = lanes * 8;
+  alignas(Batch<S>) std::array<std::array<S, block>, In> source;
+  alignas(Batch<S>) std::array<std::array<S, block>, Out> target;
+  for (std::size_t begin = 0; begin < n; begin += block) {
+    const std::size_t count = n - begin < block ? n - begin : block;
+    for (std::size_t i = 0; i < block; ++i) {
+      // The last element fills the rest.
+      const S* row = in + (begin + (i < count ? i : count - 1)) * In;
+      for (std::size_t c = 0; c < In; ++c) source[c][i] = row[c];
+    }
+    for (std::size_t i = 0; i < count; i += lanes) {
+      Eigen::Matrix<Batch<S>, In, 1> x;
+      for (std::size_t c = 0; c < In; ++c) x[static_cast<int>(c)] = Batch<S>::load_aligned(&source[c][i]);
+      const Eigen::Matrix<Batch<S>, Out, 1> y = f(x);
+      for (std::size_t c = 0; c < Out; ++c) y[static_cast<int>(c)].store_aligned(&target[c][i]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      S* row = out + (begin + i) * Out;
+      for (std::size_t c = 0; c < Out; ++c) row[c] = target[c][i];
+    }
+  }
+}
+
+}  // namespace detail
+
 /// elements[i] = expOrigin(tangents[i]), the exponential of a group. As many as the shorter range holds.
 template <class M>
 void expAll(std::span<const typename ManifoldTraits<M>::Tangent> tangents, std::span<M> elements) {
   using S = typename M::Scalar;
   using Traits = ManifoldTraits<BatchOf<M>>;
   const std::size_t n = tangents.size() < elements.size() ? tangents.size() : elements.size();
-  for (std::size_t i = 0; i < n; i += batch_size<M>) {
-    const std::size_t count = n - i < batch_size<M> ? n - i : batch_size<M>;
-    typename Traits::Tangent v;
-    detail::loadRows<S, Traits::DoF>(tangents[i].data(), v.data(), count);
-    storeBatch<M>(Traits::expOrigin(v), &elements[i], count);
-  }
+  if (n == 0) return;
+  detail::overBatches<S, Traits::DoF, M::num_parameters>(
+      tangents[0].data(), elements[0].data(), n,
+      [](const typename Traits::Tangent& v) { return Traits::expOrigin(v).params(); });
 }
 
 /// tangents[i] = logOrigin(elements[i]), the logarithm of a group. As many as the shorter range holds.
@@ -153,11 +191,10 @@ void logAll(std::span<const M> elements, std::span<typename ManifoldTraits<M>::T
   using S = typename M::Scalar;
   using Traits = ManifoldTraits<BatchOf<M>>;
   const std::size_t n = tangents.size() < elements.size() ? tangents.size() : elements.size();
-  for (std::size_t i = 0; i < n; i += batch_size<M>) {
-    const std::size_t count = n - i < batch_size<M> ? n - i : batch_size<M>;
-    const typename Traits::Tangent v = Traits::logOrigin(loadBatch<M>(&elements[i], count));
-    detail::storeRows<S, Traits::DoF>(v.data(), tangents[i].data(), count);
-  }
+  if (n == 0) return;
+  detail::overBatches<S, M::num_parameters, Traits::DoF>(
+      elements[0].data(), tangents[0].data(), n,
+      [](const auto& params) { return Traits::logOrigin(BatchOf<M>::fromParams(params)); });
 }
 
 }  // namespace liestat

@@ -4,52 +4,19 @@
 
 #include <support/high_precision.hpp>
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <limits>
-#include <vector>
 
 namespace {
 
 using namespace liestat_test;
 
-/// Logarithms of the scale.
-template <class S>
-std::vector<double> sweptScales() {
-  std::vector<double> sigma{0, 1e-12, -1e-9, 1e-6, -1e-3, 0.1, -0.4, 0.7, -0.99, 1.01, -2, 4};
-  // float's scales saturate at 1e-5 and 1e5.
-  const int last = is_float<S> ? 4 : 6;
-  for (int decade = -last; decade <= last; ++decade) sigma.push_back(std::log(10.) * decade);
-  return sigma;
-}
-
 template <class G>
 void sweep(const char* name, int translation) {
   using S = typename G::Scalar;
-  Table worst;
-  std::size_t turn = 0;
-  for (const double angle : sweptAngles<S>()) {
-    // Two directions are enough for each of the many scales, and every third scale at each angle in turn.
-    auto list = tangents<S, G::DoF - 1>(angle, translation);
-    list.erase(list.begin() + 1, list.begin() + 4);
-    std::vector<typename G::Tangent> scaled;
-    const std::vector<double> scales = sweptScales<S>();
-    for (std::size_t i = turn++ % 3; i < scales.size(); i += 3) {
-      const double sigma = scales[i];
-      for (const auto& v : list) {
-        typename G::Tangent w;
-        w << v, static_cast<S>(sigma);
-        scaled.push_back(w);
-        if constexpr (G::N == G::Dim) {
-          const Matrix reference = series(Matrix(G::hat(w)), 0);
-          const Real size = norm(reference);
-          Matrix d(G::exp(w).matrix());
-          for (std::size_t k = 0; k < d.a.size(); ++k) d.a[k] -= reference.a[k];
-          worst["exp, relative"].see(static_cast<double>(norm(d) / size), angle);
-        }
-      }
-    }
-    sweepGroup<G>(worst, angle, scaled);
-  }
+  const Table worst = sweepScaledGroup<G>(translation);
   print(name, is_float<S> ? "float" : "double", worst);
   const double bar = 32 * static_cast<double>(std::numeric_limits<S>::epsilon());
   for (const auto& [operation, w] : worst) {

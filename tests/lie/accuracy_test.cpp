@@ -6,6 +6,8 @@
 
 #include <support/high_precision.hpp>
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <limits>
 #include <random>

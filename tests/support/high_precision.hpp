@@ -5,7 +5,6 @@
 #include <lie/lie.hpp>
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
@@ -216,18 +215,23 @@ std::vector<double> sweptAngles() {
   return angles;
 }
 
-/// Worst error of each operation, and where.
+/// Worst error of an operation, where, and the mean of all.
 struct Worst {
-  double error = 0, angle = 0;
+  double error = 0, angle = 0, sum = 0;
+  int count = 0;
   void see(double e, double at) {
+    sum += e;
+    ++count;
     if (!(e <= error)) error = e, angle = at;
   }
+  double mean() const { return sum / count; }
 };
 using Table = std::map<std::string, Worst>;
 
 inline void print(const char* name, const char* scalar, const Table& table) {
   for (const auto& [operation, worst] : table) {
-    std::printf("%-8s %-7s %-22s %9.2e at %.12g\n", name, scalar, operation.c_str(), worst.error, worst.angle);
+    std::printf("%-6s %-6s %-20s  worst %8.2e at %-14.12g  mean %8.2e\n", name, scalar, operation.c_str(), worst.error,
+                worst.angle, worst.mean());
   }
 }
 
@@ -282,6 +286,48 @@ void expectWithinBar(const char* name, const Table& worst) {
     EXPECT_LE(w.error, is_inverse ? Bar<S>::inverse_jacobian : Bar<S>::value)
         << name << (is_float<S> ? " float " : " double ") << operation << " at angle " << w.angle;
   }
+}
+
+/// Logarithms of the scale.
+template <class S>
+std::vector<double> sweptScales() {
+  std::vector<double> sigma{0, 1e-12, -1e-9, 1e-6, -1e-3, 0.1, -0.4, 0.7, -0.99, 1.01, -2, 4};
+  // float's scales saturate at 1e-5 and 1e5.
+  const int last = is_float<S> ? 4 : 6;
+  for (int decade = -last; decade <= last; ++decade) sigma.push_back(std::log(10.) * decade);
+  return sigma;
+}
+
+/// The operations of a group with a scale, over the scales and the angles.
+template <class G>
+Table sweepScaledGroup(int translation) {
+  using S = typename G::Scalar;
+  Table worst;
+  std::size_t turn = 0;
+  for (const double angle : sweptAngles<S>()) {
+    // Two directions are enough for each of the many scales, and every third scale at each angle in turn.
+    auto list = tangents<S, G::DoF - 1>(angle, translation);
+    list.erase(list.begin() + 1, list.begin() + 4);
+    std::vector<typename G::Tangent> scaled;
+    const std::vector<double> scales = sweptScales<S>();
+    for (std::size_t i = turn++ % 3; i < scales.size(); i += 3) {
+      const double sigma = scales[i];
+      for (const auto& v : list) {
+        typename G::Tangent w;
+        w << v, static_cast<S>(sigma);
+        scaled.push_back(w);
+        if constexpr (G::N == G::Dim) {
+          const Matrix reference = series(Matrix(G::hat(w)), 0);
+          const Real size = norm(reference);
+          Matrix d(G::exp(w).matrix());
+          for (std::size_t k = 0; k < d.a.size(); ++k) d.a[k] -= reference.a[k];
+          worst["exp, relative"].see(static_cast<double>(norm(d) / size), angle);
+        }
+      }
+    }
+    sweepGroup<G>(worst, angle, scaled);
+  }
+  return worst;
 }
 
 }  // namespace liestat_test
