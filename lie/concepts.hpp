@@ -88,4 +88,12 @@ concept Quotient = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::representativeJacobian(0) } -> std::convertible_to<typename ManifoldTraits<M>::Square>;
 };
 
+/// A manifold whose traits take it apart: factors(x) is a std::tuple of features of other manifolds, fromFactors(tuple)
+/// goes back, and where there is a metric the squared distance is the sum of the factors'. Means, their starts and
+/// their certificates of uniqueness are then those of the factors.
+template <class M>
+concept Factored = Homogeneous<M> && requires(const M& x) {
+  { ManifoldTraits<M>::fromFactors(ManifoldTraits<M>::factors(x)) } -> std::convertible_to<M>;
+};
+
 }  // namespace liestat

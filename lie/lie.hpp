@@ -4,6 +4,7 @@
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
 #include <lie/non_oriented_frame3.hpp>
+#include <lie/product.hpp>
 #include <lie/rn.hpp>
 #include <lie/rxso2.hpp>
 #include <lie/rxso3.hpp>

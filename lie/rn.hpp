@@ -25,6 +25,7 @@ class Translation {
   /// The identity: zero.
   Translation() : v_(Tangent::Zero()) {}
   explicit Translation(const Tangent& v) : v_(v) {}
+  static Translation fromParams(const Params& v) { return Translation(v); }
   const Tangent& params() const { return v_; }
   const Scalar* data() const { return v_.data(); }
   Scalar* data() { return v_.data(); }
@@ -47,31 +48,53 @@ class Translation {
   Tangent v_;
 };
 
+namespace detail {
+
+/// What a flat space has in common, M a vector or a translation: no curvature, derivatives that are identities.
+template <class M, class S, int N>
+struct FlatManifold : TrivialIsotropy<M, Translation<S, N>> {
+  using Base = TrivialIsotropy<M, Translation<S, N>>;
+  using typename Base::Square, typename Base::Tangent;
+
+  static Square dexpOrigin(const Tangent&) { return Square::Identity(); }
+  static Square dlogOrigin(const M&) { return Square::Identity(); }
+
+  static Tangent metricWeights() { return Tangent::Ones(); }
+  static S injectivityRadius() { return S(std::numeric_limits<double>::infinity()); }
+  static S maxSectionalCurvature() { return S(0); }
+  static Square hessianHalfSquaredDistance(const Tangent&) { return Square::Identity(); }
+  static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
+  static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
+  static VolumeElement<S, N> logVolume(const Tangent&) { return {}; }
+  static constexpr bool covariance_models_coincide = true;
+};
+
+}  // namespace detail
+
 /// Fixed-size column vectors; dynamic sizes and integers are not manifolds.
 template <class S, int N, int O>
   requires(N > 0 && !std::is_integral_v<S>)
-struct ManifoldTraits<Eigen::Matrix<S, N, 1, O, N, 1>>
-    : TrivialIsotropy<Eigen::Matrix<S, N, 1, O, N, 1>, Translation<S, N>> {
+struct ManifoldTraits<Eigen::Matrix<S, N, 1, O, N, 1>> : detail::FlatManifold<Eigen::Matrix<S, N, 1, O, N, 1>, S, N> {
   using M = Eigen::Matrix<S, N, 1, O, N, 1>;
-  using Base = TrivialIsotropy<M, Translation<S, N>>;
-  using typename Base::Group, typename Base::Tangent, typename Base::Square;
+  using Group = Translation<S, N>;
+  using Tangent = Eigen::Matrix<S, N, 1>;
 
   static M origin() { return M::Zero(); }
   static M act(const Group& f, const M& x) { return x + f.params(); }
   static Group placement(const M& x) { return Group(x); }
   static M expOrigin(const Tangent& v) { return v; }
   static Tangent logOrigin(const M& x) { return x; }
-  static Square dexpOrigin(const Tangent&) { return Square::Identity(); }
-  static Square dlogOrigin(const M&) { return Square::Identity(); }
+};
 
-  static Tangent metricWeights() { return Tangent::Ones(); }
-  static S injectivityRadius() { return std::numeric_limits<S>::infinity(); }
-  static S maxSectionalCurvature() { return S(0); }
-  static Square hessianHalfSquaredDistance(const Tangent&) { return Square::Identity(); }
-  static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
-  static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
-  static detail::VolumeElement<S, N> logVolume(const Tangent&) { return {}; }
-  static constexpr bool covariance_models_coincide = true;
+/// The group of translations, acting on itself.
+template <class S, int N>
+struct ManifoldTraits<Translation<S, N>> : detail::FlatManifold<Translation<S, N>, S, N> {
+  using M = Translation<S, N>;
+
+  static M act(const M& f, const M& x) { return f * x; }
+  static M placement(const M& x) { return x; }
+  static M expOrigin(const typename M::Tangent& v) { return M(v); }
+  static typename M::Tangent logOrigin(const M& x) { return x.params(); }
 };
 
 }  // namespace liestat

@@ -22,30 +22,52 @@ M sample(const Gaussian<M>& g, CounterRng& rng) {
   return exp(g.mean, e);
 }
 
+namespace detail {
+
+/// A transformation whose rotations are uniform and whose translations are uniform in a cube.
+template <LieGroup G>
+G uniformTransformation(CounterRng& rng, double half_width) {
+  using S = typename G::Scalar;
+  const auto inCube = [&]<int N>(std::integral_constant<int, N>) {
+    Eigen::Matrix<S, N, 1> v;
+    for (int i = 0; i < N; ++i) v[i] = S(half_width * (2 * rng.uniform() - 1));
+    return v;
+  };
+  constexpr std::integral_constant<int, 2> plane{};
+  constexpr std::integral_constant<int, 3> space{};
+  if constexpr (requires { G::num_parts; }) {
+    G g;
+    forEachIndex<G::num_parts>([&](auto i) {
+      using Part = typename G::template Part<i>;
+      g.template get<i>() = uniformTransformation<Part>(rng, half_width);
+    });
+    return g;
+  } else if constexpr (std::is_constructible_v<G, Eigen::Quaternion<S>>) {  // SO3
+    return G(rng.unitQuaternion().cast<S>());
+  } else if constexpr (G::DoF == 9 && requires(const G& g) { g.velocity(); }) {  // SE23
+    const Eigen::Quaternion<S> q = rng.unitQuaternion().cast<S>();
+    const Eigen::Matrix<S, 3, 1> position = inCube(space);
+    return G(q, position, inCube(space));
+  } else if constexpr (G::DoF == 6 && requires(const G& g) { g.so3(); }) {  // SE3
+    const Eigen::Quaternion<S> q = rng.unitQuaternion().cast<S>();
+    return G(q, inCube(space));
+  } else if constexpr (G::DoF == 3 && requires(const G& g) { g.so2(); }) {  // SE2
+    const S angle = S(EIGEN_PI * (2 * rng.uniform() - 1));
+    return G(angle, inCube(plane));
+  } else if constexpr (G::DoF == 1 && requires(const G& g) { g.unit_complex(); }) {  // SO2
+    return G(S(EIGEN_PI * (2 * rng.uniform() - 1)));
+  } else {  // translations
+    return G::exp(inCube(std::integral_constant<int, G::DoF>{}));
+  }
+}
+
+}  // namespace detail
+
 /// A feature whose orientation is uniform and whose position is uniform in the cube [-half_width, half_width]^d (m).
 template <Homogeneous M>
 M sampleUniform(CounterRng& rng, double half_width = 1) {
   using T = ManifoldTraits<M>;
-  using S = ScalarOf<M>;
-  const auto position = [&](int dimension) {
-    Eigen::VectorXd v(dimension);
-    for (int i = 0; i < dimension; ++i) v[i] = half_width * (2 * rng.uniform() - 1);
-    return v;
-  };
-  using Group = typename T::Group;
-  if constexpr (requires { typename Group::Quaternion; }) {  // SO3 acts
-    return T::act(Group(rng.unitQuaternion().cast<S>()), T::origin());
-  } else if constexpr (Group::DoF == 6 && requires(Group g) { g.so3(); }) {  // SE3 acts
-    const Eigen::Quaternion<S> q = rng.unitQuaternion().cast<S>();
-    return T::act(Group(q, position(3).template cast<S>()), T::origin());
-  } else if constexpr (requires(Group g) { g.so2(); }) {  // SE2 acts
-    const S angle = S(EIGEN_PI * (2 * rng.uniform() - 1));
-    return T::act(Group(angle, position(2).template cast<S>()), T::origin());
-  } else if constexpr (requires(Group g) { g.unit_complex(); }) {  // SO2 acts
-    return T::act(Group(S(EIGEN_PI * (2 * rng.uniform() - 1))), T::origin());
-  } else {  // translations
-    return T::act(Group::exp(position(T::DoF).template cast<S>()), T::origin());
-  }
+  return T::act(detail::uniformTransformation<typename T::Group>(rng, half_width), T::origin());
 }
 
 }  // namespace liestat

@@ -4,6 +4,7 @@
 // third of widely spread quotient frames (means.md, section 5.2).
 #pragma once
 
+#include <lie/detail/part_tuple.hpp>
 #include <lie/manifold.hpp>
 #include <stats/detail/rotation_sums.hpp>
 
@@ -15,6 +16,9 @@
 #include <cstddef>
 #include <limits>
 #include <ranges>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -79,6 +83,20 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
   return samples[best];
 }
 
+/// The factors of M, as a std::tuple.
+template <Factored M>
+using FactorsOf = std::decay_t<decltype(ManifoldTraits<M>::factors(std::declval<const M&>()))>;
+
+/// The I-th factors of a range of features, as they are asked for.
+template <std::size_t I, Factored M, class R>
+struct FactorRange {
+  const R& samples;
+  std::size_t size() const { return std::ranges::size(samples); }
+  std::tuple_element_t<I, FactorsOf<M>> operator[](std::ptrdiff_t k) const {
+    return std::get<I>(ManifoldTraits<M>::factors(samples[k]));
+  }
+};
+
 /// Manifolds whose start is the mean itself: linear spaces.
 template <Homogeneous M>
 inline constexpr bool starts_at_mean = std::same_as<M, TangentOf<M>>;
@@ -86,13 +104,20 @@ inline constexpr bool starts_at_mean = std::same_as<M, TangentOf<M>>;
 }  // namespace detail
 
 /// A start for the mean of a non-empty range of features. One pass over the data where the manifold sits in a linear
-/// space (vectors, rotations, directions, frames); quotients take the best of eight data.
+/// space (vectors, rotations, directions, frames); quotients take the best of eight data; products start by factors.
 template <Homogeneous M, class R, class W>
 M startOfMean(const R& samples, const W& weights) {
   using S = ScalarOf<M>;
   const std::size_t n = std::ranges::size(samples);
   const auto sample = [&](std::size_t i) -> decltype(auto) { return samples[static_cast<std::ptrdiff_t>(i)]; };
-  if constexpr (detail::starts_at_mean<M>) {
+  if constexpr (Factored<M>) {
+    using Factors = detail::FactorsOf<M>;
+    return [&]<std::size_t... I>(std::index_sequence<I...>) {
+      return M(ManifoldTraits<M>::fromFactors(
+          Factors(startOfMean<std::tuple_element_t<I, Factors>>(detail::FactorRange<I, M, R>{samples}, weights)...)));
+    }
+    (std::make_index_sequence<std::tuple_size_v<Factors>>{});
+  } else if constexpr (detail::starts_at_mean<M>) {
     M sum = M::Zero();
     S weight(0);
     for (std::size_t i = 0; i < n; ++i) sum += S(weights[i]) * sample(i), weight += S(weights[i]);

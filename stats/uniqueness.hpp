@@ -11,6 +11,7 @@
 //               within 2 Σp_i θ_i / Σp_i, by the triangle inequality. Where the first radius exceeds the second: unique
 //   circle      SO(2), Frame2: all minima by sorting, exact
 //   global      branch and bound on SO(3), its quotients and S² (stats/detail/branch_and_bound.hpp)
+//   factors     of a product each factor's minimum is certified by itself
 // Needs Eigen alone. Data never throws: what is not finite is not_certified.
 #pragma once
 
@@ -27,6 +28,7 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -489,6 +491,69 @@ bool areValidWeights(const W& weights, std::size_t n) {
   return true;
 }
 
+/// The mean of the I-th factors: their part of a mean, from which it starts.
+template <std::size_t I, Metric M, class R, class W>
+auto factorMean(const R& samples, const W& weights, const MeanResult<M>& mean) {
+  using F = std::tuple_element_t<I, FactorsOf<M>>;
+  MeanOptions<F> options;
+  options.start = std::get<I>(ManifoldTraits<M>::factors(mean.mean));
+  return frechetMean<F>(SerialExecutor{}, FactorRange<I, M, R>{samples}, weights, options);
+}
+
+template <Metric M, class R, class W>
+UniquenessResult<M> findUniqueness(const R& samples, const W& weights, const MeanResult<M>& mean,
+                                   const UniquenessOptions& options);
+
+/// The criterion of a product is a sum of its factors', each of which has its own variable: the minima of the product
+/// are the tuples of the factors' minima.
+template <Metric M, class R, class W>
+UniquenessResult<M> uniquenessByFactors(const R& samples, const W& weights, const MeanResult<M>& mean,
+                                        const UniquenessOptions& options) {
+  using Factors = FactorsOf<M>;
+  constexpr std::size_t n = std::tuple_size_v<Factors>;
+  UniquenessResult<M> result;
+  Factors best = ManifoldTraits<M>::factors(mean.mean);
+  const auto rivals_of = [&]<std::size_t... I>(std::index_sequence<I...>) {
+    return std::tuple<std::vector<std::tuple_element_t<I, Factors>>...>{};
+  };
+  auto rivals = rivals_of(std::make_index_sequence<n>{});
+  bool certified = true, ambiguous = false, improved = false;
+  result.cost = 0;
+  result.r_star = std::numeric_limits<double>::infinity();
+  forEachIndex<n>([&](auto i) {
+    const FactorRange<i, M, R> factors{samples};
+    const auto part = findUniqueness(factors, weights, factorMean<i>(samples, weights, mean), options);
+    std::get<i>(best) = part.minimiser;
+    std::get<i>(rivals) = part.rivals;
+    certified = certified && part.unique != Uniqueness::not_certified;
+    ambiguous = ambiguous || part.unique == Uniqueness::ambiguous;
+    improved = improved || part.improved;
+    result.cost += part.cost;
+    result.r_star = std::min(result.r_star, part.r_star);
+    result.cells += part.cells;
+  });
+  result.minimiser = ManifoldTraits<M>::fromFactors(best);
+  result.improved = improved || (!mean.converged && result.cost < mean.cost);
+  // Two minima of one factor make two of the product, whatever else there may be.
+  result.unique = ambiguous ? Uniqueness::ambiguous : certified ? Uniqueness::unique : Uniqueness::not_certified;
+  if (ambiguous) result.proof = "a factor has several minima of equal cost";
+  if (result.unique == Uniqueness::unique) result.proof = "each factor's minimum is the only one";
+  std::vector<Factors> minima{best};
+  forEachIndex<n>([&](auto i) {
+    const std::size_t so_far = minima.size();
+    for (const auto& rival : std::get<i>(rivals)) {
+      for (std::size_t k = 0; k < so_far && minima.size() <= options.max_rivals; ++k) {
+        minima.push_back(minima[k]);
+        std::get<i>(minima.back()) = rival;
+      }
+    }
+  });
+  for (std::size_t k = 1; k < minima.size(); ++k) {
+    result.rivals.push_back(ManifoldTraits<M>::fromFactors(minima[k]));
+  }
+  return result;
+}
+
 template <Metric M, class R, class W>
 UniquenessResult<M> findUniqueness(const R& samples, const W& weights, const MeanResult<M>& mean,
                                    const UniquenessOptions& options) {
@@ -498,7 +563,9 @@ UniquenessResult<M> findUniqueness(const R& samples, const W& weights, const Mea
   using std::isfinite;
   const std::size_t n = std::ranges::size(samples);
   if (n == 0 || !isfinite(static_cast<double>(mean.cost)) || !areValidWeights(weights, n)) return result;
-  if constexpr (compactFactor<M>() == CompactFactor::none) {
+  if constexpr (Factored<M>) {
+    return uniquenessByFactors(samples, weights, mean, options);
+  } else if constexpr (compactFactor<M>() == CompactFactor::none) {
     result.r_star = std::numeric_limits<double>::infinity();
     result.unique = Uniqueness::unique;
     result.proof = "the manifold is flat";
@@ -520,7 +587,14 @@ UniquenessResult<M> findUniqueness(const R& samples, const W& weights, const Mea
 
 template <Metric M, class R, class W>
 double findLocalRadius(const R& samples, const W& weights, const M& mean) {
-  if constexpr (compactFactor<M>() == CompactFactor::none) {
+  if constexpr (Factored<M>) {
+    double least = std::numeric_limits<double>::infinity();
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      const auto factor = std::get<i>(ManifoldTraits<M>::factors(mean));
+      least = std::min(least, findLocalRadius(FactorRange<i, M, R>{samples}, weights, factor));
+    });
+    return least;
+  } else if constexpr (compactFactor<M>() == CompactFactor::none) {
     return std::numeric_limits<double>::infinity();
   } else if constexpr (compactFactor<M>() == CompactFactor::circle) {
     double largest = 0;
@@ -574,6 +648,11 @@ struct CutLocusMass {
   double mass = 0;    ///< weighted fraction of the data with such a gap
   /// Largest relative change of the Hessian by the kinks of the squared distance (see cutLocusMass).
   double hessian_change = 0;
+
+  /// Of the factors of a product the one that has more of it counts.
+  void worsen(const CutLocusMass& factor) {
+    if (!std::isnan(hessian_change) && !(factor.hessian_change < hessian_change)) *this = factor;
+  }
 };
 
 namespace detail {
@@ -582,6 +661,14 @@ template <Metric M, class R, class W>
 CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResult<M>& mean, double window) {
   CutLocusMass result;
   result.window = window;
+  if constexpr (Factored<M>) {
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      const auto part =
+          findCutLocusMass(FactorRange<i, M, R>{samples}, weights, factorMean<i>(samples, weights, mean), window);
+      result.worsen(part);
+    });
+    return result;
+  }
   constexpr CompactFactor factor = compactFactor<M>();
   if constexpr (factor == CompactFactor::rotation || factor == CompactFactor::circle) {
     constexpr int N = factor == CompactFactor::rotation ? 3 : 1;
@@ -680,6 +767,30 @@ struct CertifiedMean {
 
 namespace detail {
 
+/// The cut locus within the confidence region of a mean with the given covariance.
+template <Metric M, class R, class W>
+CutLocusMass cutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
+                            const SquareOf<M>& covariance, ResidualNoise noise) {
+  CutLocusMass result;
+  constexpr CompactFactor factor = compactFactor<M>();
+  if constexpr (Factored<M>) {
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      const auto part = factorMean<i>(samples, weights, mean);
+      result.worsen(
+          cutLocusNearby(FactorRange<i, M, R>{samples}, weights, part, covarianceFromResiduals(part, noise), noise));
+    });
+  } else if constexpr (factor == CompactFactor::rotation || factor == CompactFactor::circle) {
+    constexpr int K = factor == CompactFactor::rotation ? 3 : 1;
+    using Matrix = Eigen::Matrix<double, K, K>;
+    const Matrix block = covariance.template bottomRightCorner<K, K>().template cast<double>();
+    // The mean may be anywhere in its confidence region, three standard deviations wide; gaps change at most twice as
+    // fast as it moves. No less than 0.2 rad, or there is nothing to estimate a density from.
+    const double sd = std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix>(block).eigenvalues()[K - 1]));
+    result = findCutLocusMass(samples, weights, mean, std::max(6 * sd, 0.2));
+  }
+  return result;
+}
+
 template <Metric M, class R, class W>
 CertifiedMean<M> findCertifiedMean(const R& samples, const W& weights, const CertifiedMeanOptions<M>& options) {
   CertifiedMean<M> result;
@@ -708,20 +819,11 @@ CertifiedMean<M> findCertifiedMean(const R& samples, const W& weights, const Cer
   if (!covariance.allFinite()) {
     return without(Status::ill_defined, "the Hessian of the criterion is not positive definite at the mean");
   }
-  constexpr CompactFactor factor = compactFactor<M>();
-  if constexpr (factor == CompactFactor::rotation || factor == CompactFactor::circle) {
-    constexpr int K = factor == CompactFactor::rotation ? 3 : 1;
-    using Matrix = Eigen::Matrix<double, K, K>;
-    const Matrix block = covariance.template bottomRightCorner<K, K>().template cast<double>();
-    // The mean may be anywhere in its confidence region, three standard deviations wide; gaps change at most twice as
-    // fast as it moves. No less than 0.2 rad, or there is nothing to estimate a density from.
-    const double sd = std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix>(block).eigenvalues()[K - 1]));
-    result.cut_locus = findCutLocusMass(samples, weights, result.mean, std::max(6 * sd, 0.2));
-    if (!(result.cut_locus.hessian_change <= options.largest_hessian_change)) {
-      return without(Status::ill_defined,
-                     "too many features lie near the cut locus of the mean, where the squared distance has a kink: no "
-                     "first-order covariance is right");
-    }
+  result.cut_locus = cutLocusNearby(samples, weights, result.mean, covariance, options.noise);
+  if (!(result.cut_locus.hessian_change <= options.largest_hessian_change)) {
+    return without(Status::ill_defined,
+                   "too many features lie near the cut locus of the mean, where the squared distance has a kink: no "
+                   "first-order covariance is right");
   }
   result.estimate = Gaussian<M>{result.mean.mean, covariance};
   result.status = Status::ok;

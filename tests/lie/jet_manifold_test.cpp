@@ -4,6 +4,7 @@
 #include <lie/lie.hpp>
 
 #include <support/jets.hpp>
+#include <support/products.hpp>
 
 #include <gtest/gtest.h>
 
@@ -61,6 +62,14 @@ TEST(Jet, SO3) { checkManifold<liestat::SO3>(0, 4); }
 TEST(Jet, S2) { checkManifold<liestat::S2>(0, 4); }
 TEST(Jet, Frame2) { checkManifold<liestat::Frame2>(2, 4); }
 TEST(Jet, Frame3) { checkManifold<liestat::Frame3>(3, 4); }
+template <class S, int>
+using VectorAndRotation = liestat::Product<Vector3<S>, liestat::SO3<S>>;
+template <class S, int>
+using FrameAndDirectionOf = FrameAndDirection<S>;
+TEST(Jet, Products) {
+  checkManifold<VectorAndRotation>(3, 4);
+  checkManifold<FrameAndDirectionOf>(3, 4);
+}
 TEST(Jet, Quotients) {
   checkManifold<liestat::SemiOrientedFrame3>(3, EIGEN_PI / 2);
   checkManifold<liestat::NonOrientedFrame3>(3, EIGEN_PI / 2);

@@ -44,6 +44,7 @@ using namespace liestat;
 
 static_assert(LieGroup<SO2d> && LieGroup<SO3d> && LieGroup<SE2d> && LieGroup<SE3d> && LieGroup<Translation<double, 3>>);
 static_assert(LieGroup<SO3f> && LieGroup<SO3<Jet3>> && LieGroup<SE3<Jet3>>);
+static_assert(Metric<Translation<double, 3>>);
 static_assert(LieGroup<SE23d> && LieGroup<SE23<Jet3>> && Homogeneous<SE23f> && !Metric<SE23d>);
 static_assert(!LieGroup<S2d> && !LieGroup<Frame3d> && !LieGroup<Eigen::Vector3d>);
 
@@ -56,6 +57,15 @@ static_assert(Metric<Eigen::Vector3d> && Metric<Eigen::Matrix<float, 7, 1>> && M
 static_assert(Metric<S2d> && Metric<Frame2d> && Metric<Frame3d> && Metric<Frame3<Jet3>>);
 static_assert(Metric<SemiOrientedFrame3d> && Metric<NonOrientedFrame3f>);
 static_assert(Quotient<SemiOrientedFrame3d> && Quotient<NonOrientedFrame3d> && !Quotient<Frame3d> && !Quotient<SO3d>);
+
+// A product is what all of its parts are; a quotient if one of them is.
+static_assert(Metric<Product<SO3d, Eigen::Vector3d>> && Metric<Product<Frame3d, Product<S2d, SO2d>>>);
+static_assert(Metric<Product<SO3<Jet3>, S2<Jet3>>> && !Quotient<Product<SO3d, S2d>>);
+static_assert(Homogeneous<Product<SE3d, S2d>> && !Metric<Product<SE3d, S2d>>);
+static_assert(Quotient<Product<SO3d, NonOrientedFrame3d>> && Metric<Product<SO3d, NonOrientedFrame3d>>);
+static_assert(!LieGroup<Product<SO3d, SE3d>> && LieGroup<ProductGroup<SO3d, SE3d>>);
+static_assert(LieGroup<ProductGroup<SO3f, Translation<float, 2>>> && Metric<ProductGroup<SO3f, Translation<float, 2>>>);
+static_assert(Homogeneous<ProductGroup<SO3d, SE3d>> && !Metric<ProductGroup<SO3d, SE3d>>);
 
 // Sizes unknown at compile time, row vectors and integers are not manifolds.
 static_assert(!Homogeneous<Eigen::VectorXd> && !Homogeneous<Eigen::MatrixXd> && !Homogeneous<Eigen::Vector3i>);

@@ -1,0 +1,147 @@
+// Statistics of products: the criterion is a sum over the parts, so means and, without correlation between parts, fusions
+// are those of the parts. Statistical tests have fixed seeds.
+
+#include <stats/covariance.hpp>
+#include <stats/group_mean.hpp>
+#include <stats/maha.hpp>
+#include <stats/mean.hpp>
+#include <stats/random.hpp>
+#include <stats/sampling.hpp>
+
+#include <lie/lie.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+template <std::size_t I, class M>
+auto parts(const std::vector<M>& samples) {
+  std::vector<typename M::template Part<I>> result;
+  for (const M& x : samples) result.push_back(x.template get<I>());
+  return result;
+}
+
+template <class M>
+std::vector<M> scattered(int n, double sd, std::uint64_t seed = 1) {
+  CounterRng rng(seed, 0);
+  Gaussian<M> g;
+  g.mean = sampleUniform<M>(rng);
+  g.covariance *= sd * sd;
+  std::vector<M> samples;
+  for (int i = 0; i < n; ++i) samples.push_back(sample(g, rng));
+  return samples;
+}
+
+template <class M>
+class ProductTest : public testing::Test {};
+// Small ones, for each costs the compiler seconds.
+using Products =
+    testing::Types<Product<SO3d, Vector3d>, Product<SO2d, S2d>, Product<SemiOrientedFrame3d, Vector2d>>;
+TYPED_TEST_SUITE(ProductTest, Products);
+
+TYPED_TEST(ProductTest, MeanIsThatOfTheParts) {
+  using M = TypeParam;
+  const auto samples = scattered<M>(20, 0.3);
+  std::vector<double> weights;
+  for (int i = 0; i < 20; ++i) weights.push_back(0.5 + 0.1 * i);
+  const auto whole = mean(samples), weighted = mean(samples, weights);
+  const auto first = mean(parts<0>(samples));
+  const auto second = mean(parts<1>(samples)), second_weighted = mean(parts<1>(samples), weights);
+  ASSERT_TRUE(whole.converged && weighted.converged);
+  EXPECT_LE(distance(whole.mean.template get<0>(), first.mean), 1e-11);
+  EXPECT_LE(distance(whole.mean.template get<1>(), second.mean), 1e-11);
+  EXPECT_LE(distance(weighted.mean.template get<1>(), second_weighted.mean), 1e-11);
+  EXPECT_NEAR(whole.cost, first.cost + second.cost, 1e-12 * whole.cost);
+  const SquareOf<M> covariance = covarianceFromResiduals(whole);
+  EXPECT_LE((M::template covarianceBlock<0, 0>(covariance) - covarianceFromResiduals(first)).norm(), 1e-12);
+  EXPECT_LE((M::template covarianceBlock<1, 1>(covariance) - covarianceFromResiduals(second)).norm(), 1e-12);
+}
+
+TEST(Product, FusionWithoutCorrelationIsThatOfTheParts) {
+  using M = Product<S2d, SO3d>;
+  using First = typename M::template Part<0>;
+  using Second = typename M::template Part<1>;
+  CounterRng rng(2, 0);
+  std::vector<Gaussian<M>> all;
+  std::vector<Gaussian<First>> first;
+  std::vector<Gaussian<Second>> second;
+  for (const M& x : scattered<M>(8, 0.05)) {
+    const TangentOf<M> d = 0.01 * (TangentOf<M>(rng.normalVector<M::DoF>()).array().square() + 0.1).matrix();
+    Gaussian<M> g{x, d.asDiagonal()};
+    all.push_back(g);
+    first.push_back({x.template get<0>(), M::template covarianceBlock<0, 0>(g.covariance)});
+    second.push_back({x.template get<1>(), M::template covarianceBlock<1, 1>(g.covariance)});
+  }
+  const auto whole = maha(all, CovarianceAt::measured);
+  ASSERT_EQ(whole.status, Status::ok);
+  const auto fused_first = fuse(first, CovarianceAt::measured);
+  const auto fused_second = fuse(second, CovarianceAt::measured);
+  EXPECT_LE(distance(whole.mean.template get<0>(), fused_first.mean), 1e-10);
+  EXPECT_LE(distance(whole.mean.template get<1>(), fused_second.mean), 1e-10);
+  // Second order by differences where a part (directions) has none in closed form: 1e-6.
+  EXPECT_LE((M::template covarianceBlock<0, 0>(whole.covariance) - fused_first.covariance).norm(), 1e-6);
+  EXPECT_LE((M::template covarianceBlock<1, 1>(whole.covariance) - fused_second.covariance).norm(), 1e-6);
+}
+
+// The frame's order of blocks is (translation, rotation).
+TEST(Product, RotationWithVectorIsTheFrame) {
+  using M = Product<SO3d, Vector3d>;
+  const auto samples = scattered<M>(30, 0.4);
+  std::vector<Frame3d> frames;
+  for (const auto& [rotation, translation] : samples) frames.push_back(Frame3d(rotation, translation));
+  const auto product = mean(samples);
+  const auto frame = mean(frames);
+  ASSERT_TRUE(product.converged && frame.converged);
+  EXPECT_LE(distance(Frame3d(product.mean.get<0>(), product.mean.get<1>()), frame.mean), 1e-12);
+  EXPECT_NEAR(product.cost, frame.cost, 1e-12);
+  EXPECT_LE((M::covarianceBlock<0, 0>(product.hessian) - frame.hessian.bottomRightCorner<3, 3>()).norm(), 1e-11);
+  EXPECT_LE((M::covarianceBlock<1, 1>(product.hessian) - frame.hessian.topLeftCorner<3, 3>()).norm(), 1e-11);
+  // The frame's translations are seen from its own axes.
+  const Eigen::Matrix3d R = frame.mean.rotationMatrix();
+  EXPECT_LE((M::covarianceBlock<0, 1>(product.scatter) - frame.scatter.bottomLeftCorner<3, 3>() * R.transpose()).norm(),
+            1e-11);
+}
+
+// What correlates two vectors is no different from what correlates the coordinates of one.
+TEST(Product, CorrelatedVectorsAreOneVector) {
+  using M = Product<Vector2d, Vector3d>;
+  using Vector5d = Eigen::Matrix<double, 5, 1>;
+  CounterRng rng(3, 0);
+  std::vector<Gaussian<M>> two;
+  std::vector<Gaussian<Vector5d>> one;
+  for (int i = 0; i < 6; ++i) {
+    const Vector5d x = rng.normalVector<5>();
+    Eigen::Matrix<double, 5, 5> A;
+    for (int k = 0; k < 5; ++k) A.col(k) = rng.normalVector<5>();
+    one.push_back({x, A * A.transpose() + 0.1 * Eigen::Matrix<double, 5, 5>::Identity()});
+    two.push_back({M(x.head<2>(), x.tail<3>()), one.back().covariance});
+  }
+  const auto fused = fuse(one);
+  const auto fused_product = fuse(two);
+  EXPECT_LE((fused_product.mean.params() - fused.mean).norm(), 1e-12);
+  EXPECT_LE((fused_product.covariance - fused.covariance).norm(), 1e-12);
+}
+
+TEST(Product, GroupMeanIsThatOfTheParts) {
+  using G = ProductGroup<SO3d, SE3d, Translation<double, 2>>;
+  const auto samples = scattered<G>(15, 0.3);
+  const auto whole = groupMean(samples);
+  ASSERT_TRUE(whole.converged);
+  EXPECT_LE(log(groupMean(parts<0>(samples)).mean, whole.mean.get<0>()).norm(), 1e-11);
+  EXPECT_LE(log(groupMean(parts<1>(samples)).mean, whole.mean.get<1>()).norm(), 1e-11);
+  EXPECT_LE(log(groupMean(parts<2>(samples)).mean, whole.mean.get<2>()).norm(), 1e-11);
+  // Equivariant from both sides.
+  const G f = G::exp(0.4 * G::Tangent::Ones());
+  std::vector<G> moved;
+  for (const G& x : samples) moved.push_back(f * x * f);
+  EXPECT_LE(log(groupMean(moved).mean, f * whole.mean * f).norm(), 1e-11);
+}
+
+}  // namespace
