@@ -33,7 +33,8 @@ enum class MahaMethod {
 template <Homogeneous M>
 struct MahaOptions {
   MahaMethod method = MahaMethod::newton;
-  /// Stop when a step's norm (rad, m) falls below; unset: max(1e-12, 4 eps (scale of the data)).
+  /// Stop when a step's norm (rad, m) falls below; unset: max(1e-12, 4 eps (scale of the data)). Steps that rounding
+  /// keeps above it end the iteration too, once they are below √eps standard deviations of the estimate.
   std::optional<double> tolerance = {};
   int max_iterations = 100;
   /// Where to start; unset: the chordal mean weighted by det(Σ_i)^(-1/k), for quotients the best of several data.
@@ -226,8 +227,14 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
       if (newton) step = -factor.solve(sums.gradient);
     }
     if (!newton) step = -sums.gauss_newton.llt().solve(sums.gradient);
+    const double previous = result.iterations > 0 ? result.residual : std::numeric_limits<double>::infinity();
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
+    // Where standard deviations differ by factors of hundreds, the rounding of the precise measures moves the estimate
+    // along its less certain directions by more than the tolerance, for ever. Steps that no longer shrink, and are
+    // below √eps standard deviations of the estimate, are such rounding.
+    const bool stalled =
+        result.residual > 0.5 * previous && step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
     ++result.iterations;
     // Halving until the cost decreases keeps the iteration from cycling between two sets of representatives.
     const S rounding = S(16) * std::numeric_limits<S>::epsilon() * (S(1) + std::abs(sums.cost));
@@ -242,7 +249,7 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
     }
     if (!accepted) break;  // a kink of the criterion: no descent along an exact descent direction
     y = next, sums = next_sums;
-    if (result.residual <= result.tolerance) {
+    if (result.residual <= result.tolerance || stalled) {
       result.converged = true;
       break;
     }

@@ -42,6 +42,10 @@ G uniformTransformation(CounterRng& rng, double half_width) {
       g.template get<i>() = uniformTransformation<Part>(rng, half_width);
     });
     return g;
+  } else if constexpr (requires(const G& g) { g.scale(); }) {  // the logarithm of the scale is uniform too
+    G g = G::sampleUniform(rng);
+    if constexpr (requires { g.translation(); }) g.translation() *= S(half_width);
+    return g;
   } else if constexpr (std::is_constructible_v<G, Eigen::Quaternion<S>>) {  // SO3
     return G(rng.unitQuaternion().cast<S>());
   } else if constexpr (G::DoF == 9 && requires(const G& g) { g.velocity(); }) {  // SE23
@@ -63,7 +67,8 @@ G uniformTransformation(CounterRng& rng, double half_width) {
 
 }  // namespace detail
 
-/// A feature whose orientation is uniform and whose position is uniform in the cube [-half_width, half_width]^d (m).
+/// A feature whose orientation is uniform and whose position is uniform in the cube [-half_width, half_width]^d (m);
+/// where there is a scale, its logarithm to base 2 is uniform in [-1, 1].
 template <Homogeneous M>
 M sampleUniform(CounterRng& rng, double half_width = 1) {
   using T = ManifoldTraits<M>;
