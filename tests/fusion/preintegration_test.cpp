@@ -1,0 +1,315 @@
+// Increments, covariances and bias Jacobians against differences and Monte Carlo; schemes against analytic motion; bad
+// recordings.
+
+#include <fusion/preintegrate.hpp>
+#include <fusion/preintegration_factor.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using Vector3 = Eigen::Vector3d;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+
+struct Steps {
+  std::vector<double> h;
+  std::vector<Vector3> rate, force;
+
+  Preintegration<double> run(const PreintegrationOptions<double>& options, std::size_t begin, std::size_t end) const {
+    Preintegration<double> motion(options);
+    for (std::size_t i = begin; i < end; ++i) motion.add(h[i], rate[i], force[i]);
+    return motion;
+  }
+  Preintegration<double> run(const PreintegrationOptions<double>& options) const { return run(options, 0, h.size()); }
+};
+
+/// Irregular steps of a body that turns at some 2 rad/s.
+Steps someSteps(std::size_t n) {
+  std::mt19937 generator(3);
+  const auto draw = [&] { return static_cast<double>(generator()) * 0x1p-31 - 1; };
+  Steps steps;
+  for (std::size_t i = 0; i < n; ++i) {
+    steps.h.push_back(0.005 * (1.5 + draw()));
+    steps.rate.push_back(2 * Vector3(draw(), draw(), draw()));
+    steps.force.push_back(Vector3(draw(), draw(), 9 + draw()));
+  }
+  return steps;
+}
+
+const PreintegrationOptions<double> some_options{.noise = {1.7e-3, 2e-2},
+                                                 .bias = {Vector3(0.01, 0.02, -0.01), Vector3(0.1, -0.2, 0.05)}};
+
+Vector9 difference(const SE23d& from, const SE23d& to) { return (from.inverse() * to).log(); }
+
+TEST(Preintegration, AConstantRateAndForceAreIntegratedExactly) {
+  // One step is a thousand, at every angle of the step.
+  for (const double angle : {1e-9, 1e-3, 0.24, 0.26, 1.0, 3.0}) {
+    const Vector3 rate = angle * Vector3(1, -2, 2) / 3, force(1, 2, 9);
+    Preintegration<double> one, many;
+    one.add(1, rate, force);
+    for (int i = 0; i < 1000; ++i) many.add(0.001, rate, force);
+    EXPECT_LE(difference(one.increment(), many.increment()).norm(), 1e-11) << angle;
+    EXPECT_NEAR(one.duration(), many.duration(), 1e-12);
+  }
+  // Free fall without rotation: a parabola.
+  Preintegration<double> fall;
+  fall.add(2, Vector3::Zero(), Vector3(0, 0, 3));
+  EXPECT_EQ(fall.increment().translation(), Vector3(0, 0, 6));
+  EXPECT_EQ(fall.increment().velocity(), Vector3(0, 0, 6));
+}
+
+TEST(Preintegration, BiasJacobianAgreesWithDifferences) {
+  const Steps steps = someSteps(40);
+  const auto motion = steps.run(some_options);
+  const double e = 1e-5;
+  const auto analytic = motion.biasJacobian();
+  for (int k = 0; k < 6; ++k) {
+    auto plus = some_options, minus = some_options;
+    (k < 3 ? plus.bias.gyroscope[k] : plus.bias.accelerometer[k - 3]) += e;
+    (k < 3 ? minus.bias.gyroscope[k] : minus.bias.accelerometer[k - 3]) -= e;
+    const Vector9 numeric = (difference(motion.increment(), steps.run(plus).increment()) -
+                             difference(motion.increment(), steps.run(minus).increment())) /
+                            (2 * e);
+    // e² and eps/e are both some 1e-10.
+    EXPECT_LE((numeric - analytic.col(k)).norm(), 1e-9) << "bias " << k;
+  }
+}
+
+// The noise of each reading by itself, carried to the end by differences of the whole chain.
+TEST(Preintegration, CovarianceIsTheSumOverTheReadings) {
+  const Steps steps = someSteps(30);
+  const auto motion = steps.run(some_options);
+  const double e = 1e-5;
+  Matrix9 sum = Matrix9::Zero();
+  for (std::size_t i = 0; i < steps.h.size(); ++i) {
+    for (int k = 0; k < 6; ++k) {
+      Steps plus = steps, minus = steps;
+      (k < 3 ? plus.rate[i][k] : plus.force[i][k - 3]) += e;
+      (k < 3 ? minus.rate[i][k] : minus.force[i][k - 3]) -= e;
+      const Vector9 column = (difference(motion.increment(), plus.run(some_options).increment()) -
+                              difference(motion.increment(), minus.run(some_options).increment())) /
+                             (2 * e);
+      const double density = k < 3 ? some_options.noise.gyroscope : some_options.noise.accelerometer;
+      sum += density * density / steps.h[i] * column * column.transpose();
+    }
+  }
+  const Matrix9 covariance = motion.gaussian().covariance;
+  EXPECT_LE((covariance - sum).norm(), 1e-8 * sum.norm());
+  EXPECT_EQ(covariance, covariance.transpose());
+}
+
+TEST(Preintegration, TheCovarianceIsTrue) {
+  const Steps truth = someSteps(100);
+  const auto exact = truth.run(some_options).increment();
+  std::mt19937_64 generator(8);
+  std::normal_distribution<double> normal;
+  const int trials = 400;
+  double index = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Steps measured = truth;
+    for (std::size_t i = 0; i < truth.h.size(); ++i) {
+      for (int k = 0; k < 3; ++k) {
+        measured.rate[i][k] += some_options.noise.gyroscope / std::sqrt(truth.h[i]) * normal(generator);
+        measured.force[i][k] += some_options.noise.accelerometer / std::sqrt(truth.h[i]) * normal(generator);
+      }
+    }
+    index += mahalanobisSquared(measured.run(some_options).gaussian(), exact) / trials;
+  }
+  // The mean of 400 χ²_9: standard error √(18/400). Five of them are exceeded once in two million seeds.
+  EXPECT_NEAR(index, 9, 5 * std::sqrt(18. / trials));
+}
+
+TEST(Preintegration, ConsecutiveIntervalsMergeExactly) {
+  const Steps steps = someSteps(40);
+  const auto whole = steps.run(some_options), merged = steps.run(some_options, 0, 17) * steps.run(some_options, 17, 40);
+  EXPECT_LE(difference(whole.increment(), merged.increment()).norm(), 1e-14);
+  const Matrix9 covariance = whole.gaussian().covariance;
+  EXPECT_LE((covariance - merged.gaussian().covariance).norm(), 1e-14 * covariance.norm());
+  EXPECT_LE((whole.biasJacobian() - merged.biasJacobian()).norm(), 1e-14);
+  EXPECT_DOUBLE_EQ(whole.duration(), merged.duration());
+}
+
+TEST(Preintegration, AdditiveCovarianceIsANamedConversion) {
+  const auto motion = someSteps(20).run(some_options);
+  const Matrix9 library = motion.gaussian().covariance, additive = motion.additiveCovariance();
+  const Eigen::Matrix3d R = motion.increment().so3().matrix();
+  // Order (rotation, velocity, position); velocity and position in the axes of the start.
+  EXPECT_LE((additive.block<3, 3>(0, 0) - library.block<3, 3>(3, 3)).norm(), 1e-16);
+  EXPECT_LE((additive.block<3, 3>(3, 3) - R * library.block<3, 3>(6, 6) * R.transpose()).norm(), 1e-16);
+  EXPECT_LE((additive.block<3, 3>(0, 6) - library.block<3, 3>(3, 0) * R.transpose()).norm(), 1e-16);
+}
+
+// The design note's numbers: 0.2 s at 1.5 rad/s and 3 m/s².
+TEST(Preintegration, BiasUpdateWithoutReintegration) {
+  Steps steps;
+  for (int i = 0; i < 40; ++i) {
+    const double s = 0.3 * i;
+    steps.h.push_back(0.005);
+    steps.rate.push_back(1.5 * Vector3(std::cos(s), std::sin(s), 0.5).normalized());
+    steps.force.push_back(3 * Vector3(std::sin(s), 0.4, std::cos(s)).normalized());
+  }
+  const PreintegrationOptions<double> options;
+  const auto motion = steps.run(options);
+  struct Row {
+    double change, rotation, velocity;
+  };
+  for (const auto& [change, rotation, velocity] : {Row{0.001, 3e-9, 6e-8}, Row{0.01, 3e-7, 1e-6}, Row{0.05, 8e-6, 4e-5}}) {
+    PreintegrationOptions<double> other = options;
+    other.bias.gyroscope = change * Vector3(1, 1, 1).normalized();
+    const Vector9 error = difference(steps.run(other).increment(), motion.increment(other.bias));
+    // Another motion than the note's: within a factor of four, and quadratic in the change.
+    EXPECT_LE(error.segment<3>(3).norm(), 4 * rotation) << change;
+    EXPECT_LE(error.tail<3>().norm(), 4 * velocity) << change;
+    EXPECT_GE(error.segment<3>(3).norm(), rotation / 20) << "the update is an approximation";
+  }
+  ImuBias<double> bias;
+  bias.gyroscope[0] = 0.04;
+  EXPECT_FALSE(motion.mustReintegrate(bias));
+  bias.gyroscope[0] = 0.06;
+  EXPECT_TRUE(motion.mustReintegrate(bias));
+  bias.gyroscope[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(motion.mustReintegrate(bias));
+}
+
+TEST(PreintegrationFactor, ResidualAndItsDerivatives) {
+  const auto motion = someSteps(60).run(some_options);
+  const SE23d first(SO3d::exp({0.3, -1, 2}), Vector3(1, 2, 3), Vector3(-1, 0.5, 2));
+  const Vector3 gravity(0, 0.1, -9.81);
+  ImuBias<double> bias = some_options.bias;
+  bias.gyroscope += Vector3(0.01, -0.02, 0.015);
+  bias.accelerometer += Vector3(0.1, 0.05, -0.2);
+  // The state that the motion leads to has no residual.
+  const double t = motion.duration();
+  const SE23d D = motion.increment(bias);
+  const SO3d R(first.so3());
+  const SE23d reached(R * SO3d(D.so3()),
+                      Vector3(first.translation() + t * first.velocity() + 0.5 * t * t * gravity +
+                              R * Vector3(D.translation())),
+                      Vector3(first.velocity() + t * gravity + R * Vector3(D.velocity())));
+  EXPECT_LE(preintegrationResidual(motion, first, reached, bias, gravity).value.norm(), 1e-14);
+
+  // Elsewhere: a residual of some size, for derivatives that are exact there too.
+  const SE23d second = reached * SE23d::exp(Vector9::LinSpaced(9, -0.4, 0.5));
+  const auto r = preintegrationResidual(motion, first, second, bias, gravity);
+  EXPECT_LE((r.value - preintegrationError(motion, first, second, bias, gravity)).norm(), 1e-15);
+  const double e = 1e-5;
+  for (int k = 0; k < 9; ++k) {
+    const Vector9 d = e * Vector9::Unit(k);
+    const auto by = [&](const Vector9& a, const Vector9& b) {
+      return preintegrationError(motion, SE23d(first * SE23d::exp(a)), SE23d(second * SE23d::exp(b)), bias, gravity);
+    };
+    const Vector9 zero = Vector9::Zero();
+    EXPECT_LE(((by(d, zero) - by(-d, zero)) / (2 * e) - r.by_first.col(k)).norm(), 1e-8) << k;
+    EXPECT_LE(((by(zero, d) - by(zero, -d)) / (2 * e) - r.by_second.col(k)).norm(), 1e-8) << k;
+  }
+  for (int k = 0; k < 9; ++k) {
+    const auto by = [&](double change) {
+      ImuBias<double> b = bias;
+      Vector3 g = gravity;
+      (k < 3 ? b.gyroscope[k] : k < 6 ? b.accelerometer[k - 3] : g[k - 6]) += change;
+      return preintegrationError(motion, first, second, b, g);
+    };
+    const Vector9 numeric = (by(e) - by(-e)) / (2 * e);
+    const Vector9 analytic = k < 6 ? Vector9(r.by_bias.col(k)) : Vector9(r.by_gravity.col(k - 6));
+    EXPECT_LE((numeric - analytic).norm(), 1e-8) << k;
+  }
+}
+
+/// Readings of an agile motion: R(t) = Exp(a(t)) with a, and the position, sums of sines; no gravity.
+struct AnalyticMotion {
+  static Vector3 turn(double t) { return Vector3(0.5 * std::sin(2.1 * t), 0.4 * std::cos(3.3 * t), 0.6 * std::sin(4 * t)); }
+  static Vector3 turnRate(double t) {
+    return Vector3(1.05 * std::cos(2.1 * t), -1.32 * std::sin(3.3 * t), 2.4 * std::cos(4 * t));
+  }
+  static Vector3 position(double t) { return Vector3(std::sin(2 * t), 0.7 * std::cos(3 * t), 0.3 * std::sin(5 * t)); }
+  static Vector3 velocity(double t) {
+    return Vector3(2 * std::cos(2 * t), -2.1 * std::sin(3 * t), 1.5 * std::cos(5 * t));
+  }
+  static Vector3 acceleration(double t) {
+    return Vector3(-4 * std::sin(2 * t), -6.3 * std::cos(3 * t), -7.5 * std::sin(5 * t));
+  }
+  static SE23d state(double t) { return SE23d(SO3d::exp(turn(t)), position(t), velocity(t)); }
+  static ImuSample<double> sample(double t) {
+    return {t, SO3d::rightJacobian(turn(t)) * turnRate(t), SO3d::exp(turn(t)).inverse() * acceleration(t)};
+  }
+  static std::vector<ImuSample<double>> samples(double rate) {
+    std::vector<ImuSample<double>> list;
+    for (int i = -3; i <= 1.2 * rate; ++i) list.push_back(sample(i / rate));
+    return list;
+  }
+};
+
+double errorOf(ImuScheme scheme, double rate) {
+  const auto list = AnalyticMotion::samples(rate);
+  // Both ends lie between readings.
+  const double begin = 0.0123, end = 1.0391;
+  const auto result = preintegrate<double>(list, begin, end, {.scheme = scheme});
+  EXPECT_TRUE(result.ok());
+  EXPECT_NEAR(result.motion.duration(), end - begin, 1e-12);
+  return preintegrationError<double>(result.motion, AnalyticMotion::state(begin), AnalyticMotion::state(end), {},
+                                     Vector3::Zero())
+      .norm();
+}
+
+TEST(Schemes, HaveTheirOrders) {
+  // Doubling the rate divides the error by 2^order.
+  const double held = errorOf(ImuScheme::held, 200) / errorOf(ImuScheme::held, 400);
+  const double averaged = errorOf(ImuScheme::averaged, 200) / errorOf(ImuScheme::averaged, 400);
+  const double cubic = errorOf(ImuScheme::cubic, 100) / errorOf(ImuScheme::cubic, 200);
+  EXPECT_NEAR(held, 2, 0.3) << "instantaneous readings held: half a reading late";
+  EXPECT_NEAR(averaged, 4, 0.8);
+  EXPECT_GE(cubic, 7) << "of third order at least";
+  EXPECT_LE(errorOf(ImuScheme::averaged, 200), 1e-3);
+  EXPECT_LE(errorOf(ImuScheme::cubic, 200), 1e-5);
+}
+
+TEST(Recordings, HeldReadingsAreDeltaAngles) {
+  // Readings that are means over the time to the next lose nothing.
+  const std::vector<ImuSample<double>> list{{0, Vector3(0.1, 0, 2), Vector3(1, 2, 3)},
+                                            {0.1, Vector3(1, -1, 0), Vector3(0, 2, 9)},
+                                            {0.2, Vector3::Zero(), Vector3::Zero()}};
+  Preintegration<double> expected;
+  expected.add(0.1, list[0].angular_rate, list[0].specific_force);
+  expected.add(0.05, list[1].angular_rate, list[1].specific_force);
+  const auto result = preintegrate<double>(list, 0., 0.15, {.scheme = ImuScheme::held, .largest_gap = 0.2});
+  ASSERT_TRUE(result.ok());
+  EXPECT_LE(difference(expected.increment(), result.motion.increment()).norm(), 1e-15);
+}
+
+TEST(Recordings, FaultsAreNamed) {
+  auto list = AnalyticMotion::samples(200);
+  const auto fault = [&](double begin, double end) {
+    const auto result = preintegrate<double>(list, begin, end);
+    return std::pair(result.fault, result.sample);
+  };
+  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::none);
+  EXPECT_EQ(fault(0.4, 0.2).first, RecordingFault::bad_interval);
+  EXPECT_EQ(fault(0.4, 0.4).first, RecordingFault::bad_interval);
+  EXPECT_EQ(fault(std::nan(""), 0.4).first, RecordingFault::bad_interval);
+  EXPECT_EQ(fault(-1, 0.4).first, RecordingFault::not_covered);
+  EXPECT_EQ(fault(0.2, 9), std::pair(RecordingFault::not_covered, list.size() - 1));
+  const auto good = list;
+  list[40].specific_force[1] = std::nan("");
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{40}));
+  list = good;
+  list[50].time = list[49].time;
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_ascending, std::size_t{50})) << "duplicated";
+  list = good;
+  std::swap(list[60], list[61]);
+  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::not_ascending);
+  list = good;
+  list.erase(list.begin() + 50, list.begin() + 80);
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::gap, std::size_t{50}));
+  EXPECT_EQ(fault(0.01, 0.2).first, RecordingFault::none) << "the gap is elsewhere";
+  list.clear();
+  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::not_covered);
+}
+
+}  // namespace
