@@ -1,6 +1,6 @@
-// Worst and mean error of every operation of every group against 50 digits, and where the worst was: over all decades of
-// the angle to pi, and of the scale where there is one. The Frobenius norm of the error, for a tangent whose translation
-// has norm one, relative where the result is larger than one.
+// Worst and mean error of every operation of every group against 50 digits, and where the worst was: over all decades
+// of the angle to pi, and of the scale where there is one. The Frobenius norm of the error, for a tangent whose
+// translation has norm one, relative where the result is larger than one.
 
 #include <support/high_precision.hpp>
 

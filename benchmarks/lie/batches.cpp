@@ -1,5 +1,5 @@
-// Exponentials and logarithms of many elements at a time, stored: the batches of lie/batch.hpp, the library's scalars and
-// a loop over Eigen's angle-axis, on the same thousand elements, which stay in the first cache.
+// Exponentials and logarithms of many elements at a time, stored: the batches of lie/batch.hpp, the library's scalars
+// and a loop over Eigen's angle-axis, on the same thousand elements, which stay in the first cache.
 #include "../inputs.hpp"
 
 #include <lie/batch.hpp>
@@ -39,8 +39,9 @@ void suite(const std::string& name) {
     elements.push_back(T::expOrigin(tangents.back()));
   }
   perElement("expAll/" + name, [tangents, out = elements]() mutable { expAll<M>(tangents, std::span<M>(out)); });
-  perElement("logAll/" + name,
-             [elements, out = tangents]() mutable { logAll<M>(std::span<const M>(elements), std::span<Tangent>(out)); });
+  perElement("logAll/" + name, [elements, out = tangents]() mutable {
+    logAll<M>(std::span<const M>(elements), std::span<Tangent>(out));
+  });
   perElement("exp one by one/" + name, [tangents, out = elements]() mutable {
     for (std::size_t i = 0; i < n; ++i) out[i] = T::expOrigin(tangents[i]);
   });
@@ -65,8 +66,8 @@ void suite(const std::string& name) {
   perElement("Eigen exp/SO3", [vectors, out = rotations]() mutable {
     for (std::size_t i = 0; i < n; ++i) {
       const double angle = vectors[i].norm();
-      out[i] = angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, vectors[i] / angle))
-                         : Eigen::Quaterniond::Identity();
+      out[i] =
+          angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, vectors[i] / angle)) : Eigen::Quaterniond::Identity();
     }
   });
   perElement("Eigen log/SO3", [rotations, out = vectors]() mutable {

@@ -16,9 +16,13 @@ using State = Product<Frame3d, S2d, Eigen::Vector2d>;
 using T = ManifoldTraits<State>;
 
 template <class M>
-concept shows_parameters = requires(const M& x) { x.params(); };
+concept shows_parameters = requires(const M& x) {
+  x.params();
+};
 template <class M>
-concept casts = requires(const M& x) { x.template cast<float>(); };
+concept casts = requires(const M& x) {
+  x.template cast<float>();
+};
 
 State::Tangent tangent(double scale) {
   State::Tangent v;
@@ -88,7 +92,8 @@ TEST(Product, OperationsAreThoseOfTheParts) {
             ManifoldTraits<Frame3d>::hessianHalfSquaredDistance(z_frame));
   EXPECT_EQ(T::injectivityRadius(), static_cast<double>(EIGEN_PI));
   EXPECT_EQ(T::maxSectionalCurvature(), 1);
-  EXPECT_EQ((ManifoldTraits<Product<SO3d, SemiOrientedFrame3d>>::injectivityRadius()), static_cast<double>(EIGEN_PI / 2));
+  EXPECT_EQ((ManifoldTraits<Product<SO3d, SemiOrientedFrame3d>>::injectivityRadius()),
+            static_cast<double>(EIGEN_PI / 2));
   EXPECT_EQ((ManifoldTraits<Product<SO3d, SO2d>>::maxSectionalCurvature()), 0.25);
 }
 

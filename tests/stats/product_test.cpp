@@ -1,5 +1,5 @@
-// Statistics of products: the criterion is a sum over the parts, so means and, without correlation between parts, fusions
-// are those of the parts. Statistical tests have fixed seeds.
+// Statistics of products: the criterion is a sum over the parts, so means and, without correlation between parts,
+// fusions are those of the parts. Statistical tests have fixed seeds.
 
 #include <stats/covariance.hpp>
 #include <stats/group_mean.hpp>
@@ -42,8 +42,7 @@ std::vector<M> scattered(int n, double sd, std::uint64_t seed = 1) {
 template <class M>
 class ProductTest : public testing::Test {};
 // Small ones, for each costs the compiler seconds.
-using Products =
-    testing::Types<Product<SO3d, Vector3d>, Product<SO2d, S2d>, Product<SemiOrientedFrame3d, Vector2d>>;
+using Products = testing::Types<Product<SO3d, Vector3d>, Product<SO2d, S2d>, Product<SemiOrientedFrame3d, Vector2d>>;
 TYPED_TEST_SUITE(ProductTest, Products);
 
 TYPED_TEST(ProductTest, MeanIsThatOfTheParts) {
