@@ -1,9 +1,11 @@
 // Every manifold of the room lie/; one line each.
 #pragma once
 
+#include <lie/essential.hpp>
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
 #include <lie/non_oriented_frame3.hpp>
+#include <lie/oriented_point.hpp>
 #include <lie/product.hpp>
 #include <lie/rn.hpp>
 #include <lie/rxso2.hpp>

@@ -106,8 +106,7 @@ struct Se23Math {
   }
   static Square leftJacobianInverse(const Tangent& t) {
     const Vector3 rho = t.template head<3>(), phi = t.template segment<3>(3), nu = t.template tail<3>();
-    const Matrix3 inverse = Rotation::leftJacobianInverse(phi);
-    return blocks(inverse, -inverse * Pose::coupling(rho, phi) * inverse, -inverse * Pose::coupling(nu, phi) * inverse);
+    return blocks(Rotation::leftJacobianInverse(phi), Pose::inverseCoupling(rho, phi), Pose::inverseCoupling(nu, phi));
   }
   /// ∂(x·exp(d))/∂d and ∂log(x⁻¹y)/∂y at y = x, on parameters.
   static Eigen::Matrix<S, 10, 9> productJacobian(const Params& x) {
@@ -153,10 +152,10 @@ class SE23Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> 
 
   /// Rotation and position, viewed in place.
   Eigen::Map<const SE3<Scalar>> pose() const { return Eigen::Map<const SE3<Scalar>>(data()); }
-  Eigen::Map<Part<SE3<Scalar>>> pose() { return Eigen::Map<Part<SE3<Scalar>>>(data()); }
+  detail::PartView<Derived, SE3<Scalar>> pose() { return detail::PartView<Derived, SE3<Scalar>>(data()); }
   /// The velocity (m/s), viewed in place, in the axes in which the position is.
   Eigen::Map<const Vector3> velocity() const { return Eigen::Map<const Vector3>(data() + 7); }
-  Eigen::Map<Part<Vector3>> velocity() { return Eigen::Map<Part<Vector3>>(data() + 7); }
+  detail::PartView<Derived, Vector3> velocity() { return detail::PartView<Derived, Vector3>(data() + 7); }
 };
 
 using SE23d = SE23<double>;

@@ -4,7 +4,7 @@
 // larger than one; the reference is evaluated at the rounded input. The bar: 4e-15, for inverse Jacobians 6e-15, and
 // 2e-6 in float. The worst errors are printed.
 
-#include <support/high_precision.hpp>
+#include <support/accuracy_bar.hpp>
 
 #include <gtest/gtest.h>
 
@@ -16,66 +16,6 @@
 namespace {
 
 using namespace liestat_test;
-using liestat_test::referenceLog;
-
-/// Exponential and logarithm of the manifolds, as parameters and from parameters.
-template <class S>
-Matrix referenceExp(const liestat::S2<S>&, const Matrix& v) {
-  // Column z of the rotation about (-v_y, v_x, 0).
-  const Matrix R = series(crossMatrix({-v.a[1], v.a[0], 0}), 0);
-  return column({R.at(0, 2), R.at(1, 2), R.at(2, 2)});
-}
-template <class S>
-Matrix referenceLog(const liestat::S2<S>& x) {
-  const Matrix p(x.params());
-  const Real s = sqrt(p.a[0] * p.a[0] + p.a[1] * p.a[1]);
-  // At the antipode every direction is right; the library's choice is x.
-  if (s == 0) return column({p.a[2] < 0 ? 4 * atan(Real(1)) : Real(0), 0});
-  const Real f = atan2(s, p.a[2]) / s;
-  return column({f * p.a[0], f * p.a[1]});
-}
-Matrix quaternionExp(const Matrix& v, int first) {
-  // Left multiplication by the quaternion (v/2, 0) as a matrix on (x, y, z, w); its exponential applied to 1.
-  const std::size_t i = static_cast<std::size_t>(first);
-  const Real x = v.a[i] / 2, y = v.a[i + 1] / 2, z = v.a[i + 2] / 2;
-  Matrix L(4, 4);
-  L.a = {0, -z, y, x, z, 0, -x, y, -y, x, 0, z, -x, -y, -z, 0};
-  const Matrix q = series(L, 0);
-  return column({q.at(0, 3), q.at(1, 3), q.at(2, 3), q.at(3, 3)});
-}
-template <class S>
-Matrix referenceExp(const liestat::Frame3<S>&, const Matrix& v) {
-  const Matrix q = quaternionExp(v, 3);
-  return column({q.a[0], q.a[1], q.a[2], q.a[3], v.a[0], v.a[1], v.a[2]});
-}
-template <class S>
-Matrix referenceLog(const liestat::Frame3<S>& x) {
-  const Matrix p(x.params());
-  const auto omega = quaternionLog(p);
-  return column({p.a[4], p.a[5], p.a[6], omega[0], omega[1], omega[2]});
-}
-template <class S>
-Matrix referenceExp(const liestat::Frame2<S>&, const Matrix& v) {
-  return column({cos(v.a[2]), sin(v.a[2]), v.a[0], v.a[1]});
-}
-template <class S>
-Matrix referenceLog(const liestat::Frame2<S>& x) {
-  const Matrix p(x.params());
-  return column({p.a[2], p.a[3], atan2(p.a[1], p.a[0])});
-}
-
-template <class M>
-void sweepManifold(Table& worst, const std::vector<double>& angles, int translation) {
-  using T = liestat::ManifoldTraits<M>;
-  using S = typename T::Scalar;
-  for (const double angle : angles) {
-    for (const auto& v : tangents<S, T::DoF>(angle, translation)) {
-      const M x = T::expOrigin(v);
-      worst["exp"].see(error(x.params(), referenceExp(x, Matrix(v))), angle);
-      worst["log"].see(error(T::logOrigin(x), referenceLog(x)), angle);
-    }
-  }
-}
 
 template <class S>
 void checkAll(const std::vector<double>& angles) {

@@ -22,8 +22,9 @@ void checkInvariants(const ceres::Manifold& manifold, const ceres::Vector& x, co
 
 template <class M>
 class CeresInvariants : public testing::Test {};
-using Manifolds = testing::Types<Eigen::Vector3d, SO2d, SO3d, SE2d, SE3d, RxSO2d, RxSO3d, Sim2d, Sim3d, S2d, Frame2d,
-                                 Frame3d, SemiOrientedFrame3d, NonOrientedFrame3d>;
+using Manifolds = testing::Types<Eigen::Vector3d, SO2d, SO3d, SE2d, SE3d, RxSO2d, RxSO3d, Sim2d, Sim3d, SE23d, S2d,
+                                 OrientedPointd, Essentiald, Frame2d, Frame3d, SemiOrientedFrame3d, NonOrientedFrame3d,
+                                 Product<SO3d, Eigen::Vector3d>>;
 TYPED_TEST_SUITE(CeresInvariants, Manifolds);
 
 TYPED_TEST(CeresInvariants, Hold) {

@@ -66,6 +66,8 @@ template <class S, int>
 using VectorAndRotation = liestat::Product<Vector3<S>, liestat::SO3<S>>;
 template <class S, int>
 using FrameAndDirectionOf = FrameAndDirection<S>;
+TEST(Jet, OrientedPoint) { checkManifold<liestat::OrientedPoint>(3, 4); }
+TEST(Jet, Essential) { checkManifold<liestat::Essential>(0, 4); }
 TEST(Jet, Products) {
   checkManifold<VectorAndRotation>(3, 4);
   checkManifold<FrameAndDirectionOf>(3, 4);

@@ -30,6 +30,8 @@ LIESTAT_INSTANTIATE_ALL(Sim2)
 LIESTAT_INSTANTIATE_ALL(Sim3)
 LIESTAT_INSTANTIATE_ALL(SE23)
 LIESTAT_INSTANTIATE_ALL(S2)
+LIESTAT_INSTANTIATE_ALL(OrientedPoint)
+LIESTAT_INSTANTIATE_ALL(Essential)
 LIESTAT_INSTANTIATE_ALL(Frame2)
 LIESTAT_INSTANTIATE_ALL(Frame3)
 LIESTAT_INSTANTIATE_ALL(SemiOrientedFrame3)
@@ -57,6 +59,9 @@ static_assert(Metric<Eigen::Vector3d> && Metric<Eigen::Matrix<float, 7, 1>> && M
 static_assert(Metric<S2d> && Metric<Frame2d> && Metric<Frame3d> && Metric<Frame3<Jet3>>);
 static_assert(Metric<SemiOrientedFrame3d> && Metric<NonOrientedFrame3f>);
 static_assert(Quotient<SemiOrientedFrame3d> && Quotient<NonOrientedFrame3d> && !Quotient<Frame3d> && !Quotient<SO3d>);
+
+static_assert(Metric<OrientedPointd> && Metric<OrientedPoint<Jet3>> && Metric<Essentiald> && Metric<Essential<Jet3>>);
+static_assert(sizeof(OrientedPointd) == 6 * sizeof(double) && sizeof(Essentialf) == 7 * sizeof(float));
 
 // A product is what all of its parts are; a quotient if one of them is.
 static_assert(Metric<Product<SO3d, Eigen::Vector3d>> && Metric<Product<Frame3d, Product<S2d, SO2d>>>);
@@ -95,7 +100,7 @@ TEST(Types, ViewsOfPartsWriteThrough) {
   pose.translation() << 1, 2, 3;
   pose.so3() = SO3d::rotX(0.5);
   EXPECT_EQ(pose.data()[4], 1);
-  EXPECT_EQ(pose.data()[0], std::sin(0.25));
+  EXPECT_DOUBLE_EQ(pose.data()[0], std::sin(0.25));
   double memory[7] = {0, 0, 0, 1, 0, 0, 0};
   Eigen::Map<SE3d> view(memory);
   view.translation() << 4, 5, 6;
@@ -103,7 +108,7 @@ TEST(Types, ViewsOfPartsWriteThrough) {
   EXPECT_EQ(memory[6], 6);
   EXPECT_EQ(memory[2], SO3d::rotZ(1).data()[2]);
   view *= SE3d::transX(1);
-  EXPECT_EQ(memory[4], 4 + std::cos(1.0)) << "the translation is in the body frame";
+  EXPECT_DOUBLE_EQ(memory[4], 4 + std::cos(1.0)) << "the translation is in the body frame";
 }
 
 TEST(Types, CheckedConstructorsRefuse) {

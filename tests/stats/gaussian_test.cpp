@@ -14,7 +14,7 @@ namespace {
 template <class M>
 class GaussianTest : public testing::Test {};
 using Features = testing::Types<Eigen::Vector3d, SO2d, SO3d, SE2d, SE3d, S2d, Frame2d, Frame3d, SemiOrientedFrame3d,
-                                NonOrientedFrame3d, SE23d, Product<SO3d, Eigen::Vector3d>, Product<Frame3d, S2d>,
+                                NonOrientedFrame3d, OrientedPointd, Essentiald, Product<SO3d, Eigen::Vector3d>,
                                 Product<SemiOrientedFrame3d, Eigen::Vector2d>>;
 TYPED_TEST_SUITE(GaussianTest, Features);
 
