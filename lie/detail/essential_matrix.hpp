@@ -51,7 +51,7 @@ bool isInFront(const Pose& pose, const Eigen::MatrixBase<A>& x_a, const Eigen::M
   using S = typename Pose::Scalar;
   using Vector3 = Eigen::Matrix<S, 3, 1>;
   const Vector3 x = x_a, d = pose.direction().unit_vector(), y = pose.so3() * Vector3(x_b), n = x.cross(y);
-  return (d.cross(y).dot(n) > S(0)) & (d.cross(x).dot(n) > S(0));
+  return d.cross(y).dot(n) > S(0) && d.cross(x).dot(n) > S(0);
 }
 
 }  // namespace liestat::detail
