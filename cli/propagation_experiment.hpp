@@ -1,0 +1,62 @@
+#pragma once
+
+#include <stats/validation.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// The simulated experiments of `liestat validate propagation`: features with known noise are composed, inverted,
+/// compared, or move points, and the truth is looked for under the propagated covariance. All operations see the same
+/// draws.
+
+enum class Propagated { rotation, pose, similarity };
+inline constexpr std::array all_propagated{Propagated::rotation, Propagated::pose, Propagated::similarity};
+
+enum class Operation { compose, inverse, between, act, chain };
+inline constexpr std::array all_operations{Operation::compose, Operation::inverse, Operation::between, Operation::act,
+                                           Operation::chain};
+
+/// The names of the program's options and JSON fields.
+std::string name(Propagated feature);
+std::string name(Operation operation);
+
+/// An operation, to first or to fourth order in the noise.
+struct PropagationMethod {
+  Operation operation;
+  bool fourth_order;
+};
+inline constexpr std::array propagation_methods{
+    PropagationMethod{Operation::compose, false}, PropagationMethod{Operation::compose, true},
+    PropagationMethod{Operation::inverse, false}, PropagationMethod{Operation::between, false},
+    PropagationMethod{Operation::act, false},     PropagationMethod{Operation::chain, false},
+    PropagationMethod{Operation::chain, true}};
+
+/// Number of factors in a chain.
+inline constexpr std::size_t chain_length = 10;
+
+/// One experiment.
+struct PropagationExperiment {
+  Propagated feature = Propagated::pose;
+  /// The largest standard deviation of a rotation (rad) and of a translation or point (m); along the other axes 2/3 and
+  /// 1/3 of it, of the logarithm of a scale 1/3. Correlation 1/2 between neighbouring coordinates.
+  double spread = 0.1;
+  std::size_t trials = 1000;
+  std::uint64_t seed = 1;
+  std::vector<PropagationMethod> methods{propagation_methods.begin(), propagation_methods.end()};
+};
+
+/// Degrees of freedom of an operation's result.
+int degreesOfFreedom(Propagated feature, Operation operation);
+
+/// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
+/// each of the methods. `progress(trials done, all)` is called from any thread, never twice at the same time.
+std::vector<ValidationReport> run(const PropagationExperiment& experiment, int threads,
+                                  const std::function<void(std::size_t, std::size_t)>& progress = {});
+
+}  // namespace liestat::cli

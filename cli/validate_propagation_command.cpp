@@ -1,0 +1,111 @@
+#include <cli/commands.hpp>
+#include <cli/json_output.hpp>
+#include <cli/progress.hpp>
+#include <cli/validate_propagation.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <cstdio>
+#include <memory>
+
+namespace liestat::cli {
+namespace {
+
+struct Options {
+  PropagationValidation validation;
+  std::vector<std::string> features, operations;
+  std::vector<double> spreads;
+  std::string json, report;
+};
+
+template <class List>
+std::vector<std::string> names(const List& list) {
+  std::vector<std::string> all;
+  for (const auto value : list) all.push_back(name(value));
+  return all;
+}
+
+/// The enumerators with the given names, all of them for none. CLI11 has checked the names.
+template <class List>
+auto chosen(const List& list, const std::vector<std::string>& wanted) {
+  std::vector<typename List::value_type> values;
+  for (const auto value : list) {
+    for (const std::string& w : wanted) {
+      if (w == name(value) && (values.empty() || values.back() != value)) values.push_back(value);
+    }
+  }
+  return wanted.empty() ? std::vector<typename List::value_type>(list.begin(), list.end()) : values;
+}
+
+JsonObject toJson(const PropagationRow& row) {
+  const ValidationReport& r = row.report;
+  JsonObject o;
+  o.set("feature", name(row.experiment.feature)).set("operation", name(row.method.operation));
+  o.set("order", row.method.fourth_order ? 4 : 1).set("in_domain", row.promise.has_value());
+  o.set("spread", row.experiment.spread).set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
+  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
+  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+  o.set("tail", row.tail).set("failures", r.failures).set("passed", row.passed);
+  return o;
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  PropagationValidation validation = options.validation;
+  validation.features = chosen(all_propagated, options.features);
+  validation.operations = chosen(all_operations, options.operations);
+  if (!options.spreads.empty()) validation.spreads = options.spreads;
+
+  std::vector<PropagationRow> rows;
+  {
+    // The bar counts in thousandths, as the amount of work is known only inside.
+    Progress bar("validate propagation", 1000);
+    rows = validatePropagation(validation, [&bar](std::uint64_t done, std::uint64_t all) {
+      const std::uint64_t now = all == 0 ? 1000 : 1000 * done / all;
+      if (now > bar.done()) bar.advance(now - bar.done());
+    });
+  }
+  std::fputs(formatPropagationTables(rows).c_str(), stdout);
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, validation.seed);
+    std::vector<JsonObject> list;
+    for (const PropagationRow& row : rows) list.push_back(toJson(row));
+    object.set("false_alarm", propagation_false_alarm).set("rows", list);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) writePropagationReport(options.report, invocation.command_line, rows);
+  bool passed = true;
+  for (const PropagationRow& row : rows) passed = passed && row.passed.value_or(true);
+  return passed ? exit_fine : exit_validation_failed;
+}
+
+}  // namespace
+
+void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  CLI::App* app = validate.add_subcommand(
+      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_propagated)));
+  app->add_option("--operation", options->operations,
+                  "compose, inverse, between, act, chain (of ten factors): a comma list (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_operations)));
+  app->add_option("--spread", options->spreads,
+                  "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
+      ->delimiter(',')
+      ->check(CLI::Range(1e-6, 10.0));
+  app->add_option("--trials", options->validation.trials, "Trials a row (default 20000)")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
+  app->add_option("--seed", options->validation.seed,
+                  "Seed; the same seed gives the same bits on any number of threads");
+  app->add_option("--threads", options->validation.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  app->add_option("--json", options->json, "Write the rows to a JSON file ('-': standard output)");
+  app->add_option("--report", options->report, "Write a page with plots into this directory");
+  app->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli
