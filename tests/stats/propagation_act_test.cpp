@@ -44,6 +44,7 @@ TEST(Act, movesDirectionsAndFrames) {
   expectAction(SO3d::sampleUniform(rng), S2d(0.3, -0.5, 0.7), moved, "SO3 on S2");
   expectAction(SE3d::sampleUniform(rng), sampleUniform<Frame3d>(rng), moved, "SE3 on Frame3");
   expectAction(SE2d::sampleUniform(rng), sampleUniform<Frame2d>(rng), moved, "SE2 on Frame2");
+  expectAction(SE3d::sampleUniform(rng), sampleUniform<OrientedPointd>(rng), moved, "SE3 on oriented points");
 }
 
 TEST(Between, ofFeaturesThatAreNoGroup) {
