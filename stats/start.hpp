@@ -139,6 +139,8 @@ M startOfMean(const R& samples, const W& weights) {
     params.template head<4>() = rotations.mean();
     if constexpr (vectors > 0) params.template tail<vectors>() = translation / weight;
     return M::fromParams(params);
+  } else if constexpr (requires(const M& x) { x.scale(); }) {  // a mean of parameters would weigh by the scale
+    return detail::bestOfSeveral<M>(samples, weights);
   } else if constexpr (
       requires(const M& x) { x.so2(); } || requires(const M& x) { x.unit_complex(); }) {
     typename M::Params sum = M::Params::Zero();
