@@ -1,14 +1,54 @@
-#include <cli/means_experiment.hpp>
+#include <cli/means_trial.hpp>
+#include <cli/parallel.hpp>
 #include <lie/lie.hpp>
+#include <stats/validation.hpp>
+
+#include <cmath>
 
 namespace liestat::cli {
-namespace detail {
+namespace {
 
-template <class M>
-std::vector<ValidationReport> runTrials(const MeansExperiment&, int,
-                                        const std::function<void(std::size_t, std::size_t)>&);
+using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
 
-}  // namespace detail
+Trial trialOf(Feature feature) {
+  switch (feature) {
+    case Feature::point:
+      return detail::runTrial<Eigen::Vector3d>;
+    case Feature::rotation:
+      return detail::runTrial<SO3d>;
+    case Feature::frame:
+      return detail::runTrial<Frame3d>;
+    case Feature::semi_oriented_frame:
+      return detail::runTrial<SemiOrientedFrame3d>;
+    case Feature::non_oriented_frame:
+      return detail::runTrial<NonOrientedFrame3d>;
+    case Feature::direction:
+      break;
+  }
+  return detail::runTrial<S2d>;
+}
+
+/// Logarithm of the ratio of two errors.
+double logRatio(double error, double reference) { return std::log(error / reference); }
+
+/// What the reports are made of, in the order of the methods that are wanted.
+std::vector<TrialOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
+  std::vector<TrialOutcome> list;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    const detail::MethodOutcome& o = outcomes[m];
+    const bool is_maha = methods[m].criterion == Criterion::maha;
+    const detail::MethodOutcome& reference =
+        outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
+    TrialOutcome outcome{.mu2 = o.mahalanobis_squared, .iterations = o.iterations};
+    outcome.extra[log_ratio_rotation] = logRatio(o.rotation_error, reference.rotation_error);
+    outcome.extra[log_ratio_translation] = logRatio(o.translation_error, reference.translation_error);
+    list.push_back(outcome);
+  }
+  return list;
+}
+
+}  // namespace
 
 std::string name(Feature feature) {
   switch (feature) {
@@ -80,21 +120,18 @@ int degreesOfFreedom(Feature feature) {
 
 std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
                                   const std::function<void(std::size_t, std::size_t)>& progress) {
-  switch (experiment.feature) {
-    case Feature::point:
-      return detail::runTrials<Eigen::Vector3d>(experiment, threads, progress);
-    case Feature::rotation:
-      return detail::runTrials<SO3d>(experiment, threads, progress);
-    case Feature::frame:
-      return detail::runTrials<Frame3d>(experiment, threads, progress);
-    case Feature::semi_oriented_frame:
-      return detail::runTrials<SemiOrientedFrame3d>(experiment, threads, progress);
-    case Feature::non_oriented_frame:
-      return detail::runTrials<NonOrientedFrame3d>(experiment, threads, progress);
-    case Feature::direction:
-      return detail::runTrials<S2d>(experiment, threads, progress);
+  const int k = degreesOfFreedom(experiment.feature);
+  std::vector<ReferenceLaw> laws;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    laws.push_back(methods[m].known_noise ? ReferenceLaw::chiSquared(k)
+                                          : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
   }
-  return {};
+  const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
+  const Trial trial = trialOf(experiment.feature);
+  return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
+    return wantedOutcomes(experiment, trial(experiment, rng));
+  });
 }
 
 }  // namespace liestat::cli

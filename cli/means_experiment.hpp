@@ -1,7 +1,6 @@
 #pragma once
 
 #include <stats/maha.hpp>
-#include <stats/validation.hpp>
 
 #include <array>
 #include <cstddef>
@@ -9,6 +8,10 @@
 #include <functional>
 #include <string>
 #include <vector>
+
+namespace liestat {
+struct ValidationReport;
+}
 
 namespace liestat::cli {
 

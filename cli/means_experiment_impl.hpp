@@ -1,9 +1,8 @@
 #pragma once
 
-// The experiment for one type of feature; each type is compiled in a unit of its own.
+// One trial for one type of feature; each type is compiled in a unit of its own, the harness around them is not.
 
-#include <cli/means_experiment.hpp>
-#include <cli/parallel.hpp>
+#include <cli/means_trial.hpp>
 #include <lie/lie.hpp>
 #include <stats/covariance.hpp>
 #include <stats/maha.hpp>
@@ -12,11 +11,8 @@
 #include <stats/uniqueness.hpp>
 
 #include <cmath>
-#include <limits>
 
 namespace liestat::cli::detail {
-
-inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 /// The report's covariance Σ of a feature, in the library's tangent order.
 template <class M>
@@ -92,15 +88,6 @@ Scene<M> drawScene(const MeansExperiment& experiment, CounterRng& rng) {
   }
   return scene;
 }
-
-/// What one method gave in one trial.
-struct MethodOutcome {
-  double mahalanobis_squared = not_a_number;  ///< of the exact feature about the estimate; NaN if the method failed
-  int iterations = 0;                         ///< started at the first measure
-  double rotation_error = not_a_number;       ///< rad; NaN where the feature has no orientation
-  double translation_error = not_a_number;    ///< m; NaN where the feature has no position
-};
-using MethodOutcomes = std::array<MethodOutcome, methods.size()>;
 
 /// Angle and length of the error of an estimate.
 template <class M>
@@ -178,11 +165,8 @@ void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, 
   if (best.status == Status::ok) outcome.mahalanobis_squared = mahalanobisSquared(best.estimate(), scene.exact);
 }
 
-/// Logarithm of the ratio of two errors.
-inline double logRatio(double error, double reference) { return std::log(error / reference); }
-
 template <class M>
-std::vector<TrialOutcome> runTrial(const MeansExperiment& experiment, CounterRng& rng) {
+MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
   const Scene<M> scene = drawScene<M>(experiment, rng);
   MethodOutcomes outcomes{};
   const auto wanted = [&](Criterion criterion) {
@@ -209,34 +193,7 @@ std::vector<TrialOutcome> runTrial(const MeansExperiment& experiment, CounterRng
     const std::size_t m = methodIndex({Criterion::maha, corrected, true});
     if (experiment.wanted[m]) mahalanobisMeans(experiment, scene, corrected, outcomes[m]);
   }
-
-  std::vector<TrialOutcome> list;
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    if (!experiment.wanted[m]) continue;
-    const MethodOutcome& o = outcomes[m];
-    const bool is_maha = methods[m].criterion == Criterion::maha;
-    const MethodOutcome& reference = outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
-    TrialOutcome outcome{.mu2 = o.mahalanobis_squared, .iterations = o.iterations};
-    outcome.extra[log_ratio_rotation] = logRatio(o.rotation_error, reference.rotation_error);
-    outcome.extra[log_ratio_translation] = logRatio(o.translation_error, reference.translation_error);
-    list.push_back(outcome);
-  }
-  return list;
-}
-
-template <class M>
-std::vector<ValidationReport> runTrials(const MeansExperiment& experiment, int threads,
-                                        const std::function<void(std::size_t, std::size_t)>& progress) {
-  std::vector<ReferenceLaw> laws;
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    if (!experiment.wanted[m]) continue;
-    laws.push_back(methods[m].known_noise
-                       ? ReferenceLaw::chiSquared(ManifoldTraits<M>::DoF)
-                       : ReferenceLaw::hotelling(ManifoldTraits<M>::DoF, static_cast<int>(experiment.n)));
-  }
-  const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
-  return validateAll(ProgramExecutor{threads}, options, laws,
-                     [&](CounterRng& rng, std::uint64_t) { return runTrial<M>(experiment, rng); });
+  return outcomes;
 }
 
 }  // namespace liestat::cli::detail

@@ -3,6 +3,7 @@
 // errors.
 
 #include <cli/means_experiment.hpp>
+#include <stats/validation.hpp>
 
 #include <gtest/gtest.h>
 

@@ -5,6 +5,7 @@
 // fresh seed; the seeds are fixed.
 
 #include <cli/means_experiment.hpp>
+#include <stats/validation.hpp>
 
 #include <gtest/gtest.h>
 

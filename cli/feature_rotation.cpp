@@ -1,0 +1,12 @@
+// All that is a template of the feature, in one unit: its parts share most of what they instantiate.
+
+#include <cli/means_experiment_impl.hpp>
+#include <cli/split_impl.hpp>
+
+namespace liestat::cli::detail {
+
+template MeanAnalysis analyse<SO3d>(const Measures&, const AnalysisOptions&);
+template SplitResult split<SO3d>(const Measures&, const SplitPlan&, int);
+template MethodOutcomes runTrial<SO3d>(const MeansExperiment&, CounterRng&);
+
+}  // namespace liestat::cli::detail

@@ -1,7 +1,0 @@
-#include <cli/mean_analysis_impl.hpp>
-
-namespace liestat::cli::detail {
-
-template MeanAnalysis analyse<S2d>(const Measures&, const AnalysisOptions&);
-
-}  // namespace liestat::cli::detail

@@ -1,8 +1,0 @@
-#include <cli/means_experiment_impl.hpp>
-
-namespace liestat::cli::detail {
-
-template std::vector<ValidationReport> runTrials<Frame3d>(const MeansExperiment&, int,
-                                                          const std::function<void(std::size_t, std::size_t)>&);
-
-}  // namespace liestat::cli::detail
