@@ -94,13 +94,13 @@ inline double kolmogorovDurbin(std::size_t n, double d) {
 
 /// P(D_n ≤ x/√n) by the expansion of Pelz and Good, four terms.
 inline double kolmogorovPelzGood(std::size_t n, double x) {
-  constexpr double pi = 3.14159265358979323846;
+  constexpr double half_turn = 3.14159265358979323846;
   const double x2 = x * x, x4 = x2 * x2, x6 = x4 * x2, x8 = x4 * x4;
-  const double root_half_pi = std::sqrt(pi / 2);
+  const double root_half_pi = std::sqrt(half_turn / 2);
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0, t2 = 0, t3 = 0;
   // Sums over all integers k of functions of (k + 1/2)² and of k²; both are even, so k ≥ 0 counts twice.
   for (int k = 0; k < 200; ++k) {
-    const double half2 = pi * pi * (k + 0.5) * (k + 0.5), whole2 = pi * pi * k * k;
+    const double half2 = half_turn * half_turn * (k + 0.5) * (k + 0.5), whole2 = half_turn * half_turn * k * k;
     const double e = std::exp(-half2 / (2 * x2)), f = std::exp(-whole2 / (2 * x2));
     if (k > 0 && f < 1e-30) break;
     const double half4 = half2 * half2, half6 = half4 * half2;
