@@ -176,7 +176,7 @@ template <class Polynomials>
 void comparePolynomials(const Polynomials& polynomials, int steps) {
   double lanes[detail::pack_size];
   const auto at = [&](const auto& coefficients, double x) {
-    detail::storePack(lanes, detail::evaluate(coefficients, detail::Pack{} + x));
+    detail::storePack(lanes, detail::evaluatePolynomial(coefficients, detail::Pack{} + x));
     return lanes[0];
   };
   for (int i = 0; i <= steps; ++i) {
