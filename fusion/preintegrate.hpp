@@ -15,8 +15,8 @@ namespace liestat {
 enum class ImuScheme {
   averaged,  ///< instantaneous readings; the mean of two neighbours holds between them, integrated exactly. Order 2
   held,      ///< a reading is the mean rate and force from its time to the next (delta-angle sensors)
-  cubic      ///< instantaneous readings; a cubic through four, Magnus' and Simpson's rules. Order 3 to 4; for exact data
-             ///< and slow sensors, because it amplifies vibration
+  cubic  ///< instantaneous readings; a cubic through four, Magnus' and Simpson's rules. Order 3 to 4; for exact data
+         ///< and slow sensors, because it amplifies vibration
 };
 
 /// How a recording is integrated.
@@ -30,11 +30,11 @@ struct RecordingOptions {
 /// Why an increment over a recording is not to be used.
 enum class RecordingFault {
   none,
-  bad_interval,     ///< the end is not after the start
-  not_covered,      ///< the readings do not reach from start to end
-  not_ascending,    ///< a time is not later than the one before
-  not_finite,       ///< a time, rate or force is NaN or infinite
-  gap               ///< two readings are further apart than options.largest_gap
+  bad_interval,   ///< the end is not after the start
+  not_covered,    ///< the readings do not reach from start to end
+  not_ascending,  ///< a time is not later than the one before
+  not_finite,     ///< a time, rate or force is NaN or infinite
+  gap             ///< two readings are further apart than options.largest_gap
 };
 
 /// What preintegrate() returns. Only a result without fault is to be used.
@@ -89,14 +89,15 @@ class ImuInterpolant {
 template <class S, class Rate>
 Eigen::Matrix<S, 3, 1> magnusRotation(const Rate& rate, const S& begin, const S& h) {
   const S root = std::sqrt(S(3));
-  const Eigen::Matrix<S, 3, 1> a = rate(begin + h * (S(0.5) - root / S(6))), b = rate(begin + h * (S(0.5) + root / S(6)));
+  const Eigen::Matrix<S, 3, 1> a = rate(begin + h * (S(0.5) - root / S(6))),
+                               b = rate(begin + h * (S(0.5) + root / S(6)));
   return S(0.5) * h * (a + b) + (root / S(12) * h * h) * a.cross(b);
 }
 
 }  // namespace detail
 
-/// The motion from time `begin` to `end` (s) out of readings in the order of time. Readings before and after the interval
-/// may be among them, and the scheme uses those next to it.
+/// The motion from time `begin` to `end` (s) out of readings in the order of time. Readings before and after the
+/// interval may be among them, and the scheme uses those next to it.
 template <class S>
 RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& begin, const S& end,
                                 const RecordingOptions<S>& options = {}) {
@@ -139,7 +140,8 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
       const detail::ImuInterpolant<S> at(samples, k, 4);
       const auto rate = [&](const S& time) { return Vector3(at(time).rate - bias.gyroscope); };
       const S middle = S(0.5) * (from + to);
-      const Vector3 half = detail::magnusRotation<S>(rate, from, S(0.5) * h), whole = detail::magnusRotation<S>(rate, from, h);
+      const Vector3 half = detail::magnusRotation<S>(rate, from, S(0.5) * h),
+                    whole = detail::magnusRotation<S>(rate, from, h);
       const Vector3 first = at(from).force - bias.accelerometer;
       const Vector3 second = SO3<S>::exp(half) * Vector3(at(middle).force - bias.accelerometer);
       const Vector3 third = SO3<S>::exp(whole) * Vector3(at(to).force - bias.accelerometer);

@@ -75,8 +75,8 @@ template <class S>
 Eigen::Matrix<S, 3, 3> integralSlope(const Eigen::Matrix<S, 3, 1>& theta, const Eigen::Matrix<S, 3, 1>& a, const S& k1,
                                      const S& k2, const S& q1, const S& q2) {
   const Eigen::Matrix<S, 3, 1> w = theta.cross(a), ww = theta.cross(w);
-  Eigen::Matrix<S, 3, 3> D = (q1 * w + q2 * ww - (S(2) * k2) * a) * theta.transpose() + (k2 * theta) * a.transpose() -
-                             skew(k1 * a);
+  Eigen::Matrix<S, 3, 3> D =
+      (q1 * w + q2 * ww - (S(2) * k2) * a) * theta.transpose() + (k2 * theta) * a.transpose() - skew(k1 * a);
   // d/dθ of θ×(θ×a) = θ (θ·a) - a |θ|² is (θ·a) I + θ aᵀ - 2 a θᵀ.
   D.diagonal().array() += k2 * theta.dot(a);
   return D;
@@ -158,8 +158,8 @@ class Preintegration {
         back * bias_.vg, back * bias_.va;
     return J;
   }
-  /// The covariance of additive errors in the axes of the start, order (rotation, velocity, position), the rotation's on
-  /// the right: the form in which most of the literature writes it.
+  /// The covariance of additive errors in the axes of the start, order (rotation, velocity, position), the rotation's
+  /// on the right: the form in which most of the literature writes it.
   Matrix9 additiveCovariance() const {
     const Matrix9 sigma = covariance_.assembled(Matrix3(Matrix3::Identity()));
     Matrix9 T = Matrix9::Zero();
@@ -168,8 +168,8 @@ class Preintegration {
     return T * sigma * T.transpose();
   }
 
-  /// This interval and the one that follows it as one; exact, also for covariance and Jacobians. Both must have been made
-  /// with the same options.
+  /// This interval and the one that follows it as one; exact, also for covariance and Jacobians. Both must have been
+  /// made with the same options.
   Preintegration operator*(const Preintegration& next) const {
     Preintegration all(options_);
     const SO3<S> R = increment_.so3();
@@ -251,10 +251,8 @@ class Preintegration {
     const Matrix3 G2 = detail::rotationPolynomial(rotation, S(0.5), k.c, k.d);
     const Matrix3 turn = h * (R * G1);
     const Matrix3 slide = (h * h) * (R * G2);
-    const Matrix3 speed =
-        (h * h) * (R * detail::integralSlope<S>(rotation, force, k.b, k.c, k.b_slope, k.c_slope));
-    const Matrix3 drift =
-        (h * h * h) * (R * detail::integralSlope<S>(rotation, force, k.c, k.d, k.c_slope, k.d_slope));
+    const Matrix3 speed = (h * h) * (R * detail::integralSlope<S>(rotation, force, k.b, k.c, k.b_slope, k.c_slope));
+    const Matrix3 drift = (h * h * h) * (R * detail::integralSlope<S>(rotation, force, k.c, k.d, k.c_slope, k.d_slope));
     bias_.pg -= drift;
     bias_.pa -= slide;
     bias_.rg -= turn;

@@ -26,8 +26,8 @@ SE23<S> impliedIncrement(const SE23<S>& first, const SE23<S>& second, const S& t
   using Vector3 = Eigen::Matrix<S, 3, 1>;
   const SO3<S> back = SO3<S>(first.so3()).inverse();
   const Vector3 velocity = back * Vector3(second.velocity() - first.velocity() - t * gravity);
-  const Vector3 position = back * Vector3(second.translation() - first.translation() - t * first.velocity() -
-                                          (S(0.5) * t * t) * gravity);
+  const Vector3 position =
+      back * Vector3(second.translation() - first.translation() - t * first.velocity() - (S(0.5) * t * t) * gravity);
   return SE23<S>(back * SO3<S>(second.so3()), position, velocity);
 }
 

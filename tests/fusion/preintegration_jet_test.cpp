@@ -26,9 +26,9 @@ TEST(PreintegrationFactor, DerivativesByJets) {
   };
   const Eigen::Matrix<double, 9, 1> zero = Eigen::Matrix<double, 9, 1>::Zero();
   const ImuBias<Jet> jet_bias{seeded(bias.gyroscope, 18), seeded(bias.accelerometer, 21)};
-  const auto error = preintegrationError<Jet>(
-      motion, SE23<Jet>(first.cast<Jet>() * SE23<Jet>::exp(seeded(zero, 0))),
-      SE23<Jet>(second.cast<Jet>() * SE23<Jet>::exp(seeded(zero, 9))), jet_bias, seeded(gravity, 24));
+  const auto error = preintegrationError<Jet>(motion, SE23<Jet>(first.cast<Jet>() * SE23<Jet>::exp(seeded(zero, 0))),
+                                              SE23<Jet>(second.cast<Jet>() * SE23<Jet>::exp(seeded(zero, 9))), jet_bias,
+                                              seeded(gravity, 24));
   const auto r = preintegrationResidual(motion, first, second, bias, gravity);
   Eigen::Matrix<double, 9, 27> analytic;
   analytic << r.by_first, r.by_second, r.by_bias, r.by_gravity;

@@ -160,7 +160,8 @@ TEST(Preintegration, BiasUpdateWithoutReintegration) {
   struct Row {
     double change, rotation, velocity;
   };
-  for (const auto& [change, rotation, velocity] : {Row{0.001, 3e-9, 6e-8}, Row{0.01, 3e-7, 1e-6}, Row{0.05, 8e-6, 4e-5}}) {
+  for (const auto& [change, rotation, velocity] :
+       {Row{0.001, 3e-9, 6e-8}, Row{0.01, 3e-7, 1e-6}, Row{0.05, 8e-6, 4e-5}}) {
     PreintegrationOptions<double> other = options;
     other.bias.gyroscope = change * Vector3(1, 1, 1).normalized();
     const Vector9 error = difference(steps.run(other).increment(), motion.increment(other.bias));
@@ -189,10 +190,10 @@ TEST(PreintegrationFactor, ResidualAndItsDerivatives) {
   const double t = motion.duration();
   const SE23d D = motion.increment(bias);
   const SO3d R(first.so3());
-  const SE23d reached(R * SO3d(D.so3()),
-                      Vector3(first.translation() + t * first.velocity() + 0.5 * t * t * gravity +
-                              R * Vector3(D.translation())),
-                      Vector3(first.velocity() + t * gravity + R * Vector3(D.velocity())));
+  const SE23d reached(
+      R * SO3d(D.so3()),
+      Vector3(first.translation() + t * first.velocity() + 0.5 * t * t * gravity + R * Vector3(D.translation())),
+      Vector3(first.velocity() + t * gravity + R * Vector3(D.velocity())));
   EXPECT_LE(preintegrationResidual(motion, first, reached, bias, gravity).value.norm(), 1e-14);
 
   // Elsewhere: a residual of some size, for derivatives that are exact there too.
@@ -224,7 +225,9 @@ TEST(PreintegrationFactor, ResidualAndItsDerivatives) {
 
 /// Readings of an agile motion: R(t) = Exp(a(t)) with a, and the position, sums of sines; no gravity.
 struct AnalyticMotion {
-  static Vector3 turn(double t) { return Vector3(0.5 * std::sin(2.1 * t), 0.4 * std::cos(3.3 * t), 0.6 * std::sin(4 * t)); }
+  static Vector3 turn(double t) {
+    return Vector3(0.5 * std::sin(2.1 * t), 0.4 * std::cos(3.3 * t), 0.6 * std::sin(4 * t));
+  }
   static Vector3 turnRate(double t) {
     return Vector3(1.05 * std::cos(2.1 * t), -1.32 * std::sin(3.3 * t), 2.4 * std::cos(4 * t));
   }
