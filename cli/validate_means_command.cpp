@@ -1,8 +1,6 @@
 #include <cli/commands.hpp>
-#include <cli/input_error.hpp>
-#include <cli/json_output.hpp>
-#include <cli/progress.hpp>
 #include <cli/validate_means.hpp>
+#include <cli/validation_command.hpp>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -26,26 +24,6 @@ struct Options {
   bool certify = false, full = false;
 };
 
-/// The names of all members of a list of enumerators.
-template <class List>
-std::vector<std::string> names(const List& list) {
-  std::vector<std::string> all;
-  for (const auto value : list) all.push_back(name(value));
-  return all;
-}
-
-/// The enumerators with the given names, all of them for none. CLI11 has checked the names.
-template <class List>
-auto chosen(const List& list, const std::vector<std::string>& wanted) {
-  std::vector<typename List::value_type> values;
-  for (const auto value : list) {
-    for (const std::string& w : wanted) {
-      if (w == name(value)) values.push_back(value);
-    }
-  }
-  return wanted.empty() ? std::vector<typename List::value_type>(list.begin(), list.end()) : values;
-}
-
 JsonObject toJson(const MeansRow& row) {
   const MeansExperiment& e = row.experiment;
   const ValidationReport& r = row.report;
@@ -60,9 +38,8 @@ JsonObject toJson(const MeansRow& row) {
   }
   o.set("formula", row.method.corrected ? "corrected" : "printed").set("known_noise", row.method.known_noise);
   o.set("in_domain", row.promise.has_value());
-  o.set("n", e.n).set("spread", e.spread).set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
-  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
-  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+  o.set("n", e.n).set("spread", e.spread);
+  setStatistics(o, r);
   o.set("tail", static_cast<double>(r.tailCount()) / static_cast<double>(r.size()));
   o.set("iterations", r.mean_iterations).set("failures", r.failures);
   o.set("ratio_rotation", row.ratio(log_ratio_rotation))
@@ -88,27 +65,12 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.certify = options.certify || options.full;
   validation.all_printed = options.full;
 
-  std::vector<MeansRow> rows;
-  {
-    // The bar counts in thousandths, as the amount of work is known only inside.
-    Progress bar("validate means", 1000);
-    rows = validateMeans(validation, [&bar](std::uint64_t done, std::uint64_t all) {
-      const std::uint64_t now = all == 0 ? 1000 : 1000 * done / all;
-      if (now > bar.done()) bar.advance(now - bar.done());
-    });
-  }
+  const std::vector<MeansRow> rows =
+      withProgressBar("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
   std::fputs(formatMeansTables(rows).c_str(), stdout);
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, options.seed);
-    std::vector<JsonObject> list;
-    for (const MeansRow& row : rows) list.push_back(toJson(row));
-    object.set("false_alarm", run_false_alarm).set("rows", list);
-    writeJson(options.json, object);
-  }
+  writeRows(options.json, invocation, options.seed, run_false_alarm, rows, toJson);
   if (!options.report.empty()) writeMeansReport(options.report, invocation.command_line, rows);
-  bool passed = true;
-  for (const MeansRow& row : rows) passed = passed && row.passed.value_or(true);
-  return passed ? exit_fine : exit_validation_failed;
+  return exitCodeOf(rows);
 }
 
 }  // namespace

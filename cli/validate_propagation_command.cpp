@@ -1,7 +1,6 @@
 #include <cli/commands.hpp>
-#include <cli/json_output.hpp>
-#include <cli/progress.hpp>
 #include <cli/validate_propagation.hpp>
+#include <cli/validation_command.hpp>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -20,33 +19,13 @@ struct Options {
   std::string json, report;
 };
 
-template <class List>
-std::vector<std::string> names(const List& list) {
-  std::vector<std::string> all;
-  for (const auto value : list) all.push_back(name(value));
-  return all;
-}
-
-/// The enumerators with the given names, all of them for none. CLI11 has checked the names.
-template <class List>
-auto chosen(const List& list, const std::vector<std::string>& wanted) {
-  std::vector<typename List::value_type> values;
-  for (const auto value : list) {
-    for (const std::string& w : wanted) {
-      if (w == name(value) && (values.empty() || values.back() != value)) values.push_back(value);
-    }
-  }
-  return wanted.empty() ? std::vector<typename List::value_type>(list.begin(), list.end()) : values;
-}
-
 JsonObject toJson(const PropagationRow& row) {
   const ValidationReport& r = row.report;
   JsonObject o;
   o.set("feature", name(row.experiment.feature)).set("operation", name(row.method.operation));
   o.set("order", row.method.fourth_order ? 4 : 1).set("in_domain", row.promise.has_value());
-  o.set("spread", row.experiment.spread).set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
-  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
-  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+  o.set("spread", row.experiment.spread);
+  setStatistics(o, r);
   o.set("tail", row.tail).set("failures", r.failures).set("passed", row.passed);
   return o;
 }
@@ -57,27 +36,12 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.operations = chosen(all_operations, options.operations);
   if (!options.spreads.empty()) validation.spreads = options.spreads;
 
-  std::vector<PropagationRow> rows;
-  {
-    // The bar counts in thousandths, as the amount of work is known only inside.
-    Progress bar("validate propagation", 1000);
-    rows = validatePropagation(validation, [&bar](std::uint64_t done, std::uint64_t all) {
-      const std::uint64_t now = all == 0 ? 1000 : 1000 * done / all;
-      if (now > bar.done()) bar.advance(now - bar.done());
-    });
-  }
+  const std::vector<PropagationRow> rows = withProgressBar(
+      "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
   std::fputs(formatPropagationTables(rows).c_str(), stdout);
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, validation.seed);
-    std::vector<JsonObject> list;
-    for (const PropagationRow& row : rows) list.push_back(toJson(row));
-    object.set("false_alarm", propagation_false_alarm).set("rows", list);
-    writeJson(options.json, object);
-  }
+  writeRows(options.json, invocation, validation.seed, propagation_false_alarm, rows, toJson);
   if (!options.report.empty()) writePropagationReport(options.report, invocation.command_line, rows);
-  bool passed = true;
-  for (const PropagationRow& row : rows) passed = passed && row.passed.value_or(true);
-  return passed ? exit_fine : exit_validation_failed;
+  return exitCodeOf(rows);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <lie/lie.hpp>
 
+#include <support/products.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,24 +19,7 @@ namespace {
 using namespace liestat;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-template <std::size_t I, class M>
-auto parts(const std::vector<M>& samples) {
-  std::vector<typename M::template Part<I>> result;
-  for (const M& x : samples) result.push_back(x.template get<I>());
-  return result;
-}
-
-template <class M>
-std::vector<M> scattered(int n, double sd, std::uint64_t seed = 1) {
-  CounterRng rng(seed, 0);
-  Gaussian<M> g;
-  g.mean = sampleUniform<M>(rng);
-  g.covariance *= sd * sd;
-  std::vector<M> samples;
-  for (int i = 0; i < n; ++i) samples.push_back(sample(g, rng));
-  return samples;
-}
+using liestat_test::parts, liestat_test::scattered;
 
 TEST(ProductUniqueness, TightDataHaveAUniqueMean) {
   const auto samples = scattered<Product<Frame3d, Product<S2d, Vector2d>>>(12, 0.1);
