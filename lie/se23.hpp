@@ -138,11 +138,6 @@ class SE23;
 template <class Derived>
 class SE23Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
   using Base = detail::GroupBase<Derived>;
-  /// T, const for views of const memory.
-  template <class T>
-  using Part =
-      std::conditional_t<std::is_const_v<std::remove_pointer_t<typename detail::ShellTraits<Derived>::Pointer>>,
-                         const T, T>;
 
  public:
   using Base::data;

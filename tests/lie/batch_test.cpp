@@ -116,6 +116,21 @@ TYPED_TEST(BatchOfGroup, RangesOfAnyLength) {
   }
 }
 
+TEST(BatchOfManifolds, ElementsAreLoadedAndStored) {
+  constexpr std::size_t lanes = batch_size<SE3d>;
+  std::vector<SE3d> poses, inverses(lanes + 1);
+  for (const auto& v : tangents<SE3d>()) poses.push_back(SE3d::exp(v));
+  storeBatch(loadBatch(poses.data()).inverse(), inverses.data());
+  for (std::size_t i = 0; i < lanes; ++i) expectNear(inverses[i].params(), poses[i].inverse().params(), "inverse", 0);
+  EXPECT_EQ(inverses[lanes].params(), SE3d().params()) << "nothing is written behind the end";
+  // Fewer than the lanes: the last one fills the rest, and only so many are written.
+  const auto few = loadBatch(poses.data(), 1);
+  for (std::size_t i = 0; i < lanes; ++i) EXPECT_EQ(lane(few.params(), i), poses[0].params());
+  storeBatch(few, inverses.data(), 1);
+  EXPECT_EQ(inverses[0].params(), poses[0].params());
+  expectNear(inverses[1].params(), poses[1].inverse().params(), "the second is as it was", 0);
+}
+
 TEST(BatchOfManifolds, ExpAndLogAgreeWithTheScalars) {
   const auto check = [](auto sample) {
     using M = decltype(sample);
