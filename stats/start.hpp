@@ -101,6 +101,17 @@ struct FactorRange {
 template <Homogeneous M>
 inline constexpr bool starts_at_mean = std::same_as<M, TangentOf<M>>;
 
+/// Rotations and poses of the plane. Not those with a scale, by which a mean of parameters would weigh.
+template <Homogeneous M>
+inline constexpr bool has_unit_complex = [] {
+  if constexpr (requires(const M& x) { x.scale(); }) {
+    return false;
+  } else {
+    return requires(const M& x) { x.so2(); }
+    || requires(const M& x) { x.unit_complex(); };
+  }
+}();
+
 }  // namespace detail
 
 /// A start for the mean of a non-empty range of features. One pass over the data where the manifold sits in a linear
@@ -139,10 +150,7 @@ M startOfMean(const R& samples, const W& weights) {
     params.template head<4>() = rotations.mean();
     if constexpr (vectors > 0) params.template tail<vectors>() = translation / weight;
     return M::fromParams(params);
-  } else if constexpr (requires(const M& x) { x.scale(); }) {  // a mean of parameters would weigh by the scale
-    return detail::bestOfSeveral<M>(samples, weights);
-  } else if constexpr (
-      requires(const M& x) { x.so2(); } || requires(const M& x) { x.unit_complex(); }) {
+  } else if constexpr (detail::has_unit_complex<M>) {
     typename M::Params sum = M::Params::Zero();
     S weight(0);
     for (std::size_t i = 0; i < n; ++i) sum += S(weights[i]) * sample(i).params(), weight += S(weights[i]);

@@ -10,7 +10,7 @@
 
 #include <lie/lie.hpp>
 
-#include <support/products.hpp>
+#include <support/product_samples.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,36 +1,32 @@
-// Random samples of products, and their parts.
+// Products on which the contract is checked: of each kind of part, and nested.
 #pragma once
 
-#include <lie/product.hpp>
-#include <stats/random.hpp>
-#include <stats/sampling.hpp>
+#include <lie/lie.hpp>
 
-#include <cstddef>
-#include <cstdint>
-#include <vector>
+#include <support/turned_s2.hpp>
 
 namespace liestat_test {
 
-using liestat::CounterRng, liestat::Gaussian, liestat::sample, liestat::sampleUniform;
+template <class S>
+using Vector2 = Eigen::Matrix<S, 2, 1>;
+template <class S>
+using Vector3 = Eigen::Matrix<S, 3, 1>;
 
-/// The I-th parts.
-template <std::size_t I, class M>
-auto parts(const std::vector<M>& samples) {
-  std::vector<typename M::template Part<I>> result;
-  for (const M& x : samples) result.push_back(x.template get<I>());
-  return result;
-}
-
-/// n samples around a random point, with standard deviations sd in every coordinate.
-template <class M>
-std::vector<M> scattered(int n, double sd, std::uint64_t seed = 1) {
-  CounterRng rng(seed, 0);
-  Gaussian<M> g;
-  g.mean = sampleUniform<M>(rng);
-  g.covariance *= sd * sd;
-  std::vector<M> samples;
-  for (int i = 0; i < n; ++i) samples.push_back(sample(g, rng));
-  return samples;
-}
+/// Frame3 with its coordinates in another order.
+template <class S>
+using RotationAndVector = liestat::Product<liestat::SO3<S>, Vector3<S>>;
+template <class S>
+using FrameAndDirection = liestat::Product<liestat::Frame3<S>, liestat::S2<S>>;
+/// Two quotients: eight representatives.
+template <class S>
+using Quotients = liestat::Product<liestat::SemiOrientedFrame3<S>, Vector2<S>, liestat::NonOrientedFrame3<S>>;
+/// A user's type with a placement of his own, and a product in a product.
+template <class S>
+using UsersProduct = liestat::Product<TurnedS2<S>, liestat::Product<liestat::SO2<S>, Vector2<S>>>;
+/// Extended pose with the biases of gyroscope and accelerometer: no metric.
+template <class S>
+using InertialState = liestat::Product<liestat::SE23<S>, Vector3<S>, Vector3<S>>;
+template <class S>
+using GroupOfThree = liestat::ProductGroup<liestat::SO3<S>, liestat::SE2<S>, liestat::Translation<S, 2>>;
 
 }  // namespace liestat_test
