@@ -19,6 +19,15 @@
 #include <tuple>
 
 namespace liestat {
+namespace detail {
+
+// A concept and not a requires-expression where it is used: clang 14 takes one within a generic lambda for false.
+template <class G>
+concept HasNormalize = requires(G& g) {
+  g.normalize();
+};
+
+}  // namespace detail
 
 /// A tuple of features; see the header comment. auto [rotation, bias] = x; names its parts.
 template <Homogeneous... Ms>
@@ -72,7 +81,7 @@ class ProductGroup : public detail::PartTuple<ProductGroup, Gs...> {
   void normalize() {
     detail::forEachIndex<num_parts>([&](auto i) {
       using P = Part<i>;
-      if constexpr (requires(P x) { x.normalize(); }) this->template get<i>().normalize();
+      if constexpr (detail::HasNormalize<P>) this->template get<i>().normalize();
     });
   }
 
@@ -172,7 +181,7 @@ struct ProductManifold
   }
   static auto transvectionJacobian() requires(HasTransvectionJacobian<Ms> || ...) {
     return blockDiagonal<Scalar>(GroupSizes{}, Sizes{}, [](auto i) {
-      if constexpr (requires { T<i>::transvectionJacobian(); }) {
+      if constexpr (HasTransvectionJacobian<std::tuple_element_t<i, std::tuple<Ms...>>>) {
         return T<i>::transvectionJacobian();
       } else {
         return T<i>::placementJacobian(T<i>::origin());
