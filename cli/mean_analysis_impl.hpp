@@ -1,4 +1,4 @@
-// The templates behind mean_analysis.hpp and split.hpp; each feature is compiled in a unit of its own.
+// The templates behind mean_analysis.hpp and split.hpp, compiled in features.cpp.
 #pragma once
 
 #include <cli/input_error.hpp>

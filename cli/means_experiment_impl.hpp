@@ -1,6 +1,6 @@
 #pragma once
 
-// One trial for one type of feature; each type is compiled in a unit of its own, the harness around them is not.
+// One trial for one type of feature; the types are compiled in features.cpp, the harness around them is not.
 
 #include <cli/means_trial.hpp>
 #include <lie/lie.hpp>

@@ -121,7 +121,7 @@ SquareOf<M> worldAxesCovariance(const Gaussian<M>& g) {
 /// The Gaussian of a mean and its covariance along the axes of the world; inverse of worldAxesCovariance.
 template <detail::HasTangentParts M>
 Gaussian<M> fromWorldAxesCovariance(const M& mean, const SquareOf<M>& world_covariance) {
-  const SquareOf<M> J = detail::worldAxes(mean).inverse();
+  const SquareOf<M> J = detail::inverse<ScalarOf<M>, ManifoldTraits<M>::DoF>(detail::worldAxes(mean));
   return {mean, J * world_covariance * J.transpose()};
 }
 

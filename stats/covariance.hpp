@@ -5,6 +5,7 @@
 // mean.
 #pragma once
 
+#include <stats/detail/factors.hpp>
 #include <stats/mean.hpp>
 
 namespace liestat {
@@ -20,10 +21,7 @@ namespace detail {
 /// H⁻¹ W S W H⁻¹; NaN where H is not positive definite.
 template <Metric M>
 SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
-  const Eigen::LLT<SquareOf<M>> factor(result.hessian);
-  if (factor.info() != Eigen::Success) {
-    return SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
-  }
+  const Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> factor(result.hessian);
   const SquareOf<M> G = factor.solve(SquareOf<M>(ManifoldTraits<M>::metricWeights().asDiagonal()));
   return G * S * G.transpose();
 }

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
-
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <stats/detail/factors.hpp>
 
 #include <cmath>
 #include <limits>
@@ -22,9 +20,7 @@ struct Gaussian {
 /// Squared Mahalanobis distance zᵀ Σ⁻¹ z of a tangent vector; NaN if Σ is not positive definite.
 template <class S, int N>
 S mahalanobisSquared(const Eigen::Matrix<S, N, 1>& z, const Eigen::Matrix<S, N, N>& covariance) {
-  const Eigen::LLT<Eigen::Matrix<S, N, N>> factor(covariance);
-  if (factor.info() != Eigen::Success) return std::numeric_limits<S>::quiet_NaN();
-  return factor.matrixL().solve(z).squaredNorm();
+  return detail::Cholesky<S, N>(covariance).halfSolve(z).squaredNorm();
 }
 
 /// Squared Mahalanobis distance of y from the Gaussian, in the exponential chart at its mean (Pennec 1998,
@@ -73,7 +69,7 @@ SquareOf<M> principalChartCovariance(const Gaussian<M>& g) {
 }
 template <Homogeneous M>
 SquareOf<M> covarianceFromPrincipalChart(const M& x, const SquareOf<M>& chart_covariance) {
-  const SquareOf<M> J = principalChartJacobian(x).inverse();
+  const SquareOf<M> J = detail::inverse<ScalarOf<M>, ManifoldTraits<M>::DoF>(principalChartJacobian(x));
   return J * chart_covariance * J.transpose();
 }
 

@@ -5,8 +5,6 @@
 
 #include <stats/mean.hpp>
 
-#include <Eigen/LU>
-
 namespace liestat {
 
 /// What groupMean() returns. Matrices are in the body frame at the mean.
@@ -29,7 +27,7 @@ struct GroupMeanResult {
   SquareOf<G> covarianceFromResiduals() const {
     using S = ScalarOf<G>;
     if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
-    const SquareOf<G> inverse = jacobian.inverse();
+    const SquareOf<G> inverse = detail::inverse<S, G::DoF>(jacobian);
     return inverse * scatter * inverse.transpose() * (S(sum_of_weights) / (S(n) - S(1)));
   }
 };
@@ -73,7 +71,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     result.scatter = sums.scatter;
     result.jacobian = sums.jacobian;
     result.sum_of_weights = sums.weight;
-    const TangentOf<G> step = sums.jacobian.partialPivLu().solve(sums.sum);
+    const TangentOf<G> step = detail::inverse<S, G::DoF>(sums.jacobian) * sums.sum;
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
     ++result.iterations;

@@ -66,11 +66,8 @@ struct MahaResult {
 /// det(Σ)^(-1/k): the weight that WLSQ gives to a measure of covariance Σ (Pennec 1998, section 5.1).
 template <class S, int N>
 S scalarWeight(const Eigen::Matrix<S, N, N>& covariance) {
-  using std::exp, std::log;
-  const Eigen::LLT<Eigen::Matrix<S, N, N>> factor(covariance);
-  if (factor.info() != Eigen::Success) return std::numeric_limits<S>::quiet_NaN();
-  const Eigen::Matrix<S, N, N> L = factor.matrixL();
-  return exp(S(-2) / S(N) * L.diagonal().array().log().sum());
+  using std::exp;
+  return exp(-detail::Cholesky<S, N>(covariance).logDeterminant() / S(N));
 }
 
 namespace detail {
@@ -194,9 +191,9 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
   std::vector<M> features;
   if (!options.start) weights.reserve(result.n), features.reserve(result.n);
   for (const Gaussian<M>& g : samples) {
-    const Eigen::LLT<SquareOf<M>> factor(g.covariance);
+    const detail::Cholesky<S, T::DoF> factor(g.covariance);
     const bool finite = g.covariance.allFinite();
-    if (finite && factor.info() != Eigen::Success) {
+    if (finite && !factor.ok()) {
       result.status = Status::ill_defined;
       return result;
     }
@@ -207,7 +204,7 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
         return result;
       }
     }
-    problem.information.push_back(factor.solve(SquareOf<M>::Identity()));
+    problem.information.push_back(factor.inverse());
     if (!options.start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
   }
 
@@ -222,11 +219,11 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
     TangentOf<M> step;
     bool newton = false;
     if (detail::MahaProblem<M, R>::second_order && options.method == MahaMethod::newton) {
-      const Eigen::LLT<SquareOf<M>> factor(sums.hessian);
-      newton = factor.info() == Eigen::Success;
+      const detail::Cholesky<S, T::DoF> factor(sums.hessian);
+      newton = factor.ok();
       if (newton) step = -factor.solve(sums.gradient);
     }
-    if (!newton) step = -sums.gauss_newton.llt().solve(sums.gradient);
+    if (!newton) step = -detail::Cholesky<S, T::DoF>(sums.gauss_newton).solve(sums.gradient);
     const double previous = result.iterations > 0 ? result.residual : std::numeric_limits<double>::infinity();
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
@@ -260,10 +257,10 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
   result.gauss_newton = sums.gauss_newton;
   if (!result.converged) return result;
   result.hessian = problem.hessian(executor, y, sums);
-  const Eigen::LLT<SquareOf<M>> factor(result.hessian);
-  result.status = factor.info() == Eigen::Success ? Status::ok : Status::ill_defined;
+  const detail::Cholesky<S, T::DoF> factor(result.hessian);
+  result.status = factor.ok() ? Status::ok : Status::ill_defined;
   if (result.status == Status::ok) {
-    const SquareOf<M> inverse = factor.solve(SquareOf<M>::Identity());
+    const SquareOf<M> inverse = factor.inverse();
     result.covariance = options.likelihood ? inverse : SquareOf<M>(inverse * sums.gauss_newton * inverse);
   }
   return result;

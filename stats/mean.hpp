@@ -5,12 +5,11 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/factors.hpp>
 #include <stats/detail/rotation_sums.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>
 #include <stats/status.hpp>
-
-#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
@@ -246,8 +245,8 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
     TangentOf<M> step = fixed_point;
     bool newton = false;
     if (options.method == MeanMethod::newton) {
-      const Eigen::LLT<SquareOf<M>> factor(sums.hessian);
-      if (factor.info() == Eigen::Success) {
+      const Cholesky<S, T::DoF> factor(sums.hessian);
+      if (factor.ok()) {
         const TangentOf<M> candidate = factor.solve(sums.gradient);
         // Outside the injectivity radius a Newton step has lost its meaning.
         newton = candidate.allFinite() && norm(candidate) < static_cast<double>(T::injectivityRadius());

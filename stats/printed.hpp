@@ -4,10 +4,9 @@
 // update's H⁻¹.
 #pragma once
 
+#include <stats/detail/factors.hpp>
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
-
-#include <Eigen/LU>
 
 namespace liestat::printed {
 
@@ -64,13 +63,15 @@ MahaResult<M> maha(const R& samples, const MahaOptions<M>& options = {}) {
     result.cost = 0;
     for (const Gaussian<M>& g : samples) {
       const ErrorVector<M> e = errorVector(y, g.mean);
-      const SquareOf<M> information = (e.by_feature * g.covariance * e.by_feature.transpose()).inverse();
+      const SquareOf<M> information =
+          detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(e.by_feature * g.covariance * e.by_feature.transpose())
+              .inverse();
       const SquareOf<M> weighted = e.by_base.transpose() * information;
       result.cost += ScalarOf<M>(0.5) * e.z.dot(information * e.z);
       phi += weighted * e.z;
       H += weighted * e.by_base;
     }
-    const TangentOf<M> step = -H.llt().solve(phi);
+    const TangentOf<M> step = -detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).solve(phi);
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
     ++result.iterations;
@@ -83,7 +84,7 @@ MahaResult<M> maha(const R& samples, const MahaOptions<M>& options = {}) {
   }
   result.mean = y;
   result.hessian = result.gauss_newton = H;
-  if (result.converged) result.covariance = H.inverse();
+  if (result.converged) result.covariance = detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).inverse();
   return result;
 }
 

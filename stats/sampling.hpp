@@ -2,10 +2,9 @@
 #pragma once
 
 #include <lie/lie.hpp>
+#include <stats/detail/factors.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/random.hpp>
-
-#include <Eigen/Cholesky>
 
 namespace liestat {
 
@@ -13,13 +12,8 @@ namespace liestat {
 template <Homogeneous M>
 M sample(const Gaussian<M>& g, CounterRng& rng) {
   constexpr int N = ManifoldTraits<M>::DoF;
-  // LDLᵀ with pivoting factors semi-definite matrices too.
-  const Eigen::LDLT<SquareOf<M>> factor(g.covariance);
   const TangentOf<M> standard = rng.normalVector<N>().template cast<ScalarOf<M>>();
-  TangentOf<M> e = factor.vectorD().cwiseMax(ScalarOf<M>(0)).cwiseSqrt().cwiseProduct(standard);
-  e = factor.matrixL() * e;
-  e = factor.transpositionsP().transpose() * e;
-  return exp(g.mean, e);
+  return exp(g.mean, TangentOf<M>(detail::SemidefiniteRoot<ScalarOf<M>, N>(g.covariance) * standard));
 }
 
 namespace detail {

@@ -17,6 +17,7 @@
 
 #include <stats/covariance.hpp>
 #include <stats/detail/branch_and_bound.hpp>
+#include <stats/detail/factors.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
 
@@ -706,12 +707,12 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
     if (!kinks.allFinite() || !H.allFinite()) {
       result.hessian_change = std::numeric_limits<double>::quiet_NaN();
     } else if (result.mass > 0) {
-      const Eigen::LLT<Matrix> factor_of_H(H);
-      if (factor_of_H.info() != Eigen::Success) {
+      const Cholesky<double, N> factor_of_H(H);
+      if (!factor_of_H.ok()) {
         result.hessian_change = std::numeric_limits<double>::infinity();
       } else {
-        const Matrix half = factor_of_H.matrixL().solve(kinks);
-        const Matrix relative = factor_of_H.matrixL().solve(Matrix(half.transpose()));
+        const Matrix half = factor_of_H.halfSolve(kinks);
+        const Matrix relative = factor_of_H.halfSolve(Matrix(half.transpose()));
         result.hessian_change = Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[N - 1];
       }
     }

@@ -19,12 +19,12 @@
 // Reports are the same to the bit for every executor and every number of threads or ranks: trial i draws from
 // CounterRng(seed, i), and all sums are made in the order of the trials.
 
+#include "detail/factors.hpp"
 #include "executor.hpp"
 #include "inference.hpp"
 #include "kolmogorov.hpp"
 #include "random.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -461,10 +461,8 @@ struct DefaultMahalanobis {
   double operator()(const Truth& truth, const Estimate& estimate) const {
     if constexpr (std::derived_from<Truth, Eigen::MatrixBase<Truth>>) {
       using Matrix = std::remove_cvref_t<decltype(estimate.covariance)>;
-      const Eigen::LLT<Matrix> llt(estimate.covariance);
-      if (llt.info() != Eigen::Success) return detail::not_a_number;
-      const Truth whitened = llt.matrixL().solve(truth - estimate.mean);
-      return static_cast<double>(whitened.squaredNorm());
+      const detail::Cholesky<typename Matrix::Scalar, Matrix::RowsAtCompileTime> factor(estimate.covariance);
+      return static_cast<double>(factor.halfSolve(Truth(truth - estimate.mean)).squaredNorm());
     } else {
       return static_cast<double>(mahalanobisSquared(estimate, truth));
     }

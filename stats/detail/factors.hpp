@@ -1,0 +1,180 @@
+// Factors of small matrices by plain loops over a fixed size: Cholesky's, the pivoted one for what may be singular, and an
+// inverse. Eigen's own are made for large matrices too: for each size they bring dozens of types of expressions and the
+// blocked kernels of its products with them, which are never run here and cost a compiler seconds.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace liestat::detail {
+
+/// Cholesky's factor A = L Lᵀ of a symmetric matrix, of which the lower triangle is read. Where that is not positive definite, ok() is
+/// false and all results are NaN.
+template <class S, int N>
+class Cholesky {
+ public:
+  using Matrix = Eigen::Matrix<S, N, N>;
+
+  explicit Cholesky(const Matrix& A) {
+    using std::sqrt;
+    for (int j = 0; j < N; ++j) {
+      S pivot = A(j, j);
+      for (int k = 0; k < j; ++k) pivot -= L_(j, k) * L_(j, k);
+      // Written so that NaN is no success either.
+      if (!(pivot > S(0))) {
+        fail();
+        return;
+      }
+      L_(j, j) = sqrt(pivot);
+      inverse_pivots_[j] = S(1) / L_(j, j);
+      for (int i = j + 1; i < N; ++i) {
+        S sum = A(i, j);
+        for (int k = 0; k < j; ++k) sum -= L_(i, k) * L_(j, k);
+        L_(i, j) = sum * inverse_pivots_[j];
+      }
+    }
+    ok_ = true;
+  }
+
+  bool ok() const { return ok_; }
+  /// L⁻¹ B.
+  template <int K>
+  Eigen::Matrix<S, N, K> halfSolve(Eigen::Matrix<S, N, K> B) const {
+    for (int c = 0; c < K; ++c) {
+      for (int i = 0; i < N; ++i) {
+        S sum = B(i, c);
+        for (int k = 0; k < i; ++k) sum -= L_(i, k) * B(k, c);
+        B(i, c) = sum * inverse_pivots_[i];
+      }
+    }
+    return B;
+  }
+  /// A⁻¹ B.
+  template <int K>
+  Eigen::Matrix<S, N, K> solve(const Eigen::Matrix<S, N, K>& B) const {
+    Eigen::Matrix<S, N, K> X = halfSolve<K>(B);
+    for (int c = 0; c < K; ++c) {
+      for (int i = N - 1; i >= 0; --i) {
+        S sum = X(i, c);
+        for (int k = i + 1; k < N; ++k) sum -= L_(k, i) * X(k, c);
+        X(i, c) = sum * inverse_pivots_[i];
+      }
+    }
+    return X;
+  }
+  /// A⁻¹, symmetric to the last bit.
+  Matrix inverse() const {
+    const Matrix half = halfSolve<N>(Matrix::Identity());
+    Matrix X;
+    for (int j = 0; j < N; ++j) {
+      for (int i = j; i < N; ++i) {
+        S sum(0);
+        for (int k = i; k < N; ++k) sum += half(k, i) * half(k, j);
+        X(i, j) = X(j, i) = sum;
+      }
+    }
+    return X;
+  }
+  /// log det A.
+  S logDeterminant() const {
+    using std::log;
+    S sum(0);
+    for (int i = 0; i < N; ++i) sum += log(L_(i, i));
+    return S(2) * sum;
+  }
+
+ private:
+  void fail() {
+    L_.setConstant(std::numeric_limits<S>::quiet_NaN());
+    inverse_pivots_.setConstant(std::numeric_limits<S>::quiet_NaN());
+  }
+
+  Matrix L_;
+  Eigen::Matrix<S, N, 1> inverse_pivots_;
+  bool ok_ = false;
+};
+
+/// A square root B of a symmetric matrix that may be singular, B Bᵀ = A: Pᵀ L √D by LDLᵀ with the largest pivot first.
+/// Pivots below zero, which rounding makes, count as zero. The lower triangle is read.
+template <class S, int N>
+class SemidefiniteRoot {
+ public:
+  explicit SemidefiniteRoot(Eigen::Matrix<S, N, N> A) {
+    using std::sqrt;
+    for (int j = 0; j < N; ++j) {
+      for (int i = j + 1; i < N; ++i) A(j, i) = A(i, j);
+    }
+    for (int i = 0; i < N; ++i) order_[i] = i;
+    for (int j = 0; j < N; ++j) {
+      // The largest of the diagonal that is left, moved to the front.
+      int pivot = j;
+      for (int i = j + 1; i < N; ++i) {
+        if (A(i, i) > A(pivot, pivot)) pivot = i;
+      }
+      if (pivot != j) {
+        for (int k = 0; k < N; ++k) std::swap(A(j, k), A(pivot, k));
+        for (int k = 0; k < N; ++k) std::swap(A(k, j), A(k, pivot));
+        std::swap(order_[j], order_[pivot]);
+      }
+      const S d = A(j, j);
+      scale_[j] = d > S(0) ? sqrt(d) : S(0);
+      const S inverse = d > S(0) ? S(1) / d : S(0);
+      for (int i = j + 1; i < N; ++i) {
+        const S l = A(i, j) * inverse;
+        for (int k = j + 1; k <= i; ++k) {
+          A(i, k) -= l * A(k, j);
+          A(k, i) = A(i, k);
+        }
+        A(j, i) = l;  // the row above the diagonal is not read again
+      }
+    }
+    L_ = A;
+  }
+
+  /// B v.
+  Eigen::Matrix<S, N, 1> operator*(const Eigen::Matrix<S, N, 1>& v) const {
+    Eigen::Matrix<S, N, 1> result;
+    for (int i = 0; i < N; ++i) {
+      S sum = scale_[i] * v[i];
+      for (int k = 0; k < i; ++k) sum += L_(k, i) * scale_[k] * v[k];
+      result[order_[i]] = sum;
+    }
+    return result;
+  }
+
+ private:
+  Eigen::Matrix<S, N, N> L_;  // its transpose, above the diagonal
+  Eigen::Matrix<S, N, 1> scale_;
+  std::array<int, N> order_;
+};
+
+/// A⁻¹ by Gauss' and Jordan's elimination with row pivots; infinite or NaN where A is singular.
+template <class S, int N>
+Eigen::Matrix<S, N, N> inverse(Eigen::Matrix<S, N, N> A) {
+  using std::abs;
+  Eigen::Matrix<S, N, N> X = Eigen::Matrix<S, N, N>::Identity();
+  for (int j = 0; j < N; ++j) {
+    int pivot = j;
+    for (int i = j + 1; i < N; ++i) {
+      if (abs(A(i, j)) > abs(A(pivot, j))) pivot = i;
+    }
+    for (int k = 0; k < N; ++k) {
+      std::swap(A(j, k), A(pivot, k));
+      std::swap(X(j, k), X(pivot, k));
+    }
+    const S scale = S(1) / A(j, j);
+    for (int k = 0; k < N; ++k) A(j, k) *= scale, X(j, k) *= scale;
+    for (int i = 0; i < N; ++i) {
+      if (i == j) continue;
+      const S factor = A(i, j);
+      for (int k = 0; k < N; ++k) A(i, k) -= factor * A(j, k), X(i, k) -= factor * X(j, k);
+    }
+  }
+  return X;
+}
+
+}  // namespace liestat::detail
