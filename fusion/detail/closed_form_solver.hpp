@@ -1,0 +1,286 @@
+// The closed form's passes: diagnosis of ranks, weights, minimisers, costs, covariance.
+#pragma once
+
+#include <fusion/closed_form_types.hpp>
+#include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/sphere_least_squares.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace liestat::detail {
+
+/// A noise for exact data (rad): far above rounding, far below anything a wrong solution leaves.
+inline constexpr double exact_noise = 1e-9;
+/// Quantile of χ² with one degree of freedom at 0.95: what two costs differ by when the data tell minimisers apart.
+inline constexpr double chi_squared_1_95 = 3.841458820694124;
+
+inline double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// A minimiser in scaled unknowns.
+struct MotionCandidate {
+  Motion y;
+  std::vector<Eigen::Vector3d> P;
+  double cost = 0;           ///< in the units of ClosedFormSolution
+  double curvature = 0;      ///< of the sphere's problem, see SphereMinima
+  std::size_t negative = 0;  ///< features behind a camera
+};
+
+/// What the unweighted system says by itself.
+struct RankDiagnosis {
+  Triangle root;
+  std::vector<SmallMatrix> by_motion;
+  std::vector<int> feature_rank;
+  int feature_null = 0, motion_null = 0;
+  double largest = 0;
+  std::vector<double> values;   ///< descending
+  std::vector<Motion> vectors;  ///< motions of unit length with their features, their last entry 0; by values
+};
+
+class ClosedFormSolver {
+ public:
+  ClosedFormSolver(RayTable& table, const ClosedFormOptions& options)
+      : table_(table), options_(options), sigma_(options.bearing_noise > 0 ? options.bearing_noise : exact_noise) {}
+
+  double sigma() const { return sigma_; }
+  const RayTable& table() const { return table_; }
+  /// V' = V T and so on: what a scaled unknown is worth.
+  double gravityScale() const { return 2 / (table_.window * table_.window); }
+  double rankTolerance() const { return bias() ? 1e-12 : 1e-10; }
+  bool bias() const { return options_.estimate_bias; }
+  /// A prior that says something.
+  bool hasPrior() const { return bias() && std::isfinite(options_.bias_deviation); }
+  /// Unknowns of the motion.
+  int motionSize() const { return bias() ? 9 : 6; }
+
+  /// Ranks and singular values, in time linear in the observations. With W = (P(y), y), the features that fit a motion
+  /// best, null vectors are W y with R y = 0, R the root of what remains when the features are taken out. The singular
+  /// values of R relative to |W y| are those of the whole system restricted to the range of W: an upper bound for as
+  /// many of its smallest, and zero exactly where the whole has zeros.
+  RankDiagnosis diagnose() const {
+    const int m = motionSize();
+    RankDiagnosis d{Triangle(m + 1), {}, {}, 0, 0, largestSingularValue(), {}, {}};
+    SmallMatrix lengths = SmallMatrix::identity(m);
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      LeadingElimination e = eliminateOrthogonally(table_.of(i), table_.images, bias(), rankTolerance());
+      d.root.add(e.rest);
+      for (int k = 0; k < 3; ++k) {
+        for (int a = 0; a <= m; ++a) e.gain(k, a) = -e.gain(k, a);
+        for (int a = 0; a < m; ++a) {
+          for (int b = 0; b < m; ++b) lengths(a, b) += e.gain(k, a) * e.gain(k, b);
+        }
+      }
+      d.by_motion.push_back(e.gain);
+      d.feature_rank.push_back(e.rank);
+      d.feature_null += 3 - e.rank;
+    }
+    // R relative to W: R C⁻¹ with WᵀW = CᵀC.
+    const SmallMatrix inverse = Triangle::cholesky(lengths).inverse(m);
+    const SmallSvd svd(d.root.r.block(0, 0, m, m) * inverse);
+    for (int k = 0; k < m; ++k) {
+      d.values.push_back(svd.value(k));
+      d.motion_null += svd.value(k) <= rankTolerance() * d.largest;
+      Motion y(bias());
+      for (int i = 0; i < m; ++i) {
+        for (int j = i; j < m; ++j) y[i] += inverse(i, j) * svd.v(k, j);
+      }
+      y[m] = 0;
+      d.vectors.push_back(y);
+    }
+    return d;
+  }
+
+  /// All weights those of a depth of one.
+  void resetWeights() {
+    for (Ray& ray : table_.rays) ray.weight = 1 / sigma_;
+  }
+  /// Weights of the depths in a solution, floored (design note, 3.4).
+  void setWeights(const MotionCandidate& solution) {
+    std::vector<double> depths;
+    depths.reserve(table_.rays.size());
+    forEachRay([&](std::size_t i, Ray& ray) {
+      depths.push_back(std::abs(ray.u.dot(relativePosition(table_.images[ray.image], solution.P[i], solution.y))));
+    });
+    const double floor = std::max(0.2, 0.01 * median(depths));
+    std::size_t k = 0;
+    forEachRay([&](std::size_t, Ray& ray) { ray.weight = 1 / (sigma_ * std::max(depths[k++], floor)); });
+  }
+
+  /// Features taken out at the present weights; their sum is the motion's problem.
+  MotionBlock eliminate() {
+    MotionBlock sum(bias());
+    features_.clear();
+    features_.reserve(table_.features());
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      features_.push_back(eliminateFeature(table_.of(i), table_.images, bias()));
+      sum += features_.back().block;
+    }
+    return sum;
+  }
+  const std::vector<EliminatedFeature>& eliminated() const { return features_; }
+  Eigen::Vector3d feature(std::size_t i, const Motion& y) const { return apply(features_[i].by_motion, y); }
+
+  /// The prior of the bias as rows of the motion's problem.
+  void addPrior(Triangle& root) const {
+    SmallMatrix rows(3, root.size());
+    for (int k = 0; k < 3; ++k) rows(k, 3 + k) = gravityScale() / options_.bias_deviation;
+    root.add(rows);
+  }
+
+  /// The motions that minimise |root y|² for the gravity that is asked for; the directions that `tolerance` (relative)
+  /// leaves free in V (and b) are left out.
+  std::vector<MotionCandidate> minimise(const Triangle& root, double tolerance) const {
+    const int leading = motionSize() - 3;
+    const LeadingElimination lead(root, leading,
+                                  tolerance * root.r.block(0, 0, leading, leading).norm());
+    const Eigen::Matrix3d R = lead.rest.r.matrix3(0, 0);
+    const Eigen::Vector3d r = lead.rest.r.vector3(0, 3);
+    SphereMinima minima;
+    if (options_.gravity) {
+      minima = minimiseOnSphere(R, r, *options_.gravity / gravityScale());
+    } else if (R.allFinite() && r.allFinite()) {
+      minima.count = 1;
+      minima.point[0] = -apply3(LeadingElimination(lead.rest, 3, 0).gain);
+    }
+    std::vector<MotionCandidate> found;
+    for (int k = 0; k < minima.count; ++k) {
+      MotionCandidate candidate{Motion(bias()), {}};
+      const Eigen::Vector3d& G = minima.point[k];
+      for (int i = 0; i < leading; ++i) {
+        candidate.y[i] =
+            -(lead.gain(i, 0) * G[0] + lead.gain(i, 1) * G[1] + lead.gain(i, 2) * G[2] + lead.gain(i, 3));
+      }
+      candidate.y.set(leading, G);
+      candidate.curvature = minima.curvature[k];
+      found.push_back(candidate);
+    }
+    return found;
+  }
+
+  /// Cost and depth signs of a motion with its features, in angles.
+  void evaluate(MotionCandidate& candidate) const {
+    candidate.cost = 0;
+    candidate.negative = 0;
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      bool behind = false;
+      for (const Ray& ray : table_.of(i)) {
+        const Eigen::Vector3d d = relativePosition(table_.images[ray.image], candidate.P[i], candidate.y);
+        candidate.cost += ray.u.cross(d).squaredNorm() / (sigma_ * sigma_ * d.squaredNorm());
+        behind = behind || ray.u.dot(d) < 0;
+      }
+      candidate.negative += behind;
+    }
+    if (hasPrior()) candidate.cost += (gravityScale() / options_.bias_deviation * candidate.y.bias()).squaredNorm();
+  }
+
+  /// Covariance of the scaled motion (V', [b'], G') at a root, with gravity's length fixed where it is known; false
+  /// where not all of it is determined.
+  bool covariance(Triangle root, const Motion& y, SmallMatrix& result) const {
+    const int m = motionSize();
+    if (options_.gravity) {
+      // A stiff row along G: its length has no freedom.
+      SmallMatrix row(1, m + 1);
+      const Eigen::Vector3d stiff = 1e6 * root.r.norm() * y.gravity().normalized();
+      for (int k = 0; k < 3; ++k) row(0, m - 3 + k) = stiff[k];
+      root.add(row);
+    }
+    double smallest = std::numeric_limits<double>::infinity(), largest = 0;
+    for (int k = 0; k < m; ++k) {
+      smallest = std::min(smallest, std::abs(root.r(k, k)));
+      largest = std::max(largest, std::abs(root.r(k, k)));
+    }
+    if (!(smallest > 1e-14 * largest)) return false;
+    const SmallMatrix inverse = root.inverse(m);
+    result = SmallMatrix(m, m);
+    for (int i = 0; i < m; ++i) {
+      for (int j = 0; j < m; ++j) {
+        for (int k = std::max(i, j); k < m; ++k) result(i, j) += inverse(i, k) * inverse(j, k);
+      }
+    }
+    return true;
+  }
+
+  /// How well the data fix the factor by which P and V (not G) may be scaled: its information, less what the noise of
+  /// the bearings feigns. With d = P - τ V' the residual of a factor 1 + e grows by e N'd, and a noise of σ in a bearing
+  /// turns the depth itself into N'd of σ uᵀd twice over.
+  double scaleInformation(const MotionCandidate& solution) const {
+    double information = 0;
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      for (const Ray& ray : table_.of(i)) {
+        const Eigen::Vector3d d = solution.P[i] - table_.images[ray.image].tau * solution.y.velocity();
+        const double along = ray.u.dot(d);
+        information += ray.weight * ray.weight * (d.squaredNorm() - along * along * (1 + 2 * sigma_ * sigma_));
+      }
+    }
+    return information;
+  }
+
+  template <class F>
+  void forEachRay(const F& f) {
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      for (std::size_t k = table_.begin[i]; k < table_.begin[i + 1]; ++k) f(i, table_.rays[k]);
+    }
+  }
+
+ private:
+  /// Of the whole system, by the power method on its arrow-shaped normal matrix: a lower bound that is within a few
+  /// per cent, which is all that a relative threshold needs.
+  double largestSingularValue() const {
+    Motion y(bias());
+    const int m = motionSize();
+    y.value.fill(1);
+    std::vector<Eigen::Vector3d> P(table_.features(), Eigen::Vector3d::Ones());
+    double length = 0;
+    for (int pass = 0; pass < 20; ++pass) {
+      y[m] = 0;
+      double square = 0;
+      for (int k = 0; k < m; ++k) square += y[k] * y[k];
+      for (const Eigen::Vector3d& p : P) square += p.squaredNorm();
+      length = std::sqrt(square);
+      Motion unit = y;
+      for (int k = 0; k < m; ++k) unit[k] /= length;
+      y.value.fill(0);
+      Eigen::Vector3d by_velocity = Eigen::Vector3d::Zero(), by_gravity = by_velocity, by_bias = by_velocity;
+      for (std::size_t i = 0; i < P.size(); ++i) {
+        const Eigen::Vector3d p = P[i] / length;
+        P[i].setZero();
+        for (const Ray& ray : table_.of(i)) {
+          const ScaledImage& image = table_.images[ray.image];
+          Eigen::Vector3d d = relativePosition(image, p, unit) + image.s;
+          d -= ray.u.dot(d) * ray.u;
+          P[i] += d;
+          by_velocity -= image.tau * d;
+          by_gravity -= image.tau * image.tau * d;
+          if (bias()) by_bias -= image.bias.transpose() * d;
+        }
+      }
+      y.set(0, by_velocity);
+      if (bias()) y.set(3, by_bias);
+      y.set(m - 3, by_gravity);
+    }
+    // The last vector was of unit length before the matrix was applied twice.
+    double square = 0;
+    for (int k = 0; k < m; ++k) square += y[k] * y[k];
+    for (const Eigen::Vector3d& p : P) square += p.squaredNorm();
+    return std::sqrt(std::sqrt(square));
+  }
+  /// The single column of a matrix of three rows.
+  static Eigen::Vector3d apply3(const SmallMatrix& column) { return column.vector3(0, 0); }
+
+  RayTable& table_;
+  const ClosedFormOptions& options_;
+  double sigma_;
+  std::vector<EliminatedFeature> features_;
+};
+
+}  // namespace liestat::detail

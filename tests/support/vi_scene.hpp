@@ -1,0 +1,242 @@
+// Scenes for visual-inertial tests: analytic motions of a body with a camera among features, exact bearings and exact
+// twice integrated forces. World z upwards.
+#pragma once
+
+#include <fusion/closed_form_types.hpp>
+#include <lie/so3.hpp>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace liestat_test {
+
+/// Uniform numbers and directions, the same with every standard library.
+class SceneRandom {
+ public:
+  explicit SceneRandom(std::uint64_t seed) : generator_(seed) {}
+  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53; }
+  double normal() {
+    const double radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));
+    return radius * std::cos(uniform(0, 6.283185307179586));
+  }
+  Eigen::Vector3d normal3() {
+    const double x = normal(), y = normal(), z = normal();
+    return {x, y, z};
+  }
+  Eigen::Vector3d unit() { return normal3().normalized(); }
+
+ private:
+  std::mt19937_64 generator_;
+};
+
+enum class SceneMotion { varying, constant_acceleration, constant_velocity, stationary, straight, planar, free_fall };
+enum class SceneTurn { general, fixed_axis, none };
+enum class SceneLayout {
+  general,
+  plane,     ///< features in a plane that the motion leaves
+  line,      ///< features in a line
+  coplanar,  ///< features in the plane of a planar motion
+  ahead      ///< the first feature on the line of a straight motion
+};
+
+struct SceneOptions {
+  std::size_t images = 6, features = 8;
+  SceneMotion motion = SceneMotion::varying;
+  SceneTurn turn = SceneTurn::general;
+  SceneLayout layout = SceneLayout::general;
+  double window = 2;                                    ///< s
+  double far = 1;                                       ///< features this many times farther
+  double acceleration = 1.5;                            ///< m/s², RMS per axis of the varying part
+  double turn_rate = 0.5;                               ///< rad/s, RMS per axis
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();     ///< lever arm
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();       ///< of the accelerometer, left in the displacements
+  bool level_acceleration = false;                      ///< constant acceleration at a right angle to gravity
+};
+
+/// A body's motion and what it sees.
+class Scene {
+ public:
+  static constexpr double g = 9.81;
+
+  Scene(const SceneOptions& options, std::uint64_t seed) : options_(options), random_(seed) {
+    drawMotion();
+    drawTimes();
+    drawFeatures();
+    build();
+  }
+
+  liestat::ClosedFormWindow window;
+  Eigen::Vector3d velocity, gravity;       ///< V, G in the body's axes at the first image
+  std::vector<Eigen::Vector3d> features;   ///< the same
+  std::vector<double> times;
+
+  Eigen::Vector3d position(double t) const {
+    Eigen::Vector3d p = t * velocity_ + 0.5 * t * t * acceleration_;
+    for (const Wave& w : move_) p += w.amplitude * std::sin(w.rate * t + w.phase);
+    return p;
+  }
+  Eigen::Vector3d speed(double t) const {
+    Eigen::Vector3d v = velocity_ + t * acceleration_;
+    for (const Wave& w : move_) v += w.amplitude * (w.rate * std::cos(w.rate * t + w.phase));
+    return v;
+  }
+  Eigen::Vector3d accelerationAt(double t) const {
+    Eigen::Vector3d a = acceleration_;
+    for (const Wave& w : move_) a -= w.amplitude * (w.rate * w.rate * std::sin(w.rate * t + w.phase));
+    return a;
+  }
+  /// world_R_body.
+  liestat::SO3d attitude(double t) const { return start_ * liestat::SO3d::exp(angle(t)); }
+  /// Rate and specific force in the body's axes.
+  liestat::ImuSample<double> reading(double t) const {
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+    for (const Wave& w : turn_) rate += w.amplitude * (w.rate * std::cos(w.rate * t + w.phase));
+    return {t, liestat::SO3d::rightJacobian(angle(t)) * rate,
+            attitude(t).inverse() * Eigen::Vector3d(accelerationAt(t) + g * Eigen::Vector3d::UnitZ())};
+  }
+  /// Adds to each bearing a tangent noise of so many rad.
+  void addNoise(double sigma, SceneRandom& random) {
+    for (auto& track : window.features) {
+      for (auto& seen : track) {
+        const Eigen::Vector3d noise = sigma * random.normal3();
+        seen.bearing = (seen.bearing + noise - seen.bearing.dot(noise) * seen.bearing).normalized();
+      }
+    }
+  }
+
+ private:
+  struct Wave {
+    Eigen::Vector3d amplitude;
+    double rate, phase;
+  };
+
+  Eigen::Vector3d angle(double t) const {
+    Eigen::Vector3d a = Eigen::Vector3d::Zero();
+    for (const Wave& w : turn_) a += w.amplitude * std::sin(w.rate * t + w.phase);
+    return a;
+  }
+
+  void drawMotion() {
+    using M = SceneMotion;
+    const M kind = options_.motion;
+    start_ = liestat::SO3d::exp(3 * random_.uniform(0, 1) * random_.unit());
+    velocity_ = random_.unit();
+    acceleration_ = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d line = random_.unit(), normal = random_.unit();
+    if (kind == M::constant_acceleration) {
+      acceleration_ = options_.acceleration * 1.7 * random_.uniform(0.7, 1.3) * random_.unit();
+      if (options_.level_acceleration) acceleration_.z() = 0;
+    }
+    if (kind == M::free_fall) acceleration_ = -g * Eigen::Vector3d::UnitZ();
+    const auto flat = [&](const Eigen::Vector3d& x) -> Eigen::Vector3d {
+      if (kind == M::straight) return line.dot(x) * line;
+      return flatten(x, normal);
+    };
+    const bool restricted = kind == M::straight || kind == M::planar;
+    for (int k = 0; k < 4 && (kind == M::varying || restricted); ++k) {
+      const double rate = 6.283185307179586 * random_.uniform(0.2, 1);
+      const Eigen::Vector3d amplitude = options_.acceleration / std::sqrt(2.) / (rate * rate) * random_.normal3();
+      const double phase = random_.uniform(0, 6.283185307179586);
+      move_.push_back({restricted ? flat(amplitude) : amplitude, rate, phase});
+    }
+    if (restricted) velocity_ = flat(velocity_).normalized();
+    if (kind == M::stationary) velocity_.setZero();
+    normal_ = normal;
+    const Eigen::Vector3d axis = random_.unit();
+    for (int k = 0; k < 3 && options_.turn != SceneTurn::none; ++k) {
+      const double rate = 6.283185307179586 * random_.uniform(0.2, 0.8);
+      Eigen::Vector3d amplitude = options_.turn_rate * std::sqrt(2. / 3) / rate * random_.normal3();
+      if (options_.turn == SceneTurn::fixed_axis) amplitude = amplitude.sum() * axis;
+      turn_.push_back({amplitude, rate, 0});
+    }
+  }
+
+  void drawTimes() {
+    const double step = options_.window / static_cast<double>(options_.images - 1);
+    for (std::size_t j = 0; j < options_.images; ++j) {
+      const double jitter = j == 0 || j + 1 == options_.images ? 0 : random_.uniform(-0.2, 0.2);
+      times.push_back(step * (static_cast<double>(j) + jitter));
+    }
+  }
+
+  void drawFeatures() {
+    const Eigen::Vector3d centre = position(0.5 * options_.window), ahead = random_.unit();
+    const Eigen::Vector3d along = random_.unit(), plane = random_.unit();
+    for (std::size_t i = 0; i < options_.features; ++i) {
+      // A cone of 80 degrees, 2 to 8 m away.
+      Eigen::Vector3d direction = ahead + 0.7 * random_.uniform(0, 1) * random_.unit();
+      Eigen::Vector3d p = centre + options_.far * random_.uniform(2, 8) * direction.normalized();
+      if (options_.layout == SceneLayout::coplanar) p = position(0) + flatten(p - position(0), normal_);
+      if (options_.layout == SceneLayout::plane) p = centre + 4 * ahead + 2 * flatten(random_.normal3(), plane);
+      if (options_.layout == SceneLayout::line) p = centre + 4 * ahead + random_.uniform(-2, 2) * along;
+      if (options_.layout == SceneLayout::ahead && i == 0) {
+        p = position(0) + 10 * (position(options_.window) - position(0)).normalized();
+      }
+      points_.push_back(p);
+    }
+  }
+  static Eigen::Vector3d flatten(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) {
+    return x - normal.dot(x) * normal;
+  }
+
+  /// -∫ (t - s) C(s) ds by Gauss' rule with five points in 64 panels.
+  Eigen::Matrix3d displacementByBias(double t) const {
+    constexpr std::array<double, 5> node{-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                                         0.9061798459386640};
+    constexpr std::array<double, 5> weight{0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
+                                           0.4786286704993665, 0.2369268850561891};
+    const liestat::SO3d back = attitude(0).inverse();
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    const double h = t / 64;
+    for (int panel = 0; panel < 64; ++panel) {
+      for (std::size_t k = 0; k < 5; ++k) {
+        const double s = h * (panel + 0.5 + 0.5 * node[k]);
+        sum -= 0.5 * h * weight[k] * (t - s) * (back * attitude(s)).matrix();
+      }
+    }
+    return sum;
+  }
+
+  void build() {
+    const liestat::SO3d body_R_world = attitude(0).inverse();
+    velocity = body_R_world * speed(0);
+    gravity = body_R_world * Eigen::Vector3d(0, 0, -g);
+    window.camera = options_.camera;
+    for (const double t : times) {
+      liestat::WindowImage image;
+      image.time = t;
+      image.rotation = (body_R_world * attitude(t)).matrix();
+      if (t == 0) image.rotation.setIdentity();
+      const Eigen::Vector3d moved = body_R_world * Eigen::Vector3d(position(t) - position(0));
+      image.displacement_by_bias = displacementByBias(t);
+      image.displacement = moved - t * velocity - 0.5 * t * t * gravity - image.displacement_by_bias * options_.bias;
+      window.images.push_back(image);
+    }
+    for (const Eigen::Vector3d& point : points_) {
+      const Eigen::Vector3d P = body_R_world * Eigen::Vector3d(point - position(0));
+      features.push_back(P);
+      liestat::FeatureTrack track;
+      for (std::size_t j = 0; j < times.size(); ++j) {
+        const Eigen::Matrix3d back = window.images[j].rotation.transpose();
+        const Eigen::Vector3d moved = body_R_world * Eigen::Vector3d(position(times[j]) - position(0));
+        track.push_back({j, (back * (P - moved) - options_.camera).normalized()});
+      }
+      window.features.push_back(std::move(track));
+    }
+  }
+
+  SceneOptions options_;
+  SceneRandom random_;
+  liestat::SO3d start_;
+  Eigen::Vector3d velocity_, acceleration_, normal_;
+  std::vector<Wave> move_, turn_;
+  std::vector<Eigen::Vector3d> points_;
+};
+
+}  // namespace liestat_test
