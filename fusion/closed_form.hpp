@@ -109,35 +109,49 @@ class ClosedFormRun {
 
   void solveNoisy() {
     solver_.resetWeights();
-    Triangle root(solver_.motionSize() + 1);
-    for (int pass = 0; pass <= options_.weight_passes; ++pass) {
-      if (pass > 0) solver_.setWeights(candidates_[0]);
-      root = Triangle::cholesky(solver_.eliminate().Q);
-      if (solver_.hasPrior()) solver_.addPrior(root);
-      candidates_ = solver_.minimise(root, 1e-12);
-      if (candidates_.empty()) {
-        result_.status = Status::no_parallax;  // no finite answer
-        return;
-      }
-      for (Candidate& c : candidates_) {
-        for (std::size_t i = 0; i < table_.features(); ++i) c.P.push_back(solver_.feature(i, c.y));
-        solver_.evaluate(c);
-      }
-      order();
+    candidates_ = weightedMinima();
+    if (candidates_.empty()) {
+      result_.status = Status::no_parallax;  // no finite answer
+      return;
     }
-    deviations(root);
+    // Each minimiser with the weights of its own depths; one with most features behind the camera is beyond help.
+    for (Candidate& c : candidates_) {
+      for (int pass = 0; pass < options_.weight_passes && isInFront(c); ++pass) {
+        solver_.setWeights(c);
+        const std::vector<Candidate> next = weightedMinima();
+        if (next.empty()) break;
+        const bool second = next.size() == 2 && gravityAngle(next[1], c) < gravityAngle(next[0], c);
+        c = next[second ? 1 : 0];
+      }
+    }
+    order();
+    // Both may have gone to the same minimum.
+    if (candidates_.size() == 2 && gravityAngle(candidates_[0], candidates_[1]) < 1e-6) candidates_.pop_back();
+    deviations();
     classify();
   }
 
-  /// The cheaper first; where noise can't tell, the one with more features in front.
+  /// The minimisers at the present weights.
+  std::vector<Candidate> weightedMinima() {
+    Triangle root = Triangle::cholesky(solver_.eliminate().Q);
+    if (solver_.hasPrior()) solver_.addPrior(root);
+    std::vector<Candidate> minima = solver_.minimise(root, 1e-12);
+    for (Candidate& c : minima) {
+      for (std::size_t i = 0; i < table_.features(); ++i) c.P.push_back(solver_.feature(i, c.y));
+      solver_.evaluate(c);
+    }
+    return minima;
+  }
+
+  bool isInFront(const Candidate& c) const { return 2 * c.negative < table_.features(); }
+
+  /// The one whose features are in front of the camera, then the cheaper.
   void order() {
     if (candidates_.size() < 2) return;
-    const double difference = candidates_[1].cost - candidates_[0].cost;
-    const bool tie = std::abs(difference) <= chi_squared_1_95;
-    const bool swap = tie && candidates_[0].negative != candidates_[1].negative
-                          ? candidates_[1].negative < candidates_[0].negative
-                          : difference < 0;
-    if (swap) std::swap(candidates_[0], candidates_[1]);
+    const bool first = isInFront(candidates_[0]), second = isInFront(candidates_[1]);
+    if (first != second ? second : candidates_[1].cost < candidates_[0].cost) {
+      std::swap(candidates_[0], candidates_[1]);
+    }
   }
 
   /// Whether the data decide between the minimisers of exact data with a null space.
@@ -177,10 +191,10 @@ class ClosedFormRun {
   }
 
   /// Predicted deviations and covariances at the first minimiser.
-  void deviations(const Triangle& root) {
+  void deviations() {
     const Candidate& best = candidates_[0];
-    const double information = solver_.scaleInformation(best);
-    result_.scale_deviation = information > 0 ? 1 / std::sqrt(information) : std::numeric_limits<double>::infinity();
+    Triangle root = Triangle::cholesky(solver_.eliminatePredicted(best).Q);
+    if (solver_.hasPrior()) solver_.addPrior(root);
     SmallMatrix scaled(1, 1);
     const bool determined = solver_.covariance(root, best.y, scaled);
     const int m = solver_.motionSize();
@@ -202,6 +216,7 @@ class ClosedFormRun {
       result_.covariance_content =
           solver_.hasPrior() ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise;
     }
+    std::vector<double> relative;
     for (std::size_t i = 0; i < table_.features(); ++i) {
       const EliminatedFeature& e = solver_.eliminated()[i];
       ClosedFormFeature& feature = result_.features[table_.feature[i]];
@@ -215,7 +230,9 @@ class ClosedFormRun {
       }
       feature.depth_deviation = std::sqrt(variance);
       feature.depth_determined = feature.parallax > 2 * solver_.sigma();
+      relative.push_back(feature.depth_deviation / std::abs(u.dot(best.P[i])));
     }
+    if (!relative.empty()) result_.scale_deviation = median(relative);
   }
 
   void classify() {

@@ -210,19 +210,20 @@ class ClosedFormSolver {
     return true;
   }
 
-  /// How well the data fix the factor by which P and V (not G) may be scaled: its information, less what the noise of
-  /// the bearings feigns. With d = P - τ V' the residual of a factor 1 + e grows by e N'd, and a noise of σ in a bearing
-  /// turns the depth itself into N'd of σ uᵀd twice over.
-  double scaleInformation(const MotionCandidate& solution) const {
-    double information = 0;
-    for (std::size_t i = 0; i < table_.features(); ++i) {
-      for (const Ray& ray : table_.of(i)) {
-        const Eigen::Vector3d d = solution.P[i] - table_.images[ray.image].tau * solution.y.velocity();
-        const double along = ray.u.dot(d);
-        information += ray.weight * ray.weight * (d.squaredNorm() - along * along * (1 + 2 * sigma_ * sigma_));
-      }
-    }
-    return information;
+  /// Features taken out along the directions that a solution predicts, with its depths as weights: the information of
+  /// the angles at the solution. Measured directions would not do: their noise turns depth into information on what the
+  /// data do not tell (the scale of a constant velocity), some 2/(3 m - ...) of it an observation.
+  MotionBlock eliminatePredicted(const MotionCandidate& solution) {
+    const std::vector<Ray> measured = table_.rays;
+    forEachRay([&](std::size_t i, Ray& ray) {
+      const Eigen::Vector3d d = relativePosition(table_.images[ray.image], solution.P[i], solution.y);
+      const double depth = d.norm();
+      ray.u = depth > 0 ? Eigen::Vector3d(d / depth) : ray.u;
+      ray.weight = depth > 0 ? 1 / (sigma_ * depth) : 0;
+    });
+    const MotionBlock block = eliminate();
+    table_.rays = measured;
+    return block;
   }
 
   template <class F>
