@@ -19,10 +19,10 @@ namespace liestat {
 
 /// What the inertial sensor says about one image: C_j and S_j of the paper (Martinelli 2012, section II).
 struct WindowImage {
-  double time = 0;                                                   ///< s since the first image
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();            ///< C_j: the body's axes in t0
-  Eigen::Vector3d displacement = Eigen::Vector3d::Zero();            ///< S_j: twice integrated specific force (m)
-  Eigen::Matrix3d displacement_by_bias = Eigen::Matrix3d::Zero();    ///< of S_j, by the accelerometer's bias
+  double time = 0;                                                 ///< s since the first image
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< C_j: the body's axes in t0
+  Eigen::Vector3d displacement = Eigen::Vector3d::Zero();          ///< S_j: twice integrated specific force (m)
+  Eigen::Matrix3d displacement_by_bias = Eigen::Matrix3d::Zero();  ///< of S_j, by the accelerometer's bias
 };
 
 /// The image at the end of a motion that was integrated from the first image on.
@@ -35,7 +35,7 @@ inline WindowImage windowImage(const Preintegration<double>& from_first) {
 
 /// A feature as one image saw it.
 struct TrackedBearing {
-  std::size_t image = 0;                                ///< index into the window's images
+  std::size_t image = 0;                              ///< index into the window's images
   Eigen::Vector3d bearing = Eigen::Vector3d::Zero();  ///< in the body's axes; of any length but zero
 };
 
@@ -51,13 +51,15 @@ struct ClosedFormWindow {
 
 struct ClosedFormOptions {
   std::optional<double> gravity = 9.81;  ///< |G| in m/s²; none: its length is an unknown too
-  /// Standard deviation of a bearing across it, in rad (pixel noise over focal length). 0: exact data, whose status is
-  /// decided by ranks.
+  /// Standard deviation of a bearing in each direction across it, in rad (pixel noise over focal length). 0: exact
+  /// data, whose status is decided by ranks.
   double bearing_noise = 0;
-  bool estimate_bias = false;    ///< also the accelerometer's bias, as a correction of the integrated one
-  double bias_deviation = 0.1;   ///< m/s², of its prior N(0, s²); infinite: none
-  int weight_passes = 3;         ///< passes with weights 1/depth² after the first; exact data need none
-  bool singular_values = true;   ///< the diagnosis of ranks; exact data always have it
+  bool estimate_bias = false;     ///< also the accelerometer's bias, as a correction of the integrated one
+  double bias_deviation = 0.1;    ///< m/s², of its prior N(0, s²); infinite: none
+  int weight_passes = 3;          ///< passes with weights 1/depth² after the first; exact data need none
+  bool singular_values = true;    ///< the diagnosis of ranks; exact data always have it
+  double least_parallax = 4;      ///< with noise: RMS parallax of a feature that is used, in deviations of a bearing
+  bool remove_noise_bias = true;  ///< with noise: take off what noise adds to the system. Without, scale is too small
   /// What counts as determined, with noise: the scale to 30 %, the vertical to 0.2 rad.
   double largest_scale_deviation = 0.3;
   double largest_tilt_deviation = 0.2;
@@ -119,9 +121,9 @@ struct ClosedFormSolution {
 
 /// What a covariance accounts for.
 enum class CovarianceContent {
-  none,                     ///< there is none: exact data, or not all unknowns are determined
-  image_noise,              ///< image noise only: not the inertial sensor's noise, nor unmodelled biases
-  image_noise_bias_prior    ///< image noise and the prior of the accelerometer's bias
+  none,                   ///< there is none: exact data, or not all unknowns are determined
+  image_noise,            ///< image noise only: not the inertial sensor's noise, nor unmodelled biases
+  image_noise_bias_prior  ///< image noise and the prior of the accelerometer's bias
 };
 
 /// Never an unmarked wrong answer: solutions are there where the data determine them, see status.
@@ -148,8 +150,9 @@ struct ClosedFormResult {
   double scale_deviation = std::numeric_limits<double>::infinity();  ///< relative, predicted; with noise
   double tilt_deviation = std::numeric_limits<double>::infinity();   ///< rad, of the vertical, predicted; with noise
 
-  double window = 0;              ///< s, from the first image to the last that was used
-  std::size_t images_used = 0;    ///< images with an observation that was used
+  double noise_share = 0;       ///< of what is known of the motion's least known direction, 0 to 1; with noise
+  double window = 0;            ///< s, from the first image to the last that was used
+  std::size_t images_used = 0;  ///< images with an observation that was used
   std::size_t features_used = 0;
   std::size_t observations_used = 0;
   std::size_t degrees_of_freedom = 0;  ///< of the first solution's cost

@@ -1,11 +1,11 @@
 // Linear least squares in three unknowns whose length is known: minimise |R x + r|² on |x| = radius, with every local
 // minimum. Gravity in a visual-inertial initialisation is such a vector.
 //
-// With R = U diag(s) Vᵀ, l = s² ascending, e = -s Uᵀr, stationary points are V (l + λ)⁻¹ e with Σ e²/(l + λ)² = radius².
-// The global minimum is the only root λ ≥ -l₁; at most one other minimum exists, the root in (-l₂, -l₁) next to -l₁
-// (J. M. Martínez, "Local minimizers of quadratic functions on Euclidean balls and spheres", SIAM J. Optim. 4, 1994).
-// Roots are sought in μ = l₁ + λ, with differences l_k - l₁ = (s_k - s₁)(s_k + s₁): where a singular value is zero, μ is
-// the square of rounding and still has all its digits.
+// With R = U diag(s) Vᵀ, l = s² ascending, e = -s Uᵀr, stationary points are V (l + λ)⁻¹ e with Σ e²/(l + λ)² =
+// radius². The global minimum is the only root λ ≥ -l₁; at most one other minimum exists, the root in (-l₂, -l₁) next
+// to -l₁ (J. M. Martínez, "Local minimizers of quadratic functions on Euclidean balls and spheres", SIAM J. Optim. 4,
+// 1994). Roots are sought in μ = l₁ + λ, with differences l_k - l₁ = (s_k - s₁)(s_k + s₁): where a singular value is
+// zero, μ is the square of rounding and still has all its digits.
 #pragma once
 
 #include <fusion/detail/small_linear.hpp>
@@ -21,10 +21,10 @@ namespace liestat {
 /// The minima of least squares on a sphere, the global one first. Not finite input gives count = 0.
 struct SphereMinima {
   Eigen::Vector3d point[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  double cost[2] = {0, 0};       ///< |R x + r|²
+  double cost[2] = {0, 0};  ///< |R x + r|²
   double curvature[2] = {0, 0};  ///< μ = l₁ + λ: with λ, the smallest eigenvalue of RᵀR + λ; ≥ 0 at the global minimum
   int count = 0;                 ///< 1, or 2 where a second local minimum exists
-  Eigen::Vector3d values = Eigen::Vector3d::Zero();  ///< singular values of R, ascending
+  Eigen::Vector3d values = Eigen::Vector3d::Zero();          ///< singular values of R, ascending
   Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  ///< of x, in the columns, in the order of the values
 };
 

@@ -38,8 +38,8 @@ struct RayTable {
   double window = 0;
   std::vector<ScaledImage> images;
   std::vector<Ray> rays;
-  std::vector<std::size_t> begin{0};   ///< of the rays of each feature, and their end
-  std::vector<std::size_t> feature;  ///< its number in the window
+  std::vector<std::size_t> begin{0};  ///< of the rays of each feature, and their end
+  std::vector<std::size_t> feature;   ///< its number in the window
 
   std::size_t features() const { return feature.size(); }
   std::span<const Ray> of(std::size_t i) const { return {rays.data() + begin[i], begin[i + 1] - begin[i]}; }
@@ -141,7 +141,12 @@ inline Eigen::Matrix3d featureCovariance(const Eigen::Matrix3d& H, int& rank) {
 }
 
 /// Takes a feature out by normal equations: moments of I - u uᵀ, because E consists of multiples of I.
-inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<const ScaledImage> images, bool bias) {
+///
+/// Bearings with a noise of σ in each of two directions make E[I - u uᵀ] larger than the true one by 2 σ² u uᵀ: a
+/// feature at depth z seems to leave a residual of √2 σ z, and least squares shrink the scene to make it smaller. With
+/// `noise` = σ that is taken off, which makes the minimum consistent: the matrix may then be indefinite.
+inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<const ScaledImage> images, bool bias,
+                                          double noise = 0) {
   using Matrix3 = Eigen::Matrix3d;
   using Vector3 = Eigen::Vector3d;
   Matrix3 moment[5], by_bias[3], bias_bias = Matrix3::Zero();
@@ -154,9 +159,9 @@ inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<c
     const ScaledImage& image = images[ray.image];
     const double w = ray.weight * ray.weight, t = image.tau;
     const Vector3 wu = w * ray.u;
-    Matrix3 power = -wu * ray.u.transpose();
+    Matrix3 power = -(1 + 2 * noise * noise) * wu * ray.u.transpose();
     for (int i = 0; i < 3; ++i) power(i, i) += w;
-    Vector3 f = w * image.s - ray.u.dot(image.s) * wu;
+    Vector3 f = w * image.s - (1 + 2 * noise * noise) * ray.u.dot(image.s) * wu;
     square += image.s.dot(f);
     if (bias) {
       Matrix3 b = power * image.bias;

@@ -31,7 +31,8 @@ inline ClosedFormFault faultOf(const ClosedFormWindow& window, const ClosedFormO
     }
     if (index == 0 ? image.time != 0 : !(image.time > window.images[index - 1].time)) return Fault::image_order;
     const Eigen::Matrix3d error = image.rotation.transpose() * image.rotation - Eigen::Matrix3d::Identity();
-    if (!(error.norm() < 1e-6) || !(image.rotation.col(0).cross(image.rotation.col(1)).dot(image.rotation.col(2)) > 0)) {
+    if (!(error.norm() < 1e-6) ||
+        !(image.rotation.col(0).cross(image.rotation.col(1)).dot(image.rotation.col(2)) > 0)) {
       return Fault::not_a_rotation;
     }
   }
@@ -72,7 +73,8 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
     // Chords of the directions to their mean.
     const Eigen::Vector3d mean = sum.normalized();
     double square = 0;
-    for (std::size_t k = table.begin.back(); k < table.rays.size(); ++k) square += (table.rays[k].u - mean).squaredNorm();
+    for (std::size_t k = table.begin.back(); k < table.rays.size(); ++k)
+      square += (table.rays[k].u - mean).squaredNorm();
     feature.parallax = std::sqrt(square / static_cast<double>(track.size()));
     table.begin.push_back(table.rays.size());
     table.feature.push_back(i);
@@ -91,6 +93,22 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
                             scale * image.displacement_by_bias});
   }
   return table;
+}
+
+/// The features of a table whose parallax is at least so much (rad).
+inline RayTable withParallax(const RayTable& table, const ClosedFormResult& result, double least) {
+  RayTable kept;
+  kept.window = table.window;
+  kept.images = table.images;
+  kept.rays.reserve(table.rays.size());
+  for (std::size_t i = 0; i < table.features(); ++i) {
+    if (!(result.features[table.feature[i]].parallax >= least)) continue;
+    const std::span<const Ray> rays = table.of(i);
+    kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
+    kept.begin.push_back(kept.rays.size());
+    kept.feature.push_back(table.feature[i]);
+  }
+  return kept;
 }
 
 }  // namespace liestat::detail

@@ -47,6 +47,13 @@ struct RankDiagnosis {
   std::vector<Motion> vectors;  ///< motions of unit length with their features, their last entry 0; by values
 };
 
+/// The motion's problem less the noise in it.
+struct NoiseShare {
+  Triangle root;
+  std::vector<double> shares;  ///< of noise in what is known of each direction of the motion, descending, 0 to about 1
+  std::vector<Motion> directions;  ///< these directions, their last entry 0
+};
+
 class ClosedFormSolver {
  public:
   ClosedFormSolver(RayTable& table, const ClosedFormOptions& options)
@@ -116,16 +123,58 @@ class ClosedFormSolver {
     forEachRay([&](std::size_t, Ray& ray) { ray.weight = 1 / (sigma_ * std::max(depths[k++], floor)); });
   }
 
-  /// Features taken out at the present weights; their sum is the motion's problem.
-  MotionBlock eliminate() {
+  /// Features taken out at the present weights; their sum is the motion's problem. With `noise` (rad) less what noise
+  /// of that size adds to it, see eliminateFeature.
+  MotionBlock eliminate(double noise = 0) {
     MotionBlock sum(bias());
     features_.clear();
     features_.reserve(table_.features());
     for (std::size_t i = 0; i < table_.features(); ++i) {
-      features_.push_back(eliminateFeature(table_.of(i), table_.images, bias()));
+      features_.push_back(eliminateFeature(table_.of(i), table_.images, bias(), noise));
       sum += features_.back().block;
     }
     return sum;
+  }
+  /// The motion's problem with its prior and without the noise of the bearings. Of what the noisy problem says on a
+  /// direction (eigenvectors of one relative to the other) the share of noise is taken off; a direction that is nothing
+  /// but noise is left free.
+  NoiseShare withoutNoise() {
+    const MotionBlock clean = eliminate(sigma_), noisy = eliminate(0);
+    const int m = motionSize(), n = m + 1;
+    Triangle root = Triangle::cholesky(noisy.Q);
+    if (hasPrior()) addPrior(root);
+    const SmallMatrix inverse = root.inverse(n);
+    SmallMatrix difference(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        difference(i, j) = i <= j ? noisy.Q(i, j) - clean.Q(i, j) : noisy.Q(j, i) - clean.Q(j, i);
+      }
+    }
+    const SmallSvd share(transposed(inverse) * difference * inverse);
+    NoiseShare result{Triangle(n), {}, {}};
+    SmallMatrix rows(n, n);
+    for (int k = 0; k < n; ++k) {
+      const double left = options_.remove_noise_bias ? std::sqrt(std::max(0., 1 - share.value(k))) : 1;
+      for (int j = 0; j < n; ++j) {
+        for (int i = 0; i <= j; ++i) rows(k, j) += left * share.v(k, i) * root.r(i, j);
+      }
+    }
+    result.root.add(rows);
+    // The same for the directions of the motion alone, without the constant column.
+    const SmallMatrix of_motion = inverse.block(0, 0, m, m);
+    const SmallSvd motion(transposed(of_motion) * difference.block(0, 0, m, m) * of_motion);
+    for (int k = 0; k < m; ++k) {
+      Motion y(bias());
+      for (int i = 0; i < m; ++i) {
+        for (int j = i; j < m; ++j) y[i] += of_motion(i, j) * motion.v(k, j);
+      }
+      y[m] = 0;
+      result.shares.push_back(motion.value(k));
+      result.directions.push_back(y);
+    }
+    // Features go with the problem that is solved.
+    if (options_.remove_noise_bias) eliminate(sigma_);
+    return result;
   }
   const std::vector<EliminatedFeature>& eliminated() const { return features_; }
   Eigen::Vector3d feature(std::size_t i, const Motion& y) const { return apply(features_[i].by_motion, y); }
@@ -141,8 +190,7 @@ class ClosedFormSolver {
   /// leaves free in V (and b) are left out.
   std::vector<MotionCandidate> minimise(const Triangle& root, double tolerance) const {
     const int leading = motionSize() - 3;
-    const LeadingElimination lead(root, leading,
-                                  tolerance * root.r.block(0, 0, leading, leading).norm());
+    const LeadingElimination lead(root, leading, tolerance * root.r.block(0, 0, leading, leading).norm());
     const Eigen::Matrix3d R = lead.rest.r.matrix3(0, 0);
     const Eigen::Vector3d r = lead.rest.r.vector3(0, 3);
     SphereMinima minima;
@@ -157,8 +205,7 @@ class ClosedFormSolver {
       MotionCandidate candidate{Motion(bias()), {}};
       const Eigen::Vector3d& G = minima.point[k];
       for (int i = 0; i < leading; ++i) {
-        candidate.y[i] =
-            -(lead.gain(i, 0) * G[0] + lead.gain(i, 1) * G[1] + lead.gain(i, 2) * G[2] + lead.gain(i, 3));
+        candidate.y[i] = -(lead.gain(i, 0) * G[0] + lead.gain(i, 1) * G[1] + lead.gain(i, 2) * G[2] + lead.gain(i, 3));
       }
       candidate.y.set(leading, G);
       candidate.curvature = minima.curvature[k];
@@ -212,7 +259,7 @@ class ClosedFormSolver {
 
   /// Features taken out along the directions that a solution predicts, with its depths as weights: the information of
   /// the angles at the solution. Measured directions would not do: their noise turns depth into information on what the
-  /// data do not tell (the scale of a constant velocity), some 2/(3 m - ...) of it an observation.
+  /// data do not tell, such as the scale at constant velocity.
   MotionBlock eliminatePredicted(const MotionCandidate& solution) {
     const std::vector<Ray> measured = table_.rays;
     forEachRay([&](std::size_t i, Ray& ray) {

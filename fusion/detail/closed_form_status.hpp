@@ -44,8 +44,8 @@ inline bool coplanarityMatters(std::size_t images, std::size_t features) {
 
 /// What the null vectors of the motion say about its parts.
 struct NullShape {
-  int gravity_rank = 0;        ///< how many directions of G they move
-  bool bias_is_gravity = true; ///< all are changes of the bias that gravity makes up for, V at rest
+  int gravity_rank = 0;         ///< how many directions of G they move
+  bool bias_is_gravity = true;  ///< all are changes of the bias that gravity makes up for, V at rest
 };
 
 inline NullShape nullShape(const RankDiagnosis& d) {
@@ -60,8 +60,8 @@ inline NullShape nullShape(const RankDiagnosis& d) {
     Eigen::Vector3d rest = G;
     for (int j = 0; j < shape.gravity_rank; ++j) rest -= moved[j].dot(rest) * moved[j];
     if (shape.gravity_rank < 3 && rest.norm() > zero) moved[shape.gravity_rank++] = rest.normalized();
-    shape.bias_is_gravity = shape.bias_is_gravity && y.velocity().norm() <= zero &&
-                            (y.bias() - G).norm() <= 1e-4 * G.norm();
+    shape.bias_is_gravity =
+        shape.bias_is_gravity && y.velocity().norm() <= zero && (y.bias() - G).norm() <= 1e-4 * G.norm();
   }
   return shape;
 }
@@ -78,7 +78,7 @@ inline double relativeMotion(const RayTable& table, const Motion& y) {
 
 /// The case of exact data before anything is solved; `ok` where what follows depends on the solutions.
 inline ClosedFormStatus statusOfRanks(const RankDiagnosis& d, const RayTable& table, std::size_t images,
-                               bool gravity_known) {
+                                      bool gravity_known) {
   using Status = ClosedFormStatus;
   const std::size_t features = table.features();
   const bool bias = d.vectors.front().hasBias();

@@ -77,6 +77,14 @@ struct SmallMatrix {
   }
 };
 
+inline SmallMatrix transposed(const SmallMatrix& a) {
+  SmallMatrix m(a.cols, a.rows);
+  for (int i = 0; i < a.rows; ++i) {
+    for (int j = 0; j < a.cols; ++j) m(j, i) = a(i, j);
+  }
+  return m;
+}
+
 /// Singular values, descending, of a small square matrix A = U diag(values) Vᵀ by Hestenes' one-sided Jacobi rotations:
 /// each value to its own relative accuracy where the columns allow it. u and v hold their vectors in rows.
 struct SmallSvd {
@@ -205,14 +213,14 @@ struct Triangle {
     SmallMatrix copy = other.r;
     add(copy);
   }
-  /// The inverse of the leading n×n block; not finite where that is singular.
+  /// The inverse of the leading n×n block; unknowns without a pivot are zero.
   SmallMatrix inverse(int n) const {
     SmallMatrix x(n, n);
     for (int c = 0; c < n; ++c) {
       for (int i = c; i >= 0; --i) {
         double sum = i == c ? 1 : 0;
         for (int k = i + 1; k <= c; ++k) sum -= r(i, k) * x(k, c);
-        x(i, c) = sum / r(i, i);
+        x(i, c) = r(i, i) != 0 ? sum / r(i, i) : 0;
       }
     }
     return x;
@@ -225,7 +233,7 @@ struct Triangle {
     std::array<double, SmallMatrix::most> before;
     for (int k = 0; k < n; ++k) before[static_cast<std::size_t>(k)] = A(k, k);
     for (int k = 0; k < n; ++k) {
-      if (!(A(k, k) > 1e-15 * before[static_cast<std::size_t>(k)])) continue;
+      if (!(A(k, k) > 1e-13 * before[static_cast<std::size_t>(k)])) continue;
       const double pivot = std::sqrt(A(k, k));
       for (int j = k; j < n; ++j) root.r(k, j) = A(k, j) / pivot;
       for (int i = k + 1; i < n; ++i) {

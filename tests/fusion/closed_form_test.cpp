@@ -158,7 +158,12 @@ const std::vector<Case>& cases() {
        S::gravity_undetermined,
        S::gravity_undetermined,
        false},
-      {"at rest, n=3", {.images = 3, .features = 2, .motion = Motion::stationary}, false, 2, S::stationary, S::stationary},
+      {"at rest, n=3",
+       {.images = 3, .features = 2, .motion = Motion::stationary},
+       false,
+       2,
+       S::stationary,
+       S::stationary},
       {"at rest", {.images = 6, .features = 5, .motion = Motion::stationary}, false, 5, S::stationary, S::stationary},
       {"at rest, one feature",
        {.images = 6, .features = 1, .motion = Motion::stationary},
@@ -193,10 +198,7 @@ const std::vector<Case>& cases() {
        1,
        S::ambiguous,
        S::ok},
-      {"coplanar, n=4",
-       {.images = 4, .features = 2, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       0},
+      {"coplanar, n=4", {.images = 4, .features = 2, .motion = Motion::planar, .layout = Layout::coplanar}, false, 0},
       {"coplanar, n=6, one feature",
        {.images = 6, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
        false,
@@ -236,7 +238,12 @@ const std::vector<Case>& cases() {
       {"bias, n=6, one feature", {.images = 6, .features = 1}, true, 0},
       {"bias", {.images = 8, .features = 6, .bias = Vector3(0.1, -0.2, 0.15)}, true, 0},
       {"bias, one axis", {.images = 6, .features = 4, .turn = Turn::fixed_axis}, true, 1, S::mirror_gravity, S::ok},
-      {"bias, no rotation", {.images = 6, .features = 4, .turn = Turn::none}, true, 3, S::bias_unobservable, S::bias_unobservable},
+      {"bias, no rotation",
+       {.images = 6, .features = 4, .turn = Turn::none},
+       true,
+       3,
+       S::bias_unobservable,
+       S::bias_unobservable},
       {"bias, constant acceleration",
        {.images = 6, .features = 4, .motion = Motion::constant_acceleration},
        true,
@@ -369,8 +376,7 @@ TEST(SecondSolution, IsAScaledCopyForConstantAccelerationAndForThreeImages) {
       // The difference of the two is as small as 1 - γ: their accuracy is the better the further they are apart.
       const double bar = 1e-10 * std::max(1., std::abs(gamma)) / std::min(1., std::abs(1 - gamma));
       // What three images see of a varying force is a constant one and a velocity that it adds.
-      const Vector3 added =
-          images[last / 2].displacement / images[last / 2].time - 0.5 * images[last / 2].time * A;
+      const Vector3 added = images[last / 2].displacement / images[last / 2].time - 0.5 * images[last / 2].time * A;
       EXPECT_LE((other.velocity - (gamma * (scene.velocity + added) - added)).norm(), bar);
       EXPECT_LE((other.gravity - (gamma * (A + scene.gravity) - A)).norm(), 10 * bar);
       for (std::size_t i = 0; i < other.features.size(); ++i) {
@@ -496,8 +502,9 @@ TEST(Elimination, NormalEquationsAgreeWithReflections) {
     const Scene scene({.images = 8, .features = 8, .camera = Vector3(0.1, 0, 0.05)}, seed);
     const auto result = solveClosedForm(scene.window, {.bearing_noise = 1e-5});
     ASSERT_TRUE(result.ok()) << describe(result.status);
-    EXPECT_LE(relativeError(result.solutions[0], scene), 1e-7);
-    EXPECT_LE(featureError(result.solutions[0], scene), 1e-7);
+    // What is taken off for the claimed noise, 1e-10 of the information, is felt where the scale is weak.
+    EXPECT_LE(relativeError(result.solutions[0], scene), 1e-6);
+    EXPECT_LE(featureError(result.solutions[0], scene), 1e-6);
     EXPECT_EQ(result.covariance.rows(), 6);
     EXPECT_EQ(result.covariance_content, CovarianceContent::image_noise);
     EXPECT_EQ(result.degrees_of_freedom, 2 * 64u - 24 - 5);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fusion/closed_form_types.hpp>
+#include <fusion/preintegrate.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Core>
@@ -20,7 +21,9 @@ namespace liestat_test {
 class SceneRandom {
  public:
   explicit SceneRandom(std::uint64_t seed) : generator_(seed) {}
-  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53; }
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
+  }
   double normal() {
     const double radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));
     return radius * std::cos(uniform(0, 6.283185307179586));
@@ -50,13 +53,13 @@ struct SceneOptions {
   SceneMotion motion = SceneMotion::varying;
   SceneTurn turn = SceneTurn::general;
   SceneLayout layout = SceneLayout::general;
-  double window = 2;                                    ///< s
-  double far = 1;                                       ///< features this many times farther
-  double acceleration = 1.5;                            ///< m/s², RMS per axis of the varying part
-  double turn_rate = 0.5;                               ///< rad/s, RMS per axis
-  Eigen::Vector3d camera = Eigen::Vector3d::Zero();     ///< lever arm
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();       ///< of the accelerometer, left in the displacements
-  bool level_acceleration = false;                      ///< constant acceleration at a right angle to gravity
+  double window = 2;                                 ///< s
+  double far = 1;                                    ///< features this many times farther
+  double acceleration = 1.5;                         ///< m/s², RMS per axis of the varying part
+  double turn_rate = 0.5;                            ///< rad/s, RMS per axis
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();  ///< lever arm
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();    ///< of the accelerometer, left in the displacements
+  bool level_acceleration = false;                   ///< constant acceleration at a right angle to gravity
 };
 
 /// A body's motion and what it sees.
@@ -72,8 +75,8 @@ class Scene {
   }
 
   liestat::ClosedFormWindow window;
-  Eigen::Vector3d velocity, gravity;       ///< V, G in the body's axes at the first image
-  std::vector<Eigen::Vector3d> features;   ///< the same
+  Eigen::Vector3d velocity, gravity;      ///< V, G in the body's axes at the first image
+  std::vector<Eigen::Vector3d> features;  ///< the same
   std::vector<double> times;
 
   Eigen::Vector3d position(double t) const {
@@ -99,6 +102,22 @@ class Scene {
     for (const Wave& w : turn_) rate += w.amplitude * (w.rate * std::cos(w.rate * t + w.phase));
     return {t, liestat::SO3d::rightJacobian(angle(t)) * rate,
             attitude(t).inverse() * Eigen::Vector3d(accelerationAt(t) + g * Eigen::Vector3d::UnitZ())};
+  }
+  /// Replaces what the images know of the motion by what an inertial sensor at 200 Hz measures of it.
+  void measure(const liestat::ImuNoise<double>& noise, SceneRandom& random) {
+    constexpr double step = 0.005;
+    std::vector<liestat::ImuSample<double>> readings;
+    for (int k = 0; k <= static_cast<int>(options_.window / step) + 1; ++k) {
+      readings.push_back(reading(k * step));
+      readings.back().angular_rate += noise.gyroscope / std::sqrt(step) * random.normal3();
+      readings.back().specific_force += noise.accelerometer / std::sqrt(step) * random.normal3() + options_.bias;
+    }
+    liestat::Preintegration<double> whole;
+    for (std::size_t j = 1; j < times.size(); ++j) {
+      whole = whole * liestat::preintegrate<double>(readings, times[j - 1], times[j]).motion;
+      window.images[j] = liestat::windowImage(whole);
+      window.images[j].time = times[j];
+    }
   }
   /// Adds to each bearing a tangent noise of so many rad.
   void addNoise(double sigma, SceneRandom& random) {

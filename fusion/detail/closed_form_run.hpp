@@ -1,0 +1,389 @@
+// One solve of the closed form: exact data by ranks, noisy data by weights, noise and what is left of it.
+#pragma once
+
+#include <fusion/closed_form_types.hpp>
+#include <fusion/detail/closed_form_input.hpp>
+#include <fusion/detail/closed_form_solver.hpp>
+#include <fusion/detail/closed_form_status.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// One solve: a class only to hold what its steps share.
+class ClosedFormRun {
+ public:
+  ClosedFormRun(RayTable& table, const ClosedFormOptions& options, ClosedFormResult& result)
+      : table_(table), options_(options), result_(result), solver_(table, options) {}
+
+  void run() {
+    const bool exact = !(options_.bearing_noise > 0);
+    if (exact || options_.singular_values) {
+      const RankDiagnosis ranks = solver_.diagnose();
+      result_.null_dimension = ranks.motion_null + ranks.feature_null;
+      result_.largest_singular_value = ranks.largest;
+      result_.singular_values = ranks.values;
+      if (exact) solveExactly(ranks);
+    }
+    if (!exact) solveNoisy();
+    report(exact);
+  }
+
+ private:
+  using Candidate = MotionCandidate;
+  /// Measured (docs/closed_form.md): at constant velocity or acceleration 0.91 and more in 2000 windows.
+  static constexpr double lost_share = 0.8;
+  using Status = ClosedFormStatus;
+
+  void solveExactly(const RankDiagnosis& ranks) {
+    Status& status = result_.status;
+    status = statusOfRanks(ranks, table_, result_.images_used, options_.gravity.has_value());
+    const bool has_prior = solver_.hasPrior();
+    const bool infinite = ranks.motion_null > 1 || status == Status::no_parallax || status == Status::too_few_images ||
+                          status == Status::gravity_undetermined || status == Status::coplanar;
+    const bool finite_plane = status == Status::coplanar && ranks.motion_null == 1 && options_.gravity;
+    if (infinite && !finite_plane && !(status == Status::bias_unobservable && has_prior)) return;
+
+    solver_.resetWeights();
+    Triangle root = ranks.root;
+    for (double& x : root.r.value) x /= solver_.sigma();
+    // Where the data decide, exact data decide alone.
+    const bool needs_prior = has_prior && ranks.motion_null > 0;
+    if (needs_prior) solver_.addPrior(root);
+    candidates_ = solver_.minimise(root, needs_prior ? 1e-13 : solver_.rankTolerance());
+    for (Candidate& c : candidates_) {
+      if (status == Status::scale_unobservable) addScale(ranks, c);
+      for (const auto& by_motion : ranks.by_motion) c.P.push_back(apply(by_motion, c.y));
+      if (status == Status::scale_unobservable) normaliseScale(c);
+      solver_.evaluate(c);
+    }
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      result_.features[table_.feature[i]].depth_determined =
+          ranks.feature_rank[i] == 3 && status != Status::scale_unobservable;
+    }
+    if (status == Status::stationary) {
+      if (candidates_.empty() || relativeMotion(table_, candidates_[0].y) > 1e-6) status = Status::no_parallax;
+    }
+    // Gravity is determined by itself here: the sphere's other minimum is no solution.
+    if (status == Status::stationary || status == Status::scale_unobservable || status == Status::no_parallax) {
+      candidates_.resize(std::min<std::size_t>(candidates_.size(), 1));
+    }
+    decideExactly();
+  }
+
+  void solveNoisy() {
+    // What has no parallax says nothing on the motion but that it is small, which is wrong.
+    RayTable near = withParallax(table_, result_, options_.least_parallax * solver_.sigma());
+    if (near.features() == 0) {
+      result_.status = solveAtRest() ? Status::stationary : Status::no_parallax;
+      return;
+    }
+    std::swap(table_, near);
+    countUsed();
+    if (tooFew()) {
+      result_.status = Status::too_few_images;
+      return;
+    }
+    solver_.resetWeights();
+    Triangle root = Triangle::cholesky(solver_.eliminate().Q);
+    if (solver_.hasPrior()) solver_.addPrior(root);
+    candidates_ = minima(root);
+    if (candidates_.empty()) return;  // not finite
+    const Candidate least_squares = candidates_[0];  // the global minimum, whatever its angles
+    order();
+    solver_.setWeights(candidates_[0]);
+    NoiseShare share = solver_.withoutNoise();
+    candidates_ = minima(share.root);
+    // Each minimiser with the weights of its own depths; one with most features behind the camera is beyond help.
+    for (Candidate& c : candidates_) {
+      for (int pass = 1; pass < options_.weight_passes && isInFront(c); ++pass) {
+        solver_.setWeights(c);
+        const std::vector<Candidate> next = minima(solver_.withoutNoise().root);
+        if (next.empty()) break;
+        const bool second = next.size() == 2 && gravityAngle(next[1], c) < gravityAngle(next[0], c);
+        c = next[second ? 1 : 0];
+      }
+    }
+    order();
+    // Both may have gone to the same minimum.
+    if (candidates_.size() == 2 && gravityAngle(candidates_[0], candidates_[1]) < 1e-6) candidates_.pop_back();
+    solver_.setWeights(candidates_[0]);
+    share = solver_.withoutNoise();
+    result_.noise_share = share.shares[0];
+    lost_features_.clear();
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      lost_features_.push_back(solver_.feature(i, share.directions[0]));
+    }
+    deviations();
+    classify(share);
+    withhold(least_squares, share);
+  }
+
+  /// The minimisers of a problem, with the features as they were eliminated last.
+  std::vector<Candidate> minima(const Triangle& root) {
+    std::vector<Candidate> found = solver_.minimise(root, 1e-12);
+    for (Candidate& c : found) {
+      for (std::size_t i = 0; i < table_.features(); ++i) c.P.push_back(solver_.feature(i, c.y));
+      solver_.evaluate(c);
+    }
+    return found;
+  }
+  bool tooFew() const {
+    const std::size_t features = table_.features(), rows = 2 * table_.rays.size();
+    return genericNullDimension(result_.images_used, features, solver_.bias()) >= 2 ||
+           rows + 1 < 3 * features + static_cast<std::size_t>(solver_.motionSize());
+  }
+  void countUsed() {
+    for (ClosedFormFeature& feature : result_.features) feature.used = false;
+    for (const std::size_t i : table_.feature) result_.features[i].used = true;
+    std::vector<bool> seen(table_.images.size(), false);
+    for (const Ray& ray : table_.rays) seen[ray.image] = true;
+    result_.images_used = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
+    result_.features_used = table_.features();
+    result_.observations_used = table_.rays.size();
+  }
+  /// Whether the forces are those of a body at rest, to a hundredth: then that is the solution.
+  bool solveAtRest() {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double squares = 0;
+    for (const ScaledImage& image : table_.images) {
+      const double t = image.tau * image.tau;
+      sum -= t * (image.s - table_.images[0].s);
+      squares += t * t;
+    }
+    Eigen::Vector3d G = sum / squares;
+    const double expected = options_.gravity ? *options_.gravity / solver_.gravityScale() : G.norm();
+    if (!(std::abs(G.norm() - expected) <= 0.02 * expected)) return false;
+    for (const ScaledImage& image : table_.images) {
+      const Eigen::Vector3d moved = image.s - table_.images[0].s + image.tau * image.tau * G;
+      if (!(moved.norm() <= 0.01 * expected)) return false;
+    }
+    Candidate rest{Motion(solver_.bias()), {}};
+    G *= expected / G.norm();
+    rest.y.set(rest.y.size - 4, G);
+    // Depths are free: one metre.
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (const Ray& ray : table_.of(i)) mean += ray.u;
+      rest.P.push_back(table_.images[0].s + mean.normalized());
+    }
+    solver_.evaluate(rest);
+    candidates_ = {rest};
+    return true;
+  }
+
+  bool isInFront(const Candidate& c) const { return 2 * c.negative < table_.features(); }
+
+  /// The one whose features are in front of the camera, then the cheaper.
+  void order() {
+    if (candidates_.size() < 2) return;
+    const bool first = isInFront(candidates_[0]), second = isInFront(candidates_[1]);
+    if (first != second ? second : candidates_[1].cost < candidates_[0].cost) {
+      std::swap(candidates_[0], candidates_[1]);
+    }
+  }
+
+  /// Whether the data decide between the minimisers of exact data with a null space.
+  void decideExactly() {
+    order();
+    Status& status = result_.status;
+    if (candidates_.empty()) return;
+    if (status == Status::mirror_gravity && !hasRival()) status = Status::ok;
+    if (status != Status::ambiguous) return;
+    // A line that touches the sphere: the two are one to the root of rounding.
+    if (candidates_.size() < 2 || gravityAngle(candidates_[0], candidates_[1]) < 1e-5) {
+      status = Status::double_root;
+    } else if (!hasRival() || candidates_[1].negative > 0) {
+      status = Status::ok;
+    }
+  }
+  /// Whether the second minimiser explains the data as well as the first.
+  bool hasRival() const {
+    return candidates_.size() == 2 && candidates_[1].cost - candidates_[0].cost <= chi_squared_1_95;
+  }
+
+  /// V and P may be scaled together: a length for both, before it is normalised.
+  void addScale(const RankDiagnosis& ranks, Candidate& c) const {
+    for (int k = 0; k < solver_.motionSize(); ++k) c.y[k] += ranks.vectors.back()[k];
+  }
+  /// Features in front of the camera, at a median distance of one.
+  void normaliseScale(Candidate& c) const {
+    std::vector<double> distances;
+    double front = 0;
+    for (std::size_t i = 0; i < c.P.size(); ++i) {
+      distances.push_back(c.P[i].norm());
+      front += table_.of(i).front().u.dot(c.P[i]);
+    }
+    const double factor = std::copysign(1 / median(distances), front);
+    c.y.set(0, factor * c.y.velocity());
+    for (Eigen::Vector3d& p : c.P) p *= factor;
+  }
+
+  /// Predicted deviations and covariances at the first minimiser.
+  void deviations() {
+    const Candidate& best = candidates_[0];
+    Triangle root = Triangle::cholesky(solver_.eliminatePredicted(best).Q);
+    if (solver_.hasPrior()) solver_.addPrior(root);
+    SmallMatrix scaled(1, 1);
+    const bool determined = solver_.covariance(root, best.y, scaled);
+    const int m = solver_.motionSize();
+    if (determined) {
+      // The larger of the two deviations across G.
+      const Eigen::Vector3d G = best.y.gravity();
+      const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
+      const Eigen::Matrix2d tilt = across * scaled.matrix3(m - 3, m - 3) * across.transpose();
+      const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)), spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
+      result_.tilt_deviation = std::sqrt(half + spread) / G.norm();
+
+      // From (V', [b'], G') to (V, G, [b]).
+      result_.covariance.resize(m, m);
+      const auto from = [m](int i) { return i < 3 ? i : i < 6 ? m - 6 + i : i - 3; };
+      const auto unit = [&](int i) { return i < 3 ? 1 / table_.window : solver_.gravityScale(); };
+      for (int i = 0; i < m; ++i) {
+        for (int j = 0; j < m; ++j) result_.covariance(i, j) = unit(i) * unit(j) * scaled(from(i), from(j));
+      }
+      result_.covariance_content =
+          solver_.hasPrior() ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise;
+    }
+    std::vector<double> relative;
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      const EliminatedFeature& e = solver_.eliminated()[i];
+      ClosedFormFeature& feature = result_.features[table_.feature[i]];
+      const Eigen::Vector3d u = table_.of(i).front().u;
+      if (!determined || e.rank < 3) continue;
+      double variance = u.dot(e.covariance * u);
+      for (int a = 0; a < m; ++a) {
+        for (int b = 0; b < m; ++b) {
+          variance += u.dot(e.by_motion.vector3(0, a)) * scaled(a, b) * u.dot(e.by_motion.vector3(0, b));
+        }
+      }
+      feature.depth_deviation = std::sqrt(variance);
+      feature.depth_determined = true;
+      relative.push_back(feature.depth_deviation / std::abs(u.dot(best.P[i])));
+    }
+    if (!relative.empty()) result_.scale_deviation = median(relative);
+  }
+
+  /// The case with noise. A direction of the motion is lost where noise is nearly all that is known of it.
+  void classify(const NoiseShare& share) {
+    Status& status = result_.status;
+    const Motion& weak = share.directions[0];
+    const bool lost = share.shares[0] > lost_share;
+    // What gravity gains a bias may make up for.
+    const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > 0.1 * weak.velocity().norm();
+    const Eigen::Vector3d G = candidates_[0].y.gravity(), along = weak.gravity().normalized();
+    // Where the lost direction leaves the sphere of gravity again: the other solution.
+    const Eigen::Vector3d other = G - 2 * G.dot(along) * along;
+    const double chord = std::atan2(G.cross(other).norm(), G.dot(other));
+    // Without a lost direction two minima within a deviation are one, not quite converged.
+    if (candidates_.size() == 2 && !lost && gravityAngle(candidates_[0], candidates_[1]) < result_.tilt_deviation) {
+      candidates_.pop_back();
+    }
+    const bool rival = hasRival() && isInFront(candidates_[1]);
+    if (coplanarityMatters(result_.images_used, table_.features()) && outOfPlane(table_.rays) < 3 * solver_.sigma()) {
+      status = Status::coplanar;
+    } else if (lost && !moves_gravity) {
+      status = Status::scale_unobservable;
+    } else if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity)) {
+      status = Status::gravity_undetermined;
+    } else if (rival && solver_.bias() && isMirror()) {
+      status = Status::mirror_gravity;
+    } else if (lost && !(chord > 5 * result_.tilt_deviation)) {
+      status = Status::double_root;
+    } else if (rival) {
+      status = Status::ambiguous;
+    } else if (!(result_.tilt_deviation <= options_.largest_tilt_deviation)) {
+      status = Status::gravity_undetermined;
+    } else if (!(result_.scale_deviation <= options_.largest_scale_deviation)) {
+      status = Status::scale_unobservable;
+    } else {
+      status = biasRestsOnPrior() ? Status::bias_unobservable : Status::ok;
+    }
+  }
+
+  /// Keeps of the solutions what the status promises.
+  void withhold(const Candidate& least_squares, const NoiseShare& share) {
+    const Status status = result_.status;
+    const bool vague = !(result_.tilt_deviation <= options_.largest_tilt_deviation) ||
+                       !(result_.scale_deviation <= options_.largest_scale_deviation);
+    if (status == Status::gravity_undetermined || (status == Status::coplanar && vague)) candidates_.clear();
+    if (status == Status::scale_unobservable) {
+      candidates_.resize(1);
+      Candidate& c = candidates_[0];
+      if (share.shares[0] > lost_share) {
+        // Noise has drawn least squares to a scale of nothing, which is where gravity is told best; the direction of
+        // the motion and its features are those of the lost direction.
+        c = least_squares;
+        c.y.set(0, share.directions[0].velocity());
+        for (std::size_t i = 0; i < c.P.size(); ++i) c.P[i] = lost_features_[i];
+      }
+      normaliseScale(c);
+      solver_.evaluate(c);
+    }
+    if (candidates_.empty() || status == Status::scale_unobservable) {
+      result_.covariance.resize(0, 0);
+      result_.covariance_content = CovarianceContent::none;
+      for (ClosedFormFeature& feature : result_.features) {
+        feature.depth_determined = false;
+        feature.depth_deviation = std::numeric_limits<double>::infinity();
+      }
+    }
+  }
+
+  /// Two gravities that differ by what the biases differ.
+  bool isMirror() const {
+    const Eigen::Vector3d G = candidates_[1].y.gravity() - candidates_[0].y.gravity();
+    return (candidates_[1].y.bias() - candidates_[0].y.bias() - G).norm() < 0.2 * G.norm();
+  }
+  /// Of the three directions of the bias the data improve one at most (with |G| known one comes from its length).
+  bool biasRestsOnPrior() const {
+    if (!solver_.hasPrior() || result_.covariance.rows() != 9) return false;
+    const SmallSvd svd(SmallMatrix::of<3, 3>(Eigen::Matrix3d(result_.covariance.block<3, 3>(6, 6))));
+    return std::sqrt(svd.value(1)) > 0.98 * options_.bias_deviation;
+  }
+
+  void report(bool exact) {
+    const double T = table_.window, g = solver_.gravityScale();
+    for (const Candidate& c : candidates_) {
+      ClosedFormSolution s;
+      s.velocity = c.y.velocity() / T;
+      s.gravity = g * c.y.gravity();
+      s.accelerometer_bias = g * c.y.bias();
+      s.features.assign(result_.features.size(),
+                        Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+      for (std::size_t i = 0; i < table_.features(); ++i) s.features[table_.feature[i]] = c.P[i];
+      s.cost = c.cost;
+      s.negative_depths = c.negative;
+      result_.solutions.push_back(std::move(s));
+    }
+    const std::size_t rows = 2 * table_.rays.size() + (!exact && solver_.hasPrior() ? 3 : 0);
+    const std::size_t unknowns =
+        3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
+    result_.degrees_of_freedom = rows > unknowns ? rows - unknowns : 0;
+    if (candidates_.empty()) return;
+    for (std::size_t i = 0; i < table_.features(); ++i) {
+      double square = 0;
+      for (const Ray& ray : table_.of(i)) {
+        const Eigen::Vector3d d = relativePosition(table_.images[ray.image], candidates_[0].P[i], candidates_[0].y);
+        square += ray.u.cross(d).squaredNorm() / d.squaredNorm();
+      }
+      result_.features[table_.feature[i]].residual = std::sqrt(square / static_cast<double>(table_.of(i).size()));
+    }
+  }
+
+  RayTable& table_;
+  const ClosedFormOptions& options_;
+  ClosedFormResult& result_;
+  ClosedFormSolver solver_;
+  std::vector<Candidate> candidates_;
+  std::vector<Eigen::Vector3d> lost_features_;  ///< where the features go along the direction that is known least
+};
+
+}  // namespace liestat::detail
