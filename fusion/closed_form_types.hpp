@@ -99,7 +99,7 @@ enum class ClosedFormFault {
 struct ClosedFormFeature {
   std::size_t observations = 0;
   bool used = false;              ///< false: seen in fewer than two images
-  bool depth_determined = false;  ///< false: no parallax; the position is then the point of its line nearest to t0
+  bool depth_determined = false;  ///< false: no parallax; its position is then any point of its line in front
   double parallax = 0;            ///< rad, RMS of its directions about their mean after compensation of the rotation
   double residual = 0;            ///< rad, RMS over its observations
   double depth_deviation = std::numeric_limits<double>::infinity();  ///< m, along its first bearing; image noise only
@@ -133,7 +133,7 @@ struct ClosedFormResult {
   std::size_t fault_index = 0;
 
   /// Local minima, the one to prefer first: 0, 1 or 2. With scale_unobservable, V and P are scaled to a median distance
-  /// of features of one; with no_parallax and stationary depths are the least that fit.
+  /// of features of one.
   std::vector<ClosedFormSolution> solutions;
   std::vector<ClosedFormFeature> features;
 
@@ -157,8 +157,12 @@ struct ClosedFormResult {
   std::size_t observations_used = 0;
   std::size_t degrees_of_freedom = 0;  ///< of the first solution's cost
 
-  /// Exactly one answer.
-  bool ok() const { return status == ClosedFormStatus::ok; }
+  /// Whether the first solution's cost is one of noise, by χ². If not: outliers, an unmodelled bias, bearings noisier
+  /// than was said.
+  bool consistent = false;
+
+  /// Exactly one answer, which explains the data.
+  bool ok() const { return status == ClosedFormStatus::ok && consistent; }
 };
 
 /// In words, for people.

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -33,12 +34,12 @@ class ClosedFormRun {
       if (exact) solveExactly(ranks);
     }
     if (!exact) solveNoisy();
-    report(exact);
+    report();
   }
 
  private:
   using Candidate = MotionCandidate;
-  /// Measured (docs/closed_form.md): at constant velocity or acceleration 0.91 and more in 2000 windows.
+  /// Measured (docs/closed_form.md): at constant velocity or acceleration 0.91 and more in 1800 windows.
   static constexpr double lost_share = 0.8;
   using Status = ClosedFormStatus;
 
@@ -60,7 +61,12 @@ class ClosedFormRun {
     candidates_ = solver_.minimise(root, needs_prior ? 1e-13 : solver_.rankTolerance());
     for (Candidate& c : candidates_) {
       if (status == Status::scale_unobservable) addScale(ranks, c);
-      for (const auto& by_motion : ranks.by_motion) c.P.push_back(apply(by_motion, c.y));
+      const double reach = 1 + 2 * farthest(c.y);
+      for (std::size_t i = 0; i < table_.features(); ++i) {
+        c.P.push_back(apply(ranks.by_motion[i], c.y));
+        // A depth that is free: anywhere in front of the camera.
+        if (ranks.feature_rank[i] < 3) c.P.back() += reach * table_.of(i).front().u;
+      }
       if (status == Status::scale_unobservable) normaliseScale(c);
       solver_.evaluate(c);
     }
@@ -95,7 +101,7 @@ class ClosedFormRun {
     Triangle root = Triangle::cholesky(solver_.eliminate().Q);
     if (solver_.hasPrior()) solver_.addPrior(root);
     candidates_ = minima(root);
-    if (candidates_.empty()) return;  // not finite
+    if (candidates_.empty()) return;                 // not finite
     const Candidate least_squares = candidates_[0];  // the global minimum, whatever its angles
     order();
     solver_.setWeights(candidates_[0]);
@@ -149,26 +155,12 @@ class ClosedFormRun {
     result_.features_used = table_.features();
     result_.observations_used = table_.rays.size();
   }
-  /// Whether the forces are those of a body at rest, to a hundredth: then that is the solution.
+  /// Whether the forces are those of a body at rest: then that is the solution, with depths, which are free, of 1 m.
   bool solveAtRest() {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double squares = 0;
-    for (const ScaledImage& image : table_.images) {
-      const double t = image.tau * image.tau;
-      sum -= t * (image.s - table_.images[0].s);
-      squares += t * t;
-    }
-    Eigen::Vector3d G = sum / squares;
-    const double expected = options_.gravity ? *options_.gravity / solver_.gravityScale() : G.norm();
-    if (!(std::abs(G.norm() - expected) <= 0.02 * expected)) return false;
-    for (const ScaledImage& image : table_.images) {
-      const Eigen::Vector3d moved = image.s - table_.images[0].s + image.tau * image.tau * G;
-      if (!(moved.norm() <= 0.01 * expected)) return false;
-    }
+    const std::optional<Eigen::Vector3d> G = gravityAtRest(table_, options_.gravity, solver_.gravityScale());
+    if (!G) return false;
     Candidate rest{Motion(solver_.bias()), {}};
-    G *= expected / G.norm();
-    rest.y.set(rest.y.size - 4, G);
-    // Depths are free: one metre.
+    rest.y.set(rest.y.size - 4, *G);
     for (std::size_t i = 0; i < table_.features(); ++i) {
       Eigen::Vector3d mean = Eigen::Vector3d::Zero();
       for (const Ray& ray : table_.of(i)) mean += ray.u;
@@ -209,6 +201,15 @@ class ClosedFormRun {
     return candidates_.size() == 2 && candidates_[1].cost - candidates_[0].cost <= chi_squared_1_95;
   }
 
+  /// The largest distance of the camera from t0 (m).
+  double farthest(const Motion& y) const {
+    double most = 0;
+    for (const ScaledImage& image : table_.images) {
+      most = std::max(most, relativePosition(image, Eigen::Vector3d::Zero(), y).norm());
+    }
+    return most;
+  }
+
   /// V and P may be scaled together: a length for both, before it is normalised.
   void addScale(const RankDiagnosis& ranks, Candidate& c) const {
     for (int k = 0; k < solver_.motionSize(); ++k) c.y[k] += ranks.vectors.back()[k];
@@ -239,7 +240,8 @@ class ClosedFormRun {
       const Eigen::Vector3d G = best.y.gravity();
       const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
       const Eigen::Matrix2d tilt = across * scaled.matrix3(m - 3, m - 3) * across.transpose();
-      const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)), spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
+      const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)),
+                   spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
       result_.tilt_deviation = std::sqrt(half + spread) / G.norm();
 
       // From (V', [b'], G') to (V, G, [b]).
@@ -276,6 +278,8 @@ class ClosedFormRun {
     Status& status = result_.status;
     const Motion& weak = share.directions[0];
     const bool lost = share.shares[0] > lost_share;
+    // Plain least squares never quite fit, and that says nothing on the case.
+    const bool misfit = options_.remove_noise_bias && !isConsistent();
     // What gravity gains a bias may make up for.
     const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > 0.1 * weak.velocity().norm();
     const Eigen::Vector3d G = candidates_[0].y.gravity(), along = weak.gravity().normalized();
@@ -291,7 +295,7 @@ class ClosedFormRun {
       status = Status::coplanar;
     } else if (lost && !moves_gravity) {
       status = Status::scale_unobservable;
-    } else if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity)) {
+    } else if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity || misfit)) {
       status = Status::gravity_undetermined;
     } else if (rival && solver_.bias() && isMirror()) {
       status = Status::mirror_gravity;
@@ -337,6 +341,19 @@ class ClosedFormRun {
     }
   }
 
+  std::size_t degreesOfFreedom() const {
+    const std::size_t rows =
+        2 * table_.rays.size() + (options_.bearing_noise > 0 && solver_.hasPrior() ? std::size_t{3} : 0);
+    const std::size_t unknowns =
+        3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
+    return rows > unknowns ? rows - unknowns : 0;
+  }
+  /// Whether the first minimiser's cost is one of noise: five deviations of χ², and the same for none.
+  bool isConsistent() const {
+    const double dof = static_cast<double>(degreesOfFreedom());
+    return candidates_[0].cost <= dof + 5 * std::sqrt(2 * dof) + 12;
+  }
+
   /// Two gravities that differ by what the biases differ.
   bool isMirror() const {
     const Eigen::Vector3d G = candidates_[1].y.gravity() - candidates_[0].y.gravity();
@@ -349,24 +366,22 @@ class ClosedFormRun {
     return std::sqrt(svd.value(1)) > 0.98 * options_.bias_deviation;
   }
 
-  void report(bool exact) {
+  void report() {
     const double T = table_.window, g = solver_.gravityScale();
     for (const Candidate& c : candidates_) {
       ClosedFormSolution s;
       s.velocity = c.y.velocity() / T;
       s.gravity = g * c.y.gravity();
       s.accelerometer_bias = g * c.y.bias();
-      s.features.assign(result_.features.size(),
-                        Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+      s.features.assign(result_.features.size(), Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
       for (std::size_t i = 0; i < table_.features(); ++i) s.features[table_.feature[i]] = c.P[i];
       s.cost = c.cost;
       s.negative_depths = c.negative;
       result_.solutions.push_back(std::move(s));
     }
-    const std::size_t rows = 2 * table_.rays.size() + (!exact && solver_.hasPrior() ? 3 : 0);
-    const std::size_t unknowns =
-        3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
-    result_.degrees_of_freedom = rows > unknowns ? rows - unknowns : 0;
+    result_.degrees_of_freedom = degreesOfFreedom();
+    // With a scale that is made up there is no cost to speak of.
+    result_.consistent = result_.status == Status::scale_unobservable || (!candidates_.empty() && isConsistent());
     if (candidates_.empty()) return;
     for (std::size_t i = 0; i < table_.features(); ++i) {
       double square = 0;

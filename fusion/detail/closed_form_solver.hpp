@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace liestat::detail {
@@ -139,7 +140,11 @@ class ClosedFormSolver {
   /// direction (eigenvectors of one relative to the other) the share of noise is taken off; a direction that is nothing
   /// but noise is left free.
   NoiseShare withoutNoise() {
-    const MotionBlock clean = eliminate(sigma_), noisy = eliminate(0);
+    const MotionBlock clean = eliminate(sigma_);
+    std::vector<EliminatedFeature> of_clean = std::move(features_);
+    const MotionBlock noisy = eliminate(0);
+    // Features go with the problem that is solved.
+    if (options_.remove_noise_bias) features_ = std::move(of_clean);
     const int m = motionSize(), n = m + 1;
     Triangle root = Triangle::cholesky(noisy.Q);
     if (hasPrior()) addPrior(root);
@@ -172,8 +177,6 @@ class ClosedFormSolver {
       result.shares.push_back(motion.value(k));
       result.directions.push_back(y);
     }
-    // Features go with the problem that is solved.
-    if (options_.remove_noise_bias) eliminate(sigma_);
     return result;
   }
   const std::vector<EliminatedFeature>& eliminated() const { return features_; }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 namespace liestat::detail {
@@ -99,6 +100,27 @@ inline ClosedFormStatus statusOfRanks(const RankDiagnosis& d, const RayTable& ta
   if (planar && null > generic && coplanarityMatters(images, features)) return Status::coplanar;
   if (d.motion_null > 1) return bias ? Status::bias_unobservable : Status::gravity_undetermined;
   return gravity_known ? Status::ambiguous : Status::gravity_undetermined;
+}
+
+/// G T²/2 of a body that stays where it is, if the forces are that: their length gravity's to 2 % (an accelerometer's
+/// bias), and their direction steady to 1 %.
+inline std::optional<Eigen::Vector3d> gravityAtRest(const RayTable& table, const std::optional<double>& gravity,
+                                                    double scale) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squares = 0;
+  for (const ScaledImage& image : table.images) {
+    const double t = image.tau * image.tau;
+    sum -= t * (image.s - table.images[0].s);
+    squares += t * t;
+  }
+  const Eigen::Vector3d G = sum / squares;
+  const double length = G.norm(), expected = gravity ? *gravity / scale : length;
+  if (!(std::abs(length - expected) <= 0.02 * expected)) return std::nullopt;
+  for (const ScaledImage& image : table.images) {
+    const Eigen::Vector3d moved = image.s - table.images[0].s + image.tau * image.tau * G;
+    if (!(moved.norm() <= 0.01 * expected)) return std::nullopt;
+  }
+  return expected / length * G;
 }
 
 /// Angle between the gravities of two minimisers.

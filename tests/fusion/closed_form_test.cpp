@@ -4,6 +4,8 @@
 #include <fusion/preintegrate.hpp>
 #include <support/vi_scene.hpp>
 
+#include "closed_form_cases.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -88,181 +90,8 @@ double bestError(const ClosedFormResult& result, const Scene& scene) {
   return best;
 }
 
-/// A row of the table: what is asked, and what must come out.
-struct Case {
-  const char* name;
-  SceneOptions scene;
-  bool bias = false;
-  int null = 0;
-  Status status = Status::ok;
-  Status or_status = Status::ok;  ///< the other status that scenes of this row may have
-  bool solved = true;             ///< the truth is among the solutions
-};
-
-const std::vector<Case>& cases() {
-  using S = Status;
-  static const std::vector<Case> list{
-      {"n=2, one feature", {.images = 2, .features = 1}, false, 5, S::too_few_images, S::too_few_images, false},
-      {"n=2", {.images = 2, .features = 5}, false, 4, S::too_few_images, S::too_few_images, false},
-      {"n=3, one feature", {.images = 3, .features = 1}, false, 3, S::too_few_images, S::too_few_images, false},
-      {"n=3, two features", {.images = 3, .features = 2}, false, 1, S::ambiguous, S::ok},
-      {"n=3", {.images = 3, .features = 6}, false, 1, S::ambiguous, S::ok},
-      {"n=4, one feature", {.images = 4, .features = 1}, false, 1, S::ambiguous, S::ok},
-      {"n=4", {.images = 4, .features = 2}, false, 0},
-      {"n=5, one feature", {.images = 5, .features = 1}, false, 0},
-      {"general", {.images = 6, .features = 8}, false, 0},
-      {"many", {.images = 11, .features = 12}, false, 0},
-      {"constant acceleration, n=3",
-       {.images = 3, .features = 3, .motion = Motion::constant_acceleration},
-       false,
-       1,
-       S::ambiguous,
-       S::ok},
-      {"constant acceleration, n=4, one feature",
-       {.images = 4, .features = 1, .motion = Motion::constant_acceleration},
-       false,
-       1,
-       S::ambiguous,
-       S::ok},
-      {"constant acceleration",
-       {.images = 6, .features = 5, .motion = Motion::constant_acceleration},
-       false,
-       1,
-       S::ambiguous,
-       S::ok},
-      {"constant velocity, n=3",
-       {.images = 3, .features = 2, .motion = Motion::constant_velocity},
-       false,
-       1,
-       S::scale_unobservable,
-       S::scale_unobservable,
-       false},
-      {"constant velocity",
-       {.images = 6, .features = 5, .motion = Motion::constant_velocity},
-       false,
-       1,
-       S::scale_unobservable,
-       S::scale_unobservable,
-       false},
-      {"constant velocity, n=4, one feature",
-       {.images = 4, .features = 1, .motion = Motion::constant_velocity},
-       false,
-       2,
-       S::gravity_undetermined,
-       S::gravity_undetermined,
-       false},
-      {"constant velocity, n=7, one feature",
-       {.images = 7, .features = 1, .motion = Motion::constant_velocity},
-       false,
-       2,
-       S::gravity_undetermined,
-       S::gravity_undetermined,
-       false},
-      {"at rest, n=3",
-       {.images = 3, .features = 2, .motion = Motion::stationary},
-       false,
-       2,
-       S::stationary,
-       S::stationary},
-      {"at rest", {.images = 6, .features = 5, .motion = Motion::stationary}, false, 5, S::stationary, S::stationary},
-      {"at rest, one feature",
-       {.images = 6, .features = 1, .motion = Motion::stationary},
-       false,
-       3,
-       S::no_parallax,
-       S::no_parallax,
-       false},
-      {"coplanar, n=3, two features",
-       {.images = 3, .features = 2, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       2,
-       S::coplanar,
-       S::coplanar,
-       false},
-      {"coplanar, n=4, one feature",
-       {.images = 4, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       2,
-       S::coplanar,
-       S::coplanar,
-       false},
-      {"coplanar, n=5, one feature",
-       {.images = 5, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       1,
-       S::coplanar,
-       S::coplanar},
-      {"coplanar, n=3, three features",
-       {.images = 3, .features = 3, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       1,
-       S::ambiguous,
-       S::ok},
-      {"coplanar, n=4", {.images = 4, .features = 2, .motion = Motion::planar, .layout = Layout::coplanar}, false, 0},
-      {"coplanar, n=6, one feature",
-       {.images = 6, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
-       false,
-       0},
-      {"straight, n=4, one feature",
-       {.images = 4, .features = 1, .motion = Motion::straight},
-       false,
-       2,
-       S::coplanar,
-       S::coplanar,
-       false},
-      {"straight, n=5, one feature",
-       {.images = 5, .features = 1, .motion = Motion::straight},
-       false,
-       1,
-       S::coplanar,
-       S::coplanar},
-      {"straight, n=6, one feature", {.images = 6, .features = 1, .motion = Motion::straight}, false, 0},
-      {"straight", {.images = 5, .features = 3, .motion = Motion::straight}, false, 0},
-      {"planar motion", {.images = 5, .features = 3, .motion = Motion::planar}, false, 0},
-      {"planar features", {.images = 5, .features = 5, .layout = Layout::plane}, false, 0},
-      {"collinear features", {.images = 5, .features = 5, .layout = Layout::line}, false, 0},
-      {"no rotation", {.images = 5, .features = 5, .turn = Turn::none}, false, 0},
-      // Constant acceleration with A = 0: γ₂ = -1.
-      {"free fall", {.images = 5, .features = 5, .motion = Motion::free_fall}, false, 1},
-      {"straight at a feature",
-       {.images = 5, .features = 4, .motion = Motion::straight, .layout = Layout::ahead},
-       false,
-       1},
-      {"lever arm", {.images = 6, .features = 8, .camera = Vector3(0.1, -0.2, 0.05)}, false, 0},
-      {"bias, n=3, one feature", {.images = 3, .features = 1}, true, 6, S::too_few_images, S::too_few_images, false},
-      {"bias, n=3", {.images = 3, .features = 4}, true, 4, S::too_few_images, S::too_few_images, false},
-      {"bias, n=4, one feature", {.images = 4, .features = 1}, true, 4, S::too_few_images, S::too_few_images, false},
-      {"bias, n=4", {.images = 4, .features = 3}, true, 1, S::ambiguous, S::ok},
-      {"bias, n=5, one feature", {.images = 5, .features = 1}, true, 2, S::too_few_images, S::too_few_images, false},
-      {"bias, n=5", {.images = 5, .features = 3, .bias = Vector3(0.1, -0.2, 0.15)}, true, 0},
-      {"bias, n=6, one feature", {.images = 6, .features = 1}, true, 0},
-      {"bias", {.images = 8, .features = 6, .bias = Vector3(0.1, -0.2, 0.15)}, true, 0},
-      {"bias, one axis", {.images = 6, .features = 4, .turn = Turn::fixed_axis}, true, 1, S::mirror_gravity, S::ok},
-      {"bias, no rotation",
-       {.images = 6, .features = 4, .turn = Turn::none},
-       true,
-       3,
-       S::bias_unobservable,
-       S::bias_unobservable},
-      {"bias, constant acceleration",
-       {.images = 6, .features = 4, .motion = Motion::constant_acceleration},
-       true,
-       1,
-       S::ambiguous,
-       S::ok},
-      {"bias, constant velocity",
-       {.images = 6, .features = 4, .motion = Motion::constant_velocity},
-       true,
-       1,
-       S::scale_unobservable,
-       S::scale_unobservable,
-       false},
-  };
-  return list;
-}
-
 TEST(ClosedFormCases, EveryRowOfTheTable) {
-  for (const Case& row : cases()) {
+  for (const ClosedFormCase& row : closedFormCases()) {
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
       SCOPED_TRACE(std::string(row.name) + ", scene " + std::to_string(seed));
       const Scene scene(row.scene, seed);
@@ -271,6 +100,7 @@ TEST(ClosedFormCases, EveryRowOfTheTable) {
       EXPECT_EQ(result.null_dimension, row.null);
       EXPECT_TRUE(result.status == row.status || result.status == row.or_status) << describe(result.status);
       EXPECT_EQ(result.solutions.empty(), !row.solved && row.status != Status::scale_unobservable);
+      EXPECT_EQ(result.consistent, !result.solutions.empty());
       if (row.solved) {
         EXPECT_LE(bestError(result, scene), 1e-9);
       }

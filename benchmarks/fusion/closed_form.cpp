@@ -1,0 +1,133 @@
+// The closed form of visual-inertial initialisation: one pass of elimination, minimisers and back-substitution; whole
+// solves; and the dense normal equations that a straightforward program sets up.
+#include "../inputs.hpp"
+
+#include <fusion/closed_form.hpp>
+#include <lie/so3.hpp>
+
+#include <Eigen/Cholesky>
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace liestat::bench {
+namespace {
+
+constexpr double noise = 1. / 450;
+
+/// Two seconds of a body that swings and turns among features some five metres ahead.
+ClosedFormWindow makeWindow(std::size_t images, std::size_t features, double sigma) {
+  Inputs random;
+  const Eigen::Vector3d velocity(0.8, -0.5, 0.2), gravity(1, 2, -9.5);
+  const auto moved = [&](double t) {
+    return Eigen::Vector3d(t * velocity +
+                           0.3 * Eigen::Vector3d(std::sin(3 * t), 1 - std::cos(2.5 * t), std::sin(2 * t)));
+  };
+  ClosedFormWindow window;
+  for (std::size_t j = 0; j < images; ++j) {
+    const double t = 2. * static_cast<double>(j) / static_cast<double>(images - 1);
+    // V is the derivative at the start.
+    const Eigen::Vector3d V = velocity + Eigen::Vector3d(0.9, 0, 0.6);
+    window.images.push_back({t, SO3d::exp(0.4 * Eigen::Vector3d(std::sin(t), std::sin(2 * t), t)).matrix(),
+                             moved(t) - t * V - 0.5 * t * t * gravity});
+  }
+  for (std::size_t i = 0; i < features; ++i) {
+    const Eigen::Vector3d P = Eigen::Vector3d(0, 0, 5) + 1.5 * random.normal<3>();
+    FeatureTrack track;
+    for (std::size_t j = 0; j < images; ++j) {
+      const Eigen::Vector3d mu =
+          window.images[j].rotation.transpose() * (P - moved(window.images[j].time)).normalized();
+      track.push_back({j, mu + sigma * random.normal<3>()});
+    }
+    window.features.push_back(track);
+  }
+  return window;
+}
+
+ClosedFormWindow makeWindow(const benchmark::State& state, double sigma) {
+  return makeWindow(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)), sigma);
+}
+
+void pass(benchmark::State& state) {
+  const ClosedFormWindow window = makeWindow(state, noise);
+  const ClosedFormOptions options{.gravity = Eigen::Vector3d(1, 2, -9.5).norm(), .bearing_noise = noise};
+  ClosedFormResult result;
+  detail::RayTable table = detail::rayTable(window, result);
+  detail::ClosedFormSolver solver(table, options);
+  solver.resetWeights();
+  for (auto _ : state) {
+    auto found = solver.minimise(detail::Triangle::cholesky(solver.eliminate().Q), 1e-12);
+    for (std::size_t i = 0; i < table.features(); ++i) found[0].P.push_back(solver.feature(i, found[0].y));
+    solver.evaluate(found[0]);
+    benchmark::DoNotOptimize(found);
+  }
+  state.SetComplexityN(state.range(0) * state.range(1));
+}
+
+void solve(benchmark::State& state, const ClosedFormOptions& options, double sigma) {
+  const ClosedFormWindow window = makeWindow(state, sigma);
+  for (auto _ : state) {
+    auto result = solveClosedForm(window, options);
+    if (!result.ok()) state.SkipWithError(describe(result.status));
+    benchmark::DoNotOptimize(result);
+  }
+  state.SetComplexityN(state.range(0) * state.range(1));
+}
+
+const double gravity_length = Eigen::Vector3d(1, 2, -9.5).norm();
+
+void noisy(benchmark::State& state) {
+  solve(state, {.gravity = gravity_length, .bearing_noise = noise, .singular_values = false}, noise);
+}
+void exact(benchmark::State& state) { solve(state, {.gravity = gravity_length}, 0); }
+void bias(benchmark::State& state) {
+  // The prior decides: only the time is of interest.
+  const ClosedFormWindow window = makeWindow(state, noise);
+  const ClosedFormOptions options{
+      .gravity = gravity_length, .bearing_noise = noise, .estimate_bias = true, .singular_values = false};
+  for (auto _ : state) {
+    auto result = solveClosedForm(window, options);
+    benchmark::DoNotOptimize(result);
+  }
+}
+
+/// All unknowns at once, gravity's length free: what elimination saves.
+void dense(benchmark::State& state) {
+  const ClosedFormWindow window = makeWindow(state, noise);
+  ClosedFormResult result;
+  const detail::RayTable table = detail::rayTable(window, result);
+  const Eigen::Index features = 3 * static_cast<Eigen::Index>(table.features());
+  for (auto _ : state) {
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(table.rays.size()), features + 6);
+    Eigen::VectorXd b(A.rows());
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < table.features(); ++i) {
+      for (const detail::Ray& ray : table.of(i)) {
+        const auto& image = table.images[ray.image];
+        const Eigen::Matrix<double, 2, 3> N = detail::tangentRows(ray.u);
+        A.block<2, 3>(row, 3 * static_cast<Eigen::Index>(i)) = N;
+        A.block<2, 3>(row, features) = -image.tau * N;
+        A.block<2, 3>(row, features + 3) = -image.tau * image.tau * N;
+        b.segment<2>(row) = N * image.s;
+        row += 2;
+      }
+    }
+    Eigen::VectorXd x = (A.transpose() * A).ldlt().solve(A.transpose() * b);
+    benchmark::DoNotOptimize(x);
+  }
+  state.SetComplexityN(state.range(0) * state.range(1));
+}
+
+BENCHMARK(pass)->Name("ClosedForm/one pass")->Args({21, 25})->Args({21, 50})->Args({21, 100})->Args({21, 200})
+    ->Complexity(benchmark::oN)->Unit(benchmark::kMicrosecond);
+BENCHMARK(noisy)->Name("ClosedForm/noisy data, all passes")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(exact)->Name("ClosedForm/exact data, ranks")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(bias)->Name("ClosedForm/noisy data with bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(dense)->Name("Dense/normal equations")->Args({21, 25})->Args({21, 50})->Args({21, 100})
+    ->Complexity()->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace liestat::bench
