@@ -4,8 +4,6 @@
 // vectors in the body's axes at their image.
 #pragma once
 
-#include <fusion/preintegration.hpp>
-
 #include <Eigen/Core>
 
 #include <cmath>
@@ -17,6 +15,9 @@
 
 namespace liestat {
 
+template <class S>
+class Preintegration;
+
 /// What the inertial sensor says about one image: C_j and S_j of the paper (Martinelli 2012, section II).
 struct WindowImage {
   double time = 0;                                                 ///< s since the first image
@@ -25,12 +26,13 @@ struct WindowImage {
   Eigen::Matrix3d displacement_by_bias = Eigen::Matrix3d::Zero();  ///< of S_j, by the accelerometer's bias
 };
 
-/// The image at the end of a motion that was integrated from the first image on.
-inline WindowImage windowImage(const Preintegration<double>& from_first) {
+/// The image at the end of a motion that was integrated from the first image on (fusion/preintegration.hpp).
+template <class S>
+WindowImage windowImage(const Preintegration<S>& from_first) {
   const Eigen::Matrix3d rotation = from_first.increment().so3().matrix();
   // The Jacobian is in the library's right tangent, in the axes of the end.
-  return {from_first.duration(), rotation, Eigen::Vector3d(from_first.increment().translation()),
-          rotation * from_first.biasJacobian().block<3, 3>(0, 3)};
+  const Eigen::Matrix3d by_bias = from_first.biasJacobian().template block<3, 3>(0, 3);
+  return {from_first.duration(), rotation, Eigen::Vector3d(from_first.increment().translation()), rotation * by_bias};
 }
 
 /// A feature as one image saw it.

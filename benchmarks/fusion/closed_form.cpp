@@ -121,13 +121,24 @@ void dense(benchmark::State& state) {
   state.SetComplexityN(state.range(0) * state.range(1));
 }
 
-BENCHMARK(pass)->Name("ClosedForm/one pass")->Args({21, 25})->Args({21, 50})->Args({21, 100})->Args({21, 200})
-    ->Complexity(benchmark::oN)->Unit(benchmark::kMicrosecond);
+BENCHMARK(pass)
+    ->Name("ClosedForm/one pass")
+    ->Args({21, 25})
+    ->Args({21, 50})
+    ->Args({21, 100})
+    ->Args({21, 200})
+    ->Complexity(benchmark::oN)
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(noisy)->Name("ClosedForm/noisy data, all passes")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(exact)->Name("ClosedForm/exact data, ranks")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(bias)->Name("ClosedForm/noisy data with bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
-BENCHMARK(dense)->Name("Dense/normal equations")->Args({21, 25})->Args({21, 50})->Args({21, 100})
-    ->Complexity()->Unit(benchmark::kMicrosecond);
+BENCHMARK(dense)
+    ->Name("Dense/normal equations")
+    ->Args({21, 25})
+    ->Args({21, 50})
+    ->Args({21, 100})
+    ->Complexity()
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace liestat::bench

@@ -1,6 +1,6 @@
-// Factors of small matrices by plain loops over a fixed size: Cholesky's, the pivoted one for what may be singular, and an
-// inverse. Eigen's own are made for large matrices too: for each size they bring dozens of types of expressions and the
-// blocked kernels of its products with them, which are never run here and cost a compiler seconds.
+// Factors of small matrices by plain loops over a fixed size: Cholesky's, the pivoted one for what may be singular, and
+// an inverse. Eigen's own are made for large matrices too: for each size they bring dozens of types of expressions and
+// the blocked kernels of its products with them, which are never run here and cost a compiler seconds.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,8 @@
 
 namespace liestat::detail {
 
-/// Cholesky's factor A = L Lᵀ of a symmetric matrix, of which the lower triangle is read. Where that is not positive definite, ok() is
-/// false and all results are NaN.
+/// Cholesky's factor A = L Lᵀ of a symmetric matrix, of which the lower triangle is read. Where that is not positive
+/// definite, ok() is false and all results are NaN.
 template <class S, int N>
 class Cholesky {
  public:

@@ -15,8 +15,9 @@ struct ClosedFormCase {
   bool bias = false;
   int null = 0;
   liestat::ClosedFormStatus status = liestat::ClosedFormStatus::ok;
-  liestat::ClosedFormStatus or_status = liestat::ClosedFormStatus::ok;  ///< the other status that scenes of this row may have
-  bool solved = true;             ///< the truth is among the solutions
+  liestat::ClosedFormStatus or_status =
+      liestat::ClosedFormStatus::ok;  ///< the other status that scenes of this row may have
+  bool solved = true;                 ///< the truth is among the solutions
 };
 
 inline const std::vector<ClosedFormCase>& closedFormCases() {

@@ -2,6 +2,8 @@
 // noise can decide, and what the covariance is worth.
 
 #include <fusion/closed_form.hpp>
+#include <fusion/preintegrate.hpp>
+#include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
 #include <gtest/gtest.h>
@@ -44,7 +46,7 @@ struct Sample {
 Scene noisyScene(const SceneOptions& options, std::uint64_t seed, bool with_imu = true) {
   Scene scene(options, seed);
   SceneRandom random(seed + 1000003);
-  if (with_imu) scene.measure(imu, random);
+  if (with_imu) measure(scene, imu, random);
   scene.addNoise(pixel, random);
   return scene;
 }
@@ -91,6 +93,21 @@ TEST(ClosedFormWindows, MeetTheTableAndBeatItWithoutTheBiasOfNoise) {
     EXPECT_LE(2 * speed[0].upper(), 1.25 * row.speed) << row.window;
     EXPECT_LT(speed[0].upper(), speed[1].lower()) << row.window;
     EXPECT_GE(ok, 0.99 * trials) << row.window;
+  }
+}
+
+TEST(Window, IsMadeByPreintegration) {
+  const Scene scene({.images = 4, .features = 3}, 9);
+  std::vector<ImuSample<double>> readings;
+  for (int k = -5; k <= 2010; ++k) readings.push_back(scene.reading(k * 0.001));
+  for (std::size_t j = 1; j < scene.times.size(); ++j) {
+    const auto motion = preintegrate<double>(readings, 0., scene.times[j], {.scheme = ImuScheme::cubic});
+    ASSERT_TRUE(motion.ok());
+    const WindowImage image = windowImage(motion.motion), &exact = scene.window.images[j];
+    EXPECT_NEAR(image.time, exact.time, 1e-12);
+    EXPECT_LE((image.rotation - exact.rotation).norm(), 1e-8);
+    EXPECT_LE((image.displacement - exact.displacement).norm(), 1e-7);
+    EXPECT_LE((image.displacement_by_bias - exact.displacement_by_bias).norm(), 1e-5);
   }
 }
 

@@ -1,7 +1,7 @@
 // The closed form on exact data: every case that the design note distinguishes, the second solution, bad input.
 
 #include <fusion/closed_form.hpp>
-#include <fusion/preintegrate.hpp>
+#include <lie/so3.hpp>
 #include <support/vi_scene.hpp>
 
 #include "closed_form_cases.hpp"
@@ -342,21 +342,6 @@ TEST(Elimination, NormalEquationsAgreeWithReflections) {
     Eigen::Matrix<double, 6, 1> along;
     along << Vector3::Zero(), scene.gravity.normalized();
     EXPECT_LE(along.dot(result.covariance * along), 1e-9 * result.covariance.trace());
-  }
-}
-
-TEST(Window, IsMadeByPreintegration) {
-  const Scene scene({.images = 4, .features = 3}, 9);
-  std::vector<ImuSample<double>> readings;
-  for (int k = -5; k <= 2010; ++k) readings.push_back(scene.reading(k * 0.001));
-  for (std::size_t j = 1; j < scene.times.size(); ++j) {
-    const auto motion = preintegrate<double>(readings, 0., scene.times[j], {.scheme = ImuScheme::cubic});
-    ASSERT_TRUE(motion.ok());
-    const WindowImage image = windowImage(motion.motion), &exact = scene.window.images[j];
-    EXPECT_NEAR(image.time, exact.time, 1e-12);
-    EXPECT_LE((image.rotation - exact.rotation).norm(), 1e-8);
-    EXPECT_LE((image.displacement - exact.displacement).norm(), 1e-7);
-    EXPECT_LE((image.displacement_by_bias - exact.displacement_by_bias).norm(), 1e-5);
   }
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <fusion/closed_form_types.hpp>
-#include <fusion/preintegrate.hpp>
+#include <fusion/imu.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Core>
@@ -103,22 +103,7 @@ class Scene {
     return {t, liestat::SO3d::rightJacobian(angle(t)) * rate,
             attitude(t).inverse() * Eigen::Vector3d(accelerationAt(t) + g * Eigen::Vector3d::UnitZ())};
   }
-  /// Replaces what the images know of the motion by what an inertial sensor at 200 Hz measures of it.
-  void measure(const liestat::ImuNoise<double>& noise, SceneRandom& random) {
-    constexpr double step = 0.005;
-    std::vector<liestat::ImuSample<double>> readings;
-    for (int k = 0; k <= static_cast<int>(options_.window / step) + 1; ++k) {
-      readings.push_back(reading(k * step));
-      readings.back().angular_rate += noise.gyroscope / std::sqrt(step) * random.normal3();
-      readings.back().specific_force += noise.accelerometer / std::sqrt(step) * random.normal3() + options_.bias;
-    }
-    liestat::Preintegration<double> whole;
-    for (std::size_t j = 1; j < times.size(); ++j) {
-      whole = whole * liestat::preintegrate<double>(readings, times[j - 1], times[j]).motion;
-      window.images[j] = liestat::windowImage(whole);
-      window.images[j].time = times[j];
-    }
-  }
+  const SceneOptions& options() const { return options_; }
   /// Adds to each bearing a tangent noise of so many rad.
   void addNoise(double sigma, SceneRandom& random) {
     for (auto& track : window.features) {
