@@ -33,7 +33,6 @@ struct MotionCandidate {
   Motion y;
   std::vector<Eigen::Vector3d> P;
   double cost = 0;           ///< in the units of ClosedFormSolution
-  double curvature = 0;      ///< of the sphere's problem, see SphereMinima
   std::size_t negative = 0;  ///< features behind a camera
 };
 
@@ -211,7 +210,6 @@ class ClosedFormSolver {
         candidate.y[i] = -(lead.gain(i, 0) * G[0] + lead.gain(i, 1) * G[1] + lead.gain(i, 2) * G[2] + lead.gain(i, 3));
       }
       candidate.y.set(leading, G);
-      candidate.curvature = minima.curvature[k];
       found.push_back(candidate);
     }
     return found;

@@ -6,10 +6,12 @@
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <vector>
@@ -274,33 +276,62 @@ TEST(ClosedFormNoise, OkIsRight) {
   }
 }
 
+/// NEES of (V, G) or (V, G, b) of a result, with G on its sphere.
+double nees(const ClosedFormResult& result, const Scene& scene, const Eigen::Vector3d& bias) {
+  const ClosedFormSolution& s = result.solutions.at(0);
+  const Eigen::Index n = result.covariance.rows();
+  Eigen::VectorXd error(n), along = Eigen::VectorXd::Zero(n);
+  error.head(3) = s.velocity - scene.velocity;
+  error.segment(3, 3) = s.gravity - scene.gravity;
+  if (n == 9) error.tail(3) = s.accelerometer_bias - bias;
+  // The covariance has no part along G, nor has the error to first order: give both one.
+  along.segment(3, 3) = s.gravity.normalized();
+  Eigen::MatrixXd covariance = result.covariance;
+  error -= along.dot(error) * along;
+  covariance += covariance.trace() * along * along.transpose();
+  return error.dot(covariance.ldlt().solve(error));
+}
+
+// Without the inertial sensor's noise, what the covariance says it contains is all there is.
 TEST(ClosedFormNoise, TheCovarianceIsThatOfImageNoise) {
-  // Without the inertial sensor's noise, what the covariance says it contains is all there is: NEES of (V, G) is 5 but
-  // for what the closed form loses against maximum likelihood.
-  double index[2] = {0, 0};
   constexpr int trials = 300;
-  for (int trial = 0; trial < trials; ++trial) {
-    for (const bool with_imu : {false, true}) {
-      const Scene scene = noisyScene({.images = 21, .features = 20}, 90000 + trial, with_imu);
-      const auto result = solveClosedForm(scene.window, {.bearing_noise = pixel, .singular_values = false});
-      ASSERT_EQ(result.covariance_content, CovarianceContent::image_noise);
-      Eigen::Matrix<double, 6, 1> error;
-      error << result.solutions[0].velocity - scene.velocity, result.solutions[0].gravity - scene.gravity;
-      // The covariance has no part along G, nor has the error to first order: give both one.
-      Eigen::Matrix<double, 6, 1> along;
-      along << Eigen::Vector3d::Zero(), result.solutions[0].gravity.normalized();
-      Eigen::Matrix<double, 6, 6> covariance = result.covariance;
-      error -= along.dot(error) * along;
-      covariance += covariance.trace() * along * along.transpose();
-      index[with_imu] += error.dot(covariance.ldlt().solve(error)) / trials;
+  for (const bool bias : {false, true}) {
+    double index = 0, with_imu = 0, depth = 0, cost = 0, degrees = 0;
+    int depths = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      SceneOptions options{.images = 21, .features = 20};
+      SceneRandom random(90000 + static_cast<std::uint64_t>(trial));
+      if (bias) options.bias = 0.1 * random.normal3();
+      const ClosedFormOptions solve{.bearing_noise = pixel, .estimate_bias = bias, .singular_values = false};
+      const Scene scene = noisyScene(options, 90000 + trial, false);
+      const auto result = solveClosedForm(scene.window, solve);
+      ASSERT_EQ(result.covariance_content,
+                bias ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise);
+      index += nees(result, scene, options.bias) / trials;
+      cost += result.solutions[0].cost;
+      degrees += static_cast<double>(result.degrees_of_freedom);
+      for (std::size_t i = 0; i < scene.features.size(); ++i) {
+        if (!result.features[i].used) continue;
+        const Eigen::Vector3d u = scene.window.features[i].front().bearing;
+        const double error = u.dot(result.solutions[0].features[i] - scene.features[i]);
+        depth += std::pow(error / result.features[i].depth_deviation, 2);
+        ++depths;
+      }
+      const Scene measured = noisyScene(options, 90000 + trial);
+      with_imu += nees(solveClosedForm(measured.window, solve), measured, options.bias) / trials;
     }
+    const double expected = bias ? 8 : 5;
+    std::printf(
+        "  NEES %.2f of %.0f with image noise only, %.1f with the sensor's too; depths %.2f of 1; cost per degree "
+        "of freedom %.3f\n",
+        index, expected, with_imu, depth / depths, cost / degrees);
+    // A mean of 300 χ²_k has a standard error of √(2k/300).
+    EXPECT_NEAR(index, expected, 4 * std::sqrt(2 * expected / trials));
+    EXPECT_GT(with_imu, index + 1);
+    // Depths of a window share the error of its scale: as if there were one a window.
+    EXPECT_NEAR(depth / depths, 1, 4 * std::sqrt(2. / trials));
+    EXPECT_NEAR(cost / degrees, 1, 4 * std::sqrt(2 / degrees) + 0.01);
   }
-  std::printf("  NEES of (V, G), 5 degrees of freedom: %.2f with image noise only, %.2f with the sensor's noise too\n",
-              index[0], index[1]);
-  // A mean of 300 χ²₅ has a standard error of √(10/300) = 0.18.
-  EXPECT_GE(index[0], 5 - 4 * 0.18);
-  EXPECT_LE(index[0], 5 + 4 * 0.18);
-  EXPECT_GT(index[1], index[0]);
 }
 
 }  // namespace
