@@ -58,7 +58,7 @@ foreach(line IN LISTS lines)
   target_link_libraries(header_${id} PRIVATE liestat liestat_strict ${missing_libraries})
   target_compile_options(header_${id} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O0>)
   # The sanitizers have nothing to find in a unit without code; clang-tidy reads it all the same.
-  if(CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+  if(LIESTAT_SANITIZED)
     set_target_properties(header_${id} PROPERTIES EXCLUDE_FROM_ALL TRUE)
   endif()
   # clang's list also names what a header merely asked after with __has_include, as libstdc++ does for TBB.
