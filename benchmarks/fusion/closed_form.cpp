@@ -1,8 +1,9 @@
 // The closed form of visual-inertial initialisation: one pass of elimination, minimisers and back-substitution; whole
-// solves; and the dense normal equations that a straightforward program sets up.
+// solves; consensus over features; and the dense normal equations that a straightforward program sets up.
 #include "../inputs.hpp"
 
 #include <fusion/closed_form.hpp>
+#include <fusion/closed_form_ransac.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -94,6 +96,27 @@ void bias(benchmark::State& state) {
   }
 }
 
+/// Fifty hypotheses where four tracks of ten drift, with the solve of those that stay.
+void ransac(benchmark::State& state) {
+  ClosedFormWindow window = makeWindow(state, noise);
+  Inputs random;
+  for (std::size_t i = 0; i < window.features.size() * 2 / 5; ++i) {
+    Eigen::Vector3d walk = Eigen::Vector3d::Zero();
+    for (TrackedBearing& seen : window.features[i]) seen.bearing += walk += 8 * noise * random.normal<3>();
+  }
+  // A confidence that is never reached: all hypotheses are tried.
+  const RansacOptions options{
+      .closed_form = {.gravity = gravity_length, .bearing_noise = noise, .singular_values = false},
+      .most_hypotheses = 50,
+      .confidence = 1 - 1e-16};
+  std::mt19937_64 generator(1);
+  for (auto _ : state) {
+    auto robust = solveClosedFormRobustly(window, generator, options);
+    if (robust.hypotheses != 50) state.SkipWithError("not fifty hypotheses");
+    benchmark::DoNotOptimize(robust);
+  }
+}
+
 /// All unknowns at once, gravity's length free: what elimination saves.
 void dense(benchmark::State& state) {
   const ClosedFormWindow window = makeWindow(state, noise);
@@ -132,6 +155,7 @@ BENCHMARK(pass)
 BENCHMARK(noisy)->Name("ClosedForm/noisy data, all passes")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(exact)->Name("ClosedForm/exact data, ranks")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(bias)->Name("ClosedForm/noisy data with bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(ransac)->Name("ClosedForm/50 hypotheses")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(dense)
     ->Name("Dense/normal equations")
     ->Args({21, 25})

@@ -1,0 +1,159 @@
+// Consensus over features: drifting tracks are found and left out, and what remains is as good as without them.
+
+#include <fusion/closed_form_ransac.hpp>
+#include <support/vi_measurements.hpp>
+#include <support/vi_scene.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+
+constexpr double pixel = 1. / 450;
+const RansacOptions options{.closed_form = {.bearing_noise = pixel, .singular_values = false}};
+
+Scene noisyScene(const SceneOptions& scene_options, std::uint64_t seed) {
+  Scene scene(scene_options, seed);
+  SceneRandom random(seed + 1000003);
+  measure(scene, {1.7e-4, 2e-3}, random);
+  scene.addNoise(pixel, random);
+  return scene;
+}
+
+/// The first features walk away, by `step` rad an image in each direction.
+void drift(Scene& scene, std::size_t count, double step, SceneRandom& random) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Eigen::Vector3d walk = Eigen::Vector3d::Zero();
+    for (TrackedBearing& seen : scene.window.features[i]) {
+      if (seen.image > 0) walk += step * random.normal3();
+      seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
+    }
+  }
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+TEST(ClosedFormRansac, LeavesOutDriftingTracks) {
+  constexpr std::size_t features = 40, trials = 300;
+  for (const std::size_t wrong : {std::size_t{16}, std::size_t{20}}) {
+    std::size_t kept_right = 0, kept_wrong = 0, right = 0, ok = 0, hypotheses = 0;
+    std::vector<double> robust_error, oracle_error, plain_error;
+    for (std::size_t trial = 0; trial < trials; ++trial) {
+      Scene scene = noisyScene({.images = 21, .features = features}, 120000 + trial);
+      SceneRandom random(130000 + trial);
+      drift(scene, wrong, 8 * pixel, random);
+      std::mt19937_64 generator(trial);
+      const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+      hypotheses += robust.hypotheses;
+      ok += robust.ok();
+      for (const std::size_t i : robust.inliers) ++(i < wrong ? kept_wrong : kept_right);
+      right += features - wrong;
+      EXPECT_EQ(robust.inliers.size() + robust.outliers.size(), features);
+      ASSERT_FALSE(robust.result.solutions.empty());
+      robust_error.push_back((robust.result.solutions[0].velocity - scene.velocity).norm());
+
+      const auto plain = solveClosedForm(scene.window, options.closed_form);
+      const bool none = plain.solutions.empty();
+      plain_error.push_back(none ? 10 : (plain.solutions[0].velocity - scene.velocity).norm());
+      for (std::size_t i = 0; i < wrong; ++i) scene.window.features[i].clear();
+      const auto oracle = solveClosedForm(scene.window, options.closed_form);
+      oracle_error.push_back((oracle.solutions.at(0).velocity - scene.velocity).norm());
+    }
+    const double precision = static_cast<double>(kept_right) / static_cast<double>(kept_right + kept_wrong);
+    const double recall = static_cast<double>(kept_right) / static_cast<double>(right);
+    std::printf(
+        "  %zu of %zu wrong: precision %.4f, recall %.4f, ok %zu of %zu, %.0f hypotheses; speed error %.4f, "
+        "oracle %.4f, without selection %.2f m/s\n",
+        wrong, features, precision, recall, ok, trials, static_cast<double>(hypotheses) / static_cast<double>(trials),
+        median(robust_error), median(oracle_error), median(plain_error));
+    EXPECT_GE(precision, 0.995);
+    EXPECT_GE(recall, 0.99);
+    EXPECT_GE(ok, trials * 98 / 100);
+    // The same windows: what differs is the few features that were lost.
+    EXPECT_LE(median(robust_error), 1.05 * median(oracle_error));
+    EXPECT_GE(median(plain_error), 5 * median(oracle_error));
+  }
+}
+
+TEST(ClosedFormRansac, TakesAllWhereAllAreRight) {
+  std::size_t kept = 0, all = 0, hypotheses = 0;
+  for (std::size_t trial = 0; trial < 100; ++trial) {
+    const Scene scene = noisyScene({.images = 11, .features = 20, .window = 1}, 140000 + trial);
+    std::mt19937_64 generator(trial);
+    const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+    kept += robust.inliers.size();
+    all += 20;
+    hypotheses += robust.hypotheses;
+  }
+  std::printf("  all right, one second: recall %.4f, %.1f hypotheses\n",
+              static_cast<double>(kept) / static_cast<double>(all), static_cast<double>(hypotheses) / 100);
+  EXPECT_GE(kept, all * 99 / 100);
+}
+
+TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
+  Scene scene = noisyScene({.images = 21, .features = 40}, 5);
+  SceneRandom random(6);
+  drift(scene, 16, 8 * pixel, random);
+  const auto solve = [&](auto generator) { return solveClosedFormRobustly(scene.window, generator, options); };
+  const auto first = solve(std::mt19937_64(3)), again = solve(std::mt19937_64(3)), other = solve(std::minstd_rand(4));
+  EXPECT_EQ(first.inliers, again.inliers);
+  EXPECT_EQ(first.hypotheses, again.hypotheses);
+  EXPECT_EQ(first.result.solutions.at(0).velocity, again.result.solutions.at(0).velocity);
+  // What is found does not hang on who draws.
+  EXPECT_EQ(first.inliers, other.inliers);
+  for (const std::size_t i : first.inliers) EXPECT_TRUE(first.result.features[i].used);
+  for (const std::size_t i : first.outliers) EXPECT_FALSE(first.result.features[i].used);
+}
+
+TEST(ClosedFormRansac, SaysWhenThereIsNoConsensus) {
+  Scene scene = noisyScene({.images = 21, .features = 20}, 8);
+  SceneRandom random(9);
+  drift(scene, 20, 0.05, random);
+  std::mt19937_64 generator(1);
+  const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+  EXPECT_TRUE(robust.inliers.empty());
+  EXPECT_EQ(robust.hypotheses, options.most_hypotheses);
+  EXPECT_FALSE(robust.ok());
+}
+
+TEST(ClosedFormRansac, RefusesBadInput) {
+  Scene scene = noisyScene({.images = 6, .features = 8}, 1);
+  std::mt19937_64 generator(1);
+  const auto fault = [&](const ClosedFormWindow& window, const RansacOptions& o) {
+    return solveClosedFormRobustly(window, generator, o).result.fault;
+  };
+  EXPECT_EQ(fault(scene.window, {}), ClosedFormFault::bad_option);
+  RansacOptions bad = options;
+  bad.features_drawn = 0;
+  EXPECT_EQ(fault(scene.window, bad), ClosedFormFault::bad_option);
+  bad = options;
+  bad.confidence = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fault(scene.window, bad), ClosedFormFault::bad_option);
+  ClosedFormWindow window = scene.window;
+  window.features[2][1].bearing.setZero();
+  EXPECT_EQ(fault(window, options), ClosedFormFault::bad_bearing);
+  window.features.assign(3, {});
+  EXPECT_EQ(fault(window, options), ClosedFormFault::no_feature);
+  // Too few to choose from: all are taken.
+  window = scene.window;
+  window.features.resize(4);
+  const auto few = solveClosedFormRobustly(window, generator, options);
+  EXPECT_EQ(few.hypotheses, 0u);
+  EXPECT_EQ(few.inliers.size(), 4u);
+  EXPECT_EQ(few.result.fault, ClosedFormFault::none);
+}
+
+}  // namespace
