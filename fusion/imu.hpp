@@ -26,6 +26,9 @@ template <class S>
 struct ImuNoise {
   S gyroscope = S(0);      ///< rad/s/√Hz
   S accelerometer = S(0);  ///< m/s²/√Hz
+  /// Random walk of the biases: over t seconds they change by density·√t.
+  S gyroscope_walk = S(0);      ///< rad/s²/√Hz
+  S accelerometer_walk = S(0);  ///< m/s³/√Hz
 };
 
 }  // namespace liestat

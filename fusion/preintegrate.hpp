@@ -148,7 +148,7 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
       // Simpson's rule for the integral of the force and for that of (h - s) times it.
       const Vector3 velocity = (h / S(6)) * (first + S(4) * second + third);
       const Vector3 position = (h * h / S(6)) * (first + S(2) * second);
-      result.motion.addVarying(h, at(middle).rate, at(middle).force, whole, position, velocity);
+      result.motion.addVarying(h, at(middle).force, whole, position, velocity);
     }
   }
   return result;

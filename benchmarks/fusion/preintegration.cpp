@@ -27,7 +27,7 @@ struct Readings {
 void add(benchmark::State& state) {
   const Readings readings;
   while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(n))) {
-    Preintegration<double> motion({.noise = {1.7e-4, 2e-3}});
+    Preintegration<double> motion({.noise = {.gyroscope = 1.7e-4, .accelerometer = 2e-3}});
     for (std::size_t i = 0; i < n; ++i) motion.add(0.005, readings.rate[i], readings.force[i]);
     benchmark::DoNotOptimize(motion);
   }

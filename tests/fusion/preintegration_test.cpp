@@ -43,7 +43,7 @@ Steps someSteps(std::size_t n) {
   return steps;
 }
 
-const PreintegrationOptions<double> some_options{.noise = {1.7e-3, 2e-2},
+const PreintegrationOptions<double> some_options{.noise = {.gyroscope = 1.7e-3, .accelerometer = 2e-2},
                                                  .bias = {Vector3(0.01, 0.02, -0.01), Vector3(0.1, -0.2, 0.05)}};
 
 Vector9 difference(const SE23d& from, const SE23d& to) { return (from.inverse() * to).log(); }
@@ -105,6 +105,55 @@ TEST(Preintegration, CovarianceIsTheSumOverTheReadings) {
   EXPECT_EQ(covariance, covariance.transpose());
 }
 
+PreintegrationOptions<double> withWalk() {
+  PreintegrationOptions<double> options = some_options;
+  options.noise.gyroscope_walk = 3e-3;
+  options.noise.accelerometer_walk = 4e-2;
+  return options;
+}
+
+// A step of the walk shifts all readings that follow it, and the bias at the end.
+TEST(Preintegration, BiasWalksAreTheSumOverTheirSteps) {
+  const Steps steps = someSteps(30);
+  const auto options = withWalk();
+  const auto motion = steps.run(options);
+  const double e = 1e-5;
+  using Matrix15 = Eigen::Matrix<double, 15, 15>;
+  Matrix15 sum = Matrix15::Zero();
+  sum.topLeftCorner<9, 9>() = steps.run(some_options).gaussian().covariance;
+  for (std::size_t i = 0; i < steps.h.size(); ++i) {
+    for (int k = 0; k < 6; ++k) {
+      Steps plus = steps, minus = steps;
+      for (std::size_t j = i + 1; j < steps.h.size(); ++j) {
+        // A bias that grew means that the truth was less than what was measured.
+        (k < 3 ? plus.rate[j][k] : plus.force[j][k - 3]) -= e;
+        (k < 3 ? minus.rate[j][k] : minus.force[j][k - 3]) += e;
+      }
+      Eigen::Matrix<double, 15, 1> column = Eigen::Matrix<double, 15, 1>::Unit(9 + k);
+      column.head<9>() = (difference(motion.increment(), plus.run(options).increment()) -
+                          difference(motion.increment(), minus.run(options).increment())) /
+                         (2 * e);
+      const double density = k < 3 ? options.noise.gyroscope_walk : options.noise.accelerometer_walk;
+      sum += density * density * steps.h[i] * column * column.transpose();
+    }
+  }
+  const Matrix15 covariance = motion.covarianceWithBias();
+  EXPECT_LE((covariance - sum).norm(), 1e-8 * sum.norm());
+  // Block by block too, for their sizes differ.
+  for (int a = 0; a < 15; a += 3) {
+    for (int b = 0; b < 15; b += 3) {
+      EXPECT_LE((covariance.block<3, 3>(a, b) - sum.block<3, 3>(a, b)).norm(),
+                1e-7 * std::sqrt(sum.block<3, 3>(a, a).norm() * sum.block<3, 3>(b, b).norm()))
+          << a << ", " << b;
+    }
+  }
+  EXPECT_EQ(covariance, covariance.transpose());
+  EXPECT_EQ(Matrix9(covariance.topLeftCorner<9, 9>()), motion.gaussian().covariance);
+  // And without a walk the biases are certain.
+  const Matrix15 still = steps.run(some_options).covarianceWithBias();
+  EXPECT_EQ(still.bottomRows<6>().norm(), 0);
+}
+
 TEST(Preintegration, TheCovarianceIsTrue) {
   const Steps truth = someSteps(100);
   const auto exact = truth.run(some_options).increment();
@@ -128,7 +177,10 @@ TEST(Preintegration, TheCovarianceIsTrue) {
 
 TEST(Preintegration, ConsecutiveIntervalsMergeExactly) {
   const Steps steps = someSteps(40);
-  const auto whole = steps.run(some_options), merged = steps.run(some_options, 0, 17) * steps.run(some_options, 17, 40);
+  const auto options = withWalk();
+  const auto whole = steps.run(options), merged = steps.run(options, 0, 17) * steps.run(options, 17, 40);
+  EXPECT_LE((whole.covarianceWithBias() - merged.covarianceWithBias()).norm(),
+            1e-14 * whole.covarianceWithBias().norm());
   EXPECT_LE(difference(whole.increment(), merged.increment()).norm(), 1e-14);
   const Matrix9 covariance = whole.gaussian().covariance;
   EXPECT_LE((covariance - merged.gaussian().covariance).norm(), 1e-14 * covariance.norm());
