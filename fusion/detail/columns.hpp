@@ -21,7 +21,9 @@ struct Columns {
   static EIGEN_ALWAYS_INLINE Column e0() { return Column(S(1), S(0), S(0), S(0)); }
   static EIGEN_ALWAYS_INLINE Column e1() { return Column(S(0), S(1), S(0), S(0)); }
   static EIGEN_ALWAYS_INLINE Column e2() { return Column(S(0), S(0), S(1), S(0)); }
-  static EIGEN_ALWAYS_INLINE Column column(const S& x, const S& y, const S& z) { return e0() * x + e1() * y + e2() * z; }
+  static EIGEN_ALWAYS_INLINE Column column(const S& x, const S& y, const S& z) {
+    return e0() * x + e1() * y + e2() * z;
+  }
   static EIGEN_ALWAYS_INLINE Column column(const Vector3& v) { return column(v[0], v[1], v[2]); }
   static EIGEN_ALWAYS_INLINE Columns of(const Matrix3& m) {
     return {column(m(0, 0), m(1, 0), m(2, 0)), column(m(0, 1), m(1, 1), m(2, 1)), column(m(0, 2), m(1, 2), m(2, 2))};
