@@ -26,6 +26,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "liestat " + std::string(programVersion()));
   app.require_subcommand(1);
   addMeanCommand(app, invocation);
+  addPreintegrateCommand(app, invocation);
   CLI::App* validate = app.add_subcommand("validate", "Does an estimator keep what its covariance promises?");
   validate->require_subcommand(1);
   addValidateMeansCommand(*validate, invocation);

@@ -181,4 +181,4 @@ function(liestat_summary)
 endfunction()
 
 # What the program cannot do without; its tests share the list.
-set(LIESTAT_CLI_NEEDS boost random123 cli11 fmt json)
+set(LIESTAT_CLI_NEEDS boost random123 cli11 fmt json yaml)

@@ -1,7 +1,8 @@
 // Preintegrated motions as factors for Ceres (needs Ceres 2.1; nothing else in fusion/ does).
 //
 //   problem.AddParameterBlock(state.data(), 10, new liestat::CeresManifold<liestat::SE23d>);   // lie/ceres.hpp
-//   problem.AddResidualBlock(new liestat::PreintegrationCost(motion), nullptr, first.data(), second.data(), bias.data(),
+//   problem.AddResidualBlock(new liestat::PreintegrationCost(motion), nullptr, first.data(), second.data(),
+//   bias.data(),
 //                            gravity.data());
 //   problem.SetParameterBlockConstant(gravity.data());
 //
@@ -68,8 +69,8 @@ class PreintegrationCost final : public ceres::SizedCostFunction<9, 10, 10, 6, 3
 };
 
 /// The same with biases that walk: besides the nine, the six changes of the biases, all divided by the root of
-/// covarianceWithBias(). Fifteen residuals; parameter blocks: first state (10), its bias (6), second state (10), its bias
-/// (6), gravity (3). Both walks must have a density, or evaluation fails.
+/// covarianceWithBias(). Fifteen residuals; parameter blocks: first state (10), its bias (6), second state (10), its
+/// bias (6), gravity (3). Both walks must have a density, or evaluation fails.
 class PreintegrationWalkCost final : public ceres::SizedCostFunction<15, 10, 6, 10, 6, 3> {
  public:
   explicit PreintegrationWalkCost(const Preintegration<double>& motion)

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "cli/imu_file.hpp"
 #include "cli/input_error.hpp"
 #include "cli/reading.hpp"
 
@@ -53,6 +54,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } catch (const liestat::cli::InputError& error) {
       require(std::string_view(error.what()).find('\n') == std::string_view::npos);
     }
+  }
+  try {
+    const liestat::cli::ImuFile imu = liestat::cli::parseImu(text, "fuzz");
+    require(imu.samples.size() > 1 && imu.samples.size() == imu.lines.size() && imu.duration() > 0);
+  } catch (const liestat::cli::InputError& error) {
+    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
   }
   try {
     (void)liestat::cli::parseTable(text, "fuzz", {"x"}, {"y"});

@@ -35,9 +35,10 @@ SE23d reached(const Preintegration<double>& motion, const SE23d& first, const Im
   const SE23d D = motion.increment(bias);
   const double t = motion.duration();
   const SO3d R(first.so3());
-  return SE23d(R * SO3d(D.so3()),
-               Vector3d(first.translation() + t * first.velocity() + 0.5 * t * t * gravity + R * Vector3d(D.translation())),
-               Vector3d(first.velocity() + t * gravity + R * Vector3d(D.velocity())));
+  return SE23d(
+      R * SO3d(D.so3()),
+      Vector3d(first.translation() + t * first.velocity() + 0.5 * t * t * gravity + R * Vector3d(D.translation())),
+      Vector3d(first.velocity() + t * gravity + R * Vector3d(D.velocity())));
 }
 
 /// Blocks of parameters with the manifolds they are on; those of states have ten numbers.

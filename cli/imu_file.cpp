@@ -1,0 +1,159 @@
+#include "cli/imu_file.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "cli/input_error.hpp"
+#include "cli/reading.hpp"
+#include "cli/text.hpp"
+
+namespace liestat::cli {
+namespace {
+
+constexpr double unit_norm_tolerance = 1e-3;
+
+bool isNanoseconds(std::string_view field) {
+  return field.size() >= 15 && field.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+std::int64_t nanosecondsField(std::string_view field, const std::string& file, std::size_t line) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc() || end != field.data() + field.size() || value < 0) {
+    throw InputError(file, line, "timestamp is '" + printable(field) + "'", "a whole number of nanoseconds");
+  }
+  return value;
+}
+
+/// Rows of a time stamp in nanoseconds and numbers.
+class StampedRows {
+ public:
+  StampedRows(std::string_view text, const std::string& file, std::span<const char* const> columns)
+      : reader_(text), file_(file), columns_(columns) {}
+
+  bool next() {
+    if (!reader_.next()) return false;
+    splitFields(reader_.line(), Separator::comma, fields_);
+    if (fields_.size() < columns_.size() + 1) {
+      throw InputError(file_, reader_.number(), fmt::format("{} fields", fields_.size()),
+                       fmt::format("{} (timestamp [ns], {})", columns_.size() + 1, fmt::join(columns_, ", ")));
+    }
+    return true;
+  }
+  std::int64_t stamp() const { return nanosecondsField(fields_[0], file_, reader_.number()); }
+  std::size_t line() const { return reader_.number(); }
+  bool has(std::size_t column) const { return column + 1 < fields_.size(); }
+  double number(std::size_t column, std::string_view name) const {
+    return numberField(fields_[column + 1], name, file_, reader_.number());
+  }
+  Eigen::Vector3d vector(std::size_t column) const {
+    Eigen::Vector3d v;
+    for (std::size_t i = 0; i < 3; ++i) {
+      v[static_cast<Eigen::Index>(i)] =
+          number(column + i, column + i < columns_.size() ? columns_[column + i] : "a bias");
+    }
+    return v;
+  }
+
+ private:
+  LineReader reader_;
+  const std::string& file_;
+  std::span<const char* const> columns_;
+  std::vector<std::string_view> fields_;
+};
+
+void checkOrder(const ImuFile& file, const std::string& name) {
+  for (std::size_t i = 1; i < file.samples.size(); ++i) {
+    const double step = file.samples[i].time - file.samples[i - 1].time;
+    if (!(step > 0)) {
+      throw InputError(name, file.lines[i],
+                       step < 0 ? fmt::format("the time is {:.6g} s before that of line {}", -step, file.lines[i - 1])
+                                : fmt::format("the time is that of line {} again", file.lines[i - 1]),
+                       "times that ascend");
+    }
+  }
+}
+
+void checkUnits(const ImuFile& file, const std::string& name) {
+  double force = 0, rate = 0;
+  for (const ImuSample<double>& s : file.samples) {
+    force += s.specific_force.norm() / static_cast<double>(file.samples.size());
+    rate += s.angular_rate.norm() / static_cast<double>(file.samples.size());
+  }
+  if (force > 0.5 && force < 2) {
+    throw InputError(name, 0, fmt::format("specific forces are {:.3g} in the mean: in g?", force),
+                     "m/s^2, some 9.8 at rest");
+  }
+  // The fastest gyroscopes of vehicles end at 35 rad/s.
+  if (rate > 35) {
+    throw InputError(name, 0, fmt::format("angular rates are {:.3g} in the mean: in degrees a second?", rate), "rad/s");
+  }
+}
+
+}  // namespace
+
+ImuFile parseImu(std::string_view text, std::string name) {
+  ImuFile file;
+  LineReader first(text);
+  if (!first.next()) throw InputError(name, 0, "the file has no data");
+  std::vector<std::string_view> fields;
+  splitFields(first.line(), Separator::comma, fields);
+  if (isNanoseconds(fields[0])) {
+    file.format = "euroc";
+    static constexpr const char* columns[] = {"w_x", "w_y", "w_z", "a_x", "a_y", "a_z"};
+    StampedRows rows(text, name, columns);
+    while (rows.next()) {
+      const std::int64_t stamp = rows.stamp();
+      if (file.samples.empty()) file.start_ns = stamp;
+      file.samples.push_back({1e-9 * static_cast<double>(stamp - file.start_ns), rows.vector(0), rows.vector(3)});
+      file.lines.push_back(rows.line());
+    }
+  } else {
+    file.format = "csv";
+    const NumericTable table = parseTable(text, name, {"t", "wx", "wy", "wz", "ax", "ay", "az"});
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+      file.samples.push_back({table(i, 0), Eigen::Vector3d(table(i, 1), table(i, 2), table(i, 3)),
+                              Eigen::Vector3d(table(i, 4), table(i, 5), table(i, 6))});
+      file.lines.push_back(table.line(i));
+    }
+  }
+  if (file.samples.size() < 2) throw InputError(name, 0, "there is one reading", "two at least");
+  checkOrder(file, name);
+  checkUnits(file, name);
+  return file;
+}
+
+ImuFile readImu(const std::string& path) {
+  const TextFile file = loadText(path);
+  return parseImu(file.text, file.name);
+}
+
+std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t start_ns) {
+  const TextFile file = loadText(path);
+  static constexpr const char* columns[] = {"p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z", "v_x", "v_y", "v_z"};
+  StampedRows rows(file.text, file.name, columns);
+  std::vector<GroundTruth> truth;
+  while (rows.next()) {
+    GroundTruth row;
+    row.time = 1e-9 * static_cast<double>(rows.stamp() - start_ns);
+    if (!truth.empty() && !(row.time > truth.back().time)) {
+      throw InputError(file.name, rows.line(), "the time is not after that of the row before", "times that ascend");
+    }
+    const Eigen::Quaterniond q(rows.number(3, "q_w"), rows.number(4, "q_x"), rows.number(5, "q_y"),
+                               rows.number(6, "q_z"));
+    if (!(std::abs(q.norm() - 1) < unit_norm_tolerance)) {
+      throw InputError(file.name, rows.line(), fmt::format("the quaternion has norm {:.6g}", q.norm()), "norm 1");
+    }
+    row.state = SE23d(SO3d(q), rows.vector(0), rows.vector(7));
+    if (rows.has(15)) row.bias = {rows.vector(10), rows.vector(13)};
+    truth.push_back(row);
+  }
+  if (truth.empty()) throw InputError(file.name, 0, "the file has no data");
+  return truth;
+}
+
+}  // namespace liestat::cli

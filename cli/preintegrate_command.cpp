@@ -1,0 +1,266 @@
+#include <cli/calibration.hpp>
+#include <cli/commands.hpp>
+#include <cli/imu_file.hpp>
+#include <cli/input_error.hpp>
+#include <cli/json_output.hpp>
+#include <cli/table.hpp>
+#include <fusion/preintegrate.hpp>
+#include <fusion/preintegration_factor.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <span>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* command_name = "liestat preintegrate";
+
+struct Options {
+  std::string imu, calibration, truth, json;
+  std::vector<double> noise, gyroscope_bias, accelerometer_bias;
+  std::optional<double> begin, end, window;
+  ImuScheme scheme = ImuScheme::averaged;
+  double largest_gap = 0.1, gravity = 9.81;
+};
+
+const std::map<std::string, ImuScheme> schemes = {
+    {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
+
+/// One interval, and how far it is from the truth where that is known.
+struct Window {
+  double begin = 0;
+  RecordingResult<double> result;
+  std::optional<Eigen::Matrix<double, 9, 1>> error;  ///< position, rotation, velocity
+  double squared_distance = 0;                       ///< of the error under the covariance
+};
+
+std::string describe(RecordingFault fault) {
+  switch (fault) {
+    case RecordingFault::none:
+      return "ok";
+    case RecordingFault::bad_interval:
+      return "bad interval";
+    case RecordingFault::not_covered:
+      return "not covered";
+    case RecordingFault::not_ascending:
+      return "times not ascending";
+    case RecordingFault::not_finite:
+      return "not finite";
+    case RecordingFault::gap:
+      return "gap";
+  }
+  return "unknown";
+}
+
+/// The state at a time, between its two neighbours; empty where the file has none within 50 ms on either side.
+std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time) {
+  const auto next =
+      std::lower_bound(truth.begin(), truth.end(), time, [](const GroundTruth& g, double t) { return g.time < t; });
+  if (next == truth.end() || (next == truth.begin() && next->time > time)) return std::nullopt;
+  if (next->time == time) return *next;
+  const GroundTruth& before = *(next - 1);
+  const double h = next->time - before.time;
+  if (h > 0.1) return std::nullopt;
+  const double s = (time - before.time) / h;
+  GroundTruth at = before;
+  at.time = time;
+  at.state = SE23d(interpolate(SO3d(before.state.so3()), SO3d(next->state.so3()), s),
+                   Eigen::Vector3d((1 - s) * before.state.translation() + s * next->state.translation()),
+                   Eigen::Vector3d((1 - s) * before.state.velocity() + s * next->state.velocity()));
+  return at;
+}
+
+Eigen::Vector3d deviations(const Window& w, int block) {
+  return w.result.motion.gaussian().covariance.diagonal().segment<3>(3 * block).cwiseSqrt();
+}
+double largest(const Eigen::Vector3d& v) { return v.maxCoeff(); }
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+JsonObject toJson(const Window& w, bool with_noise) {
+  JsonObject o;
+  o.set("begin", w.begin).set("status", describe(w.result.fault)).set("duration", w.result.motion.duration());
+  o.set("largest_gap", w.result.largest_gap);
+  if (!w.result.ok()) return o;
+  const SE23d& x = w.result.motion.increment();
+  o.set("quaternion_xyzw", Eigen::Vector4d(x.so3().params())).set("rotation_vector", Eigen::Vector3d(x.so3().log()));
+  o.set("position", Eigen::Vector3d(x.translation())).set("velocity", Eigen::Vector3d(x.velocity()));
+  if (with_noise) {
+    o.set("covariance", w.result.motion.gaussian().covariance);
+  } else {
+    o.set("covariance", nullptr);
+  }
+  o.set("bias_jacobian", w.result.motion.biasJacobian());
+  if (w.error) {
+    o.set("error", *w.error);
+    if (with_noise) o.set("squared_distance", w.squared_distance);
+  }
+  return o;
+}
+
+void print(const std::vector<Window>& windows, bool with_noise, bool with_truth) {
+  std::vector<std::string> headers = {"begin s", "duration", "turn deg", "velocity m/s", "position m"};
+  if (with_noise) headers.insert(headers.end(), {"sd turn deg", "sd velocity", "sd position"});
+  if (with_truth) headers.insert(headers.end(), {"error deg", "error m/s", "error m"});
+  Table table(headers);
+  const double degrees = 180 / EIGEN_PI;
+  for (const Window& w : windows) {
+    const SE23d& x = w.result.motion.increment();
+    if (!w.result.ok()) {
+      table.row({number(w.begin), describe(w.result.fault)});
+      continue;
+    }
+    std::vector<std::string> cells = {number(w.begin), number(w.result.motion.duration()),
+                                      number(degrees * x.so3().log().norm()), number(x.velocity().norm()),
+                                      number(x.translation().norm())};
+    if (with_noise) {
+      for (const double sd :
+           {degrees * largest(deviations(w, 1)), largest(deviations(w, 2)), largest(deviations(w, 0))}) {
+        cells.push_back(number(sd, 3));
+      }
+    }
+    if (with_truth && w.error) {
+      for (const double e : {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
+        cells.push_back(number(e, 3));
+    }
+    table.row(cells);
+  }
+  std::fputs(table.str().c_str(), stdout);
+}
+
+void printSummary(const std::vector<Window>& windows, bool with_noise) {
+  std::vector<double> rotation, velocity, position;
+  double index = 0;
+  for (const Window& w : windows) {
+    if (!w.error) continue;
+    rotation.push_back(w.error->segment<3>(3).norm());
+    velocity.push_back(w.error->tail<3>().norm());
+    position.push_back(w.error->head<3>().norm());
+    index += w.squared_distance;
+  }
+  if (rotation.empty()) return;
+  std::fputs(fmt::format("\nagainst the truth, {} windows: medians {:.3g} rad, {:.3g} m/s, {:.3g} m\n", rotation.size(),
+                         median(rotation), median(velocity), median(position))
+                 .c_str(),
+             stdout);
+  if (!with_noise) return;
+  const double mean = index / static_cast<double>(rotation.size());
+  std::fputs(fmt::format("squared distance under the covariance: {:.4g} in the mean, 9 expected\n", mean).c_str(), stdout);
+}
+
+Eigen::Vector3d vectorOf(const std::vector<double>& list) {
+  return list.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(list[0], list[1], list[2]);
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  const ImuFile imu = readImu(options.imu);
+  RecordingOptions<double> how;
+  how.scheme = options.scheme;
+  how.largest_gap = options.largest_gap;
+  if (!options.calibration.empty()) how.preintegration.noise = readImuNoise(options.calibration);
+  ImuNoise<double>& noise = how.preintegration.noise;
+  const auto take = [&](std::size_t i, double& density) {
+    if (i < options.noise.size()) density = options.noise[i];
+  };
+  take(0, noise.gyroscope), take(1, noise.accelerometer), take(2, noise.gyroscope_walk), take(3, noise.accelerometer_walk);
+  const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
+  how.preintegration.bias = {vectorOf(options.gyroscope_bias), vectorOf(options.accelerometer_bias)};
+  const bool bias_given = !options.gyroscope_bias.empty() || !options.accelerometer_bias.empty();
+  std::vector<GroundTruth> truth;
+  if (!options.truth.empty()) truth = readGroundTruth(options.truth, imu.start_ns);
+
+  const double begin = options.begin.value_or(imu.samples.front().time);
+  const double end = options.end.value_or(imu.samples.back().time);
+  if (!(end > begin)) {
+    throw InputError(command_name, 0, fmt::format("the interval is from {} to {} s", begin, end), "an end after the beginning");
+  }
+  const double length = options.window.value_or(end - begin);
+  // The last window is a whole one; rounding must not take it away.
+  const auto count = static_cast<std::size_t>((end - begin) / length * (1 + 1e-12));
+  if (count == 0) {
+    throw InputError(command_name, 0, fmt::format("a window of {} s does not fit into {} s", length, end - begin));
+  }
+  const Eigen::Vector3d gravity(0, 0, -options.gravity);
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i < count; ++i) {
+    Window w;
+    w.begin = begin + static_cast<double>(i) * length;
+    const double until = i + 1 == count && !options.window ? end : w.begin + length;
+    const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
+    if (first && !bias_given) how.preintegration.bias = first->bias;
+    w.result = preintegrate<double>(imu.samples, w.begin, until, how);
+    if (w.result.ok() && first && last) {
+      w.error = preintegrationError<double>(w.result.motion, first->state, last->state, how.preintegration.bias, gravity);
+      if (with_noise) w.squared_distance = mahalanobisSquared<double, 9>(*w.error, w.result.motion.gaussian().covariance);
+    }
+    windows.push_back(w);
+  }
+  if (options.json != "-") {
+    print(windows, with_noise, !truth.empty());
+    printSummary(windows, with_noise);
+  }
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line);
+    object.set("file", options.imu).set("format", imu.format).set("readings", imu.samples.size());
+    object.set("start_ns", imu.start_ns);
+    object.set("covariance_order", "position rotation velocity").set("covariance_side", "right");
+    object.set("covariance_frame", "axes of the body at the end of the window, m rad m/s");
+    std::vector<JsonObject> list;
+    for (const Window& w : windows) list.push_back(toJson(w, with_noise));
+    object.set("windows", list);
+    writeJson(options.json, object);
+  }
+  const bool any = std::any_of(windows.begin(), windows.end(), [](const Window& w) { return w.result.ok(); });
+  return any ? exit_fine : exit_not_trusted;
+}
+
+}  // namespace
+
+void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
+  command->add_option("--imu", options->imu, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+      ->required();
+  command->add_option("--calibration", options->calibration, "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
+  command
+      ->add_option("--noise", options->noise,
+                   "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
+      ->delimiter(',')
+      ->expected(2, 4)
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z (default 0, or the truth's)")
+      ->delimiter(',')
+      ->expected(3);
+  command->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default 0, or the truth's)")
+      ->delimiter(',')
+      ->expected(3);
+  command->add_option("--begin", options->begin, "s since the first reading, or the file's seconds (default: the first)");
+  command->add_option("--end", options->end, "The same (default: the last)");
+  command->add_option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--scheme", options->scheme, "averaged (default), held, cubic")
+      ->transform(CLI::CheckedTransformer(schemes));
+  command->add_option("--largest-gap", options->largest_gap, "s between two readings (default 0.1)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
+  command->add_option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");
+  command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli
