@@ -2,7 +2,7 @@
 // two degrees of gravity over two seconds), and has no linear unknown for it.
 //
 //   const auto found = liestat::estimateGyroscopeBias(window, {.closed_form = {.bearing_noise = 1. / 450}});
-//   if (found.ok()) … found.bias, found.deviation(), found.result.solutions[0]
+//   if (found.ok()) … found.bias, found.covariance, found.result.solutions[0]
 //
 // The outer problem over the bias of the design note, section 3.6: the bearings' angles as a function of the bias, with
 // velocity, gravity and features the best for each, by damped Gauss-Newton with these eliminated. Angles of predicted
@@ -26,10 +26,10 @@
 namespace liestat {
 
 struct GyroscopeBiasOptions {
-  ClosedFormOptions closed_form = {};                ///< bearing_noise must be given
-  Eigen::Vector3d prior = Eigen::Vector3d::Zero();   ///< rad/s
-  double prior_deviation = 0.1;                      ///< rad/s
-  double largest_step = 0.2;                         ///< rad/s
+  ClosedFormOptions closed_form = {};               ///< bearing_noise must be given
+  Eigen::Vector3d prior = Eigen::Vector3d::Zero();  ///< rad/s
+  double prior_deviation = 0.1;                     ///< rad/s
+  double largest_step = 0.2;                        ///< rad/s
   /// A window of at most so many seconds is only solved with a prior as good as one from rest.
   double least_window = 1;
   double deviation_from_rest = 0.02;  ///< rad/s
@@ -45,13 +45,30 @@ enum class GyroscopeBiasStatus {
   bad_input          ///< see result.fault
 };
 
+/// In words, for people.
+inline const char* describe(GyroscopeBiasStatus status) {
+  switch (status) {
+    case GyroscopeBiasStatus::ok:
+      return "the gyroscope's bias was found";
+    case GyroscopeBiasStatus::not_converged:
+      return "the search for the gyroscope's bias did not converge";
+    case GyroscopeBiasStatus::no_closed_form:
+      return "no solution with features in front of the camera to estimate the gyroscope's bias from";
+    case GyroscopeBiasStatus::window_too_short:
+      return "the window is too short to estimate the gyroscope's bias without a prior from rest";
+    case GyroscopeBiasStatus::bad_input:
+      return "bad input";
+  }
+  return "";
+}
+
 struct GyroscopeBiasResult {
   GyroscopeBiasStatus status = GyroscopeBiasStatus::bad_input;
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< rad/s, whole: not the change of the one that was integrated
   /// From image noise and the prior; without the inertial sensor's noise.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;           ///< for this bias
-  double cost = 0;                   ///< Σ (angle/noise)² and the priors
+  ClosedFormResult result;  ///< for this bias
+  double cost = 0;          ///< Σ (angle/noise)² and the priors
   int rounds = 0, iterations = 0;
   int integrations = 0;  ///< how often the readings were integrated anew
 
@@ -71,8 +88,8 @@ class GyroscopeBiasProblem {
   };
 
   /// Starts at the first solution, with the features that are in front; `base` is the bias of the readings.
-  GyroscopeBiasProblem(const InertialWindow& window, const GyroscopeBiasOptions& options,
-                       const ClosedFormResult& start, const Eigen::Vector3d& bias, const ImuBias<double>& base)
+  GyroscopeBiasProblem(const InertialWindow& window, const GyroscopeBiasOptions& options, const ClosedFormResult& start,
+                       const Eigen::Vector3d& bias, const ImuBias<double>& base)
       : window_(window), options_(options), base_(base) {
     const ClosedFormSolution& s = start.solutions[0];
     state_ = {s.velocity, s.gravity, bias, s.accelerometer_bias, {}, {}};

@@ -19,8 +19,8 @@ namespace liestat {
 
 /// What was measured between the first and the last of n images. The working frame is the body's at the first image.
 struct InertialWindow {
-  std::vector<Preintegration<double>> motions;  ///< n - 1: from each image to the next, all with the same bias
-  std::vector<FeatureTrack> features;           ///< bearings in the body's axes at their image
+  std::vector<Preintegration<double>> motions;       ///< n - 1: from each image to the next, all with the same bias
+  std::vector<FeatureTrack> features;                ///< bearings in the body's axes at their image
   Eigen::Vector3d camera = Eigen::Vector3d::Zero();  ///< p_c: the camera's centre in the body (m)
 };
 
@@ -28,6 +28,7 @@ struct InertialWindow {
 /// C_j, and of S_j by both.
 struct BiasedImage {
   WindowImage image;
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero();  ///< once integrated specific force (m/s)
   Eigen::Matrix3d rotation_by_gyroscope = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d displacement_by_gyroscope = Eigen::Matrix3d::Zero();
 };
@@ -39,7 +40,6 @@ inline std::vector<BiasedImage> biasedImages(const std::vector<Preintegration<do
   using Matrix3 = Eigen::Matrix3d;
   using Vector3 = Eigen::Vector3d;
   std::vector<BiasedImage> images(motions.size() + 1);
-  Vector3 speed = Vector3::Zero();
   Matrix3 speed_by_gyroscope = Matrix3::Zero(), speed_by_accelerometer = Matrix3::Zero();
   for (std::size_t k = 0; k < motions.size(); ++k) {
     const Preintegration<double>& motion = motions[k];
@@ -55,7 +55,7 @@ inline std::vector<BiasedImage> biasedImages(const std::vector<Preintegration<do
     const Vector3 moved = C * Vector3(step.translation()), gained = C * Vector3(step.velocity());
     to.image.time = from.image.time + t;
     to.image.rotation = C * turn;
-    to.image.displacement = from.image.displacement + t * speed + moved;
+    to.image.displacement = from.image.displacement + t * from.speed + moved;
     to.image.displacement_by_bias = from.image.displacement_by_bias + t * speed_by_accelerometer + C * block(0, 3);
     to.rotation_by_gyroscope = from.rotation_by_gyroscope + C * block(3, 0);
     // d(C x) = (A δ)×(C x) where C turns by A δ.
@@ -63,7 +63,7 @@ inline std::vector<BiasedImage> biasedImages(const std::vector<Preintegration<do
                                    detail::skew(moved) * from.rotation_by_gyroscope;
     speed_by_gyroscope += C * block(6, 0) - detail::skew(gained) * from.rotation_by_gyroscope;
     speed_by_accelerometer += C * block(6, 3);
-    speed += gained;
+    to.speed = from.speed + gained;
   }
   return images;
 }

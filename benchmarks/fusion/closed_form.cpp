@@ -1,9 +1,12 @@
 // The closed form of visual-inertial initialisation: one pass of elimination, minimisers and back-substitution; whole
-// solves; consensus over features; and the dense normal equations that a straightforward program sets up.
+// solves; consensus over features; the gyroscope's bias; the refinement; and the dense normal equations that a
+// straightforward program sets up.
 #include "../inputs.hpp"
 
 #include <fusion/closed_form.hpp>
 #include <fusion/closed_form_ransac.hpp>
+#include <fusion/gyroscope_bias.hpp>
+#include <fusion/refinement.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Cholesky>
@@ -117,6 +120,79 @@ void ransac(benchmark::State& state) {
   }
 }
 
+/// The same two seconds with an inertial sensor at 200 Hz, its gyroscope off by 0.01 rad/s.
+struct Measured {
+  Eigen::Vector3d velocity{1.7, -0.5, 0.8}, gravity{1, 2, -9.5};
+  InertialWindow window;
+
+  explicit Measured(const benchmark::State& state) {
+    const auto images = static_cast<std::size_t>(state.range(0)), features = static_cast<std::size_t>(state.range(1));
+    Inputs random;
+    const int readings = 400 / static_cast<int>(images - 1);
+    const Eigen::Vector3d off(0.006, -0.008, 0);
+    SO3d turned;
+    std::vector<Preintegration<double>> truth;
+    for (std::size_t j = 1; j < images; ++j) {
+      const PreintegrationOptions<double> options{.noise = {.gyroscope = 1.7e-4, .accelerometer = 2e-3}};
+      Preintegration<double> exact(options), measured(options);
+      for (int k = 0; k < readings; ++k) {
+        const double h = 0.005, t = h * (static_cast<double>(j - 1) * readings + k);
+        const Eigen::Vector3d rate = 0.5 * Eigen::Vector3d(std::cos(t), 2 * std::cos(2 * t), 1);
+        const Eigen::Vector3d acceleration(-2.7 * std::sin(3 * t), 1.9 * std::cos(2.5 * t), -1.2 * std::sin(2 * t));
+        const Eigen::Vector3d force = turned.inverse() * Eigen::Vector3d(acceleration - gravity);
+        exact.add(h, rate, force);
+        measured.add(h, rate + off + random.normal<3>(1.7e-4 / std::sqrt(h)),
+                     force + random.normal<3>(2e-3 / std::sqrt(h)));
+        turned *= SO3d::exp(h * rate);
+      }
+      truth.push_back(exact);
+      window.motions.push_back(measured);
+    }
+    const auto seen_from = biasedImages(truth, {});
+    for (std::size_t i = 0; i < features; ++i) {
+      const Eigen::Vector3d P = Eigen::Vector3d(0, 0, 5) + 1.5 * random.normal<3>();
+      FeatureTrack track;
+      for (std::size_t j = 0; j < images; ++j) {
+        const WindowImage& at = seen_from[j].image;
+        const Eigen::Vector3d d = P - at.time * velocity - 0.5 * at.time * at.time * gravity - at.displacement;
+        track.push_back({j, at.rotation.transpose() * d.normalized() + noise * random.normal<3>()});
+      }
+      window.features.push_back(track);
+    }
+  }
+  ClosedFormOptions options() const {
+    return {.gravity = gravity.norm(), .bearing_noise = noise, .singular_values = false};
+  }
+};
+
+void gyroscopeBias(benchmark::State& state) {
+  const Measured measured(state);
+  const GyroscopeBiasOptions options{.closed_form = measured.options()};
+  for (auto _ : state) {
+    auto found = estimateGyroscopeBias(measured.window, options);
+    if (found.status != GyroscopeBiasStatus::ok) state.SkipWithError("not found");
+    benchmark::DoNotOptimize(found);
+  }
+}
+
+void refinement(benchmark::State& state) {
+  const Measured measured(state);
+  const auto start = solveClosedForm(closedFormWindow(measured.window, {}), measured.options());
+  if (start.solutions.empty()) {
+    state.SkipWithError(describe(start.status));
+    return;
+  }
+  double iterations = 0;
+  for (auto _ : state) {
+    auto refined =
+        refine(measured.window, start.solutions[0], {}, {.bearing_noise = noise, .gravity = measured.gravity.norm()});
+    if (!refined.ok()) state.SkipWithError("not refined");
+    iterations = refined.iterations;
+    benchmark::DoNotOptimize(refined);
+  }
+  state.counters["iterations"] = iterations;
+}
+
 /// All unknowns at once, gravity's length free: what elimination saves.
 void dense(benchmark::State& state) {
   const ClosedFormWindow window = makeWindow(state, noise);
@@ -156,6 +232,15 @@ BENCHMARK(noisy)->Name("ClosedForm/noisy data, all passes")->Args({21, 50})->Uni
 BENCHMARK(exact)->Name("ClosedForm/exact data, ranks")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(bias)->Name("ClosedForm/noisy data with bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(ransac)->Name("ClosedForm/50 hypotheses")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(gyroscopeBias)->Name("ClosedForm/gyroscope's bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(refinement)
+    ->Name("Refinement")
+    ->Args({11, 50})
+    ->Args({21, 25})
+    ->Args({21, 50})
+    ->Args({21, 100})
+    ->Args({41, 50})
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(dense)
     ->Name("Dense/normal equations")
     ->Args({21, 25})

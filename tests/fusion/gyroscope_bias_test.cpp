@@ -39,7 +39,7 @@ struct Recorded {
     window = {motionsOf(scene, readings), scene.window.features, scene_options.camera};
   }
   auto integrate() const {
-    return [this](const ImuBias<double>& at) { return motionsOf(scene, readings, {.bias = at}); };
+    return [this](const ImuBias<double>& at) { return motionsOf(scene, readings, {.preintegration = {.bias = at}}); };
   }
 };
 
@@ -55,7 +55,7 @@ TEST(BiasedImages, AreWhatIntegrationGives) {
   const auto distance = [&](double part) {
     const ImuBias<double> bias{part * recorded.bias, part * Eigen::Vector3d(0.05, -0.1, 0.02)};
     const auto updated = biasedImages(recorded.window.motions, bias);
-    const auto anew = motionsOf(recorded.scene, recorded.readings, {.bias = bias});
+    const auto anew = motionsOf(recorded.scene, recorded.readings, {.preintegration = {.bias = bias}});
     Preintegration<double> whole({.bias = bias});
     double most = 0;
     for (std::size_t j = 1; j < updated.size(); ++j) {
@@ -128,12 +128,13 @@ TEST(GyroscopeBias, MeetsTheTarget) {
     }
     bias.push_back((found.bias - recorded.bias).norm());
   }
-  std::printf("  0.05 rad/s over 2 s: bias %.5f / %.5f rad/s, scale %.2f / %.1f %%, gravity %.3f / %.2f deg; ok %d of %d, "
-              "%.1f rounds, %.1f iterations, %.1f integrations; without: scale %.1f / %.0f %%, gravity %.2f / %.1f deg\n",
-              quantile(bias, 0.5), quantile(bias, 0.95), quantile(scale, 0.5), quantile(scale, 0.95),
-              quantile(degrees, 0.5), quantile(degrees, 0.95), ok, trials, 1. * rounds / trials,
-              1. * iterations / trials, 1. * integrations / trials, quantile(plain_scale, 0.5),
-              quantile(plain_scale, 0.95), quantile(plain_degrees, 0.5), quantile(plain_degrees, 0.95));
+  std::printf(
+      "  0.05 rad/s over 2 s: bias %.5f / %.5f rad/s, scale %.2f / %.1f %%, gravity %.3f / %.2f deg; ok %d of %d, "
+      "%.1f rounds, %.1f iterations, %.1f integrations; without: scale %.1f / %.0f %%, gravity %.2f / %.1f deg\n",
+      quantile(bias, 0.5), quantile(bias, 0.95), quantile(scale, 0.5), quantile(scale, 0.95), quantile(degrees, 0.5),
+      quantile(degrees, 0.95), ok, trials, 1. * rounds / trials, 1. * iterations / trials, 1. * integrations / trials,
+      quantile(plain_scale, 0.5), quantile(plain_scale, 0.95), quantile(plain_degrees, 0.5),
+      quantile(plain_degrees, 0.95));
   EXPECT_LE(quantile(bias, 0.5), 0.0017);
   EXPECT_LE(quantile(bias, 0.95), 0.008);
   EXPECT_LE(quantile(scale, 0.5), 2.8);

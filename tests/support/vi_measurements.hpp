@@ -25,14 +25,12 @@ inline std::vector<liestat::ImuSample<double>> readingsOf(
 }
 
 /// The motions from each image of a scene to the next.
-inline std::vector<liestat::Preintegration<double>> motionsOf(
-    const Scene& scene, const std::vector<liestat::ImuSample<double>>& readings,
-    const liestat::PreintegrationOptions<double>& options = {}) {
+inline std::vector<liestat::Preintegration<double>> motionsOf(const Scene& scene,
+                                                              const std::vector<liestat::ImuSample<double>>& readings,
+                                                              const liestat::RecordingOptions<double>& options = {}) {
   std::vector<liestat::Preintegration<double>> motions;
   for (std::size_t j = 1; j < scene.times.size(); ++j) {
-    motions.push_back(
-        liestat::preintegrate<double>(readings, scene.times[j - 1], scene.times[j], {.preintegration = options})
-            .motion);
+    motions.push_back(liestat::preintegrate<double>(readings, scene.times[j - 1], scene.times[j], options).motion);
   }
   return motions;
 }

@@ -1,0 +1,298 @@
+// The refinement against the design note's tables of accuracy and consistency.
+
+#include <fusion/closed_form.hpp>
+#include <fusion/refinement.hpp>
+#include <support/vi_measurements.hpp>
+#include <support/vi_scene.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+using Status = RefinementStatus;
+
+constexpr double pixel = 1. / 450;
+const ImuNoise<double> imu{1.7e-4, 2e-3};
+const RefinementOptions options{.bearing_noise = pixel};
+
+/// A window with biases out of their priors, and the closed form for biases of zero.
+struct Recorded {
+  Scene scene;
+  ImuBias<double> bias;
+  std::vector<ImuSample<double>> readings;
+  InertialWindow window;
+  ClosedFormResult start;
+
+  Recorded(SceneOptions scene_options, std::uint64_t seed, const ImuNoise<double>& noise = imu, double sigma = pixel)
+      : Recorded(scene_options, seed, noise, sigma, SceneRandom(seed + 1000003)) {}
+
+  /// The state at the last image, in t0's frame.
+  SE23d last() const {
+    const SO3d body_R_world = scene.attitude(0).inverse();
+    const double t = scene.times.back();
+    return {body_R_world * scene.attitude(t), Eigen::Vector3d(body_R_world * (scene.position(t) - scene.position(0))),
+            Eigen::Vector3d(body_R_world * scene.speed(t))};
+  }
+
+ private:
+  Recorded(SceneOptions scene_options, std::uint64_t seed, const ImuNoise<double>& noise, double sigma,
+           SceneRandom random)
+      : scene((scene_options.bias = options.accelerometer_deviation * random.normal3(), scene_options), seed) {
+    bias = {options.gyroscope_deviation * random.normal3(), scene.options().bias};
+    readings = readingsOf(scene, noise, random, bias.gyroscope);
+    scene.addNoise(sigma, random);
+    window = {motionsOf(scene, readings, {.preintegration = {.noise = imu}}), scene.window.features,
+              scene.options().camera};
+    start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = pixel, .singular_values = false});
+  }
+};
+
+/// eᵀ C⁻¹ e of the first n unknowns.
+double normalised(const detail::SmallMatrix& covariance, const std::vector<double>& error, int n) {
+  const detail::Triangle root = detail::Triangle::cholesky(covariance.block(0, 0, n, n));
+  double sum = 0;
+  std::vector<double> x;
+  for (int i = 0; i < n; ++i) {
+    double value = error[static_cast<std::size_t>(i)];
+    for (int k = 0; k < i; ++k) value -= root.r(k, i) * x[static_cast<std::size_t>(k)];
+    x.push_back(value / root.r(i, i));
+    sum += x.back() * x.back();
+  }
+  return sum;
+}
+void append(std::vector<double>& to, const Eigen::Vector3d& x) { to.insert(to.end(), x.data(), x.data() + 3); }
+
+/// NEES of V (3 degrees of freedom), (V, G) (5), all (11) and the last state (9).
+struct Consistency {
+  double of[4];
+
+  Consistency(const RefinementResult& r, const Recorded& truth) {
+    // The covariance has no part along G, nor has the error to first order: give both one.
+    const Eigen::Vector3d along = r.gravity.normalized();
+    Eigen::Vector3d gravity = r.gravity - truth.scene.gravity;
+    gravity -= along.dot(gravity) * along;
+    std::vector<double> error;
+    append(error, r.velocity() - truth.scene.velocity);
+    append(error, gravity);
+    append(error, r.bias.gyroscope - truth.bias.gyroscope);
+    append(error, r.bias.accelerometer - truth.bias.accelerometer);
+    detail::SmallMatrix covariance = detail::SmallMatrix::of<12, 12>(r.covariance);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) covariance(3 + i, 3 + j) += along[i] * along[j];
+    }
+    of[0] = normalised(covariance, error, 3);
+    of[1] = normalised(covariance, error, 6);
+    of[2] = normalised(covariance, error, 12);
+    const Eigen::Matrix<double, 9, 1> last = (truth.last().inverse() * r.states.back()).log();
+    detail::SmallMatrix of_last(9, 9);
+    for (int i = 0; i < 9; ++i) {
+      for (int j = 0; j < 9; ++j) of_last(i, j) = r.last_covariance(i, j);
+    }
+    of[3] = normalised(of_last, std::vector<double>(last.data(), last.data() + 9), 9);
+  }
+};
+
+double quantile(std::vector<double> values, double p) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1))];
+}
+double tilt(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+
+// Exact motion and bearings: the start is pulled to the truth, from whatever biases.
+TEST(Refinement, FindsExactMotion) {
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    Recorded recorded({.images = 11, .features = 12, .camera = {0.05, -0.1, 0.02}}, 400 + seed, {}, 0);
+    // The scheme that is good to 1e-6 m/s and 6e-7 m in a second, at the true biases: an update of first order from
+    // those of zero, where the refinement starts, leaves 1e-5 rad.
+    recorded.window.motions =
+        motionsOf(recorded.scene, recorded.readings,
+                  {.preintegration = {.noise = imu, .bias = recorded.bias}, .scheme = ImuScheme::cubic});
+    ASSERT_FALSE(recorded.start.solutions.empty());
+    RefinementOptions exact = options;
+    // Priors at the truth do not pull.
+    exact.prior = recorded.bias;
+    exact.least_decrease = 1e-9;
+    const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, exact);
+    EXPECT_EQ(refined.status, Status::ok);
+    EXPECT_TRUE(refined.ok());
+    EXPECT_LE(refined.cost, 1e-6);
+    double far = (recorded.last().inverse() * refined.states.back()).log().norm();
+    for (std::size_t i = 0; i < refined.features.size(); ++i) {
+      if (refined.features[i].allFinite())
+        far = std::max(far, (refined.features[i] - recorded.scene.features[i]).norm());
+    }
+    far = std::max({far, (refined.velocity() - recorded.scene.velocity).norm(),
+                    (refined.gravity - recorded.scene.gravity).norm(),
+                    (refined.bias.gyroscope - recorded.bias.gyroscope).norm(),
+                    (refined.bias.accelerometer - recorded.bias.accelerometer).norm()});
+    EXPECT_LE(far, 1e-6) << seed;
+    // With |G| unknown it is found.
+    exact.gravity = std::nullopt;
+    const auto free = refine(recorded.window, recorded.start.solutions[0], {}, exact);
+    EXPECT_EQ(free.status, Status::ok);
+    EXPECT_EQ(free.degrees_of_freedom + 1, refined.degrees_of_freedom);
+    EXPECT_NEAR(free.gravity.norm(), Scene::g, 1e-3);
+    EXPECT_GT(free.gravity.dot(free.covariance.block<3, 3>(3, 3) * free.gravity),
+              100 * refined.gravity.dot(refined.covariance.block<3, 3>(3, 3) * refined.gravity));
+  }
+}
+
+TEST(Refinement, CovariancesBelongTogether) {
+  const Recorded recorded({.images = 6, .features = 10, .window = 1}, 77);
+  ASSERT_FALSE(recorded.start.solutions.empty());
+  const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, options);
+  ASSERT_EQ(refined.status, Status::ok);
+  double symmetric = 0, same = 0;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < 9; ++j) {
+      same = std::max(same, std::abs(refined.covariance(3 + i, 3 + j) - refined.last_covariance(9 + i, 9 + j)));
+      symmetric = std::max(symmetric, std::abs(refined.last_covariance(i, j) - refined.last_covariance(j, i)));
+    }
+  }
+  EXPECT_LE(same, 1e-14);
+  EXPECT_LE(symmetric, 1e-12);
+  // Noise that is called larger is: biases alone keep their priors.
+  RefinementOptions rough = options;
+  rough.inertial_noise_factor = 10;
+  const auto inflated = refine(recorded.window, recorded.start.solutions[0], {}, rough);
+  EXPECT_EQ(inflated.status, Status::ok);
+  EXPECT_GT(inflated.covariance(0, 0), refined.covariance(0, 0));
+  EXPECT_LE(inflated.covariance(9, 9), std::pow(options.accelerometer_deviation, 2));
+  // Too few iterations are said to be.
+  RefinementOptions hasty = options;
+  hasty.most_iterations = 1;
+  EXPECT_EQ(refine(recorded.window, recorded.start.solutions[0], {}, hasty).status, Status::not_converged);
+}
+
+TEST(Refinement, RefusesBadInput) {
+  const Recorded recorded({.images = 6, .features = 10, .window = 1}, 78);
+  ASSERT_FALSE(recorded.start.solutions.empty());
+  const ClosedFormSolution& start = recorded.start.solutions[0];
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto fault = [&](const InertialWindow& w, const ClosedFormSolution& s, const RefinementOptions& o) {
+    const auto refined = refine(w, s, {}, o);
+    EXPECT_EQ(refined.status, Status::bad_input);
+    EXPECT_FALSE(refined.ok());
+    return refined.fault;
+  };
+  EXPECT_EQ(fault(recorded.window, start, {}), ClosedFormFault::bad_option);
+  RefinementOptions bad = options;
+  bad.gyroscope_deviation = 0;
+  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  bad = options;
+  bad.inertial_noise_factor = nan;
+  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  bad = options;
+  bad.gravity = -9.81;
+  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  ClosedFormSolution wrong = start;
+  wrong.velocity[1] = nan;
+  EXPECT_EQ(fault(recorded.window, wrong, options), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault({}, start, options), ClosedFormFault::too_few_images);
+  InertialWindow window = recorded.window;
+  window.features[3][1].image = 60;
+  EXPECT_EQ(fault(window, start, options), ClosedFormFault::wrong_index);
+  // No noise was given for the motions.
+  window = recorded.window;
+  window.motions = motionsOf(recorded.scene, recorded.readings);
+  EXPECT_EQ(refine(window, start, {}, options).status, Status::bad_motion);
+  // Features behind the camera are no start.
+  wrong = start;
+  for (Eigen::Vector3d& P : wrong.features) P *= -1;
+  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_feature);
+  wrong.features.clear();
+  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_feature);
+  // Biases that are far from those of the readings.
+  bad = options;
+  bad.prior.gyroscope = Eigen::Vector3d(0.2, 0, 0);
+  bad.gyroscope_deviation = 1e-4;
+  EXPECT_TRUE(refine(recorded.window, start, {}, bad).must_reintegrate);
+}
+
+TEST(Refinement, MeetsTheTables) {
+  struct Row {
+    double window;
+    std::size_t images, features;
+    int trials;
+    double speed[2], degrees[2], scale[2];  ///< targets of section 5: median, 95 %
+  };
+  const double none = std::numeric_limits<double>::infinity();
+  const Row rows[] = {
+      {1, 11, 20, 200, {0.041, 0.13}, {0.52, 1.0}, {1.9, 6}},
+      {2, 11, 20, 200, {none, none}, {none, none}, {none, none}},
+      {2, 21, 20, 100, {0.016, 0.05}, {0.27, 0.6}, {0.7, 2}},
+      {3, 16, 20, 100, {none, none}, {none, none}, {none, none}},
+      {2, 21, 50, 60, {none, none}, {none, none}, {none, none}},
+  };
+  std::printf(
+      "  T  n  Nf  NEES of 3, 5, 11, last 9    chi2   95 %%  speed m/s       gravity deg   scale of V %%  of features  "
+      "ok, "
+      "iterations\n");
+  for (const Row& row : rows) {
+    std::vector<double> speed, degrees, scale, size;
+    double index[4] = {}, cost = 0, dof = 0;
+    int inside = 0, counted = 0, iterations = 0, ok = 0;
+    for (int trial = 0; trial < row.trials; ++trial) {
+      const Recorded recorded({.images = row.images, .features = row.features, .window = row.window},
+                              200000 + static_cast<std::uint64_t>(trial));
+      if (recorded.start.solutions.empty()) continue;
+      const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, options);
+      ok += refined.ok();
+      ASSERT_NE(refined.status, Status::bad_input);
+      const Consistency nees(refined, recorded);
+      for (int k = 0; k < 4; ++k) index[k] += nees.of[k];
+      // χ²₅ at 0.95.
+      inside += nees.of[1] <= 11.0705;
+      ++counted;
+      cost += refined.cost;
+      dof += static_cast<double>(refined.degrees_of_freedom);
+      iterations += refined.iterations;
+      const Eigen::Vector3d& V = recorded.scene.velocity;
+      speed.push_back((refined.velocity() - V).norm());
+      degrees.push_back(tilt(refined.gravity, recorded.scene.gravity) * 180 / M_PI);
+      scale.push_back(100 * std::abs(refined.velocity().norm() / V.norm() - 1));
+      std::vector<double> ratio;
+      for (std::size_t i = 0; i < row.features; ++i) {
+        if (refined.features[i].allFinite()) {
+          ratio.push_back(refined.features[i].norm() / recorded.scene.features[i].norm());
+        }
+      }
+      size.push_back(100 * std::abs(quantile(ratio, 0.5) - 1));
+    }
+    std::printf(
+        "%3.0f %2zu %3zu  %5.2f %5.2f %5.2f  %5.2f   %.3f  %3.0f   %.4f / %.3f  %.3f / %.2f  %.2f / %4.1f   %.2f / "
+        "%.1f   %d of %d, %.1f\n",
+        row.window, row.images, row.features, index[0] / counted, index[1] / counted, index[2] / counted,
+        index[3] / counted, cost / dof, 100. * inside / counted, quantile(speed, 0.5), quantile(speed, 0.95),
+        quantile(degrees, 0.5), quantile(degrees, 0.95), quantile(scale, 0.5), quantile(scale, 0.95),
+        quantile(size, 0.5), quantile(size, 0.95), ok, row.trials, 1. * iterations / counted);
+    EXPECT_GE(ok, row.trials * 98 / 100);
+    const double expected[] = {3, 5, 11, 9};
+    for (int k = 0; k < 4; ++k) {
+      EXPECT_NEAR(index[k] / counted, expected[k], 4 * std::sqrt(2 * expected[k] / counted)) << k;
+    }
+    EXPECT_NEAR(cost / dof, 1, 0.02);
+    EXPECT_NEAR(1. * inside / counted, 0.95, 4 * std::sqrt(0.05 * 0.95 / counted));
+    // Quantiles within four standard errors of their ranks: of this run, and of the 50 trials of the targets.
+    const auto meets = [&](std::vector<double> values, const double* target) {
+      for (const int k : {0, 1}) {
+        const double p = k == 0 ? 0.5 : 0.95, error = std::sqrt(p * (1 - p) * (1. / counted + 1. / 50));
+        EXPECT_LE(quantile(values, std::max(0., p - 4 * error)), target[k]) << p;
+      }
+    };
+    meets(speed, row.speed);
+    meets(degrees, row.degrees);
+    meets(scale, row.scale);
+  }
+}
+
+}  // namespace
