@@ -23,9 +23,9 @@ struct ImuFile {
   double duration() const { return samples.back().time - samples.front().time; }
 };
 
-/// Reads `#timestamp [ns],w x y z [rad/s],a x y z [m/s²]` (EuRoC, TUM-VI), or a CSV file with the columns t (s), wx, wy,
-/// wz, ax, ay, az; `-` is standard input. Throws InputError, also where times do not ascend and where the numbers are
-/// those of other units: forces of some 1 (g), rates of hundreds (degrees a second).
+/// Reads `#timestamp [ns],w x y z [rad/s],a x y z [m/s²]` (EuRoC, TUM-VI), or a CSV file with the columns t (s), wx,
+/// wy, wz, ax, ay, az; `-` is standard input. Throws InputError, also where times do not ascend and where the numbers
+/// are those of other units: forces of some 1 (g), rates of hundreds (degrees a second).
 ImuFile readImu(const std::string& path);
 /// The same from memory.
 ImuFile parseImu(std::string_view text, std::string name);

@@ -30,6 +30,7 @@ int run(int argc, char** argv) {
   CLI::App* validate = app.add_subcommand("validate", "Does an estimator keep what its covariance promises?");
   validate->require_subcommand(1);
   addValidateMeansCommand(*validate, invocation);
+  addValidatePreintegrationCommand(*validate, invocation);
   addValidatePropagationCommand(*validate, invocation);
   addValidateSplitCommand(*validate, invocation);
   try {

@@ -133,7 +133,8 @@ void print(const std::vector<Window>& windows, bool with_noise, bool with_truth)
       }
     }
     if (with_truth && w.error) {
-      for (const double e : {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
+      for (const double e :
+           {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
         cells.push_back(number(e, 3));
     }
     table.row(cells);
@@ -158,7 +159,8 @@ void printSummary(const std::vector<Window>& windows, bool with_noise) {
              stdout);
   if (!with_noise) return;
   const double mean = index / static_cast<double>(rotation.size());
-  std::fputs(fmt::format("squared distance under the covariance: {:.4g} in the mean, 9 expected\n", mean).c_str(), stdout);
+  std::fputs(fmt::format("squared distance under the covariance: {:.4g} in the mean, 9 expected\n", mean).c_str(),
+             stdout);
 }
 
 Eigen::Vector3d vectorOf(const std::vector<double>& list) {
@@ -175,7 +177,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   const auto take = [&](std::size_t i, double& density) {
     if (i < options.noise.size()) density = options.noise[i];
   };
-  take(0, noise.gyroscope), take(1, noise.accelerometer), take(2, noise.gyroscope_walk), take(3, noise.accelerometer_walk);
+  take(0, noise.gyroscope), take(1, noise.accelerometer), take(2, noise.gyroscope_walk),
+      take(3, noise.accelerometer_walk);
   const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
   how.preintegration.bias = {vectorOf(options.gyroscope_bias), vectorOf(options.accelerometer_bias)};
   const bool bias_given = !options.gyroscope_bias.empty() || !options.accelerometer_bias.empty();
@@ -185,7 +188,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   const double begin = options.begin.value_or(imu.samples.front().time);
   const double end = options.end.value_or(imu.samples.back().time);
   if (!(end > begin)) {
-    throw InputError(command_name, 0, fmt::format("the interval is from {} to {} s", begin, end), "an end after the beginning");
+    throw InputError(command_name, 0, fmt::format("the interval is from {} to {} s", begin, end),
+                     "an end after the beginning");
   }
   const double length = options.window.value_or(end - begin);
   // The last window is a whole one; rounding must not take it away.
@@ -203,8 +207,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
     if (first && !bias_given) how.preintegration.bias = first->bias;
     w.result = preintegrate<double>(imu.samples, w.begin, until, how);
     if (w.result.ok() && first && last) {
-      w.error = preintegrationError<double>(w.result.motion, first->state, last->state, how.preintegration.bias, gravity);
-      if (with_noise) w.squared_distance = mahalanobisSquared<double, 9>(*w.error, w.result.motion.gaussian().covariance);
+      w.error =
+          preintegrationError<double>(w.result.motion, first->state, last->state, how.preintegration.bias, gravity);
+      if (with_noise)
+        w.squared_distance = mahalanobisSquared<double, 9>(*w.error, w.result.motion.gaussian().covariance);
     }
     windows.push_back(w);
   }
@@ -233,9 +239,12 @@ void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
-  command->add_option("--imu", options->imu, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+  command
+      ->add_option("--imu", options->imu,
+                   "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
       ->required();
-  command->add_option("--calibration", options->calibration, "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
+  command->add_option("--calibration", options->calibration,
+                      "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
   command
       ->add_option("--noise", options->noise,
                    "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
@@ -248,9 +257,11 @@ void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
   command->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default 0, or the truth's)")
       ->delimiter(',')
       ->expected(3);
-  command->add_option("--begin", options->begin, "s since the first reading, or the file's seconds (default: the first)");
+  command->add_option("--begin", options->begin,
+                      "s since the first reading, or the file's seconds (default: the first)");
   command->add_option("--end", options->end, "The same (default: the last)");
-  command->add_option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
+  command
+      ->add_option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
       ->check(CLI::PositiveNumber);
   command->add_option("--scheme", options->scheme, "averaged (default), held, cubic")
       ->transform(CLI::CheckedTransformer(schemes));

@@ -14,6 +14,7 @@
 #include "cli/gnuplot.hpp"
 #include "cli/imu_file.hpp"
 #include "cli/temporary_directory.hpp"
+#include "cli/validate_preintegration.hpp"
 
 namespace liestat::cli {
 namespace {
@@ -71,8 +72,10 @@ TEST(Calibrations, DensitiesOfEurocAndOfKalibr) {
     EXPECT_EQ(noise.accelerometer_walk, 3e-3);
   };
   check(parseImuNoise("sensor_type: imu\nrate_hz: 200\n" + densities, "f"));
-  check(parseImuNoise("%YAML:1.0\n\nimu0:\n  accelerometer_noise_density: 2e-3\n  gyroscope_random_walk: 2e-5\n"
-                      "  accelerometer_random_walk: 3e-3\n  gyroscope_noise_density: 1e-4\n", "f"));
+  check(
+      parseImuNoise("%YAML:1.0\n\nimu0:\n  accelerometer_noise_density: 2e-3\n  gyroscope_random_walk: 2e-5\n"
+                    "  accelerometer_random_walk: 3e-3\n  gyroscope_noise_density: 1e-4\n",
+                    "f"));
   const auto message = [](const std::string& text) { return errorOf([&] { parseImuNoise(text, "f"); }); };
   EXPECT_EQ(message("gyroscope_noise_density: 1e-4\n"),
             "f: there is no accelerometer_noise_density, expected the densities of noise and walk of an IMU");
@@ -137,15 +140,46 @@ TEST(Preintegrate, WhatCannotBeUsedIsSaid) {
   EXPECT_EQ(preintegrate(directory, {"--imu", "none.csv"}).status, 2);
 }
 
+TEST(ValidatePreintegration, JudgesWhatIsPromised) {
+  PreintegrationValidation validation;
+  validation.trials = 200;
+  validation.windows = {0.1};
+  validation.noises = {1, 100};
+  const std::vector<PreintegrationRow> rows = validatePreintegration(validation);
+  ASSERT_EQ(rows.size(), all_preintegration_checks.size() * 2);
+  for (const PreintegrationRow& row : rows) {
+    EXPECT_EQ(row.report.trials, 200U);
+    EXPECT_EQ(row.report.dof, row.check == PreintegrationCheck::motion_and_bias ? 15 : 9);
+    EXPECT_EQ(row.passed.has_value(), row.noise == 1) << "promised up to ten times the sensor's noise";
+    EXPECT_TRUE(row.passed.value_or(true)) << row.reason;
+  }
+  const std::string table = formatPreintegrationTable(rows);
+  EXPECT_NE(table.find("3 of 3 rows in the promised domain (noise up to 10) pass"), std::string::npos) << table;
+}
+
+TEST(ValidatePreintegration, TheProgramWritesItsRows) {
+  const TemporaryDirectory directory;
+  const ProgramResult result = runProgram({LIESTAT_PROGRAM, "validate", "preintegration", "--trials", "50", "--window",
+                                           "0.1", "--noise", "1", "--json", "out.json", "--report", "page"},
+                                          directory.path().string());
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  ASSERT_EQ(json["rows"].size(), 3U);
+  EXPECT_EQ(json["rows"][2]["check"], "motion_and_bias");
+  EXPECT_EQ(json["rows"][2]["dof"], 15);
+  EXPECT_TRUE(json["rows"][0]["in_domain"].get<bool>());
+  EXPECT_TRUE(std::filesystem::exists(directory / "page/index.html"));
+}
+
 // The data's README: over a second, with the biases of the ground truth, medians of 1.3e-3 rad, 4.3e-2 m/s, 2.5e-2 m.
 TEST(Preintegrate, Euroc) {
   const char* data = std::getenv("LIESTAT_DATA");
   if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
   const std::string folder = std::string(data) + "/vi/euroc/";
   const TemporaryDirectory directory;
-  const Outcome run = preintegrate(directory, {"--imu", folder + "V1_02_medium_imu0.csv", "--calibration",
-                                           folder + "kalibr_imu_chain.yaml", "--truth",
-                                           folder + "V1_02_medium_gt.csv", "--begin", "2", "--window", "1"});
+  const Outcome run = preintegrate(
+      directory, {"--imu", folder + "V1_02_medium_imu0.csv", "--calibration", folder + "kalibr_imu_chain.yaml",
+                  "--truth", folder + "V1_02_medium_gt.csv", "--begin", "2", "--window", "1"});
   ASSERT_EQ(run.status, 0) << run.errors;
   std::vector<double> rotation, velocity, position;
   for (const Json& w : run.json["windows"]) {

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <stats/validation.hpp>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// What is asked of a preintegrated motion.
+enum class PreintegrationCheck {
+  motion,          ///< the increment under its 9×9 covariance, biases known and constant
+  walk,            ///< the increment under its 9×9 covariance, biases that walk
+  motion_and_bias  ///< increment and change of the biases under their 15×15 covariance; merged out of two halves
+};
+inline constexpr std::array all_preintegration_checks = {PreintegrationCheck::motion, PreintegrationCheck::walk,
+                                                         PreintegrationCheck::motion_and_bias};
+std::string name(PreintegrationCheck check);
+int degreesOfFreedom(PreintegrationCheck check);
+
+/// What `liestat validate preintegration` runs: the product of the lists, at 200 readings a second.
+struct PreintegrationValidation {
+  std::vector<PreintegrationCheck> checks{all_preintegration_checks.begin(), all_preintegration_checks.end()};
+  std::vector<double> windows{0.1, 0.5, 1.0, 2.0};  ///< s
+  std::vector<double> noises{1, 10, 100};           ///< densities over those of an ADIS16448
+  std::size_t trials = 2000;
+  std::uint64_t seed = 1;
+  int threads = 0;
+};
+
+/// One line of the JSON.
+struct PreintegrationRow {
+  PreintegrationCheck check{};
+  double window = 0, noise = 0;
+  ValidationReport report;
+  std::optional<bool> passed;  ///< the verdict; absent outside the promised domain
+  std::string reason;          ///< why it failed
+};
+
+/// False-alarm probability of a whole run, shared by the rows that are judged.
+inline constexpr double preintegration_false_alarm = 1e-5;
+/// Up to this multiple of the ADIS16448's noise the laws are promised (docs/preintegration.md).
+inline constexpr double preintegration_promise = 10;
+
+std::vector<PreintegrationRow> validatePreintegration(
+    const PreintegrationValidation& validation,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+/// The table for the terminal, the verdict last.
+std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows);
+
+}  // namespace liestat::cli
