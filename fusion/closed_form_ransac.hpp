@@ -26,6 +26,7 @@ namespace liestat {
 struct RansacOptions {
   ClosedFormOptions closed_form = {};  ///< bearing_noise must be given
   double largest_residual = 3;         ///< RMS angle of a feature that belongs, in deviations of a bearing
+  double misfit_deviations = 5;        ///< of a feature's χ², beyond which it is dropped from the solution in the end
   std::size_t features_drawn = 4;      ///< a hypothesis
   std::size_t most_hypotheses = 300;
   double confidence = 0.9999;    ///< drawing ends when an all-right sample was missed with 1 - this probability
@@ -180,6 +181,29 @@ class MotionConsensus {
   Score best_{0};
 };
 
+/// The features of a solution whose squared angles are too large for noise, by χ²: what drifts slowly passes the limit
+/// of a hypothesis. Where most are larger than noise the motion is to blame, such as a bias: their median is the
+/// measure.
+inline std::vector<std::size_t> misfits(const ClosedFormResult& result, const RansacOptions& options) {
+  std::vector<std::size_t> used;
+  std::vector<double> relative;
+  const auto freedom = [&](std::size_t i) { return 2 * static_cast<double>(result.features[i].observations) - 3; };
+  for (std::size_t i = 0; i < result.features.size() && !result.solutions.empty(); ++i) {
+    const ClosedFormFeature& feature = result.features[i];
+    if (!feature.used || !(freedom(i) > 0)) continue;
+    const double angle = feature.residual / options.closed_form.bearing_noise;
+    used.push_back(i);
+    relative.push_back(angle * angle * static_cast<double>(feature.observations) / freedom(i));
+  }
+  const double measure = std::max(1., median(relative));
+  std::vector<std::size_t> found;
+  for (std::size_t k = 0; k < used.size(); ++k) {
+    const double limit = 1 + options.misfit_deviations * std::sqrt(2 / freedom(used[k]));
+    if (relative[k] > measure * limit) found.push_back(used[k]);
+  }
+  return found;
+}
+
 }  // namespace detail
 
 /// Velocity, gravity and features of a window of which up to half of the tracks, and more with more hypotheses, are
@@ -193,7 +217,7 @@ ClosedFormRansacResult solveClosedFormRobustly(const ClosedFormWindow& window, G
   result.fault = detail::faultOf(window, options.closed_form, result.fault_index);
   if (result.fault == ClosedFormFault::none &&
       (!(options.closed_form.bearing_noise > 0) || !(options.largest_residual > 0) || options.features_drawn == 0 ||
-       !(options.confidence >= 0 && options.confidence < 1))) {
+       !(options.misfit_deviations > 0) || !(options.confidence >= 0 && options.confidence < 1))) {
     result.fault = ClosedFormFault::bad_option;
   }
   if (result.fault != ClosedFormFault::none) return robust;
@@ -207,17 +231,28 @@ ClosedFormRansacResult solveClosedFormRobustly(const ClosedFormWindow& window, G
       if (consensus.found()) agreeing = consensus.agreeing();
     }
   }
+  ClosedFormWindow kept = window;
+  const bool found = std::find(agreeing.begin(), agreeing.end(), true) != agreeing.end();
   for (std::size_t i = 0; i < table.features(); ++i) {
-    (agreeing[i] ? robust.inliers : robust.outliers).push_back(table.feature[i]);
+    const std::size_t feature = table.feature[i];
+    (agreeing[i] ? robust.inliers : robust.outliers).push_back(feature);
+    // A feature without observations keeps its place.
+    if (found && !agreeing[i]) kept.features[feature].clear();
   }
-  if (robust.inliers.empty() || robust.outliers.empty()) {
-    result = solveClosedForm(window, options.closed_form);
-    return robust;
-  }
-  // A feature without observations keeps its place.
-  ClosedFormWindow kept{window.images, std::vector<FeatureTrack>(window.features.size()), window.camera};
-  for (const std::size_t i : robust.inliers) kept.features[i] = window.features[i];
   result = solveClosedForm(kept, options.closed_form);
+  if (robust.hypotheses == 0 || !found) return robust;
+  for (std::size_t pass = 0; pass < options.local_passes; ++pass) {
+    const std::vector<std::size_t> wrong = detail::misfits(result, options);
+    if (wrong.empty() || robust.inliers.size() < wrong.size() + options.features_drawn) break;
+    for (const std::size_t i : wrong) {
+      kept.features[i].clear();
+      robust.inliers.erase(std::find(robust.inliers.begin(), robust.inliers.end(), i));
+      robust.outliers.push_back(i);
+    }
+    result = solveClosedForm(kept, options.closed_form);
+  }
+  std::sort(robust.outliers.begin(), robust.outliers.end());
+  for (const std::size_t i : robust.outliers) result.features[i].observations = window.features[i].size();
   return robust;
 }
 
