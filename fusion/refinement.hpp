@@ -253,7 +253,7 @@ class RefinementProblem {
     }
     Eigen::Matrix<double, 2, 3> by_d;
     std::size_t image = state.X.size();
-    Eigen::Matrix3d back;
+    Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // of the image last seen
     for (const Observation& seen : observations_) {
       if (seen.image != image) {
         image = seen.image;
