@@ -38,8 +38,8 @@ class Motion {
   Eigen::Vector3d phase_, other_;
 };
 
-/// The squared distance of the truth in one trial: a motion whose rate and force are constant in each step, and readings
-/// of it with white noise and biases that walk, from known biases at the start.
+/// The squared distance of the truth in one trial: a motion whose rate and force are constant in each step, and
+/// readings of it with white noise and biases that walk, from known biases at the start.
 double trial(PreintegrationCheck check, double window, double scale, CounterRng& rng) {
   const bool walks = check != PreintegrationCheck::motion;
   PreintegrationOptions<double> options;
@@ -99,7 +99,8 @@ std::vector<PreintegrationRow> validatePreintegration(
   std::vector<PreintegrationRow> rows;
   for (const PreintegrationCheck check : validation.checks) {
     for (const double window : validation.windows) {
-      for (const double noise : validation.noises) rows.push_back({.check = check, .window = window, .noise = noise, .report = {}, .passed = {}, .reason = {}});
+      for (const double noise : validation.noises)
+        rows.push_back({.check = check, .window = window, .noise = noise, .report = {}, .passed = {}, .reason = {}});
     }
   }
   const auto promised = [](const PreintegrationRow& row) { return row.noise <= preintegration_promise; };
@@ -108,14 +109,15 @@ std::vector<PreintegrationRow> validatePreintegration(
   double all = 0, before = 0;
   for (const PreintegrationRow& row : rows) all += row.window;
   for (PreintegrationRow& row : rows) {
-    const ValidationOptions options{
-        .trials = validation.trials,
-        .seed = validation.seed,
-        .chunk_size = 16,
-        .progress = [&](std::size_t done, std::size_t of) {
-          const double share = static_cast<double>(done) / static_cast<double>(of);
-          if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * row.window) / all), 1000000);
-        }};
+    const ValidationOptions options{.trials = validation.trials,
+                                    .seed = validation.seed,
+                                    .chunk_size = 16,
+                                    .progress = [&](std::size_t done, std::size_t of) {
+                                      const double share = static_cast<double>(done) / static_cast<double>(of);
+                                      if (progress)
+                                        progress(static_cast<std::uint64_t>(1e6 * (before + share * row.window) / all),
+                                                 1000000);
+                                    }};
     std::vector<ValidationReport> reports =
         validateAll(ProgramExecutor{validation.threads}, options,
                     std::vector<ReferenceLaw>{ReferenceLaw::chiSquared(degreesOfFreedom(row.check))},
@@ -153,7 +155,8 @@ std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows
     reasons += fmt::format("FAILED {} {} s, noise {}: {}\n", name(row.check), row.window, row.noise, row.reason);
   }
   return fmt::format(
-      "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n{}\n{}{} of {} rows in "
+      "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n{}\n{}{} of {} rows "
+      "in "
       "the promised domain (noise up to {:g}) pass; false alarms: one in {:g} runs\n{}\n",
       table.str(110), reasons, judged - failed, judged, preintegration_promise, 1 / preintegration_false_alarm,
       failed == 0 ? "PASSED" : "FAILED");

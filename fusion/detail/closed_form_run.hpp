@@ -274,8 +274,9 @@ class ClosedFormRun {
   }
 
   /// The case with noise. A direction of the motion is lost where noise is nearly all that is known of it.
-  void classify(const NoiseShare& share) {
-    Status& status = result_.status;
+  void classify(const NoiseShare& share) { result_.status = caseOf(share); }
+
+  Status caseOf(const NoiseShare& share) {
     const Motion& weak = share.directions[0];
     const bool lost = share.shares[0] > lost_share;
     // Plain least squares never quite fit, and that says nothing on the case.
@@ -292,24 +293,18 @@ class ClosedFormRun {
     }
     const bool rival = hasRival() && isInFront(candidates_[1]);
     if (coplanarityMatters(result_.images_used, table_.features()) && outOfPlane(table_.rays) < 3 * solver_.sigma()) {
-      status = Status::coplanar;
-    } else if (lost && !moves_gravity) {
-      status = Status::scale_unobservable;
-    } else if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity || misfit)) {
-      status = Status::gravity_undetermined;
-    } else if (rival && solver_.bias() && isMirror()) {
-      status = Status::mirror_gravity;
-    } else if (lost && !(chord > 5 * result_.tilt_deviation)) {
-      status = Status::double_root;
-    } else if (rival) {
-      status = Status::ambiguous;
-    } else if (!(result_.tilt_deviation <= options_.largest_tilt_deviation)) {
-      status = Status::gravity_undetermined;
-    } else if (!(result_.scale_deviation <= options_.largest_scale_deviation)) {
-      status = Status::scale_unobservable;
-    } else {
-      status = biasRestsOnPrior() ? Status::bias_unobservable : Status::ok;
+      return Status::coplanar;
     }
+    if (lost && !moves_gravity) return Status::scale_unobservable;
+    if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity || misfit)) {
+      return Status::gravity_undetermined;
+    }
+    if (rival && solver_.bias() && isMirror()) return Status::mirror_gravity;
+    if (lost && !(chord > 5 * result_.tilt_deviation)) return Status::double_root;
+    if (rival) return Status::ambiguous;
+    if (!(result_.tilt_deviation <= options_.largest_tilt_deviation)) return Status::gravity_undetermined;
+    if (!(result_.scale_deviation <= options_.largest_scale_deviation)) return Status::scale_unobservable;
+    return biasRestsOnPrior() ? Status::bias_unobservable : Status::ok;
   }
 
   /// Keeps of the solutions what the status promises.
