@@ -379,12 +379,8 @@ inline RefinementResult refine(const InertialWindow& window, const ClosedFormSol
   const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
   const std::vector<double> first = system.inverse({problem.stateBlock(0, 2), g, g + 1, g + 2}),
                             end = system.inverse({last(0), last(1), last(2), g, g + 1, g + 2});
-  for (int i = 0; i < 12; ++i) {
-    for (int j = 0; j < 12; ++j) result.covariance(i, j) = first[static_cast<std::size_t>(12 * i + j)];
-  }
-  for (int i = 0; i < 18; ++i) {
-    for (int j = 0; j < 18; ++j) result.last_covariance(i, j) = end[static_cast<std::size_t>(18 * i + j)];
-  }
+  result.covariance = Eigen::Map<const Eigen::Matrix<double, 12, 12>>(first.data());
+  result.last_covariance = Eigen::Map<const Eigen::Matrix<double, 18, 18>>(end.data());
   return result;
 }
 

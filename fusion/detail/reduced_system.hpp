@@ -32,7 +32,8 @@ struct ResidualRows {
   void add(int of_block, const Matrix& J) {
     for (int i = 0; i < rows; ++i) {
       for (int k = 0; k < 3; ++k) {
-        by[static_cast<std::size_t>(i)][static_cast<std::size_t>(3 * terms + k)] = J(i, k);
+        const int column = 3 * terms + k;
+        by[static_cast<std::size_t>(i)][static_cast<std::size_t>(column)] = J(i, k);
       }
     }
     block[static_cast<std::size_t>(terms++)] = of_block;
