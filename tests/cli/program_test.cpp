@@ -359,13 +359,11 @@ std::string series(double shared) {
   return text;
 }
 
-const std::string splits = instrumented ? "40" : "200";
-
 TEST_F(Program, SplitsOfIndependentMeasuresPass) {
   // One false alarm in 1e5 seeds; this one is fixed.
   directory_.write("f.csv", series(0));
   const ProgramRun r =
-      run({"validate", "split", "f.csv", "--splits", splits, "--json", "out.json", "--report", "report"});
+      run({"validate", "split", "f.csv", "--splits", "200", "--json", "out.json", "--report", "report"});
   EXPECT_EQ(r.status, 0) << r.errors;
   EXPECT_EQ(r.json["passed"], true);
   EXPECT_NEAR(r.json["random"]["index"].get<double>(), 3, 4 * r.json["random"]["index_se"].get<double>());
@@ -376,7 +374,7 @@ TEST_F(Program, SplitsOfIndependentMeasuresPass) {
 
 TEST_F(Program, SplitsByBlocksRevealSharedErrors) {
   directory_.write("f.csv", series(0.2));
-  const ProgramRun r = run({"validate", "split", "f.csv", "--splits", splits, "--json", "out.json"});
+  const ProgramRun r = run({"validate", "split", "f.csv", "--splits", "200", "--json", "out.json"});
   EXPECT_EQ(r.status, 1) << r.errors;
   EXPECT_EQ(r.json["passed"], false);
   EXPECT_LT(r.json["random"]["index"].get<double>(), 4);
