@@ -14,14 +14,16 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <memory>
-#include <span>
+#include <optional>
 
 namespace liestat::cli {
 namespace {
 
 constexpr const char* command_name = "liestat preintegrate";
+constexpr double most_windows = 1e6;
 
 struct Options {
   std::string imu, calibration, truth, json;
@@ -193,10 +195,13 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   const double length = options.window.value_or(end - begin);
   // The last window is a whole one; rounding must not take it away.
-  const auto count = static_cast<std::size_t>((end - begin) / length * (1 + 1e-12));
-  if (count == 0) {
-    throw InputError(command_name, 0, fmt::format("a window of {} s does not fit into {} s", length, end - begin));
+  const double fit = (end - begin) / length * (1 + 1e-12);
+  if (!(fit >= 1 && fit <= most_windows)) {
+    throw InputError(command_name, 0,
+                     fmt::format("windows of {} s fit {:.4g} times into {} s", length, fit, end - begin),
+                     fmt::format("once to {:g} times", most_windows));
   }
+  const auto count = static_cast<std::size_t>(fit);
   const Eigen::Vector3d gravity(0, 0, -options.gravity);
   std::vector<Window> windows;
   for (std::size_t i = 0; i < count; ++i) {
@@ -204,7 +209,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     w.begin = begin + static_cast<double>(i) * length;
     const double until = i + 1 == count && !options.window ? end : w.begin + length;
     const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
-    if (first && !bias_given) how.preintegration.bias = first->bias;
+    if (!bias_given) how.preintegration.bias = first ? first->bias : ImuBias<double>{};
     w.result = preintegrate<double>(imu.samples, w.begin, until, how);
     if (w.result.ok() && first && last) {
       w.error =

@@ -137,6 +137,9 @@ TEST(Preintegrate, WhatCannotBeUsedIsSaid) {
   EXPECT_EQ(some.json["windows"][2]["status"], "gap");
   EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--begin", "3"}).status, 2);
   EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--window", "7"}).status, 2);
+  for (const char* window : {"1e-300", "nan", "inf", "0"}) {
+    EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--window", window}).status, 2) << window;
+  }
   EXPECT_EQ(preintegrate(directory, {"--imu", "none.csv"}).status, 2);
 }
 
