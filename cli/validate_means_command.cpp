@@ -7,7 +7,6 @@
 #include <CLI/Formatter.hpp>
 
 #include <cmath>
-#include <cstdio>
 #include <memory>
 
 namespace liestat::cli {
@@ -17,7 +16,8 @@ struct Options {
   std::vector<std::string> features, noises, criteria;
   std::vector<std::size_t> n;
   std::vector<double> spreads;
-  std::string covariance_at = "estimated", json, report;
+  std::string covariance_at = "estimated";
+  ValidationOutput output;
   std::size_t trials = 0;
   std::uint64_t seed = 1;
   int threads = 0;
@@ -67,10 +67,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
   const std::vector<MeansRow> rows =
       withProgressBar("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
-  std::fputs(formatMeansTables(rows).c_str(), stdout);
-  writeRows(options.json, invocation, options.seed, run_false_alarm, rows, toJson);
-  if (!options.report.empty()) writeMeansReport(options.report, invocation.command_line, rows);
-  return exitCodeOf(rows);
+  return publish(options.output, invocation, options.seed, run_false_alarm, rows, formatMeansTables, toJson,
+                 writeMeansReport);
 }
 
 }  // namespace
@@ -97,15 +95,10 @@ void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   app->add_option("--covariance-at", options->covariance_at,
                   "Frame in which the noise of frames is Gaussian and MAHA takes its covariances")
       ->check(CLI::IsMember({"estimated", "measured"}));
-  app->add_option("--trials", options->trials, "Trials a row (default 1000, with --full 4000)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
-  app->add_option("--seed", options->seed, "Seed; the same seed gives the same bits on any number of threads");
-  app->add_option("--threads", options->threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  addRunOptions(*app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
   app->add_flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
   app->add_flag("--full", options->full,
                 "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
-  app->add_option("--json", options->json, "Write the rows to a JSON file ('-': standard output)");
-  app->add_option("--report", options->report, "Write a page with plots into this directory");
   app->callback(
       [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
 }

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 
 namespace liestat::cli {
@@ -20,7 +19,7 @@ struct Options {
   PreintegrationValidation validation;
   std::vector<std::string> checks;
   std::vector<double> windows, noises;
-  std::string json, report;
+  ValidationOutput output;
 };
 
 JsonObject toJson(const PreintegrationRow& row) {
@@ -85,10 +84,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (!options.noises.empty()) validation.noises = options.noises;
   const std::vector<PreintegrationRow> rows = withProgressBar(
       "validate preintegration", [&](const auto& progress) { return validatePreintegration(validation, progress); });
-  if (options.json != "-") std::fputs(formatPreintegrationTable(rows).c_str(), stdout);
-  writeRows(options.json, invocation, validation.seed, preintegration_false_alarm, rows, toJson);
-  if (!options.report.empty()) writeReport(options.report, invocation.command_line, rows);
-  return exitCodeOf(rows);
+  return publish(options.output, invocation, validation.seed, preintegration_false_alarm, rows,
+                 formatPreintegrationTable, toJson, writeReport);
 }
 
 }  // namespace
@@ -106,13 +103,8 @@ void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation
   app->add_option("--noise", options->noises, "Multiples of an ADIS16448's noise, a comma list (default 1,10,100)")
       ->delimiter(',')
       ->check(CLI::Range(1e-3, 1e4));
-  app->add_option("--trials", options->validation.trials, "Trials a row (default 2000)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
-  app->add_option("--seed", options->validation.seed,
-                  "Seed; the same seed gives the same bits on any number of threads");
-  app->add_option("--threads", options->validation.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
-  app->add_option("--json", options->json, "Write the rows to a JSON file ('-': standard output)");
-  app->add_option("--report", options->report, "Write a page with plots into this directory");
+  addRunOptions(*app, "2000", options->validation.trials, options->validation.seed, options->validation.threads,
+                options->output);
   app->callback(
       [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
 }

@@ -6,7 +6,6 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
-#include <cstdio>
 #include <memory>
 
 namespace liestat::cli {
@@ -16,7 +15,7 @@ struct Options {
   PropagationValidation validation;
   std::vector<std::string> features, operations;
   std::vector<double> spreads;
-  std::string json, report;
+  ValidationOutput output;
 };
 
 JsonObject toJson(const PropagationRow& row) {
@@ -38,10 +37,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
   const std::vector<PropagationRow> rows = withProgressBar(
       "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
-  std::fputs(formatPropagationTables(rows).c_str(), stdout);
-  writeRows(options.json, invocation, validation.seed, propagation_false_alarm, rows, toJson);
-  if (!options.report.empty()) writePropagationReport(options.report, invocation.command_line, rows);
-  return exitCodeOf(rows);
+  return publish(options.output, invocation, validation.seed, propagation_false_alarm, rows, formatPropagationTables,
+                 toJson, writePropagationReport);
 }
 
 }  // namespace
@@ -61,13 +58,8 @@ void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
                   "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
       ->delimiter(',')
       ->check(CLI::Range(1e-6, 10.0));
-  app->add_option("--trials", options->validation.trials, "Trials a row (default 20000)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
-  app->add_option("--seed", options->validation.seed,
-                  "Seed; the same seed gives the same bits on any number of threads");
-  app->add_option("--threads", options->validation.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
-  app->add_option("--json", options->json, "Write the rows to a JSON file ('-': standard output)");
-  app->add_option("--report", options->report, "Write a page with plots into this directory");
+  addRunOptions(*app, "20000", options->validation.trials, options->validation.seed, options->validation.threads,
+                options->output);
   app->callback(
       [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
 }

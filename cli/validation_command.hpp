@@ -1,15 +1,18 @@
 #pragma once
 
 // What the commands `validate means`, `validate propagation` and the like have in common: lists of names on the command
-// line, a progress bar, rows in JSON, the exit code.
+// line, options of a run, a progress bar, rows in JSON, the exit code.
 
 #include <cli/commands.hpp>
 #include <cli/json_output.hpp>
 #include <cli/progress.hpp>
 #include <stats/validation.hpp>
 
+#include <CLI/App.hpp>
+
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <functional>
 #include <string>
 #include <vector>
@@ -54,21 +57,38 @@ inline void setStatistics(JsonObject& o, const ValidationReport& r) {
   o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
 }
 
-/// Writes rows, each by toJson(row), to a JSON file; nothing for an empty path.
-template <class Row, class ToJson>
-void writeRows(const std::string& path, const Invocation& invocation, std::uint64_t seed, double false_alarm,
-               const std::vector<Row>& rows, const ToJson& toJson) {
-  if (path.empty()) return;
-  JsonObject object = jsonEnvelope(invocation.command_line, seed);
-  std::vector<JsonObject> list;
-  for (const Row& row : rows) list.push_back(toJson(row));
-  object.set("false_alarm", false_alarm).set("rows", list);
-  writeJson(path, object);
+/// Where the rows go besides the terminal; empty for nowhere.
+struct ValidationOutput {
+  std::string json, report;
+};
+
+/// Declares what every validation takes: its size, its seed, its threads, and where the rows go. `size` says what the
+/// default is.
+inline void addRunOptions(CLI::App& app, const std::string& size, std::size_t& trials, std::uint64_t& seed,
+                          int& threads, ValidationOutput& output) {
+  app.add_option("--trials", trials, "Trials a row (default " + size + ")")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
+  app.add_option("--seed", seed, "Seed; the same seed gives the same bits on any number of threads");
+  app.add_option("--threads", threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  app.add_option("--json", output.json, "Write the rows to a JSON file ('-': standard output)");
+  app.add_option("--report", output.report, "Write a page with plots into this directory");
 }
 
-/// The exit code of rows of which some were judged.
-template <class Row>
-int exitCodeOf(const std::vector<Row>& rows) {
+/// Shows rows as format(rows) on the terminal, each as toJson(row) in a JSON file and as a page by writeReport; returns
+/// the exit code of those that were judged.
+template <class Row, class Format, class ToJson, class WriteReport>
+int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
+            const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport) {
+  // Whoever asks for JSON on standard output wants nothing else there.
+  if (output.json != "-") std::fputs(format(rows).c_str(), stdout);
+  if (!output.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, seed);
+    std::vector<JsonObject> list;
+    for (const Row& row : rows) list.push_back(toJson(row));
+    object.set("false_alarm", false_alarm).set("rows", list);
+    writeJson(output.json, object);
+  }
+  if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
   const bool passed = std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row.passed.value_or(true); });
   return passed ? exit_fine : exit_validation_failed;
 }

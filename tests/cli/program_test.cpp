@@ -335,6 +335,16 @@ TEST_F(Program, StandardInputAndOutput) {
   EXPECT_EQ(Json::parse(contentOf(directory_ / "out.json"))["n"], 1) << "nothing but JSON";
 }
 
+TEST_F(Program, ValidationsWriteNothingButJsonWhereItGoesToStandardOutput) {
+  for (const char* what : {"means --feature point --noise iid --n 5", "propagation --feature rotation --spread 0.1",
+                           "preintegration --window 0.1 --noise 1"}) {
+    const std::string command = std::string("\"$0\" validate ") + what + " --trials 20 --json - > out.json";
+    const ProgramResult result = runProgram({"sh", "-c", command, LIESTAT_PROGRAM}, directory_.path().string());
+    EXPECT_EQ(result.status, 0) << result.errors;
+    EXPECT_FALSE(Json::parse(contentOf(directory_ / "out.json"))["rows"].empty()) << what;
+  }
+}
+
 TEST_F(Program, ReportIsWritten) {
   const ProgramRun r = mean(frames(40), {"--report", "report"});
   ASSERT_EQ(r.status, 0);
