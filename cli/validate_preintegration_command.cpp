@@ -38,42 +38,48 @@ void writeReport(const std::string& directory, const std::string& command_line,
       "Each trial makes a motion, readings of it with noise and walking biases, and takes the squared Mahalanobis "
       "distance of the true increment under the covariance. If that is true, the distances follow a chi-square law.");
   report.code(command_line);
-  Panel index{.title = "index over k", .x = {.label = "window, s", .logarithmic = true}, .y = {.label = "index / k"}};
-  Panel coverage{.title = "inside the 95 % region",
-                 .x = {.label = "window, s", .logarithmic = true},
-                 .y = {.label = "fraction"},
-                 .references = {{.at = 0.95}}};
-  index.references = {{.at = 1}};
-  std::vector<std::vector<std::string>> table;
-  const auto label = [](const PreintegrationRow& row) {
-    return fmt::format("{}, noise {:g}", name(row.check), row.noise);
-  };
-  for (const PreintegrationRow& head : rows) {
-    const auto& drawn = index.series;
-    if (std::any_of(drawn.begin(), drawn.end(), [&](const Series& s) { return s.name == label(head); })) continue;
-    Series indices{.name = label(head), .style = Style::linespoints, .colour = index.series.size()}, covers = indices;
+  // A panel for each noise; what is checked, as a curve over the windows.
+  const auto panels = [&](const std::string& quantity, double expected, const auto& value) {
+    std::vector<Panel> list;
     for (const PreintegrationRow& row : rows) {
-      if (label(row) != label(head)) continue;
-      indices.x.push_back(row.window), covers.x.push_back(row.window);
-      indices.y.push_back(row.report.index / row.report.law.mean());
-      covers.y.push_back(row.report.coverage[2].observed);
+      const std::string title = fmt::format("{}, noise {:g}", quantity, row.noise);
+      auto panel = std::find_if(list.begin(), list.end(), [&](const Panel& p) { return p.title == title; });
+      if (panel == list.end()) {
+        list.push_back({.title = title,
+                        .x = {.label = "window, s", .logarithmic = true},
+                        .y = {.label = quantity},
+                        .references = {{.at = expected}}});
+        panel = list.end() - 1;
+      }
+      if (panel->series.empty() || panel->series.back().name != name(row.check)) {
+        panel->series.push_back({.name = name(row.check), .style = Style::linespoints});
+      }
+      panel->series.back().x.push_back(row.window);
+      panel->series.back().y.push_back(value(row));
     }
-    index.series.push_back(indices);
-    coverage.series.push_back(covers);
-  }
+    return list;
+  };
+  report.plot({.name = "index",
+               .caption = "Validation index over its expectation, 1 expected (dotted).",
+               .panels = panels("index / k", 1,
+                                [](const PreintegrationRow& row) { return row.report.index / row.report.law.mean(); }),
+               .columns = 3});
+  report.plot(
+      {.name = "coverage",
+       .caption = "Fraction of truths inside the 95 % region (dotted).",
+       .panels = panels("covered", 0.95, [](const PreintegrationRow& row) { return row.report.coverage[2].observed; }),
+       .columns = 3});
+  std::vector<std::vector<std::string>> table;
   for (const PreintegrationRow& row : rows) {
-    table.push_back({label(row), number(row.window), fmt::format("{}", row.report.trials), number(row.report.index),
-                     number(row.report.index_se, 2), number(row.report.ks_p_value, 2),
-                     number(100 * row.report.coverage[2].observed),
+    table.push_back({name(row.check), number(row.window), number(row.noise), fmt::format("{}", row.report.trials),
+                     number(row.report.index), number(row.report.index_se, 2), number(row.report.law.mean()),
+                     number(row.report.ks_p_value, 2), number(100 * row.report.coverage[2].observed),
                      !row.passed   ? ""
                      : *row.passed ? "pass"
                                    : "FAIL"});
   }
-  report.plot({.name = "over_windows",
-               .caption = "Index over its expectation, and coverage, over the length of the window.",
-               .panels = {index, coverage},
-               .columns = 2});
-  report.table({"check", "window s", "trials", "index", "SE", "K-S p", "95 % covers", "verdict"}, table);
+  report.table({"check", "window s", "noise", "trials", "index", "SE", "expected", "K-S p", "95 % covers", "verdict"},
+               table);
   report.write();
 }
 
