@@ -43,7 +43,7 @@ struct RecordingResult {
   Preintegration<S> motion;
   RecordingFault fault = RecordingFault::none;
   std::size_t sample = 0;  ///< the reading at which the fault is
-  S largest_gap = S(0);    ///< s, between readings that were used
+  S largest_gap = S(0);    ///< s, between readings that were used, up to the fault
 
   bool ok() const { return fault == RecordingFault::none; }
 };
@@ -66,6 +66,9 @@ class ImuInterpolant {
     last_ = std::min(first_ + points, samples.size());
     first_ = last_ > points ? last_ - points : 0;
   }
+  /// The readings that it uses.
+  std::size_t first() const { return first_; }
+  std::size_t end() const { return last_; }
   ImuReading<S> operator()(const S& time) const {
     ImuReading<S> r{Eigen::Matrix<S, 3, 1>::Zero(), Eigen::Matrix<S, 3, 1>::Zero()};
     for (std::size_t i = first_; i < last_; ++i) {
@@ -96,8 +99,10 @@ Eigen::Matrix<S, 3, 1> magnusRotation(const Rate& rate, const S& begin, const S&
 
 }  // namespace detail
 
-/// The motion from time `begin` to `end` (s) out of readings in the order of time. Readings before and after the
-/// interval may be among them, and the scheme uses those next to it.
+/// The motion from time `begin` to `end` (s) out of readings in the order of time. The readings may be those of a whole
+/// recording: the interval's are found by bisection, and only they are looked at and checked, with the one next to them
+/// at each end that the cubic scheme needs. Where times do not ascend the result is a fault, or that of readings which
+/// do ascend from `begin` to `end`.
 template <class S>
 RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& begin, const S& end,
                                 const RecordingOptions<S>& options = {}) {
@@ -110,34 +115,41 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
   };
   // Written so that NaN is a fault too.
   if (!(end > begin) || !std::isfinite(end - begin)) return fault(RecordingFault::bad_interval, 0);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const ImuSample<S>& s = samples[i];
-    if (!std::isfinite(s.time) || !s.angular_rate.allFinite() || !s.specific_force.allFinite()) {
-      return fault(RecordingFault::not_finite, i);
-    }
-    if (i > 0 && !(s.time > samples[i - 1].time)) return fault(RecordingFault::not_ascending, i);
-  }
-  const bool held = options.scheme == ImuScheme::held;
   if (samples.size() < 2 || samples.front().time > begin) return fault(RecordingFault::not_covered, 0);
   if (samples.back().time < end) return fault(RecordingFault::not_covered, samples.size() - 1);
 
-  // The last reading at or before the beginning.
-  std::size_t k = 0;
-  while (k + 2 < samples.size() && samples[k + 1].time <= begin) ++k;
+  // The last reading at or before the beginning: bisection ends between one that is and one that is not, in any order.
+  const auto after = std::partition_point(samples.begin(), samples.end(),
+                                          [&](const ImuSample<S>& sample) { return sample.time <= begin; });
+  // Only a time that is not a number is neither after the beginning nor at or before it.
+  if (after == samples.begin()) return fault(RecordingFault::not_finite, 0);
+  std::size_t k = static_cast<std::size_t>(after - samples.begin()) - 1;
+  const bool held = options.scheme == ImuScheme::held;
+  const std::size_t points = options.scheme == ImuScheme::cubic ? 4 : 2;
+  const std::size_t foremost = detail::ImuInterpolant<S>(samples, k, points).first();
+  std::size_t checked = foremost;
   for (; k + 1 < samples.size() && samples[k].time < end; ++k) {
+    const detail::ImuInterpolant<S> at(samples, k, points);
+    for (; checked < at.end(); ++checked) {
+      const ImuSample<S>& s = samples[checked];
+      if (!std::isfinite(s.time) || !s.angular_rate.allFinite() || !s.specific_force.allFinite()) {
+        return fault(RecordingFault::not_finite, checked);
+      }
+      if (checked == foremost) continue;
+      const S gap = s.time - samples[checked - 1].time;
+      if (!(gap > S(0))) return fault(RecordingFault::not_ascending, checked);
+      result.largest_gap = std::max(result.largest_gap, gap);
+      if (gap > options.largest_gap) return fault(RecordingFault::gap, checked);
+    }
     const S from = std::max(begin, samples[k].time), to = std::min(end, samples[k + 1].time), h = to - from;
-    const S gap = samples[k + 1].time - samples[k].time;
-    result.largest_gap = std::max(result.largest_gap, gap);
-    if (gap > options.largest_gap) return fault(RecordingFault::gap, k + 1);
     if (!(h > S(0))) continue;
     if (held) {
       result.motion.add(h, samples[k].angular_rate, samples[k].specific_force);
     } else if (options.scheme == ImuScheme::averaged) {
-      const auto at = detail::ImuInterpolant<S>(samples, k, 2)(S(0.5) * (from + to));
-      result.motion.add(h, at.rate, at.force);
+      const detail::ImuReading<S> mean = at(S(0.5) * (from + to));
+      result.motion.add(h, mean.rate, mean.force);
     } else {
       const ImuBias<S>& bias = options.preintegration.bias;
-      const detail::ImuInterpolant<S> at(samples, k, 4);
       const auto rate = [&](const S& time) { return Vector3(at(time).rate - bias.gyroscope); };
       const S middle = S(0.5) * (from + to);
       const Vector3 half = detail::magnusRotation<S>(rate, from, S(0.5) * h),
@@ -151,6 +163,8 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
       result.motion.addVarying(h, at(middle).force, whole, position, velocity);
     }
   }
+  // The last reading was beyond the end, and is not where times do not ascend.
+  if (samples[k].time < end) return fault(RecordingFault::not_covered, k);
   return result;
 }
 

@@ -351,8 +351,11 @@ TEST(Recordings, FaultsAreNamed) {
   EXPECT_EQ(fault(-1, 0.4).first, RecordingFault::not_covered);
   EXPECT_EQ(fault(0.2, 9), std::pair(RecordingFault::not_covered, list.size() - 1));
   const auto good = list;
-  list[40].specific_force[1] = std::nan("");
-  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{40}));
+  list[50].specific_force[1] = std::nan("");
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{50}));
+  list = good;
+  list[50].time = std::nan("");
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{50}));
   list = good;
   list[50].time = list[49].time;
   EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_ascending, std::size_t{50})) << "duplicated";
@@ -365,6 +368,70 @@ TEST(Recordings, FaultsAreNamed) {
   EXPECT_EQ(fault(0.01, 0.2).first, RecordingFault::none) << "the gap is elsewhere";
   list.clear();
   EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::not_covered);
+}
+
+// A recording may be long and its windows many: what they do not use is not looked at.
+TEST(Recordings, OnlyWhatIsUsedIsChecked) {
+  const auto good = AnalyticMotion::samples(200);
+  // 0.2 s is between readings 42 and 43, 0.4 s is before reading 84.
+  const double begin = 0.1975, end = 0.4025;
+  const std::size_t first = 42, last = 84;
+  ASSERT_LT(good[first].time, begin);
+  ASSERT_GT(good[first + 1].time, begin);
+  ASSERT_LT(good[last - 1].time, end);
+  ASSERT_GT(good[last].time, end);
+  for (const ImuScheme scheme : {ImuScheme::averaged, ImuScheme::held, ImuScheme::cubic}) {
+    // The cubic scheme has one more reading at each end.
+    const std::size_t more = scheme == ImuScheme::cubic ? 1 : 0;
+    const auto expected = preintegrate<double>(good, begin, end, {.scheme = scheme});
+    ASSERT_TRUE(expected.ok());
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      auto list = good;
+      list[i].angular_rate[2] = std::nan("");
+      const auto result = preintegrate<double>(list, begin, end, {.scheme = scheme});
+      if (i + more >= first && i <= last + more) {
+        EXPECT_EQ(result.fault, RecordingFault::not_finite) << i;
+        EXPECT_EQ(result.sample, i);
+      } else {
+        ASSERT_TRUE(result.ok()) << i;
+        EXPECT_TRUE(result.motion.increment().matrix() == expected.motion.increment().matrix()) << i;
+      }
+    }
+    // A gap next to the interval matters to the cubic scheme alone.
+    auto list = good;
+    for (std::size_t i = 0; i < first; ++i) list[i].time -= 0.2;
+    EXPECT_EQ(preintegrate<double>(list, begin, end, {.scheme = scheme}).fault,
+              more ? RecordingFault::gap : RecordingFault::none);
+  }
+}
+
+// Bisection of what is not sorted: a fault, or the increment of readings that ascend from begin to end.
+TEST(Recordings, InAnyOrderThereIsNoWrongAnswer) {
+  const auto good = AnalyticMotion::samples(200);
+  std::mt19937_64 generator(7);
+  std::size_t faults = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    auto list = good;
+    const std::size_t changes = 1 + generator() % 20;
+    for (std::size_t k = 0; k < changes; ++k) {
+      const std::size_t i = generator() % list.size();
+      if (generator() % 3 == 0) {
+        list[i].time = generator() % 2 == 0 ? std::nan("") : std::numeric_limits<double>::infinity();
+      } else {
+        std::swap(list[i], list[generator() % list.size()]);
+      }
+    }
+    const auto result = preintegrate<double>(list, 0.2, 0.4);
+    if (!result.ok()) {
+      ++faults;
+      continue;
+    }
+    // No reading is counted twice or left out without a gap that shows.
+    EXPECT_NEAR(result.motion.duration(), 0.2, 1e-12);
+    EXPECT_LE(result.largest_gap, 0.1);
+  }
+  EXPECT_GE(faults, 1000u);
+  EXPECT_LT(faults, 2000u);
 }
 
 }  // namespace
