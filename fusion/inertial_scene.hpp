@@ -1,4 +1,5 @@
-// A simulated scene of visual-inertial initialisation: a body with a camera and an inertial sensor moves among features.
+// A simulated scene of visual-inertial initialisation: a body with a camera and an inertial sensor moves among
+// features.
 //
 //   liestat::InertialScene scene({.images = 21, .features = 20}, 1);  // seed 1
 //   liestat::SceneRandom random(2);

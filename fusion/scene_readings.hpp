@@ -20,9 +20,10 @@ namespace liestat {
 
 /// What an inertial sensor reads from the first image to beyond the last, `rate` times a second: with white noise, the
 /// scene's bias of the accelerometer (InertialSceneOptions::bias) and one of the gyroscope (rad/s). Biases do not walk.
-inline std::vector<ImuSample<double>> readingsOf(
-    const InertialScene& scene, const ImuNoise<double>& noise, SceneRandom& random,
-    const Eigen::Vector3d& gyroscope_bias = Eigen::Vector3d::Zero(), double rate = 200) {
+inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, const ImuNoise<double>& noise,
+                                                 SceneRandom& random,
+                                                 const Eigen::Vector3d& gyroscope_bias = Eigen::Vector3d::Zero(),
+                                                 double rate = 200) {
   const double step = 1 / rate;
   std::vector<ImuSample<double>> readings;
   for (int k = 0; k <= static_cast<int>(scene.options().window / step) + 1; ++k) {
@@ -35,8 +36,8 @@ inline std::vector<ImuSample<double>> readingsOf(
 
 /// The motions from each image of a scene to the next (InertialWindow::motions).
 inline std::vector<Preintegration<double>> motionsOf(const InertialScene& scene,
-                                                              const std::vector<ImuSample<double>>& readings,
-                                                              const RecordingOptions<double>& options = {}) {
+                                                     const std::vector<ImuSample<double>>& readings,
+                                                     const RecordingOptions<double>& options = {}) {
   std::vector<Preintegration<double>> motions;
   for (std::size_t j = 1; j < scene.times.size(); ++j) {
     motions.push_back(preintegrate<double>(readings, scene.times[j - 1], scene.times[j], options).motion);

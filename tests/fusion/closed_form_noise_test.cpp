@@ -2,6 +2,7 @@
 // noise can decide, and what the covariance is worth.
 
 #include <fusion/closed_form.hpp>
+#include <fusion/closed_form_cases.hpp>
 #include <fusion/preintegrate.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
@@ -22,8 +23,6 @@ using namespace liestat;
 using namespace liestat_test;
 using Status = ClosedFormStatus;
 using Motion = SceneMotion;
-using Turn = SceneTurn;
-using Layout = SceneLayout;
 
 constexpr double pixel = 1. / 450;
 /// ADIS16448.
@@ -113,73 +112,10 @@ TEST(Window, IsMadeByPreintegration) {
   }
 }
 
-struct NoisyCase {
-  const char* name;
-  SceneOptions scene;
-  std::vector<Status> expected;
-  double share = 0.97;  ///< of the windows that must be among these
-  bool bias = false;
-  double bias_deviation = 0.1;
-};
-
 TEST(ClosedFormNoise, DecidesTheCases) {
   using S = Status;
-  const double infinite = std::numeric_limits<double>::infinity();
-  const NoisyCase cases[] = {
-      {"general", {.images = 21, .features = 20}, {S::ok}},
-      {"general, one second", {.images = 11, .features = 20, .window = 1}, {S::ok}},
-      {"general, five images", {.images = 5, .features = 20}, {S::ok}},
-      {"no rotation", {.images = 21, .features = 20, .turn = Turn::none}, {S::ok}},
-      {"free fall", {.images = 21, .features = 20, .motion = Motion::free_fall}, {S::ok}},
-      {"straight at a feature",
-       {.images = 21, .features = 20, .motion = Motion::straight, .layout = Layout::ahead},
-       {S::ok}},
-      {"two images", {.images = 2, .features = 20}, {S::too_few_images}, 1},
-      {"three images, one feature", {.images = 3, .features = 1}, {S::too_few_images}, 1},
-      {"three images", {.images = 3, .features = 20}, {S::ok, S::ambiguous, S::double_root}, 0.9},
-      {"constant acceleration",
-       {.images = 21, .features = 20, .motion = Motion::constant_acceleration},
-       {S::ok, S::ambiguous, S::double_root}},
-      {"level acceleration",
-       {.images = 21, .features = 20, .motion = Motion::constant_acceleration, .level_acceleration = true},
-       {S::double_root, S::ambiguous},
-       0.9},
-      {"constant velocity",
-       {.images = 21, .features = 20, .motion = Motion::constant_velocity},
-       {S::scale_unobservable}},
-      {"constant velocity, one second",
-       {.images = 11, .features = 20, .motion = Motion::constant_velocity, .window = 1},
-       {S::scale_unobservable}},
-      {"constant velocity, four seconds",
-       {.images = 41, .features = 20, .motion = Motion::constant_velocity, .window = 4},
-       {S::scale_unobservable}},
-      {"constant velocity, one feature",
-       {.images = 21, .features = 1, .motion = Motion::constant_velocity},
-       {S::gravity_undetermined, S::no_parallax, S::stationary}},
-      {"at rest", {.images = 21, .features = 20, .motion = Motion::stationary}, {S::stationary}},
-      {"features 1e3 times farther", {.images = 21, .features = 20, .far = 1e3}, {S::no_parallax}},
-      {"features 1e6 times farther", {.images = 21, .features = 20, .far = 1e6}, {S::no_parallax}},
-      {"coplanar, one feature",
-       {.images = 5, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
-       {S::coplanar},
-       0.9},
-      {"bias", {.images = 21, .features = 20}, {S::ok}, 0.97, true},
-      {"bias, one axis", {.images = 21, .features = 20, .turn = Turn::fixed_axis}, {S::ok}, 0.9, true},
-      {"bias, one axis, no prior",
-       {.images = 21, .features = 20, .turn = Turn::fixed_axis},
-       {S::mirror_gravity, S::gravity_undetermined},
-       0.97,
-       true,
-       infinite},
-      {"bias, no rotation", {.images = 21, .features = 20, .turn = Turn::none}, {S::bias_unobservable}, 0.97, true},
-      {"bias, constant velocity",
-       {.images = 21, .features = 20, .motion = Motion::constant_velocity},
-       {S::scale_unobservable},
-       0.9,
-       true},
-  };
   constexpr int trials = 100;
-  for (const NoisyCase& row : cases) {
+  for (const NoisyClosedFormCase& row : noisyClosedFormCases()) {
     int counts[12] = {};
     int among = 0;
     Sample known, directions;

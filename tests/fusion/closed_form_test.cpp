@@ -1,10 +1,9 @@
 // The closed form on exact data: every case that the design note distinguishes, the second solution, bad input.
 
 #include <fusion/closed_form.hpp>
+#include <fusion/closed_form_cases.hpp>
 #include <lie/so3.hpp>
 #include <support/vi_scene.hpp>
-
-#include "closed_form_cases.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,27 +1,37 @@
-// The rows of the design note's table of cases (section 4): motion and layout, and what must come out on exact data.
+// The cases that the closed form of visual-inertial initialisation distinguishes (the design note's section 4): motions
+// and layouts, and what must be recognised, on exact data and with noise.
+//
+//   for (const liestat::ClosedFormCase& c : liestat::closedFormCases()) {
+//     const liestat::InertialScene scene(c.scene, seed);
+//     const auto result = liestat::solveClosedForm(scene.window, {.estimate_bias = c.bias});
+//     … result.status == c.status || result.status == c.or_status, result.null_dimension == c.null
+//   }
 #pragma once
 
 #include <fusion/closed_form_types.hpp>
-#include <support/vi_scene.hpp>
+#include <fusion/inertial_scene.hpp>
 
+#include <Eigen/Core>
+
+#include <limits>
 #include <vector>
 
-namespace liestat_test {
+namespace liestat {
 
-/// A row of the table: what is asked, and what must come out.
+/// A case on exact data: what is asked, and what must come out.
 struct ClosedFormCase {
-  const char* name;
-  SceneOptions scene;
-  bool bias = false;
-  int null = 0;
-  liestat::ClosedFormStatus status = liestat::ClosedFormStatus::ok;
-  liestat::ClosedFormStatus or_status =
-      liestat::ClosedFormStatus::ok;  ///< the other status that scenes of this row may have
-  bool solved = true;                 ///< the truth is among the solutions
+  const char* name;  ///< its own
+  InertialSceneOptions scene;
+  bool bias = false;  ///< the bias of the accelerometer is an unknown too
+  int null = 0;       ///< dimension of the system's null space
+  ClosedFormStatus status = ClosedFormStatus::ok;
+  ClosedFormStatus or_status = ClosedFormStatus::ok;  ///< the other status that scenes of this row may have
+  bool solved = true;                                 ///< the truth is among the solutions
 };
 
+/// All cases of the design note, and those that its rows stand for.
 inline const std::vector<ClosedFormCase>& closedFormCases() {
-  using S = liestat::ClosedFormStatus;
+  using S = ClosedFormStatus;
   using Motion = SceneMotion;
   using Turn = SceneTurn;
   using Layout = SceneLayout;
@@ -186,4 +196,77 @@ inline const std::vector<ClosedFormCase>& closedFormCases() {
   return list;
 }
 
-}  // namespace liestat_test
+/// A case that a window with noise can decide: a pixel of 1/450 rad and the noise of an ADIS16448.
+struct NoisyClosedFormCase {
+  const char* name;  ///< its own
+  InertialSceneOptions scene;
+  std::vector<ClosedFormStatus> expected;
+  double share = 0.97;  ///< of the windows that must be among these, at least
+  bool bias = false;    ///< the bias of the accelerometer is an unknown too
+  double bias_deviation = 0.1;
+};
+
+/// All of them. Windows have the images that decide; where the case itself is one of few images, those.
+inline const std::vector<NoisyClosedFormCase>& noisyClosedFormCases() {
+  using S = ClosedFormStatus;
+  using Motion = SceneMotion;
+  using Turn = SceneTurn;
+  using Layout = SceneLayout;
+  const double infinite = std::numeric_limits<double>::infinity();
+  static const std::vector<NoisyClosedFormCase> list{
+      {"general", {.images = 21, .features = 20}, {S::ok}},
+      {"general, one second", {.images = 11, .features = 20, .window = 1}, {S::ok}},
+      {"general, five images", {.images = 5, .features = 20}, {S::ok}},
+      {"no rotation", {.images = 21, .features = 20, .turn = Turn::none}, {S::ok}},
+      {"free fall", {.images = 21, .features = 20, .motion = Motion::free_fall}, {S::ok}},
+      {"straight at a feature",
+       {.images = 21, .features = 20, .motion = Motion::straight, .layout = Layout::ahead},
+       {S::ok}},
+      {"two images", {.images = 2, .features = 20}, {S::too_few_images}, 1},
+      {"three images, one feature", {.images = 3, .features = 1}, {S::too_few_images}, 1},
+      {"three images", {.images = 3, .features = 20}, {S::ok, S::ambiguous, S::double_root}, 0.9},
+      {"constant acceleration",
+       {.images = 21, .features = 20, .motion = Motion::constant_acceleration},
+       {S::ok, S::ambiguous, S::double_root}},
+      {"level acceleration",
+       {.images = 21, .features = 20, .motion = Motion::constant_acceleration, .level_acceleration = true},
+       {S::double_root, S::ambiguous},
+       0.9},
+      {"constant velocity",
+       {.images = 21, .features = 20, .motion = Motion::constant_velocity},
+       {S::scale_unobservable}},
+      {"constant velocity, one second",
+       {.images = 11, .features = 20, .motion = Motion::constant_velocity, .window = 1},
+       {S::scale_unobservable}},
+      {"constant velocity, four seconds",
+       {.images = 41, .features = 20, .motion = Motion::constant_velocity, .window = 4},
+       {S::scale_unobservable}},
+      {"constant velocity, one feature",
+       {.images = 21, .features = 1, .motion = Motion::constant_velocity},
+       {S::gravity_undetermined, S::no_parallax, S::stationary}},
+      {"at rest", {.images = 21, .features = 20, .motion = Motion::stationary}, {S::stationary}},
+      {"features 1e3 times farther", {.images = 21, .features = 20, .far = 1e3}, {S::no_parallax}},
+      {"features 1e6 times farther", {.images = 21, .features = 20, .far = 1e6}, {S::no_parallax}},
+      {"coplanar, one feature",
+       {.images = 5, .features = 1, .motion = Motion::planar, .layout = Layout::coplanar},
+       {S::coplanar},
+       0.9},
+      {"bias", {.images = 21, .features = 20}, {S::ok}, 0.97, true},
+      {"bias, one axis", {.images = 21, .features = 20, .turn = Turn::fixed_axis}, {S::ok}, 0.9, true},
+      {"bias, one axis, no prior",
+       {.images = 21, .features = 20, .turn = Turn::fixed_axis},
+       {S::mirror_gravity, S::gravity_undetermined},
+       0.97,
+       true,
+       infinite},
+      {"bias, no rotation", {.images = 21, .features = 20, .turn = Turn::none}, {S::bias_unobservable}, 0.97, true},
+      {"bias, constant velocity",
+       {.images = 21, .features = 20, .motion = Motion::constant_velocity},
+       {S::scale_unobservable},
+       0.9,
+       true},
+  };
+  return list;
+}
+
+}  // namespace liestat
