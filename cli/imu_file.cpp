@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "cli/input_error.hpp"
 #include "cli/reading.hpp"
+#include "cli/stamped_rows.hpp"
 #include "cli/text.hpp"
 
 namespace liestat::cli {
@@ -16,66 +15,9 @@ namespace {
 
 constexpr double unit_norm_tolerance = 1e-3;
 
-bool isNanoseconds(std::string_view field) {
-  return field.size() >= 15 && field.find_first_not_of("0123456789") == std::string_view::npos;
-}
-
-std::int64_t nanosecondsField(std::string_view field, const std::string& file, std::size_t line) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size() || value < 0) {
-    throw InputError(file, line, "timestamp is '" + printable(field) + "'", "a whole number of nanoseconds");
-  }
-  return value;
-}
-
-/// Rows of a time stamp in nanoseconds and numbers.
-class StampedRows {
- public:
-  StampedRows(std::string_view text, const std::string& file, std::span<const char* const> columns)
-      : reader_(text), file_(file), columns_(columns) {}
-
-  bool next() {
-    if (!reader_.next()) return false;
-    splitFields(reader_.line(), Separator::comma, fields_);
-    if (fields_.size() < columns_.size() + 1) {
-      throw InputError(file_, reader_.number(), fmt::format("{} fields", fields_.size()),
-                       fmt::format("{} (timestamp [ns], {})", columns_.size() + 1, fmt::join(columns_, ", ")));
-    }
-    return true;
-  }
-  std::int64_t stamp() const { return nanosecondsField(fields_[0], file_, reader_.number()); }
-  std::size_t line() const { return reader_.number(); }
-  bool has(std::size_t column) const { return column + 1 < fields_.size(); }
-  double number(std::size_t column, std::string_view name) const {
-    return numberField(fields_[column + 1], name, file_, reader_.number());
-  }
-  Eigen::Vector3d vector(std::size_t column) const {
-    Eigen::Vector3d v;
-    for (std::size_t i = 0; i < 3; ++i) {
-      v[static_cast<Eigen::Index>(i)] =
-          number(column + i, column + i < columns_.size() ? columns_[column + i] : "a bias");
-    }
-    return v;
-  }
-
- private:
-  LineReader reader_;
-  const std::string& file_;
-  std::span<const char* const> columns_;
-  std::vector<std::string_view> fields_;
-};
-
 void checkOrder(const ImuFile& file, const std::string& name) {
-  for (std::size_t i = 1; i < file.samples.size(); ++i) {
-    const double step = file.samples[i].time - file.samples[i - 1].time;
-    if (!(step > 0)) {
-      throw InputError(name, file.lines[i],
-                       step < 0 ? fmt::format("the time is {:.6g} s before that of line {}", -step, file.lines[i - 1])
-                                : fmt::format("the time is that of line {} again", file.lines[i - 1]),
-                       "times that ascend");
-    }
-  }
+  for (std::size_t i = 1; i < file.samples.size(); ++i)
+    requireAscending(file.samples[i - 1].time, file.lines[i - 1], file.samples[i].time, name, file.lines[i]);
 }
 
 void checkUnits(const ImuFile& file, const std::string& name) {

@@ -1,0 +1,71 @@
+// Any text as a calibration or as tracks: what keeps its promises, or an InputError of one line. Anything else is a
+// finding. A line of three dots parts the input into the file of tracks and that of the images' times.
+//
+//   build/sanitize/fuzz/recording_fuzz -max_total_time=120 new_corpus fuzz/corpus/recording
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "cli/calibration.hpp"
+#include "cli/image_tracks.hpp"
+#include "cli/input_error.hpp"
+
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+template <class Action>
+void attempt(Action&& action) {
+  try {
+    action();
+  } catch (const liestat::cli::InputError& error) {
+    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
+  }
+}
+
+void check(const liestat::cli::Calibration& calibration) {
+  require(calibration.imu || !calibration.cameras.empty());
+  for (const auto& [name, camera, imu_T_cam, timeshift] : calibration.cameras) {
+    require(!name.empty() && std::isfinite(timeshift) && imu_T_cam.params().allFinite());
+    require(std::abs(imu_T_cam.so3().params().norm() - 1) < 1e-12);
+    require(camera.fu > 0 && camera.fv > 0 && camera.width >= 0 && camera.height >= 0);
+    for (const double u : {camera.cu, camera.cu + camera.fu, camera.cu - 0.1 * camera.fu, 0.0}) {
+      const auto bearing = camera.bearing(u, camera.cv - 0.3 * camera.fv);
+      if (bearing) require(std::abs(bearing->norm() - 1) < 1e-12 && camera.project(*bearing).has_value());
+    }
+  }
+}
+
+void check(const liestat::cli::ImageTracks& tracks) {
+  require(tracks.frames.size() == tracks.times.size() && !tracks.observations.empty());
+  for (std::size_t i = 0; i < tracks.times.size(); ++i) {
+    require(std::isfinite(tracks.times[i]) && (i == 0 || tracks.times[i] > tracks.times[i - 1]));
+  }
+  for (const auto& o : tracks.observations) {
+    require(o.image < tracks.times.size() && o.track < tracks.track_ids.size());
+    require(std::isfinite(o.u) && std::isfinite(o.v) && o.line > 0);
+  }
+  require(tracks.seen_once <= tracks.track_ids.size());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  attempt([&] { check(liestat::cli::parseCalibration(text, "fuzz")); });
+  attempt([&] { (void)liestat::cli::parseImuNoise(text, "fuzz"); });
+  attempt([&] { check(liestat::cli::parseImageTracks(text, "fuzz", {}, {}, 1403715523912143104)); });
+  const std::size_t dots = text.find("\n...\n");
+  if (dots != std::string_view::npos) {
+    attempt([&] {
+      check(liestat::cli::parseImageTracks(text.substr(0, dots + 1), "fuzz", text.substr(dots + 5), "times", 0));
+    });
+  }
+  return 0;
+}
