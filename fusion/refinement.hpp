@@ -86,6 +86,8 @@ struct RefinementResult {
   /// Of the last state in its right tangent (position, rotation, velocity), then G and both biases: what a filter
   /// starts from. In t0's frame, whose position and heading are exact by definition.
   Eigen::Matrix<double, 18, 18> last_covariance = Eigen::Matrix<double, 18, 18>::Zero();
+  /// Of the last state, rows as above, with V.
+  Eigen::Matrix<double, 9, 3> last_velocity_covariance = Eigen::Matrix<double, 9, 3>::Zero();
 
   double cost = 0;  ///< χ² of bearings, motions and priors
   std::size_t degrees_of_freedom = 0;
@@ -377,10 +379,13 @@ inline RefinementResult refine(const InertialWindow& window, const ClosedFormSol
   result.status = summary.converged ? Status::ok : Status::not_converged;
   const int g = problem.gravityBlock();
   const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
-  const std::vector<double> first = system.inverse({problem.stateBlock(0, 2), g, g + 1, g + 2}),
-                            end = system.inverse({last(0), last(1), last(2), g, g + 1, g + 2});
-  result.covariance = Eigen::Map<const Eigen::Matrix<double, 12, 12>>(first.data());
-  result.last_covariance = Eigen::Map<const Eigen::Matrix<double, 18, 18>>(end.data());
+  const std::vector<double> inverse =
+      system.inverse({problem.stateBlock(0, 2), last(0), last(1), last(2), g, g + 1, g + 2});
+  const Eigen::Map<const Eigen::Matrix<double, 21, 21>> joint(inverse.data());
+  result.covariance << joint.topLeftCorner<3, 3>(), joint.topRightCorner<3, 9>(), joint.bottomLeftCorner<9, 3>(),
+      joint.bottomRightCorner<9, 9>();
+  result.last_covariance = joint.bottomRightCorner<18, 18>();
+  result.last_velocity_covariance = joint.block<9, 3>(3, 0);
   return result;
 }
 

@@ -244,7 +244,12 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
       next_sums = problem.evaluate(executor, next);
       accepted = next_sums.cost <= sums.cost + rounding;
     }
-    if (!accepted) break;  // a kink of the criterion: no descent along an exact descent direction
+    if (!accepted) {
+      // A kink of the criterion: no descent along an exact descent direction. Or the rounding of the cost, which is
+      // large where coordinates are large in deviations: not of steps that are nothing.
+      result.converged = result.residual <= result.tolerance;
+      break;
+    }
     y = next, sums = next_sums;
     if (result.residual <= result.tolerance || stalled) {
       result.converged = true;
