@@ -113,9 +113,7 @@ struct Bent {
   Eigen::Vector2d point;
   Eigen::Matrix2d derivative;
 
-  double determinant() const {
-    return derivative(0, 0) * derivative(1, 1) - derivative(0, 1) * derivative(1, 0);
-  }
+  double determinant() const { return derivative(0, 0) * derivative(1, 1) - derivative(0, 1) * derivative(1, 0); }
 };
 
 Bent bendRadtan(const Eigen::Vector4d& c, const Eigen::Vector2d& m) {
@@ -214,8 +212,7 @@ double Camera::bearingDeviation(double u, double v) const {
   } else {
     const double z = ray->z();
     area /= z * z * z;
-    if (distortion == Distortion::radtan)
-      area *= bendRadtan(coefficients, ray->head<2>() / z).determinant();
+    if (distortion == Distortion::radtan) area *= bendRadtan(coefficients, ray->head<2>() / z).determinant();
   }
   return 1 / std::sqrt(area);
 }

@@ -36,7 +36,8 @@ Places readTimes(std::string_view text, const std::string& name, std::int64_t st
     if (!result.times.empty()) requireAscending(result.times.back(), lines.back(), time, name, line);
     const auto [place, is_new] = places.emplace(frame, result.times.size());
     if (!is_new) {
-      throw InputError(name, line, fmt::format("frame {} again, as in line {}", frame, lines[place->second]), "it once");
+      throw InputError(name, line, fmt::format("frame {} again, as in line {}", frame, lines[place->second]),
+                       "it once");
     }
     result.times.push_back(time);
     result.frames.push_back(frame);
@@ -104,8 +105,8 @@ ImageTracks parseImageTracks(std::string_view tracks_text, std::string tracks_na
   ImageTracks result;
   const bool with_times = !times_name.empty();
   const NumericTable table = tableOfTracks(tracks_text, tracks_name, with_times);
-  const Places images = with_times ? readTimes(times_text, times_name, start_ns, result)
-                                   : timesOfTracks(table, start_ns, result);
+  const Places images =
+      with_times ? readTimes(times_text, times_name, start_ns, result) : timesOfTracks(table, start_ns, result);
   const bool left = !(table.has("u") && table.has("v"));
   const std::size_t u = table.column(left ? "uL" : "u"), v = table.column(left ? "vL" : "v");
   const bool has_time = table.has("t_s");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -74,28 +75,55 @@ ImuFile readImu(const std::string& path) {
   return parseImu(file.text, file.name);
 }
 
-std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t start_ns) {
-  const TextFile file = loadText(path);
+std::vector<GroundTruth> parseGroundTruth(std::string_view text, const std::string& name, std::int64_t start_ns) {
   static constexpr const char* columns[] = {"p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z", "v_x", "v_y", "v_z"};
-  StampedRows rows(file.text, file.name, columns);
+  StampedRows rows(text, name, columns);
   std::vector<GroundTruth> truth;
   while (rows.next()) {
     GroundTruth row;
     row.time = 1e-9 * static_cast<double>(rows.stamp() - start_ns);
     if (!truth.empty() && !(row.time > truth.back().time)) {
-      throw InputError(file.name, rows.line(), "the time is not after that of the row before", "times that ascend");
+      throw InputError(name, rows.line(), "the time is not after that of the row before", "times that ascend");
     }
     const Eigen::Quaterniond q(rows.number(3, "q_w"), rows.number(4, "q_x"), rows.number(5, "q_y"),
                                rows.number(6, "q_z"));
     if (!(std::abs(q.norm() - 1) < unit_norm_tolerance)) {
-      throw InputError(file.name, rows.line(), fmt::format("the quaternion has norm {:.6g}", q.norm()), "norm 1");
+      throw InputError(name, rows.line(), fmt::format("the quaternion has norm {:.6g}", q.norm()), "norm 1");
     }
     row.state = SE23d(SO3d(q), rows.vector(0), rows.vector(7));
     if (rows.has(15)) row.bias = {rows.vector(10), rows.vector(13)};
     truth.push_back(row);
   }
-  if (truth.empty()) throw InputError(file.name, 0, "the file has no data");
+  if (truth.empty()) throw InputError(name, 0, "the file has no data");
   return truth;
+}
+
+std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t start_ns) {
+  const TextFile file = loadText(path);
+  return parseGroundTruth(file.text, file.name, start_ns);
+}
+
+std::int64_t firstStamp(std::string_view text, const std::string& name) {
+  StampedRows rows(text, name, {});
+  if (!rows.next()) throw InputError(name, 0, "the file has no data");
+  return rows.stamp();
+}
+
+std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time) {
+  const auto next =
+      std::lower_bound(truth.begin(), truth.end(), time, [](const GroundTruth& g, double t) { return g.time < t; });
+  if (next == truth.end() || (next == truth.begin() && next->time > time)) return std::nullopt;
+  if (next->time == time) return *next;
+  const GroundTruth& before = *(next - 1);
+  const double h = next->time - before.time;
+  if (h > 0.1) return std::nullopt;
+  const double s = (time - before.time) / h;
+  GroundTruth at = before;
+  at.time = time;
+  at.state = SE23d(interpolate(SO3d(before.state.so3()), SO3d(next->state.so3()), s),
+                   Eigen::Vector3d((1 - s) * before.state.translation() + s * next->state.translation()),
+                   Eigen::Vector3d((1 - s) * before.state.velocity() + s * next->state.velocity()));
+  return at;
 }
 
 }  // namespace liestat::cli

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,5 +41,14 @@ struct GroundTruth {
 /// Reads EuRoC's ground truth: timestamp [ns], p x y z, q w x y z, v x y z and, if there, b_w x y z, b_a x y z. Throws
 /// InputError.
 std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t start_ns);
+/// The same from memory.
+std::vector<GroundTruth> parseGroundTruth(std::string_view text, const std::string& name, std::int64_t start_ns);
+
+/// The time stamp of the first row of one of EuRoC's files, ns. Throws InputError.
+std::int64_t firstStamp(std::string_view text, const std::string& name);
+
+/// The state at a time, between its two neighbours: linear, and along the geodesic of the rotations. Empty outside of
+/// the rows and where these are more than 0.1 s apart.
+std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time);
 
 }  // namespace liestat::cli

@@ -38,8 +38,8 @@ namespace liestat {
 /// not tell, are not in it. All in the body's axes: the direction of gravity (downwards), the velocity (m/s), the
 /// gyroscope's bias (rad/s), and the resting force: what the accelerometer would read at rest, its bias less gravity
 /// (m/s²). That is known much better than either of the two, which only the rotation of a window tells apart: bias and
-/// direction would be known along a line that follows gravity's sphere, and a Gaussian is straight. Tangent: 2 + 3 + 3 +
-/// 3.
+/// direction would be known along a line that follows gravity's sphere, and a Gaussian is straight. Tangent: 2 + 3 + 3
+/// + 3.
 using InertialState = Product<S2d, Eigen::Vector3d, Eigen::Vector3d, Eigen::Vector3d>;
 
 namespace detail {
@@ -74,8 +74,7 @@ inline Eigen::Vector3d accelerometerBias(const InertialState& state, double grav
   return state.get<3>() + gravity * state.get<0>().unit_vector();
 }
 inline Gaussian<Eigen::Vector3d> accelerometerBias(const Gaussian<InertialState>& state, double gravity) {
-  const Eigen::Matrix<double, 3, 11> J =
-      detail::fromInertialTangent(state.mean.get<0>(), gravity).bottomRows<3>();
+  const Eigen::Matrix<double, 3, 11> J = detail::fromInertialTangent(state.mean.get<0>(), gravity).bottomRows<3>();
   return {accelerometerBias(state.mean, gravity), J * state.covariance * J.transpose()};
 }
 
@@ -175,9 +174,8 @@ inline WindowStates windowStates(const RefinementResult& refined) {
   // In deviations, because those differ by factors of thousands.
   const Eigen::Matrix<double, 11, 1> unit = states.first.covariance.diagonal().cwiseSqrt();
   const detail::Matrix11 cross = unit.cwiseInverse().asDiagonal() * A * covariance * B.transpose();
-  const detail::Cholesky<double, 11> factor(detail::Matrix11(unit.cwiseInverse().asDiagonal() *
-                                                             states.first.covariance *
-                                                             unit.cwiseInverse().asDiagonal()));
+  const detail::Cholesky<double, 11> factor(
+      detail::Matrix11(unit.cwiseInverse().asDiagonal() * states.first.covariance * unit.cwiseInverse().asDiagonal()));
   if (!factor.ok()) return none();
   states.by_first = factor.solve<11>(cross).transpose() * unit.cwiseInverse().asDiagonal();
   const detail::Matrix11 half = factor.halfSolve<11>(cross);
@@ -200,9 +198,9 @@ class WindowFusion {
   /// What came of a window that was added.
   struct Meeting {
     Status status = Status::too_few;
-    /// Squared distance of the window from all before it, under both covariances: χ² of 11 degrees of freedom where both
-    /// are true (somewhat less where the prior says more than the windows, because it is common to both). 0 for the
-    /// first window.
+    /// Squared distance of the window from all before it, under both covariances: χ² of 11 degrees of freedom where
+    /// both are true (somewhat less where the prior says more than the windows, because it is common to both). 0 for
+    /// the first window.
     double chi2 = 0;
     int degrees_of_freedom = 0;
   };
@@ -244,8 +242,8 @@ class WindowFusion {
   /// At the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }
-  /// The sum over all meetings: larger than χ² of so many degrees of freedom says that windows contradict each other, or
-  /// are noisier than their covariances say (chiSquaredSurvival of stats/inference.hpp is the probability).
+  /// The sum over all meetings: larger than χ² of so many degrees of freedom says that windows contradict each other,
+  /// or are noisier than their covariances say (chiSquaredSurvival of stats/inference.hpp is the probability).
   double chi2() const { return chi2_; }
   std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
   /// What covariances would have to be multiplied by for the windows to be as far apart as they are; at least 1.
@@ -259,8 +257,8 @@ class WindowFusion {
     using Vector11 = Eigen::Matrix<double, 11, 1>;
     const detail::Matrix11 before = transport(at_first, window.first.mean).covariance;
     const Vector11 moved = window.by_first * Vector11(log(window.first.mean, at_first.mean));
-    const Gaussian<InertialState> at_last{
-        window.last.mean, window.by_first * before * window.by_first.transpose() + window.independent};
+    const Gaussian<InertialState> at_last{window.last.mean,
+                                          window.by_first * before * window.by_first.transpose() + window.independent};
     return transport(at_last, exp(window.last.mean, moved));
   }
 

@@ -65,8 +65,8 @@ TEST(CalibrationFiles, BlocksFlowsAndOpenCV) {
 
 TEST(CalibrationFiles, Distortions) {
   const auto lensOf = [](const std::string& model, const std::string& coefficients) {
-    return parseCalibration("cam0:\n  T_imu_cam: " + pose + "\n  intrinsics: [1, 1, 0, 0]\n  distortion_model: " + model +
-                                "\n" + coefficients,
+    return parseCalibration("cam0:\n  T_imu_cam: " + pose +
+                                "\n  intrinsics: [1, 1, 0, 0]\n  distortion_model: " + model + "\n" + coefficients,
                             "f")
         .cameras.at(0)
         .camera;
@@ -83,7 +83,8 @@ TEST(CalibrationFiles, FilesThatBelongTogether) {
   const std::string densities =
       "gyroscope_noise_density: 1e-4\ngyroscope_random_walk: 2e-5\naccelerometer_noise_density: 2e-3\n"
       "accelerometer_random_walk: 3e-3\n";
-  const std::string cameras = directory.write("chain.yaml", chain + std::regex_replace(chain, std::regex("cam0"), "cam1"));
+  const std::string cameras =
+      directory.write("chain.yaml", chain + std::regex_replace(chain, std::regex("cam0"), "cam1"));
   // The sensor half a turn about z from the body: EuRoC's way to say where things are.
   std::filesystem::create_directories(directory.path() / "cam0");
   std::filesystem::create_directories(directory.path() / "imu0");
@@ -93,7 +94,8 @@ TEST(CalibrationFiles, FilesThatBelongTogether) {
           densities);
   const std::string camera = directory.write(
       "cam0/sensor.yaml",
-      "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1]\n"
+      "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, "
+      "1]\n"
       "rate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\nintrinsics: [458, 457, 367, 248] #fu, fv, cu, cv\n"
       "distortion_model: radial-tangential\ndistortion_coefficients: [-0.3, 0.1, 1e-4, 2e-4]\n");
 
@@ -114,9 +116,13 @@ TEST(CalibrationFiles, FilesThatBelongTogether) {
   }
   expectPose(readCalibration({camera}).cameras.at(0).imu_T_cam);
 
-  EXPECT_EQ(errorOf([&] { readCalibration({cameras, camera}); }),
+  EXPECT_EQ(errorOf([&] {
+              readCalibration({cameras, camera});
+            }),
             camera + ": it has cam0, as has " + cameras + ", expected each camera once");
-  EXPECT_EQ(errorOf([&] { readCalibration({sensor, sensor}); }),
+  EXPECT_EQ(errorOf([&] {
+              readCalibration({sensor, sensor});
+            }),
             sensor + ": it has an IMU, as has " + sensor + ", expected one in all files");
 }
 
@@ -132,13 +138,16 @@ TEST(CalibrationFiles, BadOnesAreNamed) {
   EXPECT_EQ(changed("T_imu_cam", "T_cn_cnm1"),
             "f:2: cam0 has no pose on the IMU, expected T_cam_imu (takes the IMU's coordinates to the camera's) or "
             "T_imu_cam (its inverse), or EuRoC's T_BS");
-  EXPECT_EQ(changed("  camera_model", "  T_cam_imu: " + pose + "\n  camera_model"),
-            "f:3: cam0's T_cam_imu is not the inverse of T_imu_cam in line 2: 3.14 rad and 0.678 m from it, expected one "
-            "of the two, or both agreeing");
-  EXPECT_EQ(changed("[[0, -1,", "[[0, 1,"),
-            "f:2: cam0's T_imu_cam: the rotation matrix has determinant -1, it is a reflection, expected determinant 1");
-  EXPECT_EQ(changed("[[0, -1,", "[[0, -1.01,"),
-            "f:2: cam0's T_imu_cam: the rotation matrix is not orthogonal (error 0.01005), expected an error within 0.001");
+  EXPECT_EQ(
+      changed("  camera_model", "  T_cam_imu: " + pose + "\n  camera_model"),
+      "f:3: cam0's T_cam_imu is not the inverse of T_imu_cam in line 2: 3.14 rad and 0.678 m from it, expected one "
+      "of the two, or both agreeing");
+  EXPECT_EQ(
+      changed("[[0, -1,", "[[0, 1,"),
+      "f:2: cam0's T_imu_cam: the rotation matrix has determinant -1, it is a reflection, expected determinant 1");
+  EXPECT_EQ(
+      changed("[[0, -1,", "[[0, -1.01,"),
+      "f:2: cam0's T_imu_cam: the rotation matrix is not orthogonal (error 0.01005), expected an error within 0.001");
   EXPECT_EQ(changed("0, 1]]", "0, 2]]"), "f:2: the last row of cam0's T_imu_cam is 0 0 0 2, expected 0 0 0 1");
   EXPECT_EQ(changed(", [0, 0, 0, 1]]", "]"), "") << "the last row says nothing";
   EXPECT_EQ(changed("0.1], [", "0.1, 5], ["),
@@ -147,13 +156,14 @@ TEST(CalibrationFiles, BadOnesAreNamed) {
             "f:2: cam0's T_imu_cam has 2 rows, expected 4 rows of 4 numbers, the last 0 0 0 1");
   EXPECT_EQ(changed("0.1]", ".nan]").substr(0, 4), "f:2:");
   EXPECT_EQ(changed("[458,", "[0,"), "f:6: cam0's intrinsics have the focal length 0, expected a positive one");
-  EXPECT_EQ(changed("[458,", "[nan,"),
-            "f:6: cam0's intrinsics is 'nan', expected four numbers, fu fv cu cv in pixels");
+  EXPECT_EQ(changed("[458,", "[nan,"), "f:6: cam0's intrinsics is 'nan', expected four numbers, fu fv cu cv in pixels");
   EXPECT_EQ(changed(", 248]", "]"), "f:6: cam0's intrinsics are 3, expected four numbers, fu fv cu cv in pixels");
-  EXPECT_EQ(changed("pinhole", "omni"), "f:3: cam0's camera_model is 'omni', expected pinhole; others are not supported");
-  EXPECT_EQ(changed("radtan", "fov"),
-            "f:5: cam0's distortion_model is 'fov', expected radtan (radial-tangential), equidistant or none; others are "
-            "not supported");
+  EXPECT_EQ(changed("pinhole", "omni"),
+            "f:3: cam0's camera_model is 'omni', expected pinhole; others are not supported");
+  EXPECT_EQ(
+      changed("radtan", "fov"),
+      "f:5: cam0's distortion_model is 'fov', expected radtan (radial-tangential), equidistant or none; others are "
+      "not supported");
   EXPECT_EQ(changed("-0.3, 0.1, 1e-4, 2e-4", "-0.3, 0.1, 1e-4, 2e-4, 0.1"),
             "f:4: cam0's distortion_coeffs are 5, expected four numbers, k1 k2 p1 p2");
   EXPECT_EQ(changed("radtan", "none"),
@@ -162,10 +172,12 @@ TEST(CalibrationFiles, BadOnesAreNamed) {
             "f:7: cam0's resolution is 752, expected two whole numbers, width and height in pixels");
   EXPECT_EQ(changed("  camera_model", "  intrinsics: [1, 1, 1, 1]\n  camera_model"),
             "f:7: 'intrinsics' appears twice, expected it once");
-  EXPECT_EQ(message(chain + "  timeshift_cam_imu: soon\n"), "f:8: cam0's timeshift_cam_imu is 'soon', expected seconds");
-  EXPECT_EQ(message("cameras: 3\n"),
-            "f: there is neither a camera nor an IMU, expected cam0 or imu0 of Kalibr's and OpenVINS' chains, or EuRoC's "
-            "sensor.yaml");
+  EXPECT_EQ(message(chain + "  timeshift_cam_imu: soon\n"),
+            "f:8: cam0's timeshift_cam_imu is 'soon', expected seconds");
+  EXPECT_EQ(
+      message("cameras: 3\n"),
+      "f: there is neither a camera nor an IMU, expected cam0 or imu0 of Kalibr's and OpenVINS' chains, or EuRoC's "
+      "sensor.yaml");
   EXPECT_EQ(message("imu0:\n  update_rate: 200\n"),
             "f: there is no gyroscope_noise_density, expected the densities of noise and walk of an IMU");
   EXPECT_EQ(message("cam0: [1, 2\n").substr(0, 2), "f:");

@@ -1,4 +1,5 @@
-// Pixels and bearings: each the other's inverse wherever either is defined, and how the one's noise becomes the other's.
+// Pixels and bearings: each the other's inverse wherever either is defined, and how the one's noise becomes the
+// other's.
 
 #include "cli/camera.hpp"
 
@@ -28,15 +29,15 @@ Camera euroc() {
 
 /// TUM-VI's lens: the corners of the image are more than 90 degrees off the axis.
 Camera fisheye() {
-  return {.fu = 190.97847715128717,
-          .fv = 190.9733070521226,
-          .cu = 254.93170605935475,
-          .cv = 256.8974428996504,
-          .distortion = Distortion::equidistant,
-          .coefficients = {0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202,
-                           0.00020293673591811182},
-          .width = 512,
-          .height = 512};
+  return {
+      .fu = 190.97847715128717,
+      .fv = 190.9733070521226,
+      .cu = 254.93170605935475,
+      .cv = 256.8974428996504,
+      .distortion = Distortion::equidistant,
+      .coefficients = {0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182},
+      .width = 512,
+      .height = 512};
 }
 
 Camera pinhole() { return {.fu = 450, .fv = 440, .cu = 376, .cv = 240, .width = 752, .height = 480}; }
@@ -119,7 +120,8 @@ TEST(Cameras, NothingIsSeenBehindOrBeyondTheFold) {
   EXPECT_TRUE(folds.bearing(199.9, 0));
   EXPECT_FALSE(folds.bearing(200.1, 0));
   EXPECT_TRUE(std::isnan(folds.bearingDeviation(200.1, 0)));
-  // One that ascends again far out stays folded: 1 - 3 r²/2 + r⁴ of slope 1 - 9 r²/2 + 5 r⁴, negative from √0.4 to √0.5.
+  // One that ascends again far out stays folded: 1 - 3 r²/2 + r⁴ of slope 1 - 9 r²/2 + 5 r⁴, negative from √0.4 to
+  // √0.5.
   folds.coefficients = {-1.5, 1, 0, 0};
   EXPECT_TRUE(folds.project({0.632, 0, 1}));
   EXPECT_FALSE(folds.project({0.633, 0, 1}));

@@ -78,12 +78,14 @@ TEST(ImageTrackFiles, BadOnesAreNamed) {
             "f:4: frame 0 is at t_s 0.01, 0.01 s from its time in an earlier line, expected one time for a frame");
   EXPECT_EQ(message(timed + "0,1,2,3,0.1\n1,1,2,3,0\n"),
             "f:3: the time is 0.1 s before that of line 2, expected times that ascend");
-  EXPECT_EQ(message(timed + "0,1,2,3,0.1\n1,1,2,3,0.1\n"), "f:3: the time is that of line 2 again, expected times that ascend");
+  EXPECT_EQ(message(timed + "0,1,2,3,0.1\n1,1,2,3,0.1\n"),
+            "f:3: the time is that of line 2 again, expected times that ascend");
   EXPECT_EQ(message(timed + "0,1,nan,3,0.1\n"), "f:2: u is 'nan', expected a finite number");
   EXPECT_EQ(message(timed + "-1,1,2,3,0.1\n"), "f:2: frame is -1, expected a whole number of 0 or more");
   EXPECT_EQ(message(timed + "0,1.5,2,3,0.1\n"), "f:2: track is 1.5, expected a whole number of 0 or more");
   EXPECT_EQ(message(timed + "0,1,2\n"), "f:2: 3 fields, expected 5 as in the header");
-  EXPECT_EQ(message(header + "0,1,2,3\n"), "f: there is no column 't_s', and no file of the images' times, expected one of them");
+  EXPECT_EQ(message(header + "0,1,2,3\n"),
+            "f: there is no column 't_s', and no file of the images' times, expected one of them");
   EXPECT_EQ(message("frame,track,x,y\n0,1,2,3\n").substr(0, 29), "f:1: there is no column 'u', ");
   EXPECT_EQ(message("0,1,2,3\n").substr(0, 42), "f:1: numbers where the header should be, e");
   EXPECT_EQ(message(header), "f:1: there is a header but no data, expected at least one row after it");
@@ -99,7 +101,8 @@ TEST(ImageTrackFiles, BadOnesAreNamed) {
             "t:2: the time is that of line 1 again, expected times that ascend");
   EXPECT_EQ(message(rows, "1403715523912143104,a.png\nlater,b.png\n"),
             "t:2: timestamp is 'later', expected a whole number of nanoseconds");
-  EXPECT_EQ(message(rows, "1403715523912143104,a.png\n"), "f:3: frame 5 has no time in t, expected a frame of its 1 rows");
+  EXPECT_EQ(message(rows, "1403715523912143104,a.png\n"),
+            "f:3: frame 5 has no time in t, expected a frame of its 1 rows");
   EXPECT_EQ(message(timed + "0,1,2,3,0.5\n", "frame,t_s\n0,0.2\n"),
             "f:2: frame 0 is at t_s 0.5, 0.3 s from its time in t, expected one time for a frame");
 }
@@ -110,7 +113,8 @@ TEST(ImageTrackFiles, Kitti) {
   const char* data = std::getenv("LIESTAT_DATA");
   if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
   const std::string folder = std::string(data) + "/vi/kitti/";
-  EXPECT_NE(errorOf([&] { readImageTracks(folder + "drive_0001_tracks.csv", folder + "drive_0001_motion.csv", 0); }), "");
+  EXPECT_NE(errorOf([&] { readImageTracks(folder + "drive_0001_tracks.csv", folder + "drive_0001_motion.csv", 0); }),
+            "");
 
   const TemporaryDirectory directory;
   const TextFile file = loadText(folder + "drive_0001_tracks.csv");
@@ -119,7 +123,8 @@ TEST(ImageTrackFiles, Kitti) {
   std::string times = "frame,t_s\n";
   const TextFile motion_file = loadText(folder + "drive_0001_motion.csv");
   LineReader lines(motion_file.text);
-  while (lines.next()) times += std::string(lines.line().substr(0, lines.line().find(',', lines.line().find(',') + 1))) + "\n";
+  while (lines.next())
+    times += std::string(lines.line().substr(0, lines.line().find(',', lines.line().find(',') + 1))) + "\n";
   const ImageTracks read = readImageTracks(tracks, directory.write("times.csv", times), 1317042145000000000);
   EXPECT_EQ(read.observations.size(), 10501U);
   EXPECT_EQ(read.track_ids.size(), 707U);

@@ -53,10 +53,7 @@ struct Recording {
 
  private:
   Recording(std::uint64_t seed, SceneRandom random)
-      : scene({.images = 71,
-               .features = 20,
-               .window = 7,
-               .bias = options.accelerometer_deviation * random.normal3()},
+      : scene({.images = 71, .features = 20, .window = 7, .bias = options.accelerometer_deviation * random.normal3()},
               seed),
         bias{options.gyroscope_deviation * random.normal3(), scene.options().bias} {
     readings = readingsOf(scene, imu, random, bias.gyroscope);
@@ -66,7 +63,8 @@ struct Recording {
 
 RefinementResult refined(const InertialWindow& window, std::size_t n = 3) {
   const auto start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = pixel, .singular_values = false});
-  return start.solutions.empty() ? RefinementResult{} : refine(window, start.solutions[0], {}, withSharedPrior(options, n));
+  return start.solutions.empty() ? RefinementResult{}
+                                 : refine(window, start.solutions[0], {}, withSharedPrior(options, n));
 }
 
 /// All windows of two seconds, from images 0, 25 and 50 on.
