@@ -217,7 +217,6 @@ inline bool isUsable(const GyroscopeBiasOptions& o) {
 template <class Integrate>
 GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const GyroscopeBiasOptions& options,
                                           const Integrate& integrate) {
-  using Status = GyroscopeBiasStatus;
   GyroscopeBiasResult found;
   ClosedFormResult& result = found.result;
   found.bias = options.prior;
@@ -241,19 +240,19 @@ GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const Gyroscope
   };
   if (!closedForm()) return found;
   if (result.window <= options.least_window && options.prior_deviation > options.deviation_from_rest) {
-    found.status = Status::window_too_short;
+    found.status = GyroscopeBiasStatus::window_too_short;
     return found;
   }
-  found.status = Status::not_converged;
+  found.status = GyroscopeBiasStatus::not_converged;
   while (found.rounds < options.most_rounds) {
     if (result.solutions.empty() || result.status == ClosedFormStatus::stationary ||
         result.status == ClosedFormStatus::scale_unobservable) {
-      found.status = Status::no_closed_form;
+      found.status = GyroscopeBiasStatus::no_closed_form;
       return found;
     }
     detail::GyroscopeBiasProblem problem(window, options, result, found.bias, base);
     if (problem.features() == 0) {
-      found.status = Status::no_closed_form;
+      found.status = GyroscopeBiasStatus::no_closed_form;
       return found;
     }
     detail::ReducedSystem system(problem.blocks(), problem.features());
@@ -271,7 +270,7 @@ GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const Gyroscope
     closedForm();
     // A tenth of a deviation is nothing.
     if (summary.converged && regular && change.norm() <= 0.1 * std::sqrt(found.covariance.trace())) {
-      found.status = Status::ok;
+      found.status = GyroscopeBiasStatus::ok;
       break;
     }
   }

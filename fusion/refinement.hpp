@@ -327,7 +327,6 @@ class RefinementProblem {
 /// own correction of the accelerometer's is added). The motions must have been integrated with the sensor's noise.
 inline RefinementResult refine(const InertialWindow& window, const ClosedFormSolution& start,
                                const ImuBias<double>& start_bias, const RefinementOptions& options) {
-  using Status = RefinementStatus;
   RefinementResult result;
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   const bool finite = start.velocity.allFinite() && positive(start.gravity.norm()) &&
@@ -346,12 +345,12 @@ inline RefinementResult refine(const InertialWindow& window, const ClosedFormSol
   if (result.fault != ClosedFormFault::none) return result;
   detail::RefinementProblem problem(window, options);
   if (!problem.setWeights()) {
-    result.status = Status::bad_motion;
+    result.status = RefinementStatus::bad_motion;
     return result;
   }
   problem.start(start, bias);
   if (problem.features().empty()) {
-    result.status = Status::no_feature;
+    result.status = RefinementStatus::no_feature;
     return result;
   }
   detail::ReducedSystem system(problem.blocks(), problem.features().size());
@@ -373,10 +372,10 @@ inline RefinementResult refine(const InertialWindow& window, const ClosedFormSol
   result.must_reintegrate = std::any_of(window.motions.begin(), window.motions.end(),
                                         [&](const auto& motion) { return motion.mustReintegrate(best.bias); });
   if (!system.factor(0)) {
-    result.status = Status::singular;
+    result.status = RefinementStatus::singular;
     return result;
   }
-  result.status = summary.converged ? Status::ok : Status::not_converged;
+  result.status = summary.converged ? RefinementStatus::ok : RefinementStatus::not_converged;
   const int g = problem.gravityBlock();
   const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
   const std::vector<double> inverse =
