@@ -26,6 +26,7 @@ struct Invocation {
 
 void addMeanCommand(CLI::App& app, Invocation& invocation);
 void addPreintegrateCommand(CLI::App& app, Invocation& invocation);
+void addSimulateViCommand(CLI::App& simulate, Invocation& invocation);
 void addValidateMeansCommand(CLI::App& validate, Invocation& invocation);
 void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation);
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation);

@@ -27,6 +27,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   addMeanCommand(app, invocation);
   addPreintegrateCommand(app, invocation);
+  CLI::App* simulate = app.add_subcommand("simulate", "Files of simulated measurements with their truth");
+  simulate->require_subcommand(1);
+  addSimulateViCommand(*simulate, invocation);
   CLI::App* validate = app.add_subcommand("validate", "Does an estimator keep what its covariance promises?");
   validate->require_subcommand(1);
   addValidateMeansCommand(*validate, invocation);
