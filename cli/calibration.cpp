@@ -55,8 +55,8 @@ struct Section {
   const std::string& file;
   std::string name;  ///< cam0; empty for the file as a whole
 
-  Section(YAML::Node map, const std::string& file_name, std::string section)
-      : node(std::move(map)), file(file_name), name(std::move(section)) {
+  Section(const YAML::Node& map, const std::string& file_name, std::string section)
+      : node(map), file(file_name), name(std::move(section)) {
     std::set<std::string> keys;
     for (const auto& entry : node) {
       if (entry.first.IsScalar() && !keys.insert(entry.first.Scalar()).second) {
@@ -144,9 +144,9 @@ SE3d rigidMotion(const Named& matrix) {
   }
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rotation(i, j) = values[static_cast<std::size_t>(4 * i + j)].first;
-    translation[i] = values[static_cast<std::size_t>(4 * i + 3)].first;
+  for (int k = 0; k < 12; ++k) {
+    const double value = values[static_cast<std::size_t>(k)].first;
+    (k % 4 == 3 ? translation[k / 4] : rotation(k / 4, k % 4)) = value;
   }
   for (std::size_t k = 12; k < values.size(); ++k) {
     if (std::abs(values[k].first - (k == 15 ? 1 : 0)) > 1e-9) {

@@ -23,7 +23,8 @@ constexpr double time_tolerance = 1e-5;
 /// double.
 double sinceStart(double seconds, std::int64_t start_ns) {
   constexpr std::int64_t second = 1000000000;
-  return (seconds - static_cast<double>(start_ns / second)) - 1e-9 * static_cast<double>(start_ns % second);
+  const std::int64_t whole = start_ns / second, rest = start_ns % second;
+  return (seconds - static_cast<double>(whole)) - 1e-9 * static_cast<double>(rest);
 }
 
 /// Places in an ImageTracks by the frames' numbers.
@@ -100,8 +101,8 @@ NumericTable tableOfTracks(std::string_view text, const std::string& name, bool 
 
 }  // namespace
 
-ImageTracks parseImageTracks(std::string_view tracks_text, std::string tracks_name, std::string_view times_text,
-                             std::string times_name, std::int64_t start_ns) {
+ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
+                             const std::string& times_name, std::int64_t start_ns) {
   ImageTracks result;
   const bool with_times = !times_name.empty();
   const NumericTable table = tableOfTracks(tracks_text, tracks_name, with_times);

@@ -36,7 +36,7 @@ struct ImageTracks {
 /// that are not whole. `image_times` may be empty; `-` is standard input.
 ImageTracks readImageTracks(const std::string& tracks, const std::string& image_times, std::int64_t start_ns);
 /// The same from memory.
-ImageTracks parseImageTracks(std::string_view tracks_text, std::string tracks_name, std::string_view times_text,
-                             std::string times_name, std::int64_t start_ns);
+ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
+                             const std::string& times_name, std::int64_t start_ns);
 
 }  // namespace liestat::cli
