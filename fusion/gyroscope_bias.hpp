@@ -20,6 +20,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct GyroscopeBiasOptions {
   ClosedFormOptions closed_form = {};               ///< bearing_noise must be given
   Eigen::Vector3d prior = Eigen::Vector3d::Zero();  ///< rad/s
   double prior_deviation = 0.1;                     ///< rad/s
+  std::optional<Eigen::Vector3d> start = {};        ///< rad/s, where to begin; none: at the prior
   double largest_step = 0.2;                        ///< rad/s
   /// A window of at most so many seconds is only solved with a prior as good as one from rest.
   double least_window = 1;
@@ -207,7 +209,7 @@ class GyroscopeBiasProblem {
 
 inline bool isUsable(const GyroscopeBiasOptions& o) {
   return o.closed_form.bearing_noise > 0 && o.prior.allFinite() && o.prior_deviation > 0 &&
-         std::isfinite(o.prior_deviation) && o.largest_step > 0;
+         std::isfinite(o.prior_deviation) && o.largest_step > 0 && (!o.start || o.start->allFinite());
 }
 
 }  // namespace detail
@@ -219,7 +221,7 @@ GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const Gyroscope
                                           const Integrate& integrate) {
   GyroscopeBiasResult found;
   ClosedFormResult& result = found.result;
-  found.bias = options.prior;
+  found.bias = options.start.value_or(options.prior);
   if (!detail::isUsable(options)) result.fault = ClosedFormFault::bad_option;
   if (result.fault == ClosedFormFault::none && window.motions.empty()) result.fault = ClosedFormFault::too_few_images;
   if (result.fault != ClosedFormFault::none) return found;

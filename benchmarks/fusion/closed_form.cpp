@@ -1,12 +1,13 @@
 // The closed form of visual-inertial initialisation: one pass of elimination, minimisers and back-substitution; whole
-// solves; consensus over features; the gyroscope's bias; the refinement; and the dense normal equations that a
-// straightforward program sets up.
+// solves; consensus over features; the gyroscope's bias, with the motion and from rotations; the whole initialisation
+// with wrong tracks; the refinement; and the dense normal equations that a straightforward program sets up.
 #include "../inputs.hpp"
 
 #include <fusion/closed_form.hpp>
 #include <fusion/closed_form_ransac.hpp>
 #include <fusion/gyroscope_bias.hpp>
 #include <fusion/refinement.hpp>
+#include <fusion/robust_initialisation.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Cholesky>
@@ -175,6 +176,37 @@ void gyroscopeBias(benchmark::State& state) {
   }
 }
 
+/// Four tracks of ten drift.
+InertialWindow withDrift(InertialWindow window) {
+  Inputs random;
+  for (std::size_t i = 0; i < window.features.size() * 2 / 5; ++i) {
+    Eigen::Vector3d walk = Eigen::Vector3d::Zero();
+    for (TrackedBearing& seen : window.features[i]) seen.bearing += walk += 8 * noise * random.normal<3>();
+  }
+  return window;
+}
+
+void epipolarBias(benchmark::State& state) {
+  const InertialWindow window = withDrift(Measured(state).window);
+  for (auto _ : state) {
+    auto found = estimateEpipolarGyroscopeBias(window, {.bearing_noise = noise});
+    if (!found.ok()) state.SkipWithError(describe(found.status));
+    benchmark::DoNotOptimize(found);
+  }
+}
+
+void robustInitialisation(benchmark::State& state) {
+  const Measured measured(state);
+  const InertialWindow window = withDrift(measured.window);
+  const RobustInitialisationOptions options{.ransac = {.closed_form = measured.options()}};
+  std::mt19937_64 generator(1);
+  for (auto _ : state) {
+    auto found = initialiseRobustly(window, generator, options);
+    if (found.status != RobustInitialisationStatus::ok) state.SkipWithError(describe(found.status));
+    benchmark::DoNotOptimize(found);
+  }
+}
+
 void refinement(benchmark::State& state) {
   const Measured measured(state);
   const auto start = solveClosedForm(closedFormWindow(measured.window, {}), measured.options());
@@ -233,6 +265,14 @@ BENCHMARK(exact)->Name("ClosedForm/exact data, ranks")->Args({21, 50})->Unit(ben
 BENCHMARK(bias)->Name("ClosedForm/noisy data with bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(ransac)->Name("ClosedForm/50 hypotheses")->Args({21, 50})->Unit(benchmark::kMicrosecond);
 BENCHMARK(gyroscopeBias)->Name("ClosedForm/gyroscope's bias")->Args({21, 50})->Unit(benchmark::kMicrosecond);
+BENCHMARK(epipolarBias)
+    ->Name("Initialisation/gyroscope's bias from rotations")
+    ->Args({21, 50})
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK(robustInitialisation)
+    ->Name("Initialisation/with wrong tracks and bias")
+    ->Args({21, 50})
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(refinement)
     ->Name("Refinement")
     ->Args({11, 50})

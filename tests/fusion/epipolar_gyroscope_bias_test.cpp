@@ -1,0 +1,201 @@
+// The gyroscope's bias from rotations alone: among drifting tracks, with a covariance that is true, with and without
+// parallax, and what it refuses.
+
+#include <fusion/epipolar_gyroscope_bias.hpp>
+#include <support/vi_recorded.hpp>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+using Status = EpipolarBiasStatus;
+
+constexpr double pixel = 1. / 450;
+constexpr ImuNoise<double> adis{1.7e-4, 2e-3};
+const EpipolarBiasOptions options{.bearing_noise = pixel};
+
+double squaredDistance(const EpipolarBiasResult& found, const Eigen::Vector3d& bias) {
+  const Eigen::Vector3d error = found.bias - bias;
+  return error.dot(found.covariance.llt().solve(error));
+}
+
+TEST(EpipolarGyroscopeBias, IsFoundWithoutNoise) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    // A lever arm changes nothing but translations.
+    const RecordedScene recorded(
+        {.scene = {.images = 21, .features = 12, .camera = {0.2, -0.3, 0.1}}, .bias = 0.1, .sigma = 0}, 300 + seed);
+    const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
+    EXPECT_EQ(found.status, Status::ok) << seed;
+    EXPECT_EQ(found.inliers.size(), 12u);
+    // The prior pulls by covariance · bias / 0.1²; averaged readings are wrong by 1e-5 rad in a second.
+    EXPECT_LE((found.bias - recorded.bias).norm(), 2e-5 + found.covariance.trace() * 0.1 / 0.01) << seed;
+  }
+}
+
+TEST(EpipolarGyroscopeBias, IsFoundAmongDriftingTracks) {
+  struct Row {
+    double bias, window;
+    std::size_t drifting;
+    double median, most;  ///< rad/s
+  };
+  constexpr std::size_t features = 40, trials = 25;
+  for (const auto& [bias, window, drifting, median, most] :
+       {Row{0, 2, 16, 0.003, 0.015}, Row{0.05, 2, 16, 0.003, 0.015}, Row{0.1, 1, 16, 0.008, 0.04},
+        Row{0.1, 2, 20, 0.003, 0.015}, Row{0.1, 4, 16, 0.0015, 0.006}, Row{0.2, 2, 20, 0.003, 0.015}}) {
+    std::vector<double> error;
+    std::size_t ok = 0, right = 0, wrong = 0;
+    int starts = 0;
+    for (std::size_t trial = 0; trial < trials; ++trial) {
+      const RecordedScene recorded({.scene = {.images = static_cast<std::size_t>(10 * window) + 1,
+                                              .features = features,
+                                              .window = window},
+                                    .bias = bias,
+                                    .noise = adis,
+                                    .drifting = drifting},
+                                   200000 + trial);
+      const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
+      ok += found.ok();
+      starts += found.starts;
+      error.push_back((found.bias - recorded.bias).norm());
+      for (const std::size_t i : found.inliers) ++(i < drifting ? wrong : right);
+      EXPECT_EQ(found.inliers.size() + found.outliers.size(), features);
+    }
+    std::printf("  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, bias %.5f / %.5f rad/s, precision %.4f, recall "
+                "%.4f, %.1f starts\n",
+                bias, window, drifting, features, ok, trials, quantileOf(error, 0.5), quantileOf(error, 0.95),
+                static_cast<double>(right) / static_cast<double>(right + wrong),
+                static_cast<double>(right) / static_cast<double>(trials * (features - drifting)),
+                starts / static_cast<double>(trials));
+    EXPECT_GE(ok, trials - 1);
+    EXPECT_LE(quantileOf(error, 0.5), median);
+    EXPECT_LE(quantileOf(error, 0.95), most);
+    EXPECT_LE(wrong, right / 100);
+    EXPECT_GE(right, trials * (features - drifting) * 98 / 100);
+  }
+}
+
+TEST(EpipolarGyroscopeBias, CovarianceIsTrue) {
+  struct Row {
+    const char* what;
+    RecordedOptions recorded;
+    Status status;
+  };
+  const SceneOptions moving{.images = 21, .features = 30}, one_second{.images = 11, .features = 30, .window = 1};
+  SceneOptions still = moving, far = moving;
+  still.motion = SceneMotion::stationary;
+  far.far = 1e4;
+  constexpr ImuNoise<double> coarse{3e-3, 2e-3};
+  constexpr std::size_t trials = 100;
+  for (const auto& [what, recorded_options, status] :
+       {Row{"no noise of the gyroscope", {.scene = moving, .bias = 0.05}, Status::ok},
+        Row{"much noise of the gyroscope", {.scene = moving, .bias = 0.05, .noise = coarse}, Status::ok},
+        Row{"one second", {.scene = one_second, .bias = 0.05, .noise = adis}, Status::ok},
+        Row{"drifting tracks", {.scene = moving, .bias = 0.05, .noise = adis, .drifting = 10}, Status::ok},
+        Row{"at rest", {.scene = still, .bias = 0.05, .noise = adis, .drifting = 12}, Status::no_parallax},
+        Row{"pure rotation", {.scene = far, .bias = 0.1, .noise = adis, .drifting = 12}, Status::no_parallax}}) {
+    double nees = 0, deviation = 0;
+    std::size_t right = 0;
+    for (std::size_t trial = 0; trial < trials; ++trial) {
+      const RecordedScene recorded(recorded_options, 210000 + trial);
+      const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
+      if (found.status != status || !found.consistent) continue;
+      ++right;
+      nees += squaredDistance(found, recorded.bias);
+      deviation += std::sqrt(found.covariance.trace());
+    }
+    nees /= static_cast<double>(right);
+    std::printf("  %s: NEES %.2f of 3, deviation %.5f rad/s, %zu of %zu %s\n", what, nees,
+                deviation / static_cast<double>(right), right, trials, describe(status));
+    EXPECT_GE(right, trials - 2) << what;
+    // Four standard errors, and a tenth for what is not linear.
+    EXPECT_NEAR(nees, 3, 4 * std::sqrt(6. / static_cast<double>(trials)) + 0.3) << what;
+  }
+}
+
+// Between no parallax and enough of it there is no answer, and none is given. What it gives instead is off by speed
+// over distance.
+TEST(EpipolarGyroscopeBias, SaysWhenItIsNotDetermined) {
+  std::size_t ok = 0, off = 0;
+  for (std::uint64_t trial = 0; trial < 60; ++trial) {
+    const RecordedScene recorded(
+        {.scene = {.images = 21, .features = 30, .far = 10}, .bias = 0.1, .noise = adis, .drifting = trial % 2 * 10},
+        220000 + trial);
+    const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
+    EXPECT_LE((found.bias - recorded.bias).norm(), 0.08);
+    if (found.status != Status::ok || !found.consistent) continue;
+    ++ok;
+    off += squaredDistance(found, recorded.bias) > 30;
+  }
+  std::printf("  20 to 80 m away: %zu of 60 ok, %zu of these off\n", ok, off);
+  EXPECT_LE(off, 1u);
+
+  const RecordedScene few({.scene = {.images = 21, .features = 2}, .bias = 0.05}, 5);
+  EXPECT_EQ(estimateEpipolarGyroscopeBias(few.window, options).status, Status::undetermined);
+  // All tracks drift: whatever agrees is not most of them, or not noise.
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const RecordedScene wrong({.scene = {.images = 21, .features = 20}, .drifting = 20, .drift = 0.05}, seed);
+    EXPECT_FALSE(estimateEpipolarGyroscopeBias(wrong.window, options).ok());
+  }
+}
+
+TEST(EpipolarGyroscopeBias, TracksMayBeShort) {
+  // Each is seen by eight images in a row, and one by a single image.
+  std::vector<double> error;
+  for (std::uint64_t trial = 0; trial < 20; ++trial) {
+    RecordedScene recorded({.scene = {.images = 21, .features = 60}, .bias = 0.1, .noise = adis}, 230000 + trial);
+    for (std::size_t i = 0; i < 60; ++i) {
+      FeatureTrack& track = recorded.window.features[i];
+      const std::size_t from = i % 14;
+      const auto begin = track.begin() + static_cast<std::ptrdiff_t>(from);
+      track = FeatureTrack(begin, begin + (i == 0 ? 1 : 8));
+    }
+    const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
+    EXPECT_TRUE(found.ok()) << describe(found.status);
+    // Neighbours with too little parallax are not used, nor are tracks that only they have.
+    EXPECT_LE(found.inliers.size() + found.outliers.size(), 59u);
+    EXPECT_GE(found.inliers.size(), 45u);
+    EXPECT_TRUE(std::isinf(found.residuals[0]));
+    error.push_back((found.bias - recorded.bias).norm());
+  }
+  EXPECT_LE(quantileOf(error, 0.5), 0.01);
+}
+
+TEST(EpipolarGyroscopeBias, RefusesBadInput) {
+  const RecordedScene recorded({.scene = {.images = 6, .features = 8}, .bias = 0.02}, 4);
+  const auto fault = [&](const InertialWindow& window, const EpipolarBiasOptions& o) {
+    const auto found = estimateEpipolarGyroscopeBias(window, o);
+    EXPECT_EQ(found.status == Status::bad_input, found.fault != ClosedFormFault::none);
+    return found.fault;
+  };
+  EXPECT_EQ(fault(recorded.window, options), ClosedFormFault::none);
+  EXPECT_EQ(fault(recorded.window, {}), ClosedFormFault::bad_option);  // no noise
+  EpipolarBiasOptions bad = options;
+  bad.prior_deviation = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  bad = options;
+  bad.prior[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  bad = options;
+  bad.least_consensus = 0;
+  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault({}, options), ClosedFormFault::too_few_images);
+  InertialWindow window = recorded.window;
+  window.features[1][2].image = 77;
+  EXPECT_EQ(fault(window, options), ClosedFormFault::wrong_index);
+  window = recorded.window;
+  window.features[3][1].bearing.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(fault(window, options), ClosedFormFault::bad_bearing);
+  window.features.clear();
+  EXPECT_EQ(estimateEpipolarGyroscopeBias(window, options).status, Status::undetermined);
+}
+
+}  // namespace

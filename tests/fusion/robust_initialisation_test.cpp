@@ -1,0 +1,149 @@
+// The whole initialisation with wrong tracks and an unknown bias of the gyroscope: as good as with the right tracks
+// given, at any bias.
+
+#include <fusion/robust_initialisation.hpp>
+#include <support/vi_recorded.hpp>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+using Status = RobustInitialisationStatus;
+
+constexpr double pixel = 1. / 450;
+constexpr ImuNoise<double> adis{1.7e-4, 2e-3};
+const RobustInitialisationOptions options{
+    .ransac = {.closed_form = {.bearing_noise = pixel, .singular_values = false}}};
+
+RobustInitialisation initialise(const RecordedScene& recorded, std::uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  return initialiseRobustly(recorded.window, generator, options, recorded.integrator());
+}
+double speedError(const ClosedFormResult& result, const Scene& scene) {
+  return result.solutions.empty() ? 10 : (result.solutions[0].velocity - scene.velocity).norm();
+}
+
+TEST(RobustInitialisation, IsAsGoodAsWithTheRightTracks) {
+  struct Row {
+    double bias, window;
+    std::size_t drifting;
+  };
+  constexpr std::size_t features = 40, trials = 40;
+  std::vector<double> without_bias;
+  for (const auto& [bias, window, drifting] :
+       {Row{0, 2, 16}, Row{0.05, 2, 16}, Row{0.1, 2, 16}, Row{0.2, 2, 20}, Row{0.1, 1, 16}}) {
+    std::vector<double> error, speed, oracle;
+    double nees = 0;
+    std::size_t ok = 0, right = 0, wrong = 0, hypotheses = 0;
+    for (std::size_t trial = 0; trial < trials; ++trial) {
+      const RecordedScene recorded({.scene = {.images = static_cast<std::size_t>(10 * window) + 1,
+                                              .features = features,
+                                              .window = window},
+                                    .bias = bias,
+                                    .noise = adis,
+                                    .drifting = drifting},
+                                   240000 + trial);
+      const auto found = initialise(recorded, trial);
+      ok += found.ok();
+      hypotheses += found.hypotheses;
+      EXPECT_EQ(found.inliers.size() + found.outliers.size(), features);
+      for (const std::size_t i : found.inliers) ++(i < drifting ? wrong : right);
+      const Eigen::Vector3d off = found.gyroscope_bias - recorded.bias;
+      error.push_back(off.norm());
+      nees += off.dot(found.bias_covariance.llt().solve(off)) / trials;
+      speed.push_back(speedError(found.result, recorded.scene));
+      // The same with the right tracks, and a prior around the true bias.
+      InertialWindow kept = recorded.window;
+      for (std::size_t i = 0; i < drifting; ++i) kept.features[i].clear();
+      GyroscopeBiasOptions told{.closed_form = options.ransac.closed_form};
+      told.start = recorded.bias;
+      told.least_window = 0;
+      oracle.push_back(
+          speedError(estimateGyroscopeBias(kept, told, recorded.integrator()).result, recorded.scene));
+    }
+    const double precision = static_cast<double>(right) / static_cast<double>(right + wrong);
+    const double recall = static_cast<double>(right) / static_cast<double>(trials * (features - drifting));
+    std::printf("  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, precision %.4f, recall %.4f, bias %.5f / %.5f "
+                "rad/s, NEES %.2f; speed error %.4f / %.3f, right tracks given %.4f / %.3f m/s; %.0f hypotheses\n",
+                bias, window, drifting, features, ok, trials, precision, recall, quantileOf(error, 0.5),
+                quantileOf(error, 0.95), nees, quantileOf(speed, 0.5), quantileOf(speed, 0.95),
+                quantileOf(oracle, 0.5), quantileOf(oracle, 0.95),
+                static_cast<double>(hypotheses) / static_cast<double>(trials));
+    EXPECT_GE(precision, 0.999);
+    EXPECT_GE(recall, 0.998);
+    EXPECT_GE(ok, trials - 1);
+    EXPECT_LE(quantileOf(speed, 0.5), 1.05 * quantileOf(oracle, 0.5));
+    EXPECT_LE(quantileOf(speed, 0.95), 1.1 * quantileOf(oracle, 0.95));
+    EXPECT_LE(quantileOf(error, 0.5), window < 2 ? 0.005 : 0.0017);
+    // Of image noise: the gyroscope's adds a tenth.
+    EXPECT_NEAR(nees, 3.2, 4 * std::sqrt(6. / trials));
+  }
+}
+
+// There is no motion to agree on, but the tracks that stay and the bias are found by their rotation.
+TEST(RobustInitialisation, AtRestAndAtConstantVelocity) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    RecordedOptions recorded_options{.scene = {.images = 21, .features = 30, .motion = SceneMotion::stationary},
+                                     .bias = 0.1,
+                                     .noise = adis,
+                                     .drifting = 12};
+    const RecordedScene still(recorded_options, seed);
+    const auto rest = initialise(still, seed);
+    EXPECT_EQ(rest.status, Status::bias_from_rotations);
+    EXPECT_EQ(rest.epipolar.status, EpipolarBiasStatus::no_parallax);
+    EXPECT_EQ(rest.result.status, ClosedFormStatus::stationary);
+    EXPECT_FALSE(rest.ok());
+    EXPECT_EQ(rest.inliers.size(), 18u);
+    EXPECT_EQ(rest.result.features[0].observations, 21u);
+    EXPECT_LE((rest.gyroscope_bias - still.bias).norm(), 0.003);
+    ASSERT_EQ(rest.result.solutions.size(), 1u);
+    const Eigen::Vector3d G = rest.result.solutions[0].gravity;
+    EXPECT_LE(G.cross(still.scene.gravity).norm() / (9.81 * 9.81), 0.003);
+
+    recorded_options.scene.motion = SceneMotion::constant_velocity;
+    const RecordedScene uniform(recorded_options, seed);
+    const auto moved = initialise(uniform, seed);
+    EXPECT_FALSE(moved.ok());
+    EXPECT_LE((moved.gyroscope_bias - uniform.bias).norm(), 0.02);
+  }
+}
+
+TEST(RobustInitialisation, WithoutReadingsOrTracks) {
+  const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6}, 3);
+  std::mt19937_64 generator(1);
+  const auto found = initialiseRobustly(recorded.window, generator, options);
+  EXPECT_TRUE(found.ok()) << describe(found.status);
+  EXPECT_LE((found.gyroscope_bias - recorded.bias).norm(), 0.01);
+
+  const RecordedScene wrong({.scene = {.images = 21, .features = 20}, .drifting = 20, .drift = 0.05}, 8);
+  const auto lost = initialise(wrong, 1);
+  EXPECT_FALSE(lost.ok());
+
+  const auto fault = [&](const InertialWindow& window, const RobustInitialisationOptions& o) {
+    const auto refused = initialiseRobustly(window, generator, o);
+    EXPECT_EQ(refused.status, Status::bad_input);
+    return refused.result.fault;
+  };
+  EXPECT_EQ(fault(recorded.window, {}), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault({}, options), ClosedFormFault::too_few_images);
+  RobustInitialisationOptions bad = options;
+  bad.ransac.features_drawn = 0;
+  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  InertialWindow window = recorded.window;
+  window.features[7][3].bearing.setZero();
+  EXPECT_EQ(fault(window, options), ClosedFormFault::bad_bearing);
+  window.features.assign(3, {});
+  EXPECT_EQ(fault(window, options), ClosedFormFault::no_feature);
+}
+
+}  // namespace

@@ -1,0 +1,60 @@
+// A scene as a camera with noise and tracks that drift and an inertial sensor with a gyroscope's bias record it.
+#pragma once
+
+#include <fusion/inertial_window.hpp>
+#include <support/vi_measurements.hpp>
+#include <support/vi_scene.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace liestat_test {
+
+struct RecordedOptions {
+  SceneOptions scene = {};
+  double bias = 0;                           ///< rad/s, of the gyroscope, in a random direction
+  double sigma = 1. / 450;                   ///< rad, of a bearing
+  liestat::ImuNoise<double> noise = {};      ///< that readings have, and motions are integrated with
+  std::size_t drifting = 0;                  ///< the first tracks walk away,
+  double drift = 8. / 450;                   ///< rad, by so much an image in each direction
+};
+
+struct RecordedScene {
+  RecordedOptions options;
+  Scene scene;
+  std::vector<liestat::ImuSample<double>> readings;
+  Eigen::Vector3d bias;
+  liestat::InertialWindow window;
+
+  RecordedScene(const RecordedOptions& o, std::uint64_t seed) : options(o), scene(o.scene, seed) {
+    SceneRandom random(seed + 1000003);
+    bias = o.bias * random.unit();
+    readings = readingsOf(scene, o.noise, random, bias);
+    scene.addNoise(o.sigma, random);
+    for (std::size_t i = 0; i < o.drifting; ++i) {
+      Eigen::Vector3d walk = Eigen::Vector3d::Zero();
+      for (liestat::TrackedBearing& seen : scene.window.features[i]) {
+        if (seen.image > 0) walk += o.drift * random.normal3();
+        seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
+      }
+    }
+    window = {integrate({}), scene.window.features, o.scene.camera};
+  }
+  std::vector<liestat::Preintegration<double>> integrate(const liestat::ImuBias<double>& at) const {
+    return motionsOf(scene, readings, {.preintegration = {.noise = options.noise, .bias = at}});
+  }
+  auto integrator() const {
+    return [this](const liestat::ImuBias<double>& at) { return integrate(at); };
+  }
+};
+
+inline double quantileOf(std::vector<double> values, double p) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0 : values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1))];
+}
+
+}  // namespace liestat_test
