@@ -1,5 +1,6 @@
-// Any text as a calibration or as tracks: what keeps its promises, or an InputError of one line. Anything else is a
-// finding. A line of three dots parts the input into the file of tracks and that of the images' times.
+// Any text as a calibration, as tracks or as a ground truth: what keeps its promises, or an InputError of one line.
+// Anything else is a finding. A line of three dots parts the input into the file of tracks and that of the images'
+// times.
 //
 //   build/sanitize/fuzz/recording_fuzz -max_total_time=120 new_corpus fuzz/corpus/recording
 
@@ -12,6 +13,7 @@
 
 #include "cli/calibration.hpp"
 #include "cli/image_tracks.hpp"
+#include "cli/imu_file.hpp"
 #include "cli/input_error.hpp"
 
 namespace {
@@ -61,6 +63,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   attempt([&] { check(liestat::cli::parseCalibration(text, "fuzz")); });
   attempt([&] { (void)liestat::cli::parseImuNoise(text, "fuzz"); });
   attempt([&] { check(liestat::cli::parseImageTracks(text, "fuzz", {}, {}, 1403715523912143104)); });
+  attempt([&] {
+    const std::int64_t start_ns = liestat::cli::firstStamp(text, "fuzz");
+    const auto truth = liestat::cli::parseGroundTruth(text, "fuzz", start_ns);
+    require(!truth.empty() && truth.front().time == 0);
+    for (const auto& row : truth) require(row.state.params().allFinite() && std::isfinite(row.time));
+    const auto at = liestat::cli::truthAt(truth, 0.5 * truth.back().time);
+    require(!at || at->state.params().allFinite());
+  });
   const std::size_t dots = text.find("\n...\n");
   if (dots != std::string_view::npos) {
     attempt([&] {
