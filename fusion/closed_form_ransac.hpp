@@ -62,7 +62,7 @@ class MotionConsensus {
     solver_.eliminate();
     const double least = options.closed_form.least_parallax * options.closed_form.bearing_noise;
     for (std::size_t i = 0; i < table.features(); ++i) {
-      has_parallax_.push_back(result.features[table.feature[i]].parallax >= least);
+      has_parallax_.push_back(hasParallax(result.features[table.feature[i]], least));
       if (has_parallax_.back()) drawable_.push_back(i);
     }
     best_.cost = static_cast<double>(table.features());
@@ -106,7 +106,8 @@ class MotionConsensus {
     }
   }
 
-  /// The mean squared angle of a feature with its best position for a motion; the limit, where it is beyond or behind.
+  /// The mean squared angle, relative to each bearing's own deviation, of a feature with its best position for a
+  /// motion; the limit, where it is beyond or behind.
   double meanSquare(std::size_t i, const Motion& y) const {
     const Eigen::Vector3d P = solver_.feature(i, y);
     const std::span<const Ray> rays = table_.of(i);
@@ -116,7 +117,7 @@ class MotionConsensus {
       const Eigen::Vector3d d = relativePosition(table_.images[ray.image], P, y);
       // Without parallax the sign of a depth is noise. NaN is out.
       if (has_parallax_[i] && !(ray.u.dot(d) > 0)) return limit_;
-      sum += ray.u.cross(d).squaredNorm() / d.squaredNorm();
+      sum += ray.precision * ray.precision * ray.u.cross(d).squaredNorm() / d.squaredNorm();
       if (!(sum < most)) return limit_;
     }
     return sum / static_cast<double>(rays.size());
@@ -191,7 +192,7 @@ inline std::vector<std::size_t> misfits(const ClosedFormResult& result, const Ra
   for (std::size_t i = 0; i < result.features.size() && !result.solutions.empty(); ++i) {
     const ClosedFormFeature& feature = result.features[i];
     if (!feature.used || !(freedom(i) > 0)) continue;
-    const double angle = feature.residual / options.closed_form.bearing_noise;
+    const double angle = feature.residual / (feature.deviation * options.closed_form.bearing_noise);
     used.push_back(i);
     relative.push_back(angle * angle * static_cast<double>(feature.observations) / freedom(i));
   }

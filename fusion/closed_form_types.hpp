@@ -39,6 +39,9 @@ WindowImage windowImage(const Preintegration<S>& from_first) {
 struct TrackedBearing {
   std::size_t image = 0;                              ///< index into the window's images
   Eigen::Vector3d bearing = Eigen::Vector3d::Zero();  ///< in the body's axes; of any length but zero
+  /// Its standard deviation in units of the options' `bearing_noise`, the same in each direction across it. A pixel is
+  /// a smaller angle off the axis of a camera, and detectors have scales.
+  double deviation = 1;
 };
 
 /// All that was seen of a feature; in any order, not all images need to see it.
@@ -53,8 +56,8 @@ struct ClosedFormWindow {
 
 struct ClosedFormOptions {
   std::optional<double> gravity = 9.81;  ///< |G| in m/s²; none: its length is an unknown too
-  /// Standard deviation of a bearing in each direction across it, in rad (pixel noise over focal length). 0: exact
-  /// data, whose status is decided by ranks.
+  /// Standard deviation of a bearing in each direction across it, in rad (pixel noise over focal length), times the
+  /// bearing's own `deviation`. 0: exact data, whose status is decided by ranks, whatever their deviations.
   double bearing_noise = 0;
   bool estimate_bias = false;     ///< also the accelerometer's bias, as a correction of the integrated one
   double bias_deviation = 0.1;    ///< m/s², of its prior N(0, s²); infinite: none
@@ -92,7 +95,7 @@ enum class ClosedFormFault {
   image_order,       ///< index: the image that is not later than the one before, or does not start at 0
   not_a_rotation,    ///< index: image
   wrong_index,       ///< index: feature that names an image that does not exist
-  bad_bearing,       ///< index: feature with a bearing of zero length or not finite
+  bad_bearing,       ///< index: feature with a bearing of zero length or not finite, or a deviation not positive
   no_feature,        ///< none was seen twice
   bad_option         ///< gravity, noise, bias deviation or lever arm not usable
 };
@@ -103,7 +106,8 @@ struct ClosedFormFeature {
   bool used = false;              ///< false: seen in fewer than two images
   bool depth_determined = false;  ///< false: no parallax; its position is then any point of its line in front
   double parallax = 0;            ///< rad, RMS of its directions about their mean after compensation of the rotation
-  double residual = 0;            ///< rad, RMS over its observations
+  double residual = 0;            ///< rad, RMS over its observations; this and the parallax weighted by 1/deviation²
+  double deviation = 1;           ///< of its bearings, relative: root of the harmonic mean of their squares
   double depth_deviation = std::numeric_limits<double>::infinity();  ///< m, along its first bearing; image noise only
 };
 
@@ -228,7 +232,7 @@ inline std::string describeFault(const ClosedFormResult& result) {
     case ClosedFormFault::wrong_index:
       return "feature " + at + ": seen by an image that does not exist";
     case ClosedFormFault::bad_bearing:
-      return "feature " + at + ": a bearing is zero or not finite";
+      return "feature " + at + ": a bearing is zero or not finite, or its deviation is not positive";
     case ClosedFormFault::no_feature:
       return "no feature was seen in two images";
     case ClosedFormFault::bad_option:

@@ -7,19 +7,20 @@
 //
 // The directions u and u' of a feature from two images and the translation between these lie in a plane: for the right
 // rotation all normals u × u' are orthogonal to one vector, whatever depths and speeds are. The bias is what makes them
-// so for pairs of images 1, 2, 4 … steps apart, each with a translation of its own, in least squares of angles. Sources:
-// L. Kneip and S. Lynen, "Direct optimization of frame-to-frame rotation", ICCV 2013; Y. He et al., "A rotation-
-// translation-decoupled solution for robust and efficient visual-inertial initialization", CVPR 2023; here normals are
-// weighted by their noise, translations are unknowns of the least squares (variable projection) instead of eigenvectors,
-// whose eigenvalues noise shifts, and tracks have the weights of Geman and McClure until they are accepted or rejected.
+// so for pairs of images 1, 2, 4 … steps apart, each with a translation of its own, in least squares of angles.
+// Sources: L. Kneip and S. Lynen, "Direct optimization of frame-to-frame rotation", ICCV 2013; Y. He et al., "A
+// rotation- translation-decoupled solution for robust and efficient visual-inertial initialization", CVPR 2023; here
+// normals are weighted by their noise, translations are unknowns of the least squares (variable projection) instead of
+// eigenvectors, whose eigenvalues noise shifts, and tracks have the weights of Geman and McClure until they are
+// accepted or rejected.
 //
 // Without parallax normals are nothing but noise, and the constraint does not tell a rotation. Two rules keep that out:
-// a window whose directions all stay where they are, after rotations that the bias explains, is solved for that, without
-// translations (status no_parallax: at rest, pure rotation); in others a pair of images counts only if its directions
-// have moved, beyond what any rotation explains, by `least_parallax` deviations. What both leave out, hardly any
-// parallax, is `undetermined`. A lever arm of the camera only changes the translations.
-// Residuals are weighted by the noise of bearings alone: the gyroscope's must be smaller over the window (3e-4 rad in two
-// seconds of an ADIS16448, where a pixel is 2e-3).
+// a window whose directions all stay where they are, after rotations that the bias explains, is solved for that,
+// without translations (status no_parallax: at rest, pure rotation); in others a pair of images counts only if its
+// directions have moved, beyond what any rotation explains, by `least_parallax` deviations. What both leave out, hardly
+// any parallax, is `undetermined`. A lever arm of the camera only changes the translations. Residuals are weighted by
+// the noise of bearings alone: the gyroscope's must be smaller over the window (3e-4 rad in two seconds of an
+// ADIS16448, where a pixel is 2e-3).
 #pragma once
 
 #include <fusion/closed_form_types.hpp>
@@ -42,10 +43,11 @@ struct EpipolarBiasOptions {
   double bearing_noise = 0;                         ///< rad, as of the closed form; must be given
   Eigen::Vector3d prior = Eigen::Vector3d::Zero();  ///< rad/s
   double prior_deviation = 0.1;                     ///< rad/s
-  /// Of a pair of images that is used: RMS by which its directions move, beyond what a rotation explains, in deviations.
+  /// Of a pair of images that is used: RMS by which its directions move, beyond what a rotation explains, in
+  /// deviations.
   double least_parallax = 4;
-  double misfit_deviations = 5;  ///< of a track's χ², beyond which it is rejected
-  double least_consensus = 0.4;  ///< share of the tracks that must agree
+  double misfit_deviations = 5;     ///< of a track's χ², beyond which it is rejected
+  double least_consensus = 0.4;     ///< share of the tracks that must agree
   double largest_deviation = 0.02;  ///< rad/s, predicted, of the bias's least known direction
   int most_iterations = 30;         ///< of the last stage
 };
@@ -53,8 +55,8 @@ struct EpipolarBiasOptions {
 enum class EpipolarBiasStatus {
   ok,
   no_parallax,    ///< found, by directions that stay: the body did not move, or features are far (then see covariance)
-  undetermined,   ///< the data do not tell the bias well enough: too few tracks, or hardly any parallax; the bias is then
-                  ///< the one that makes directions stay best
+  undetermined,   ///< the data do not tell the bias well enough: too few tracks, or hardly any parallax; the bias is
+                  ///< then the one that makes directions stay best
   no_consensus,   ///< too few tracks agree on a bias
   not_converged,  ///< the iterations ended first
   bad_input       ///< see fault
@@ -184,7 +186,8 @@ class EpipolarSearch {
     return false;
   }
 
-  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay; whether they do.
+  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay; whether they
+  /// do.
   bool settle() {
     for (int round = 0; round < 6; ++round) {
       const std::vector<double> before = problem_.weight;
@@ -368,7 +371,6 @@ class EpipolarSearch {
 template <class Integrate>
 EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window, const EpipolarBiasOptions& options,
                                                  const Integrate& integrate) {
-  using Status = EpipolarBiasStatus;
   EpipolarBiasResult found;
   found.bias = options.prior;
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -414,15 +416,17 @@ EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window, c
   }
   const auto tracks = static_cast<double>(found.inliers.size() + found.outliers.size());
   if (found.pairs_used == 0 || !regular) {
-    found.status = Status::undetermined;
+    found.status = EpipolarBiasStatus::undetermined;
   } else if (static_cast<double>(found.inliers.size()) < options.least_consensus * tracks) {
-    found.status = Status::no_consensus;
+    found.status = EpipolarBiasStatus::no_consensus;
   } else if (!settled) {
-    found.status = Status::not_converged;
+    found.status = EpipolarBiasStatus::not_converged;
   } else {
     const detail::SmallSvd svd(detail::SmallMatrix::of<3, 3>(found.covariance));
     const bool known = std::sqrt(svd.value(0)) <= options.largest_deviation;
-    found.status = !known ? Status::undetermined : still ? Status::no_parallax : Status::ok;
+    found.status = !known  ? EpipolarBiasStatus::undetermined
+                   : still ? EpipolarBiasStatus::no_parallax
+                           : EpipolarBiasStatus::ok;
   }
   return found;
 }

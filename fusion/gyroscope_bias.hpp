@@ -103,7 +103,7 @@ class GyroscopeBiasProblem {
       state_.P.push_back(s.features[i]);
       for (const TrackedBearing& seen : window.features[i]) {
         const Eigen::Vector3d bearing = seen.bearing.normalized();
-        observations_.push_back({state_.P.size() - 1, seen.image, bearing, tangentRows(bearing)});
+        observations_.push_back({state_.P.size() - 1, seen.image, bearing, tangentRows(bearing), seen.deviation});
       }
     }
   }
@@ -136,6 +136,7 @@ class GyroscopeBiasProblem {
     std::size_t feature, image;
     Eigen::Vector3d bearing;
     Eigen::Matrix<double, 2, 3> across;
+    double deviation;
   };
 
   void setImages(State& state) const {
@@ -173,7 +174,7 @@ class GyroscopeBiasProblem {
       const Eigen::Vector3d x = fromImage(state, image, state.P[seen.feature]);
       const Eigen::Vector3d d = image.rotation.transpose() * x - window_.camera;
       ResidualRows rows(2);
-      if (!bearingResidual(d, seen.across, seen.bearing, sigma, rows, by_d)) {
+      if (!bearingResidual(d, seen.across, seen.bearing, seen.deviation * sigma, rows, by_d)) {
         return std::numeric_limits<double>::infinity();
       }
       cost += rows.squared();

@@ -187,7 +187,7 @@ class RefinementProblem {
       if (track.size() < 2 || !s.features[i].allFinite() || std::any_of(track.begin(), track.end(), isBehind)) continue;
       for (const TrackedBearing& seen : track) {
         const Eigen::Vector3d bearing = seen.bearing.normalized();
-        observations_.push_back({state_.P.size(), seen.image, bearing, tangentRows(bearing)});
+        observations_.push_back({state_.P.size(), seen.image, bearing, tangentRows(bearing), seen.deviation});
       }
       state_.P.push_back(s.features[i]);
       feature_.push_back(i);
@@ -233,6 +233,7 @@ class RefinementProblem {
     std::size_t feature, image;
     Eigen::Vector3d bearing;
     Eigen::Matrix<double, 2, 3> across;
+    double deviation;
   };
 
   Eigen::Vector3d inCamera(const SE23d& X, const Eigen::Vector3d& P) const {
@@ -263,7 +264,8 @@ class RefinementProblem {
       }
       const Eigen::Vector3d b = back * (state.P[seen.feature] - state.X[image].translation());
       ResidualRows rows(2);
-      if (!bearingResidual(b - window_.camera, seen.across, seen.bearing, options_.bearing_noise, rows, by_d)) {
+      if (!bearingResidual(b - window_.camera, seen.across, seen.bearing, seen.deviation * options_.bearing_noise, rows,
+                           by_d)) {
         return std::numeric_limits<double>::infinity();
       }
       cost += rows.squared();

@@ -34,8 +34,8 @@ struct RobustInitialisationOptions {
 
 enum class RobustInitialisationStatus {
   ok,  ///< motion and bias were found together; whether the motion is determined: see result.status
-  /// The motion does not tell the bias (at rest, constant velocity: see result.status and bias_status). The bias is that
-  /// of rotations, as good as epipolar.status says; without a consensus on the motion so are the inliers.
+  /// The motion does not tell the bias (at rest, constant velocity: see result.status and bias_status). The bias is
+  /// that of rotations, as good as epipolar.status says; without a consensus on the motion so are the inliers.
   bias_from_rotations,
   no_consensus,  ///< too few tracks agree, be it on a motion or on rotations; the result is that of all
   bad_input      ///< see result.fault
@@ -62,9 +62,9 @@ struct RobustInitialisation {
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
   /// With status ok from image noise and the prior, else that of `epipolar`.
   Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;                     ///< for this bias, of the inliers
-  std::vector<std::size_t> inliers, outliers;  ///< ascending
-  EpipolarBiasResult epipolar;                 ///< where it began
+  ClosedFormResult result;                                           ///< for this bias, of the inliers
+  std::vector<std::size_t> inliers, outliers;                        ///< ascending
+  EpipolarBiasResult epipolar;                                       ///< where it began
   GyroscopeBiasStatus bias_status = GyroscopeBiasStatus::bad_input;  ///< of the last estimate with the motion
   std::size_t hypotheses = 0;
   int rounds = 0;
@@ -79,7 +79,6 @@ struct RobustInitialisation {
 template <std::uniform_random_bit_generator Generator, class Integrate>
 RobustInitialisation initialiseRobustly(InertialWindow window, Generator& generator,
                                         const RobustInitialisationOptions& options, const Integrate& integrate) {
-  using Status = RobustInitialisationStatus;
   RobustInitialisation found;
   const ClosedFormOptions& closed_form = options.ransac.closed_form;
   const auto counted = [&](const ImuBias<double>& bias) {
@@ -112,7 +111,7 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
   const auto restoreCounts = [&] {
     for (const std::size_t i : found.outliers) found.result.features[i].observations = window.features[i].size();
   };
-  found.status = Status::bias_from_rotations;
+  found.status = RobustInitialisationStatus::bias_from_rotations;
   for (; found.rounds < options.most_rounds; ++found.rounds) {
     const ImuBias<double> bias{found.gyroscope_bias, accelerometer};
     const auto far = [&](const Preintegration<double>& motion) { return motion.mustReintegrate(bias); };
@@ -124,19 +123,19 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
         solveClosedFormRobustly(closedFormWindow(window, bias), generator, options.ransac);
     found.hypotheses += consensus.hypotheses;
     const bool same = found.rounds > 0 && consensus.inliers == found.inliers;
-    if (same && found.status == Status::ok) break;
+    if (same && found.status == RobustInitialisationStatus::ok) break;
     found.inliers = std::move(consensus.inliers);
     found.outliers = std::move(consensus.outliers);
     found.result = std::move(consensus.result);
     if (found.result.fault != ClosedFormFault::none) {
-      found.status = Status::bad_input;
+      found.status = RobustInitialisationStatus::bad_input;
       return found;
     }
     if (found.inliers.empty()) {
-      found.status = Status::no_consensus;
+      found.status = RobustInitialisationStatus::no_consensus;
       if (!found.epipolar.ok()) return found;
       // At rest and at constant velocity there is no motion to agree on, but still a rotation.
-      found.status = Status::bias_from_rotations;
+      found.status = RobustInitialisationStatus::bias_from_rotations;
       found.inliers = found.epipolar.inliers;
       found.outliers = found.epipolar.outliers;
       found.result = solveClosedForm(closedFormWindow(without(window, found.outliers), bias), closed_form);
@@ -147,10 +146,10 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
     GyroscopeBiasResult estimate = estimateGyroscopeBias(without(window, found.outliers), outer, counted);
     found.bias_status = estimate.status;
     if (estimate.status != GyroscopeBiasStatus::ok) {
-      found.status = Status::bias_from_rotations;
+      found.status = RobustInitialisationStatus::bias_from_rotations;
       return found;
     }
-    found.status = Status::ok;
+    found.status = RobustInitialisationStatus::ok;
     found.gyroscope_bias = estimate.bias;
     found.bias_covariance = estimate.covariance;
     found.result = std::move(estimate.result);

@@ -26,11 +26,13 @@ struct ScaledImage {
   Eigen::Matrix3d bias;  ///< (2/T²) J
 };
 
-/// An observation: where to, from which image, and 1/(standard deviation of the row), in 1/m.
+/// An observation: where to, from which image, 1/(standard deviation of the row), in 1/m, and 1/(the bearing's own
+/// relative deviation).
 struct Ray {
   Eigen::Vector3d u;
   std::size_t image = 0;
   double weight = 1;
+  double precision = 1;
 };
 
 /// The observations of all features that are used, one after the other.
@@ -144,7 +146,8 @@ inline Eigen::Matrix3d featureCovariance(const Eigen::Matrix3d& H, int& rank) {
 ///
 /// Bearings with a noise of σ in each of two directions make E[I - u uᵀ] larger than the true one by 2 σ² u uᵀ: a
 /// feature at depth z seems to leave a residual of √2 σ z, and least squares shrink the scene to make it smaller. With
-/// `noise` = σ that is taken off, which makes the minimum consistent: the matrix may then be indefinite.
+/// `noise` = σ (of a bearing of relative deviation one) that is taken off, which makes the minimum consistent: the
+/// matrix may then be indefinite.
 inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<const ScaledImage> images, bool bias,
                                           double noise = 0) {
   using Matrix3 = Eigen::Matrix3d;
@@ -159,9 +162,10 @@ inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<c
     const ScaledImage& image = images[ray.image];
     const double w = ray.weight * ray.weight, t = image.tau;
     const Vector3 wu = w * ray.u;
-    Matrix3 power = -(1 + 2 * noise * noise) * wu * ray.u.transpose();
+    const double own = noise / ray.precision, with_noise = 1 + 2 * own * own;
+    Matrix3 power = -with_noise * wu * ray.u.transpose();
     for (int i = 0; i < 3; ++i) power(i, i) += w;
-    Vector3 f = w * image.s - (1 + 2 * noise * noise) * ray.u.dot(image.s) * wu;
+    Vector3 f = w * image.s - with_noise * ray.u.dot(image.s) * wu;
     square += image.s.dot(f);
     if (bias) {
       Matrix3 b = power * image.bias;

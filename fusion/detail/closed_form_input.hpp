@@ -40,7 +40,7 @@ inline ClosedFormFault faultOf(const ClosedFormWindow& window, const ClosedFormO
     for (const TrackedBearing& seen : window.features[index]) {
       if (seen.image >= window.images.size()) return Fault::wrong_index;
       const double norm = seen.bearing.norm();
-      if (!(norm > 0) || !std::isfinite(norm)) return Fault::bad_bearing;
+      if (!(norm > 0) || !std::isfinite(norm) || !positive(seen.deviation)) return Fault::bad_bearing;
     }
   }
   index = 0;
@@ -64,18 +64,24 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
                                [&](const TrackedBearing& b) { return b.image != track.front().image; });
     if (!feature.used) continue;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double weights = 0;
     for (const TrackedBearing& b : track) {
       const Eigen::Vector3d u = window.images[b.image].rotation * b.bearing.normalized();
-      table.rays.push_back({u, b.image, 1});
+      const double precision = 1 / b.deviation;
+      table.rays.push_back({u, b.image, 1, precision});
       seen[b.image] = true;
-      sum += u;
+      sum += (precision * precision) * u;
+      weights += precision * precision;
     }
     // Chords of the directions to their mean.
     const Eigen::Vector3d mean = sum.normalized();
     double square = 0;
-    for (std::size_t k = table.begin.back(); k < table.rays.size(); ++k)
-      square += (table.rays[k].u - mean).squaredNorm();
-    feature.parallax = std::sqrt(square / static_cast<double>(track.size()));
+    for (std::size_t k = table.begin.back(); k < table.rays.size(); ++k) {
+      const Ray& ray = table.rays[k];
+      square += ray.precision * ray.precision * (ray.u - mean).squaredNorm();
+    }
+    feature.parallax = std::sqrt(square / weights);
+    feature.deviation = std::sqrt(static_cast<double>(track.size()) / weights);
     table.begin.push_back(table.rays.size());
     table.feature.push_back(i);
   }
@@ -95,14 +101,19 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
   return table;
 }
 
-/// The features of a table whose parallax is at least so much (rad).
+/// Whether a feature's parallax is at least so much (rad, for bearings of a deviation of one).
+inline bool hasParallax(const ClosedFormFeature& feature, double least) {
+  return feature.parallax >= least * feature.deviation;
+}
+
+/// The features of a table whose parallax is at least so much (rad, for bearings of a deviation of one).
 inline RayTable withParallax(const RayTable& table, const ClosedFormResult& result, double least) {
   RayTable kept;
   kept.window = table.window;
   kept.images = table.images;
   kept.rays.reserve(table.rays.size());
   for (std::size_t i = 0; i < table.features(); ++i) {
-    if (!(result.features[table.feature[i]].parallax >= least)) continue;
+    if (!hasParallax(result.features[table.feature[i]], least)) continue;
     const std::span<const Ray> rays = table.of(i);
     kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
     kept.begin.push_back(kept.rays.size());

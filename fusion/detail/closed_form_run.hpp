@@ -382,9 +382,10 @@ class ClosedFormRun {
       double square = 0;
       for (const Ray& ray : table_.of(i)) {
         const Eigen::Vector3d d = relativePosition(table_.images[ray.image], candidates_[0].P[i], candidates_[0].y);
-        square += ray.u.cross(d).squaredNorm() / d.squaredNorm();
+        square += ray.precision * ray.precision * ray.u.cross(d).squaredNorm() / d.squaredNorm();
       }
-      result_.features[table_.feature[i]].residual = std::sqrt(square / static_cast<double>(table_.of(i).size()));
+      ClosedFormFeature& feature = result_.features[table_.feature[i]];
+      feature.residual = feature.deviation * std::sqrt(square / static_cast<double>(table_.of(i).size()));
     }
   }
 

@@ -109,7 +109,7 @@ class ClosedFormSolver {
 
   /// All weights those of a depth of one.
   void resetWeights() {
-    for (Ray& ray : table_.rays) ray.weight = 1 / sigma_;
+    for (Ray& ray : table_.rays) ray.weight = ray.precision / sigma_;
   }
   /// Weights of the depths in a solution, floored (design note, 3.4).
   void setWeights(const MotionCandidate& solution) {
@@ -120,7 +120,7 @@ class ClosedFormSolver {
     });
     const double floor = std::max(0.2, 0.01 * median(depths));
     std::size_t k = 0;
-    forEachRay([&](std::size_t, Ray& ray) { ray.weight = 1 / (sigma_ * std::max(depths[k++], floor)); });
+    forEachRay([&](std::size_t, Ray& ray) { ray.weight = ray.precision / (sigma_ * std::max(depths[k++], floor)); });
   }
 
   /// Features taken out at the present weights; their sum is the motion's problem. With `noise` (rad) less what noise
@@ -223,7 +223,8 @@ class ClosedFormSolver {
       bool behind = false;
       for (const Ray& ray : table_.of(i)) {
         const Eigen::Vector3d d = relativePosition(table_.images[ray.image], candidate.P[i], candidate.y);
-        candidate.cost += ray.u.cross(d).squaredNorm() / (sigma_ * sigma_ * d.squaredNorm());
+        const double scale = ray.precision / sigma_;
+        candidate.cost += scale * scale * ray.u.cross(d).squaredNorm() / d.squaredNorm();
         behind = behind || ray.u.dot(d) < 0;
       }
       candidate.negative += behind;
@@ -267,7 +268,7 @@ class ClosedFormSolver {
       const Eigen::Vector3d d = relativePosition(table_.images[ray.image], solution.P[i], solution.y);
       const double depth = d.norm();
       ray.u = depth > 0 ? Eigen::Vector3d(d / depth) : ray.u;
-      ray.weight = depth > 0 ? 1 / (sigma_ * depth) : 0;
+      ray.weight = depth > 0 ? ray.precision / (sigma_ * depth) : 0;
     });
     const MotionBlock block = eliminate();
     table_.rays = measured;

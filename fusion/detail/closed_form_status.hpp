@@ -23,7 +23,8 @@ inline int genericNullDimension(std::size_t images, std::size_t features, bool b
   return images == 5 && one ? 2 : 0;
 }
 
-/// The largest sine of the angle between a direction and the plane that holds them best; 0 for fewer than three.
+/// The largest sine of the angle between a direction and the plane that holds them best, over the direction's relative
+/// deviation; 0 for fewer than three.
 inline double outOfPlane(const std::vector<Ray>& rays) {
   // The normal of the two that differ most from the first and from one another: nothing is squared.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -34,7 +35,7 @@ inline double outOfPlane(const std::vector<Ray>& rays) {
   if (normal.norm() == 0) return 0;
   normal.normalize();
   double most = 0;
-  for (const Ray& ray : rays) most = std::max(most, std::abs(normal.dot(ray.u)));
+  for (const Ray& ray : rays) most = std::max(most, ray.precision * std::abs(normal.dot(ray.u)));
   return most;
 }
 

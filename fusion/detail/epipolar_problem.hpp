@@ -63,7 +63,8 @@ class EpipolarProblem {
         std::size_t& own = slot_[i * images() + seen.image];
         // Twice in an image: the first.
         if (own != 0) continue;
-        sights_.push_back({seen.image, seen.bearing.normalized(), seen.bearing, bearing_noise * bearing_noise});
+        const double sigma = bearing_noise * seen.deviation;
+        sights_.push_back({seen.image, seen.bearing.normalized(), seen.bearing, sigma * sigma});
         own = sights_.size();
       }
     }
@@ -125,8 +126,8 @@ class EpipolarProblem {
     return static_cast<std::size_t>(std::count_if(pairs_.begin(), pairs_.end(), [](const Pair& p) { return p.used; }));
   }
 
-  /// The translations that fit the present bias best, by the eigenvector of least eigenvalue, twice: with equal weights,
-  /// then with those of the noise.
+  /// The translations that fit the present bias best, by the eigenvector of least eigenvalue, twice: with equal
+  /// weights, then with those of the noise.
   void fitTranslations() {
     for (Pair& pair : pairs_) {
       for (int pass = 0; pass < 2; ++pass) {
@@ -213,8 +214,7 @@ class EpipolarProblem {
       for (std::size_t m = pair.begin; m < pair.end; ++m) {
         const Sight &a = sights_[matches_[m].first], &b = sights_[matches_[m].second];
         const double parallax = a.u.cross(b.u).dot(a.u.cross(pair.t));
-        (parallax > 0 ? forward : back) +=
-            weight[matches_[m].track] * parallax * parallax / (a.variance + b.variance);
+        (parallax > 0 ? forward : back) += weight[matches_[m].track] * parallax * parallax / (a.variance + b.variance);
       }
       all += forward + back;
       wrong += std::min(forward, back);

@@ -55,13 +55,12 @@ TEST(EpipolarGyroscopeBias, IsFoundAmongDriftingTracks) {
     std::size_t ok = 0, right = 0, wrong = 0;
     int starts = 0;
     for (std::size_t trial = 0; trial < trials; ++trial) {
-      const RecordedScene recorded({.scene = {.images = static_cast<std::size_t>(10 * window) + 1,
-                                              .features = features,
-                                              .window = window},
-                                    .bias = bias,
-                                    .noise = adis,
-                                    .drifting = drifting},
-                                   200000 + trial);
+      const RecordedScene recorded(
+          {.scene = {.images = static_cast<std::size_t>(10 * window) + 1, .features = features, .window = window},
+           .bias = bias,
+           .noise = adis,
+           .drifting = drifting},
+          200000 + trial);
       const auto found = estimateEpipolarGyroscopeBias(recorded.window, options, recorded.integrator());
       ok += found.ok();
       starts += found.starts;
@@ -69,12 +68,13 @@ TEST(EpipolarGyroscopeBias, IsFoundAmongDriftingTracks) {
       for (const std::size_t i : found.inliers) ++(i < drifting ? wrong : right);
       EXPECT_EQ(found.inliers.size() + found.outliers.size(), features);
     }
-    std::printf("  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, bias %.5f / %.5f rad/s, precision %.4f, recall "
-                "%.4f, %.1f starts\n",
-                bias, window, drifting, features, ok, trials, quantileOf(error, 0.5), quantileOf(error, 0.95),
-                static_cast<double>(right) / static_cast<double>(right + wrong),
-                static_cast<double>(right) / static_cast<double>(trials * (features - drifting)),
-                starts / static_cast<double>(trials));
+    std::printf(
+        "  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, bias %.5f / %.5f rad/s, precision %.4f, recall "
+        "%.4f, %.1f starts\n",
+        bias, window, drifting, features, ok, trials, quantileOf(error, 0.5), quantileOf(error, 0.95),
+        static_cast<double>(right) / static_cast<double>(right + wrong),
+        static_cast<double>(right) / static_cast<double>(trials * (features - drifting)),
+        starts / static_cast<double>(trials));
     EXPECT_GE(ok, trials - 1);
     EXPECT_LE(quantileOf(error, 0.5), median);
     EXPECT_LE(quantileOf(error, 0.95), most);

@@ -46,13 +46,12 @@ TEST(RobustInitialisation, IsAsGoodAsWithTheRightTracks) {
     double nees = 0;
     std::size_t ok = 0, right = 0, wrong = 0, hypotheses = 0;
     for (std::size_t trial = 0; trial < trials; ++trial) {
-      const RecordedScene recorded({.scene = {.images = static_cast<std::size_t>(10 * window) + 1,
-                                              .features = features,
-                                              .window = window},
-                                    .bias = bias,
-                                    .noise = adis,
-                                    .drifting = drifting},
-                                   240000 + trial);
+      const RecordedScene recorded(
+          {.scene = {.images = static_cast<std::size_t>(10 * window) + 1, .features = features, .window = window},
+           .bias = bias,
+           .noise = adis,
+           .drifting = drifting},
+          240000 + trial);
       const auto found = initialise(recorded, trial);
       ok += found.ok();
       hypotheses += found.hypotheses;
@@ -68,17 +67,16 @@ TEST(RobustInitialisation, IsAsGoodAsWithTheRightTracks) {
       GyroscopeBiasOptions told{.closed_form = options.ransac.closed_form};
       told.start = recorded.bias;
       told.least_window = 0;
-      oracle.push_back(
-          speedError(estimateGyroscopeBias(kept, told, recorded.integrator()).result, recorded.scene));
+      oracle.push_back(speedError(estimateGyroscopeBias(kept, told, recorded.integrator()).result, recorded.scene));
     }
     const double precision = static_cast<double>(right) / static_cast<double>(right + wrong);
     const double recall = static_cast<double>(right) / static_cast<double>(trials * (features - drifting));
-    std::printf("  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, precision %.4f, recall %.4f, bias %.5f / %.5f "
-                "rad/s, NEES %.2f; speed error %.4f / %.3f, right tracks given %.4f / %.3f m/s; %.0f hypotheses\n",
-                bias, window, drifting, features, ok, trials, precision, recall, quantileOf(error, 0.5),
-                quantileOf(error, 0.95), nees, quantileOf(speed, 0.5), quantileOf(speed, 0.95),
-                quantileOf(oracle, 0.5), quantileOf(oracle, 0.95),
-                static_cast<double>(hypotheses) / static_cast<double>(trials));
+    std::printf(
+        "  %.2f rad/s, %.0f s, %zu of %zu drift: ok %zu of %zu, precision %.4f, recall %.4f, bias %.5f / %.5f "
+        "rad/s, NEES %.2f; speed error %.4f / %.3f, right tracks given %.4f / %.3f m/s; %.0f hypotheses\n",
+        bias, window, drifting, features, ok, trials, precision, recall, quantileOf(error, 0.5),
+        quantileOf(error, 0.95), nees, quantileOf(speed, 0.5), quantileOf(speed, 0.95), quantileOf(oracle, 0.5),
+        quantileOf(oracle, 0.95), static_cast<double>(hypotheses) / static_cast<double>(trials));
     EXPECT_GE(precision, 0.999);
     EXPECT_GE(recall, 0.998);
     EXPECT_GE(ok, trials - 1);
@@ -119,7 +117,8 @@ TEST(RobustInitialisation, AtRestAndAtConstantVelocity) {
 }
 
 TEST(RobustInitialisation, WithoutReadingsOrTracks) {
-  const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6}, 3);
+  const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6},
+                               3);
   std::mt19937_64 generator(1);
   const auto found = initialiseRobustly(recorded.window, generator, options);
   EXPECT_TRUE(found.ok()) << describe(found.status);

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -16,11 +17,12 @@ namespace liestat_test {
 
 struct RecordedOptions {
   SceneOptions scene = {};
-  double bias = 0;                           ///< rad/s, of the gyroscope, in a random direction
-  double sigma = 1. / 450;                   ///< rad, of a bearing
-  liestat::ImuNoise<double> noise = {};      ///< that readings have, and motions are integrated with
-  std::size_t drifting = 0;                  ///< the first tracks walk away,
-  double drift = 8. / 450;                   ///< rad, by so much an image in each direction
+  double bias = 0;                       ///< rad/s, of the gyroscope, in a random direction
+  double sigma = 1. / 450;               ///< rad, of a bearing
+  liestat::ImuNoise<double> noise = {};  ///< that readings have, and motions are integrated with
+  double spread = 1;                     ///< bearings have relative deviations between 1/spread and spread
+  std::size_t drifting = 0;              ///< the first tracks walk away,
+  double drift = 8. / 450;               ///< rad, by so much an image in each direction
 };
 
 struct RecordedScene {
@@ -34,7 +36,13 @@ struct RecordedScene {
     SceneRandom random(seed + 1000003);
     bias = o.bias * random.unit();
     readings = readingsOf(scene, o.noise, random, bias);
-    scene.addNoise(o.sigma, random);
+    for (liestat::FeatureTrack& track : scene.window.features) {
+      for (liestat::TrackedBearing& seen : track) {
+        seen.deviation = o.spread == 1 ? 1 : std::pow(o.spread, random.uniform(-1, 1));
+        const Eigen::Vector3d noise = o.sigma * seen.deviation * random.normal3();
+        seen.bearing = (seen.bearing + noise - seen.bearing.dot(noise) * seen.bearing).normalized();
+      }
+    }
     for (std::size_t i = 0; i < o.drifting; ++i) {
       Eigen::Vector3d walk = Eigen::Vector3d::Zero();
       for (liestat::TrackedBearing& seen : scene.window.features[i]) {
