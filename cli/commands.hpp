@@ -31,5 +31,6 @@ void addValidateMeansCommand(CLI::App& validate, Invocation& invocation);
 void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation);
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation);
 void addValidateSplitCommand(CLI::App& validate, Invocation& invocation);
+void addValidateViInitCommand(CLI::App& validate, Invocation& invocation);
 
 }  // namespace liestat::cli

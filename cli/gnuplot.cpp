@@ -140,6 +140,8 @@ std::string styleText(const Series& series, std::string_view colour) {
       return fmt::format("with lines lw 1.8 lc rgb '{}'{}", colour, dash);
     case Style::points:
       return fmt::format("with points pt 7 ps {} lc rgb '{}'", pointSize(series), colour);
+    case Style::stars:
+      return fmt::format("with points pt 3 ps 1.1 lw 1.6 lc rgb '{}'", colour);
     case Style::linespoints:
       return fmt::format("with linespoints pt 7 ps 0.45 lw 1.6 lc rgb '{}'{}", colour, dash);
     case Style::errorbars:

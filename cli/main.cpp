@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   addValidatePreintegrationCommand(*validate, invocation);
   addValidatePropagationCommand(*validate, invocation);
   addValidateSplitCommand(*validate, invocation);
+  addValidateViInitCommand(*validate, invocation);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

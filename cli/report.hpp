@@ -13,6 +13,7 @@ namespace liestat::cli {
 enum class Style {
   lines,         ///< through x, y; a NaN breaks the line, so one series may hold several curves
   points,        ///< at x, y
+  stars,         ///< the same, of a few points that matter
   linespoints,   ///< both
   errorbars,     ///< a point at x, y with a bar from low to high
   boxes,         ///< histogram bars at x of height y; `width` where they are not as wide as their distance
