@@ -94,7 +94,9 @@ struct EpipolarBiasResult {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   std::vector<std::size_t> inliers, outliers;  ///< ascending; a drift along the epipolar lines is not seen
   std::vector<double> residuals;               ///< of each track, RMS in deviations; infinite in neither list
-  std::size_t pairs_used = 0;                  ///< of images
+  /// Other biases for which many tracks agree, the best first: what else to try where this one turns out to be wrong.
+  std::vector<Eigen::Vector3d> others;
+  std::size_t pairs_used = 0;  ///< of images
   int starts = 0, iterations = 0;
   int integrations = 0;  ///< how often the readings were integrated anew
 
@@ -136,54 +138,60 @@ class EpipolarSearch {
     equalWeights();
     setBias(options_.prior);
     follow(10);
+    fromRotation_ = bias();
+    reach_ = most_even * quantileOf(problem_.rates(), 0.5);
     problem_.setAllPairs();
     follow(10);
-    fromRotation_ = bias();
     return settle() && isConsistent();
   }
-  /// The same for epipolar constraints, from several starts; the best few are followed to the end. Whether it settled.
+  /// The same for epipolar constraints, from several starts. A start that looks right is followed to the end at once,
+  /// the best few of the others where none was. Whether it settled.
   bool searchEpipolar() {
     rotation_ = false;
-    problem_.setPairs(problem_.bestStep(), problem_.bestStep());
     std::vector<Candidate> candidates;
+    Candidate best{std::numeric_limits<double>::infinity(), options_.prior, problem_.weight, false};
     for (starts_ = 0; starts_ < most_starts;) {
+      problem_.setPairs(problem_.bestStep(), problem_.bestStep());
       equalWeights();
       setBias(start(starts_++));
       problem_.fitTranslations();
       problem_.selectByParallax(0);
       const double cost = follow(12);
-      if (std::isfinite(cost)) candidates.push_back({cost, bias(), problem_.weight, false});
-      // Enough tracks agree: no other bias could have as many.
-      if (quantile(0.4) <= 1.1) break;
+      if (!std::isfinite(cost) || !isInReach()) continue;
+      const Candidate candidate{cost, bias(), problem_.weight, false};
+      visited_.push_back({cost, bias()});
+      if (isPromising() && !isKnown(candidate, candidates)) {
+        if (finish(candidate, best)) return true;
+      }
+      candidates.push_back(candidate);
     }
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
-    problem_.setAllPairs();
-    Candidate best{std::numeric_limits<double>::infinity(), options_.prior, problem_.weight, false};
-    std::vector<Eigen::Vector3d> tried;
+    std::vector<Candidate> followed;
     for (const Candidate& candidate : candidates) {
-      const auto isNear = [&](const Eigen::Vector3d& other) { return (other - candidate.bias).norm() < 0.01; };
-      if (std::any_of(tried.begin(), tried.end(), isNear)) continue;
-      if (tried.size() == most_followed) break;
-      tried.push_back(candidate.bias);
-      problem_.weight = candidate.weight;
-      setBias(candidate.bias);
-      problem_.fitTranslations();
-      problem_.selectByParallax(options_.least_parallax);
-      follow(10);
-      const bool settled = settle();
-      const double cost = robustCost();
-      if (cost < best.cost) best = {cost, bias(), problem_.weight, settled};
-      if (settled && isConsistent()) return true;
+      if (isKnown(candidate, followed)) continue;
+      if (followed.size() == most_followed) break;
+      followed.push_back(candidate);
+      if (finish(candidate, best)) return true;
+    }
+    problem_.setAllPairs();
+    if (!std::isfinite(best.cost)) {
+      giveUp();
+      return false;
     }
     problem_.weight = best.weight;
     setBias(best.bias);
     problem_.fitTranslations();
     problem_.selectByParallax(options_.least_parallax);
-    if (minimise() && problem_.usedPairs() > 0) return best.settled;
-    setBias(problem_.usedPairs() > 0 ? best.bias : fromRotation_);
+    return problem_.usedPairs() > 0 && minimise() && best.settled;
+  }
+  /// Without any pair to go by: the bias that makes directions stay best.
+  void giveUp() {
+    equalWeights();
+    setBias(fromRotation_);
+    problem_.fitTranslations();
+    problem_.selectByParallax(std::numeric_limits<double>::infinity());
     linearise();
-    return false;
   }
 
   /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay; whether they
@@ -195,6 +203,7 @@ class EpipolarSearch {
       if (!rotation_) {
         problem_.fitTranslations();
         problem_.selectByParallax(options_.least_parallax);
+        if (problem_.usedPairs() == 0) return false;
       }
       if (!minimise()) return false;
       if (problem_.weight == before) return true;
@@ -216,6 +225,18 @@ class EpipolarSearch {
            sum <= freedom + 3 * std::sqrt(2 * freedom) && (rotation_ || problem_.wrongWay() <= most_wrong_way);
   }
 
+  /// Biases that were come by, the best first, at most so many, and none near the one that was found.
+  std::vector<Eigen::Vector3d> others(std::size_t most) {
+    std::sort(visited_.begin(), visited_.end(), [](const Visited& a, const Visited& b) { return a.cost < b.cost; });
+    std::vector<Eigen::Vector3d> kept{bias()};
+    for (const Visited& visited : visited_) {
+      const auto isNear = [&](const Eigen::Vector3d& other) { return (other - visited.bias).norm() < 0.01; };
+      if (kept.size() <= most && std::none_of(kept.begin(), kept.end(), isNear)) kept.push_back(visited.bias);
+    }
+    kept.erase(kept.begin());
+    return kept;
+  }
+
   /// Covariance of the bias; false where it is not determined.
   bool covariance(Eigen::Matrix3d& result) {
     const EpipolarProblem::Normal normal = linearise();
@@ -230,8 +251,10 @@ class EpipolarSearch {
  private:
   static constexpr int most_starts = 16;
   static constexpr std::size_t most_followed = 4;
+  /// How much larger the mean of all parallaxes may be than their differences: a wall seen at a right angle.
+  static constexpr double most_even = 8;
   /// Below 0.0003 in 1300 windows that were right, above in most that were not; features without parallax add to it.
-  static constexpr double most_wrong_way = 0.01;
+  static constexpr double most_wrong_way = 0.002;
 
   struct Candidate {
     double cost;
@@ -240,21 +263,62 @@ class EpipolarSearch {
     bool settled;
   };
 
+  struct Visited {
+    double cost;
+    Eigen::Vector3d bias;
+  };
+  /// The same minimum.
+  static bool isKnown(const Candidate& candidate, const std::vector<Candidate>& others) {
+    return std::any_of(others.begin(), others.end(),
+                       [&](const Candidate& other) { return (other.bias - candidate.bias).norm() < 0.01; });
+  }
+  /// Whether a good part of the tracks agree after a start, to noise.
+  bool isPromising() {
+    const std::vector<double> soft = problem_.weight;
+    decide();
+    const bool promising = isConsistent();
+    problem_.weight = soft;
+    return promising;
+  }
+  /// To the minimum with all pairs; keeps it if it is the best so far, and says if there is no need to look further.
+  bool finish(const Candidate& candidate, Candidate& best) {
+    problem_.weight = candidate.weight;
+    setBias(candidate.bias);
+    problem_.setAllPairs();
+    problem_.fitTranslations();
+    problem_.selectByParallax(options_.least_parallax);
+    follow(10);
+    const bool settled = settle();
+    // One that is not consistent is but a last resort.
+    const bool consistent = isConsistent();
+    const double cost = robustCost() + (consistent ? 0 : static_cast<double>(problem_.weight.size()));
+    if (!isInReach()) return false;
+    visited_.push_back({cost, bias()});
+    if (cost < best.cost) best = {cost, bias(), problem_.weight, settled};
+    const auto in = std::count_if(problem_.weight.begin(), problem_.weight.end(), [](double w) { return w > 0; });
+    return settled && consistent && 2 * static_cast<std::size_t>(in) >= problem_.weight.size();
+  }
+
   double priorInformation() const { return 1 / (options_.prior_deviation * options_.prior_deviation); }
   void setBias(const Eigen::Vector3d& bias) { problem_.setBias({bias, accelerometer_}); }
   void equalWeights() { std::fill(problem_.weight.begin(), problem_.weight.end(), 1.); }
 
-  /// The prior, what directions say that stay, and biases around the prior.
+  /// The translation turns directions too, by speed over distance, but not all by the same: how far the bias may be
+  /// from what directions say that stay, in terms of how little they do.
+  bool isInReach() const { return (bias() - fromRotation_).norm() <= reach_; }
+  /// The prior, what directions say that stay, and biases around these.
   Eigen::Vector3d start(int k) const {
-    if (k == 0) return options_.prior;
-    if (k == 1) return fromRotation_;
+    const bool is_near = reach_ < 2 * options_.prior_deviation;
+    const Eigen::Vector3d centre = is_near ? fromRotation_ : options_.prior;
+    if (k == 0) return centre;
+    if (k == 1) return is_near ? options_.prior : fromRotation_;
     Eigen::Vector3d around = Eigen::Vector3d::Zero();
     if (k < 8) {
       around[(k - 2) / 2] = k % 2 == 0 ? -1.5 : 1.5;
     } else {
       for (int i = 0; i < 3; ++i) around[i] = (k >> i) % 2 == 0 ? -1 : 1;
     }
-    return options_.prior + options_.prior_deviation * around;
+    return centre + std::min(options_.prior_deviation, 0.5 * reach_) * around;
   }
 
   EpipolarProblem::Normal linearise() {
@@ -272,16 +336,19 @@ class EpipolarSearch {
     for (std::size_t i = 0; i < problem_.weight.size(); ++i) {
       if (problem_.count[i] > 0) values.push_back(problem_.meanSquare(i));
     }
+    return quantileOf(std::move(values), share);
+  }
+  static double quantileOf(std::vector<double> values, double share) {
     if (values.empty()) return 1;
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
   }
-  /// Of tracks, each at most one.
+  /// Of tracks, each at most one, which is what one costs that is in no pair.
   double robustCost() const {
     double cost = 0;
     for (std::size_t i = 0; i < problem_.weight.size(); ++i) {
-      if (problem_.count[i] > 0) cost += problem_.meanSquare(i) / (3 + problem_.meanSquare(i));
+      cost += problem_.count[i] > 0 ? problem_.meanSquare(i) / (3 + problem_.meanSquare(i)) : 1;
     }
     return cost;
   }
@@ -361,6 +428,8 @@ class EpipolarSearch {
   EpipolarProblem problem_;
   bool rotation_ = true;
   Eigen::Vector3d fromRotation_ = Eigen::Vector3d::Zero();
+  double reach_ = 0;
+  std::vector<Visited> visited_;
   int starts_ = 0, iterations_ = 0;
 };
 
@@ -404,7 +473,9 @@ EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window, c
       settled = search.settle();
     }
   }
+  if (search.pairs() == 0) search.giveUp();
   found.bias = search.bias();
+  found.others = search.others(8);
   found.starts = search.starts();
   found.iterations = search.iterations();
   found.pairs_used = search.pairs();

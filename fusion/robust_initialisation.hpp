@@ -7,8 +7,8 @@
 //   if (found.ok()) … found.gyroscope_bias, found.result.solutions[0], found.inliers; then refine()
 //
 // First the gyroscope's bias from rotations alone (epipolar_gyroscope_bias.hpp), which needs no motion and bears wrong
-// tracks; for it the consensus on the motion (closed_form_ransac.hpp); on the tracks that agree the bias and the motion
-// together (gyroscope_bias.hpp), and again while tracks come or go.
+// tracks; for it, and for others that came near where few agree, the consensus on the motion (closed_form_ransac.hpp);
+// on the tracks that agree the bias and the motion together (gyroscope_bias.hpp), and again while tracks come or go.
 #pragma once
 
 #include <fusion/closed_form_ransac.hpp>
@@ -60,7 +60,7 @@ inline const char* describe(RobustInitialisationStatus status) {
 struct RobustInitialisation {
   RobustInitialisationStatus status = RobustInitialisationStatus::bad_input;
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
-  /// With status ok from image noise and the prior, else that of `epipolar`.
+  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
   Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
   ClosedFormResult result;                                           ///< for this bias, of the inliers
   std::vector<std::size_t> inliers, outliers;                        ///< ascending
@@ -112,8 +112,8 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
     for (const std::size_t i : found.outliers) found.result.features[i].observations = window.features[i].size();
   };
   found.status = RobustInitialisationStatus::bias_from_rotations;
-  for (; found.rounds < options.most_rounds; ++found.rounds) {
-    const ImuBias<double> bias{found.gyroscope_bias, accelerometer};
+  const auto consensusFor = [&](const Eigen::Vector3d& gyroscope) {
+    const ImuBias<double> bias{gyroscope, accelerometer};
     const auto far = [&](const Preintegration<double>& motion) { return motion.mustReintegrate(bias); };
     if (std::any_of(window.motions.begin(), window.motions.end(), far)) {
       std::vector<Preintegration<double>> motions = counted(bias);
@@ -122,6 +122,24 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
     ClosedFormRansacResult consensus =
         solveClosedFormRobustly(closedFormWindow(window, bias), generator, options.ransac);
     found.hypotheses += consensus.hypotheses;
+    return consensus;
+  };
+  for (; found.rounds < options.most_rounds; ++found.rounds) {
+    ClosedFormRansacResult consensus = consensusFor(found.gyroscope_bias);
+    const std::size_t tracks = consensus.inliers.size() + consensus.outliers.size();
+    if (found.rounds == 0 && found.epipolar.status != EpipolarBiasStatus::no_parallax) {
+      // Rotations may have more than one explanation: the motion decides, if a good part of the tracks agree on it.
+      std::vector<Eigen::Vector3d> others = found.epipolar.others;
+      others.push_back(options.prior);
+      for (const Eigen::Vector3d& other : others) {
+        if (2 * consensus.inliers.size() >= tracks) break;
+        ClosedFormRansacResult next = consensusFor(other);
+        if (5 * next.inliers.size() < 2 * tracks || next.inliers.size() <= consensus.inliers.size()) continue;
+        consensus = std::move(next);
+        found.gyroscope_bias = other;
+        found.bias_covariance = options.prior_deviation * options.prior_deviation * Eigen::Matrix3d::Identity();
+      }
+    }
     const bool same = found.rounds > 0 && consensus.inliers == found.inliers;
     if (same && found.status == RobustInitialisationStatus::ok) break;
     found.inliers = std::move(consensus.inliers);
@@ -138,7 +156,8 @@ RobustInitialisation initialiseRobustly(InertialWindow window, Generator& genera
       found.status = RobustInitialisationStatus::bias_from_rotations;
       found.inliers = found.epipolar.inliers;
       found.outliers = found.epipolar.outliers;
-      found.result = solveClosedForm(closedFormWindow(without(window, found.outliers), bias), closed_form);
+      found.result = solveClosedForm(
+          closedFormWindow(without(window, found.outliers), {found.gyroscope_bias, accelerometer}), closed_form);
       restoreCounts();
       return found;
     }

@@ -102,6 +102,23 @@ class EpipolarProblem {
     }
     return best;
   }
+  /// How fast the direction of each track moves at the present bias (rad/s, RMS over pairs), of tracks that are in any.
+  std::vector<double> rates() const {
+    std::vector<double> sum(weight.size(), 0.), result;
+    std::vector<std::size_t> matches(weight.size(), 0);
+    for (const Pair& pair : pairs_) {
+      const double dt = images_[pair.second].image.time - images_[pair.first].image.time;
+      for (std::size_t m = pair.begin; m < pair.end; ++m) {
+        const Match& match = matches_[m];
+        sum[match.track] += (sights_[match.first].u - sights_[match.second].u).squaredNorm() / (dt * dt);
+        ++matches[match.track];
+      }
+    }
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      if (matches[i] > 0) result.push_back(std::sqrt(sum[i] / static_cast<double>(matches[i])));
+    }
+    return result;
+  }
   /// Tracks with residuals, as linearise() left them.
   std::size_t tracks() const {
     return static_cast<std::size_t>(std::count_if(count.begin(), count.end(), [](std::size_t c) { return c > 0; }));

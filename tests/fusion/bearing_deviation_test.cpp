@@ -1,5 +1,5 @@
-// Bearings with deviations of their own: whatever is estimated is consistent, and a common factor is the same as another
-// bearing_noise.
+// Bearings with deviations of their own: whatever is estimated is consistent, and a common factor is the same as
+// another bearing_noise.
 
 #include <fusion/refinement.hpp>
 #include <fusion/robust_initialisation.hpp>
@@ -25,8 +25,8 @@ using namespace liestat_test;
 constexpr double pixel = 1. / 450;
 const ClosedFormOptions closed_form{.bearing_noise = pixel, .singular_values = false};
 
-/// eᵀ C⁻¹ e of the first n unknowns, the second three of which are a gravity of known length: the covariance has no part
-/// along it, nor has the error to first order.
+/// eᵀ C⁻¹ e of the first n unknowns, the second three of which are a gravity of known length: the covariance has no
+/// part along it, nor has the error to first order.
 template <class Covariance>
 double squaredDistance(const Covariance& covariance, std::vector<double> error, int n, const Eigen::Vector3d& gravity) {
   const Eigen::Vector3d along = gravity.normalized();
@@ -87,9 +87,10 @@ TEST(BearingDeviation, TheClosedFormIsConsistent) {
     ignored.push_back(plain.solutions.empty() ? 10 : (plain.solutions[0].velocity - recorded.scene.velocity).norm());
   }
   index /= trials;
-  std::printf("  NEES %.2f of 5, depths %.2f of 1, cost per degree of freedom %.3f; speed error %.4f, deviations "
-              "ignored %.4f m/s\n",
-              index, depth / depths, cost / degrees, quantileOf(speed, 0.5), quantileOf(ignored, 0.5));
+  std::printf(
+      "  NEES %.2f of 5, depths %.2f of 1, cost per degree of freedom %.3f; speed error %.4f, deviations "
+      "ignored %.4f m/s\n",
+      index, depth / depths, cost / degrees, quantileOf(speed, 0.5), quantileOf(ignored, 0.5));
   EXPECT_NEAR(index, 5, 4 * std::sqrt(2. * 5 / trials));
   // Depths of a window share the error of its scale: as if there were one a window.
   EXPECT_NEAR(depth / depths, 1, 4 * std::sqrt(2. / trials));
@@ -113,16 +114,16 @@ TEST(BearingDeviation, BiasesAndRefinementAreConsistent) {
     outer += squaredDistance(found.covariance, errorsOf({found.bias - recorded.bias}), 3, Eigen::Vector3d::UnitZ());
     const auto refined = refine(recorded.window, found.result.solutions.at(0), {.gyroscope = found.bias}, refinement);
     ASSERT_EQ(refined.status, RefinementStatus::ok) << trial;
-    refined_index += squaredDistance(refined.covariance,
-                                     errorsOf({refined.velocity() - recorded.scene.velocity,
-                                               refined.gravity - recorded.scene.gravity}),
-                                     6, refined.gravity);
+    refined_index += squaredDistance(
+        refined.covariance,
+        errorsOf({refined.velocity() - recorded.scene.velocity, refined.gravity - recorded.scene.gravity}), 6,
+        refined.gravity);
     cost += refined.cost;
     degrees += static_cast<double>(refined.degrees_of_freedom);
   }
   rotation /= trials, outer /= trials, refined_index /= trials;
-  std::printf("  NEES: bias by rotations %.2f of 3, with the motion %.2f of 3, refined %.2f of 5; cost %.3f\n", rotation,
-              outer, refined_index, cost / degrees);
+  std::printf("  NEES: bias by rotations %.2f of 3, with the motion %.2f of 3, refined %.2f of 5; cost %.3f\n",
+              rotation, outer, refined_index, cost / degrees);
   const double error = 4 * std::sqrt(6. / trials);
   EXPECT_NEAR(rotation, 3.1, error);
   // Of image noise: the gyroscope's adds a tenth.
@@ -136,11 +137,9 @@ TEST(BearingDeviation, ConsensusKnowsNoiseFromDrift) {
   std::size_t right = 0, wrong = 0;
   constexpr std::size_t trials = 30, drifting = 16, features = 40;
   for (std::size_t trial = 0; trial < trials; ++trial) {
-    const RecordedScene recorded({.scene = {.images = 21, .features = features},
-                                  .noise = {1.7e-4, 2e-3},
-                                  .spread = 2,
-                                  .drifting = drifting},
-                                 320000 + trial);
+    const RecordedScene recorded(
+        {.scene = {.images = 21, .features = features}, .noise = {1.7e-4, 2e-3}, .spread = 2, .drifting = drifting},
+        320000 + trial);
     std::mt19937_64 generator(trial);
     const auto robust =
         solveClosedFormRobustly(closedFormWindow(recorded.window, {}), generator, {.closed_form = closed_form});
@@ -152,9 +151,9 @@ TEST(BearingDeviation, ConsensusKnowsNoiseFromDrift) {
 
 // All deviations twice as large, and the noise half of it: nothing changes.
 TEST(BearingDeviation, ACommonFactorIsThatOfTheNoise) {
-  const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.02, .noise = {1.7e-4, 2e-3},
-                                .spread = 1.5, .drifting = 6},
-                               17);
+  const RecordedScene recorded(
+      {.scene = {.images = 21, .features = 20}, .bias = 0.02, .noise = {1.7e-4, 2e-3}, .spread = 1.5, .drifting = 6},
+      17);
   InertialWindow twice = recorded.window;
   for (FeatureTrack& track : twice.features) {
     for (TrackedBearing& seen : track) seen.deviation *= 2;
@@ -192,7 +191,8 @@ TEST(BearingDeviation, ACommonFactorIsThatOfTheNoise) {
 
 TEST(BearingDeviation, MustBePositive) {
   const RecordedScene recorded({.scene = {.images = 6, .features = 8}}, 4);
-  for (const double bad : {0., -1., std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {0., -1., std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     InertialWindow window = recorded.window;
     window.features[5][2].deviation = bad;
     const ClosedFormWindow closed = closedFormWindow(window, {});
