@@ -309,7 +309,7 @@ class EpipolarSearch {
   /// The prior, what directions say that stay, and biases around these.
   Eigen::Vector3d start(int k) const {
     const bool is_near = reach_ < 2 * options_.prior_deviation;
-    const Eigen::Vector3d centre = is_near ? fromRotation_ : options_.prior;
+    Eigen::Vector3d centre = is_near ? fromRotation_ : options_.prior;
     if (k == 0) return centre;
     if (k == 1) return is_near ? options_.prior : fromRotation_;
     Eigen::Vector3d around = Eigen::Vector3d::Zero();

@@ -36,10 +36,10 @@ double squaredDistance(const Covariance& covariance, std::vector<double> error, 
   }
   double part = 0;
   for (int i = 0; n > 3 && i < 3; ++i) {
-    part += along[i] * error[static_cast<std::size_t>(3 + i)];
+    part += along[i] * error[3 + static_cast<std::size_t>(i)];
     for (int j = 0; j < 3; ++j) C(3 + i, 3 + j) += along[i] * along[j];
   }
-  for (int i = 0; n > 3 && i < 3; ++i) error[static_cast<std::size_t>(3 + i)] -= part * along[i];
+  for (int i = 0; n > 3 && i < 3; ++i) error[3 + static_cast<std::size_t>(i)] -= part * along[i];
   const detail::Triangle root = detail::Triangle::cholesky(C);
   double sum = 0;
   std::vector<double> x;
