@@ -9,7 +9,7 @@
 // rotation all normals u × u' are orthogonal to one vector, whatever depths and speeds are. The bias is what makes them
 // so for pairs of images 1, 2, 4 … steps apart, each with a translation of its own, in least squares of angles.
 // Sources: L. Kneip and S. Lynen, "Direct optimization of frame-to-frame rotation", ICCV 2013; Y. He et al., "A
-// rotation- translation-decoupled solution for robust and efficient visual-inertial initialization", CVPR 2023; here
+// rotation-translation-decoupled solution for robust and efficient visual-inertial initialization", CVPR 2023; here
 // normals are weighted by their noise, translations are unknowns of the least squares (variable projection) instead of
 // eigenvectors, whose eigenvalues noise shifts, and tracks have the weights of Geman and McClure until they are
 // accepted or rejected.
@@ -18,9 +18,10 @@
 // a window whose directions all stay where they are, after rotations that the bias explains, is solved for that,
 // without translations (status no_parallax: at rest, pure rotation); in others a pair of images counts only if its
 // directions have moved, beyond what any rotation explains, by `least_parallax` deviations. What both leave out, hardly
-// any parallax, is `undetermined`. A lever arm of the camera only changes the translations. Residuals are weighted by
-// the noise of bearings alone: the gyroscope's must be smaller over the window (3e-4 rad in two seconds of an
-// ADIS16448, where a pixel is 2e-3).
+// any parallax, is `undetermined`. Several rotations may then explain the normals: a minimum must have its features in
+// front of the camera, and no mean parallax far beyond the differences between parallaxes; `others` are those next to
+// it. A lever arm of the camera only changes the translations. Residuals are weighted by the noise of bearings alone:
+// the gyroscope's must be smaller over the window (3e-4 rad in two seconds of an ADIS16448, where a pixel is 2e-3).
 #pragma once
 
 #include <fusion/closed_form_types.hpp>
@@ -148,7 +149,7 @@ class EpipolarSearch {
   /// the best few of the others where none was. Whether it settled.
   bool searchEpipolar() {
     rotation_ = false;
-    std::vector<Candidate> candidates;
+    std::vector<Candidate> candidates, followed;
     Candidate best{std::numeric_limits<double>::infinity(), options_.prior, problem_.weight, false};
     for (starts_ = 0; starts_ < most_starts;) {
       problem_.setPairs(problem_.bestStep(), problem_.bestStep());
@@ -160,17 +161,16 @@ class EpipolarSearch {
       if (!std::isfinite(cost) || !isInReach()) continue;
       const Candidate candidate{cost, bias(), problem_.weight, false};
       visited_.push_back({cost, bias()});
-      if (isPromising() && !isKnown(candidate, candidates)) {
-        if (finish(candidate, best)) return true;
-      }
       candidates.push_back(candidate);
+      if (!isPromising() || isKnown(candidate, followed)) continue;
+      followed.push_back(candidate);
+      if (finish(candidate, best)) return true;
     }
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
-    std::vector<Candidate> followed;
     for (const Candidate& candidate : candidates) {
       if (isKnown(candidate, followed)) continue;
-      if (followed.size() == most_followed) break;
+      if (followed.size() >= most_followed) break;
       followed.push_back(candidate);
       if (finish(candidate, best)) return true;
     }
@@ -194,8 +194,8 @@ class EpipolarSearch {
     linearise();
   }
 
-  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay; whether they
-  /// do.
+  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay (or six
+  /// times: one at the limit may come and go); whether there is a minimum.
   bool settle() {
     for (int round = 0; round < 6; ++round) {
       const std::vector<double> before = problem_.weight;
