@@ -171,6 +171,37 @@ struct ClosedFormResult {
   bool ok() const { return status == ClosedFormStatus::ok && consistent; }
 };
 
+/// The enumerator's name, for files.
+inline const char* name(ClosedFormStatus status) {
+  switch (status) {
+    case ClosedFormStatus::ok:
+      return "ok";
+    case ClosedFormStatus::ambiguous:
+      return "ambiguous";
+    case ClosedFormStatus::double_root:
+      return "double_root";
+    case ClosedFormStatus::scale_unobservable:
+      return "scale_unobservable";
+    case ClosedFormStatus::stationary:
+      return "stationary";
+    case ClosedFormStatus::no_parallax:
+      return "no_parallax";
+    case ClosedFormStatus::gravity_undetermined:
+      return "gravity_undetermined";
+    case ClosedFormStatus::bias_unobservable:
+      return "bias_unobservable";
+    case ClosedFormStatus::mirror_gravity:
+      return "mirror_gravity";
+    case ClosedFormStatus::coplanar:
+      return "coplanar";
+    case ClosedFormStatus::too_few_images:
+      return "too_few_images";
+    case ClosedFormStatus::bad_input:
+      return "bad_input";
+  }
+  return "";
+}
+
 /// In words, for people.
 inline const char* describe(ClosedFormStatus status) {
   switch (status) {

@@ -42,6 +42,15 @@ struct RefinementOptions {
   double least_decrease = 1e-3;  ///< of the cost (χ²): below it, it has converged
 };
 
+/// What each of n windows that are to be fused (fusion/window_fusion.hpp) is refined with, so that all together count
+/// the prior of the biases once: deviations √n times as large.
+inline RefinementOptions withSharedPrior(RefinementOptions options, std::size_t n) {
+  const double root = std::sqrt(static_cast<double>(n));
+  options.gyroscope_deviation *= root;
+  options.accelerometer_deviation *= root;
+  return options;
+}
+
 enum class RefinementStatus {
   ok,
   not_converged,  ///< the iterations ended first

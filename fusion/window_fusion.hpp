@@ -4,7 +4,7 @@
 //
 //   liestat::WindowFusion fusion(9.81);
 //   for (…) {  // disjoint windows, in the order of time, refined withSharedPrior(options, n)
-//     const auto meeting = fusion.add(liestat::windowStates(refined), integrate_gap);  // meeting.chi2 ~ χ²(11)
+//     const auto meeting = fusion.add(liestat::windowStates(refined, window), integrate_gap);  // meeting.chi2 ~ χ²(11)
 //   }
 //   if (fusion.ok()) … fusion.state(): at the last image of the last window, with its covariance
 //
@@ -125,8 +125,10 @@ struct WindowStates {
   bool ok() const { return first.covariance.allFinite() && independent.allFinite(); }
 };
 
-/// The states at the ends of a refined window. Not ok() where the refinement did not succeed.
-inline WindowStates windowStates(const RefinementResult& refined) {
+/// The states at the ends of a refined window. A refinement has one bias for the whole window, the mean of one that
+/// walks as the noise of the window's motions says: what it is at either end departs from that by a variance of a third
+/// of what it walks. Not ok() where the refinement did not succeed.
+inline WindowStates windowStates(const RefinementResult& refined, const InertialWindow& window) {
   WindowStates states;
   const auto none = [&states] {
     states.first.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -169,11 +171,21 @@ inline WindowStates windowStates(const RefinementResult& refined) {
   states.first.mean = state(refined.gravity, refined.velocity());
   states.last.mean = state(G, V);
   const Eigen::Matrix<double, 11, 21> A = tangent(states.first.mean, at_first), B = tangent(states.last.mean, at_last);
+  Eigen::Matrix<double, 11, 1> walked = Eigen::Matrix<double, 11, 1>::Zero();
+  for (const Preintegration<double>& motion : window.motions) {
+    const ImuNoise<double>& noise = motion.options().noise;
+    walked.segment<3>(5).array() += noise.gyroscope_walk * noise.gyroscope_walk * motion.duration();
+    walked.tail<3>().array() += noise.accelerometer_walk * noise.accelerometer_walk * motion.duration();
+  }
   states.first.covariance = A * covariance * A.transpose();
   states.last.covariance = B * covariance * B.transpose();
+  states.first.covariance.diagonal() += walked / 3;
+  states.last.covariance.diagonal() += walked / 3;
   // In deviations, because those differ by factors of thousands.
   const Eigen::Matrix<double, 11, 1> unit = states.first.covariance.diagonal().cwiseSqrt();
-  const detail::Matrix11 cross = unit.cwiseInverse().asDiagonal() * A * covariance * B.transpose();
+  detail::Matrix11 both = A * covariance * B.transpose();
+  both.diagonal() -= walked / 6;
+  const detail::Matrix11 cross = unit.cwiseInverse().asDiagonal() * both;
   const detail::Cholesky<double, 11> factor(
       detail::Matrix11(unit.cwiseInverse().asDiagonal() * states.first.covariance * unit.cwiseInverse().asDiagonal()));
   if (!factor.ok()) return none();
@@ -181,15 +193,6 @@ inline WindowStates windowStates(const RefinementResult& refined) {
   const detail::Matrix11 half = factor.halfSolve<11>(cross);
   states.independent = states.last.covariance - half.transpose() * half;
   return states;
-}
-
-/// What each of n windows is to be refined with, so that all together count the prior of the biases once: deviations √n
-/// times as large.
-inline RefinementOptions withSharedPrior(RefinementOptions options, std::size_t n) {
-  const double root = std::sqrt(static_cast<double>(n));
-  options.gyroscope_deviation *= root;
-  options.accelerometer_deviation *= root;
-  return options;
 }
 
 /// Collects windows in the order of time; see the header comment.

@@ -79,9 +79,10 @@ struct Fused {
   explicit Fused(const Recording& recording, std::size_t wrong = 9) {
     double end = 0;
     for (const std::size_t k : {0, 1, 2}) {
-      last = refined(recording.window(25 * k, 25 * k + 20));
+      const InertialWindow window = recording.window(25 * k, 25 * k + 20);
+      last = refined(window);
       ok = ok && last.ok();
-      states = windowStates(last);
+      states = windowStates(last, window);
       if (k == wrong) {
         // Ten deviations of the gyroscope's bias.
         states.first.mean.get<2>().x() += 10 * std::sqrt(states.first.covariance(5, 5));
@@ -97,11 +98,12 @@ struct Fused {
 
 TEST(WindowFusion, OfOneWindowIsItsPosterior) {
   const Recording recording(3);
-  const RefinementResult one = refined(recording.window(0, 20), 1);
+  const InertialWindow window = recording.window(0, 20);
+  const RefinementResult one = refined(window, 1);
   ASSERT_TRUE(one.ok());
   WindowFusion fusion(Scene::g);
   EXPECT_FALSE(fusion.ok());
-  const WindowStates states = windowStates(one);
+  const WindowStates states = windowStates(one, window);
   const auto none = [](const ImuBias<double>&) { return Preintegration<double>(); };
   EXPECT_EQ(fusion.add(states, none).status, liestat::Status::ok);
   ASSERT_TRUE(fusion.ok());
@@ -178,9 +180,10 @@ TEST(WindowFusion, IsConsistent) {
     index += mahalanobisSquared(fused.fusion.state(), truth);
     chi2 += fused.fusion.chi2();
     degrees += static_cast<double>(fused.fusion.degrees_of_freedom());
-    const RefinementResult alone = refined(recording.window(50, 70), 1);
+    const InertialWindow last = recording.window(50, 70);
+    const RefinementResult alone = refined(last, 1);
     for (const int k : {0, 1}) {
-      const InertialState x = k == 0 ? windowStates(alone).last.mean : fused.fusion.state().mean;
+      const InertialState x = k == 0 ? windowStates(alone, last).last.mean : fused.fusion.state().mean;
       gyroscope[k] += (x.get<2>() - recording.bias.gyroscope).squaredNorm();
       accelerometer[k] += (accelerometerBias(x, Scene::g) - recording.bias.accelerometer).squaredNorm();
       tilts[k] += std::pow(distance(x.get<0>(), truth.get<0>()), 2);
@@ -223,10 +226,10 @@ TEST(WindowFusion, SeesAContradiction) {
 }
 
 TEST(WindowFusion, LeavesOutWhatHasNoCovariance) {
-  EXPECT_FALSE(windowStates({}).ok());
+  EXPECT_FALSE(windowStates({}, {}).ok());
   WindowFusion fusion(Scene::g);
   const auto none = [](const ImuBias<double>&) { return Preintegration<double>(); };
-  EXPECT_EQ(fusion.add(windowStates({}), none).status, liestat::Status::ill_defined);
+  EXPECT_EQ(fusion.add(windowStates({}, {}), none).status, liestat::Status::ill_defined);
   EXPECT_FALSE(fusion.ok());
   EXPECT_EQ(fusion.inflation(), 1);
 }
