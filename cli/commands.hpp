@@ -32,5 +32,6 @@ void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation);
 void addValidateSplitCommand(CLI::App& validate, Invocation& invocation);
 void addValidateViInitCommand(CLI::App& validate, Invocation& invocation);
+void addViInitCommand(CLI::App& app, Invocation& invocation);
 
 }  // namespace liestat::cli

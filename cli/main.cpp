@@ -27,6 +27,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   addMeanCommand(app, invocation);
   addPreintegrateCommand(app, invocation);
+  addViInitCommand(app, invocation);
   CLI::App* simulate = app.add_subcommand("simulate", "Files of simulated measurements with their truth");
   simulate->require_subcommand(1);
   addSimulateViCommand(*simulate, invocation);

@@ -3,6 +3,7 @@
 #include <cli/imu_file.hpp>
 #include <cli/input_error.hpp>
 #include <cli/json_output.hpp>
+#include <cli/summary.hpp>
 #include <cli/table.hpp>
 #include <fusion/preintegrate.hpp>
 #include <fusion/preintegration_factor.hpp>
@@ -66,13 +67,6 @@ Eigen::Vector3d deviations(const Window& w, int block) {
   return w.result.motion.gaussian().covariance.diagonal().segment<3>(3 * block).cwiseSqrt();
 }
 double largest(const Eigen::Vector3d& v) { return v.maxCoeff(); }
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 JsonObject toJson(const Window& w, bool with_noise) {
   JsonObject o;
@@ -138,7 +132,7 @@ void printSummary(const std::vector<Window>& windows, bool with_noise) {
   }
   if (rotation.empty()) return;
   std::fputs(fmt::format("\nagainst the truth, {} windows: medians {:.3g} rad, {:.3g} m/s, {:.3g} m\n", rotation.size(),
-                         median(rotation), median(velocity), median(position))
+                         quantile(rotation, 0.5), quantile(velocity, 0.5), quantile(position, 0.5))
                  .c_str(),
              stdout);
   if (!with_noise) return;

@@ -130,36 +130,6 @@ SolutionCount solutionsOf(ClosedFormStatus status) {
   }
 }
 
-std::string name(ClosedFormStatus status) {
-  switch (status) {
-    case S::ok:
-      return "ok";
-    case S::ambiguous:
-      return "ambiguous";
-    case S::double_root:
-      return "double_root";
-    case S::scale_unobservable:
-      return "scale_unobservable";
-    case S::stationary:
-      return "stationary";
-    case S::no_parallax:
-      return "no_parallax";
-    case S::gravity_undetermined:
-      return "gravity_undetermined";
-    case S::bias_unobservable:
-      return "bias_unobservable";
-    case S::mirror_gravity:
-      return "mirror_gravity";
-    case S::coplanar:
-      return "coplanar";
-    case S::too_few_images:
-      return "too_few_images";
-    case S::bad_input:
-      return "bad_input";
-  }
-  return "";
-}
-
 const std::vector<Table1Entry>& table1Entries() {
   static const std::vector<Table1Entry> entries{
       {"varying acceleration, not coplanar; n = 4, N ≥ 2; n ≥ 5",

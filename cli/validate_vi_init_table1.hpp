@@ -15,9 +15,6 @@ namespace liestat::cli {
 /// How many solutions a status stands for.
 enum class SolutionCount { one, two, infinite };
 SolutionCount solutionsOf(ClosedFormStatus status);
-/// The status' name in JSON.
-std::string name(ClosedFormStatus status);
-
 /// A row of Martinelli's Table 1 (2012), or what his text says beside it.
 struct Table1Entry {
   const char* cases;  ///< the motion, images n and features N
