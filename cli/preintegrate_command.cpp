@@ -1,6 +1,7 @@
 #include <cli/calibration.hpp>
 #include <cli/commands.hpp>
 #include <cli/imu_file.hpp>
+#include <cli/imu_options.hpp>
 #include <cli/input_error.hpp>
 #include <cli/json_output.hpp>
 #include <cli/summary.hpp>
@@ -16,7 +17,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 
@@ -27,15 +27,11 @@ constexpr const char* command_name = "liestat preintegrate";
 constexpr double most_windows = 1e6;
 
 struct Options {
-  std::string imu, calibration, truth, json;
-  std::vector<double> noise, gyroscope_bias, accelerometer_bias;
+  ImuOptions imu;
+  std::string calibration, truth, json;
   std::optional<double> begin, end, window;
-  ImuScheme scheme = ImuScheme::averaged;
-  double largest_gap = 0.1, gravity = 9.81;
+  double gravity = 9.81;
 };
-
-const std::map<std::string, ImuScheme> schemes = {
-    {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
 
 /// One interval, and how far it is from the truth where that is known.
 struct Window {
@@ -141,25 +137,15 @@ void printSummary(const std::vector<Window>& windows, bool with_noise) {
              stdout);
 }
 
-Eigen::Vector3d vectorOf(const std::vector<double>& list) {
-  return list.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(list[0], list[1], list[2]);
-}
-
 int runCommand(const Options& options, const Invocation& invocation) {
-  const ImuFile imu = readImu(options.imu);
+  const ImuFile imu = readImu(options.imu.file);
   RecordingOptions<double> how;
-  how.scheme = options.scheme;
-  how.largest_gap = options.largest_gap;
-  if (!options.calibration.empty()) how.preintegration.noise = readImuNoise(options.calibration);
+  how.scheme = options.imu.scheme;
+  how.largest_gap = options.imu.largest_gap;
   ImuNoise<double>& noise = how.preintegration.noise;
-  const auto take = [&](std::size_t i, double& density) {
-    if (i < options.noise.size()) density = options.noise[i];
-  };
-  take(0, noise.gyroscope), take(1, noise.accelerometer), take(2, noise.gyroscope_walk),
-      take(3, noise.accelerometer_walk);
+  noise = options.imu.noiseOver(options.calibration.empty() ? ImuNoise<double>{} : readImuNoise(options.calibration));
   const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
-  how.preintegration.bias = {vectorOf(options.gyroscope_bias), vectorOf(options.accelerometer_bias)};
-  const bool bias_given = !options.gyroscope_bias.empty() || !options.accelerometer_bias.empty();
+  how.preintegration.bias = options.imu.bias();
   std::vector<GroundTruth> truth;
   if (!options.truth.empty()) truth = readGroundTruth(options.truth, imu.start_ns);
 
@@ -185,7 +171,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     w.begin = begin + static_cast<double>(i) * length;
     const double until = i + 1 == count && !options.window ? end : w.begin + length;
     const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
-    if (!bias_given) how.preintegration.bias = first ? first->bias : ImuBias<double>{};
+    if (!options.imu.hasBias()) how.preintegration.bias = first ? first->bias : ImuBias<double>{};
     w.result = preintegrate<double>(imu.samples, w.begin, until, how);
     if (w.result.ok() && first && last) {
       w.error =
@@ -201,7 +187,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
-    object.set("file", options.imu).set("format", imu.format).set("readings", imu.samples.size());
+    object.set("file", options.imu.file).set("format", imu.format).set("readings", imu.samples.size());
     object.set("start_ns", imu.start_ns);
     object.set("covariance_order", "position rotation velocity").set("covariance_side", "right");
     object.set("covariance_frame", "axes of the body at the end of the window, m rad m/s");
@@ -220,33 +206,14 @@ void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
-  command
-      ->add_option("--imu", options->imu,
-                   "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
-      ->required();
+  addImuOptions(*command, options->imu, " (default 0, or the truth's)");
   command->add_option("--calibration", options->calibration,
                       "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
-  command
-      ->add_option("--noise", options->noise,
-                   "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
-      ->delimiter(',')
-      ->expected(2, 4)
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z (default 0, or the truth's)")
-      ->delimiter(',')
-      ->expected(3);
-  command->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default 0, or the truth's)")
-      ->delimiter(',')
-      ->expected(3);
   command->add_option("--begin", options->begin,
                       "s since the first reading, or the file's seconds (default: the first)");
   command->add_option("--end", options->end, "The same (default: the last)");
   command
       ->add_option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--scheme", options->scheme, "averaged (default), held, cubic")
-      ->transform(CLI::CheckedTransformer(schemes));
-  command->add_option("--largest-gap", options->largest_gap, "s between two readings (default 0.1)")
       ->check(CLI::PositiveNumber);
   command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
   command->add_option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");

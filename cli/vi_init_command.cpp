@@ -1,5 +1,6 @@
 #include <cli/calibration.hpp>
 #include <cli/commands.hpp>
+#include <cli/imu_options.hpp>
 #include <cli/input_error.hpp>
 #include <cli/validation_command.hpp>
 #include <cli/vi_init.hpp>
@@ -12,7 +13,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <map>
 #include <memory>
 
 namespace liestat::cli {
@@ -21,20 +21,14 @@ namespace {
 constexpr const char* command_name = "liestat vi-init";
 
 struct Options {
-  std::string imu, tracks, image_times, truth, json, report, camera;
+  ImuOptions imu;
+  std::string tracks, image_times, truth, json, report, camera;
   std::vector<std::string> calibration;
-  std::vector<double> intrinsics, noise, gyroscope_bias, accelerometer_bias;
+  std::vector<double> intrinsics;
   bool free_gravity = false, no_consensus = false, no_refinement = false;
   double gravity = 9.81;
   ViInitOptions how;
 };
-
-const std::map<std::string, ImuScheme> schemes = {
-    {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
-
-Eigen::Vector3d vectorOf(const std::vector<double>& list) {
-  return list.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(list[0], list[1], list[2]);
-}
 
 CameraCalibration cameraOf(const Options& options, const Calibration& calibration) {
   CameraCalibration camera;
@@ -59,16 +53,11 @@ CameraCalibration cameraOf(const Options& options, const Calibration& calibratio
 
 ViRecording recordingOf(const Options& options) {
   ViRecording recording;
-  recording.imu = readImu(options.imu);
+  recording.imu = readImu(options.imu.file);
   recording.tracks = readImageTracks(options.tracks, options.image_times, recording.imu.start_ns);
   const Calibration calibration = options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
   recording.camera = cameraOf(options, calibration);
-  if (calibration.imu) recording.noise = *calibration.imu;
-  const auto take = [&](std::size_t i, double& density) {
-    if (i < options.noise.size()) density = options.noise[i];
-  };
-  take(0, recording.noise.gyroscope), take(1, recording.noise.accelerometer);
-  take(2, recording.noise.gyroscope_walk), take(3, recording.noise.accelerometer_walk);
+  recording.noise = options.imu.noiseOver(calibration.imu.value_or(ImuNoise<double>{}));
   if (!(recording.noise.gyroscope > 0 && recording.noise.accelerometer > 0)) {
     throw InputError(command_name, 0, "the inertial sensor's densities of noise are not known",
                      "--calibration with an imu0, or --noise gyroscope,accelerometer");
@@ -83,7 +72,9 @@ ViRecording recordingOf(const Options& options) {
 int runCommand(const Options& options, const Invocation& invocation) {
   ViInitOptions how = options.how;
   how.gravity = options.free_gravity ? std::nullopt : std::optional(options.gravity);
-  how.prior = {vectorOf(options.gyroscope_bias), vectorOf(options.accelerometer_bias)};
+  how.prior = options.imu.bias();
+  how.scheme = options.imu.scheme;
+  how.largest_gap = options.imu.largest_gap;
   how.consensus = !options.no_consensus;
   how.refinement = !options.no_refinement;
   const ViRecording recording = recordingOf(options);
@@ -107,10 +98,7 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
   ViInitOptions& how = options->how;
   CLI::App* command = app.add_subcommand(
       "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
-  command
-      ->add_option("--imu", options->imu,
-                   "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
-      ->required();
+  addImuOptions(*command, options->imu, ": as it is expected (default 0)");
   command->add_option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s")
       ->required();
   command->add_option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
@@ -120,12 +108,6 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
   command->add_option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's")
       ->delimiter(',')
       ->expected(4);
-  command
-      ->add_option("--noise", options->noise,
-                   "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
-      ->delimiter(',')
-      ->expected(2, 4)
-      ->check(CLI::NonNegativeNumber);
   command->add_option("--noise-factor", how.noise_factor, "Multiplies these densities (default 1)")
       ->check(CLI::Range(1e-3, 1e6));
   command->add_option("--pixel-noise", how.pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
@@ -140,16 +122,11 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
   command->add_option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)")->check(CLI::Range(1e-3, 1e3));
   command->add_flag("--free-gravity", options->free_gravity, "|G| is not known");
-  command->add_option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z: as it is expected (default 0)")
-      ->delimiter(',')
-      ->expected(3);
-  command->add_option("--gyroscope-deviation", how.gyroscope_deviation, "rad/s, of that (default 0.1)")
+  command->add_option("--gyroscope-deviation", how.gyroscope_deviation, "rad/s, of its expected bias (default 0.1)")
       ->check(CLI::Range(1e-9, 10.));
   command
-      ->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z: as it is expected (default 0)")
-      ->delimiter(',')
-      ->expected(3);
-  command->add_option("--accelerometer-deviation", how.accelerometer_deviation, "m/s^2, of that (default 0.15)")
+      ->add_option("--accelerometer-deviation", how.accelerometer_deviation,
+                   "m/s^2, of its expected bias (default 0.15)")
       ->check(CLI::Range(1e-9, 100.));
   command->add_flag("--known-biases", how.known_biases, "Biases are as they are expected: nothing is estimated");
   command->add_flag("--true-biases", how.true_biases, "Those of the ground truth are used: nothing is estimated");
@@ -160,10 +137,6 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
   command->add_option("--begin", how.begin,
                       "s since the first reading, or the file's seconds (default: the first image)");
   command->add_option("--end", how.end, "The same (default: the last image)");
-  command->add_option("--scheme", how.scheme, "Of integration: averaged (default), held, cubic")
-      ->transform(CLI::CheckedTransformer(schemes));
-  command->add_option("--largest-gap", how.largest_gap, "s between two readings (default 0.1)")
-      ->check(CLI::PositiveNumber);
   command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with");
   command->add_option("--seed", how.seed, "Of the consensus");
   command->add_option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
