@@ -30,8 +30,8 @@ struct ImuOptions {
   /// The densities of a calibration, with those that were given in their place.
   ImuNoise<double> noiseOver(ImuNoise<double> densities) const {
     std::size_t i = 0;
-    for (double* density : {&densities.gyroscope, &densities.accelerometer, &densities.gyroscope_walk,
-                            &densities.accelerometer_walk}) {
+    for (double* density :
+         {&densities.gyroscope, &densities.accelerometer, &densities.gyroscope_walk, &densities.accelerometer_walk}) {
       if (i < noise.size()) *density = noise[i];
       ++i;
     }
@@ -45,8 +45,7 @@ inline void addImuOptions(CLI::App& command, ImuOptions& options, const std::str
   static const std::map<std::string, ImuScheme> schemes = {
       {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
   command
-      .add_option("--imu", options.file,
-                  "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+      .add_option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
       ->required();
   command
       .add_option("--noise", options.noise,

@@ -16,7 +16,7 @@
 namespace liestat::cli {
 namespace {
 
-constexpr double most_windows = 1e5;
+constexpr double most_windows = 2e4;
 
 /// The angle between two directions.
 double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -75,13 +75,13 @@ class Initialiser {
     w.end = times_[images.back()];
     chooseTracks(w);
     const std::optional<GroundTruth> truth = truthAt(recording_.truth, w.begin);
-    const bool known = options_.known_biases || options_.true_biases;
-    w.integrated = start;
-    if (options_.true_biases && truth) w.integrated = truth->bias;
+    // Where there is no truth at the time, its biases are not known.
+    w.known_biases = options_.true_biases ? truth.has_value() : options_.known_biases;
+    w.integrated = options_.true_biases && truth ? truth->bias : start;
     w.measured.motions = integrate(w, w.integrated);
     if (w.fault != RecordingFault::none) return w;
-    findMotion(w, known, number);
-    if (options_.refinement) refineWindow(w, known, 1, w.refined);
+    findMotion(w, number);
+    if (options_.refinement) refineWindow(w, 1, w.refined);
     compare(w);
     return w;
   }
@@ -89,7 +89,7 @@ class Initialiser {
   /// A window again, with a part of the prior.
   std::optional<RefinementResult> withPartOfPrior(ViWindow window, std::size_t n) const {
     std::optional<RefinementResult> refined;
-    refineWindow(window, options_.known_biases || options_.true_biases, n, refined);
+    refineWindow(window, n, refined);
     return refined;
   }
 
@@ -168,8 +168,8 @@ class Initialiser {
             .bias_deviation = options_.accelerometer_deviation};
   }
 
-  void findMotion(ViWindow& w, bool known, std::size_t number) const {
-    const ClosedFormOptions closed_form = closedFormOptions(known);
+  void findMotion(ViWindow& w, std::size_t number) const {
+    const ClosedFormOptions closed_form = closedFormOptions(w.known_biases);
     RobustInitialisation& found = w.found;
     const auto integrateAnew = [&](const ImuBias<double>& bias) {
       ViWindow again = w;
@@ -178,7 +178,7 @@ class Initialiser {
     found.gyroscope_bias = w.integrated.gyroscope;
     if (options_.consensus) {
       std::mt19937_64 generator(options_.seed + 0x9E3779B97F4A7C15ULL * number);
-      if (known) {
+      if (w.known_biases) {
         ClosedFormRansacResult consensus = solveClosedFormRobustly(closedFormWindow(w.measured, w.integrated),
                                                                    generator, {.closed_form = closed_form});
         found.result = std::move(consensus.result);
@@ -194,7 +194,7 @@ class Initialiser {
       found = initialiseRobustly(w.measured, generator, options, integrateAnew);
     } else {
       for (std::size_t i = 0; i < w.measured.features.size(); ++i) found.inliers.push_back(i);
-      if (known) {
+      if (w.known_biases) {
         found.result = solveClosedForm(closedFormWindow(w.measured, w.integrated), closed_form);
         return;
       }
@@ -218,7 +218,7 @@ class Initialiser {
     return kept;
   }
 
-  void refineWindow(ViWindow& w, bool known, std::size_t parts, std::optional<RefinementResult>& refined) const {
+  void refineWindow(ViWindow& w, std::size_t parts, std::optional<RefinementResult>& refined) const {
     const ClosedFormResult& closed = w.closedForm();
     if (closed.solutions.empty() || closed.status == ClosedFormStatus::stationary ||
         closed.status == ClosedFormStatus::scale_unobservable) {
@@ -230,7 +230,7 @@ class Initialiser {
     options.prior = options_.prior;
     options.gyroscope_deviation = options_.gyroscope_deviation;
     options.accelerometer_deviation = options_.accelerometer_deviation;
-    if (known) {
+    if (w.known_biases) {
       // As good as exact.
       options.prior = w.integrated;
       options.gyroscope_deviation = options.accelerometer_deviation = 1e-6;
@@ -342,6 +342,7 @@ bool ViWindow::ok() const {
 std::string ViWindow::status() const {
   if (fault != RecordingFault::none) return fault == RecordingFault::gap ? "gap" : "no_readings";
   const ClosedFormResult& closed = closedForm();
+  if (tracks.empty() || closed.fault == ClosedFormFault::no_feature) return "no_features";
   if (closed.status != ClosedFormStatus::ok) return name(closed.status);
   if (found.inliers.empty()) return "no_consensus";
   if (ok()) return "ok";

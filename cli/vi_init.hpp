@@ -65,6 +65,7 @@ struct ViWindow {
   std::vector<std::size_t> tracks;  ///< of the recording's; features of the results in this order
   InertialWindow measured;          ///< integrated with `integrated`
   ImuBias<double> integrated;
+  bool known_biases = false;  ///< they are the truth: nothing was estimated
   /// Motion, tracks that agree, and the gyroscope's bias. Where biases are known, or all tracks are right, what was not
   /// asked for is as it was given.
   RobustInitialisation found;

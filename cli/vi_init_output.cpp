@@ -163,13 +163,18 @@ struct Summary {
   }
 };
 
+/// Points as rows.
+Eigen::MatrixXd rowsOf(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) rows.row(static_cast<Eigen::Index>(i)) = points[i];
+  return rows;
+}
+
 JsonObject toJson(const ClosedFormSolution& s) {
   JsonObject o;
   o.set("velocity", s.velocity).set("gravity", s.gravity).set("accelerometer_bias_change", s.accelerometer_bias);
   o.set("roll", s.roll()).set("pitch", s.pitch()).set("cost", s.cost).set("negative_depths", s.negative_depths);
-  Eigen::MatrixXd features(static_cast<Eigen::Index>(s.features.size()), 3);
-  for (std::size_t i = 0; i < s.features.size(); ++i) features.row(static_cast<Eigen::Index>(i)) = s.features[i];
-  return o.set("features", features);
+  return o.set("features", rowsOf(s.features));
 }
 
 JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vector<double>& times) {
@@ -194,7 +199,7 @@ JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vecto
     state.set("velocity", Eigen::Vector3d(r.states[j].velocity()));
     states.push_back(state);
   }
-  return o.set("states", states);
+  return o.set("states", states).set("features", rowsOf(r.features));
 }
 
 JsonObject toJson(const ViError& e) {
