@@ -3,6 +3,7 @@
 
 #include <fusion/refinement.hpp>
 #include <fusion/robust_initialisation.hpp>
+#include <support/small_mahalanobis.hpp>
 #include <support/vi_recorded.hpp>
 
 #include <Eigen/Core>
@@ -40,16 +41,8 @@ double squaredDistance(const Covariance& covariance, std::vector<double> error, 
     for (int j = 0; j < 3; ++j) C(3 + i, 3 + j) += along[i] * along[j];
   }
   for (int i = 0; n > 3 && i < 3; ++i) error[3 + static_cast<std::size_t>(i)] -= part * along[i];
-  const detail::Triangle root = detail::Triangle::cholesky(C);
-  double sum = 0;
-  std::vector<double> x;
-  for (int i = 0; i < n; ++i) {
-    double value = error[static_cast<std::size_t>(i)];
-    for (int k = 0; k < i; ++k) value -= root.r(k, i) * x[static_cast<std::size_t>(k)];
-    x.push_back(value / root.r(i, i));
-    sum += x.back() * x.back();
-  }
-  return sum;
+  error.resize(static_cast<std::size_t>(n));
+  return liestat_test::mahalanobisSquared(C, error);
 }
 std::vector<double> errorsOf(std::initializer_list<Eigen::Vector3d> parts) {
   std::vector<double> error;

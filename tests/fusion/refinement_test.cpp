@@ -2,6 +2,7 @@
 
 #include <fusion/closed_form.hpp>
 #include <fusion/refinement.hpp>
+#include <support/small_mahalanobis.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
@@ -58,16 +59,7 @@ struct Recorded {
 
 /// eᵀ C⁻¹ e of the first n unknowns.
 double normalised(const detail::SmallMatrix& covariance, const std::vector<double>& error, int n) {
-  const detail::Triangle root = detail::Triangle::cholesky(covariance.block(0, 0, n, n));
-  double sum = 0;
-  std::vector<double> x;
-  for (int i = 0; i < n; ++i) {
-    double value = error[static_cast<std::size_t>(i)];
-    for (int k = 0; k < i; ++k) value -= root.r(k, i) * x[static_cast<std::size_t>(k)];
-    x.push_back(value / root.r(i, i));
-    sum += x.back() * x.back();
-  }
-  return sum;
+  return liestat_test::mahalanobisSquared(covariance.block(0, 0, n, n), {error.begin(), error.begin() + n});
 }
 void append(std::vector<double>& to, const Eigen::Vector3d& x) { to.insert(to.end(), x.data(), x.data() + 3); }
 
