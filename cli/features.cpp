@@ -1,7 +1,7 @@
 // All that is a template of the feature, for every feature, in one unit: they share nearly all that they instantiate,
 // so that a second type costs a compiler an eighth of the first.
 
-#include <cli/means_experiment_impl.hpp>
+#include <experiments/means_experiment_impl.hpp>
 #include <cli/split_impl.hpp>
 
 namespace liestat::cli::detail {

@@ -6,9 +6,9 @@
 #include <new>
 #include <string>
 
-#include "cli/commands.hpp"
-#include "cli/input_error.hpp"
-#include "cli/json_output.hpp"
+#include <cli/commands/commands.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/show/json.hpp>
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "cli/mean_analysis.hpp"
+#include <cli/mean_analysis.hpp>
 
 #include <lie/lie.hpp>
 

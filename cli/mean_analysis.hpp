@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/measures.hpp>
+#include <cli/io/measures.hpp>
 #include <stats/status.hpp>
 
 #include <Eigen/Core>

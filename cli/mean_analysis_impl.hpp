@@ -1,9 +1,9 @@
 // The templates behind mean_analysis.hpp and split.hpp, compiled in features.cpp.
 #pragma once
 
-#include <cli/input_error.hpp>
+#include <cli/io/input_error.hpp>
 #include <cli/mean_analysis.hpp>
-#include <cli/parallel.hpp>
+#include <experiments/parallel.hpp>
 #include <lie/lie.hpp>
 #include <stats/covariance.hpp>
 #include <stats/group_mean.hpp>

@@ -1,4 +1,4 @@
-#include "cli/split.hpp"
+#include <cli/split.hpp>
 
 #include <lie/lie.hpp>
 #include <stats/inference.hpp>

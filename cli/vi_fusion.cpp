@@ -1,6 +1,6 @@
-#include "cli/vi_fusion.hpp"
+#include <cli/vi_fusion.hpp>
 
-#include <fusion/window_fusion.hpp>
+#include <fusion/init/window_fusion.hpp>
 #include <stats/inference.hpp>
 
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "cli/vi_init.hpp"
+#include <cli/vi_init.hpp>
 
 namespace liestat::cli {
 

@@ -1,4 +1,4 @@
-#include "cli/vi_init.hpp"
+#include <cli/vi_init.hpp>
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <span>
 #include <utility>
 
-#include "cli/input_error.hpp"
-#include "cli/summary.hpp"
-#include "cli/vi_fusion.hpp"
+#include <cli/io/input_error.hpp>
+#include <experiments/summary.hpp>
+#include <cli/vi_fusion.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <fusion/preintegrate.hpp>
-#include <fusion/refinement.hpp>
-#include <fusion/robust_initialisation.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <fusion/init/refinement.hpp>
+#include <fusion/init/robust_initialisation.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/calibration.hpp"
-#include "cli/image_tracks.hpp"
-#include "cli/imu_file.hpp"
+#include <cli/io/calibration.hpp>
+#include <cli/io/image_tracks.hpp>
+#include <cli/io/imu_file.hpp>
 
 namespace liestat::cli {
 
@@ -84,7 +84,7 @@ struct ViWindow {
   std::string status() const;
 };
 
-/// What disjoint windows say together (fusion/window_fusion.hpp), at the last image of the last.
+/// What disjoint windows say together (fusion/init/window_fusion.hpp), at the last image of the last.
 struct ViFusion {
   double begin = 0, end = 0;  ///< s
   std::vector<std::size_t> windows;

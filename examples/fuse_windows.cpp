@@ -6,9 +6,9 @@
 // inertial sensor. Their distance from each other is χ² if the covariances are true, and that is the only thing to look
 // at on a real recording, where the truth is not known: a sensor five times as noisy as its data sheet says is not
 // seen in the cost of any window, which is ruled by its bearings.
-#include <fusion/closed_form.hpp>
-#include <fusion/scene_readings.hpp>
-#include <fusion/window_fusion.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <experiments/scene_readings.hpp>
+#include <fusion/init/window_fusion.hpp>
 
 #include <cmath>
 #include <cstddef>

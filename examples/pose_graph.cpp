@@ -3,7 +3,7 @@
 //
 // The noise is known, so the solution can be judged: the sum of the squared whitened residuals follows χ² with as many
 // degrees of freedom as there are residuals beyond the parameters.
-#include <lie/ceres.hpp>
+#include <lie/compat/ceres.hpp>
 #include <lie/se3.hpp>
 #include <stats/inference.hpp>
 #include <stats/random.hpp>

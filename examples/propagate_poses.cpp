@@ -5,7 +5,7 @@
 // range go through a function of our own, whose Jacobian ceres::Jet finds. All of it is compared with 2000 simulated
 // drives.
 #include <lie/se3.hpp>
-#include <stats/propagation_jet.hpp>
+#include <stats/compat/jet.hpp>
 #include <stats/sampling.hpp>
 
 #include <cstdio>

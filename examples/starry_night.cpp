@@ -9,9 +9,9 @@
 // frames are alike. That is seen without knowing the truth. Let the means of several parts of the data be compared
 // under their own covariances: parts drawn at random agree, for each has its share of every common error; parts that
 // are blocks of time do not. The ratio is the factor by which the covariance is too small.
-#include "cli/stereo.hpp"
-#include "cli/table.hpp"
-#include "cli/tracks.hpp"
+#include <cli/io/stereo.hpp>
+#include <cli/show/table.hpp>
+#include <cli/io/tracks.hpp>
 
 #include <stats/maha.hpp>
 #include <stats/random.hpp>

@@ -9,9 +9,9 @@
 #include <string>
 #include <string_view>
 
-#include "cli/imu_file.hpp"
-#include "cli/input_error.hpp"
-#include "cli/reading.hpp"
+#include <cli/io/imu_file.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/reading.hpp>
 
 namespace {
 

@@ -11,10 +11,10 @@
 #include <string>
 #include <string_view>
 
-#include "cli/calibration.hpp"
-#include "cli/image_tracks.hpp"
-#include "cli/imu_file.hpp"
-#include "cli/input_error.hpp"
+#include <cli/io/calibration.hpp>
+#include <cli/io/image_tracks.hpp>
+#include <cli/io/imu_file.hpp>
+#include <cli/io/input_error.hpp>
 
 namespace {
 

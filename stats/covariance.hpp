@@ -5,7 +5,7 @@
 // mean.
 #pragma once
 
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/mean.hpp>
 
 namespace liestat {

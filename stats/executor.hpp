@@ -1,7 +1,7 @@
 #pragma once
 
 // Where the work is done. Estimators and Monte-Carlo runs are written against the concept Executor and know no threads
-// and no ranks: stats/executor_tbb.hpp and stats/executor_mpi.hpp are drop-in replacements for SerialExecutor.
+// and no ranks: stats/compat/tbb.hpp and stats/compat/mpi.hpp are drop-in replacements for SerialExecutor.
 //
 // Floating-point addition is not associative. So the work is cut into chunks whose number depends on the data alone,
 // never on the machine, and the chunks' results are combined one after the other in the order 0, 1, 2, …: the same bits

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 
 #include <cmath>
 #include <limits>

@@ -5,7 +5,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/detail/rotation_sums.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>

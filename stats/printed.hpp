@@ -4,7 +4,7 @@
 // update's H⁻¹.
 #pragma once
 
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
 

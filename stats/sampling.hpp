@@ -2,7 +2,7 @@
 #pragma once
 
 #include <lie/lie.hpp>
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/random.hpp>
 

@@ -17,7 +17,7 @@
 
 #include <stats/covariance.hpp>
 #include <stats/detail/branch_and_bound.hpp>
-#include <stats/detail/factors.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
 

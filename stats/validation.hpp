@@ -19,11 +19,11 @@
 // Reports are the same to the bit for every executor and every number of threads or ranks: trial i draws from
 // CounterRng(seed, i), and all sums are made in the order of the trials.
 
-#include "detail/factors.hpp"
-#include "executor.hpp"
-#include "inference.hpp"
-#include "kolmogorov.hpp"
-#include "random.hpp"
+#include <lie/detail/small_matrix.hpp>
+#include <stats/executor.hpp>
+#include <stats/inference.hpp>
+#include <stats/kolmogorov.hpp>
+#include <stats/random.hpp>
 
 #include <Eigen/Core>
 

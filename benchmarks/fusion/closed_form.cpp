@@ -3,11 +3,11 @@
 // with wrong tracks; the refinement; and the dense normal equations that a straightforward program sets up.
 #include "../inputs.hpp"
 
-#include <fusion/closed_form.hpp>
-#include <fusion/closed_form_ransac.hpp>
-#include <fusion/gyroscope_bias.hpp>
-#include <fusion/refinement.hpp>
-#include <fusion/robust_initialisation.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/consensus.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
+#include <fusion/init/refinement.hpp>
+#include <fusion/init/robust_initialisation.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Cholesky>

@@ -2,7 +2,7 @@
 // that a straightforward program computes for the covariance alone.
 #include "../inputs.hpp"
 
-#include <fusion/preintegration.hpp>
+#include <fusion/imu/preintegration.hpp>
 
 #include <benchmark/benchmark.h>
 

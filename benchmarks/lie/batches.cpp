@@ -1,8 +1,8 @@
-// Exponentials and logarithms of many elements at a time, stored: the batches of lie/batch.hpp, the library's scalars
+// Exponentials and logarithms of many elements at a time, stored: the batches of lie/compat/batch.hpp, the library's scalars
 // and a loop over Eigen's angle-axis, on the same thousand elements, which stay in the first cache.
 #include "../inputs.hpp"
 
-#include <lie/batch.hpp>
+#include <lie/compat/batch.hpp>
 #include <lie/frame3.hpp>
 #include <lie/sim3.hpp>
 

@@ -5,7 +5,7 @@
 // Unknowns of the motion are ordered (V', [b'], G', 1): gravity last, because it remains when the others are taken out.
 #pragma once
 
-#include <fusion/closed_form_types.hpp>
+#include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/small_linear.hpp>
 
 #include <Eigen/Core>

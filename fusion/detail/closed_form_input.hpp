@@ -1,7 +1,7 @@
 // Checks of a window, and the table of what can be used of it.
 #pragma once
 
-#include <fusion/closed_form_types.hpp>
+#include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
 
 #include <Eigen/Core>

@@ -1,7 +1,7 @@
 // One solve of the closed form: exact data by ranks, noisy data by weights, noise and what is left of it.
 #pragma once
 
-#include <fusion/closed_form_types.hpp>
+#include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_input.hpp>
 #include <fusion/detail/closed_form_solver.hpp>
 #include <fusion/detail/closed_form_status.hpp>

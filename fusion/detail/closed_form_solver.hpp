@@ -1,9 +1,9 @@
 // The closed form's passes: diagnosis of ranks, weights, minimisers, costs, covariance.
 #pragma once
 
-#include <fusion/closed_form_types.hpp>
+#include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
-#include <fusion/sphere_least_squares.hpp>
+#include <fusion/init/sphere_least_squares.hpp>
 
 #include <Eigen/Core>
 

@@ -9,7 +9,7 @@
 
 #include <fusion/detail/closed_form_blocks.hpp>
 #include <fusion/detail/small_linear.hpp>
-#include <fusion/inertial_window.hpp>
+#include <fusion/imu/window.hpp>
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
 // Calibration files of the programs that write them, and what is wrong with bad ones.
 
-#include "cli/calibration.hpp"
+#include <cli/io/calibration.hpp>
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/temporary_directory.hpp"
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,7 +1,7 @@
 // Pixels and bearings: each the other's inverse wherever either is defined, and how the one's noise becomes the
 // other's.
 
-#include "cli/camera.hpp"
+#include <cli/io/camera.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/temporary_directory.hpp"
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

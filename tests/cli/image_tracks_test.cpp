@@ -1,14 +1,14 @@
 // Tracks of features over images, good and bad.
 
-#include "cli/image_tracks.hpp"
+#include <cli/io/image_tracks.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <string>
 
-#include "cli/temporary_directory.hpp"
-#include "cli/text.hpp"
+#include <cli/temporary_directory.hpp>
+#include <cli/io/text.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -15,11 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "cli/json_output.hpp"
-#include "cli/output_file.hpp"
-#include "cli/progress.hpp"
-#include "cli/table.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/show/json.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/show/progress.hpp>
+#include <cli/show/table.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

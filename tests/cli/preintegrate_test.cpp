@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "cli/calibration.hpp"
-#include "cli/gnuplot.hpp"
-#include "cli/imu_file.hpp"
-#include "cli/temporary_directory.hpp"
-#include "cli/validate_preintegration.hpp"
+#include <cli/io/calibration.hpp>
+#include <cli/show/plots.hpp>
+#include <cli/io/imu_file.hpp>
+#include <cli/temporary_directory.hpp>
+#include <experiments/preintegration_validation.hpp>
 
 namespace liestat::cli {
 namespace {

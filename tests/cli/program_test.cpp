@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

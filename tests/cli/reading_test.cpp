@@ -1,4 +1,4 @@
-#include "cli/reading.hpp"
+#include <cli/io/reading.hpp>
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "cli/input_error.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/io/input_error.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

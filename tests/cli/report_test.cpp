@@ -1,4 +1,4 @@
-#include "cli/report.hpp"
+#include <cli/show/page.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,10 +1,10 @@
 // `liestat simulate vi`: readings that are those of the written truth, tracks that point at the written landmarks, and
 // noise of the size asked for, all of it read back from the files.
 
-#include "cli/simulate_vi.hpp"
+#include <experiments/simulate_vi.hpp>
 
-#include <fusion/preintegrate.hpp>
-#include <fusion/preintegration_factor.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <fusion/imu/factor.hpp>
 
 #include <gtest/gtest.h>
 
@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
-#include "cli/tracks.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
+#include <cli/io/tracks.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "cli/stereo.hpp"
+#include <cli/io/stereo.hpp>
 
 #include <gtest/gtest.h>
 

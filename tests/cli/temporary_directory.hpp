@@ -9,7 +9,7 @@
 #include <string>
 #include <unistd.h>
 
-#include "cli/input_error.hpp"
+#include <cli/io/input_error.hpp>
 
 namespace liestat::cli {
 

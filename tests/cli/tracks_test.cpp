@@ -1,4 +1,4 @@
-#include "cli/tracks.hpp"
+#include <cli/io/tracks.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/temporary_directory.hpp"
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,6 +1,6 @@
 // The verdict of `liestat validate means` on what the documentation promises.
 
-#include "cli/validate_means.hpp"
+#include <experiments/means_validation.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // `liestat validate propagation`: what is run, what is judged, and what the program writes.
 
-#include "cli/validate_propagation.hpp"
+#include <experiments/propagation_validation.hpp>
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,24 +1,24 @@
 // `liestat validate vi-init`: each check, what it can't pass, the paper's table and figures, and what the program
 // writes.
 
-#include "cli/validate_vi_init.hpp"
+#include <experiments/vi_init_validation.hpp>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fusion/closed_form_cases.hpp>
+#include <experiments/closed_form_cases.hpp>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
-#include "cli/validate_vi_init_scene.hpp"
-#include "cli/validate_vi_init_table1.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
+#include <experiments/two_solutions.hpp>
+#include <experiments/table1.hpp>
 
 namespace liestat::cli {
 namespace {

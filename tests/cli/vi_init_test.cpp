@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/gnuplot.hpp"
-#include "cli/temporary_directory.hpp"
+#include <cli/show/plots.hpp>
+#include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

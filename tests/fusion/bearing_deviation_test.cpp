@@ -1,8 +1,8 @@
 // Bearings with deviations of their own: whatever is estimated is consistent, and a common factor is the same as
 // another bearing_noise.
 
-#include <fusion/refinement.hpp>
-#include <fusion/robust_initialisation.hpp>
+#include <fusion/init/refinement.hpp>
+#include <fusion/init/robust_initialisation.hpp>
 #include <support/small_mahalanobis.hpp>
 #include <support/vi_recorded.hpp>
 

@@ -1,7 +1,7 @@
 // Preintegrated motions under Ceres: derivatives along the manifolds, whitening, and a chain of states that is found.
 
-#include <fusion/ceres.hpp>
-#include <lie/ceres.hpp>
+#include <fusion/compat/ceres.hpp>
+#include <lie/compat/ceres.hpp>
 
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>

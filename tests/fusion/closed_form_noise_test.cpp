@@ -1,9 +1,9 @@
 // The closed form on noisy data: accuracy against the design note's table of windows, the status of each case that
 // noise can decide, and what the covariance is worth.
 
-#include <fusion/closed_form.hpp>
-#include <fusion/closed_form_cases.hpp>
-#include <fusion/preintegrate.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <experiments/closed_form_cases.hpp>
+#include <fusion/imu/preintegrate.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 

@@ -1,7 +1,7 @@
 // The closed form on exact data: every case that the design note distinguishes, the second solution, bad input.
 
-#include <fusion/closed_form.hpp>
-#include <fusion/closed_form_cases.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <experiments/closed_form_cases.hpp>
 #include <lie/so3.hpp>
 #include <support/vi_scene.hpp>
 

@@ -1,6 +1,6 @@
 // The outer problem over the gyroscope's bias, against the design note's target, and what it refuses.
 
-#include <fusion/gyroscope_bias.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 

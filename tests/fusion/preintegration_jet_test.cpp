@@ -1,6 +1,6 @@
 // The residual of a preintegrated motion through ceres::Jet agrees with its analytic derivatives.
 
-#include <fusion/preintegration_factor.hpp>
+#include <fusion/imu/factor.hpp>
 
 #include <ceres/jet.h>
 #include <gtest/gtest.h>

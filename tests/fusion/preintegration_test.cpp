@@ -1,8 +1,8 @@
 // Increments, covariances and bias Jacobians against differences and Monte Carlo; schemes against analytic motion; bad
 // recordings.
 
-#include <fusion/preintegrate.hpp>
-#include <fusion/preintegration_factor.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <fusion/imu/factor.hpp>
 
 #include <gtest/gtest.h>
 

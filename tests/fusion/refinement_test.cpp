@@ -1,7 +1,7 @@
 // The refinement against the design note's tables of accuracy and consistency.
 
-#include <fusion/closed_form.hpp>
-#include <fusion/refinement.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/refinement.hpp>
 #include <support/small_mahalanobis.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

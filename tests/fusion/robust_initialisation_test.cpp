@@ -1,7 +1,7 @@
 // The whole initialisation with wrong tracks and an unknown bias of the gyroscope: as good as with the right tracks
 // given, at any bias.
 
-#include <fusion/robust_initialisation.hpp>
+#include <fusion/init/robust_initialisation.hpp>
 #include <support/vi_recorded.hpp>
 
 #include <Eigen/Cholesky>

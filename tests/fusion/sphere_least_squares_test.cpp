@@ -1,6 +1,6 @@
 // Minima on the sphere against dense sampling, in the hard case, and where the matrix loses rank.
 
-#include <fusion/sphere_least_squares.hpp>
+#include <fusion/init/sphere_least_squares.hpp>
 #include <support/vi_scene.hpp>
 
 #include <gtest/gtest.h>

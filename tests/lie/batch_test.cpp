@@ -1,6 +1,6 @@
 // Batches agree with scalars, lane by lane, also where the lanes of one batch are on both sides of a branch.
 
-#include <lie/batch.hpp>
+#include <lie/compat/batch.hpp>
 #include <lie/lie.hpp>
 
 #include <gtest/gtest.h>

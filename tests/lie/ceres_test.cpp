@@ -1,6 +1,6 @@
 // The manifolds under Ceres' own matchers.
 
-#include <lie/ceres.hpp>
+#include <lie/compat/ceres.hpp>
 #include <lie/lie.hpp>
 
 #include <ceres/manifold_test_utils.h>

@@ -1,6 +1,6 @@
 // Formatting of owned values and of views.
 
-#include <lie/fmt.hpp>
+#include <lie/compat/fmt.hpp>
 #include <lie/lie.hpp>
 
 #include <gtest/gtest.h>

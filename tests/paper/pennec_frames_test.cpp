@@ -2,7 +2,7 @@
 // the spread at which the quotients' means are ill-defined. References as in pennec_rotations_test.cpp: four standard
 // errors.
 
-#include <cli/means_experiment.hpp>
+#include <experiments/means_experiment.hpp>
 #include <stats/validation.hpp>
 
 #include <gtest/gtest.h>

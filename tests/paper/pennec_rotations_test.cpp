@@ -4,7 +4,7 @@
 // comparison raises a false alarm with probability 6e-5, and the 60 comparisons of this file together with 4e-3 at a
 // fresh seed; the seeds are fixed.
 
-#include <cli/means_experiment.hpp>
+#include <experiments/means_experiment.hpp>
 #include <stats/validation.hpp>
 
 #include <gtest/gtest.h>

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/stereo.hpp"
+#include <cli/io/stereo.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,6 +1,6 @@
 // Run under mpirun with any number of ranks: every rank makes every comparison, and every rank must agree.
 
-#include <stats/executor_mpi.hpp>
+#include <stats/compat/mpi.hpp>
 
 #include <gtest/gtest.h>
 #include <mpi.h>

@@ -1,4 +1,4 @@
-#include <stats/executor_tbb.hpp>
+#include <stats/compat/tbb.hpp>
 
 #include <gtest/gtest.h>
 

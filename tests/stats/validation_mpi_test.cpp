@@ -1,6 +1,6 @@
 // Run under mpirun with any number of ranks: a report has the same bits on every rank as without MPI.
 
-#include <stats/executor_mpi.hpp>
+#include <stats/compat/mpi.hpp>
 #include <stats/validation.hpp>
 
 #include <gtest/gtest.h>

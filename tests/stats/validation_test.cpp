@@ -1,7 +1,7 @@
 // The harness on estimators whose law is known exactly. Where a run must pass, the false-alarm probability is the 1e-5
 // of passed(), at a fixed seed; where it must fail, the deviation is more than ten standard errors.
 
-#include <stats/executor_tbb.hpp>
+#include <stats/compat/tbb.hpp>
 #include <stats/validation.hpp>
 
 #include <gtest/gtest.h>

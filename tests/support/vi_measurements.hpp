@@ -1,7 +1,7 @@
 // What an inertial sensor measures of a scene, under the names that the tests have for it.
 #pragma once
 
-#include <fusion/scene_readings.hpp>
+#include <experiments/scene_readings.hpp>
 #include <support/vi_scene.hpp>
 
 namespace liestat_test {

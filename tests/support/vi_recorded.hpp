@@ -1,7 +1,7 @@
 // A scene as a camera with noise and tracks that drift and an inertial sensor with a gyroscope's bias record it.
 #pragma once
 
-#include <fusion/inertial_window.hpp>
+#include <fusion/imu/window.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 

@@ -1,7 +1,7 @@
 // The library's simulated scenes under the names that the tests have for them.
 #pragma once
 
-#include <fusion/inertial_scene.hpp>
+#include <experiments/inertial_scene.hpp>
 
 namespace liestat_test {
 

@@ -1,0 +1,66 @@
+#pragma once
+
+// What the commands that read an inertial sensor have in common on the command line.
+
+#include <cli/io/calibration.hpp>
+#include <fusion/imu/preintegrate.hpp>
+
+#include <CLI/App.hpp>
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+struct ImuOptions {
+  std::string file;
+  std::vector<double> noise, gyroscope_bias, accelerometer_bias;
+  ImuScheme scheme = ImuScheme::averaged;
+  double largest_gap = 0.1;  ///< s
+
+  bool hasBias() const { return !gyroscope_bias.empty() || !accelerometer_bias.empty(); }
+  /// What was given, and zero.
+  ImuBias<double> bias() const {
+    const auto vector = [](const std::vector<double>& list) {
+      return list.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(list[0], list[1], list[2]);
+    };
+    return {vector(gyroscope_bias), vector(accelerometer_bias)};
+  }
+  /// The densities of a calibration, with those that were given in their place.
+  ImuNoise<double> noiseOver(ImuNoise<double> densities) const {
+    std::size_t i = 0;
+    for (double* density :
+         {&densities.gyroscope, &densities.accelerometer, &densities.gyroscope_walk, &densities.accelerometer_walk}) {
+      if (i < noise.size()) *density = noise[i];
+      ++i;
+    }
+    return densities;
+  }
+};
+
+/// Declares --imu, --noise, both biases, --scheme and --largest-gap. `bias` says what a bias is taken for that is not
+/// given.
+inline void addImuOptions(CLI::App& command, ImuOptions& options, const std::string& bias) {
+  static const std::map<std::string, ImuScheme> schemes = {
+      {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
+  command
+      .add_option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+      ->required();
+  command
+      .add_option("--noise", options.noise,
+                  "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
+      ->delimiter(',')
+      ->expected(2, 4)
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--gyroscope-bias", options.gyroscope_bias, "rad/s, x,y,z" + bias)->delimiter(',')->expected(3);
+  command.add_option("--accelerometer-bias", options.accelerometer_bias, "m/s^2, x,y,z" + bias)
+      ->delimiter(',')
+      ->expected(3);
+  command.add_option("--scheme", options.scheme, "Of integration: averaged (default), held, cubic")
+      ->transform(CLI::CheckedTransformer(schemes));
+  command.add_option("--largest-gap", options.largest_gap, "s between two readings (default 0.1)")
+      ->check(CLI::PositiveNumber);
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,62 @@
+#include <cli/commands/commands.hpp>
+#include <cli/show/mean.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include <cli/commands/measures_options.hpp>
+
+namespace liestat::cli {
+namespace {
+
+struct Options {
+  MeasuresInput input;
+  AnalysisOptions analysis;
+  bool no_certify = false;
+  std::string json, report;
+};
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  const Measures measures = options.input.read("liestat mean");
+  AnalysisOptions how = options.analysis;
+  how.certify = !options.no_certify;
+  how.charts = !options.report.empty();
+  const MeanAnalysis analysis = analyseMean(measures, how);
+  // Whoever asks for JSON on standard output wants nothing else there.
+  if (options.json != "-") std::fputs(formatMean(options.input.file, measures, analysis).c_str(), stdout);
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line);
+    setMeanFields(object, options.input.file, measures, analysis);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) {
+    writeMeanReport(options.report, invocation.command_line, options.input.file, measures, analysis);
+  }
+  const bool trusted = analysis.status == Status::ok || analysis.status == Status::not_applicable;
+  return trusted ? exit_fine : exit_not_trusted;
+}
+
+}  // namespace
+
+void addMeanCommand(CLI::App& app, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("mean", "Mean, covariance, dispersion and uniqueness of the features in a file");
+  options->input.declare(*command, true);
+  command->add_flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
+  command
+      ->add_option("--budget", options->analysis.budget,
+                   "Cells of branch and bound (default 1000000, with more than 100000 measures 2000)")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000000}));
+  command->add_option("--threads", options->analysis.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command->add_option("--report", options->report, "Write a page with plots into this directory");
+  command->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,35 @@
+#include <cli/commands/measures_options.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+namespace liestat::cli {
+
+void MeasuresInput::declare(CLI::App& app, bool file_required) {
+  CLI::Option* path = app.add_option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
+  if (file_required) path->required();
+  app.add_option("--format", format, "auto, csv, tum, euroc or kitti (default auto)")
+      ->check(CLI::IsMember({"auto", "csv", "tum", "euroc", "kitti"}));
+  app.add_option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
+      ->check(CLI::IsMember(meanFeatureNames()));
+  app.add_option("--criterion", options.criterion,
+                 "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
+      ->check(CLI::IsMember({"lsq", "wlsq", "maha"}));
+  app.add_option("--covariance-at", options.covariance_at,
+                 "Where covariances of frames belong: measured (the frame of each measure) or estimated (of the mean)")
+      ->check(CLI::IsMember({"measured", "estimated"}));
+  app.add_flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
+  app.add_option("--norm-tolerance", norm_tolerance,
+                 "Quaternions, directions and matrices that are off by less are normalised (default 0.001)")
+      ->check(CLI::Range(0.0, 0.5));
+}
+
+Measures MeasuresInput::read(const std::string& command) const {
+  ReadingOptions how;
+  how.format = formatFromName(format).value_or(Format::automatic);
+  how.norm_tolerance = norm_tolerance;
+  return chooseMeasures(readFeatureFile(file, how), options, command);
+}
+
+}  // namespace liestat::cli

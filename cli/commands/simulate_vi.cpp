@@ -1,0 +1,244 @@
+#include <cli/io/calibration.hpp>
+#include <cli/commands/commands.hpp>
+#include <cli/io/imu_file.hpp>
+#include <cli/io/input_error.hpp>
+#include <experiments/simulate_vi.hpp>
+#include <cli/io/text.hpp>
+#include <stats/random.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* command_name = "liestat simulate vi";
+/// Where the clock of a recording without a truth begins, ns since 1970; and what is too small to be such a time.
+constexpr std::int64_t usual_start_ns = 1600000000000000000, least_start_ns = 1000000000000000;
+constexpr double most_readings = 1e8, most_looks = 1e10;
+
+struct Options {
+  std::string truth, imu, output;
+  std::vector<std::string> calibration;
+  std::vector<double> box, gyroscope_bias, accelerometer_bias;
+  std::optional<double> begin, end;
+  ViSceneOptions scene;
+  double imu_rate = 200, imu_noise = 1, spacing = 0.1, gravity = 9.81;
+};
+
+/// Of the sensor in EuRoC's recordings, ADIS16448.
+constexpr ImuNoise<double> usual_noise{
+    .gyroscope = 1.6968e-4, .accelerometer = 2e-3, .gyroscope_walk = 1.9393e-5, .accelerometer_walk = 3e-3};
+
+/// What is used without a calibration: a pinhole that looks along the body's x axis.
+CameraCalibration usualCamera() {
+  CameraCalibration camera;
+  camera.name = "cam0";
+  camera.camera = {.fu = 450, .fv = 450, .cu = 376, .cv = 240, .width = 752, .height = 480};
+  Eigen::Matrix3d imu_R_cam;
+  imu_R_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  camera.imu_T_cam = SE3d(imu_R_cam, Eigen::Vector3d(0.05, 0.02, 0.01));
+  return camera;
+}
+
+struct Sensors {
+  CameraCalibration camera = usualCamera();
+  std::optional<ImuNoise<double>> noise = usual_noise;
+};
+
+Sensors sensorsOf(const Options& options) {
+  Sensors sensors;
+  if (options.calibration.empty()) return sensors;
+  const Calibration calibration = readCalibration(options.calibration);
+  if (calibration.cameras.empty()) throw InputError(joined(options.calibration, ", "), 0, "there is no camera", "cam0");
+  sensors.camera = calibration.cameras.front();
+  sensors.noise = calibration.imu;
+  return sensors;
+}
+
+/// Given on the command line, or drawn: a calibrated sensor's.
+Eigen::Vector3d biasOf(const std::vector<double>& given, double deviation, CounterRng& rng) {
+  const Eigen::Vector3d drawn = deviation * rng.normalVector<3>();
+  return given.empty() ? drawn : Eigen::Vector3d(given[0], given[1], given[2]);
+}
+
+void checkSize(const Options& options, double duration) {
+  const double readings = duration * options.imu_rate;
+  const double looks = duration * options.scene.image_rate * static_cast<double>(options.scene.landmarks);
+  if (readings <= most_readings && looks <= most_looks) return;
+  throw InputError(command_name, 0, fmt::format("{:.3g} readings, and {:.3g} looks at a landmark", readings, looks),
+                   fmt::format("{:g} and {:g} at most", most_readings, most_looks));
+}
+
+SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
+  if (!options.imu.empty()) {
+    if (options.truth.empty())
+      throw InputError(command_name, 0, "there is no --truth", "where the body was that --imu recorded");
+    const ImuFile imu = readImu(options.imu);
+    if (imu.format != "euroc")
+      throw InputError(options.imu, 0, "the times are seconds", "nanoseconds, as in the truth (EuRoC)");
+    const std::vector<GroundTruth> truth = readGroundTruth(options.truth, imu.start_ns);
+    const double begin = options.begin.value_or(std::max(imu.samples.front().time, truth.front().time));
+    const double end = options.end.value_or(std::min(imu.samples.back().time, truth.back().time));
+    checkSize(options, end - begin);
+    SimulatedRecording recording = simulateImages(imu, truth, begin, end, sensors.camera, options.scene);
+    recording.noise = sensors.noise;
+    return recording;
+  }
+
+  SyntheticImuOptions imu;
+  imu.rate = options.imu_rate;
+  imu.gravity = {0, 0, -options.gravity};
+  if (!sensors.noise && options.imu_noise > 0) {
+    throw InputError(joined(options.calibration, ", "), 0, "there is no IMU, whose noise would be simulated",
+                     "a file with imu0 too, or --imu-noise 0");
+  }
+  const ImuNoise<double> nominal = sensors.noise.value_or(usual_noise);
+  const double s = options.imu_noise;
+  imu.noise = {.gyroscope = s * nominal.gyroscope,
+               .accelerometer = s * nominal.accelerometer,
+               .gyroscope_walk = s * nominal.gyroscope_walk,
+               .accelerometer_walk = s * nominal.accelerometer_walk};
+  CounterRng rng(options.scene.seed, 1);
+  imu.bias.gyroscope = biasOf(options.gyroscope_bias, 0.01, rng);
+  imu.bias.accelerometer = biasOf(options.accelerometer_bias, 0.05, rng);
+
+  std::int64_t start_ns = usual_start_ns;
+  std::optional<SplineTrajectory> motion;
+  if (options.truth.empty()) {
+    const double end = options.end.value_or(20);
+    if (!(end > 0)) throw InputError(command_name, 0, fmt::format("the end is at {:.10g} s", end), "one after 0 s");
+    checkSize(options, end);
+    motion = builtInTrajectory(end, options.scene.seed);
+  } else {
+    const TextFile file = loadText(options.truth);
+    start_ns = firstStamp(file.text, file.name);
+    motion = trajectoryAlong(parseGroundTruth(file.text, file.name, start_ns), options.spacing, file.name);
+    // A simulator's clock may begin at zero; stamps so small are not known for nanoseconds.
+    if (start_ns < least_start_ns) start_ns = usual_start_ns;
+  }
+  const double begin = options.begin.value_or(options.truth.empty() ? 0 : motion->begin());
+  const double end = options.end.value_or(options.truth.empty() ? 20 : motion->end());
+  checkSize(options, end - begin);
+  SimulatedRecording recording = simulateMotion(*motion, begin, end, sensors.camera, imu, options.scene);
+  recording.start_ns = start_ns;
+  // Exact readings: no program can do with a noise of zero.
+  if (s == 0) recording.noise = nominal;
+  return recording;
+}
+
+void summarise(const Options& options, const SimulatedRecording& recording) {
+  const auto print = [](const std::string& line) { std::fputs((line + "\n").c_str(), stdout); };
+  const auto listed = [](const Eigen::Vector3d& v) {
+    return fmt::format("{:.4g}, {:.4g}, {:.4g}", v.x(), v.y(), v.z());
+  };
+  const double duration = recording.imu.back().time - recording.imu.front().time;
+  print(fmt::format("{:.4g} s: {} readings {}, {} images at {:g} Hz", duration, recording.imu.size(),
+                    options.imu.empty() ? "simulated" : "as recorded", recording.image_times.size(),
+                    options.scene.image_rate));
+  std::vector<std::size_t> lengths;
+  std::size_t outliers = 0;
+  for (const SimulatedTrack& track : recording.tracks) {
+    if (track.images > 0) lengths.push_back(track.images);
+    outliers += track.outlier ? 1 : 0;
+  }
+  std::sort(lengths.begin(), lengths.end());
+  print(fmt::format("{} landmarks on a box of {:.4g} x {:.4g} x {:.4g} m", options.scene.landmarks, recording.box.x(),
+                    recording.box.y(), recording.box.z()));
+  print(fmt::format(
+      "{} tracks of {} images in the median, {:.3g} an image, {} that drift", lengths.size(),
+      lengths.empty() ? 0 : lengths[lengths.size() / 2],
+      static_cast<double>(recording.observations.size()) / static_cast<double>(recording.image_times.size()),
+      outliers));
+  const ImuBias<double>& bias = recording.truth.front().bias;
+  print(
+      fmt::format("biases at the beginning {} rad/s and {} m/s^2", listed(bias.gyroscope), listed(bias.accelerometer)));
+  print("\n" + nextCommand(options.output));
+}
+
+/// The ranges of the parser let what is not a number through.
+void checkFinite(const Options& options) {
+  const ViSceneOptions& scene = options.scene;
+  std::vector<double> values = {options.imu_rate,          options.imu_noise,      options.spacing, options.gravity,
+                                scene.image_rate,          scene.pixel_noise,      scene.outliers,  scene.drift,
+                                options.begin.value_or(0), options.end.value_or(0)};
+  for (const auto* list : {&options.box, &options.gyroscope_bias, &options.accelerometer_bias})
+    values.insert(values.end(), list->begin(), list->end());
+  const bool finite = std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+  if (!finite) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+}
+
+int runCommand(Options options) {
+  checkFinite(options);
+  if (!options.box.empty()) options.scene.box = Eigen::Vector3d(options.box[0], options.box[1], options.box[2]);
+  if (options.begin && options.end && !(*options.begin < *options.end)) {
+    throw InputError(command_name, 0,
+                     fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),
+                     "an end after the beginning");
+  }
+  const SimulatedRecording recording = simulate(options, sensorsOf(options));
+  writeRecording(recording, options.output);
+  summarise(options, recording);
+  return exit_fine;
+}
+
+}  // namespace
+
+void addSimulateViCommand(CLI::App& simulate, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  ViSceneOptions& scene = options->scene;
+  CLI::App* command = simulate.add_subcommand(
+      "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
+  command->add_option("--output", options->output, "Directory for the files")->required();
+  command->add_option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
+  command->add_option("--imu", options->imu,
+                      "EuRoC's imu0/data.csv that belongs to it: kept as it is (default: simulated along a spline)");
+  command->add_option(
+      "--calibration", options->calibration,
+      "YAML of the first camera and the IMU's noise, one file or several (default: a pinhole, ADIS16448)");
+  command->add_option("--begin", options->begin,
+                      "s since the first reading, or the truth's first row (default: as early as there is a truth)");
+  command->add_option("--end", options->end, "The same (default: as late as there is a truth; 20 without)");
+  command->add_option("--image-rate", scene.image_rate, "Hz (default 10)")->check(CLI::Range(1e-3, 1e4));
+  command->add_option("--pixel-noise", scene.pixel_noise, "Standard deviation, pixels (default 1)")
+      ->check(CLI::Range(0.0, 1e4));
+  command->add_option("--landmarks", scene.landmarks, "Points on the box (default 2000)")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
+  command->add_option("--features", scene.features, "At most so many tracks an image (default 40)")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
+  command->add_option("--box", options->box, "x,y,z: edges of the box around the motion, m (default 10,10,4 or larger)")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::PositiveNumber);
+  command->add_option("--outliers", scene.outliers, "Fraction of the tracks that drift (default 0)")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--drift", scene.drift, "Of their random walk, pixels an image (default 8)")
+      ->check(CLI::Range(0.0, 1e4));
+  command->add_option("--imu-rate", options->imu_rate, "Hz, of simulated readings (default 200)")
+      ->check(CLI::Range(1.0, 1e5));
+  command->add_option("--imu-noise", options->imu_noise, "Times the calibration's densities (default 1; 0: exact)")
+      ->check(CLI::Range(0.0, 1e6));
+  command->add_option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z (default: drawn, deviation 0.01)")
+      ->delimiter(',')
+      ->expected(3);
+  command
+      ->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default: drawn, deviation 0.05)")
+      ->delimiter(',')
+      ->expected(3);
+  command->add_option("--knots", options->spacing, "s between the spline's control points (default 0.1)")
+      ->check(CLI::Range(1e-3, 10.0));
+  command->add_option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)")
+      ->check(CLI::Range(0.0, 100.0));
+  command->add_option("--seed", scene.seed, "Seed; the same seed gives the same files (default 1)");
+  command->callback([options, &invocation] { invocation.run = [options] { return runCommand(*options); }; });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,106 @@
+#include <cli/commands/commands.hpp>
+#include <experiments/means_validation.hpp>
+#include <cli/commands/validation_command.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <cmath>
+#include <memory>
+
+namespace liestat::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> features, noises, criteria;
+  std::vector<std::size_t> n;
+  std::vector<double> spreads;
+  std::string covariance_at = "estimated";
+  ValidationOutput output;
+  std::size_t trials = 0;
+  std::uint64_t seed = 1;
+  int threads = 0;
+  bool certify = false, full = false;
+};
+
+JsonObject toJson(const MeansRow& row) {
+  const MeansExperiment& e = row.experiment;
+  const ValidationReport& r = row.report;
+  const bool frame = e.feature == Feature::frame || e.feature == Feature::semi_oriented_frame ||
+                     e.feature == Feature::non_oriented_frame;
+  JsonObject o;
+  o.set("feature", name(e.feature)).set("noise", name(e.noise)).set("criterion", name(row.method.criterion));
+  if (frame && row.method.criterion == Criterion::maha) {
+    o.set("covariance_at", name(e.covariance_at));
+  } else {
+    o.set("covariance_at", nullptr);
+  }
+  o.set("formula", row.method.corrected ? "corrected" : "printed").set("known_noise", row.method.known_noise);
+  o.set("in_domain", row.promise.has_value());
+  o.set("n", e.n).set("spread", e.spread);
+  setStatistics(o, r);
+  o.set("tail", static_cast<double>(r.tailCount()) / static_cast<double>(r.size()));
+  o.set("iterations", r.mean_iterations).set("failures", r.failures);
+  o.set("ratio_rotation", row.ratio(log_ratio_rotation))
+      .set("ratio_rotation_logsd", row.logDeviation(log_ratio_rotation));
+  o.set("ratio_translation", row.ratio(log_ratio_translation));
+  o.set("ratio_translation_logsd", row.logDeviation(log_ratio_translation));
+  o.set("passed", row.passed);
+  return o;
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  MeansValidation validation;
+  validation.features = chosen(all_features, options.features);
+  validation.noises = chosen(all_noises, options.noises);
+  validation.criteria = chosen(all_criteria, options.criteria);
+  if (!options.n.empty()) validation.n = options.n;
+  validation.spreads = options.spreads;
+  if (options.full && validation.spreads.empty()) validation.spreads = {1.0 / 3, 1.0};
+  validation.covariance_at = options.covariance_at == "measured" ? CovarianceAt::measured : CovarianceAt::estimated;
+  validation.trials = options.trials != 0 ? options.trials : options.full ? 4000 : 1000;
+  validation.seed = options.seed;
+  validation.threads = options.threads;
+  validation.certify = options.certify || options.full;
+  validation.all_printed = options.full;
+
+  const std::vector<MeansRow> rows =
+      withProgressBar("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
+  return publish(options.output, invocation, options.seed, run_false_alarm, rows, formatMeansTables, toJson,
+                 writeMeansReport);
+}
+
+}  // namespace
+
+void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  CLI::App* app = validate.add_subcommand("means", "Means of features: Monte-Carlo validation of their covariances");
+  app->add_option("--feature", options->features, "Features, a comma list")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_features)));
+  app->add_option("--noise", options->noises, "Noises, a comma list")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_noises)));
+  app->add_option("--criterion", options->criteria, "Criteria, a comma list")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_criteria)));
+  app->add_option("--n", options->n, "Numbers of measures, a comma list (default 5,10,20,30,50,100)")
+      ->delimiter(',')
+      ->check(CLI::Range(std::size_t{2}, std::size_t{1000000}));
+  app->add_option("--spread", options->spreads,
+                  "Factors of the report's standard deviations, a comma list (default 1, frames 1/3)")
+      ->delimiter(',')
+      ->check(CLI::Range(1e-9, 10.0));
+  app->add_option("--covariance-at", options->covariance_at,
+                  "Frame in which the noise of frames is Gaussian and MAHA takes its covariances")
+      ->check(CLI::IsMember({"estimated", "measured"}));
+  addRunOptions(*app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
+  app->add_flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
+  app->add_flag("--full", options->full,
+                "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
+  app->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,67 @@
+#include <cli/commands/commands.hpp>
+#include <experiments/propagation_validation.hpp>
+#include <cli/commands/validation_command.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <memory>
+
+namespace liestat::cli {
+namespace {
+
+struct Options {
+  PropagationValidation validation;
+  std::vector<std::string> features, operations;
+  std::vector<double> spreads;
+  ValidationOutput output;
+};
+
+JsonObject toJson(const PropagationRow& row) {
+  const ValidationReport& r = row.report;
+  JsonObject o;
+  o.set("feature", name(row.experiment.feature)).set("operation", name(row.method.operation));
+  o.set("order", row.method.fourth_order ? 4 : 1).set("in_domain", row.promise.has_value());
+  o.set("spread", row.experiment.spread);
+  setStatistics(o, r);
+  o.set("tail", row.tail).set("failures", r.failures).set("passed", row.passed);
+  return o;
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  PropagationValidation validation = options.validation;
+  validation.features = chosen(all_propagated, options.features);
+  validation.operations = chosen(all_operations, options.operations);
+  if (!options.spreads.empty()) validation.spreads = options.spreads;
+
+  const std::vector<PropagationRow> rows = withProgressBar(
+      "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
+  return publish(options.output, invocation, validation.seed, propagation_false_alarm, rows, formatPropagationTables,
+                 toJson, writePropagationReport);
+}
+
+}  // namespace
+
+void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  CLI::App* app = validate.add_subcommand(
+      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_propagated)));
+  app->add_option("--operation", options->operations,
+                  "compose, inverse, between, act, chain (of ten factors): a comma list (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names(all_operations)));
+  app->add_option("--spread", options->spreads,
+                  "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
+      ->delimiter(',')
+      ->check(CLI::Range(1e-6, 10.0));
+  addRunOptions(*app, "20000", options->validation.trials, options->validation.seed, options->validation.threads,
+                options->output);
+  app->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,96 @@
+#pragma once
+
+// What the commands `validate means`, `validate propagation` and the like have in common: lists of names on the command
+// line, options of a run, a progress bar, rows in JSON, the exit code.
+
+#include <cli/commands/commands.hpp>
+#include <cli/show/json.hpp>
+#include <cli/show/progress.hpp>
+#include <stats/validation.hpp>
+
+#include <CLI/App.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// The names of all members of a list of enumerators.
+template <class List>
+std::vector<std::string> names(const List& list) {
+  std::vector<std::string> all;
+  for (const auto value : list) all.push_back(name(value));
+  return all;
+}
+
+/// The enumerators with the given names, each once and in their own order; all of them for none. CLI11 has checked the
+/// names.
+template <class List>
+auto chosen(const List& list, const std::vector<std::string>& wanted) {
+  std::vector<typename List::value_type> values;
+  for (const auto value : list) {
+    if (wanted.empty() || std::find(wanted.begin(), wanted.end(), name(value)) != wanted.end()) values.push_back(value);
+  }
+  return values;
+}
+
+/// What run(progress) returns, with a bar on the terminal while it runs; progress(done, all) takes amounts of work.
+template <class Run>
+auto withProgressBar(const std::string& label, const Run& run) {
+  // The bar counts in thousandths, as the amount of work is known only inside.
+  Progress bar(label, 1000);
+  const std::function<void(std::uint64_t, std::uint64_t)> progress = [&bar](std::uint64_t done, std::uint64_t all) {
+    const std::uint64_t now = all == 0 ? 1000 : 1000 * done / all;
+    if (now > bar.done()) bar.advance(now - bar.done());
+  };
+  return run(progress);
+}
+
+/// The fields of a row that are the same in every validation.
+inline void setStatistics(JsonObject& o, const ValidationReport& r) {
+  o.set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
+  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
+  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+}
+
+/// Where the rows go besides the terminal; empty for nowhere.
+struct ValidationOutput {
+  std::string json, report;
+};
+
+/// Declares what every validation takes: its size, its seed, its threads, and where the rows go. `size` says what the
+/// default is.
+inline void addRunOptions(CLI::App& app, const std::string& size, std::size_t& trials, std::uint64_t& seed,
+                          int& threads, ValidationOutput& output) {
+  app.add_option("--trials", trials, "Trials a row (default " + size + ")")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
+  app.add_option("--seed", seed, "Seed; the same seed gives the same bits on any number of threads");
+  app.add_option("--threads", threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  app.add_option("--json", output.json, "Write the rows to a JSON file ('-': standard output)");
+  app.add_option("--report", output.report, "Write a page with plots into this directory");
+}
+
+/// Shows rows as format(rows) on the terminal, each as toJson(row) in a JSON file and as a page by writeReport; returns
+/// the exit code of those that were judged.
+template <class Row, class Format, class ToJson, class WriteReport>
+int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
+            const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport) {
+  // Whoever asks for JSON on standard output wants nothing else there.
+  if (output.json != "-") std::fputs(format(rows).c_str(), stdout);
+  if (!output.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, seed);
+    std::vector<JsonObject> list;
+    for (const Row& row : rows) list.push_back(toJson(row));
+    object.set("false_alarm", false_alarm).set("rows", list);
+    writeJson(output.json, object);
+  }
+  if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
+  const bool passed = std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row.passed.value_or(true); });
+  return passed ? exit_fine : exit_validation_failed;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,148 @@
+#include <cli/io/calibration.hpp>
+#include <cli/commands/commands.hpp>
+#include <cli/commands/imu_options.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/commands/validation_command.hpp>
+#include <cli/vi_init.hpp>
+#include <cli/show/vi_init.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* command_name = "liestat vi-init";
+
+struct Options {
+  ImuOptions imu;
+  std::string tracks, image_times, truth, json, report, camera;
+  std::vector<std::string> calibration;
+  std::vector<double> intrinsics;
+  bool free_gravity = false, no_consensus = false, no_refinement = false;
+  double gravity = 9.81;
+  ViInitOptions how;
+};
+
+CameraCalibration cameraOf(const Options& options, const Calibration& calibration) {
+  CameraCalibration camera;
+  if (!options.camera.empty()) {
+    const auto named = std::find_if(calibration.cameras.begin(), calibration.cameras.end(),
+                                    [&](const CameraCalibration& c) { return c.name == options.camera; });
+    if (named == calibration.cameras.end()) {
+      std::string names;
+      for (const CameraCalibration& c : calibration.cameras) names += (names.empty() ? "" : ", ") + c.name;
+      throw InputError(command_name, 0, fmt::format("no calibration has a camera {}", printable(options.camera)),
+                       names.empty() ? "a calibration with a camera" : "one of " + names);
+    }
+    camera = *named;
+  } else if (!calibration.cameras.empty()) {
+    camera = calibration.cameras.front();
+  } else if (options.intrinsics.empty()) {
+    throw InputError(command_name, 0, "no camera is known", "--calibration with a camera, or --intrinsics fu,fv,cu,cv");
+  }
+  if (!options.intrinsics.empty()) camera.camera = cameraFromIntrinsics(options.intrinsics);
+  return camera;
+}
+
+ViRecording recordingOf(const Options& options) {
+  ViRecording recording;
+  recording.imu = readImu(options.imu.file);
+  recording.tracks = readImageTracks(options.tracks, options.image_times, recording.imu.start_ns);
+  const Calibration calibration = options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
+  recording.camera = cameraOf(options, calibration);
+  recording.noise = options.imu.noiseOver(calibration.imu.value_or(ImuNoise<double>{}));
+  if (!(recording.noise.gyroscope > 0 && recording.noise.accelerometer > 0)) {
+    throw InputError(command_name, 0, "the inertial sensor's densities of noise are not known",
+                     "--calibration with an imu0, or --noise gyroscope,accelerometer");
+  }
+  if (!options.truth.empty()) recording.truth = readGroundTruth(options.truth, recording.imu.start_ns);
+  if (options.how.true_biases && recording.truth.empty()) {
+    throw InputError(command_name, 0, "--true-biases without --truth");
+  }
+  return recording;
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  ViInitOptions how = options.how;
+  how.gravity = options.free_gravity ? std::nullopt : std::optional(options.gravity);
+  how.prior = options.imu.bias();
+  how.scheme = options.imu.scheme;
+  how.largest_gap = options.imu.largest_gap;
+  how.consensus = !options.no_consensus;
+  how.refinement = !options.no_refinement;
+  const ViRecording recording = recordingOf(options);
+  const ViInitResult result =
+      withProgressBar("vi-init", [&](const auto& progress) { return initialise(recording, how, progress); });
+  if (options.json != "-") std::fputs(viInitTable(recording, how, result).c_str(), stdout);
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, how.seed);
+    setViInit(object, recording, how, result);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, how, result);
+  const bool any = std::any_of(result.windows.begin(), result.windows.end(), [](const ViWindow& w) { return w.ok(); });
+  return any ? exit_fine : exit_not_trusted;
+}
+
+}  // namespace
+
+void addViInitCommand(CLI::App& app, Invocation& invocation) {
+  auto options = std::make_shared<Options>();
+  ViInitOptions& how = options->how;
+  CLI::App* command = app.add_subcommand(
+      "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
+  addImuOptions(*command, options->imu, ": as it is expected (default 0)");
+  command->add_option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s")
+      ->required();
+  command->add_option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
+  command->add_option("--calibration", options->calibration,
+                      "YAML of camera and inertial sensor (Kalibr, OpenVINS, EuRoC); several files are merged");
+  command->add_option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
+  command->add_option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's")
+      ->delimiter(',')
+      ->expected(4);
+  command->add_option("--noise-factor", how.noise_factor, "Multiplies these densities (default 1)")
+      ->check(CLI::Range(1e-3, 1e6));
+  command->add_option("--pixel-noise", how.pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
+      ->check(CLI::Range(1e-6, 1e3));
+  command->add_option("--window", how.window, "s (default 2)")->check(CLI::Range(0.1, 60.));
+  command->add_option("--stride", how.stride, "s from one window's start to the next (default: the window)")
+      ->check(CLI::Range(1e-3, 1e4));
+  command->add_option("--image-rate", how.image_rate, "Hz: images that are used, at most (default 10; 0: all)")
+      ->check(CLI::Range(0., 1e4));
+  command->add_option("--features", how.features, "A window, at most (default 50; 0: all)");
+  command->add_option("--least-observations", how.least_observations, "Of a feature in a window (default 4)")
+      ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
+  command->add_option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)")->check(CLI::Range(1e-3, 1e3));
+  command->add_flag("--free-gravity", options->free_gravity, "|G| is not known");
+  command->add_option("--gyroscope-deviation", how.gyroscope_deviation, "rad/s, of its expected bias (default 0.1)")
+      ->check(CLI::Range(1e-9, 10.));
+  command
+      ->add_option("--accelerometer-deviation", how.accelerometer_deviation,
+                   "m/s^2, of its expected bias (default 0.15)")
+      ->check(CLI::Range(1e-9, 100.));
+  command->add_flag("--known-biases", how.known_biases, "Biases are as they are expected: nothing is estimated");
+  command->add_flag("--true-biases", how.true_biases, "Those of the ground truth are used: nothing is estimated");
+  command->add_flag("--no-consensus", options->no_consensus, "All tracks are right");
+  command->add_flag("--no-refinement", options->no_refinement, "The closed form alone");
+  command->add_option("--fuse", how.stretch, "s: disjoint windows of such stretches are fused (default 12; 0: none)")
+      ->check(CLI::Range(0., 1e6));
+  command->add_option("--begin", how.begin,
+                      "s since the first reading, or the file's seconds (default: the first image)");
+  command->add_option("--end", how.end, "The same (default: the last image)");
+  command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with");
+  command->add_option("--seed", how.seed, "Of the consensus");
+  command->add_option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
+  command->add_option("--report", options->report, "Write a page with plots into this directory");
+  command->callback(
+      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,282 @@
+#include <cli/show/mean.hpp>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include <cli/show/table.hpp>
+
+namespace liestat::cli {
+namespace {
+
+constexpr double degrees = 180 / std::numbers::pi;
+
+const char* plural(MeanFeature feature) {
+  switch (feature) {
+    case MeanFeature::point:
+      return "points";
+    case MeanFeature::rotation:
+      return "rotations";
+    case MeanFeature::frame:
+      return "frames";
+    case MeanFeature::semi_oriented_frame:
+      return "semi-oriented frames";
+    case MeanFeature::non_oriented_frame:
+      return "non-oriented frames";
+    case MeanFeature::se3:
+      return "rigid motions (SE3)";
+    case MeanFeature::direction:
+      return "directions";
+  }
+  return "";
+}
+
+std::string criterionInWords(const Measures& measures) {
+  switch (measures.criterion) {
+    case MeanCriterion::lsq:
+      return "least squares";
+    case MeanCriterion::wlsq:
+      return "weighted least squares";
+    case MeanCriterion::maha:
+      return std::string("least Mahalanobis distances") +
+             (measures.likelihood ? " with the likelihood's volume term" : "") +
+             (!measures.covariance_at_matters                    ? ""
+              : measures.covariance_at == CovarianceAt::measured ? ", covariances in the frames of the measures"
+                                                                 : ", covariances in the frame of the mean");
+    case MeanCriterion::barycentre:
+      break;
+  }
+  return measures.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
+}
+
+std::vector<double> deviations(const TangentPart& part, const Eigen::MatrixXd& covariance) {
+  std::vector<double> list;
+  for (int i = part.begin; i < part.begin + part.size; ++i) {
+    list.push_back(part.scale() * std::sqrt(std::max(0.0, covariance(i, i))));
+  }
+  return list;
+}
+
+std::vector<std::string> triple(const std::string& what, const Eigen::Vector3d& v, const std::string& unit) {
+  return {what, number(v[0], 9), number(v[1], 9), number(v[2], 9), unit};
+}
+
+}  // namespace
+
+std::vector<std::vector<std::string>> deviationRows(const Measures& measures, const MeanAnalysis& analysis) {
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&](const std::string& what, const TangentPart& part, const Eigen::MatrixXd& covariance) {
+    std::vector<std::string> row{fmt::format("{}, {}", what, part.name)};
+    for (const double sd : deviations(part, covariance)) row.push_back(number(sd));
+    row.resize(4);
+    row.push_back(part.unit());
+    rows.push_back(row);
+  };
+  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  if (analysis.covariance.size() > 0) {
+    for (const TangentPart& part : parts) add("sd of the mean", part, analysis.covariance);
+  }
+  for (const TangentPart& part : parts) add("dispersion", part, analysis.dispersion);
+  return rows;
+}
+
+std::string oneLine(const FeatureValue& value) {
+  std::string text;
+  const auto add = [&](const char* what, const auto& v, double scale, const char* unit) {
+    if (!v) return;
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} ({:.6g}, {:.6g}, {:.6g}){}", what, scale * (*v)[0], scale * (*v)[1], scale * (*v)[2], unit);
+  };
+  add("rotation vector", value.rotation_vector, degrees, " deg");
+  add("translation", value.translation, 1, " m");
+  add("point", value.point, 1, " m");
+  add("direction", value.direction, 1, "");
+  return text;
+}
+
+std::vector<std::vector<std::string>> valueRows(const FeatureValue& value) {
+  std::vector<std::vector<std::string>> rows;
+  if (value.rotation_vector) rows.push_back(triple("rotation vector", degrees * *value.rotation_vector, "deg"));
+  if (value.translation) rows.push_back(triple("translation", *value.translation, "m"));
+  if (value.point) rows.push_back(triple("point", *value.point, "m"));
+  if (value.direction) rows.push_back(triple("direction", *value.direction, ""));
+  return rows;
+}
+
+std::string uniquenessInWords(const MeanAnalysis& analysis) {
+  const bool certified = analysis.unique != "not_certified";
+  std::string text = (certified ? analysis.unique : "not certified") + ": ";
+  if (!analysis.proof.empty()) {
+    text += analysis.proof;
+  } else if (analysis.cells > 0) {
+    text += "branch and bound did not finish";
+  } else {
+    text += "no certificate holds";
+  }
+  return analysis.cells > 0 ? text + fmt::format(", {} cells", analysis.cells) : text;
+}
+
+std::string covarianceInWords(const Measures& measures, const MeanAnalysis& analysis) {
+  if (analysis.covariance.size() == 0) {
+    return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
+  }
+  const int k = degreesOfFreedom(measures.feature);
+  const std::string law = analysis.covariance_from == "residuals"
+                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, measures.size())
+                              : fmt::format("chi-square with {} degrees of freedom", k);
+  return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
+                     analysis.covariance_from == "residuals" ? "the residuals" : "the measures' own covariances", law);
+}
+
+std::string measuresInWords(const std::string& source, const Measures& measures) {
+  std::string text =
+      fmt::format("{}: {} {} ({})", source, measures.size(),
+                  measures.size() == 1 ? name(measures.feature) : plural(measures.feature), measures.file.format);
+  if (measures.file.n_normalised > 0) {
+    text += fmt::format(", {} normalised (largest error {:.2g})", measures.file.n_normalised,
+                        measures.file.largest_norm_error);
+  }
+  return text;
+}
+
+std::string formatMean(const std::string& source, const Measures& measures, const MeanAnalysis& analysis) {
+  std::string text = measuresInWords(source, measures) + "\n";
+  text += fmt::format("mean by {}: {} after {} {}\n\n", criterionInWords(measures),
+                      analysis.converged ? "converged" : "not converged", analysis.iterations,
+                      analysis.iterations == 1 ? "step" : "steps");
+  Table table({"", "x", "y", "z", "unit"});
+  for (auto& row : valueRows(analysis.mean)) table.row(row);
+  for (auto& row : deviationRows(measures, analysis)) table.row(row);
+  text += table.str() + "\n";
+  if (analysis.mean.quaternion_xyzw) {
+    const Eigen::Vector4d& q = *analysis.mean.quaternion_xyzw;
+    text += fmt::format("quaternion x y z w  {:.9f} {:.9f} {:.9f} {:.9f}\n", q[0], q[1], q[2], q[3]);
+  }
+  text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
+  for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
+  text += "covariance   " + covarianceInWords(measures, analysis) + "\n";
+  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  for (std::size_t p = 0; measures.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
+    text += fmt::format("farthest     {} {} in {}, line {}\n", number(parts[p].scale() * analysis.largest[p].value),
+                        parts[p].unit(), parts[p].name, analysis.largest[p].line);
+  }
+  for (const std::string& note : measures.notes) text += "note         " + note + "\n";
+  for (const std::string& note : analysis.notes) text += "note         " + note + "\n";
+  if (analysis.status != Status::ok && analysis.status != Status::not_applicable) {
+    text += fmt::format("\nNot to be trusted ({}): {}.\n", name(analysis.status), analysis.reason);
+  }
+  return text;
+}
+
+JsonObject toJson(const FeatureValue& value) {
+  JsonObject object;
+  if (value.quaternion_xyzw) object.set("quaternion_xyzw", *value.quaternion_xyzw);
+  if (value.rotation_vector) object.set("rotation_vector", *value.rotation_vector);
+  if (value.translation) object.set("translation", *value.translation);
+  if (value.point) object.set("point", *value.point);
+  if (value.direction) object.set("direction", *value.direction);
+  return object;
+}
+
+void setCovarianceWords(JsonObject& object, MeanFeature feature) {
+  switch (feature) {
+    case MeanFeature::point:
+      object.set("covariance_order", "x y z (m)");
+      object.set("covariance_side", "none: the error is added to the point");
+      object.set("covariance_frame", "the coordinates of the file");
+      return;
+    case MeanFeature::direction:
+      object.set("covariance_order", "two tangent coordinates (rad)");
+      object.set("covariance_side", "right: the error is a tangent vector at the mean, followed along a great circle");
+      object.set("covariance_frame",
+                 "the tangent plane at the mean, its axes the columns of tangent_basis (the x and y axes turned by the "
+                 "smallest rotation that takes z to the mean)");
+      return;
+    case MeanFeature::rotation:
+      object.set("covariance_order", "rotation x y z (rad)");
+      break;
+    default:
+      object.set("covariance_order", "translation x y z (m), rotation x y z (rad)");
+  }
+  object.set("covariance_side", feature == MeanFeature::rotation ? "right: mean * Exp(error)"
+                                : feature == MeanFeature::se3    ? "right: mean * Exp(error), Exp of SE(3)"
+                                                              : "right: translation + R * error_t, R * Exp(error_r)");
+  object.set("covariance_frame", "the axes of the mean (body frame)");
+}
+
+JsonObject standardDeviations(MeanFeature feature, const Eigen::MatrixXd& covariance) {
+  JsonObject object;
+  for (const TangentPart& part : tangentParts(feature)) {
+    object.set(part.name + "_" + part.unit(), deviations(part, covariance));
+  }
+  return object;
+}
+
+void setMeanFields(JsonObject& object, const std::string& source, const Measures& measures,
+                   const MeanAnalysis& analysis) {
+  object.set("file", source).set("format", measures.file.format).set("feature", name(measures.feature));
+  object.set("criterion", name(measures.criterion));
+  if (measures.covariance_at_matters) {
+    object.set("covariance_at", measures.covariance_at == CovarianceAt::measured ? "measured" : "estimated");
+  } else {
+    object.set("covariance_at", nullptr);
+  }
+  object.set("likelihood", measures.likelihood).set("weighted", measures.weighted);
+  object.set("n", measures.size()).set("n_normalised", measures.file.n_normalised);
+  object.set("largest_norm_error", measures.file.largest_norm_error);
+  object.set("status", name(analysis.status));
+  if (analysis.status == Status::ok) {
+    object.set("reason", nullptr);
+  } else {
+    object.set("reason", analysis.reason);
+  }
+  object.set("converged", analysis.converged).set("iterations", analysis.iterations);
+  object.set("residual", analysis.residual).set("tolerance", analysis.tolerance);
+  object.set("mean", toJson(analysis.mean));
+
+  const bool has_covariance = analysis.covariance.size() > 0;
+  if (has_covariance) {
+    object.set("covariance", analysis.covariance);
+  } else {
+    object.set("covariance", nullptr);
+  }
+  object.set("covariance_status", name(analysis.covariance_status));
+  setCovarianceWords(object, measures.feature);
+  if (analysis.tangent_basis) object.set("tangent_basis", *analysis.tangent_basis);
+  if (has_covariance) {
+    object.set("covariance_from", analysis.covariance_from)
+        .set("covariance_law", analysis.covariance_from == "residuals" ? "hotelling" : "chi2");
+    object.set("standard_deviations", standardDeviations(measures.feature, analysis.covariance));
+  } else {
+    object.set("covariance_from", nullptr).set("covariance_law", nullptr).set("standard_deviations", nullptr);
+  }
+  object.set("dispersion", analysis.dispersion);
+  object.set("dispersion_standard_deviations", standardDeviations(measures.feature, analysis.dispersion));
+  std::vector<JsonObject> farthest;
+  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    JsonObject entry;
+    entry.set("part", parts[p].name).set("distance", parts[p].scale() * analysis.largest[p].value);
+    entry.set("unit", parts[p].unit()).set("line", analysis.largest[p].line);
+    farthest.push_back(entry);
+  }
+  object.set("farthest", farthest);
+
+  object.set("unique", analysis.unique).set("proof", uniquenessInWords(analysis));
+  std::vector<JsonObject> rivals;
+  for (const FeatureValue& rival : analysis.rivals) rivals.push_back(toJson(rival));
+  object.set("rivals", rivals).set("r_star", analysis.r_star).set("cells", analysis.cells);
+  object.set("cut_locus_mass", analysis.cut_locus_mass);
+  if (analysis.fit_dof > 0) {
+    object.set("fit", analysis.fit).set("fit_dof", analysis.fit_dof);
+    object.set("fit_p", analysis.fit_p);
+  } else {
+    object.set("fit", nullptr).set("fit_dof", nullptr).set("fit_p", nullptr);
+  }
+  std::vector<std::string> notes = measures.notes;
+  notes.insert(notes.end(), analysis.notes.begin(), analysis.notes.end());
+  object.set("notes", notes);
+}
+
+}  // namespace liestat::cli

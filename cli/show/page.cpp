@@ -1,0 +1,267 @@
+#include <cli/show/page.hpp>
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <cli/show/plots.hpp>
+#include <cli/show/json.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/io/text.hpp>
+
+namespace liestat::cli {
+namespace {
+
+constexpr std::string_view style_sheet = R"css(
+:root { color-scheme: light dark; --ink: #1c1f23; --soft: #5b6470; --rule: #d9dde2; --page: #ffffff; --stripe: #f5f6f8; --link: #0b62a8; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e4e7eb; --soft: #9aa4b0; --rule: #3a414a; --page: #16191d; --stripe: #1e2227; --link: #6db7f2; }
+}
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 60rem; padding: 2.5rem 1.25rem 4rem; background: var(--page); color: var(--ink);
+  font: 16px/1.55 "Helvetica Neue", Helvetica, Arial, sans-serif; }
+h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 1.5rem; padding-bottom: .6rem; border-bottom: 2px solid var(--rule); }
+h2 { font-size: 1.2rem; margin: 2.5rem 0 .8rem; }
+p { max-width: 46rem; margin: 0 0 1rem; }
+a { color: var(--link); }
+pre { background: var(--stripe); border: 1px solid var(--rule); border-radius: 4px; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem; }
+.scroll { overflow-x: auto; margin: 0 0 1.5rem; }
+table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
+caption { caption-side: bottom; text-align: left; color: var(--soft); padding-top: .5rem; }
+th, td { padding: .3rem .8rem; text-align: left; white-space: nowrap; }
+th { border-bottom: 2px solid var(--rule); font-weight: 600; }
+td { border-bottom: 1px solid var(--rule); }
+tbody tr:nth-child(even) { background: var(--stripe); }
+.number { text-align: right; }
+figure { margin: 1.5rem 0 2rem; }
+.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem; }
+.plot svg { display: block; width: 100%; height: auto; margin: 0 auto; }
+.plot text { font-family: Helvetica, Arial, sans-serif; }
+figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
+.notice { border-left: 4px solid #d99a00; background: var(--stripe); padding: .6rem .9rem; max-width: none; }
+footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85rem; }
+)css";
+
+std::string escaped(std::string_view text) {
+  std::string result;
+  result.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  }
+  return result;
+}
+
+bool isNumeric(const std::vector<std::vector<std::string>>& rows, std::size_t column) {
+  bool any = false;
+  for (const auto& row : rows) {
+    if (column >= row.size() || row[column].empty() || row[column] == "-" || row[column] == "n/a") continue;
+    double value = 0;
+    if (parseNumber(row[column], value) == NumberKind::no_number) return false;
+    any = true;
+  }
+  return any;
+}
+
+/// The drawing alone, without the lines that only a file of its own may begin with.
+std::string_view svgElement(std::string_view svg) {
+  const std::size_t start = svg.find("<svg");
+  return start == std::string_view::npos ? std::string_view{} : svg.substr(start);
+}
+
+/// gnuplot gives its symbols the same identifiers in every drawing, but on one page they must differ.
+std::string withOwnIdentifiers(std::string_view svg, const std::string& name) {
+  std::string result;
+  while (true) {
+    std::size_t next = std::string_view::npos;
+    for (const std::string_view mark :
+         {"id='gp", "id='textbox", "id='greybox", "href='#gp", "url(#textbox", "url(#greybox"}) {
+      const std::size_t found = svg.find(mark);
+      if (found < next) next = found;
+    }
+    if (next == std::string_view::npos) return result.append(svg);
+    next = svg.find_first_of("'#(", next) + 1;
+    while (svg[next] == '#') ++next;
+    result.append(svg.substr(0, next)).append(name).append("_");
+    svg.remove_prefix(next);
+  }
+}
+
+/// The width that the drawing was made for, from its viewBox: wider would blow up its letters.
+int svgWidth(std::string_view svg) {
+  const std::size_t start = svg.find("viewBox=\"0 0 ");
+  double width = 0;
+  if (start == std::string_view::npos) return 680;
+  const std::string_view rest = svg.substr(start + 13);
+  return parseNumber(rest.substr(0, rest.find(' ')), width) == NumberKind::finite ? static_cast<int>(width) : 680;
+}
+
+/// gnuplot repeats the command, points at the place in it and says what is wrong last.
+std::string lastLine(std::string text) {
+  text.erase(text.find_last_not_of(" \n\r\t") + 1);
+  return text.empty() ? "no message" : text.substr(text.rfind('\n') + 1);
+}
+
+}  // namespace
+
+Series ellipse(std::string name, const Eigen::Vector2d& centre, const Eigen::Matrix2d& covariance, double chi2) {
+  constexpr int steps = 96;
+  Series series{.name = std::move(name), .style = Style::lines};
+  const Eigen::LLT<Eigen::Matrix2d> factor(covariance);
+  const bool valid = factor.info() == Eigen::Success;
+  const Eigen::Matrix2d axes = std::sqrt(chi2) * Eigen::Matrix2d(factor.matrixL());
+  for (int i = 0; i <= steps; ++i) {
+    const double angle = 2 * std::numbers::pi * i / steps;
+    Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+    if (valid) point = centre + axes * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    series.x.push_back(point.x());
+    series.y.push_back(point.y());
+  }
+  return series;
+}
+
+Series histogram(std::string name, const std::vector<double>& values, double low, double high, std::size_t bins,
+                 bool density) {
+  Series series{.name = std::move(name), .style = Style::boxes};
+  const double width = (high - low) / static_cast<double>(bins);
+  std::vector<double> counts(bins, 0.0);
+  for (const double value : values) {
+    // The upper end belongs to the last bin.
+    if (value >= low && value <= high) counts[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))] += 1;
+  }
+  const double scale = density && !values.empty() ? 1 / (static_cast<double>(values.size()) * width) : 1;
+  for (std::size_t i = 0; i < bins; ++i) {
+    series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
+    series.y.push_back(scale * counts[i]);
+    series.width.push_back(width);
+  }
+  return series;
+}
+
+Report::Report(std::string directory, std::string title) : directory_(std::move(directory)), title_(std::move(title)) {
+  createDirectory(directory_);
+}
+
+std::string Report::path(const std::string& file) const { return (std::filesystem::path(directory_) / file).string(); }
+
+std::string Report::uniqueName(std::string_view name) {
+  // gnuplot takes such names, and only such, for the identifiers in its drawings.
+  const auto isLetter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  std::string clean;
+  for (const char c : name.substr(0, 80)) clean += isLetter(c) || (c >= '0' && c <= '9') ? c : '_';
+  if (clean.empty() || !isLetter(clean.front())) clean.insert(0, "plot_");
+  std::string candidate = clean;
+  for (int i = 2; std::find(names_.begin(), names_.end(), candidate) != names_.end(); ++i)
+    candidate = fmt::format("{}_{}", clean, i);
+  names_.push_back(candidate);
+  return candidate;
+}
+
+void Report::section(std::string_view title) { body_ += fmt::format("<h2>{}</h2>\n", escaped(title)); }
+
+void Report::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", escaped(text)); }
+
+void Report::code(std::string_view text) { body_ += fmt::format("<pre>{}</pre>\n", escaped(text)); }
+
+void Report::table(const std::vector<std::string>& headers, const std::vector<std::vector<std::string>>& rows,
+                   std::string_view caption) {
+  std::vector<std::string_view> classes;
+  for (std::size_t i = 0; i < headers.size(); ++i) classes.push_back(isNumeric(rows, i) ? " class=\"number\"" : "");
+  body_ += "<div class=\"scroll\"><table>\n";
+  if (!caption.empty()) body_ += fmt::format("<caption>{}</caption>\n", escaped(caption));
+  body_ += "<thead><tr>";
+  for (std::size_t i = 0; i < headers.size(); ++i)
+    body_ += fmt::format("<th{}>{}</th>", classes[i], escaped(headers[i]));
+  body_ += "</tr></thead>\n<tbody>\n";
+  for (const auto& row : rows) {
+    body_ += "<tr>";
+    for (std::size_t i = 0; i < headers.size(); ++i) {
+      body_ += fmt::format("<td{}>{}</td>", classes[i], i < row.size() ? escaped(row[i]) : std::string());
+    }
+    body_ += "</tr>\n";
+  }
+  body_ += "</tbody></table></div>\n";
+}
+
+void Report::plot(const Plot& plot) {
+  const std::string name = uniqueName(plot.name);
+  writeOutput(path(name + ".csv"), plotCsv(plot));
+  // A drawing of an earlier run would pass for one of this.
+  std::error_code ignored;
+  std::filesystem::remove(path(name + ".svg"), ignored);
+
+  std::string notice;
+  std::string svg;
+  const std::string script = plotScript(plot, name);
+  if (script.empty()) {
+    notice = "There is nothing finite to draw.";
+  } else {
+    writeOutput(path(name + ".gp"), script);
+    const ProgramResult run = runProgram({"gnuplot", "-d", name + ".gp"}, directory_);
+    if (!run.found) {
+      has_gnuplot_ = false;
+      notice = "gnuplot is not installed, so this plot was not drawn (Debian and Ubuntu: gnuplot-nox).";
+    } else if (run.status != 0 || !std::filesystem::exists(path(name + ".svg"), ignored)) {
+      notice = "gnuplot could not draw this plot: " + lastLine(run.errors);
+    } else {
+      svg = loadText(path(name + ".svg")).text;
+    }
+  }
+
+  body_ += "<figure>\n";
+  if (!svg.empty()) {
+    const std::string drawing = withOwnIdentifiers(svgElement(svg), name);
+    body_ += fmt::format("<div class=\"plot\" style=\"max-width:{}px\">{}</div>\n", svgWidth(drawing) + 18, drawing);
+  } else {
+    body_ += fmt::format("<p class=\"notice\">{}</p>\n", escaped(notice));
+  }
+  std::string caption = plot.caption;
+  for (const Panel& panel : plot.panels) {
+    for (const Series& series : panel.series) {
+      if (series.style == Style::points && series.x.size() > most_points_drawn) {
+        caption += fmt::format(" Of the {} points {}one in {} is drawn.", series.x.size(),
+                               series.name.empty() ? "" : "of '" + series.name + "' ",
+                               (series.x.size() + most_points_drawn - 1) / most_points_drawn);
+      }
+    }
+  }
+  const std::string separator = caption.empty() ? "" : " ";
+  body_ += fmt::format("<figcaption>{}{}<a href=\"{}.csv\">Data (CSV)</a>", escaped(caption), separator, name);
+  if (!svg.empty()) body_ += fmt::format(", <a href=\"{0}.svg\">SVG</a>, <a href=\"{0}.gp\">gnuplot script</a>", name);
+  body_ += "</figcaption>\n</figure>\n";
+}
+
+std::string Report::write() {
+  const std::string page = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n{2}"
+      "<footer>liestat {3}</footer>\n</body>\n</html>\n",
+      escaped(title_), style_sheet, body_, programVersion());
+  const std::string file = path("index.html");
+  writeOutput(file, page);
+  return file;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,341 @@
+#include <cli/show/plots.hpp>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+extern char** environ;
+
+namespace liestat::cli {
+namespace {
+
+// Distinct in hue and in lightness, also to eyes that miss red or green.
+constexpr std::array<std::string_view, 7> palette = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                     "#e69f00", "#56b4e9", "#555555"};
+
+constexpr int single_width = 680;
+constexpr int single_height = 440;
+constexpr int panel_width = 460;
+constexpr int panel_height = 360;
+
+/// A gnuplot string. In single quotes nothing is special but the quote itself. Its escape, the quote doubled, fails at
+/// the beginning of a string (what follows would be taken as commands), so the typographic apostrophe stands for it.
+std::string quotedText(std::string_view text) {
+  std::string result = "'";
+  for (const char c : text) {
+    if (c == '\'') {
+      result += "’";
+    } else {
+      result += static_cast<unsigned char>(c) < 0x20U ? ' ' : c;
+    }
+  }
+  return result + "'";
+}
+
+std::string csvText(std::string_view text) {
+  if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') {
+      result += "\"\"";
+    } else {
+      result += static_cast<unsigned char>(c) < 0x20U ? ' ' : c;
+    }
+  }
+  return result + "\"";
+}
+
+std::string cell(const std::vector<double>& values, std::size_t i) {
+  if (i >= values.size()) return {};
+  return std::isfinite(values[i]) ? fmt::format("{}", values[i]) : "NaN";
+}
+
+/// Can be shown on the axis at all.
+bool drawable(double value, const Axis& axis) { return std::isfinite(value) && (!axis.logarithmic || value > 0); }
+
+bool drawable(const Series& series, const Panel& panel) {
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    if (!drawable(series.x[i], panel.x)) continue;
+    if (series.style != Style::filled_curve && i < series.y.size() && drawable(series.y[i], panel.y)) return true;
+    if (series.style == Style::filled_curve && i < series.low.size() && i < series.high.size() &&
+        drawable(series.low[i], panel.y) && drawable(series.high[i], panel.y)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool drawable(const Panel& panel) {
+  return std::any_of(panel.series.begin(), panel.series.end(),
+                     [&](const Series& series) { return drawable(series, panel); });
+}
+
+/// The least and the greatest of the data that can be shown on an axis.
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void add(const std::vector<double>& values, const Axis& axis) {
+    for (const double value : values) {
+      if (!drawable(value, axis)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  }
+};
+
+/// gnuplot extends a logarithmic axis to whole decades, which leaves most of it empty when the data span one or two,
+/// and labels nothing between. Here the range follows the data, and short axes are labelled 1, 2, 5, 10.
+std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
+  double low = data.low / 1.25;
+  double high = data.high * 1.25;
+  if (axis.low && drawable(*axis.low, axis)) low = *axis.low;
+  if (axis.high && drawable(*axis.high, axis)) high = *axis.high;
+  if (!(low < high) || !(low > 0) || !std::isfinite(high))
+    return fmt::format("set {}range [*:*]\nset {}tics auto\n", letter, letter);
+  std::string script = fmt::format("set {}range [{}:{}]\n", letter, low, high);
+  if (high / low > 1e3) return script + fmt::format("set {}tics auto\n", letter);
+  std::string tics;
+  for (int exponent = static_cast<int>(std::floor(std::log10(low)));
+       exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
+    for (const int digit : {1, 2, 5}) {
+      const double tic = digit * std::pow(10.0, exponent);
+      if (tic >= low && tic <= high) tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
+    }
+  }
+  return script +
+         (tics.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, tics));
+}
+
+std::string axisText(char letter, const Axis& axis, const Extent& data) {
+  std::string script = fmt::format("set {0}label {1}{2}\nset format {0} '{3}'\n", letter, quotedText(axis.label),
+                                   letter == 'x' ? " offset 0,0.6" : "", axis.logarithmic ? "%.6g" : "% .6g");
+  if (axis.logarithmic) return script + fmt::format("set logscale {}\n", letter) + logarithmicAxis(letter, axis, data);
+  const auto end = [](const std::optional<double>& value) {
+    return value && std::isfinite(*value) ? fmt::format("{}", *value) : std::string("*");
+  };
+  return script + fmt::format("unset logscale {0}\nset {0}tics auto\nset {0}range [{1}:{2}]\n", letter, end(axis.low),
+                              end(axis.high));
+}
+
+/// Clouds are drawn with small points, so that their density shows.
+double pointSize(const Series& series) { return series.x.size() > 1000 ? 0.18 : series.x.size() > 100 ? 0.3 : 0.5; }
+
+std::string styleText(const Series& series, std::string_view colour) {
+  const std::string_view dash = series.dashed ? " dt 2" : "";
+  switch (series.style) {
+    case Style::lines:
+      return fmt::format("with lines lw 1.8 lc rgb '{}'{}", colour, dash);
+    case Style::points:
+      return fmt::format("with points pt 7 ps {} lc rgb '{}'", pointSize(series), colour);
+    case Style::stars:
+      return fmt::format("with points pt 3 ps 1.1 lw 1.6 lc rgb '{}'", colour);
+    case Style::linespoints:
+      return fmt::format("with linespoints pt 7 ps 0.45 lw 1.6 lc rgb '{}'{}", colour, dash);
+    case Style::errorbars:
+      return fmt::format("with yerrorbars pt 7 ps 0.45 lw 1.3 lc rgb '{}'", colour);
+    case Style::boxes:
+      return fmt::format("with boxes lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
+    case Style::filled_curve:
+      return fmt::format("with filledcurves fs transparent solid 0.18 noborder lc rgb '{}'", colour);
+  }
+  return {};
+}
+
+std::string usingText(const Series& series) {
+  switch (series.style) {
+    case Style::errorbars:
+      return "3:4:5:6";
+    case Style::boxes:
+      return series.width.empty() ? "3:4" : "3:4:7";
+    case Style::filled_curve:
+      return "3:5:6";
+    default:
+      return "3:4";
+  }
+}
+
+/// Every k-th point of a scatter that nobody could tell apart anyway, and that no browser could show.
+std::size_t stride(const Series& series) {
+  return series.style == Style::points ? (series.x.size() + most_points_drawn - 1) / most_points_drawn : 1;
+}
+
+void appendPanel(std::string& script, const Plot& plot, std::size_t number, const std::string& csv) {
+  const Panel& panel = plot.panels[number];
+  // The index counts the blocks of the CSV: all series before, without the empty ones.
+  std::size_t index = 0;
+  bool is_first_block = true;
+  for (std::size_t i = 0; i < number; ++i) {
+    for (const Series& series : plot.panels[i].series) index += series.x.empty() ? 0 : 1;
+  }
+  is_first_block = index == 0;
+
+  Extent x;
+  Extent y;
+  for (const Series& series : panel.series) {
+    x.add(series.x, panel.x);
+    for (const auto* values : {&series.y, &series.low, &series.high}) y.add(*values, panel.y);
+  }
+  script +=
+      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText('x', panel.x, x) + axisText('y', panel.y, y);
+  script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
+  script += "unset arrow\n";
+  for (const ReferenceLine& line : panel.references) {
+    const bool horizontal = line.direction == ReferenceLine::Direction::horizontal;
+    if (!drawable(line.at, horizontal ? panel.y : panel.x)) continue;
+    if (horizontal) {
+      script += fmt::format(
+          "set arrow from graph 0, first {0} to graph 1, first {0} nohead back lt 1 dt 3 lw 1.4 lc rgb '#555555'\n",
+          line.at);
+    } else {
+      script += fmt::format(
+          "set arrow from first {0}, graph 0 to first {0}, graph 1 nohead back lt 1 dt 3 lw 1.4 lc rgb '#555555'\n",
+          line.at);
+    }
+  }
+  const auto named = std::count_if(panel.series.begin(), panel.series.end(), [&](const Series& series) {
+    return !series.name.empty() && drawable(series, panel);
+  });
+  script += named > 1 ? "set key\n" : "unset key\n";
+
+  std::string commands;
+  std::size_t colour = 0;
+  for (const Series& series : panel.series) {
+    const std::size_t own = series.colour ? *series.colour : colour++;
+    if (series.x.empty()) continue;
+    if (drawable(series, panel)) {
+      const bool enlarged = named > 1 && series.style == Style::points && !series.name.empty();
+      const bool in_legend = named > 1 && !enlarged;
+      // The header is part of the first block.
+      commands +=
+          fmt::format("{}{} index {} every {}::{} using {} {} title {}", commands.empty() ? "plot " : ", \\\n     ",
+                      quotedText(csv), index, stride(series), is_first_block ? 1 : 0, usingText(series),
+                      styleText(series, palette[own % palette.size()]), in_legend ? quotedText(series.name) : "''");
+      // A point as small as in the cloud would be lost in the legend.
+      if (enlarged)
+        commands += fmt::format(", \\\n     keyentry with points pt 7 ps 0.6 lc rgb '{}' title {}",
+                                palette[own % palette.size()], quotedText(series.name));
+    }
+    is_first_block = false;
+    ++index;
+  }
+  // A panel without data keeps its place and says so.
+  if (commands.empty()) {
+    script +=
+        "set xrange [0:1]\nset yrange [0:1]\nunset logscale\nset xtics auto\nset ytics auto\nset label 1 'no finite "
+        "data' at graph 0.5, graph 0.5 center\n";
+    script += "plot NaN notitle\nunset label 1\n";
+    return;
+  }
+  script += commands + "\n";
+}
+
+}  // namespace
+
+std::string plotCsv(const Plot& plot) {
+  std::string text = "panel,series,x,y,low,high,width\n";
+  bool first = true;
+  for (const Panel& panel : plot.panels) {
+    for (const Series& series : panel.series) {
+      if (series.x.empty()) continue;
+      if (!first) text += "\n\n";
+      first = false;
+      const std::string names = csvText(panel.title) + "," + csvText(series.name);
+      for (std::size_t i = 0; i < series.x.size(); ++i) {
+        text += fmt::format("{},{},{},{},{},{}\n", names, cell(series.x, i), cell(series.y, i), cell(series.low, i),
+                            cell(series.high, i), cell(series.width, i));
+      }
+    }
+  }
+  return text;
+}
+
+std::string plotScript(const Plot& plot, const std::string& name) {
+  if (std::none_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return drawable(panel); }))
+    return {};
+  const std::size_t n = plot.panels.size();
+  const std::size_t columns = std::max<std::size_t>(1, std::min(n, plot.columns));
+  const std::size_t rows = (n + columns - 1) / columns;
+  const int width = n == 1 ? single_width : static_cast<int>(columns) * panel_width;
+  // Where a unit is as long on both axes a square leaves least paper empty.
+  const bool square =
+      std::all_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return panel.equal_aspect; });
+  const int height = n == 1 ? single_height : static_cast<int>(rows) * (square ? panel_width : panel_height);
+  // The name keeps the identifiers of several drawings on one page apart.
+  std::string script = fmt::format(
+      "# Draws {0}.svg from {0}.csv: gnuplot {0}.gp\n"
+      "set terminal svg size {1},{2} dynamic font 'Helvetica,12' noenhanced name '{0}' background '#ffffff'\n"
+      "set output '{0}.svg'\n"
+      "set encoding utf8\n"
+      "set datafile separator comma\n"
+      "set border 3 lw 0.8 lc rgb '#444444'\n"
+      "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
+      "set xtics offset 0,0.25\n"
+      "set grid lt 1 lw 0.5 lc rgb '#dddddd'\n"
+      "set title font 'Helvetica,13' textcolor rgb '#222222'\n"
+      // The empty title keeps the legend off the axis' label.
+      "set key below center horizontal Left reverse samplen 1.8 spacing 1.1 width 1 title ' ' font ',5'\n"
+      // Else each point with an error bar stands on a white disc; 0 would mean 1.
+      "set pointintervalbox 0.01\n"
+      "set errorbars 0.6\n",
+      name, width, height);
+  if (n > 1) script += fmt::format("set multiplot layout {},{}\n", rows, columns);
+  for (std::size_t i = 0; i < n; ++i) appendPanel(script, plot, i, name + ".csv");
+  if (n > 1) script += "\nunset multiplot\n";
+  return script;
+}
+
+ProgramResult runProgram(const std::vector<std::string>& arguments, const std::string& directory) {
+  ProgramResult result;
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    result.errors = std::strerror(errno);
+    return result;
+  }
+  std::vector<std::string> copies = arguments;
+  std::vector<char*> pointers;
+  for (std::string& copy : copies) pointers.push_back(copy.data());
+  pointers.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, pipe[1], STDERR_FILENO);
+  pid_t child = 0;
+  const int error = ::posix_spawnp(&child, pointers[0], &actions, nullptr, pointers.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  ::close(pipe[1]);
+  if (error == 0) {
+    result.found = true;
+    std::array<char, 4096> buffer{};
+    while (true) {
+      const ssize_t count = ::read(pipe[0], buffer.data(), buffer.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) break;
+      result.errors.append(buffer.data(), static_cast<std::size_t>(count));
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
+    result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  } else {
+    result.errors = std::strerror(error);
+  }
+  ::close(pipe[0]);
+  return result;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,76 @@
+#include <cli/show/progress.hpp>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <cli/show/table.hpp>
+
+namespace liestat::cli {
+namespace {
+
+constexpr auto redraw_period = std::chrono::milliseconds(200);
+
+std::string duration(double seconds) {
+  const auto whole = static_cast<std::uint64_t>(std::min(std::ceil(seconds), 3.6e8));
+  const std::uint64_t hours = whole / 3600;
+  const std::uint64_t minutes = whole / 60 % 60;
+  if (hours > 0) return fmt::format("{}:{:02}:{:02}", hours, minutes, whole % 60);
+  return fmt::format("{}:{:02}", minutes, whole % 60);
+}
+
+}  // namespace
+
+std::string progressLine(std::string_view label, std::uint64_t done, std::uint64_t total, double elapsed_s,
+                         std::size_t width) {
+  done = std::min(done, total);
+  const double share = total == 0 ? 1 : static_cast<double>(done) / static_cast<double>(total);
+  std::string left;
+  if (done > 0 && done < total) left = duration(elapsed_s * (1 - share) / share) + " left";
+  const std::string numbers = fmt::format(" {:3}%  {:>12}", static_cast<int>(100 * share), left);
+  const std::size_t taken = displayWidth(label) + 3 + numbers.size();
+  const std::size_t bar = taken < width ? std::min<std::size_t>(width - taken, 40) : 0;
+  const auto filled = static_cast<std::size_t>(share * static_cast<double>(bar));
+  return fmt::format("{} [{}{}]{}", label, std::string(filled, '='), std::string(bar - filled, ' '), numbers);
+}
+
+Progress::Progress(std::string label, std::uint64_t total, std::FILE* stream)
+    : label_(std::move(label)),
+      total_(total),
+      stream_(stream),
+      visible_(::isatty(::fileno(stream)) == 1),
+      start_(Clock::now()) {}
+
+Progress::~Progress() { finish(); }
+
+void Progress::advance(std::uint64_t n) {
+  done_.fetch_add(n, std::memory_order_relaxed);
+  if (visible_ && (Clock::now() - start_).count() >= next_draw_.load(std::memory_order_relaxed)) draw();
+}
+
+void Progress::draw() {
+  // Who comes while another thread draws has better things to do than to wait for it.
+  const std::unique_lock lock(drawing_, std::try_to_lock);
+  if (!lock.owns_lock() || !visible_) return;
+  const Clock::duration elapsed = Clock::now() - start_;
+  next_draw_.store((elapsed + redraw_period).count(), std::memory_order_relaxed);
+  const std::string line = progressLine(label_, done(), total_, std::chrono::duration<double>(elapsed).count());
+  std::fputs(("\r" + line + "\x1b[K").c_str(), stream_);
+  std::fflush(stream_);
+  drawn_ = true;
+}
+
+void Progress::finish() {
+  const std::lock_guard lock(drawing_);
+  if (drawn_) {
+    std::fputs("\r\x1b[K", stream_);
+    std::fflush(stream_);
+  }
+  drawn_ = false;
+  visible_ = false;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,108 @@
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <experiments/propagation_validation.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace liestat::cli {
+namespace {
+
+/// A curve over the noise of a quantity of a method's rows.
+template <class Value>
+Series curve(const std::vector<const PropagationRow*>& rows, const PropagationMethod& method, const Value& value) {
+  // Both orders of an operation in one colour.
+  Series series{.name = label(method),
+                .style = Style::linespoints,
+                .colour = static_cast<std::size_t>(method.operation),
+                .dashed = method.fourth_order};
+  for (const PropagationRow* row : rows) {
+    series.x.push_back(row->experiment.spread);
+    series.y.push_back(value(*row));
+  }
+  return series;
+}
+
+/// Histogram of the squared distances with the density that they should have.
+Panel histogramPanel(const PropagationRow& row) {
+  Panel panel{.title = fmt::format("{}, spread {:.3g}", label(row.method), row.experiment.spread),
+              .x = {.label = "squared Mahalanobis distance", .low = 0.0},
+              .y = {.label = "density", .low = 0.0}};
+  Series boxes{.name = "trials", .style = Style::boxes}, density{.name = row.report.law.name(), .style = Style::lines};
+  for (const HistogramBin& bin : row.histogram) {
+    for (Series* series : {&boxes, &density}) series->x.push_back(0.5 * (bin.lower + bin.upper));
+    boxes.y.push_back(bin.density);
+    density.y.push_back(bin.expected);
+  }
+  panel.series = {boxes, density};
+  return panel;
+}
+
+}  // namespace
+
+void writePropagationReport(const std::string& directory, const std::string& command_line,
+                            const std::vector<PropagationRow>& rows) {
+  Report report(directory, "Propagation of covariances: up to which noise is it right?");
+  report.paragraph(
+      "Each trial draws features with their noise, composes, inverts or compares them or moves a point, and takes the "
+      "squared Mahalanobis distance of the true result under the propagated covariance. If that is true these "
+      "distances "
+      "follow a chi-square law, and their mean, the validation index, is the number of degrees of freedom k. A larger "
+      "index says that the covariance is too small. The spread is the largest standard deviation of the inputs, in rad "
+      "and m.");
+  report.code(command_line);
+
+  for (const Propagated feature : all_propagated) {
+    Panel index{.title = "index over k", .x = {.label = "spread", .logarithmic = true}, .y = {.label = "index / k"}};
+    index.references = {{.at = 1 - consistent_deviation}, {.at = 1}, {.at = 1 + consistent_deviation}};
+    Panel coverage{.title = "inside the 95 % region",
+                   .x = {.label = "spread", .logarithmic = true},
+                   .y = {.label = "fraction"},
+                   .references = {{.at = 0.95}}};
+    Panel distance{.title = "Kolmogorov-Smirnov distance",
+                   .x = {.label = "spread", .logarithmic = true},
+                   .y = {.label = "distance", .low = 0.0}};
+    std::vector<Panel> histograms;
+    std::vector<std::vector<std::string>> table;
+    for (const PropagationMethod& method : propagation_methods) {
+      const auto list = rowsOf(rows, feature, method);
+      if (list.empty()) continue;
+      index.series.push_back(curve(list, method, [](const PropagationRow& row) { return row.relativeIndex(); }));
+      coverage.series.push_back(
+          curve(list, method, [](const PropagationRow& row) { return row.report.coverage[2].observed; }));
+      distance.series.push_back(curve(list, method, [](const PropagationRow& row) { return row.report.ks_statistic; }));
+      // Where the covariance is still right, and where it is most wrong.
+      const std::optional<double> consistent = consistentUpTo(rows, feature, method);
+      for (const PropagationRow* row : list) {
+        if (row->experiment.spread == consistent || row == list.back()) histograms.push_back(histogramPanel(*row));
+        table.push_back({label(method), number(row->experiment.spread), fmt::format("{}", row->report.trials),
+                         number(row->report.index), number(row->report.index_se, 2), number(row->report.law.mean()),
+                         number(row->report.ks_p_value, 2), number(100 * row->report.coverage[2].observed),
+                         !row->passed   ? ""
+                         : *row->passed ? "pass"
+                                        : "FAIL"});
+      }
+    }
+    if (table.empty()) continue;
+    report.section(name(feature));
+    report.plot({.name = name(feature) + "_over_noise",
+                 .caption = fmt::format("{}: index, coverage and K-S distance over the noise; dotted, what is expected "
+                                        "and {:.0f} % from it.",
+                                        name(feature), 100 * consistent_deviation),
+                 .panels = {index, coverage, distance},
+                 .columns = 3});
+    report.plot({.name = name(feature) + "_histograms",
+                 .caption = fmt::format("{}: squared distances at the largest spread with a consistent index, and at "
+                                        "the largest of all.",
+                                        name(feature)),
+                 .panels = histograms,
+                 .columns = 4});
+    report.table({"operation", "spread", "trials", "index", "SE", "expected", "K-S p", "95 % covers", "verdict"},
+                 table);
+  }
+  report.write();
+}
+
+}  // namespace liestat::cli

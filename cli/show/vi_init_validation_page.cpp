@@ -1,0 +1,322 @@
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <experiments/vi_init_validation.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace liestat::cli {
+namespace {
+
+using Check = ViInitCheck;
+using Quantity = ViInitQuantity;
+
+/// The rows of one estimator in one kind of window.
+struct Group {
+  std::vector<const ViInitRow*> rows;
+
+  const ViInitRow& first() const { return *rows.front(); }
+  const ViInitRow* of(Quantity quantity) const {
+    const auto found =
+        std::find_if(rows.begin(), rows.end(), [&](const ViInitRow* row) { return row->quantity == quantity; });
+    return found == rows.end() ? nullptr : *found;
+  }
+  std::string window() const {
+    const ViInitWindow& w = first().window;
+    return fmt::format("{:g} s, {}, {}", w.seconds, w.images, w.features);
+  }
+  std::string verdict() const {
+    bool judged = false, passed = true;
+    for (const ViInitRow* row : rows) {
+      judged = judged || row->passed;
+      passed = passed && row->passed.value_or(true);
+    }
+    return !judged ? "" : passed ? "pass" : "FAIL";
+  }
+};
+
+std::vector<Group> groups(const std::vector<ViInitRow>& rows, Check check) {
+  std::vector<Group> list;
+  for (const ViInitRow& row : rows) {
+    if (row.check != check) continue;
+    const auto belongs = [&](const Group& g) {
+      const ViInitRow& other = g.first();
+      return other.estimator == row.estimator && other.window.seconds == row.window.seconds &&
+             other.window.images == row.window.images && other.window.features == row.window.features;
+    };
+    auto group = std::find_if(list.begin(), list.end(), belongs);
+    if (group == list.end()) group = list.insert(list.end(), Group{});
+    group->rows.push_back(&row);
+  }
+  return list;
+}
+
+std::string index(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.2f}", row->report->index); }
+std::string ratio(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.3f}", row->value); }
+std::string covered(const ViInitRow* row) {
+  return row == nullptr ? "" : fmt::format("{:.1f}", 100 * row->report->coverage[2].observed);
+}
+std::string both(double median, double p95) { return number(median, 2) + " / " + number(p95, 2); }
+std::string errors(const ViInitRow* row) { return row == nullptr ? "" : both(row->median, row->p95); }
+
+/// What a check is about, in a line.
+const char* describe(Check check) {
+  switch (check) {
+    case Check::consistency:
+      return "Refinement under its covariance, biases drawn from their priors: index (degrees of freedom)";
+    case Check::closed_form:
+      return "Closed form under its covariance, image noise alone: index (degrees of freedom)";
+    case Check::accuracy:
+      return "Closed form with the sensor's noise, biases known: errors, median / 95 %";
+    case Check::gyroscope_bias:
+      return "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %";
+    case Check::drift:
+      return "40 % of the tracks drift by 8 px an image: errors, median / 95 %";
+  }
+  return "";
+}
+
+bool hasDistances(Check check) { return check == Check::consistency || check == Check::closed_form; }
+
+Table distancesTable(const std::vector<Group>& list) {
+  const bool refined = list.front().first().check == Check::consistency;
+  std::vector<std::string> headers{"T, n, N"};
+  if (refined) {
+    headers.insert(headers.end(), {"V (3)", "V,G (5)", "all (11)", "last (9)"});
+  } else {
+    headers.insert(headers.end(), {"V,G (5)", "with bias (8)"});
+  }
+  headers.insert(headers.end(), {"χ²/dof", "95 %", "lost", "verdict"});
+  Table table(headers);
+  for (const Group& g : list) {
+    std::vector<std::string> cells{g.window()};
+    if (refined) cells.push_back(index(g.of(Quantity::nees_v)));
+    cells.push_back(index(g.of(Quantity::nees_v_g)));
+    cells.push_back(index(g.of(Quantity::nees_all)));
+    if (refined) cells.push_back(index(g.of(Quantity::nees_last_state)));
+    cells.push_back(ratio(g.of(Quantity::chi2_per_dof)));
+    cells.push_back(covered(g.of(Quantity::nees_v_g)));
+    cells.push_back(fmt::format("{}", g.of(Quantity::nees_v_g)->failures));
+    cells.push_back(g.verdict());
+    table.row(cells);
+  }
+  return table;
+}
+
+/// The errors of a refinement stand below its distances.
+Table errorsTable(const std::vector<Group>& list) {
+  const Check check = list.front().first().check;
+  std::vector<std::string> headers{"estimator", "T, n, N", "speed m/s", "gravity deg", "scale %"};
+  if (check == Check::gyroscope_bias) headers[2] = "bias rad/s";
+  if (check == Check::consistency) headers.push_back("of features");
+  if (check == Check::drift) headers.push_back("selection");
+  Table table(headers);
+  for (const Group& g : list) {
+    const Quantity leading = check == Check::gyroscope_bias ? Quantity::bias : Quantity::speed;
+    std::vector<std::string> cells{name(g.first().estimator), g.window(), errors(g.of(leading)),
+                                   errors(g.of(Quantity::gravity)), errors(g.of(Quantity::scale))};
+    if (check == Check::consistency) cells.push_back(errors(g.of(Quantity::scale_of_features)));
+    if (check == Check::drift) cells.push_back(ratio(g.of(Quantity::selection)));
+    table.row(cells);
+    // What the note has, beside the first estimator of a window.
+    const auto noted = [&](Quantity quantity) {
+      const ViInitRow* row = g.of(quantity);
+      if (row == nullptr || !row->promise || !std::isfinite(row->promise->note_median)) return std::string();
+      return std::isfinite(row->promise->note_p95) ? both(row->promise->note_median, row->promise->note_p95)
+                                                   : number(row->promise->note_median, 2);
+    };
+    const std::vector<std::string> note{"  (the note)", "", noted(leading), noted(Quantity::gravity),
+                                        noted(Quantity::scale)};
+    if (std::any_of(note.begin() + 2, note.end(), [](const std::string& s) { return !s.empty(); })) table.row(note);
+  }
+  return table;
+}
+
+std::string verdict(const ViInitRow& row) {
+  if (!row.passed) return "";
+  return *row.passed ? "pass" : "FAIL";
+}
+
+/// A panel of curves over the windows' length, one for each estimator, of those windows that have 20 features and an
+/// image every tenth of a second.
+template <class Value>
+Panel overWindows(const std::vector<ViInitRow>& rows, Check check, Quantity quantity, const std::string& title,
+                  const std::string& label, const Value& value) {
+  Panel panel{.title = title, .x = {.label = "window, s", .low = 0.5, .high = 4.5}, .y = {.label = label}};
+  for (const ViInitRow& row : rows) {
+    const auto steps = static_cast<double>(row.window.images - 1);
+    if (row.check != check || row.quantity != quantity || row.window.features != 20 ||
+        std::abs(steps / row.window.seconds - 10) > 0.1) {
+      continue;
+    }
+    if (panel.series.empty() || panel.series.back().name != name(row.estimator)) {
+      auto found = std::find_if(panel.series.begin(), panel.series.end(),
+                                [&](const Series& s) { return s.name == name(row.estimator); });
+      if (found == panel.series.end()) {
+        panel.series.push_back({.name = name(row.estimator), .style = Style::linespoints});
+      } else {
+        std::rotate(found, found + 1, panel.series.end());
+      }
+    }
+    panel.series.back().x.push_back(row.window.seconds);
+    panel.series.back().y.push_back(value(row));
+  }
+  return panel;
+}
+
+/// The rows with distances of a check as points with bars of three standard errors, numbered.
+Panel indexPanel(const std::vector<ViInitRow>& rows, Check check) {
+  Panel panel{.title = check == Check::consistency ? "refinement" : "closed form, image noise alone",
+              .x = {.label = "kind of window, in the table's order"},
+              .y = {.label = "index / k"},
+              .references = {{.at = 1}}};
+  std::vector<Group> list = groups(rows, check);
+  for (const Quantity quantity :
+       {Quantity::nees_v, Quantity::nees_v_g, Quantity::nees_all, Quantity::nees_last_state}) {
+    Series series{.name = name(quantity), .style = Style::errorbars};
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const ViInitRow* row = list[i].of(quantity);
+      if (row == nullptr) continue;
+      const double k = row->report->law.mean();
+      // Side by side.
+      series.x.push_back(static_cast<double>(i + 1) + 0.12 * (static_cast<double>(panel.series.size()) - 1.5));
+      series.y.push_back(row->report->index / k);
+      series.low.push_back((row->report->index - 3 * row->report->index_se) / k);
+      series.high.push_back((row->report->index + 3 * row->report->index_se) / k);
+    }
+    if (!series.x.empty()) panel.series.push_back(series);
+  }
+  panel.x.low = 0.5;
+  panel.x.high = static_cast<double>(list.size()) + 0.5;
+  return panel;
+}
+
+Panel coveragePanel(const std::vector<ViInitRow>& rows, Check check) {
+  Panel panel = indexPanel(rows, check);
+  panel.y = {.label = "inside the 95 % region"};
+  panel.references = {{.at = 0.95}};
+  std::vector<Group> list = groups(rows, check);
+  for (Series& series : panel.series) {
+    std::size_t k = 0;
+    for (const Group& g : list) {
+      for (const ViInitRow* row : g.rows) {
+        if (name(row->quantity) != series.name) continue;
+        const Coverage& c = row->report->coverage[2];
+        series.y[k] = c.observed;
+        series.low[k] = c.observed - 3 * c.standard_error;
+        series.high[k] = std::min(1., c.observed + 3 * c.standard_error);
+        ++k;
+      }
+    }
+  }
+  return panel;
+}
+
+}  // namespace
+
+std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
+  std::string text;
+  for (const Check check : all_vi_init_checks) {
+    const std::vector<Group> list = groups(rows, check);
+    if (list.empty()) continue;
+    if (text.empty()) {
+      text = fmt::format("{} windows a row, of T seconds, n images and N features\n\n", list.front().first().trials);
+    }
+    text += fmt::format("{}\n\n", describe(check));
+    if (hasDistances(check)) text += distancesTable(list).str() + "\n";
+    if (check != Check::closed_form) text += errorsTable(list).str() + "\n";
+  }
+  std::size_t judged = 0, failed = 0;
+  for (const ViInitRow& row : rows) {
+    judged += row.passed.has_value();
+    if (row.passed.value_or(true)) continue;
+    ++failed;
+    text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
+                        name(row.quantity), row.window.seconds, row.window.images, row.window.features, row.reason);
+  }
+  return text + fmt::format("{} of {} rows with a promise pass; false alarms: one in {:g} runs\n{}\n", judged - failed,
+                            judged, 1 / vi_init_false_alarm, failed == 0 ? "PASSED" : "FAILED");
+}
+
+void writeViInitReport(const std::string& directory, const std::string& command_line,
+                       const std::vector<ViInitRow>& rows) {
+  Report report(directory, "Visual-inertial initialisation: are its covariances true, and how good is it?");
+  report.paragraph(
+      "Each trial draws a scene, what a camera and an inertial sensor measure of it, and solves the window. If a "
+      "covariance is true, the squared Mahalanobis distances of the truth under it follow a chi-square law with k "
+      "degrees of freedom, and their mean, the index, is k.");
+  report.code(command_line);
+  std::vector<Panel> distances;
+  for (const Check check : {Check::consistency, Check::closed_form}) {
+    if (groups(rows, check).empty()) continue;
+    distances.push_back(indexPanel(rows, check));
+    distances.push_back(coveragePanel(rows, check));
+  }
+  if (!distances.empty()) {
+    report.plot({.name = "consistency",
+                 .caption =
+                     "Index over its expectation, and the fraction of truths in the 95 % region, both with three "
+                     "standard errors; dotted, what is expected.",
+                 .panels = distances});
+  }
+  std::vector<Panel> accuracy;
+  for (const Quantity quantity : {Quantity::speed, Quantity::gravity, Quantity::scale}) {
+    Panel panel = overWindows(rows, Check::accuracy, quantity, name(quantity), unit(quantity),
+                              [](const ViInitRow& row) { return row.median; });
+    Panel refined =
+        overWindows(rows, Check::consistency, quantity, "", "", [](const ViInitRow& row) { return row.median; });
+    panel.series.insert(panel.series.end(), refined.series.begin(), refined.series.end());
+    const std::size_t medians = panel.series.size();
+    for (const Check check : {Check::accuracy, Check::consistency}) {
+      Panel high = overWindows(rows, check, quantity, "", "", [](const ViInitRow& row) { return row.p95; });
+      panel.series.insert(panel.series.end(), high.series.begin(), high.series.end());
+    }
+    for (std::size_t i = medians; i < panel.series.size(); ++i) {
+      panel.series[i].name += ", 95 %";
+      panel.series[i].dashed = true;
+    }
+    for (std::size_t i = 0; i < panel.series.size(); ++i)
+      panel.series[i].colour = i % std::max<std::size_t>(1, medians);
+    panel.y.logarithmic = true;
+    if (!panel.series.empty()) accuracy.push_back(panel);
+  }
+  if (!accuracy.empty()) {
+    report.plot({.name = "errors",
+                 .caption =
+                     "Medians of the errors over the length of the window, and their 95 % quantiles (dashed). 20 "
+                     "features, ten images a second. The refinement does not know the biases, the others do.",
+                 .panels = accuracy,
+                 .columns = 3});
+  }
+  for (const Check check : all_vi_init_checks) {
+    const std::vector<Group> list = groups(rows, check);
+    if (list.empty()) continue;
+    report.section(describe(check));
+    std::vector<std::vector<std::string>> table;
+    for (const Group& g : list) {
+      for (const ViInitRow* row : g.rows) {
+        const bool law = row->report.has_value(), error = std::isfinite(row->median);
+        table.push_back({name(row->estimator), g.window(), name(row->quantity), fmt::format("{}", row->trials),
+                         fmt::format("{}", row->failures),
+                         law                         ? number(row->report->index)
+                         : std::isfinite(row->value) ? number(row->value)
+                                                     : "",
+                         law                            ? number(row->report->index_se, 2)
+                         : std::isfinite(row->value_se) ? number(row->value_se, 2)
+                                                        : "",
+                         law ? number(row->report->law.mean()) : "", law ? number(row->report->ks_p_value, 2) : "",
+                         law ? number(100 * row->report->coverage[2].observed) : "",
+                         error ? number(row->median, 3) : "", error ? number(row->p95, 3) : "", unit(row->quantity),
+                         verdict(*row)});
+      }
+    }
+    report.table({"estimator", "T, images, features", "quantity", "trials", "lost", "index or value", "SE", "expected",
+                  "K-S p", "95 % covers", "median", "95 %", "unit", "verdict"},
+                 table);
+  }
+  report.write();
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,137 @@
+#include <experiments/means_trial.hpp>
+#include <experiments/parallel.hpp>
+#include <lie/lie.hpp>
+#include <stats/validation.hpp>
+
+#include <cmath>
+
+namespace liestat::cli {
+namespace {
+
+using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
+
+Trial trialOf(Feature feature) {
+  switch (feature) {
+    case Feature::point:
+      return detail::runTrial<Eigen::Vector3d>;
+    case Feature::rotation:
+      return detail::runTrial<SO3d>;
+    case Feature::frame:
+      return detail::runTrial<Frame3d>;
+    case Feature::semi_oriented_frame:
+      return detail::runTrial<SemiOrientedFrame3d>;
+    case Feature::non_oriented_frame:
+      return detail::runTrial<NonOrientedFrame3d>;
+    case Feature::direction:
+      break;
+  }
+  return detail::runTrial<S2d>;
+}
+
+/// Logarithm of the ratio of two errors.
+double logRatio(double error, double reference) { return std::log(error / reference); }
+
+/// What the reports are made of, in the order of the methods that are wanted.
+std::vector<TrialOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
+  std::vector<TrialOutcome> list;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    const detail::MethodOutcome& o = outcomes[m];
+    const bool is_maha = methods[m].criterion == Criterion::maha;
+    const detail::MethodOutcome& reference =
+        outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
+    TrialOutcome outcome{.mu2 = o.mahalanobis_squared, .iterations = o.iterations};
+    outcome.extra[log_ratio_rotation] = logRatio(o.rotation_error, reference.rotation_error);
+    outcome.extra[log_ratio_translation] = logRatio(o.translation_error, reference.translation_error);
+    list.push_back(outcome);
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string name(Feature feature) {
+  switch (feature) {
+    case Feature::point:
+      return "point";
+    case Feature::rotation:
+      return "rotation";
+    case Feature::frame:
+      return "frame";
+    case Feature::semi_oriented_frame:
+      return "semi_oriented_frame";
+    case Feature::non_oriented_frame:
+      return "non_oriented_frame";
+    case Feature::direction:
+      return "direction";
+  }
+  return "";
+}
+
+std::string name(Noise noise) {
+  switch (noise) {
+    case Noise::iid:
+      return "iid";
+    case Noise::isd:
+      return "isd";
+    case Noise::idd:
+      return "idd";
+    case Noise::exp:
+      return "exp";
+  }
+  return "";
+}
+
+std::string name(Criterion criterion) {
+  switch (criterion) {
+    case Criterion::lsq:
+      return "lsq";
+    case Criterion::wlsq:
+      return "wlsq";
+    case Criterion::maha:
+      return "maha";
+  }
+  return "";
+}
+
+std::string name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
+
+std::size_t methodIndex(const Method& method) {
+  std::size_t i = 0;
+  while (i + 1 < methods.size() &&
+         !(methods[i].criterion == method.criterion && methods[i].corrected == method.corrected &&
+           methods[i].known_noise == method.known_noise)) {
+    ++i;
+  }
+  return i;
+}
+
+int degreesOfFreedom(Feature feature) {
+  switch (feature) {
+    case Feature::point:
+    case Feature::rotation:
+      return 3;
+    case Feature::direction:
+      return 2;
+    default:
+      return 6;
+  }
+}
+
+std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
+                                  const std::function<void(std::size_t, std::size_t)>& progress) {
+  const int k = degreesOfFreedom(experiment.feature);
+  std::vector<ReferenceLaw> laws;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    laws.push_back(methods[m].known_noise ? ReferenceLaw::chiSquared(k)
+                                          : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
+  }
+  const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
+  const Trial trial = trialOf(experiment.feature);
+  return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
+    return wantedOutcomes(experiment, trial(experiment, rng));
+  });
+}
+
+}  // namespace liestat::cli

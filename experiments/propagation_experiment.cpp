@@ -1,0 +1,54 @@
+#include <experiments/propagation_experiment.hpp>
+
+#include <experiments/parallel.hpp>
+#include <experiments/propagation_trial.hpp>
+
+namespace liestat::cli {
+
+std::string name(Propagated feature) {
+  switch (feature) {
+    case Propagated::rotation:
+      return "rotation";
+    case Propagated::pose:
+      return "pose";
+    case Propagated::similarity:
+      return "similarity";
+  }
+  return "";
+}
+
+std::string name(Operation operation) {
+  switch (operation) {
+    case Operation::compose:
+      return "compose";
+    case Operation::inverse:
+      return "inverse";
+    case Operation::between:
+      return "between";
+    case Operation::act:
+      return "act";
+    case Operation::chain:
+      return "chain";
+  }
+  return "";
+}
+
+int degreesOfFreedom(Propagated feature, Operation operation) {
+  if (operation == Operation::act || feature == Propagated::rotation) return 3;
+  return feature == Propagated::pose ? 6 : 7;
+}
+
+std::vector<ValidationReport> run(const PropagationExperiment& experiment, int threads,
+                                  const std::function<void(std::size_t, std::size_t)>& progress) {
+  std::vector<ReferenceLaw> laws;
+  for (const PropagationMethod& method : experiment.methods) {
+    laws.push_back(ReferenceLaw::chiSquared(degreesOfFreedom(experiment.feature, method.operation)));
+  }
+  // A trial takes microseconds.
+  const ValidationOptions options{
+      .trials = experiment.trials, .seed = experiment.seed, .chunk_size = 256, .progress = progress};
+  return validateAll(ProgramExecutor{threads}, options, laws,
+                     [&](CounterRng& rng, std::uint64_t) { return detail::propagationTrial(experiment, rng); });
+}
+
+}  // namespace liestat::cli

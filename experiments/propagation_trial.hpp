@@ -1,0 +1,10 @@
+#pragma once
+
+#include <experiments/propagation_experiment.hpp>
+
+namespace liestat::cli::detail {
+
+/// One trial of an experiment: an outcome for each of its methods.
+std::vector<TrialOutcome> propagationTrial(const PropagationExperiment& experiment, CounterRng& rng);
+
+}  // namespace liestat::cli::detail

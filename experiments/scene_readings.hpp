@@ -1,0 +1,59 @@
+// What an inertial sensor reads of a simulated scene (experiments/inertial_scene.hpp), and what a window makes of it.
+//
+//   const auto readings = liestat::readingsOf(scene, noise, random, gyroscope_bias);
+//   const liestat::InertialWindow window{liestat::motionsOf(scene, readings, {.preintegration = {.noise = noise}}),
+//                                        scene.window.features, scene.options().camera};
+#pragma once
+
+#include <fusion/imu/readings.hpp>
+#include <experiments/inertial_scene.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <fusion/imu/preintegration.hpp>
+
+#include <Eigen/Core>
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace liestat {
+
+/// What an inertial sensor reads from the first image to beyond the last, `rate` times a second: with white noise, the
+/// scene's bias of the accelerometer (InertialSceneOptions::bias) and one of the gyroscope (rad/s). Biases do not walk.
+inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, const ImuNoise<double>& noise,
+                                                 SceneRandom& random,
+                                                 const Eigen::Vector3d& gyroscope_bias = Eigen::Vector3d::Zero(),
+                                                 double rate = 200) {
+  const double step = 1 / rate;
+  std::vector<ImuSample<double>> readings;
+  for (int k = 0; k <= static_cast<int>(scene.options().window / step) + 1; ++k) {
+    readings.push_back(scene.reading(k * step));
+    readings.back().angular_rate += noise.gyroscope / std::sqrt(step) * random.normal3() + gyroscope_bias;
+    readings.back().specific_force += noise.accelerometer / std::sqrt(step) * random.normal3() + scene.options().bias;
+  }
+  return readings;
+}
+
+/// The motions from each image of a scene to the next (InertialWindow::motions).
+inline std::vector<Preintegration<double>> motionsOf(const InertialScene& scene,
+                                                     const std::vector<ImuSample<double>>& readings,
+                                                     const RecordingOptions<double>& options = {}) {
+  std::vector<Preintegration<double>> motions;
+  for (std::size_t j = 1; j < scene.times.size(); ++j) {
+    motions.push_back(preintegrate<double>(readings, scene.times[j - 1], scene.times[j], options).motion);
+  }
+  return motions;
+}
+
+/// Replaces what the images of a scene's window know of the motion by what an inertial sensor at 200 Hz measures of it.
+inline void measure(InertialScene& scene, const ImuNoise<double>& noise, SceneRandom& random) {
+  const auto motions = motionsOf(scene, readingsOf(scene, noise, random));
+  Preintegration<double> whole;
+  for (std::size_t j = 1; j < scene.times.size(); ++j) {
+    whole = whole * motions[j - 1];
+    scene.window.images[j] = windowImage(whole);
+    scene.window.images[j].time = scene.times[j];
+  }
+}
+
+}  // namespace liestat

@@ -1,0 +1,292 @@
+#include <experiments/table1.hpp>
+
+#include <experiments/parallel.hpp>
+#include <experiments/vi_init_errors.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <experiments/closed_form_cases.hpp>
+#include <experiments/scene_readings.hpp>
+#include <stats/executor.hpp>
+#include <stats/inference.hpp>
+#include <stats/random.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace liestat::cli {
+namespace {
+
+using S = ClosedFormStatus;
+constexpr double bearing_noise = 1. / 450;
+
+/// What a scene came out as.
+struct Recognised {
+  S status = S::bad_input;
+  SolutionCount solutions = SolutionCount::infinite;
+  bool null_right = true, wrong = false;
+};
+
+/// Whether the second solution has its features in front of the camera, where the first's scaled copy is the second:
+/// for a constant acceleration, and for three images.
+std::optional<bool> secondInFront(const ClosedFormCase& c, const InertialScene& scene) {
+  const SceneMotion motion = c.scene.motion;
+  if (c.bias || c.null != 1 || !c.solved || c.scene.layout == SceneLayout::ahead) return {};
+  if (c.scene.images != 3 && motion != SceneMotion::constant_acceleration && motion != SceneMotion::free_fall)
+    return {};
+  const auto& images = scene.window.images;
+  const std::size_t last = images.size() - 1;
+  return secondSolutionScale(meanSpecificForce(images[last / 2], images[last]), scene.gravity) > 0;
+}
+
+/// Few images in one plane may leave a null line that the sphere of gravity cuts: once or twice in front of the camera.
+SolutionCount countOf(const ClosedFormResult& r) {
+  if (r.status != S::coplanar || r.solutions.empty()) return solutionsOf(r.status);
+  const auto in_front = std::count_if(r.solutions.begin(), r.solutions.end(),
+                                      [](const ClosedFormSolution& s) { return s.negative_depths == 0; });
+  return in_front > 1 ? SolutionCount::two : SolutionCount::one;
+}
+
+Recognised recognise(const ClosedFormCase& c, CounterRng& rng) {
+  const InertialScene scene(c.scene, rng());
+  const ClosedFormResult r = solveClosedForm(scene.window, {.estimate_bias = c.bias});
+  Recognised found{.status = r.status, .solutions = countOf(r), .null_right = r.null_dimension == c.null};
+  found.wrong = !found.null_right || (r.status != c.status && r.status != c.or_status);
+  if (c.solved) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const ClosedFormSolution& s : r.solutions) {
+      nearest = std::min(nearest, (s.velocity - scene.velocity).norm() / std::max(1., scene.velocity.norm()) +
+                                      (s.gravity - scene.gravity).norm() / InertialScene::g);
+    }
+    // Two solutions that nearly meet keep half of the digits.
+    found.wrong = found.wrong || !(nearest < 1e-6);
+  }
+  if (const auto two = secondInFront(c, scene)) {
+    found.wrong = found.wrong || found.solutions != (*two ? SolutionCount::two : SolutionCount::one);
+  }
+  return found;
+}
+
+Recognised recognise(const NoisyClosedFormCase& c, CounterRng& rng) {
+  InertialScene scene(c.scene, rng());
+  SceneRandom random(rng());
+  measure(scene, vi_init_imu, random);
+  scene.addNoise(bearing_noise, random);
+  const ClosedFormResult r = solveClosedForm(scene.window, {.bearing_noise = bearing_noise,
+                                                            .estimate_bias = c.bias,
+                                                            .bias_deviation = c.bias_deviation,
+                                                            .singular_values = false});
+  Recognised found{.status = r.status, .solutions = countOf(r)};
+  found.wrong = std::find(c.expected.begin(), c.expected.end(), r.status) == c.expected.end();
+  return found;
+}
+
+template <class Case>
+void fill(Table1Row& row, const Case& c, std::size_t scenes, std::uint64_t seed, int threads) {
+  row.images = c.scene.images;
+  row.features = c.scene.features;
+  row.bias = c.bias;
+  row.scenes = scenes;
+  using List = std::vector<Recognised>;
+  const std::size_t n_chunks = chunkCount(scenes, 8);
+  const List all = ProgramExecutor{threads}.reduce(
+      n_chunks,
+      [&](std::size_t chunk) {
+        List part;
+        const ChunkRange range = chunkRange(scenes, n_chunks, chunk);
+        for (std::size_t i = range.begin; i < range.end; ++i) {
+          CounterRng rng(seed, i);
+          part.push_back(recognise(c, rng));
+        }
+        return part;
+      },
+      [](List& done, const List& next) { done.insert(done.end(), next.begin(), next.end()); });
+  for (const Recognised& r : all) {
+    row.null_right += r.null_right;
+    row.wrong += r.wrong;
+    ++row.solutions[static_cast<std::size_t>(r.solutions)];
+    const auto found =
+        std::find_if(row.statuses.begin(), row.statuses.end(), [&](const auto& s) { return s.first == r.status; });
+    if (found == row.statuses.end()) {
+      row.statuses.emplace_back(r.status, 1);
+    } else {
+      ++found->second;
+    }
+  }
+  std::stable_sort(row.statuses.begin(), row.statuses.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+}
+
+}  // namespace
+
+SolutionCount solutionsOf(ClosedFormStatus status) {
+  switch (status) {
+    case S::ok:
+      return SolutionCount::one;
+    case S::ambiguous:
+    case S::double_root:
+    case S::mirror_gravity:
+      return SolutionCount::two;
+    default:
+      return SolutionCount::infinite;
+  }
+}
+
+const std::vector<Table1Entry>& table1Entries() {
+  static const std::vector<Table1Entry> entries{
+      {"varying acceleration, not coplanar; n = 4, N ≥ 2; n ≥ 5",
+       "unique",
+       {{"n=4", ""},
+        {"n=5, one feature", ""},
+        {"general", ""},
+        {"many", ""},
+        {"straight", "h"},
+        {"planar motion", "h"},
+        {"planar features", "h"},
+        {"collinear features", "h"},
+        {"no rotation", ""},
+        {"lever arm", ""}},
+       {{"general", ""}, {"general, one second", ""}, {"general, five images", ""}, {"no rotation", ""}}},
+      {"varying acceleration, not coplanar; n = 3, N ≥ 2; n = 4, N = 1",
+       "two",
+       {{"n=3, two features", "a"}, {"n=3", "a"}, {"n=4, one feature", "b"}},
+       {{"three images", "a"}}},
+      {"constant acceleration, not 0, not coplanar; n = 3, N ≥ 2; n ≥ 4",
+       "two",
+       {{"constant acceleration, n=3", "a"},
+        {"constant acceleration, n=4, one feature", "a"},
+        {"constant acceleration", "a"},
+        {"free fall", "a"}},
+       {{"constant acceleration", "a"}, {"level acceleration", "c"}, {"free fall", "a"}}},
+      {"no acceleration, any layout; any n, any N",
+       "infinite",
+       {{"constant velocity, n=3", "d"},
+        {"constant velocity", "d"},
+        {"constant velocity, n=4, one feature", "e"},
+        {"constant velocity, n=7, one feature", "e"},
+        {"at rest, n=3", "f"},
+        {"at rest", "f"},
+        {"at rest, one feature", ""}},
+       {{"constant velocity", "d"},
+        {"constant velocity, one second", "d"},
+        {"constant velocity, four seconds", "d"},
+        {"constant velocity, one feature", "e"},
+        {"at rest", "f"}}},
+      {"any motion, any layout; n ≤ 2; n = 3, N = 1",
+       "infinite",
+       {{"n=2, one feature", ""}, {"n=2", ""}, {"n=3, one feature", ""}},
+       {{"two images", ""}, {"three images, one feature", ""}}},
+      {"features and positions coplanar (the text's exception)",
+       "not full rank",
+       {{"coplanar, n=3, two features", ""},
+        {"coplanar, n=4, one feature", ""},
+        {"coplanar, n=5, one feature", "g"},
+        {"coplanar, n=3, three features", "ga"},
+        {"coplanar, n=4", "g"},
+        {"coplanar, n=6, one feature", "g"},
+        {"straight, n=4, one feature", "i"},
+        {"straight, n=5, one feature", "i"},
+        {"straight, n=6, one feature", "i"}},
+       {{"coplanar, one feature", "g"}}},
+      {"features where they do not help (not in the paper)",
+       "",
+       {{"straight at a feature", "j"}},
+       {{"straight at a feature", "j"}, {"features 1e3 times farther", "k"}, {"features 1e6 times farther", "k"}}},
+      {"with the accelerometer's bias (section 4, which counts no solutions)",
+       "",
+       {{"bias, n=3, one feature", "l"},
+        {"bias, n=3", "l"},
+        {"bias, n=4, one feature", "l"},
+        {"bias, n=4", "l"},
+        {"bias, n=5, one feature", "l"},
+        {"bias, n=5", ""},
+        {"bias, n=6, one feature", ""},
+        {"bias", ""},
+        {"bias, one axis", "m"},
+        {"bias, no rotation", "n"},
+        {"bias, constant acceleration", "a"},
+        {"bias, constant velocity", "d"}},
+       {{"bias", ""},
+        {"bias, one axis", "m"},
+        {"bias, one axis, no prior", "m"},
+        {"bias, no rotation", "n"},
+        {"bias, constant velocity", "d"}}},
+  };
+  return entries;
+}
+
+const std::vector<Table1Correction>& table1Corrections() {
+  static const std::vector<Table1Correction> list{
+      {'a', true,
+       "the second solution is the same scene scaled, and in front of the camera only if the (mean) specific force "
+       "is larger than g; else one"},
+      {'b', false, "the second solution is not a scaled copy; it is in front of the camera in some 40 % of the scenes"},
+      {'c', true, "an acceleration at a right angle to gravity: the two solutions meet in a double root"},
+      {'d', true, "only the scale is free: gravity and the direction of V are unique"},
+      {'e', true, "with one feature gravity is not determined either"},
+      {'f', true, "at rest V = 0 and gravity are known, and each depth is free"},
+      {'g', true,
+       "coplanar layouts lose rank only with few images: n = 3, N = 2; n = 4 and 5, N = 1. Beyond, it is harmless"},
+      {'h', false,
+       "what moves or lies in a line or plane is as general, unless features and positions share the plane"},
+      {'i', false, "one feature and a motion along a line always share a plane: unique from n = 6 on"},
+      {'j', false, "the depth of a feature on the line of motion is free, and nothing else"},
+      {'k', false, "the metric part of far features is lost in noise"},
+      {'l', false, "with the bias two images more are needed"},
+      {'m', true,
+       "rotation about one axis: gravity and its mirror image, with biases that differ; the bias's prior decides"},
+      {'n', false, "without rotation the bias can't be told from a shift of gravity: the answer rests on its prior"},
+  };
+  return list;
+}
+
+std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, int threads,
+                                       const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  std::vector<Table1Row> rows;
+  const auto& entries = table1Entries();
+  std::size_t all = 0;
+  for (const Table1Entry& entry : entries) all += entry.exact.size() + 9 * entry.noisy.size();
+  std::size_t done = 0;
+  const double false_alarm =
+      table1_false_alarm / static_cast<double>(closedFormCases().size() + noisyClosedFormCases().size());
+  const auto judge = [&](Table1Row& row, double allowed) {
+    row.passed = binomialSurvival(row.wrong, row.scenes, allowed) >= false_alarm;
+  };
+  const auto find = [](const auto& list, const std::string& wanted) {
+    return std::find_if(list.begin(), list.end(), [&](const auto& c) { return c.name == wanted; });
+  };
+  for (std::size_t e = 0; e < entries.size(); ++e) {
+    for (const auto& [wanted, corrections] : entries[e].exact) {
+      const auto c = find(closedFormCases(), wanted);
+      if (c == closedFormCases().end()) continue;
+      Table1Row row;
+      row.entry = e;
+      row.name = wanted;
+      row.corrections = corrections;
+      row.null = c->null;
+      row.expected = {c->status};
+      if (c->or_status != c->status) row.expected.push_back(c->or_status);
+      fill(row, *c, scenes, seed, threads);
+      judge(row, table1_near_another_case);
+      rows.push_back(std::move(row));
+      done += 1;
+      if (progress) progress(done, all);
+    }
+    for (const auto& [wanted, corrections] : entries[e].noisy) {
+      const auto c = find(noisyClosedFormCases(), wanted);
+      if (c == noisyClosedFormCases().end()) continue;
+      Table1Row row;
+      row.entry = e;
+      row.name = wanted;
+      row.corrections = corrections;
+      row.noisy = true;
+      row.expected = c->expected;
+      fill(row, *c, scenes, seed, threads);
+      judge(row, 1 - c->share);
+      rows.push_back(std::move(row));
+      done += 9;
+      if (progress) progress(done, all);
+    }
+  }
+  return rows;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,77 @@
+#include <experiments/vi_init_errors.hpp>
+#include <experiments/vi_init_trials.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/refinement.hpp>
+#include <experiments/scene_readings.hpp>
+#include <lie/se23.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace liestat::cli {
+namespace {
+
+/// The median of the features' distances over the true ones, away from 1, in percent.
+double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const InertialScene& scene) {
+  std::vector<double> ratio;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i].allFinite()) ratio.push_back(found[i].norm() / scene.features[i].norm());
+  }
+  if (ratio.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
+  std::nth_element(ratio.begin(), middle, ratio.end());
+  return 100 * std::abs(*middle - 1);
+}
+
+}  // namespace
+
+std::vector<double> refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+  const RefinementOptions options{.bearing_noise = vi_init_bearing_noise};
+  const std::uint64_t seed = rng();
+  SceneRandom random(rng());
+  const Eigen::Vector3d accelerometer = noise * options.accelerometer_deviation * random.normal3();
+  const Eigen::Vector3d gyroscope = noise * options.gyroscope_deviation * random.normal3();
+  InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
+                      seed);
+  const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
+                                   .accelerometer = noise * vi_init_imu.accelerometer};
+  const auto readings = readingsOf(scene, simulated, random, gyroscope);
+  scene.addNoise(noise * vi_init_bearing_noise, random);
+  const InertialWindow window{motionsOf(scene, readings, {.preintegration = {.noise = vi_init_imu}}),
+                              scene.window.features, scene.options().camera};
+
+  const double none = std::numeric_limits<double>::quiet_NaN(), lost = std::numeric_limits<double>::infinity();
+  const std::vector<double> failed{none, none, none, none, none, none, lost, lost, lost, lost};
+  const auto start =
+      solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
+  if (start.solutions.empty()) return failed;
+  const RefinementResult r = refine(window, start.solutions[0], {}, options);
+  // What a user would throw away for its χ² is left out only where the noise is what the estimator was told: else it
+  // would hide what is to be seen.
+  if (r.status != RefinementStatus::ok || (noise == 1 && !r.ok())) return failed;
+
+  Eigen::Matrix<double, 12, 1> error;
+  error << r.velocity() - scene.velocity, r.gravity - scene.gravity, r.bias.gyroscope - gyroscope,
+      r.bias.accelerometer - accelerometer;
+  const SO3d body_R_world = scene.attitude(0).inverse();
+  const double end = scene.times.back();
+  const SE23d last(body_R_world * scene.attitude(end),
+                   Eigen::Vector3d(body_R_world * (scene.position(end) - scene.position(0))),
+                   Eigen::Vector3d(body_R_world * scene.speed(end)));
+  const Eigen::Matrix<double, 9, 1> last_error = (last.inverse() * r.states.back()).log();
+  const ViErrors errors = viErrors(r.velocity(), r.gravity, scene);
+  return {
+      mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
+                                    Eigen::Matrix3d(r.covariance.topLeftCorner<3, 3>())),
+      neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance, r.gravity),
+      neesOnSphere<11>(error, r.covariance, r.gravity),
+      mahalanobisSquared<double, 9>(last_error, Eigen::Matrix<double, 9, 9>(r.last_covariance.topLeftCorner<9, 9>())),
+      r.cost,
+      static_cast<double>(r.degrees_of_freedom),
+      errors.speed,
+      errors.gravity,
+      errors.scale,
+      scaleOfFeatures(r.features, scene)};
+}
+
+}  // namespace liestat::cli

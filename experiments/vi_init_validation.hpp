@@ -1,0 +1,117 @@
+#pragma once
+
+#include <experiments/vi_init_trials.hpp>
+#include <stats/validation.hpp>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// What is asked of visual-inertial initialisation.
+enum class ViInitCheck {
+  consistency,     ///< the refinement under its covariance, and its errors
+  closed_form,     ///< the closed form under its covariance, with image noise alone
+  accuracy,        ///< errors of the closed form, biases known
+  gyroscope_bias,  ///< errors where the gyroscope has a bias of 0.05 rad/s
+  drift            ///< errors where 40 % of the tracks drift
+};
+inline constexpr std::array all_vi_init_checks = {ViInitCheck::consistency, ViInitCheck::closed_form,
+                                                  ViInitCheck::accuracy, ViInitCheck::gyroscope_bias,
+                                                  ViInitCheck::drift};
+std::string name(ViInitCheck check);
+
+/// What was estimated, or left out of it.
+enum class ViInitEstimator {
+  refinement,
+  closed_form,
+  closed_form_with_bias,  ///< of the accelerometer
+  least_squares,          ///< the closed form without the removal of the noise's bias
+  bias_estimated,         ///< of the gyroscope
+  bias_ignored,           ///< of the gyroscope
+  robust,
+  oracle,       ///< knows which tracks drift
+  no_selection  ///< takes all tracks
+};
+std::string name(ViInitEstimator estimator);
+
+/// What a row is about.
+enum class ViInitQuantity {
+  nees_v,           ///< squared Mahalanobis distance of V, 3 degrees of freedom
+  nees_v_g,         ///< of V and gravity, 5
+  nees_all,         ///< of V, gravity and the biases that are estimated: 11, 8 of the closed form
+  nees_last_state,  ///< of the state at the last image, 9
+  chi2_per_dof,     ///< of the bearings, motions and priors
+  speed,            ///< length of the error of V
+  gravity,          ///< angle to the true one
+  scale,            ///< length of V over the true one, off 1
+  scale_of_features,
+  bias,      ///< of the gyroscope, length of the error
+  selection  ///< fraction of the windows in which exactly the right tracks were kept
+};
+std::string name(ViInitQuantity quantity);
+/// Empty for what has none.
+std::string unit(ViInitQuantity quantity);
+
+/// What is promised of a row (docs/validation.md), and what the design note has. Infinite: nothing.
+struct ViInitPromise {
+  ValidationTolerance tolerance = {};  ///< of distances; `failure_fraction` also of all others
+  double median = std::numeric_limits<double>::infinity();
+  double p95 = std::numeric_limits<double>::infinity();
+  /// The note's figures, out of so many windows.
+  double note_median = std::numeric_limits<double>::infinity();
+  double note_p95 = std::numeric_limits<double>::infinity();
+  std::size_t note_windows = 60;
+  double deviation = 0;  ///< of χ² per degree of freedom, from 1
+  double fraction = 0;   ///< at least
+};
+
+/// What `liestat validate vi-init` runs.
+struct ViInitValidation {
+  std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
+  std::vector<double> windows;  ///< s; of those that there are; all of them for none
+  std::size_t trials = 600;
+  double noise = 1;  ///< what is simulated over what the estimators are told
+  std::uint64_t seed = 1;
+  int threads = 0;
+};
+
+/// One line of the JSON. What does not apply is NaN.
+struct ViInitRow {
+  ViInitCheck check{};
+  ViInitEstimator estimator{};
+  ViInitQuantity quantity{};
+  ViInitWindow window;
+  std::size_t trials = 0, failures = 0;
+  std::optional<ValidationReport> report;  ///< of distances; their list is empty
+  double median = std::numeric_limits<double>::quiet_NaN();
+  double p95 = std::numeric_limits<double>::quiet_NaN();
+  double value = std::numeric_limits<double>::quiet_NaN();     ///< χ² per degree of freedom, fraction
+  double value_se = std::numeric_limits<double>::quiet_NaN();  ///< its standard error if the promise is kept
+  std::optional<ViInitPromise> promise;
+  std::optional<bool> passed;  ///< the verdict; absent where nothing is promised
+  std::string reason;          ///< why it failed
+};
+
+/// False-alarm probability of a whole run, shared by the rows that are judged.
+inline constexpr double vi_init_false_alarm = 1e-5;
+
+/// What is promised of a row, if anything.
+std::optional<ViInitPromise> viInitPromise(const ViInitRow& row);
+
+std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
+                                      const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+/// The tables for the terminal, the verdict last.
+std::string formatViInitTables(const std::vector<ViInitRow>& rows);
+
+/// A page with plots.
+void writeViInitReport(const std::string& directory, const std::string& command_line,
+                       const std::vector<ViInitRow>& rows);
+
+}  // namespace liestat::cli
