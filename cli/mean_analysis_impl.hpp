@@ -383,7 +383,7 @@ MeanAnalysis analyse(const Measures& measures, const AnalysisOptions& options) {
   const std::vector<M> samples = features<M>(measures.file);
   MeanAnalysis analysis;
   M y;
-  if (measures.criterion == MeanCriterion::maha) {
+  if (measures.criterion == Criterion::maha) {
     y = mahalanobis(measures, samples, options, analysis);
   } else {
     if constexpr (is_se3<M>) {
