@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
@@ -134,4 +134,4 @@ std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads
   });
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -13,7 +13,7 @@ namespace liestat {
 struct ValidationReport;
 }
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
 /// same draws, so that their accuracies can be compared trial by trial.
@@ -93,4 +93,4 @@ int degreesOfFreedom(Feature feature);
 std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
                                   const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments
