@@ -76,7 +76,7 @@ template <class M>
 SplitResult split(const Measures& measures, const SplitPlan& plan, int threads) {
   const SplitEstimator<M> estimator(measures);
   const auto distances = [&](bool by_blocks) {
-    return ProgramExecutor{threads}.reduce(
+    return experiments::ProgramExecutor{threads}.reduce(
         plan.splits,
         [&](std::size_t s) {
           const Halves halves = plan.deal(s, by_blocks);

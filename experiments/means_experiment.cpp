@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
@@ -78,4 +78,4 @@ std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads
   });
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -14,7 +14,7 @@ namespace liestat {
 struct ValidationReport;
 }
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
 /// same draws, so that their accuracies can be compared trial by trial.
@@ -101,4 +101,4 @@ enum ExtraIndex : std::size_t { log_ratio_rotation, log_ratio_translation };
 std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
                                   const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments
