@@ -14,6 +14,7 @@
 #include <cli/vi_fusion.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr double most_windows = 2e4;
@@ -113,14 +114,13 @@ class Initialiser {
     std::vector<double> deviations;
     by_image_.resize(recording_.tracks.times.size());
     for (const PixelObservation& seen : recording_.tracks.observations) {
-      const std::optional<Eigen::Vector3d> ray = camera.bearing(seen.u, seen.v);
+      const std::optional<BearingWithSigma> ray = camera.bearingWithSigma({seen.u, seen.v});
       if (!ray) {
         ++result.observations_outside;
         continue;
       }
-      const double deviation = camera.bearingDeviation(seen.u, seen.v);
-      by_image_[seen.image].push_back({seen.track, imu_R_cam * *ray, deviation});
-      deviations.push_back(deviation);
+      by_image_[seen.image].push_back({seen.track, imu_R_cam * ray->direction, ray->sigma});
+      deviations.push_back(ray->sigma);
     }
     bearing_unit_ = quantile(deviations, 0.5);
     bearing_noise_ = options_.pixel_noise * bearing_unit_;

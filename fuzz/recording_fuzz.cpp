@@ -38,7 +38,7 @@ void check(const liestat::cli::Calibration& calibration) {
     require(std::abs(imu_T_cam.so3().params().norm() - 1) < 1e-12);
     require(camera.fu > 0 && camera.fv > 0 && camera.width >= 0 && camera.height >= 0);
     for (const double u : {camera.cu, camera.cu + camera.fu, camera.cu - 0.1 * camera.fu, 0.0}) {
-      const auto bearing = camera.bearing(u, camera.cv - 0.3 * camera.fv);
+      const auto bearing = camera.bearing({u, camera.cv - 0.3 * camera.fv});
       if (bearing) require(std::abs(bearing->norm() - 1) < 1e-12 && camera.project(*bearing).has_value());
     }
   }

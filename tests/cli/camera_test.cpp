@@ -1,12 +1,9 @@
-// Pixels and bearings: each the other's inverse wherever either is defined, and how the one's noise becomes the
-// other's.
+// A camera as the program's options give it; the models are tested in fusion/camera_test.cpp.
 
 #include <cli/io/camera.hpp>
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
-#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -15,143 +12,6 @@
 
 namespace liestat::cli {
 namespace {
-
-Camera euroc() {
-  return {.fu = 458.654,
-          .fv = 457.296,
-          .cu = 367.215,
-          .cv = 248.375,
-          .distortion = Distortion::radtan,
-          .coefficients = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05},
-          .width = 752,
-          .height = 480};
-}
-
-/// TUM-VI's lens: the corners of the image are more than 90 degrees off the axis.
-Camera fisheye() {
-  return {
-      .fu = 190.97847715128717,
-      .fv = 190.9733070521226,
-      .cu = 254.93170605935475,
-      .cv = 256.8974428996504,
-      .distortion = Distortion::equidistant,
-      .coefficients = {0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182},
-      .width = 512,
-      .height = 512};
-}
-
-Camera pinhole() { return {.fu = 450, .fv = 440, .cu = 376, .cv = 240, .width = 752, .height = 480}; }
-
-std::vector<Camera> cameras() { return {pinhole(), euroc(), fisheye()}; }
-
-TEST(Cameras, EveryPixelOfTheImageHasItsBearing) {
-  for (const Camera& camera : cameras()) {
-    for (int v = 0; v < camera.height; v += 13) {
-      for (int u = 0; u < camera.width; u += 13) {
-        const auto ray = camera.bearing(u, v);
-        ASSERT_TRUE(ray) << u << " " << v;
-        EXPECT_NEAR(ray->norm(), 1, 1e-15);
-        const auto pixel = camera.project(2.5 * *ray);
-        ASSERT_TRUE(pixel) << u << " " << v;
-        EXPECT_LT((*pixel - Eigen::Vector2d(u, v)).norm(), 1e-10) << u << " " << v;
-      }
-    }
-    const auto centre = camera.bearing(camera.cu, camera.cv);
-    ASSERT_TRUE(centre);
-    EXPECT_EQ(*centre, Eigen::Vector3d::UnitZ());
-  }
-}
-
-TEST(Cameras, EveryDirectionThatIsSeenComesBack) {
-  for (const Camera& camera : cameras()) {
-    for (double angle = 0; angle < 0.8; angle += 0.05) {
-      for (double around = 0; around < 6.2; around += 0.3) {
-        const Eigen::Vector3d ray(std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around),
-                                  std::cos(angle));
-        const auto pixel = camera.project(7 * ray);
-        ASSERT_TRUE(pixel) << angle << " " << around;
-        const auto back = camera.bearing(pixel->x(), pixel->y());
-        ASSERT_TRUE(back);
-        EXPECT_LT((*back - ray).norm(), 1e-13) << angle << " " << around;
-      }
-    }
-  }
-}
-
-// A value of Kalibr's formulas worked out by hand, apart from the code: x = 0.5, y = -0.25, r² = 0.3125.
-TEST(Cameras, DistortsAsKalibrDoes) {
-  Camera camera{.fu = 100, .fv = 200, .cu = 10, .cv = 20, .distortion = Distortion::radtan};
-  camera.coefficients = {-0.2, 0.1, 0.01, -0.02};
-  // factor = 1 - 0.0625 + 0.009765625; 2 p1 x y + p2 (r² + 2 x²); 2 p2 x y + p1 (r² + 2 y²)
-  const double factor = 0.947265625;
-  const double x = 0.5 * factor + 2 * 0.01 * -0.125 - 0.02 * 0.8125;
-  const double y = -0.25 * factor + 2 * -0.02 * -0.125 + 0.01 * 0.4375;
-  const auto pixel = camera.project({1, -0.5, 2});
-  ASSERT_TRUE(pixel);
-  EXPECT_NEAR(pixel->x(), 10 + 100 * x, 1e-12);
-  EXPECT_NEAR(pixel->y(), 20 + 200 * y, 1e-12);
-
-  camera.distortion = Distortion::equidistant;
-  camera.coefficients = {0.1, -0.2, 0.3, -0.4};
-  const double t = EIGEN_PI / 4;
-  const double bent = t + 0.1 * std::pow(t, 3) - 0.2 * std::pow(t, 5) + 0.3 * std::pow(t, 7) - 0.4 * std::pow(t, 9);
-  const auto seen = camera.project({0.6, 0.8, 1});
-  ASSERT_TRUE(seen);
-  EXPECT_NEAR(seen->x(), 10 + 100 * 0.6 * bent, 1e-12);
-  EXPECT_NEAR(seen->y(), 20 + 200 * 0.8 * bent, 1e-12);
-}
-
-TEST(Cameras, NothingIsSeenBehindOrBeyondTheFold) {
-  for (const Camera& camera : cameras()) {
-    EXPECT_FALSE(camera.project({0, 0, -1}));
-    EXPECT_FALSE(camera.project({0, 0, 0}));
-    EXPECT_FALSE(camera.project({std::numeric_limits<double>::quiet_NaN(), 0, 1}));
-    EXPECT_FALSE(camera.bearing(std::numeric_limits<double>::infinity(), 0));
-  }
-  EXPECT_FALSE(pinhole().project({1, 1, -1e-9}));
-  EXPECT_TRUE(fisheye().project({1, 1, -0.1})) << "this lens sees more than half of all directions";
-
-  // r (1 - r²/3) folds at r = 1, where it is 2/3.
-  Camera folds{.fu = 300, .fv = 300, .cu = 0, .cv = 0, .distortion = Distortion::radtan};
-  folds.coefficients = {-1. / 3, 0, 0, 0};
-  EXPECT_TRUE(folds.project({0.999, 0, 1}));
-  EXPECT_FALSE(folds.project({1.001, 0, 1}));
-  EXPECT_FALSE(folds.project({1.9, 0, 1}));
-  EXPECT_TRUE(folds.bearing(199.9, 0));
-  EXPECT_FALSE(folds.bearing(200.1, 0));
-  EXPECT_TRUE(std::isnan(folds.bearingDeviation(200.1, 0)));
-  // One that ascends again far out stays folded: 1 - 3 r²/2 + r⁴ of slope 1 - 9 r²/2 + 5 r⁴, negative from √0.4 to
-  // √0.5.
-  folds.coefficients = {-1.5, 1, 0, 0};
-  EXPECT_TRUE(folds.project({0.632, 0, 1}));
-  EXPECT_FALSE(folds.project({0.633, 0, 1}));
-  EXPECT_FALSE(folds.project({2, 0, 1}));
-  EXPECT_FALSE(folds.bearing(300, 0));
-}
-
-/// The pixels by two directions across the bearing, by central differences.
-double deviationByDifferences(const Camera& camera, double u, double v) {
-  const Eigen::Vector3d ray = *camera.bearing(u, v);
-  const Eigen::Vector3d a = ray.unitOrthogonal(), b = ray.cross(a);
-  const double h = 1e-5;
-  Eigen::Matrix2d J;
-  J.col(0) = (*camera.project(ray + h * a) - *camera.project(ray - h * a)) / (2 * h);
-  J.col(1) = (*camera.project(ray + h * b) - *camera.project(ray - h * b)) / (2 * h);
-  return 1 / std::sqrt(std::abs(J.determinant()));
-}
-
-TEST(Cameras, NoiseOfABearingIsThatOfAPixelThroughTheDerivative) {
-  for (const Camera& camera : cameras()) {
-    for (int v = 0; v < camera.height; v += 40) {
-      for (int u = 0; u < camera.width; u += 40) {
-        const double expected = deviationByDifferences(camera, u, v);
-        // Central differences leave h² ~ 1e-10 and the rounding of a pixel over h.
-        EXPECT_NEAR(camera.bearingDeviation(u, v), expected, 1e-7 * expected) << u << " " << v;
-      }
-    }
-    EXPECT_NEAR(camera.bearingDeviation(camera.cu, camera.cv), 1 / std::sqrt(camera.fu * camera.fv), 1e-15);
-  }
-}
 
 TEST(Cameras, FromIntrinsics) {
   const Camera camera = cameraFromIntrinsics({450, 440, 376, 240});

@@ -23,6 +23,7 @@
 #include <cli/io/tracks.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Eigen::Vector3d;
@@ -175,7 +176,7 @@ TEST(SimulateVi, TracksPointAtTheirLandmarks) {
     for (const PixelObservation& o : files.tracks.observations) {
       const Vector3d p = files.inCamera(o);
       EXPECT_GT(p.z(), scene.least_depth);
-      const auto bearing = files.camera().camera.bearing(o.u, o.v);
+      const auto bearing = files.camera().camera.bearing({o.u, o.v});
       ASSERT_TRUE(bearing);
       // Half a nanosecond of the stamps' rounding turns a camera at 3 rad/s and 1 m/s by 2e-9 rad.
       EXPECT_LT((*bearing - p.normalized()).norm(), 1e-8);

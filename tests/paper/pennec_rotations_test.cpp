@@ -16,6 +16,7 @@
 #include "paper/full_run.hpp"
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr std::size_t sizes[] = {5, 10, 20, 30, 50, 100};
