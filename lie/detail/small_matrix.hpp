@@ -3,7 +3,7 @@
 // they bring dozens of types of expressions and the blocked kernels of its products with them, which are never run here
 // and cost a compiler seconds. Apart, so that users of a Cholesky factor do not compile them:
 //
-//   small_orthogonal.hpp   singular values and triangular factors that do not square the matrix; run-time sizes up to 13
+//   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to 13
 //   small_columns.hpp      3×3 blocks in vector registers
 //   nearest_rotation.hpp   the rotation nearest to a 3×3 matrix
 //   trig.hpp               cross-product matrices, beside the coefficients that they are multiplied with

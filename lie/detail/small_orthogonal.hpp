@@ -1,8 +1,8 @@
 // Orthogonal factorisations of a few columns (singular values, triangular factors), which do not square the matrix and
 // so decide ranks at 1e-12. One of the headers of small matrices, which lie/detail/small_matrix.hpp lists.
 //
-// Sizes are run-time numbers of at most 13 and everything is plain loops in double: the fixed-size expressions of half a
-// dozen sizes took a compiler forty seconds, and these cost it nothing.
+// Sizes are run-time numbers of at most 13 and everything is plain loops in double: the fixed-size expressions of half
+// a dozen sizes took a compiler forty seconds, and these cost it nothing.
 #pragma once
 
 #include <Eigen/Core>
