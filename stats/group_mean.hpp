@@ -83,17 +83,44 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
   return result;
 }
 
+/// States in one sentence why a range of features has no exponential barycentre; `ok` where it has one.
+template <AnyRange R>
+struct RequireGroupMean : RequireSamples<R> {
+  static constexpr bool ok = RequireSamples<R>::ok && LieGroup<SampleInSignature<R>>;
+  static_assert(LieGroup<SampleInSignature<R>>,
+                "groupMean needs elements of a Lie group; features of another manifold have mean and maha.");
+};
+template <class R>
+using GroupInSignature = std::conditional_t<LieGroup<SampleInSignature<R>>, SampleInSignature<R>, SO3<double>>;
+
 }  // namespace detail
 
-/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few.
-template <std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
-GroupMeanResult<G> groupMean(const R& samples, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, detail::UnitWeights{}, start);
+/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. What may be
+/// passed is said at mean().
+template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(const E& executor, R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
+  if constexpr (detail::RequireGroupMean<R>::ok) {
+    return detail::groupBarycentre<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, start);
+  } else {
+    return {};
+  }
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          LieGroup G = std::ranges::range_value_t<R>>
-GroupMeanResult<G> groupMean(const R& samples, const W& weights, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, weights, start);
+template <detail::AnyRange R, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
+  return groupMean(SerialExecutor{}, samples, start);
+}
+template <Executor E, detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(const E& executor, R&& samples, W&& weights,
+                             const std::optional<std::type_identity_t<G>>& start = {}) {
+  if constexpr (detail::RequireGroupMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::groupBarycentre<G>(executor, detail::asSamples(samples), detail::asWeights(weights), start);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(R&& samples, W&& weights, const std::optional<std::type_identity_t<G>>& start = {}) {
+  return groupMean(SerialExecutor{}, samples, weights, start);
 }
 
 }  // namespace liestat
