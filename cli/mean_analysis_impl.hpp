@@ -8,7 +8,7 @@
 #include <stats/covariance.hpp>
 #include <stats/group_mean.hpp>
 #include <stats/maha.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <algorithm>
 #include <cmath>

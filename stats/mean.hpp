@@ -6,6 +6,7 @@
 
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/packing.hpp>
 #include <stats/detail/rotation_sums.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>
@@ -17,7 +18,9 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <type_traits>
+#include <vector>
 
 namespace liestat {
 
@@ -129,6 +132,16 @@ struct MeanPass {
   void operator+=(const MeanPass& other) {
     sums += other.sums;
     scatter += other.scatter;
+  }
+  std::vector<double> pack() const {
+    return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
+                  scatter.largest, scatter.smallest_gap);
+  }
+  static MeanPass unpack(std::span<const double> list) {
+    MeanPass p;
+    unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
+               p.scatter.largest, p.scatter.smallest_gap);
+    return p;
   }
 };
 
