@@ -15,6 +15,7 @@
 #include <lie/detail/nearest_rotation.hpp>
 #include <lie/manifold.hpp>
 
+#include <concepts>
 #include <optional>
 
 namespace liestat {
@@ -283,6 +284,14 @@ struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
   static Eigen::Matrix<S, 4, 1> compactCoordinates(const SO3<S, O>& x) { return x.params(); }
   static const S* parameters(const SO3<S, O>& x) { return x.data(); }
   static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 3}};
+};
+
+/// A quaternion, view or expression of one, stands for its rotation; its norm does not matter.
+template <class Q>
+  requires std::derived_from<Q, Eigen::QuaternionBase<Q>>
+struct PointTraits<Q> {
+  using type = SO3<typename Q::Scalar>;
+  static type from(const Q& quaternion) { return type(quaternion); }
 };
 
 }  // namespace liestat
