@@ -9,6 +9,7 @@
 
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
 #include <stats/group_mean.hpp>
@@ -42,6 +43,7 @@ namespace detail {
 template <LieGroup G, Executor E, class R, class W>
 CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples, const W& weights,
                                              const CertifiedGroupMeanOptions& options) {
+  eigen_assert(haveOneSize(samples, weights));
   CertifiedGroupMean<G> result;
   const auto without = [&](Status status, const char* reason) {
     result.status = status;
@@ -94,24 +96,21 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
 
 /// The exponential barycentre of a range of group elements, weighted or not, certified by the mean of its metric twin,
 /// with its covariance from the residuals where that can be trusted: status ok. The same bits on any executor.
-template <Executor E, std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, LieGroup G = SampleOf<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples,
                                          const CertifiedGroupMeanOptions& options = {}) {
-  return detail::findCertifiedGroupMean<G>(executor, samples, detail::UnitWeights{}, options);
+  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
 }
-template <std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
+template <SampleRange R, LieGroup G = SampleOf<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const CertifiedGroupMeanOptions& options = {}) {
   return certifiedGroupMean(SerialExecutor{}, samples, options);
 }
-template <Executor E, std::ranges::random_access_range R, std::ranges::random_access_range W,
-          LieGroup G = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples, const W& weights,
                                          const CertifiedGroupMeanOptions& options = {}) {
-  eigen_assert(std::ranges::size(samples) == std::ranges::size(weights));
-  return detail::findCertifiedGroupMean<G>(executor, samples, weights, options);
+  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          LieGroup G = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const W& weights,
                                          const CertifiedGroupMeanOptions& options = {}) {
   return certifiedGroupMean(SerialExecutor{}, samples, weights, options);

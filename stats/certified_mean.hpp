@@ -2,6 +2,7 @@
 // Needs Eigen alone.
 #pragma once
 
+#include <stats/detail/ranges.hpp>
 #include <stats/covariance.hpp>
 #include <stats/cut_locus.hpp>
 #include <stats/executor.hpp>
@@ -71,6 +72,7 @@ SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const M
 template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W& weights,
                                    const CertifiedMeanOptions<M>& options) {
+  eigen_assert(haveOneSize(samples, weights));
   CertifiedMean<M> result;
   const auto without = [&](Status status, const char* reason) {
     result.status = status;
@@ -117,23 +119,20 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 /// (ambiguous), when the mass near the cut locus makes the mean of quotient frames or of very scattered rotations
 /// ill-defined (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
 /// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
-template <Executor E, std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, Metric M = SampleOf<R>>
 CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const CertifiedMeanOptions<M>& options = {}) {
-  return detail::findCertifiedMean<M>(executor, samples, detail::UnitWeights{}, options);
+  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
 }
-template <std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, Metric M = SampleOf<R>>
 CertifiedMean<M> certifiedMean(const R& samples, const CertifiedMeanOptions<M>& options = {}) {
   return certifiedMean(SerialExecutor{}, samples, options);
 }
-template <Executor E, std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const W& weights,
                                const CertifiedMeanOptions<M>& options = {}) {
-  eigen_assert(std::ranges::size(samples) == std::ranges::size(weights));
-  return detail::findCertifiedMean<M>(executor, samples, weights, options);
+  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 CertifiedMean<M> certifiedMean(const R& samples, const W& weights, const CertifiedMeanOptions<M>& options = {}) {
   return certifiedMean(SerialExecutor{}, samples, weights, options);
 }

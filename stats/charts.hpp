@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/mean.hpp>
 
 #include <Eigen/Core>
@@ -25,22 +26,24 @@ struct ChartScatter {
 
 /// A range of features with their weights in both charts, y their mean, with the dispersion and the covariance of the
 /// mean in the local frame at y. Covariances move with the charts' derivatives.
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Homogeneous M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Homogeneous M = SampleOf<R>>
 ChartScatter chartScatter(const R& samples, const W& weights, const M& y,
                           const std::optional<SquareOf<M>>& dispersion = {},
                           const std::optional<SquareOf<M>>& covariance = {}) {
   using T = ManifoldTraits<M>;
   constexpr int k = T::DoF;
-  const auto n = static_cast<Eigen::Index>(std::ranges::size(samples));
+  const auto& features = detail::asSamples(samples);
+  const auto& p = detail::asWeights(weights);
+  eigen_assert(detail::haveOneSize(features, p));
+  const auto n = static_cast<Eigen::Index>(std::ranges::size(features));
   ChartScatter s;
   s.principal.resize(k, n);
   s.centred.resize(k, n);
   TangentOf<M> sum = TangentOf<M>::Zero();
   double weight = 0;
-  const auto weightOf = [&](Eigen::Index i) { return static_cast<double>(weights[static_cast<std::size_t>(i)]); };
+  const auto weightOf = [&](Eigen::Index i) { return static_cast<double>(p[static_cast<std::size_t>(i)]); };
   for (Eigen::Index i = 0; i < n; ++i) {
-    const M x = samples[static_cast<std::ptrdiff_t>(i)];
+    const M x = features[static_cast<std::ptrdiff_t>(i)];
     const TangentOf<M> r = T::logOrigin(x);
     s.principal.col(i) = r.template cast<double>();
     s.centred.col(i) = log(y, x).template cast<double>();

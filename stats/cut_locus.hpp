@@ -5,6 +5,7 @@
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/search_space.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/mean.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -82,6 +83,7 @@ Eigen::Matrix<double, N, 1> jumpAcrossCutLocus(const M& x, const Eigen::Matrix<d
 
 template <Metric M, class R, class W>
 CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResult<M>& mean, double window) {
+  eigen_assert(haveOneSize(samples, weights));
   CutLocusMass result;
   result.window = window;
   if constexpr (Factored<M>) {
@@ -133,6 +135,7 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
 template <Metric M, class R, class W>
 CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
                                 const SquareOf<M>& covariance) {
+  eigen_assert(haveOneSize(samples, weights));
   CutLocusMass result;
   if constexpr (Factored<M>) {
     forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
@@ -166,27 +169,25 @@ CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanRe
 ///     - Σ_{gap < w} p (z - z₂)(z - z₂)ᵀ/((θ + θ₂) w).
 /// hessian_change is its largest eigenvalue relative to the sample's Hessian: about π m/w for quotient frames folded
 /// about one axis, 2π m/w for rotations.
-template <std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, Metric M = SampleOf<R>>
 CutLocusMass cutLocusMass(const R& samples, const MeanResult<M>& mean, double window) {
-  return detail::findCutLocusMass(samples, detail::UnitWeights{}, mean, window);
+  return detail::findCutLocusMass(detail::asSamples(samples), detail::UnitWeights{}, mean, window);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 CutLocusMass cutLocusMass(const R& samples, const W& weights, const MeanResult<M>& mean, double window) {
-  return detail::findCutLocusMass(samples, weights, mean, window);
+  return detail::findCutLocusMass(detail::asSamples(samples), detail::asWeights(weights), mean, window);
 }
 
 /// The same within the confidence region of a mean of the given covariance (rad², local frame): the window is six times
 /// the largest standard deviation of the rotation, whatever its axis, and at least 0.2 rad.
-template <std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, Metric M = SampleOf<R>>
 CutLocusMass cutLocusNearby(const R& samples, const MeanResult<M>& mean, const SquareOf<M>& covariance) {
-  return detail::findCutLocusNearby(samples, detail::UnitWeights{}, mean, covariance);
+  return detail::findCutLocusNearby(detail::asSamples(samples), detail::UnitWeights{}, mean, covariance);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 CutLocusMass cutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
                             const SquareOf<M>& covariance) {
-  return detail::findCutLocusNearby(samples, weights, mean, covariance);
+  return detail::findCutLocusNearby(detail::asSamples(samples), detail::asWeights(weights), mean, covariance);
 }
 
 }  // namespace liestat

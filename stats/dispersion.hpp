@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/mean.hpp>
 
 #include <cstddef>
@@ -31,6 +32,7 @@ template <Homogeneous M, class R, class W>
 Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   using T = ManifoldTraits<M>;
   using S = ScalarOf<M>;
+  eigen_assert(haveOneSize(samples, weights));
   Dispersion<M> result;
   if constexpr (HasTangentParts<M>) {
     for (const TangentBlock& block : T::tangent_parts) result.farthest.push_back({block, 0, 0});
@@ -54,15 +56,13 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
 }  // namespace detail
 
 /// Dispersion of a range of features about y, weighted or not, in the local frame at y. NaN for an empty range.
-template <std::ranges::random_access_range R, Homogeneous M = std::ranges::range_value_t<R>>
+template <SampleRange R, Homogeneous M = SampleOf<R>>
 Dispersion<M> dispersionAbout(const R& samples, const M& y) {
-  return detail::findDispersion(samples, detail::UnitWeights{}, y);
+  return detail::findDispersion(detail::asSamples(samples), detail::UnitWeights{}, y);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Homogeneous M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Homogeneous M = SampleOf<R>>
 Dispersion<M> dispersionAbout(const R& samples, const W& weights, const M& y) {
-  eigen_assert(std::ranges::size(samples) == std::ranges::size(weights));
-  return detail::findDispersion(samples, weights, y);
+  return detail::findDispersion(detail::asSamples(samples), detail::asWeights(weights), y);
 }
 
 }  // namespace liestat

@@ -77,6 +77,16 @@ struct UnitWeights {
   double operator[](std::size_t) const { return 1; }
 };
 
+/// Whether there is a weight for every datum.
+template <class R, class W>
+bool haveOneSize(const R& samples, const W& weights) {
+  if constexpr (std::is_same_v<W, UnitWeights>) {
+    return true;
+  } else {
+    return std::ranges::size(samples) == std::ranges::size(weights);
+  }
+}
+
 /// What one pass over the data returns at a candidate mean.
 template <Homogeneous M>
 struct MeanSums {

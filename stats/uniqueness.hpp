@@ -16,6 +16,7 @@
 #pragma once
 
 #include <stats/detail/find_uniqueness.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/executor.hpp>
 #include <stats/mean.hpp>
 #include <stats/uniqueness_types.hpp>
@@ -27,36 +28,32 @@ namespace liestat {
 /// r*: the largest radius (rad) about a mean in which the criterion is strictly convex along every geodesic from it, so
 /// that the mean is the only minimum there: θ_i + r < π (quotients: 2r < gap_i) for all data and Σ p_i g(θ_i + r) > 0,
 /// g the transverse eigenvalue of Hess ½d². 0 if there is none.
-template <std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, Metric M = SampleOf<R>>
 double localRadius(const R& samples, const M& mean) {
-  return detail::findLocalRadius(samples, detail::UnitWeights{}, mean);
+  return detail::findLocalRadius(detail::asSamples(samples), detail::UnitWeights{}, mean);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 double localRadius(const R& samples, const W& weights, const M& mean) {
-  return detail::findLocalRadius(samples, weights, mean);
+  return detail::findLocalRadius(detail::asSamples(samples), detail::asWeights(weights), mean);
 }
 
 /// Is the mean of these features the only one? `mean` is what mean() returned for the same features and weights.
 /// If a lower minimum turns up it is returned: this is a certified global search. The same bits on any executor.
-template <Executor E, std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, Metric M = SampleOf<R>>
 UniquenessResult<M> uniqueness(const E& executor, const R& samples, const MeanResult<M>& mean,
                                const UniquenessOptions& options = {}) {
-  return detail::findUniqueness(executor, samples, detail::UnitWeights{}, mean, options);
+  return detail::findUniqueness(executor, detail::asSamples(samples), detail::UnitWeights{}, mean, options);
 }
-template <std::ranges::random_access_range R, Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, Metric M = SampleOf<R>>
 UniquenessResult<M> uniqueness(const R& samples, const MeanResult<M>& mean, const UniquenessOptions& options = {}) {
   return uniqueness(SerialExecutor{}, samples, mean, options);
 }
-template <Executor E, std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <Executor E, SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 UniquenessResult<M> uniqueness(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean,
                                const UniquenessOptions& options = {}) {
-  eigen_assert(std::ranges::size(samples) == std::ranges::size(weights));
-  return detail::findUniqueness(executor, samples, weights, mean, options);
+  return detail::findUniqueness(executor, detail::asSamples(samples), detail::asWeights(weights), mean, options);
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          Metric M = std::ranges::range_value_t<R>>
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
 UniquenessResult<M> uniqueness(const R& samples, const W& weights, const MeanResult<M>& mean,
                                const UniquenessOptions& options = {}) {
   return uniqueness(SerialExecutor{}, samples, weights, mean, options);

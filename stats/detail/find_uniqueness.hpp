@@ -93,6 +93,7 @@ UniquenessResult<M> uniquenessByFactors(const E& executor, const R& samples, con
 template <Metric M, Executor E, class R, class W>
 UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean,
                                    const UniquenessOptions& options) {
+  eigen_assert(haveOneSize(samples, weights));
   UniquenessResult<M> result;
   result.minimiser = mean.mean;
   result.cost = mean.cost;
@@ -123,6 +124,7 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
 
 template <Metric M, class R, class W>
 double findLocalRadius(const R& samples, const W& weights, const M& mean) {
+  eigen_assert(haveOneSize(samples, weights));
   if constexpr (Factored<M>) {
     double least = std::numeric_limits<double>::infinity();
     forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
