@@ -34,7 +34,7 @@ const std::vector<ValidationReport>& cell(Noise noise, std::size_t n) {
   return reports;
 }
 
-const ValidationReport& report(Noise noise, std::size_t n, const Method& method) {
+const ValidationReport& report(Noise noise, std::size_t n, Method method) {
   return cell(noise, n)[methodIndex(method)];
 }
 
