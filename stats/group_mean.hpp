@@ -46,6 +46,12 @@ struct GroupMeanSums {
     scatter += other.scatter;
     weight += other.weight;
   }
+  std::vector<double> pack() const { return packed(sum, jacobian, scatter, weight); }
+  static GroupMeanSums unpack(std::span<const double> list) {
+    GroupMeanSums s;
+    unpackInto(list, s.sum, s.jacobian, s.scatter, s.weight);
+    return s;
+  }
 };
 
 template <LieGroup G, Executor E, class R, class W>
@@ -95,8 +101,8 @@ using GroupInSignature = std::conditional_t<LieGroup<SampleInSignature<R>>, Samp
 
 }  // namespace detail
 
-/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. What may be
-/// passed is said at mean().
+/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. The same
+/// bits on any executor. What may be passed is said at mean().
 template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
 GroupMeanResult<G> groupMean(const E& executor, R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
   if constexpr (detail::RequireGroupMean<R>::ok) {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/packing.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
@@ -19,6 +20,7 @@
 #include <stats/status.hpp>
 
 #include <concepts>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -87,6 +89,12 @@ struct MahaSums {
     gradient += other.gradient;
     gauss_newton += other.gauss_newton;
     hessian += other.hessian;
+  }
+  std::vector<double> pack() const { return packed(cost, gradient, gauss_newton, hessian); }
+  static MahaSums unpack(std::span<const double> list) {
+    MahaSums s;
+    unpackInto(list, s.cost, s.gradient, s.gauss_newton, s.hessian);
+    return s;
   }
 };
 
