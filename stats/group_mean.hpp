@@ -68,7 +68,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     const G to_mean = y.inverse();
     const auto sums = sumOverData<GroupMeanSums<G>>(executor, result.n, [&](std::size_t k, GroupMeanSums<G>& s) {
       const S p = S(weights[k]);
-      const TangentOf<G> z = (to_mean * samples[static_cast<std::ptrdiff_t>(k)]).log();
+      const TangentOf<G> z = (to_mean * samples[k]).log();
       s.sum += p * z;
       s.jacobian += p * G::leftJacobianInverse(z);
       s.scatter += p * z * z.transpose();

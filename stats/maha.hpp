@@ -119,7 +119,7 @@ struct MahaProblem {
 
   /// One measure's part of the sums at y.
   void add(std::size_t i, const M& y, MahaSums<M>& sums) const {
-    const M& x = samples[static_cast<std::ptrdiff_t>(i)].mean;
+    const M& x = samples[i].mean;
     const bool measured = at == CovarianceAt::measured;
     const ErrorVector<M> e = measured ? errorVector(x, y) : errorVector(y, x);
     const SquareOf<M>& J = measured ? e.by_feature : e.by_base;

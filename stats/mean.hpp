@@ -163,7 +163,7 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
   const TangentOf<M> metric = T::metricWeights();
   for (std::size_t i = range.begin; i < range.end; ++i) {
     const S p = S(weights[i]);
-    const M at_mean = T::act(to_mean, M(samples[static_cast<std::ptrdiff_t>(i)]));
+    const M at_mean = T::act(to_mean, M(samples[i]));
     const TangentOf<M> z = T::logOrigin(at_mean);
     const TangentOf<M> wz = metric.cwiseProduct(z);
     const S squared_distance = z.dot(wz);
