@@ -67,9 +67,8 @@ Recognised recognise(const ClosedFormCase& c, CounterRng& rng) {
 
 Recognised recognise(const NoisyClosedFormCase& c, CounterRng& rng) {
   InertialScene scene(c.scene, rng());
-  SceneRandom random(rng());
-  measure(scene, vi_init_imu, random);
-  scene.addNoise(bearing_noise, random);
+  measure(scene, vi_init_imu, rng);
+  scene.addNoise(bearing_noise, rng);
   const ClosedFormResult r = solveClosedForm(scene.window, {.bearing_noise = bearing_noise,
                                                             .estimate_bias = c.bias,
                                                             .bias_deviation = c.bias_deviation,

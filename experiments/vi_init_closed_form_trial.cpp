@@ -14,8 +14,7 @@ InertialScene sceneOf(const ViInitWindow& size, const Eigen::Vector3d& bias, std
 
 std::vector<double> closedFormNeesTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene = sceneOf(size, Eigen::Vector3d::Zero(), rng());
-  SceneRandom random(rng());
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto r = solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
   // A window of which the answer is not one, or that says so, makes no claim. With the wrong noise χ² would say so
   // first, and hide what is to be seen.
@@ -34,10 +33,9 @@ std::vector<double> closedFormBiasNeesTrial(const ViInitWindow& size, double noi
   const ClosedFormOptions options{
       .bearing_noise = vi_init_bearing_noise, .estimate_bias = true, .singular_values = false};
   const std::uint64_t seed = rng();
-  SceneRandom random(rng());
-  const Eigen::Vector3d bias = noise * options.bias_deviation * random.normal3();
+  const Eigen::Vector3d bias = noise * options.bias_deviation * rng.normalVector<3>();
   InertialScene scene = sceneOf(size, bias, seed);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto r = solveClosedForm(scene.window, options);
   const double none = std::numeric_limits<double>::quiet_NaN();
   if (r.status != ClosedFormStatus::ok || (noise == 1 && !r.consistent) ||
@@ -53,10 +51,8 @@ std::vector<double> closedFormBiasNeesTrial(const ViInitWindow& size, double noi
 
 std::vector<double> closedFormErrorsTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene = sceneOf(size, Eigen::Vector3d::Zero(), rng());
-  SceneRandom random(rng());
-  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer},
-          random);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer}, rng);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   std::vector<double> values;
   for (const bool remove : {true, false}) {
     const ViErrors e = viErrors(solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise,

@@ -28,15 +28,14 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
 std::vector<double> refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   const RefinementOptions options{.bearing_noise = vi_init_bearing_noise};
   const std::uint64_t seed = rng();
-  SceneRandom random(rng());
-  const Eigen::Vector3d accelerometer = noise * options.accelerometer_deviation * random.normal3();
-  const Eigen::Vector3d gyroscope = noise * options.gyroscope_deviation * random.normal3();
+  const Eigen::Vector3d accelerometer = noise * options.accelerometer_deviation * rng.normalVector<3>();
+  const Eigen::Vector3d gyroscope = noise * options.gyroscope_deviation * rng.normalVector<3>();
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
                       seed);
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
-  const auto readings = readingsOf(scene, simulated, random, gyroscope);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  const auto readings = readingsOf(scene, simulated, rng, gyroscope);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const InertialWindow window{motionsOf(scene, readings, {.preintegration = {.noise = vi_init_imu}}),
                               scene.window.features, scene.options().camera};
 

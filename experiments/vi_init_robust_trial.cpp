@@ -8,12 +8,11 @@ namespace liestat::experiments {
 
 std::vector<double> gyroscopeBiasTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds}, rng());
-  SceneRandom random(rng());
-  const Eigen::Vector3d bias = 0.05 * random.unit();
+  const Eigen::Vector3d bias = 0.05 * rng.unitVector<3>();
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
-  const auto readings = readingsOf(scene, simulated, random, bias);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  const auto readings = readingsOf(scene, simulated, rng, bias);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto integrate = [&](const ImuBias<double>& b) {
     return motionsOf(scene, readings, {.preintegration = {.bias = b}});
   };
@@ -32,12 +31,10 @@ std::vector<double> gyroscopeBiasTrial(const ViInitWindow& size, double noise, C
 
 std::vector<double> driftTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds}, rng());
-  SceneRandom random(rng());
-  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer},
-          random);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer}, rng);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const std::size_t wrong = size.features * 2 / 5;
-  scene.addDrift(wrong, 8 * vi_init_bearing_noise, random);
+  scene.addDrift(wrong, 8 * vi_init_bearing_noise, rng);
   const RansacOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
   const ClosedFormRansacResult robust = solveClosedFormRobustly(scene.window, rng, options);
   bool exact = robust.inliers.size() == size.features - wrong;
