@@ -11,7 +11,7 @@ namespace {
 using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
 
 Trial trialOf(Feature feature) {
-  return experiments::withFeature(feature, []<Metric M>() -> Trial { return detail::runTrial<M>; });
+  return withFeature(feature, []<Metric M>() -> Trial { return detail::runTrial<M>; });
 }
 
 /// Logarithm of the ratio of two errors.

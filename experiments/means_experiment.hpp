@@ -19,19 +19,16 @@ namespace liestat::experiments {
 /// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
 /// same draws, so that their accuracies can be compared trial by trial.
 
-using experiments::Criterion;
-using experiments::Feature;
-
 /// The features of the experiment: those with a Riemannian metric.
 inline constexpr auto all_features = [] {
   constexpr auto count = [] {
     std::size_t n = 0;
-    for (const experiments::FeatureInfo& row : experiments::features) n += row.has_metric ? 1 : 0;
+    for (const FeatureInfo& row : features) n += row.has_metric ? 1 : 0;
     return n;
   };
   std::array<Feature, count()> list{};
   std::size_t n = 0;
-  for (const experiments::FeatureInfo& row : experiments::features) {
+  for (const FeatureInfo& row : features) {
     if (row.has_metric) list[n++] = row.kind;
   }
   return list;

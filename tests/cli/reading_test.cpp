@@ -14,6 +14,9 @@
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
+
+using experiments::Feature;
+
 namespace {
 
 FeatureFile read(const std::string& text, const ReadingOptions& options = {}) {
