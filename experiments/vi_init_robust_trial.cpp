@@ -36,7 +36,8 @@ DriftOutcome driftTrial(const ViInitWindow& size, double noise, CounterRng& rng)
   scene.addDrift(wrong, 8 * vi_init_bearing_noise, rng);
   const RansacOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
   const ClosedFormRansacResult robust = solveClosedFormRobustly(scene.window, rng, options);
-  DriftOutcome outcome{.exact_selection = robust.inliers.size() == size.features - wrong};
+  DriftOutcome outcome;
+  outcome.exact_selection = robust.inliers.size() == size.features - wrong;
   for (const std::size_t i : robust.inliers) outcome.exact_selection = outcome.exact_selection && i >= wrong;
   outcome.no_selection = viErrors(solveClosedForm(scene.window, options.closed_form), scene);
   ClosedFormWindow right = scene.window;

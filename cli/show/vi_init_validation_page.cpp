@@ -1,6 +1,7 @@
+#include <cli/commands/validation_command.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
-#include <experiments/vi_init_validation.hpp>
+#include <cli/show/vi_init_validation.hpp>
 
 #include <fmt/format.h>
 
@@ -44,8 +45,7 @@ std::vector<Group> groups(const std::vector<ViInitRow>& rows, Check check) {
     if (row.check != check) continue;
     const auto belongs = [&](const Group& g) {
       const ViInitRow& other = g.first();
-      return other.estimator == row.estimator && other.window.seconds == row.window.seconds &&
-             other.window.images == row.window.images && other.window.features == row.window.features;
+      return other.estimator == row.estimator && other.window == row.window;
     };
     auto group = std::find_if(list.begin(), list.end(), belongs);
     if (group == list.end()) group = list.insert(list.end(), Group{});
@@ -239,6 +239,30 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
   }
   return text + fmt::format("{} of {} rows with a promise pass; false alarms: one in {:g} runs\n{}\n", judged - failed,
                             judged, 1 / vi_init_false_alarm, failed == 0 ? "PASSED" : "FAILED");
+}
+
+JsonObject toJson(const ViInitRow& row) {
+  JsonObject o;
+  o.set("check", name(row.check)).set("estimator", name(row.estimator)).set("quantity", name(row.quantity));
+  o.set("unit", unit(row.quantity));
+  o.set("window", row.window.seconds).set("images", row.window.images).set("features", row.window.features);
+  o.set("in_domain", row.promise.has_value());
+  if (row.report) {
+    setStatistics(o, *row.report);
+  } else {
+    o.set("trials", row.trials);
+    for (const char* field :
+         {"dof", "law", "index", "index_se", "index_expected", "variance", "ks_statistic", "ks_p", "coverage95"}) {
+      o.set(field, nullptr);
+    }
+  }
+  o.set("failures", row.failures).set("median", row.median).set("p95", row.p95);
+  o.set("value", row.value).set("value_se", row.value_se);
+  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
+  o.set("promised_median", promise.median).set("promised_p95", promise.p95);
+  o.set("note_median", promise.note_median).set("note_p95", promise.note_p95);
+  o.set("passed", row.passed);
+  return o;
 }
 
 void writeViInitReport(const std::string& directory, const std::string& command_line,
