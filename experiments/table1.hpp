@@ -1,5 +1,6 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <fusion/init/closed_form_types.hpp>
 
 #include <array>
@@ -52,9 +53,6 @@ struct Table1Row {
 
 /// Probability that a scene drawn at random is so near to another case that it counts as that, with exact data.
 inline constexpr double table1_near_another_case = 1e-3;
-/// False-alarm probability of a whole run, shared by the rows.
-inline constexpr double table1_false_alarm = 1e-5;
-
 /// Recognises all cases of the table in so many scenes each; the same for any number of threads.
 std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, int threads,
                                        const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});

@@ -333,7 +333,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
     }
   }
   const auto judged = std::count_if(rows.begin(), rows.end(), [](const ViInitRow& row) { return row.promise; });
-  const double false_alarm = vi_init_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
+  const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
   auto row = rows.begin();
   for (const Experiment& e : list) {
     const std::vector<Values> values = e.run(validation, [&](std::size_t done) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <stats/validation.hpp>
 
@@ -106,9 +107,6 @@ struct ViInitRow {
   std::optional<bool> passed;  ///< the verdict; absent where nothing is promised
   std::string reason;          ///< why it failed
 };
-
-/// False-alarm probability of a whole run, shared by the rows that are judged.
-inline constexpr double vi_init_false_alarm = 1e-5;
 
 /// The promise made about a row, if there is one.
 std::optional<ViInitPromise> viInitPromise(const ViInitRow& row);

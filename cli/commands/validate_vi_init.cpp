@@ -33,7 +33,7 @@ int runTable1(const Options& options, const Invocation& invocation) {
     return recogniseTable1(scenes, options.seed, options.threads, progress);
   });
   return publish(
-      options.output, invocation, options.seed, table1_false_alarm, rows, formatTable1,
+      options.output, invocation, options.seed, run_false_alarm, rows, formatTable1,
       [](const Table1Row& row) { return toJson(row); }, writeTable1Report);
 }
 
@@ -68,7 +68,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
       withProgressBar("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
   if (rows.empty()) throw InputError("--window", 0, "none of these checks has windows of this length");
   return publish(
-      options.output, invocation, options.seed, vi_init_false_alarm, rows, formatViInitTables,
+      options.output, invocation, options.seed, run_false_alarm, rows, formatViInitTables,
       [](const ViInitRow& row) { return toJson(row); }, writeViInitReport);
 }
 

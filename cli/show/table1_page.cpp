@@ -100,7 +100,7 @@ std::string formatTable1(const std::vector<Table1Row>& rows) {
   return text + fmt::format(
                     "\n{} of {} cases are recognised as the corrected table says; false alarms: one in {:g} "
                     "runs\n{}\n",
-                    rows.size() - static_cast<std::size_t>(failed), rows.size(), 1 / table1_false_alarm,
+                    rows.size() - static_cast<std::size_t>(failed), rows.size(), 1 / run_false_alarm,
                     failed == 0 ? "PASSED" : "FAILED");
 }
 

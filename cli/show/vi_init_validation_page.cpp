@@ -1,4 +1,4 @@
-#include <cli/commands/validation_command.hpp>
+#include <cli/show/validation.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/vi_init_validation.hpp>
@@ -135,11 +135,6 @@ Table errorsTable(const std::vector<Group>& list) {
   return table;
 }
 
-std::string verdict(const ViInitRow& row) {
-  if (!row.passed) return "";
-  return *row.passed ? "pass" : "FAIL";
-}
-
 /// A panel of curves over the windows' length, one for each estimator, of those windows that have 20 features and an
 /// image every tenth of a second.
 template <class Value>
@@ -229,16 +224,12 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
     if (check != Check::closed_form) text += errorsTable(list).str() + "\n";
   }
-  std::size_t judged = 0, failed = 0;
   for (const ViInitRow& row : rows) {
-    judged += row.passed.has_value();
     if (row.passed.value_or(true)) continue;
-    ++failed;
     text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
                         name(row.quantity), row.window.seconds, row.window.images, row.window.features, row.reason);
   }
-  return text + fmt::format("{} of {} rows with a promise pass; false alarms: one in {:g} runs\n{}\n", judged - failed,
-                            judged, 1 / vi_init_false_alarm, failed == 0 ? "PASSED" : "FAILED");
+  return text + verdictLines(tally(rows), "with a promise");
 }
 
 JsonObject toJson(const ViInitRow& row) {
@@ -334,7 +325,7 @@ void writeViInitReport(const std::string& directory, const std::string& command_
                          law ? number(row->report->law.mean()) : "", law ? number(row->report->ks_p_value, 2) : "",
                          law ? number(100 * row->report->coverage[2].observed) : "",
                          error ? number(row->median, 3) : "", error ? number(row->p95, 3) : "", unit(row->quantity),
-                         verdict(*row)});
+                         verdictCell(row->passed)});
       }
     }
     report.table({"estimator", "T, images, features", "quantity", "trials", "lost", "index or value", "SE", "expected",
