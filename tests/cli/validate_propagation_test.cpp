@@ -45,7 +45,7 @@ TEST(ValidatePropagation, everyRowIsRunAndPromisesAreJudged) {
     EXPECT_EQ(row.report.failures, 0U);
     EXPECT_EQ(row.report.dof, degreesOfFreedom(row.experiment.feature, row.method.operation));
     EXPECT_EQ(row.passed.has_value(), row.experiment.spread == 0.1);
-    EXPECT_TRUE(row.passed.value_or(true)) << row.reason;
+    EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
     EXPECT_EQ(row.histogram.size(), 30U);
   }
 }
@@ -93,7 +93,7 @@ TEST(ValidatePropagation, aBrokenPromiseIsSeen) {
   row.method = experiment.methods[0];
   row.report = reports[0];
   row.passed = false;
-  row.reason = "the index is too large";
+  row.verdict = Verdict::index_too_large;
   const std::string text = formatPropagationTables({row});
   EXPECT_NE(text.find("FAILED pose compose spread 1: the index is too large"), std::string::npos) << text;
   EXPECT_NE(text.find(" !\n"), std::string::npos) << text;
