@@ -10,7 +10,7 @@
 #include <utility>
 
 #include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
+#include <cli/io/rotation_matrix.hpp>
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
