@@ -8,7 +8,7 @@
 #include <stats/maha.hpp>
 #include <stats/printed.hpp>
 #include <stats/sampling.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <cmath>
 

@@ -46,6 +46,12 @@ struct GroupMeanSums {
     scatter += other.scatter;
     weight += other.weight;
   }
+  std::vector<double> pack() const { return packed(sum, jacobian, scatter, weight); }
+  static GroupMeanSums unpack(std::span<const double> list) {
+    GroupMeanSums s;
+    unpackInto(list, s.sum, s.jacobian, s.scatter, s.weight);
+    return s;
+  }
 };
 
 template <LieGroup G, Executor E, class R, class W>
@@ -85,15 +91,26 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
 
 }  // namespace detail
 
-/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few.
+/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. The same
+/// bits on any executor.
+template <Executor E, std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
+GroupMeanResult<G> groupMean(const E& executor, const R& samples, const std::optional<G>& start = {}) {
+  return detail::groupBarycentre<G>(executor, samples, detail::UnitWeights{}, start);
+}
 template <std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
 GroupMeanResult<G> groupMean(const R& samples, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, detail::UnitWeights{}, start);
+  return groupMean(SerialExecutor{}, samples, start);
+}
+template <Executor E, std::ranges::random_access_range R, std::ranges::random_access_range W,
+          LieGroup G = std::ranges::range_value_t<R>>
+GroupMeanResult<G> groupMean(const E& executor, const R& samples, const W& weights,
+                             const std::optional<G>& start = {}) {
+  return detail::groupBarycentre<G>(executor, samples, weights, start);
 }
 template <std::ranges::random_access_range R, std::ranges::random_access_range W,
           LieGroup G = std::ranges::range_value_t<R>>
 GroupMeanResult<G> groupMean(const R& samples, const W& weights, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, weights, start);
+  return groupMean(SerialExecutor{}, samples, weights, start);
 }
 
 }  // namespace liestat

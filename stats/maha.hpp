@@ -11,12 +11,14 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/packing.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
 #include <stats/start.hpp>
 #include <stats/status.hpp>
 
+#include <span>
 #include <vector>
 
 namespace liestat {
@@ -83,6 +85,12 @@ struct MahaSums {
     gradient += other.gradient;
     gauss_newton += other.gauss_newton;
     hessian += other.hessian;
+  }
+  std::vector<double> pack() const { return packed(cost, gradient, gauss_newton, hessian); }
+  static MahaSums unpack(std::span<const double> list) {
+    MahaSums s;
+    unpackInto(list, s.cost, s.gradient, s.gauss_newton, s.hessian);
+    return s;
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/packing.hpp>
 #include <stats/detail/rotation_sums.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>
@@ -17,7 +18,9 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <type_traits>
+#include <vector>
 
 namespace liestat {
 
@@ -74,6 +77,16 @@ struct UnitWeights {
   double operator[](std::size_t) const { return 1; }
 };
 
+/// Whether there is a weight for every datum.
+template <class R, class W>
+bool haveOneSize(const R& samples, const W& weights) {
+  if constexpr (std::is_same_v<W, UnitWeights>) {
+    return true;
+  } else {
+    return std::ranges::size(samples) == std::ranges::size(weights);
+  }
+}
+
 /// What one pass over the data returns at a candidate mean.
 template <Homogeneous M>
 struct MeanSums {
@@ -129,6 +142,16 @@ struct MeanPass {
   void operator+=(const MeanPass& other) {
     sums += other.sums;
     scatter += other.scatter;
+  }
+  std::vector<double> pack() const {
+    return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
+                  scatter.largest, scatter.smallest_gap);
+  }
+  static MeanPass unpack(std::span<const double> list) {
+    MeanPass p;
+    unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
+               p.scatter.largest, p.scatter.smallest_gap);
+    return p;
   }
 };
 

@@ -28,7 +28,7 @@ constexpr const char* command_name = "liestat validate split";
 
 struct Options {
   MeasuresInput input;
-  SplitOptions split;
+  SplitSettings settings;
   std::string stereo, json, report;
 };
 
@@ -116,9 +116,11 @@ JsonObject toJson(const HalfMean& half, Feature feature) {
 
 /// The fields that every input has.
 JsonObject envelope(const Outcome& outcome, const Options& options, const Invocation& invocation) {
-  JsonObject o = jsonEnvelope(invocation.command_line, options.split.seed);
+  JsonObject o = jsonEnvelope(invocation.command_line, options.settings.split.seed);
   o.set("file", outcome.source).set("feature", name(outcome.feature)).set("dof", degreesOfFreedom(outcome.feature));
-  o.set("known_noise", outcome.known_noise).set("splits", options.split.splits).set("blocks", options.split.blocks);
+  o.set("known_noise", outcome.known_noise)
+      .set("splits", options.settings.split.splits)
+      .set("blocks", options.settings.split.blocks);
   o.set("random", toJson(outcome.random)).set("by_blocks", toJson(outcome.by_blocks));
   o.set("inflation", outcome.by_blocks.factor()).set("inflation_low", outcome.by_blocks.factorLow());
   o.set("inflation_high", outcome.by_blocks.factorHigh());
@@ -160,15 +162,15 @@ std::vector<std::string> halfRow(const char* what, const HalfMean& half, Feature
 
 int splitFile(const Options& options, const Invocation& invocation) {
   const Measures measures = options.input.read(command_name);
-  const std::size_t fewest = fewestMeasures(measures, options.split);
+  const std::size_t fewest = fewestMeasures(measures, options.settings.split);
   if (measures.size() < fewest) {
     throw InputError(options.input.file, 0, fmt::format("{} measures, too few to be split", measures.size()),
-                     fmt::format("{} at least (--blocks is {})", fewest, options.split.blocks));
+                     fmt::format("{} at least (--blocks is {})", fewest, options.settings.split.blocks));
   }
   SplitResult result;
   {
-    Progress bar("validate split", 2 * options.split.splits);
-    result = splitMeasures(measures, options.split, [&bar] { bar.advance(); });
+    Progress bar("validate split", 2 * options.settings.split.splits);
+    result = splitMeasures(measures, options.settings, [&bar] { bar.advance(); });
   }
   const Outcome outcome{.source = options.input.file,
                         .description = measuresInWords(options.input.file, measures),
@@ -185,7 +187,7 @@ int splitFile(const Options& options, const Invocation& invocation) {
   for (const auto& row : halves) text += fmt::format("{:<12} {} (largest sd {})\n", row[0], row[2], row[3]);
   text += fmt::format("squared distance of both halves {} ({}, p = {})\n\n", number(result.squared_distance),
                       result.law, number(result.p_value, 2));
-  text += verdict(outcome, options.split);
+  text += verdict(outcome, options.settings.split);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";
   if (options.json != "-") std::fputs(text.c_str(), stdout);
 
@@ -245,19 +247,19 @@ int splitStereo(const Options& options, const Invocation& invocation) {
   Outcome outcome{.source = prefix, .description = {}, .random = {}, .by_blocks = {}};
   Criterion criterion = Criterion::maha;
   {
-    Progress bar("validate split", 2 * options.split.splits * landmarks.size());
+    Progress bar("validate split", 2 * options.settings.split.splits * landmarks.size());
     for (const LandmarkMeasures& landmark : landmarks) {
       const Measures measures = measuresOf(landmark, options.input.options);
       criterion = measures.criterion;
       outcome.known_noise = measures.known_noise;
-      if (measures.size() < fewestMeasures(measures, options.split)) {
+      if (measures.size() < fewestMeasures(measures, options.settings.split)) {
         ++skipped;
         continue;
       }
       AnalysisOptions how;
-      how.threads = options.split.threads;
+      how.threads = options.settings.threads;
       LandmarkSplit row{.track = landmark.track,
-                        .split = splitMeasures(measures, options.split, [&bar] { bar.advance(); }),
+                        .split = splitMeasures(measures, options.settings, [&bar] { bar.advance(); }),
                         .whole = analyseMean(measures, how)};
       if (landmark.track < survey.size()) row.survey = survey[landmark.track];
       rows.push_back(std::move(row));
@@ -265,7 +267,7 @@ int splitStereo(const Options& options, const Invocation& invocation) {
   }
   if (rows.empty()) {
     throw InputError(prefix + "_tracks.csv", 0, "no landmark was seen often enough to be split",
-                     fmt::format("{} observations of one", options.split.blocks));
+                     fmt::format("{} observations of one", options.settings.split.blocks));
   }
   std::vector<SplitSeries> random, by_blocks;
   std::vector<std::vector<std::string>> cells;
@@ -295,7 +297,7 @@ int splitStereo(const Options& options, const Invocation& invocation) {
     text += fmt::format("to the survey: {} mm RMS, mean squared distance {} where 3 is expected\n",
                         number(1000 * std::sqrt(squares / count)), number(mahalanobis / count));
   }
-  text += verdict(outcome, options.split);
+  text += verdict(outcome, options.settings.split);
   if (options.json != "-") std::fputs(text.c_str(), stdout);
 
   if (!options.json.empty()) {
@@ -334,7 +336,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.stereo.empty() == options.input.file.empty()) {
     throw InputError(command_name, 0, "one input is needed, a FILE or --stereo PREFIX");
   }
-  if (options.split.blocks % 2 != 0) throw InputError(command_name, 0, "--blocks must be even");
+  if (options.settings.split.blocks % 2 != 0) throw InputError(command_name, 0, "--blocks must be even");
   return options.stereo.empty() ? splitFile(options, invocation) : splitStereo(options, invocation);
 }
 
@@ -347,13 +349,13 @@ void addValidateSplitCommand(CLI::App& validate, Invocation& invocation) {
   options->input.declare(*command, false);
   command->add_option("--stereo", options->stereo,
                       "Instead of FILE: PREFIX_tracks.csv, _poses.csv, _camera.csv and, if there, _landmarks.csv");
-  command->add_option("--splits", options->split.splits, "Splits of each kind (default 200)")
+  command->add_option("--splits", options->settings.split.splits, "Splits of each kind (default 200)")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
-  command->add_option("--blocks", options->split.blocks, "Blocks of time, an even number (default 10)")
+  command->add_option("--blocks", options->settings.split.blocks, "Blocks of time, an even number (default 10)")
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
-  command->add_option("--seed", options->split.seed,
+  command->add_option("--seed", options->settings.split.seed,
                       "Seed; the same seed gives the same bits on any number of threads");
-  command->add_option("--threads", options->split.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
+  command->add_option("--threads", options->settings.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
   command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command->add_option("--report", options->report, "Write a page with plots into this directory");
   command->callback(
