@@ -4,6 +4,7 @@
 #include <experiments/two_solutions.hpp>
 #include <experiments/table1.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/show/validation.hpp>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace liestat::detail {
@@ -24,6 +25,7 @@ std::vector<double> packed(const T&... values) {
 }
 
 template <class S>
+  requires std::is_arithmetic_v<S>
 void takeFrom(std::span<const double>& list, S& x) {
   x = static_cast<S>(list[0]);
   list = list.subspan(1);

@@ -14,7 +14,7 @@
 #include <cli/io/run_program.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/temporary_directory.hpp>
-#include <experiments/preintegration_validation.hpp>
+#include <cli/show/preintegration_validation.hpp>
 
 namespace liestat::cli {
 using namespace experiments;
