@@ -5,8 +5,6 @@
 #include <cli/commands/validation_command.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -99,8 +97,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "preintegration", "Motions preintegrated from noisy inertial readings: are their covariances true?");
+  CLI::App* app = addCommand(validate, "preintegration",
+                             "Motions preintegrated from noisy inertial readings: are their covariances true?");
   app->add_option("--check", options->checks, "motion, walk, motion_and_bias: a comma list (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_preintegration_checks)));

@@ -3,8 +3,6 @@
 #include <cli/commands/validation_command.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -46,8 +44,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  CLI::App* app =
+      addCommand(validate, "propagation",
+                 "Composition, inverse and action of uncertain features: up to which noise is first order right?");
   app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_propagated)));
