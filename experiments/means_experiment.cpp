@@ -1,18 +1,11 @@
 #include <experiments/means_trial.hpp>
 #include <experiments/parallel.hpp>
-#include <lie/lie.hpp>
 #include <stats/validation.hpp>
 
 #include <cmath>
 
 namespace liestat::experiments {
 namespace {
-
-using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
-
-Trial trialOf(Feature feature) {
-  return withFeature(feature, []<Metric M>() -> Trial { return detail::runTrial<M>; });
-}
 
 /// Logarithm of the ratio of two errors.
 double logRatio(double error, double reference) { return std::log(error / reference); }
@@ -72,9 +65,8 @@ std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads
                                           : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
   }
   const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
-  const Trial trial = trialOf(experiment.feature);
   return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
-    return wantedOutcomes(experiment, trial(experiment, rng));
+    return wantedOutcomes(experiment, detail::meansTrial(experiment, rng));
   });
 }
 

@@ -19,8 +19,7 @@ struct MethodOutcome {
 };
 using MethodOutcomes = std::array<MethodOutcome, methods.size()>;
 
-/// One trial: a scene from the generator, and what each of `methods` that is wanted makes of it.
-template <class M>
-MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng);
+/// One trial of an experiment: a scene from the generator, and what each of `methods` that is wanted makes of it.
+MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng);
 
 }  // namespace liestat::experiments::detail

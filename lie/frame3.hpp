@@ -134,6 +134,12 @@ struct FrameManifold : TrivialIsotropy<M, SE3<typename M::Scalar>> {
   static Square dlogFeatureTransposed(const Tangent& z, const Tangent& a) { return Math::dlogFeatureTransposed(z, a); }
   static Square dlogBaseTransposed(const Tangent& z, const Tangent& a) { return Math::dlogBaseTransposed(z, a); }
   static VolumeElement<Scalar, 6> logVolume(const Tangent& z) { return Math::logVolume(z); }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 3;
+  static Eigen::Matrix<Scalar, 4, 1> compactCoordinates(const M& x) { return x.params().template head<4>(); }
+  static const Scalar* parameters(const M& x) { return x.data(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}};
 };
 
 }  // namespace detail
@@ -149,6 +155,8 @@ struct ManifoldTraits<Frame3<S, O>> : detail::FrameManifold<Frame3<S, O>> {
     return detail::FrameMath<S>::dlog(detail::So3Math<S>::log(x.params().template head<4>()));
   }
   static S injectivityRadius() { return S(EIGEN_PI); }
+
+  using ChordalMoments = detail::QuaternionMoments<Frame3<S, O>>;
 };
 
 }  // namespace liestat

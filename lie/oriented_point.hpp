@@ -166,6 +166,7 @@ struct ManifoldTraits<OrientedPoint<S, O>> {
     v.hessian.template bottomRightCorner<2, 2>() = direction.hessian;
     return v;
   }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::point, 0, 3}, {TangentPart::direction, 3, 2}};
   /// Position and direction, of which the squared distance is the sum.
   static std::tuple<Vector3, S2<S>> factors(const M& x) { return {x.position(), x.direction()}; }
   static M fromFactors(const std::tuple<Vector3, S2<S>>& f) { return M(std::get<0>(f), std::get<1>(f)); }

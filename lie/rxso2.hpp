@@ -164,6 +164,11 @@ struct ManifoldTraits<RxSO2<S, O>> : GroupManifold<RxSO2<S, O>> {
   static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static detail::VolumeElement<S, 2> logVolume(const Tangent&) { return {}; }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::circle;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 2, 1> compactCoordinates(const RxSO2<S, O>& x) { return x.params().normalized(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 1}, {TangentPart::log_scale, 1, 1}};
 };
 
 }  // namespace liestat

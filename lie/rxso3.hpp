@@ -218,6 +218,11 @@ struct ManifoldTraits<RxSO3<S, O>> : GroupManifold<RxSO3<S, O>> {
     v.hessian.template topLeftCorner<3, 3>() = rotation.hessian;
     return v;
   }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 4, 1> compactCoordinates(const RxSO3<S, O>& x) { return x.params().normalized(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 3}, {TangentPart::log_scale, 3, 1}};
 };
 
 }  // namespace liestat

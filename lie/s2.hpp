@@ -162,6 +162,12 @@ struct ManifoldTraits<S2<S, O>> {
     return {log(h.sinc * h.cos), c * z,
             c * Square::Identity() - S(16) * detail::cotangentExcessSlope(S(S(4) * t)) * z * z.transpose()};
   }
+
+  using ChordalMoments = detail::DirectionMoments<M>;
+  static constexpr CompactFactor compact_factor = CompactFactor::sphere;
+  static constexpr int compact_begin = 0;
+  static Vector3 compactCoordinates(const M& x) { return x.params(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::direction, 0, 2}};
 };
 
 }  // namespace liestat

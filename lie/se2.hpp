@@ -193,6 +193,9 @@ class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
   static SE2 fitToSE2(const Eigen::Matrix<Scalar_, 3, 3>& T) { return SE2(T); }
 };
 
+template <class Scalar_, int Options_>
+class Frame2;
+
 /// SE(2) is homogeneous under itself, not Metric.
 template <class S, int O>
 struct ManifoldTraits<SE2<S, O>> : GroupManifold<SE2<S, O>> {
@@ -206,6 +209,12 @@ struct ManifoldTraits<SE2<S, O>> : GroupManifold<SE2<S, O>> {
     v.hessian(2, 2) = c - S(2) * detail::cotangentExcessSlope(t) * t;
     return v;
   }
+
+  using ChordalMoments = detail::ComplexMoments<SE2<S, O>>;
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 2}, {TangentPart::rotation, 2, 1}};
+  /// The same data under the product metric, of lie/frame2.hpp.
+  static Frame2<S, 0> metricTwin(const SE2<S, O>& x) { return Frame2<S, 0>(x); }
+  static SE2<S, O> fromMetricTwin(const Frame2<S, 0>& x) { return SE2<S, O>::fromParams(x.params()); }
 };
 
 }  // namespace liestat

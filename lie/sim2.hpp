@@ -189,7 +189,10 @@ class Sim2 : public Sim2Base<Sim2<Scalar_, Options_>> {
 
 /// Sim(2) is homogeneous under itself, not Metric.
 template <class S, int O>
-struct ManifoldTraits<Sim2<S, O>> : GroupManifold<Sim2<S, O>> {};
+struct ManifoldTraits<Sim2<S, O>> : GroupManifold<Sim2<S, O>> {
+  static constexpr TangentBlock tangent_parts[] = {
+      {TangentPart::translation, 0, 2}, {TangentPart::rotation, 2, 1}, {TangentPart::log_scale, 3, 1}};
+};
 
 }  // namespace liestat
 

@@ -206,7 +206,10 @@ class Sim3 : public Sim3Base<Sim3<Scalar_, Options_>> {
 
 /// Sim(3) is homogeneous under itself, not Metric.
 template <class S, int O>
-struct ManifoldTraits<Sim3<S, O>> : GroupManifold<Sim3<S, O>> {};
+struct ManifoldTraits<Sim3<S, O>> : GroupManifold<Sim3<S, O>> {
+  static constexpr TangentBlock tangent_parts[] = {
+      {TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}, {TangentPart::log_scale, 6, 1}};
+};
 
 }  // namespace liestat
 

@@ -9,6 +9,7 @@
 // Bad input      NaN in, NaN out; constructors from quaternions normalise; fitToSO3 and checkedFrom… are for data
 #pragma once
 
+#include <lie/detail/chordal.hpp>
 #include <lie/detail/arccosine.hpp>
 #include <lie/detail/group_base.hpp>
 #include <lie/detail/nearest_rotation.hpp>
@@ -276,6 +277,13 @@ struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
     return -Math::inverseJacobianSlope(z, a, S(1));
   }
   static detail::VolumeElement<S, 3> logVolume(const Tangent& z) { return Math::logVolume(z); }
+
+  using ChordalMoments = detail::QuaternionMoments<SO3<S, O>>;
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 4, 1> compactCoordinates(const SO3<S, O>& x) { return x.params(); }
+  static const S* parameters(const SO3<S, O>& x) { return x.data(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 3}};
 };
 
 /// A quaternion, view or expression of one, stands for its rotation; its norm does not matter.

@@ -85,8 +85,8 @@ std::vector<std::vector<std::string>> valueRows(const FeatureValue& value) {
 }
 
 std::string uniquenessInWords(const MeanAnalysis& analysis) {
-  const bool certified = analysis.unique != "not_certified";
-  std::string text = (certified ? analysis.unique : "not certified") + ": ";
+  const bool certified = analysis.unique != Uniqueness::not_certified;
+  std::string text = std::string(certified ? name(analysis.unique) : "not certified") + ": ";
   if (!analysis.proof.empty()) {
     text += analysis.proof;
   } else if (analysis.cells > 0) {
@@ -243,7 +243,7 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measures
   }
   object.set("farthest", farthest);
 
-  object.set("unique", analysis.unique).set("proof", uniquenessInWords(analysis));
+  object.set("unique", name(analysis.unique)).set("proof", uniquenessInWords(analysis));
   std::vector<JsonObject> rivals;
   for (const FeatureValue& rival : analysis.rivals) rivals.push_back(toJson(rival));
   object.set("rivals", rivals).set("r_star", analysis.r_star).set("cells", analysis.cells);

@@ -14,7 +14,7 @@
 #include <cli/show/plots.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/temporary_directory.hpp>
-#include <experiments/preintegration_validation.hpp>
+#include <cli/show/preintegration_validation.hpp>
 
 namespace liestat::cli {
 using namespace experiments;

@@ -1,6 +1,11 @@
 // `liestat simulate vi`: readings that are those of the written truth, tracks that point at the written landmarks, and
 // noise of the size asked for, all of it read back from the files.
 
+#include <cli/io/calibration.hpp>
+#include <cli/io/image_tracks.hpp>
+#include <cli/io/imu_file.hpp>
+#include <cli/io/recording_files.hpp>
+#include <cli/show/simulated_recording.hpp>
 #include <experiments/simulate_vi.hpp>
 
 #include <fusion/imu/preintegrate.hpp>
@@ -277,25 +282,36 @@ TEST(SimulateVi, OutliersDrift) {
   EXPECT_NEAR(static_cast<double>(count) / tracks, 0.4, 5 * std::sqrt(0.4 * 0.6 / tracks));
 }
 
+/// What an ImpossibleMotion says, empty if there was none.
+template <class Action>
+std::string complaintOf(Action&& action) {
+  try {
+    action();
+  } catch (const ImpossibleMotion& complaint) {
+    return complaint.what();
+  }
+  return {};
+}
+
 TEST(SimulateVi, WhatCannotBeMadeIsSaid) {
   const SplineTrajectory motion = builtInTrajectory(5, 1);
   const auto message = [&](double begin, double end, const ViSceneOptions& scene) {
-    return errorOf([&] { simulateMotion(motion, begin, end, someCamera(), {}, scene); });
+    return complaintOf([&] { simulateMotion(motion, begin, end, someCamera(), {}, scene); });
   };
-  EXPECT_EQ(message(-1, 3, {}), "liestat simulate vi: the interval is from -1 to 3 s, expected one within 0 to 5.05 s");
+  EXPECT_EQ(message(-1, 3, {}), "the interval is from -1 to 3 s, expected one within 0 to 5.05 s");
   EXPECT_NE(message(3, 2, {}), "");
   EXPECT_NE(message(0, std::numeric_limits<double>::quiet_NaN(), {}), "");
-  EXPECT_EQ(message(0, 0.05, {}), "liestat simulate vi: there is one image at 10 Hz, expected two at least");
+  EXPECT_EQ(message(0, 0.05, {}), "there is one image at 10 Hz, expected two at least");
   ViSceneOptions small;
   small.box = Vector3d(0.1, 10, 10);
-  EXPECT_EQ(message(0, 3, small).substr(0, 75),
-            "liestat simulate vi: the box of 0.1 x 10 x 10 m has no room for the motion,");
+  EXPECT_EQ(message(0, 3, small).substr(0, 54),
+            "the box of 0.1 x 10 x 10 m has no room for the motion,");
   std::vector<GroundTruth> truth(30);
   for (std::size_t i = 0; i < truth.size(); ++i) truth[i].time = 0.1 * static_cast<double>(i) + (i > 20 ? 0.5 : 0);
-  EXPECT_EQ(errorOf([&] { trajectoryAlong(truth, 0.1, "f"); }),
-            "f: there is a gap of more than 0.1 s around 2.1 s, expected the truth without gaps");
-  EXPECT_EQ(errorOf([&] { trajectoryAlong(truth, 1, "f"); }),
-            "f: the truth is 3.4 s long, expected 5 s at least, for control points every 1 s");
+  EXPECT_EQ(complaintOf([&] { trajectoryAlong(truth, 0.1); }),
+            "there is a gap of more than 0.1 s around 2.1 s, expected the truth without gaps");
+  EXPECT_EQ(complaintOf([&] { trajectoryAlong(truth, 1); }),
+            "the truth is 3.4 s long, expected 5 s at least, for control points every 1 s");
 }
 
 TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
@@ -339,7 +355,10 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
   EXPECT_EQ(complaint({"--drift", "nan"}),
             "liestat simulate vi: an option is not a finite number, expected finite ones\n");
   EXPECT_EQ(complaint({"--begin", "4"}),
-            "liestat simulate vi: the interval is from 4 to 3 s, expected an end after the beginning\n");
+            "the interval is from 4 to 3 s, expected an end after the beginning\n");
+  EXPECT_EQ(complaint({"--box", "0.1,10,10"}).find("liestat simulate vi: the box of 0.1 x 10 x 10 m has no room"), 0U);
+  EXPECT_EQ(complaint({"--truth", "a/truth.csv", "--knots", "9"}),
+            "a/truth.csv: the truth is 3 s long, expected 45 s at least, for control points every 9 s\n");
   EXPECT_NE(complaint({"--outliers", "2"}), "");
   EXPECT_FALSE(std::filesystem::exists(directory / "bad"));
 }

@@ -1,6 +1,6 @@
 // The verdict of `liestat validate means` on what the documentation promises.
 
-#include <experiments/means_validation.hpp>
+#include <cli/show/means_validation.hpp>
 
 #include <gtest/gtest.h>
 
@@ -63,7 +63,7 @@ TEST(ValidateMeans, whatIsJudgedIsCounted) {
     judged += row.passed.has_value();
   }
   EXPECT_EQ(judged, 2U);
-  EXPECT_NE(formatMeansTables(rows).find("2 of 2 rows within the promised domain pass"), std::string::npos);
+  EXPECT_NE(formatMeansTables(rows).find("2 of 2 rows in the promised domain pass"), std::string::npos);
 }
 
 }  // namespace

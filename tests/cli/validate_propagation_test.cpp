@@ -1,6 +1,6 @@
 // `liestat validate propagation`: what is run, what is judged, and what the program writes.
 
-#include <experiments/propagation_validation.hpp>
+#include <cli/show/propagation_validation.hpp>
 
 #include <gtest/gtest.h>
 
@@ -84,7 +84,7 @@ TEST(ValidatePropagation, aBrokenPromiseIsSeen) {
     // The inverse is exact, the fourth order still right, and so many trials do not refute a point moved by a pose.
     if (operation == Operation::inverse || operation == Operation::act || experiment.methods[m].fourth_order) continue;
     const PropagationPromise promise = propagationPromise(experiment.feature, experiment.methods[m]);
-    EXPECT_FALSE(reports[m].passed(propagation_false_alarm, *promise.at(promise.spread)))
+    EXPECT_FALSE(reports[m].passed(run_false_alarm, *promise.at(promise.spread)))
         << label(experiment.methods[m]);
   }
 

@@ -1,6 +1,5 @@
-#pragma once
-
-// One trial for one type of feature; the types are compiled in features.cpp, the harness around them is not.
+// The trials for every type of feature, in one unit: they share nearly all that they instantiate, so that a second type
+// costs a compiler an eighth of the first. The harness around them is elsewhere.
 
 #include <experiments/means_trial.hpp>
 #include <lie/lie.hpp>
@@ -8,11 +7,15 @@
 #include <stats/maha.hpp>
 #include <stats/printed.hpp>
 #include <stats/sampling.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <cmath>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
 
 namespace liestat::experiments::detail {
+namespace {
 
 /// The report's covariance Σ of a feature, in the library's tangent order.
 template <class M>
@@ -166,7 +169,7 @@ void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, 
 }
 
 template <class M>
-MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
+MethodOutcomes trial(const MeansExperiment& experiment, CounterRng& rng) {
   const Scene<M> scene = drawScene<M>(experiment, rng);
   MethodOutcomes outcomes{};
   const auto wanted = [&](Criterion criterion) {
@@ -194,6 +197,12 @@ MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
     if (experiment.wanted[m]) mahalanobisMeans(experiment, scene, corrected, outcomes[m]);
   }
   return outcomes;
+}
+
+}  // namespace
+
+MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng) {
+  return withFeature(experiment.feature, [&]<Metric M>() { return trial<M>(experiment, rng); });
 }
 
 }  // namespace liestat::experiments::detail
