@@ -43,7 +43,7 @@ InertialWindow cut(const InertialScene& scene, const std::vector<ImuSample<doubl
 }
 
 void fly(double noise_factor) {
-  SceneRandom random(5);
+  CounterRng random(5);
   const ImuBias<double> bias{{0.008, -0.012, 0.005}, {0.06, -0.03, 0.04}};
   InertialScene scene({.images = 121, .features = 20, .window = 12, .bias = bias.accelerometer}, 11);
   const ImuNoise<double> noise{noise_factor * data_sheet.gyroscope, noise_factor * data_sheet.accelerometer};

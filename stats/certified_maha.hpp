@@ -74,13 +74,11 @@ ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, Co
   return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
 }
 
-/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance where that can be trusted:
-/// status ok. It is withheld, with the reason in words, when the iteration did not converge, when several minima are
-/// equally low (ambiguous), and when the Hessian is singular or the mass near the cut locus makes the mean ill-defined.
-/// Statuses of maha() besides. The same bits on any executor.
-template <Executor E, std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-CertifiedMaha<M> certifiedMaha(const E& executor, const R& samples, CovarianceAt at,
-                               const CertifiedMahaOptions<M>& options = {}) {
+namespace detail {
+
+template <Homogeneous M, Executor E, class R>
+CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, CovarianceAt at,
+                                   const CertifiedMahaOptions<M>& options) {
   CertifiedMaha<M> result;
   const auto without = [&](Status status, const char* reason) {
     result.status = status;
@@ -100,20 +98,20 @@ CertifiedMaha<M> certifiedMaha(const E& executor, const R& samples, CovarianceAt
   std::vector<std::optional<M>> starts;
   if (options.maha.start) starts.push_back(options.maha.start);
   Status twin_status = Status::ok;
-  if constexpr (detail::has_metric_twin<M>) {
-    using Twin = detail::MetricTwinOf<M>;
+  if constexpr (has_metric_twin<M>) {
+    using Twin = MetricTwinOf<M>;
     CertifiedMeanOptions<Twin> how;
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
-    const auto twin = detail::findCertifiedMean<Twin>(executor, detail::metricTwins<M>(features), weights, how);
+    const auto twin = findCertifiedMean<Twin>(executor, metricTwins<M>(features), weights, how);
     result.cut_locus = twin.cut_locus;
     twin_status = twin.status;
-    starts.push_back(detail::fromTwin<M>(twin.mean.mean));
-    for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(detail::fromTwin<M>(rival));
+    starts.push_back(fromTwin<M>(twin.mean.mean));
+    for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
   } else {
     starts.push_back(std::nullopt);  // the one that maha() chooses
   }
-  if constexpr (!detail::isFlat<M>()) {
+  if constexpr (!isFlat<M>()) {
     constexpr std::size_t many = 20000;  // whose criterion is smooth, and dear
     const std::size_t several = n > many ? 1 : std::min(options.starts_from_data, n);
     for (std::size_t i = 0; i < several; ++i) starts.push_back(features[i * n / several]);
@@ -146,7 +144,7 @@ CertifiedMaha<M> certifiedMaha(const E& executor, const R& samples, CovarianceAt
   result.uniqueness.minimiser = best.mean;
   result.uniqueness.cost = best.cost;
   result.uniqueness.rivals.assign(minima.begin() + 1, minima.end());
-  if constexpr (detail::isFlat<M>()) {
+  if constexpr (isFlat<M>()) {
     result.uniqueness.unique = Uniqueness::unique;
     result.uniqueness.proof = "the manifold is flat";
     result.uniqueness.r_star = std::numeric_limits<double>::infinity();
@@ -159,17 +157,34 @@ CertifiedMaha<M> certifiedMaha(const E& executor, const R& samples, CovarianceAt
   for (const Gaussian<M>& g : samples) result.fit += static_cast<double>(mahalanobisSquared(g, best.mean, at));
   result.fit_dof = ManifoldTraits<M>::DoF * (static_cast<double>(n) - 1);
 
-  if (best.status == Status::not_converged) return without(best.status, detail::not_converged_reason);
-  if (best.status == Status::ill_defined) return without(best.status, detail::hessian_reason);
+  if (best.status == Status::not_converged) return without(best.status, not_converged_reason);
+  if (best.status == Status::ill_defined) return without(best.status, hessian_reason);
   if (best.status != Status::ok) return without(best.status, "this criterion has no answer for these measurements");
-  if (minima.size() > 1) return without(Status::ambiguous, detail::rival_reason);
-  if (twin_status == Status::ill_defined) return without(Status::ill_defined, detail::cut_locus_reason);
+  if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
+  if (twin_status == Status::ill_defined) return without(Status::ill_defined, cut_locus_reason);
   result.estimate = best.estimate();
   result.status = Status::ok;
   return result;
 }
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-CertifiedMaha<M> certifiedMaha(const R& samples, CovarianceAt at, const CertifiedMahaOptions<M>& options = {}) {
+
+}  // namespace detail
+
+/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance where that can be trusted:
+/// status ok. It is withheld, with the reason in words, when the iteration did not converge, when several minima are
+/// equally low (ambiguous), and when the Hessian is singular or the mass near the cut locus makes the mean ill-defined.
+/// Statuses of maha() besides. The same bits on any executor.
+template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
+                               const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::findCertifiedMaha<M>(executor, detail::asValues<Gaussian<M>>(samples), at, options);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+CertifiedMaha<M> certifiedMaha(R&& samples, CovarianceAt at,
+                               const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
   return certifiedMaha(SerialExecutor{}, samples, at, options);
 }
 

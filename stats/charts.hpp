@@ -43,7 +43,7 @@ ChartScatter chartScatter(const R& samples, const W& weights, const M& y,
   double weight = 0;
   const auto weightOf = [&](Eigen::Index i) { return static_cast<double>(p[static_cast<std::size_t>(i)]); };
   for (Eigen::Index i = 0; i < n; ++i) {
-    const M x = features[static_cast<std::ptrdiff_t>(i)];
+    const M x = features[i];
     const TangentOf<M> r = T::logOrigin(x);
     s.principal.col(i) = r.template cast<double>();
     s.centred.col(i) = log(y, x).template cast<double>();

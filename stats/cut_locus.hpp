@@ -102,7 +102,7 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
     const auto to_mean = T::placement(mean.mean).inverse();
     for (std::size_t i = 0; i < n; ++i) {
       const double p = static_cast<double>(weights[i]);
-      const M x = T::act(to_mean, M(samples[static_cast<std::ptrdiff_t>(i)]));
+      const M x = T::act(to_mean, M(samples[i]));
       weight += p;
       const TangentOf<M> whole = T::logOrigin(x);
       const Vector z = whole.template segment<N>(begin).template cast<double>();

@@ -40,7 +40,7 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   const typename T::Group to_y = T::placement(y).inverse();
   S weight(0);
   for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-    const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[static_cast<std::ptrdiff_t>(i)])));
+    const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
     const S p = S(weights[i]);
     result.covariance += p * z * z.transpose();
     weight += p;

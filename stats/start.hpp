@@ -26,7 +26,7 @@ template <class M, class R, class W>
 M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, std::size_t judges = 64) {
   using S = ScalarOf<M>;
   const std::size_t n = std::ranges::size(samples);
-  const auto at = [&](std::size_t k, std::size_t of) { return static_cast<std::ptrdiff_t>(k * n / of); };
+  const auto at = [&](std::size_t k, std::size_t of) { return k * n / of; };
   candidates = std::min(candidates, n), judges = std::min(judges, n);
   using T = ManifoldTraits<M>;
   std::vector<M> judging;
@@ -34,7 +34,7 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
   judging.reserve(judges), weight.reserve(judges);
   for (std::size_t j = 0; j < judges; ++j) {
     judging.push_back(samples[at(j, judges)]);
-    weight.push_back(S(weights[static_cast<std::size_t>(at(j, judges))]));
+    weight.push_back(S(weights[at(j, judges)]));
   }
   const auto cost_at = [&](const M& y) {
     if constexpr (HasRotationSums<M>) {
@@ -49,7 +49,7 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
     return cost;
   };
   S best_cost = std::numeric_limits<S>::infinity();
-  std::ptrdiff_t best = 0;
+  std::size_t best = 0;
   for (std::size_t c = 0; c < candidates; ++c) {
     const S cost = cost_at(samples[at(c, candidates)]);
     if (cost < best_cost) best_cost = cost, best = at(c, candidates);
@@ -66,7 +66,7 @@ template <std::size_t I, Factored M, class R>
 struct FactorRange {
   const R& samples;
   std::size_t size() const { return std::ranges::size(samples); }
-  std::tuple_element_t<I, FactorsOf<M>> operator[](std::ptrdiff_t k) const {
+  std::tuple_element_t<I, FactorsOf<M>> operator[](std::size_t k) const {
     return std::get<I>(ManifoldTraits<M>::factors(samples[k]));
   }
 };
@@ -94,7 +94,7 @@ M startOfMean(const R& samples, const W& weights) {
     if constexpr (HasChordalMoments<M>) {
       typename ManifoldTraits<M>::ChordalMoments sums;
       for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-        sums.add(samples[static_cast<std::ptrdiff_t>(i)], S(weights[i]));
+        sums.add(samples[i], S(weights[i]));
       }
       const std::optional<M> average = sums.mean();
       if (average) return *average;

@@ -138,7 +138,7 @@ double findLocalRadius(const R& samples, const W& weights, const M& mean) {
     double largest = 0;
     const auto to_mean = ManifoldTraits<M>::placement(mean).inverse();
     for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-      largest = std::max(largest, std::abs(relativeAngle(to_mean, M(samples[static_cast<std::ptrdiff_t>(i)]))));
+      largest = std::max(largest, std::abs(relativeAngle(to_mean, M(samples[i]))));
     }
     return pi - largest;
   } else {

@@ -41,7 +41,7 @@ std::vector<MetricTwinOf<M>> metricTwins(const R& samples) {
   std::vector<MetricTwinOf<M>> twins;
   const std::size_t n = std::ranges::size(samples);
   twins.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) twins.push_back(toTwin<M>(M(samples[static_cast<std::ptrdiff_t>(i)])));
+  for (std::size_t i = 0; i < n; ++i) twins.push_back(toTwin<M>(M(samples[i])));
   return twins;
 }
 

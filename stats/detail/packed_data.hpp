@@ -46,7 +46,7 @@ PackedData<Space> pack(const Space& space, const R& samples, const W& weights, c
   for (std::size_t i = 0; i < n; ++i) {
     const double p = static_cast<double>(weights[i]);
     if (p > 0) {
-      data.add(relativePoint<Space>(to_y, M(samples[static_cast<std::ptrdiff_t>(i)])), p);
+      data.add(relativePoint<Space>(to_y, M(samples[i])), p);
     }
   }
   return data;
@@ -64,7 +64,7 @@ PackedData<Space> groupedData(const PackedData<Space>& data) {
   for (std::size_t i = 0; i < data.items.size(); ++i) {
     const typename Space::Chart v = data.space.toChart(data.items[i].point);
     std::uint64_t key = 0;
-    std::array<std::uint32_t, N> cell;
+    std::array<std::uint32_t, static_cast<std::size_t>(N)> cell;
     for (int k = 0; k < N; ++k) {
       const double x = std::ldexp((v[k] + pi) / (2 * pi), finest);
       cell[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(std::clamp(x, 0.0, std::ldexp(1.0, finest) - 1));

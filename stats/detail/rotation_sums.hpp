@@ -108,7 +108,7 @@ class RotationSums {
     for (std::size_t i = begin; i < end; i += block) {
       const std::size_t count = end - i < block ? end - i : block;
       for (std::size_t j = 0; j < count; ++j) {
-        const M& x = samples[static_cast<std::ptrdiff_t>(i + j)];
+        const M& x = samples[i + j];
         const double* const p = T::parameters(x);
         for (std::size_t c = 0; c < 4; ++c) data[c][j] = p[c];
         if constexpr (Weighted) weight += data[4][j] = static_cast<double>(weights[i + j]);
@@ -135,7 +135,7 @@ class RotationSums {
         for (std::size_t j = 0; j < count; ++j) {
           const double b = best[j], s = second[j];
           if (b * s + std::sqrt(std::abs((1 - b * b) * (1 - s * s))) < gap_cosine) continue;
-          const M at_y = T::act(reference.to_y, M(samples[static_cast<std::ptrdiff_t>(i + j)]));
+          const M at_y = T::act(reference.to_y, M(samples[i + j]));
           const double gap = T::nearestRepresentative(at_y).gap();
           smallest_gap = gap < smallest_gap ? gap : smallest_gap;
           gap_cosine = std::cos(0.5 * smallest_gap) - 1e-4;
@@ -256,7 +256,7 @@ class RotationSums {
     }
     static constexpr std::size_t column(std::size_t entry) { return entry - row(entry) * (row(entry) + 1) / 2; }
     template <std::size_t N, std::size_t... Entry>
-    static void addOuter(Pack (&sums)[N], const Pack (&a)[k], const Pack (&b)[k], std::index_sequence<Entry...>) {
+    static void addOuter(Pack (&sums)[N], const Pack (&a)[static_cast<std::size_t>(k)], const Pack (&b)[static_cast<std::size_t>(k)], std::index_sequence<Entry...>) {
       ((sums[Entry] += a[row(Entry)] * b[column(Entry)]), ...);
     }
     static Square symmetric(const Pack (&sums)[entries]) {

@@ -32,7 +32,7 @@ UniquenessResult<M> circleUniqueness(const E& executor, const R& samples, const 
   for (std::size_t i = 0; i < n; ++i) {
     const double p = static_cast<double>(weights[i]);
     if (!(p > 0)) continue;
-    const double angle = relativeAngle(to_mean, M(samples[static_cast<std::ptrdiff_t>(i)]));
+    const double angle = relativeAngle(to_mean, M(samples[i]));
     data.emplace_back(angle, p);
     weight += p, sum += p * angle, squares += p * angle * angle;
     largest = std::max(largest, std::abs(angle));

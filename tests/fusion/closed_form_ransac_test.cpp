@@ -24,21 +24,10 @@ const RansacOptions options{.closed_form = {.bearing_noise = pixel, .singular_va
 
 Scene noisyScene(const SceneOptions& scene_options, std::uint64_t seed) {
   Scene scene(scene_options, seed);
-  SceneRandom random(seed + 1000003);
+  CounterRng random(seed, 0, 1);
   measure(scene, {1.7e-4, 2e-3}, random);
   scene.addNoise(pixel, random);
   return scene;
-}
-
-/// The first features walk away, by `step` rad an image in each direction.
-void drift(Scene& scene, std::size_t count, double step, SceneRandom& random) {
-  for (std::size_t i = 0; i < count; ++i) {
-    Eigen::Vector3d walk = Eigen::Vector3d::Zero();
-    for (TrackedBearing& seen : scene.window.features[i]) {
-      if (seen.image > 0) walk += step * random.normal3();
-      seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
-    }
-  }
 }
 
 double median(std::vector<double> values) {
@@ -57,8 +46,8 @@ TEST(ClosedFormRansac, LeavesOutDriftingTracks) {
     std::vector<double> robust_error, oracle_error, plain_error;
     for (std::size_t trial = 0; trial < trials; ++trial) {
       Scene scene = noisyScene({.images = 21, .features = features}, 120000 + trial);
-      SceneRandom random(130000 + trial);
-      drift(scene, wrong, pixels * pixel, random);
+      CounterRng random(120000 + trial, 0, 2);
+      scene.addDrift(wrong, pixels * pixel, random);
       std::mt19937_64 generator(trial);
       const auto robust = solveClosedFormRobustly(scene.window, generator, options);
       hypotheses += robust.hypotheses;
@@ -110,8 +99,8 @@ TEST(ClosedFormRansac, TakesAllWhereAllAreRight) {
 
 TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
   Scene scene = noisyScene({.images = 21, .features = 40}, 5);
-  SceneRandom random(6);
-  drift(scene, 16, 8 * pixel, random);
+  CounterRng random(5, 0, 2);
+  scene.addDrift(16, 8 * pixel, random);
   const auto solve = [&](auto generator) { return solveClosedFormRobustly(scene.window, generator, options); };
   const auto first = solve(std::mt19937_64(3)), again = solve(std::mt19937_64(3)), other = solve(std::minstd_rand(4));
   EXPECT_EQ(first.inliers, again.inliers);
@@ -128,8 +117,8 @@ TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
 
 TEST(ClosedFormRansac, SaysWhenThereIsNoConsensus) {
   Scene scene = noisyScene({.images = 21, .features = 20}, 8);
-  SceneRandom random(9);
-  drift(scene, 20, 0.05, random);
+  CounterRng random(8, 0, 2);
+  scene.addDrift(20, 0.05, random);
   std::mt19937_64 generator(1);
   const auto robust = solveClosedFormRobustly(scene.window, generator, options);
   EXPECT_TRUE(robust.inliers.empty());
