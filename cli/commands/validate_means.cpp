@@ -3,8 +3,6 @@
 #include <cli/show/means_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -49,7 +47,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand("means", "Means of features: Monte-Carlo validation of their covariances");
+  CLI::App* app = addCommand(validate, "means", "Means of features: Monte-Carlo validation of their covariances");
   app->add_option("--feature", options->features, "Features, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_features)));
