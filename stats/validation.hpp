@@ -8,7 +8,7 @@
 // INRIA RR-3371, 1998, section 5.2: I > k says that the covariance is too small, I < k that it is too large.
 //
 //   const auto report = liestat::validate(liestat::SerialExecutor{}, {.trials = 1000},
-//   liestat::ReferenceLaw::chiSquared(3),
+//                                         liestat::ReferenceLaw::chiSquared(3),
 //                                         [](liestat::CounterRng& rng, std::uint64_t trial) {
 //                                           …
 //                                           return liestat::TrialOutcome{.mu2 = …};
