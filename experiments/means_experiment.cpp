@@ -32,20 +32,6 @@ std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, cons
 
 }  // namespace
 
-std::string name(Noise noise) {
-  switch (noise) {
-    case Noise::iid:
-      return "iid";
-    case Noise::isd:
-      return "isd";
-    case Noise::idd:
-      return "idd";
-    case Noise::exp:
-      return "exp";
-  }
-  return "";
-}
-
 std::string name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
 
 std::size_t methodIndex(const Method& method) {

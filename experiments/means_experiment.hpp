@@ -17,8 +17,8 @@ struct ValidationReportOf;
 
 namespace liestat::experiments {
 
-/// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
-/// same draws, so that their accuracies can be compared trial by trial.
+/// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measurements; all criteria on
+/// the same draws, so that their accuracies can be compared trial by trial.
 
 /// The features of the experiment: those with a Riemannian metric.
 inline constexpr auto all_features = [] {
@@ -35,15 +35,16 @@ inline constexpr auto all_features = [] {
   return list;
 }();
 
-/// How the measures' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²), μ ~
-/// U(0,1).
+/// How the measurements' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²),
+/// μ ~ U(0,1).
 enum class Noise { iid, isd, idd, exp };
 inline constexpr std::array all_noises{Noise::iid, Noise::isd, Noise::idd, Noise::exp};
+inline constexpr std::array noise_names{"iid", "isd", "idd", "exp"};  ///< in options and JSON fields
+inline std::string name(Noise noise) { return noise_names[static_cast<std::size_t>(noise)]; }
 
 inline constexpr std::array all_criteria{Criterion::lsq, Criterion::wlsq, Criterion::maha};
 
-/// The names of the program's options and JSON fields.
-std::string name(Noise noise);
+/// The name of the program's option and JSON field.
 std::string name(CovarianceAt at);
 
 /// A way to estimate a mean and its covariance, of those that a trial compares.

@@ -4,10 +4,9 @@
 // Tangent        (translation m, rotation rad), in the frame: exp(x, v) = (t + R v_t, R·Exp(v_r))
 // Action         of SE3 from the left
 // Origin         the identity
-// Metric         d² = |translation|² + rotation angle², left-invariant; sectional curvature at most 1/4, injectivity
-// radius
-//                pi in the rotation. Its mean is (mean rotation, arithmetic mean of translations). SE3 has another
-//                exponential (the screw) and no such metric.
+// Metric         d² = |translation|² + rotation angle², left-invariant; sectional curvature at most 1/4,
+//                injectivity radius pi in the rotation. Its mean is (mean rotation, arithmetic mean of translations).
+//                SE3 has another exponential (the screw) and no such metric.
 // Bad input      NaN in, NaN out
 // Source         Pennec 1998, sections 2 and 5
 #pragma once

@@ -7,8 +7,8 @@
 // Action         of SE3 from the left: (R p + t, R d)
 // Origin         (0, 0, 0) with the direction (0, 0, 1)
 // Placement      (R, p): smooth but at the direction (0, 0, -1). What leaves the origin is the turn about the
-// direction. Metric         d² = |position|² + angle of the directions², invariant; sectional curvature at most 1,
-// injectivity
+//                direction.
+// Metric         d² = |position|² + angle of the directions², invariant; sectional curvature at most 1, injectivity
 //                radius pi in the direction. Its mean is (arithmetic mean of positions, mean direction).
 // Bad input      NaN in, NaN out; constructors normalise the direction, a zero vector gives NaN
 #pragma once

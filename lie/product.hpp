@@ -158,6 +158,7 @@ struct ProductManifold : std::conditional_t<(Quotient<Ms> || ...), ProductRepres
   using Sizes = typename M::Sizes;
   using GroupSizes = typename Group::Sizes;
 
+  static constexpr bool trivial_isotropy = (HasTrivialIsotropy<Ms> && ...);
   static constexpr bool covariance_models_coincide = (CovarianceModelsCoincide<Ms> && ...);
   /// The parts, in whose criteria that of the product separates, and back.
   static const std::tuple<Ms...>& factors(const M& x) { return x.parts(); }

@@ -5,8 +5,7 @@
 // Action         of SO3 from the left
 // Origin         (0, 0, 1)
 // Placement      the rotation of least angle from the origin to the point: smooth but at (0, 0, -1). No continuous
-// placement
-//                exists on a sphere: tangent vectors and covariances belong to this one.
+//                placement exists on a sphere: tangent vectors and covariances belong to this one.
 // Metric         distance = angle, sectional curvature 1, injectivity radius pi
 // Bad input      NaN in, NaN out; the constructor normalises, a zero vector gives NaN
 #pragma once

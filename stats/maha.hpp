@@ -5,8 +5,7 @@
 // Two models that coincide on points, rotations and every group, and differ on frames:
 //   CovarianceAt::measured   S_i lives in the frame of the measure x_i (a sensor's): w = log(x_i, y), μ² = wᵀ S_i⁻¹ w
 //   CovarianceAt::estimated  V_i lives in the frame of the estimate (an object's): z = log(y, x_i), μ² = zᵀ V_i⁻¹ z;
-//   the noise
-//                            x_i = exp(x, e_i), Cov(e_i) = V_i, of the report's experiments
+//                            the noise x_i = exp(x, e_i), Cov(e_i) = V_i, of the report's experiments
 // Feeding noise of one model to the other gives a wrong answer, not a rough one: the caller says which it is.
 #pragma once
 

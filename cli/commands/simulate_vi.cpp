@@ -9,8 +9,6 @@
 #include <stats/random.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -166,8 +164,8 @@ int runCommand(Options options) {
 void addSimulateViCommand(CLI::App& simulate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   ViSceneOptions& scene = options->scene;
-  CLI::App* command = simulate.add_subcommand(
-      "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
+  CLI::App* command = addCommand(
+      simulate, "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
   command->add_option("--output", options->output, "Directory for the files")->required();
   command->add_option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
   command->add_option("--imu", options->imu,

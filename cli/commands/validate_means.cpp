@@ -3,8 +3,6 @@
 #include <cli/show/means_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -49,7 +47,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand("means", "Means of features: Monte-Carlo validation of their covariances");
+  CLI::App* app = addCommand(validate, "means", "Means of features: Monte-Carlo validation of their covariances");
   app->add_option("--feature", options->features, "Features, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_features)));
@@ -59,7 +57,7 @@ void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   app->add_option("--criterion", options->criteria, "Criteria, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_criteria)));
-  app->add_option("--n", options->n, "Numbers of measures, a comma list (default 5,10,20,30,50,100)")
+  app->add_option("--n", options->n, "Numbers of measurements, a comma list (default 5,10,20,30,50,100)")
       ->delimiter(',')
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000000}));
   app->add_option("--spread", options->spreads,

@@ -3,8 +3,6 @@
 #include <cli/show/preintegration_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -34,8 +32,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "preintegration", "Motions preintegrated from noisy inertial readings: are their covariances true?");
+  CLI::App* app = addCommand(validate, "preintegration",
+                             "Motions preintegrated from noisy inertial readings: are their covariances true?");
   app->add_option("--check", options->checks, "motion, walk, motion_and_bias: a comma list (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_preintegration_checks)));

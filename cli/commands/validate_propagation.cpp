@@ -3,8 +3,6 @@
 #include <cli/show/propagation_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -35,8 +33,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  CLI::App* app =
+      addCommand(validate, "propagation",
+                 "Composition, inverse and action of uncertain features: up to which noise is first order right?");
   app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_propagated)));

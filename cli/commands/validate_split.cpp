@@ -10,8 +10,6 @@
 #include <cli/split.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -59,7 +57,7 @@ Measures measuresOf(const LandmarkMeasures& landmark, const MeasuresOptions& opt
   file.kind = Feature::point;
   file.format = "stereo";
   for (std::size_t i = 0; i < landmark.points.size(); ++i) {
-    file.vectors.push_back(landmark.points[i].mean);
+    file.positions.push_back(landmark.points[i].mean);
     file.covariances.emplace_back(landmark.points[i].covariance);
     file.times.push_back(landmark.times[i]);
     file.lines.push_back(landmark.frames[i]);
@@ -134,8 +132,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidateSplitCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = validate.add_subcommand(
-      "split", "Real measures split in two, at random and by blocks of time: do the halves agree?");
+  CLI::App* command = addCommand(validate, "split",
+                                 "Real measures split in two, at random and by blocks of time: do the halves agree?");
   options->input.declare(*command, false);
   command->add_option("--stereo", options->stereo,
                       "Instead of FILE: PREFIX_tracks.csv, _poses.csv, _camera.csv and, if there, _landmarks.csv");

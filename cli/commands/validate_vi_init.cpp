@@ -6,8 +6,6 @@
 #include <cli/show/vi_init_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -76,8 +74,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidateViInitCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "vi-init", "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
+  CLI::App* app = addCommand(validate, "vi-init",
+                             "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
   app->add_option("--check", options->checks,
                   "consistency, closed_form, accuracy, gyroscope_bias, drift: a comma list (default: all)")
       ->delimiter(',')

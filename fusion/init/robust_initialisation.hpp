@@ -2,8 +2,8 @@
 // anything up to 0.2 rad/s.
 //
 //   std::mt19937_64 generator(1);
-//   const auto found = liestat::initialiseRobustly(window, generator, {.ransac = {.closed_form = {.bearing_noise =
-//   1. / 450}}}, integrate);
+//   const auto found = liestat::initialiseRobustly(
+//       window, generator, {.ransac = {.closed_form = {.bearing_noise = 1. / 450}}}, integrate);
 //   if (found.ok()) … found.gyroscope_bias, found.result.solutions[0], found.inliers; then refine()
 //
 // First the gyroscope's bias from rotations alone (epipolar_gyroscope_bias.hpp), which needs no motion and bears wrong

@@ -12,7 +12,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <array>
 #include <cstddef>
 #include <cmath>
 #include <limits>

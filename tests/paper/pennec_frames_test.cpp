@@ -11,8 +11,7 @@
 
 #include "paper/full_run.hpp"
 
-namespace liestat::cli {
-using namespace experiments;
+namespace liestat::experiments {
 namespace {
 
 constexpr double third = 1.0 / 3;
@@ -148,4 +147,4 @@ TEST(PennecFrames, quotientsAreIllDefinedAtTheReportsSpread) {
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

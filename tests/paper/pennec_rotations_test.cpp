@@ -15,8 +15,7 @@
 
 #include "paper/full_run.hpp"
 
-namespace liestat::cli {
-using namespace experiments;
+namespace liestat::experiments {
 namespace {
 
 constexpr std::size_t sizes[] = {5, 10, 20, 30, 50, 100};
@@ -199,4 +198,4 @@ TEST(PennecRotations, likelihoodClosesTheGapOfMaha) {
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat::experiments
