@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <cli/io/calibration.hpp>
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/temporary_directory.hpp>
 #include <cli/show/preintegration_validation.hpp>
