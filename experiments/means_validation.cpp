@@ -7,23 +7,23 @@
 namespace liestat::experiments {
 namespace {
 
-bool isFrame(Feature feature) {
-  return feature == Feature::frame || feature == Feature::semi_oriented_frame || feature == Feature::non_oriented_frame;
-}
-
 bool listed(const std::vector<Criterion>& criteria, Criterion criterion) {
   return std::find(criteria.begin(), criteria.end(), criterion) != criteria.end();
 }
 
-/// Noise that is Gaussian in the measures' frames leaves LSQ and WLSQ without a V_i in the estimate's frame.
+/// Noise that is Gaussian in the measurements' frames leaves LSQ and WLSQ without a V_i in the estimate's frame.
 bool hasLeastSquaresNoise(const MeansExperiment& experiment) {
-  return !isFrame(experiment.feature) || experiment.covariance_at == CovarianceAt::estimated;
+  return !info(experiment.feature).frameMatters() || experiment.covariance_at == CovarianceAt::estimated;
 }
 
 }  // namespace
 
-double MeansRow::ratio(ExtraIndex index) const { return std::exp(report.extra[index].mean); }
-double MeansRow::logDeviation(ExtraIndex index) const { return report.extra[index].deviation; }
+double MeansRow::ratio(ErrorRatio of) const {
+  return std::exp((of == log_ratio_rotation ? rotation_ratio : translation_ratio).mean);
+}
+double MeansRow::logDeviation(ErrorRatio of) const {
+  return (of == log_ratio_rotation ? rotation_ratio : translation_ratio).standard_deviation;
+}
 
 std::vector<MeansRow> validateMeans(const MeansValidation& validation,
                                     const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
@@ -35,7 +35,7 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
   const std::size_t printed_maha = methodIndex({Criterion::maha, false, true});
   for (const Feature feature : validation.features) {
     std::vector<double> spreads = validation.spreads;
-    if (spreads.empty()) spreads = {isFrame(feature) ? 1.0 / 3 : 1.0};
+    if (spreads.empty()) spreads = {info(feature).frameMatters() ? 1.0 / 3 : 1.0};
     for (const double spread : spreads) {
       for (const Noise noise : validation.noises) {
         for (const std::size_t n : validation.n) {
@@ -52,7 +52,7 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
             keep[m] = listed(validation.criteria, methods[m].criterion) &&
                       (methods[m].criterion == Criterion::maha || hasLeastSquaresNoise(experiment));
           }
-          const bool rare = isFrame(feature) && !validation.all_printed && keep[printed_maha];
+          const bool rare = info(feature).frameMatters() && !validation.all_printed && keep[printed_maha];
           MethodMask frequent = keep;
           if (rare) frequent[printed_maha] = false;
           experiment.wanted = frequent;
@@ -75,7 +75,7 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
     }
   }
 
-  // Work goes with the number of measures.
+  // Work goes with the number of measurements.
   const auto work = [](const MeansExperiment& e) { return static_cast<std::uint64_t>(e.n); };
   std::uint64_t all = 0, before = 0;
   for (const Run& r : runs) all += work(r.experiment) * r.experiment.trials;
@@ -89,11 +89,13 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
     std::size_t next = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (!r.experiment.wanted[m]) continue;
-      ValidationReport& report = reports[next++];
+      MeansReport& report = reports[next++];
       if (!r.keep[m]) continue;
       MeansRow& row = rows.emplace_back();
       row.experiment = r.experiment;
       row.method = methods[m];
+      row.rotation_ratio = report.of(log_ratio_rotation);
+      row.translation_ratio = report.of(log_ratio_translation);
       row.setReport(std::move(report));
       if (methods[m].corrected) row.promise = promisedTolerance(r.experiment, methods[m]);
     }
@@ -104,16 +106,16 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
   return rows;
 }
 
-// The tolerances are twice the deviations that runs of 4000 trials and more show, which are of second order in the
-// noise: docs/validation.md has the table. Where they are not zero, the tail has one too: under noise of which a
-// variance may be as small as it likes (idd) the distances of any estimator of first order have no mean.
+// The tolerances are twice the differences from the law that runs of 4000 trials and more show, which are of second
+// order in the noise: docs/validation.md has the table. Where they are not zero, the tail has one too: under noise of
+// which a variance may be as small as it likes (idd) the distances of any estimator of first order have no mean.
 std::optional<ValidationTolerance> promisedTolerance(const MeansExperiment& experiment, const Method& method) {
   const Feature feature = experiment.feature;
   const std::size_t n = experiment.n;
   const bool maha = method.criterion == Criterion::maha;
   const bool flat = feature == Feature::point;
   // The rotation's spread; beyond these the covariance is not of first order in the noise any more.
-  if (!flat && experiment.spread > (isFrame(feature) ? 0.34 : 1.0)) return std::nullopt;
+  if (!flat && experiment.spread > (info(feature).frameMatters() ? 0.34 : 1.0)) return std::nullopt;
 
   if (method.known_noise) {
     if (flat) return ValidationTolerance{};
@@ -140,7 +142,7 @@ std::optional<ValidationTolerance> promisedTolerance(const MeansExperiment& expe
   const bool exact = experiment.noise == Noise::iid || method.criterion == Criterion::wlsq;
   if (flat && exact) return ValidationTolerance{};
   if (feature == Feature::direction) return ValidationTolerance{.index = 0.14, .ks = 0.07, .tail = 0.002};
-  if (isFrame(feature)) return ValidationTolerance{.index = 0.12, .ks = 0.07, .tail = 0.004};
+  if (info(feature).frameMatters()) return ValidationTolerance{.index = 0.12, .ks = 0.07, .tail = 0.004};
   return exact ? ValidationTolerance{.index = 0.06, .ks = 0.04, .tail = 0.002}
                : ValidationTolerance{.index = 0.10, .ks = 0.07, .tail = 0.002};
 }

@@ -75,18 +75,6 @@ double trial(PreintegrationCheck check, double window, double scale, CounterRng&
 
 }  // namespace
 
-std::string name(PreintegrationCheck check) {
-  switch (check) {
-    case PreintegrationCheck::motion:
-      return "motion";
-    case PreintegrationCheck::walk:
-      return "walk";
-    case PreintegrationCheck::motion_and_bias:
-      return "motion_and_bias";
-  }
-  return "";
-}
-
 int degreesOfFreedom(PreintegrationCheck check) { return check == PreintegrationCheck::motion_and_bias ? 15 : 9; }
 
 std::vector<PreintegrationRow> validatePreintegration(

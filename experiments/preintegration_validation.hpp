@@ -3,6 +3,7 @@
 #include <experiments/judged_report.hpp>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -18,7 +19,12 @@ enum class PreintegrationCheck {
 };
 inline constexpr std::array all_preintegration_checks = {PreintegrationCheck::motion, PreintegrationCheck::walk,
                                                          PreintegrationCheck::motion_and_bias};
-std::string name(PreintegrationCheck check);
+/// Names in options and JSON fields, in the order of the enumerators.
+inline constexpr std::array preintegration_check_names{"motion", "walk", "motion_and_bias"};
+inline std::string name(PreintegrationCheck check) {
+  return preintegration_check_names[static_cast<std::size_t>(check)];
+}
+/// Degrees of freedom of the error that is judged.
 int degreesOfFreedom(PreintegrationCheck check);
 
 /// What `liestat validate preintegration` runs: the product of the lists, at 200 readings a second.

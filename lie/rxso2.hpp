@@ -88,6 +88,8 @@ class RxSO2Base : public detail::GroupBase<Derived> {
  public:
   using typename Base::Math, typename Base::Plain, typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using RxSO2Product = typename Base::template GroupProduct<Other>;
   using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
   using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
 

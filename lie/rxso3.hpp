@@ -116,6 +116,8 @@ class RxSO3Base : public detail::GroupBase<Derived> {
  public:
   using typename Base::Math, typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
   using Base::operator*;
+  template <class Other>
+  using RxSO3Product = typename Base::template GroupProduct<Other>;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 
@@ -188,6 +190,9 @@ class RxSO3 : public RxSO3Base<RxSO3<Scalar_, Options_>> {
     this->setScale(scale);
   }
   RxSO3(const Scalar_& scale, const Matrix3& R) : RxSO3(scale, SO3<Scalar_>(R)) {}
+  /// From a scale s > 0 and a quaternion of any positive norm, which is normalised.
+  template <class D>
+  RxSO3(const Scalar_& scale, const Eigen::QuaternionBase<D>& q) : RxSO3(scale, SO3<Scalar_>(q)) {}
 };
 
 /// R⁺ × SO(3) under its bi-invariant metric.

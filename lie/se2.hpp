@@ -144,6 +144,8 @@ class SE2Base : public detail::PlanarPoseAccess<Derived, detail::GroupBase<Deriv
  public:
   using typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using SE2Product = typename Base::template GroupProduct<Other>;
 
   /// The first two rows of matrix().
   Eigen::Matrix<Scalar, 2, 3> matrix2x3() const { return this->matrix().template topRows<2>(); }
@@ -181,7 +183,10 @@ class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
   explicit SE2(const Eigen::Matrix<Scalar_, 3, 3>& T)
       : SE2(SO2<Scalar_>(Eigen::Matrix<Scalar_, 2, 2>(T.template topLeftCorner<2, 2>())),
             Vector2(T.template topRightCorner<2, 1>())) {}
-  SE2(const Eigen::Matrix<Scalar_, 2, 2>& R, const Vector2& translation) : SE2(SO2<Scalar_>(R), translation) {}
+  /// From a complex number of any positive norm or a rotation matrix, and a translation (m).
+  template <class D>
+    requires(D::RowsAtCompileTime == 2 && (D::ColsAtCompileTime == 1 || D::ColsAtCompileTime == 2))
+  SE2(const Eigen::MatrixBase<D>& rotation, const Vector2& translation) : SE2(SO2<Scalar_>(rotation), translation) {}
   /// Translations along the axes, m.
   static SE2 trans(const Vector2& t) { return SE2(SO2<Scalar_>(), t); }
   static SE2 trans(const Scalar_& x, const Scalar_& y) { return trans(Vector2(x, y)); }

@@ -180,6 +180,8 @@ class SE3Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
  public:
   using typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using SE3Product = typename Base::template GroupProduct<Other>;
 
   /// The first three rows of matrix().
   Eigen::Matrix<Scalar, 3, 4> matrix3x4() const { return this->matrix().template topRows<3>(); }

@@ -134,6 +134,8 @@ class Sim2Base : public detail::TranslationAccess<Derived, detail::GroupBase<Der
   using Base::data;
   using typename Base::Math, typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using Sim2Product = typename Base::template GroupProduct<Other>;
   using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
   using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
 

@@ -90,6 +90,8 @@ class SO2Base : public detail::GroupBase<Derived> {
   using typename Base::Math, typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
   using typename Base::Transformation;
   using Base::operator*;
+  template <class Other>
+  using SO2Product = typename Base::template GroupProduct<Other>;
   /// The complex number (cos, sin), viewed in place.
   Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> unit_complex() const {
     return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(this->data());

@@ -161,6 +161,8 @@ class SO3Base : public detail::GroupBase<Derived> {
   using typename Base::Scalar, typename Base::Plain, typename Base::Math, typename Base::Tangent;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Base::operator*;
+  template <class Other>
+  using SO3Product = typename Base::template GroupProduct<Other>;
 
   /// A rotation vector and its norm (rad).
   struct TangentAndTheta {
@@ -233,7 +235,7 @@ class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
   /// From an angle (rad) about an axis of norm one.
   explicit SO3(const Eigen::AngleAxis<Scalar_>& a) : SO3(Shell::exp(Tangent(a.angle() * a.axis()))) {}
   /// From a rotation matrix, orthogonal up to rounding; largest of the four pivots, so exact near half-turns.
-  explicit SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
+  SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
   /// The rotation nearest to any matrix in the Frobenius norm, of positive determinant or not.
   static SO3 fitToSO3(const Matrix3& M) { return fromParams(detail::nearestQuaternion<Scalar_>(M)); }
   /// From a rotation matrix read from data: nothing if |RᵀR - I| exceeds the tolerance or det R < 0 or NaN.

@@ -57,7 +57,7 @@ void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   app->add_option("--criterion", options->criteria, "Criteria, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_criteria)));
-  app->add_option("--n", options->n, "Numbers of measures, a comma list (default 5,10,20,30,50,100)")
+  app->add_option("--n", options->n, "Numbers of measurements, a comma list (default 5,10,20,30,50,100)")
       ->delimiter(',')
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000000}));
   app->add_option("--spread", options->spreads,
