@@ -46,6 +46,12 @@ eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/
 quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
 built_and_ran ./in_place "in place"
 
+# Headers that a user takes without -isystem do not warn in his units, whatever he asks the compiler to look at.
+# shellcheck disable=SC2086
+quietly $CXX -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror -I"$root" \
+  ${eigen/-I/-isystem } "$here/warnings_lie.cpp"
+echo "consumers: warnings of lie/: none"
+
 quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
 quietly "$CMAKE" --build add_subdirectory
 built_and_ran ./add_subdirectory/consumer "add_subdirectory"
