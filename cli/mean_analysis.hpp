@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/feature_values.hpp>
+#include <cli/io/feature_values.hpp>
 #include <cli/io/measures.hpp>
 #include <stats/charts.hpp>
 #include <stats/status.hpp>
@@ -35,7 +35,7 @@ struct MeanAnalysis {
   Status covariance_status = Status::ok;
   std::string covariance_from = {};                               ///< residuals or noise
   Eigen::MatrixXd dispersion;                                     ///< of the measures about the mean
-  std::vector<LargestResidual> largest = {};                      ///< one for each of tangentParts()
+  std::vector<LargestResidual> largest = {};                      ///< one for each part of the tangent vector
   std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< of directions: what the coordinates belong to
 
   Uniqueness unique = Uniqueness::not_certified;

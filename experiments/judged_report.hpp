@@ -1,13 +1,12 @@
 // What the validations of the program have in common: a report, what is promised of it, and the verdict.
 #pragma once
 
-#include <stats/validation.hpp>
+#include <stats/validation_report.hpp>
 
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,8 +20,8 @@ inline constexpr double run_false_alarm = 1e-5;
 struct JudgedReport {
   ValidationReport report;
   std::optional<ValidationTolerance> promise;  ///< absent outside the domain of the documentation: shown, not judged
-  std::optional<bool> passed;                  ///< the verdict, where there is a promise
-  std::string reason;                          ///< why it failed; else empty
+  std::optional<bool> passed;                  ///< whether it passed, where there is a promise
+  Verdict verdict = Verdict::passed;           ///< the same with the reason
   std::vector<HistogramBin> histogram;         ///< of the squared distances, with the law's density
   double tail = 0;                             ///< fraction of distances beyond the law's 99.9 % quantile
 
@@ -36,8 +35,8 @@ struct JudgedReport {
   /// The verdict, where there is a promise, at this probability of a false alarm. It needs the distances.
   void judge(double false_alarm) {
     if (!promise) return;
-    reason = report.reasonToFail(false_alarm, *promise);
-    passed = reason.empty();
+    verdict = report.verdict(false_alarm, *promise);
+    passed = verdict == Verdict::passed;
   }
 
   /// Gives back the memory of the distances: a hundred rows of a million would fill it.

@@ -1,3 +1,4 @@
+#include <experiments/means_report.hpp>
 #include <experiments/means_trial.hpp>
 #include <experiments/parallel.hpp>
 #include <stats/validation.hpp>
@@ -11,17 +12,19 @@ namespace {
 double logRatio(double error, double reference) { return std::log(error / reference); }
 
 /// What the reports are made of, in the order of the methods that are wanted.
-std::vector<TrialOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
-  std::vector<TrialOutcome> list;
+std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
+  std::vector<MeansOutcome> list;
   for (std::size_t m = 0; m < methods.size(); ++m) {
     if (!experiment.wanted[m]) continue;
     const detail::MethodOutcome& o = outcomes[m];
     const bool is_maha = methods[m].criterion == Criterion::maha;
     const detail::MethodOutcome& reference =
         outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
-    TrialOutcome outcome{.mu2 = o.mahalanobis_squared, .iterations = o.iterations};
-    outcome.extra[log_ratio_rotation] = logRatio(o.rotation_error, reference.rotation_error);
-    outcome.extra[log_ratio_translation] = logRatio(o.translation_error, reference.translation_error);
+    MeansOutcome outcome;
+    outcome.mu2 = o.mahalanobis_squared;
+    outcome.iterations = o.iterations;
+    outcome.log_ratio_rotation = logRatio(o.rotation_error, reference.rotation_error);
+    outcome.log_ratio_translation = logRatio(o.translation_error, reference.translation_error);
     list.push_back(outcome);
   }
   return list;
@@ -41,8 +44,8 @@ std::size_t methodIndex(const Method& method) {
   return i;
 }
 
-std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
-                                  const std::function<void(std::size_t, std::size_t)>& progress) {
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
+                             const std::function<void(std::size_t, std::size_t)>& progress) {
   const int k = degreesOfFreedom(experiment.feature);
   std::vector<ReferenceLaw> laws;
   for (std::size_t m = 0; m < methods.size(); ++m) {

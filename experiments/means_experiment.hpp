@@ -11,7 +11,8 @@
 #include <vector>
 
 namespace liestat {
-struct ValidationReport;
+template <class Outcome>
+struct ValidationReportOf;
 }
 
 namespace liestat::experiments {
@@ -88,15 +89,15 @@ struct MeansExperiment {
   bool certify = false;
 };
 
-/// Where the numbers of a report of run() stand: its `extra` statistics are logarithms of ratios of errors.
-enum ExtraIndex : std::size_t { log_ratio_rotation, log_ratio_translation };
+struct MeansOutcome;
+using MeansReport = ValidationReportOf<MeansOutcome>;  // experiments/means_report.hpp
 
 /// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
 /// each of `methods` that is wanted, in their order; its law is χ²_k for known noise and Hotelling's for residuals. The
 /// ratios compare a method's error with MAHA's of the same trial (the corrected one; the report's for the report's LSQ
 /// and WLSQ), and the report's MAHA with the corrected one; they are absent where that is not wanted. `progress(trials
 /// done, all)` is called from any thread, never twice at the same time.
-std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
-                                  const std::function<void(std::size_t, std::size_t)>& progress = {});
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
+                             const std::function<void(std::size_t, std::size_t)>& progress = {});
 
 }  // namespace liestat::experiments

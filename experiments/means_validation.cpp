@@ -18,8 +18,12 @@ bool hasLeastSquaresNoise(const MeansExperiment& experiment) {
 
 }  // namespace
 
-double MeansRow::ratio(ExtraIndex index) const { return std::exp(report.extra[index].mean); }
-double MeansRow::logDeviation(ExtraIndex index) const { return report.extra[index].deviation; }
+double MeansRow::ratio(ErrorRatio of) const {
+  return std::exp((of == log_ratio_rotation ? rotation_ratio : translation_ratio).mean);
+}
+double MeansRow::logDeviation(ErrorRatio of) const {
+  return (of == log_ratio_rotation ? rotation_ratio : translation_ratio).standard_deviation;
+}
 
 std::vector<MeansRow> validateMeans(const MeansValidation& validation,
                                     const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
@@ -85,11 +89,13 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
     std::size_t next = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (!r.experiment.wanted[m]) continue;
-      ValidationReport& report = reports[next++];
+      MeansReport& report = reports[next++];
       if (!r.keep[m]) continue;
       MeansRow& row = rows.emplace_back();
       row.experiment = r.experiment;
       row.method = methods[m];
+      row.rotation_ratio = report.of(log_ratio_rotation);
+      row.translation_ratio = report.of(log_ratio_translation);
       row.setReport(std::move(report));
       if (methods[m].corrected) row.promise = promisedTolerance(r.experiment, methods[m]);
     }

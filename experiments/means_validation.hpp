@@ -2,6 +2,7 @@
 
 #include <experiments/judged_report.hpp>
 #include <experiments/means_experiment.hpp>
+#include <experiments/means_report.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -38,8 +39,10 @@ struct MeansRow : JudgedReport {
   Method method{};
 
   /// exp of the mean and standard deviation of the logarithm of the error's ratio to MAHA's.
-  double ratio(ExtraIndex index) const;
-  double logDeviation(ExtraIndex index) const;
+  double ratio(ErrorRatio of) const;
+  double logDeviation(ErrorRatio of) const;
+
+  TrialStatistic rotation_ratio, translation_ratio;  ///< the logarithms
 };
 
 /// Runs everything; rows in the order of the lists.

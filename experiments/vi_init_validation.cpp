@@ -252,7 +252,7 @@ void evaluateErrors(ViInitRow& row, std::vector<double> values, double false_ala
 
 void evaluateDistances(ViInitRow& row, const std::vector<double>& values, int dof, double false_alarm) {
   row.report = reportOf(values, dof);
-  if (row.promise) row.reason = row.report->reasonToFail(false_alarm, row.promise->tolerance);
+  if (row.promise) row.reason = reason(row.report->verdict(false_alarm, row.promise->tolerance));
   row.report->mu2 = {};
 }
 

@@ -57,7 +57,7 @@ Measures measuresOf(const LandmarkMeasures& landmark, const MeasuresOptions& opt
   file.kind = Feature::point;
   file.format = "stereo";
   for (std::size_t i = 0; i < landmark.points.size(); ++i) {
-    file.vectors.push_back(landmark.points[i].mean);
+    file.positions.push_back(landmark.points[i].mean);
     file.covariances.emplace_back(landmark.points[i].covariance);
     file.times.push_back(landmark.times[i]);
     file.lines.push_back(landmark.frames[i]);

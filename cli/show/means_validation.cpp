@@ -72,7 +72,7 @@ std::string formatMeansTables(const std::vector<MeansRow>& rows) {
         const MeansRow* row = cell(key, {criterion, true, false});
         residual_cells.push_back(row ? number(row->report.ks_p_value, 2) : "-");
         const MeansRow* exact = cell(key, {criterion, true, true});
-        for (const ExtraIndex index : {log_ratio_rotation, log_ratio_translation}) {
+        for (const ErrorRatio index : {log_ratio_rotation, log_ratio_translation}) {
           accuracy_cells.push_back(
               exact && std::isfinite(exact->ratio(index)) ? fmt::format("{:.3f}", exact->ratio(index)) : "-");
         }
@@ -104,7 +104,7 @@ std::string formatMeansTables(const std::vector<MeansRow>& rows) {
     if (row.passed.value_or(true)) continue;
     text += fmt::format("\nFAILED {} {} n={} spread {:.3g} {} {}: {}", name(row.experiment.feature),
                         name(row.experiment.noise), row.experiment.n, row.experiment.spread, name(row.method.criterion),
-                        row.method.known_noise ? "known noise" : "residuals", row.reason);
+                        row.method.known_noise ? "known noise" : "residuals", reason(row.verdict));
   }
   return text + "\n" + verdictLines(tally(rows), "in the promised domain");
 }

@@ -122,7 +122,7 @@ void writeMeansReport(const std::string& directory, const std::string& command_l
       residual_confidence.references = {{.at = 0.01}};
 
       Panel accuracy{.title = "errors over MAHA's", .x = n_axis, .y = {.label = "ratio"}};
-      const ExtraIndex kind = feature == Feature::point ? log_ratio_translation : log_ratio_rotation;
+      const ErrorRatio kind = feature == Feature::point ? log_ratio_translation : log_ratio_rotation;
       for (const Criterion criterion : {Criterion::lsq, Criterion::wlsq}) {
         addIfAny(
             accuracy.series,

@@ -53,7 +53,7 @@ std::string formatPropagationTables(const std::vector<PropagationRow>& rows) {
   for (const PropagationRow& row : rows) {
     if (row.passed.value_or(true)) continue;
     text += fmt::format("\nFAILED {} {} spread {:.3g}: {}", name(row.experiment.feature), label(row.method),
-                        row.experiment.spread, row.reason);
+                        row.experiment.spread, reason(row.verdict));
   }
   const Tally count = tally(rows);
   if (count.failed > 0) text += "\n";

@@ -3,6 +3,7 @@
 #include <cli/show/mean.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
 
 #include <fmt/format.h>
 
@@ -38,11 +39,11 @@ JsonObject toJson(const HalfMean& half, Feature feature) {
 
 std::vector<std::string> halfRow(const char* what, const HalfMean& half, Feature feature) {
   std::string sd;
-  for (const TangentPart& part : tangentParts(feature)) {
+  for (const TangentBlock& part : experiments::info(feature).tangent) {
     if (half.covariance.size() == 0) continue;
     const Eigen::VectorXd variances = half.covariance.diagonal().segment(part.begin, part.size);
-    sd += fmt::format("{}{} {}", sd.empty() ? "" : ", ", number(part.scale() * std::sqrt(variances.maxCoeff()), 3),
-                      part.unit());
+    sd += fmt::format("{}{} {}", sd.empty() ? "" : ", ",
+                      number(unitOf(part).scale * std::sqrt(variances.maxCoeff()), 3), unitOf(part).name);
   }
   return {what, fmt::format("{}", half.n), oneLine(half.mean), sd.empty() ? "none" : sd};
 }

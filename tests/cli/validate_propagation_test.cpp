@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
@@ -42,7 +42,7 @@ TEST(ValidatePropagation, aFailureIsShown) {
   row.method = experiment.methods[0];
   row.setReport(reports[0]);
   row.passed = false;
-  row.reason = "the index is too large";
+  row.verdict = Verdict::index_too_large;
   const std::string text = formatPropagationTables({row});
   EXPECT_NE(text.find("FAILED pose compose spread 1: the index is too large"), std::string::npos) << text;
   EXPECT_NE(text.find(" !\n"), std::string::npos) << text;

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/temporary_directory.hpp>
 #include <experiments/two_solutions.hpp>
 #include <cli/show/table1.hpp>

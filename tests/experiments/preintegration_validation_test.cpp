@@ -20,7 +20,7 @@ TEST(PreintegrationValidation, JudgesWhatIsPromised) {
     EXPECT_EQ(row.report.trials, 200U);
     EXPECT_EQ(row.report.dof, row.check == PreintegrationCheck::motion_and_bias ? 15 : 9);
     EXPECT_EQ(row.passed.has_value(), row.noise == 1) << "promised up to ten times the sensor's noise";
-    EXPECT_TRUE(row.passed.value_or(true)) << row.reason;
+    EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
   }
   EXPECT_EQ(tally(rows).judged, 3U);
 }

@@ -35,7 +35,7 @@ TEST(PropagationValidation, everyRowIsRunAndPromisesAreJudged) {
     EXPECT_EQ(row.report.failures, 0U);
     EXPECT_EQ(row.report.dof, degreesOfFreedom(row.experiment.feature, row.method.operation));
     EXPECT_EQ(row.passed.has_value(), row.experiment.spread == 0.1);
-    EXPECT_TRUE(row.passed.value_or(true)) << row.reason;
+    EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
     EXPECT_EQ(row.histogram.size(), 30U);
   }
 }
