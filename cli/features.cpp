@@ -22,6 +22,10 @@ template SplitResult split<Frame3d>(const Measures&, const SplitPlan&, int);
 template SplitResult split<SemiOrientedFrame3d>(const Measures&, const SplitPlan&, int);
 template SplitResult split<NonOrientedFrame3d>(const Measures&, const SplitPlan&, int);
 
+}  // namespace liestat::cli::detail
+
+namespace liestat::experiments::detail {
+
 template MethodOutcomes runTrial<Eigen::Vector3d>(const MeansExperiment&, CounterRng&);
 template MethodOutcomes runTrial<SO3d>(const MeansExperiment&, CounterRng&);
 template MethodOutcomes runTrial<S2d>(const MeansExperiment&, CounterRng&);
@@ -29,4 +33,4 @@ template MethodOutcomes runTrial<Frame3d>(const MeansExperiment&, CounterRng&);
 template MethodOutcomes runTrial<SemiOrientedFrame3d>(const MeansExperiment&, CounterRng&);
 template MethodOutcomes runTrial<NonOrientedFrame3d>(const MeansExperiment&, CounterRng&);
 
-}  // namespace liestat::cli::detail
+}  // namespace liestat::experiments::detail

@@ -18,19 +18,19 @@ namespace {
 
 MeanAnalysis dispatch(const Measures& measures, const AnalysisOptions& options) {
   switch (measures.feature) {
-    case MeanFeature::point:
+    case Feature::point:
       return detail::analyse<Eigen::Vector3d>(measures, options);
-    case MeanFeature::rotation:
+    case Feature::rotation:
       return detail::analyse<SO3d>(measures, options);
-    case MeanFeature::semi_oriented_frame:
+    case Feature::semi_oriented_frame:
       return detail::analyse<SemiOrientedFrame3d>(measures, options);
-    case MeanFeature::non_oriented_frame:
+    case Feature::non_oriented_frame:
       return detail::analyse<NonOrientedFrame3d>(measures, options);
-    case MeanFeature::se3:
+    case Feature::se3:
       return detail::analyse<SE3d>(measures, options);
-    case MeanFeature::direction:
+    case Feature::direction:
       return detail::analyse<S2d>(measures, options);
-    case MeanFeature::frame:
+    case Feature::frame:
       break;
   }
   return detail::analyse<Frame3d>(measures, options);

@@ -147,7 +147,7 @@ void setIterations(MeanAnalysis& analysis, const Result& result) {
 template <Metric M>
 CertifiedMean<M> certified(const std::vector<M>& samples, const std::vector<double>& weights,
                            const AnalysisOptions& options, MeanResult<M>& first) {
-  first = mean(ProgramExecutor{options.threads}, samples, weights);
+  first = mean(experiments::ProgramExecutor{options.threads}, samples, weights);
   CertifiedMeanOptions<M> how;
   how.mean.start = first.mean;
   how.uniqueness.branch_and_bound = options.certify;
@@ -264,7 +264,7 @@ M mahalanobis(const Measures& measures, const std::vector<M>& samples, const Ana
     MahaOptions<M> how;
     how.start = x;
     how.likelihood = measures.likelihood;
-    results.push_back(maha(ProgramExecutor{options.threads}, data, measures.covariance_at, how));
+    results.push_back(maha(experiments::ProgramExecutor{options.threads}, data, measures.covariance_at, how));
   }
   const auto better = [](const MahaResult<M>& a, const MahaResult<M>& b) {
     if (a.converged != b.converged) return a.converged;
@@ -383,7 +383,7 @@ MeanAnalysis analyse(const Measures& measures, const AnalysisOptions& options) {
   const std::vector<M> samples = features<M>(measures.file);
   MeanAnalysis analysis;
   M y;
-  if (measures.criterion == MeanCriterion::maha) {
+  if (measures.criterion == Criterion::maha) {
     y = mahalanobis(measures, samples, options, analysis);
   } else {
     if constexpr (is_se3<M>) {

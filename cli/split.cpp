@@ -22,19 +22,19 @@ namespace {
 
 SplitResult dispatch(const Measures& m, const SplitPlan& plan, int threads) {
   switch (m.feature) {
-    case MeanFeature::point:
+    case Feature::point:
       return detail::split<Eigen::Vector3d>(m, plan, threads);
-    case MeanFeature::rotation:
+    case Feature::rotation:
       return detail::split<SO3d>(m, plan, threads);
-    case MeanFeature::semi_oriented_frame:
+    case Feature::semi_oriented_frame:
       return detail::split<SemiOrientedFrame3d>(m, plan, threads);
-    case MeanFeature::non_oriented_frame:
+    case Feature::non_oriented_frame:
       return detail::split<NonOrientedFrame3d>(m, plan, threads);
-    case MeanFeature::se3:
+    case Feature::se3:
       return detail::split<SE3d>(m, plan, threads);
-    case MeanFeature::direction:
+    case Feature::direction:
       return detail::split<S2d>(m, plan, threads);
-    case MeanFeature::frame:
+    case Feature::frame:
       break;
   }
   return detail::split<Frame3d>(m, plan, threads);
@@ -90,7 +90,7 @@ Halves halvesOf(const Timeline& timeline, const std::vector<char>& is_first, boo
 
 /// What a measure tells, as a number: its weight, or det(Σ)^(-1/k).
 double information(const Measures& m, std::size_t row) {
-  if (m.criterion != MeanCriterion::maha) return m.weights[row];
+  if (m.criterion != Criterion::maha) return m.weights[row];
   const Covariance& covariance = m.file.covariances[row];
   const Eigen::LLT<Covariance> factor(covariance);
   double sum = 0;

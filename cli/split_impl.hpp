@@ -11,7 +11,7 @@ template <class M>
 class SplitEstimator {
  public:
   explicit SplitEstimator(const Measures& measures) : measures_(measures), samples_(features<M>(measures.file)) {
-    if (measures.criterion == MeanCriterion::maha) gaussians_ = gaussians(samples_, measures.file);
+    if (measures.criterion == Criterion::maha) gaussians_ = gaussians(samples_, measures.file);
     std::vector<std::size_t> all(samples_.size());
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
     start_ = estimate(all).mean;
@@ -19,7 +19,7 @@ class SplitEstimator {
 
   /// Starts at the mean of all the measures once that is known.
   Estimate<M> estimate(const std::vector<std::size_t>& rows) const {
-    if (measures_.criterion == MeanCriterion::maha) {
+    if (measures_.criterion == Criterion::maha) {
       std::vector<Gaussian<M>> data;
       data.reserve(rows.size());
       for (const std::size_t row : rows) data.push_back(gaussians_[row]);
@@ -76,7 +76,7 @@ template <class M>
 SplitResult split(const Measures& measures, const SplitPlan& plan, int threads) {
   const SplitEstimator<M> estimator(measures);
   const auto distances = [&](bool by_blocks) {
-    return ProgramExecutor{threads}.reduce(
+    return experiments::ProgramExecutor{threads}.reduce(
         plan.splits,
         [&](std::size_t s) {
           const Halves halves = plan.deal(s, by_blocks);

@@ -14,6 +14,7 @@
 #include <cli/vi_fusion.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr double most_windows = 2e4;

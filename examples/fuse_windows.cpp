@@ -18,6 +18,7 @@
 namespace {
 
 using namespace liestat;
+using namespace liestat::experiments;
 
 constexpr std::size_t windows = 5, images_per_window = 20, images_between = 5;
 constexpr double pixel = 1. / 450;

@@ -16,7 +16,7 @@
 #include <limits>
 #include <vector>
 
-namespace liestat {
+namespace liestat::experiments {
 
 /// A case on exact data: what is asked, and what must come out.
 struct ClosedFormCase {
@@ -269,4 +269,4 @@ inline const std::vector<NoisyClosedFormCase>& noisyClosedFormCases() {
   return list;
 }
 
-}  // namespace liestat
+}  // namespace liestat::experiments

@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-namespace liestat {
+namespace liestat::experiments {
 
 /// Uniform and normal numbers and directions, the same with every standard library.
 class SceneRandom {
@@ -280,4 +280,4 @@ class InertialScene {
   std::vector<Eigen::Vector3d> points_;
 };
 
-}  // namespace liestat
+}  // namespace liestat::experiments

@@ -5,27 +5,13 @@
 
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
 
 Trial trialOf(Feature feature) {
-  switch (feature) {
-    case Feature::point:
-      return detail::runTrial<Eigen::Vector3d>;
-    case Feature::rotation:
-      return detail::runTrial<SO3d>;
-    case Feature::frame:
-      return detail::runTrial<Frame3d>;
-    case Feature::semi_oriented_frame:
-      return detail::runTrial<SemiOrientedFrame3d>;
-    case Feature::non_oriented_frame:
-      return detail::runTrial<NonOrientedFrame3d>;
-    case Feature::direction:
-      break;
-  }
-  return detail::runTrial<S2d>;
+  return experiments::withFeature(feature, []<Metric M>() -> Trial { return detail::runTrial<M>; });
 }
 
 /// Logarithm of the ratio of two errors.
@@ -50,24 +36,6 @@ std::vector<TrialOutcome> wantedOutcomes(const MeansExperiment& experiment, cons
 
 }  // namespace
 
-std::string name(Feature feature) {
-  switch (feature) {
-    case Feature::point:
-      return "point";
-    case Feature::rotation:
-      return "rotation";
-    case Feature::frame:
-      return "frame";
-    case Feature::semi_oriented_frame:
-      return "semi_oriented_frame";
-    case Feature::non_oriented_frame:
-      return "non_oriented_frame";
-    case Feature::direction:
-      return "direction";
-  }
-  return "";
-}
-
 std::string name(Noise noise) {
   switch (noise) {
     case Noise::iid:
@@ -82,18 +50,6 @@ std::string name(Noise noise) {
   return "";
 }
 
-std::string name(Criterion criterion) {
-  switch (criterion) {
-    case Criterion::lsq:
-      return "lsq";
-    case Criterion::wlsq:
-      return "wlsq";
-    case Criterion::maha:
-      return "maha";
-  }
-  return "";
-}
-
 std::string name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
 
 std::size_t methodIndex(const Method& method) {
@@ -104,18 +60,6 @@ std::size_t methodIndex(const Method& method) {
     ++i;
   }
   return i;
-}
-
-int degreesOfFreedom(Feature feature) {
-  switch (feature) {
-    case Feature::point:
-    case Feature::rotation:
-      return 3;
-    case Feature::direction:
-      return 2;
-    default:
-      return 6;
-  }
 }
 
 std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
@@ -134,4 +78,4 @@ std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads
   });
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

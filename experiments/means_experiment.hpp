@@ -1,5 +1,6 @@
 #pragma once
 
+#include <experiments/feature.hpp>
 #include <stats/maha.hpp>
 
 #include <array>
@@ -13,28 +14,38 @@ namespace liestat {
 struct ValidationReport;
 }
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
 /// same draws, so that their accuracies can be compared trial by trial.
 
-enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, direction };
-inline constexpr std::array all_features{
-    Feature::point,    Feature::rotation, Feature::frame, Feature::semi_oriented_frame, Feature::non_oriented_frame,
-    Feature::direction};
+using experiments::Criterion;
+using experiments::Feature;
+
+/// The features of the experiment: those with a Riemannian metric.
+inline constexpr auto all_features = [] {
+  constexpr auto count = [] {
+    std::size_t n = 0;
+    for (const experiments::FeatureInfo& row : experiments::features) n += row.has_metric ? 1 : 0;
+    return n;
+  };
+  std::array<Feature, count()> list{};
+  std::size_t n = 0;
+  for (const experiments::FeatureInfo& row : experiments::features) {
+    if (row.has_metric) list[n++] = row.kind;
+  }
+  return list;
+}();
 
 /// How the measures' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²), μ ~
 /// U(0,1).
 enum class Noise { iid, isd, idd, exp };
 inline constexpr std::array all_noises{Noise::iid, Noise::isd, Noise::idd, Noise::exp};
 
-enum class Criterion { lsq, wlsq, maha };
 inline constexpr std::array all_criteria{Criterion::lsq, Criterion::wlsq, Criterion::maha};
 
 /// The names of the program's options and JSON fields.
-std::string name(Feature feature);
 std::string name(Noise noise);
-std::string name(Criterion criterion);
 std::string name(CovarianceAt at);
 
 /// A way to estimate a mean and its covariance, of those that a trial compares.
@@ -82,9 +93,6 @@ struct MeansExperiment {
 /// Where the numbers of a report of run() stand: its `extra` statistics are logarithms of ratios of errors.
 enum ExtraIndex : std::size_t { log_ratio_rotation, log_ratio_translation };
 
-/// Number of degrees of freedom of a feature.
-int degreesOfFreedom(Feature feature);
-
 /// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
 /// each of `methods` that is wanted, in their order; its law is χ²_k for known noise and Hotelling's for residuals. The
 /// ratios compare a method's error with MAHA's of the same trial (the corrected one; the report's for the report's LSQ
@@ -93,4 +101,4 @@ int degreesOfFreedom(Feature feature);
 std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
                                   const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

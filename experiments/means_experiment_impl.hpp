@@ -12,7 +12,7 @@
 
 #include <cmath>
 
-namespace liestat::cli::detail {
+namespace liestat::experiments::detail {
 
 /// The report's covariance Σ of a feature, in the library's tangent order.
 template <class M>
@@ -196,4 +196,4 @@ MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
   return outcomes;
 }
 
-}  // namespace liestat::cli::detail
+}  // namespace liestat::experiments::detail

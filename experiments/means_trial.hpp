@@ -6,7 +6,7 @@
 #include <array>
 #include <limits>
 
-namespace liestat::cli::detail {
+namespace liestat::experiments::detail {
 
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -23,4 +23,4 @@ using MethodOutcomes = std::array<MethodOutcome, methods.size()>;
 template <class M>
 MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng);
 
-}  // namespace liestat::cli::detail
+}  // namespace liestat::experiments::detail

@@ -10,7 +10,8 @@
 #include <map>
 #include <tuple>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 namespace {
 
 bool isFrame(Feature feature) {
@@ -256,4 +257,4 @@ std::string formatMeansTables(const std::vector<MeansRow>& rows) {
   return text;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// What `liestat validate means` runs: the product of the lists.
 struct MeansValidation {
@@ -60,4 +60,4 @@ std::string formatMeansTables(const std::vector<MeansRow>& rows);
 /// The report's page.
 void writeMeansReport(const std::string& directory, const std::string& command_line, const std::vector<MeansRow>& rows);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -6,7 +6,7 @@
 #include <stats/compat/tbb.hpp>
 #endif
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The executor of the program: threads where it was built with oneTBB, else the calling thread.
 struct ProgramExecutor {
@@ -22,4 +22,4 @@ struct ProgramExecutor {
   }
 };
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

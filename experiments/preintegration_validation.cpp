@@ -11,7 +11,8 @@
 #include <cmath>
 #include <utility>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 namespace {
 
 constexpr double rate = 200;
@@ -162,4 +163,4 @@ std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows
       failed == 0 ? "PASSED" : "FAILED");
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// What is asked of a preintegrated motion.
 enum class PreintegrationCheck {
@@ -53,4 +53,4 @@ std::vector<PreintegrationRow> validatePreintegration(
 /// The table for the terminal, the verdict last.
 std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

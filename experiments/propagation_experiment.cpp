@@ -3,7 +3,7 @@
 #include <experiments/parallel.hpp>
 #include <experiments/propagation_trial.hpp>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 std::string name(Propagated feature) {
   switch (feature) {
@@ -51,4 +51,4 @@ std::vector<ValidationReport> run(const PropagationExperiment& experiment, int t
                      [&](CounterRng& rng, std::uint64_t) { return detail::propagationTrial(experiment, rng); });
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

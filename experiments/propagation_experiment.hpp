@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The simulated experiments of `liestat validate propagation`: features with known noise are composed, inverted,
 /// compared, or move points, and the truth is looked for under the propagated covariance. All operations see the same
@@ -59,4 +59,4 @@ int degreesOfFreedom(Propagated feature, Operation operation);
 std::vector<ValidationReport> run(const PropagationExperiment& experiment, int threads,
                                   const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

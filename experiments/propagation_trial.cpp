@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace liestat::cli::detail {
+namespace liestat::experiments::detail {
 namespace {
 
 /// The noise of a feature; tangent order is translation, rotation, logarithm of the scale.
@@ -92,4 +92,4 @@ std::vector<TrialOutcome> propagationTrial(const PropagationExperiment& experime
   return {};
 }
 
-}  // namespace liestat::cli::detail
+}  // namespace liestat::experiments::detail

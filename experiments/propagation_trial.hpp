@@ -2,9 +2,9 @@
 
 #include <experiments/propagation_experiment.hpp>
 
-namespace liestat::cli::detail {
+namespace liestat::experiments::detail {
 
 /// One trial of an experiment: an outcome for each of its methods.
 std::vector<TrialOutcome> propagationTrial(const PropagationExperiment& experiment, CounterRng& rng);
 
-}  // namespace liestat::cli::detail
+}  // namespace liestat::experiments::detail

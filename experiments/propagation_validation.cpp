@@ -7,7 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 
 std::optional<ValidationTolerance> PropagationPromise::at(double noise) const {
   if (!(noise <= spread)) return std::nullopt;
@@ -172,4 +173,4 @@ std::string formatPropagationTables(const std::vector<PropagationRow>& rows) {
   return text + (failed == 0 ? "PASSED\n" : "FAILED\n");
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

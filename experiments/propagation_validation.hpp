@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// What `liestat validate propagation` runs: the product of the lists.
 struct PropagationValidation {
@@ -76,4 +76,4 @@ std::string label(const PropagationMethod& method);
 std::vector<const PropagationRow*> rowsOf(const std::vector<PropagationRow>& rows, Propagated feature,
                                           const PropagationMethod& method);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -16,7 +16,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace liestat {
+namespace liestat::experiments {
 
 /// What an inertial sensor reads from the first image to beyond the last, `rate` times a second: with white noise, the
 /// scene's bias of the accelerometer (InertialSceneOptions::bias) and one of the gyroscope (rad/s). Biases do not walk.
@@ -56,4 +56,4 @@ inline void measure(InertialScene& scene, const ImuNoise<double>& noise, SceneRa
   }
 }
 
-}  // namespace liestat
+}  // namespace liestat::experiments

@@ -14,7 +14,8 @@
 #include <cli/show/json.hpp>
 #include <cli/io/output_file.hpp>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 namespace {
 
 constexpr const char* command_name = "liestat simulate vi";
@@ -435,4 +436,4 @@ std::string nextCommand(const std::string& directory) {
   return commandLine(static_cast<int>(pointers.size()), pointers.data());
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -15,7 +15,8 @@
 #include <cli/io/imu_file.hpp>
 #include <experiments/spline_trajectory.hpp>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 
 /// When there are images, and what they see of a world of points on the faces of a box.
 struct ViSceneOptions {
@@ -90,4 +91,4 @@ void writeRecording(const SimulatedRecording& recording, const std::string& dire
 /// The command line that initialises from the files of writeRecording.
 std::string nextCommand(const std::string& directory);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

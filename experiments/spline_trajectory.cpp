@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 constexpr int order = SplineTrajectory::degree + 1;
@@ -69,4 +69,4 @@ Kinematics SplineTrajectory::at(double time) const {
   return k;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

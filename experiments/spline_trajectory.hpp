@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// How a body moves at an instant.
 struct Kinematics {
@@ -40,4 +40,4 @@ class SplineTrajectory {
   std::vector<SE3d> poses_;
 };
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

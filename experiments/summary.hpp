@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// The value below which a share p of all values lies, one of them; NaN for none. Values that are not finite must not
 /// be among them.
@@ -16,4 +16,4 @@ inline double quantile(std::vector<double> values, double p) {
   return *at;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using S = ClosedFormStatus;
@@ -289,4 +289,4 @@ std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, i
   return rows;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// How many solutions a status stands for.
 enum class SolutionCount { one, two, infinite };
@@ -64,4 +64,4 @@ std::string formatTable1(const std::vector<Table1Row>& rows);
 void writeTable1Report(const std::string& directory, const std::string& command_line,
                        const std::vector<Table1Row>& rows);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -10,7 +10,8 @@
 #include <cmath>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
+using namespace cli;
 namespace {
 
 using Vector3 = Eigen::Vector3d;
@@ -240,4 +241,4 @@ void writeTwoSolutionsReport(const std::string& directory, const std::string& co
   report.write();
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

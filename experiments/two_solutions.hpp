@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// A scene with two solutions, as figures 1 and 2 of Martinelli (2012) show: a feature in four images, and three
 /// features in seven images of a constant acceleration.
@@ -33,4 +33,4 @@ std::string formatTwoSolutions(const TwoSolutions& found);
 /// A page with the figure.
 void writeTwoSolutionsReport(const std::string& directory, const std::string& command_line, const TwoSolutions& found);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

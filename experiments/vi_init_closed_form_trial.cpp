@@ -3,7 +3,7 @@
 #include <fusion/init/closed_form.hpp>
 #include <experiments/scene_readings.hpp>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 InertialScene sceneOf(const ViInitWindow& size, const Eigen::Vector3d& bias, std::uint64_t seed) {
@@ -68,4 +68,4 @@ std::vector<double> closedFormErrorsTrial(const ViInitWindow& size, double noise
   return values;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

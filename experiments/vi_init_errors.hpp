@@ -14,7 +14,7 @@
 #include <cmath>
 #include <limits>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// Densities of an ADIS16448, as its data sheet and EuRoC's calibration have them, rounded.
 inline constexpr ImuNoise<double> vi_init_imu{.gyroscope = 1.7e-4, .accelerometer = 2e-3};
@@ -55,4 +55,4 @@ double neesOnSphere(const Eigen::Matrix<double, N + 1, 1>& error, const Covarian
                                        Eigen::Matrix<double, N, N>(reduce * half));
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using Check = ViInitCheck;
@@ -128,4 +128,4 @@ std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
   }
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

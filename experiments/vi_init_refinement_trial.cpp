@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 /// The median of the features' distances over the true ones, away from 1, in percent.
@@ -74,4 +74,4 @@ std::vector<double> refinementTrial(const ViInitWindow& size, double noise, Coun
       scaleOfFeatures(r.features, scene)};
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

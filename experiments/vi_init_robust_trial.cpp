@@ -4,7 +4,7 @@
 #include <fusion/init/gyroscope_bias.hpp>
 #include <experiments/scene_readings.hpp>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 std::vector<double> gyroscopeBiasTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds}, rng());
@@ -52,4 +52,4 @@ std::vector<double> driftTrial(const ViInitWindow& size, double noise, CounterRn
           oracle.gravity,  oracle.scale, all.speed,    all.gravity, all.scale};
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

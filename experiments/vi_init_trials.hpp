@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// A window: its length, images at about equal distances, and features that all of them see.
 struct ViInitWindow {
@@ -44,4 +44,4 @@ std::vector<double> gyroscopeBiasTrial(const ViInitWindow& window, double noise,
 /// gravity, scale with those that were kept, with the right ones, with all.
 std::vector<double> driftTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

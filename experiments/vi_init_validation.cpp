@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 namespace {
 
 using Check = ViInitCheck;
@@ -348,4 +348,4 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   return rows;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat::experiments {
 
 /// What is asked of visual-inertial initialisation.
 enum class ViInitCheck {
@@ -114,4 +114,4 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows);
 void writeViInitReport(const std::string& directory, const std::string& command_line,
                        const std::vector<ViInitRow>& rows);
 
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

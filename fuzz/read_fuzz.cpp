@@ -25,18 +25,18 @@ bool isAbsentOrFull(const List& list, std::size_t n) {
 }
 
 void check(const liestat::cli::FeatureFile& file) {
-  using liestat::cli::FeatureKind;
+  using liestat::experiments::Feature;
   const std::size_t n = file.size();
-  const bool rotates = file.kind == FeatureKind::rotation || file.kind == FeatureKind::frame;
+  const bool rotates = file.kind == Feature::rotation || file.kind == Feature::frame;
   require(n > 0);
   require(file.rotations.size() == (rotates ? n : 0));
-  require(file.vectors.size() == (file.kind == FeatureKind::rotation ? 0 : n));
+  require(file.vectors.size() == (file.kind == Feature::rotation ? 0 : n));
   require(isAbsentOrFull(file.weights, n) && isAbsentOrFull(file.times, n) && isAbsentOrFull(file.covariances, n));
   require(file.n_normalised <= n);
   for (const auto& rotation : file.rotations) require(std::abs(rotation.norm() - 1) < 1e-14);
   for (const auto& vector : file.vectors) {
     require(vector.allFinite());
-    if (file.kind == FeatureKind::direction) require(std::abs(vector.norm() - 1) < 1e-14);
+    if (file.kind == Feature::direction) require(std::abs(vector.norm() - 1) < 1e-14);
   }
   for (const double weight : file.weights) require(weight > 0 && std::isfinite(weight));
   for (const double time : file.times) require(std::isfinite(time));

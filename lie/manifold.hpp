@@ -8,6 +8,8 @@
 #include <lie/concepts.hpp>
 
 #include <cmath>
+#include <concepts>
+#include <type_traits>
 
 namespace liestat {
 
@@ -18,6 +20,32 @@ template <Homogeneous M>
 using SquareOf = typename ManifoldTraits<M>::Square;
 template <Homogeneous M>
 using ScalarOf = typename ManifoldTraits<M>::Scalar;
+
+/// The point of a manifold that a value of another type stands for: `type` and `from(value)`. A view (Eigen::Map) or an
+/// expression (a column of a matrix) stands for the owning type, an Eigen::Quaternion for an SO3 (lie/so3.hpp). Estimators
+/// take ranges of such values as they take ranges of points. Specialise it for a type of your own that converts to a manifold.
+template <class V>
+struct PointTraits {};
+
+template <class V>
+  requires requires { typename ManifoldTraits<V>::Group; }
+struct PointTraits<V> {
+  using type = V;
+  static const V& from(const V& point) { return point; }
+};
+
+/// Expressions of fixed-size column vectors: the vector.
+template <class V>
+  requires(std::derived_from<V, Eigen::MatrixBase<V>> && !requires { typename ManifoldTraits<V>::Group; } &&
+           V::ColsAtCompileTime == 1 && V::RowsAtCompileTime > 0)
+struct PointTraits<V> {
+  using type = Eigen::Matrix<typename V::Scalar, V::RowsAtCompileTime, 1>;
+  static type from(const V& expression) { return expression; }
+};
+
+/// The owning type of the point that a V, reference or not, stands for.
+template <class V>
+using PointOf = typename PointTraits<std::remove_cvref_t<V>>::type;
 
 namespace detail {
 

@@ -14,6 +14,7 @@
 #include <lie/detail/nearest_rotation.hpp>
 #include <lie/manifold.hpp>
 
+#include <concepts>
 #include <optional>
 
 namespace liestat {
@@ -275,6 +276,14 @@ struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
     return -Math::inverseJacobianSlope(z, a, S(1));
   }
   static detail::VolumeElement<S, 3> logVolume(const Tangent& z) { return Math::logVolume(z); }
+};
+
+/// A quaternion, view or expression of one, stands for its rotation; its norm does not matter.
+template <class Q>
+  requires std::derived_from<Q, Eigen::QuaternionBase<Q>>
+struct PointTraits<Q> {
+  using type = SO3<typename Q::Scalar>;
+  static type from(const Q& quaternion) { return type(quaternion); }
 };
 
 }  // namespace liestat

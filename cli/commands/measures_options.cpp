@@ -12,7 +12,7 @@ void MeasuresInput::declare(CLI::App& app, bool file_required) {
   app.add_option("--format", format, "auto, csv, tum, euroc or kitti (default auto)")
       ->check(CLI::IsMember({"auto", "csv", "tum", "euroc", "kitti"}));
   app.add_option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
-      ->check(CLI::IsMember(meanFeatureNames()));
+      ->check(CLI::IsMember(experiments::featureNames()));
   app.add_option("--criterion", options.criterion,
                  "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
       ->check(CLI::IsMember({"lsq", "wlsq", "maha"}));

@@ -18,6 +18,7 @@
 #include <optional>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr const char* command_name = "liestat simulate vi";

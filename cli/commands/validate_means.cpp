@@ -10,6 +10,7 @@
 #include <memory>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 struct Options {

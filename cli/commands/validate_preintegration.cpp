@@ -13,6 +13,7 @@
 #include <memory>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 struct Options {

@@ -9,6 +9,7 @@
 #include <memory>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 struct Options {

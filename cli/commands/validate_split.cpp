@@ -35,7 +35,7 @@ struct Options {
 /// What the program did, whatever the input was.
 struct Outcome {
   std::string source, description;
-  MeanFeature feature = MeanFeature::point;
+  Feature feature = Feature::point;
   SplitSeries random, by_blocks;
   bool known_noise = true;
 
@@ -103,7 +103,7 @@ JsonObject toJson(const SplitSeries& s) {
   return o;
 }
 
-JsonObject toJson(const HalfMean& half, MeanFeature feature) {
+JsonObject toJson(const HalfMean& half, Feature feature) {
   JsonObject o;
   o.set("n", half.n).set("mean", toJson(half.mean));
   if (half.covariance.size() > 0) {
@@ -147,7 +147,7 @@ void plotSplits(Report& report, const Outcome& outcome) {
        .panels = {panel("Halves at random", outcome.random), panel("Halves of blocks of time", outcome.by_blocks)}});
 }
 
-std::vector<std::string> halfRow(const char* what, const HalfMean& half, MeanFeature feature) {
+std::vector<std::string> halfRow(const char* what, const HalfMean& half, Feature feature) {
   std::string sd;
   for (const TangentPart& part : tangentParts(feature)) {
     if (half.covariance.size() == 0) continue;
@@ -218,7 +218,7 @@ int splitFile(const Options& options, const Invocation& invocation) {
 /// The measures of one landmark as a file would have them.
 Measures measuresOf(const LandmarkMeasures& landmark, const MeasuresOptions& options) {
   FeatureFile file;
-  file.kind = FeatureKind::point;
+  file.kind = Feature::point;
   file.format = "stereo";
   for (std::size_t i = 0; i < landmark.points.size(); ++i) {
     file.vectors.push_back(landmark.points[i].mean);
@@ -243,7 +243,7 @@ int splitStereo(const Options& options, const Invocation& invocation) {
   std::vector<LandmarkSplit> rows;
   std::size_t skipped = 0;
   Outcome outcome{.source = prefix, .description = {}, .random = {}, .by_blocks = {}};
-  MeanCriterion criterion = MeanCriterion::maha;
+  Criterion criterion = Criterion::maha;
   {
     Progress bar("validate split", 2 * options.split.splits * landmarks.size());
     for (const LandmarkMeasures& landmark : landmarks) {

@@ -1,48 +1,20 @@
 #include <cli/io/measures.hpp>
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <utility>
 
 #include <cli/io/input_error.hpp>
 
 namespace liestat::cli {
+
+using experiments::Part;
+
 namespace {
-
-constexpr std::array all_mean_features{MeanFeature::point,
-                                       MeanFeature::rotation,
-                                       MeanFeature::frame,
-                                       MeanFeature::semi_oriented_frame,
-                                       MeanFeature::non_oriented_frame,
-                                       MeanFeature::se3,
-                                       MeanFeature::direction};
-
-bool isFrame(MeanFeature feature) {
-  return feature == MeanFeature::frame || feature == MeanFeature::semi_oriented_frame ||
-         feature == MeanFeature::non_oriented_frame;
-}
-
-MeanFeature usualFeature(FeatureKind kind) {
-  switch (kind) {
-    case FeatureKind::point:
-      return MeanFeature::point;
-    case FeatureKind::rotation:
-      return MeanFeature::rotation;
-    case FeatureKind::direction:
-      return MeanFeature::direction;
-    case FeatureKind::frame:
-      break;
-  }
-  return MeanFeature::frame;
-}
-
-/// Of frames, also the rotation or the translation alone can be averaged.
-bool canBe(FeatureKind kind, MeanFeature feature) {
-  if (kind == FeatureKind::frame) return feature != MeanFeature::direction;
-  return feature == usualFeature(kind);
-}
 
 /// det(Σ)^(-1/k), for covariances whose size is known at run time only.
 double weightOf(const Covariance& covariance) {
@@ -54,126 +26,81 @@ double weightOf(const Covariance& covariance) {
 
 }  // namespace
 
-std::string name(MeanFeature feature) {
-  switch (feature) {
-    case MeanFeature::point:
-      return "point";
-    case MeanFeature::rotation:
-      return "rotation";
-    case MeanFeature::frame:
-      return "frame";
-    case MeanFeature::semi_oriented_frame:
-      return "semi_oriented_frame";
-    case MeanFeature::non_oriented_frame:
-      return "non_oriented_frame";
-    case MeanFeature::se3:
-      return "se3";
-    case MeanFeature::direction:
-      return "direction";
-  }
-  return "";
-}
-
-std::string name(MeanCriterion criterion) {
-  switch (criterion) {
-    case MeanCriterion::lsq:
-      return "lsq";
-    case MeanCriterion::wlsq:
-      return "wlsq";
-    case MeanCriterion::maha:
-      return "maha";
-    case MeanCriterion::barycentre:
-      return "barycentre";
-  }
-  return "";
-}
-
-std::vector<std::string> meanFeatureNames() {
-  std::vector<std::string> names;
-  for (const MeanFeature feature : all_mean_features) names.push_back(name(feature));
-  return names;
-}
-
-int degreesOfFreedom(MeanFeature feature) {
-  int sum = 0;
-  for (const TangentPart& part : tangentParts(feature)) sum += part.size;
-  return sum;
-}
-
 double TangentPart::scale() const { return angular ? 180 / std::numbers::pi : 1; }
 
-std::vector<TangentPart> tangentParts(MeanFeature feature) {
-  switch (feature) {
-    case MeanFeature::point:
-      return {{.name = "point"}};
-    case MeanFeature::rotation:
-      return {{.name = "rotation", .angular = true}};
-    case MeanFeature::direction:
-      return {{.name = "direction", .size = 2, .angular = true}};
-    default:
-      return {{.name = "translation"}, {.name = "rotation", .begin = 3, .angular = true}};
-  }
+std::vector<TangentPart> tangentParts(Feature feature) {
+  const experiments::Parts& parts = experiments::info(feature).parts;
+  std::vector<TangentPart> list;
+  int begin = 0;
+  const auto add = [&](std::string part_name, int size, bool angular) {
+    list.push_back({std::move(part_name), begin, size, angular});
+    begin += size;
+  };
+  // In tangent vectors positions come first, whatever the order of the parameters.
+  if (parts.contains(Part::position)) add(parts.contains(Part::rotation) ? "translation" : "point", 3, false);
+  if (parts.contains(Part::rotation)) add("rotation", 3, true);
+  if (parts.contains(Part::direction)) add("direction", 2, true);
+  return list;
 }
 
 Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const std::string& command) {
   const auto refuse = [&](const std::string& why) { throw InputError(command, 0, why); };
   Measures m;
-  m.feature = usualFeature(file.kind);
-  for (const MeanFeature feature : all_mean_features) {
-    if (options.feature == name(feature)) m.feature = feature;
+  m.feature = experiments::featureFromName(options.feature).value_or(file.kind);
+  const experiments::FeatureInfo& feature = experiments::info(m.feature);
+  const experiments::FeatureInfo& rows = experiments::info(file.kind);
+  if (!rows.parts.contains(feature.parts)) {
+    refuse(fmt::format("--feature {} does not fit a file of {}", feature.name, rows.plural));
   }
-  if (!canBe(file.kind, m.feature)) {
-    refuse("--feature " + name(m.feature) + " does not fit a file of " + std::string(name(file.kind)) + "s");
-  }
-  if (!file.covariances.empty() && file.kind == FeatureKind::frame && !isFrame(m.feature) &&
-      m.feature != MeanFeature::se3) {
-    m.notes.emplace_back("the file's covariances are those of whole frames and are not used");
+  if (!file.covariances.empty() && !(rows.parts == feature.parts)) {
+    m.notes.push_back(fmt::format("the file's covariances are those of whole {} and are not used", rows.plural));
     file.covariances.clear();
   }
   const bool has_covariances = !file.covariances.empty();
-  const bool must_choose = has_covariances && isFrame(m.feature) && options.covariance_at.empty();
+  const bool must_choose = has_covariances && feature.frameMatters() && options.covariance_at.empty();
   const std::string choice =
       "--covariance-at measured (they are given in the frame of each measure, as a sensor knows them) or "
       "--covariance-at estimated (in the frame of the mean, as for parts of one object)";
 
-  if (m.feature == MeanFeature::se3) {
-    m.criterion = MeanCriterion::barycentre;
+  if (!feature.has_metric) {
+    m.criterion = Criterion::barycentre;
     if (options.criterion == "maha") {
-      m.criterion = MeanCriterion::maha;
+      m.criterion = Criterion::maha;
     } else if (!options.criterion.empty()) {
       refuse("--criterion " + options.criterion +
              " needs an invariant metric, which rigid motions have not: leave it out for the group's barycentre, or "
              "take --feature frame");
     }
   } else if (options.criterion == "lsq") {
-    m.criterion = MeanCriterion::lsq;
+    m.criterion = Criterion::lsq;
   } else if (options.criterion == "wlsq") {
-    m.criterion = MeanCriterion::wlsq;
+    m.criterion = Criterion::wlsq;
   } else if (options.criterion == "maha") {
-    m.criterion = MeanCriterion::maha;
+    m.criterion = Criterion::maha;
   } else if (has_covariances) {
     if (must_choose) {
       refuse("the file has covariances of frames, and only you know where they belong: say " + choice +
              ", or --criterion lsq to leave them aside");
     }
-    m.criterion = MeanCriterion::maha;
+    m.criterion = Criterion::maha;
   } else {
-    m.criterion = file.weights.empty() ? MeanCriterion::lsq : MeanCriterion::wlsq;
+    m.criterion = file.weights.empty() ? Criterion::lsq : Criterion::wlsq;
   }
 
-  const bool maha = m.criterion == MeanCriterion::maha;
+  const bool maha = m.criterion == Criterion::maha;
   if (maha && !has_covariances) refuse("--criterion maha needs the columns cov_00 ... of the measures' covariances");
   if (maha && must_choose) refuse("--criterion maha on frames needs " + choice);
   if (options.likelihood && !maha) refuse("--likelihood is an option of --criterion maha");
   m.likelihood = options.likelihood;
   m.covariance_at = options.covariance_at == "estimated" ? CovarianceAt::estimated : CovarianceAt::measured;
-  if (m.feature == MeanFeature::direction && m.covariance_at == CovarianceAt::estimated) {
-    refuse("--covariance-at estimated is not there for directions: no frame is common to all points of a sphere");
+  if (feature.has_isotropy && m.covariance_at == CovarianceAt::estimated) {
+    refuse(fmt::format("--covariance-at estimated is not there for {}: no frame is common to all points of a sphere",
+                       feature.plural));
   }
 
   m.weights.assign(file.size(), 1.0);
   const bool uses_weights =
-      m.criterion == MeanCriterion::wlsq || (m.criterion == MeanCriterion::barycentre && !file.weights.empty());
+      m.criterion == Criterion::wlsq || (m.criterion == Criterion::barycentre && !file.weights.empty());
   if (uses_weights) {
     if (!file.weights.empty()) {
       m.weights = file.weights;
@@ -190,10 +117,10 @@ Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const 
 
   // LSQ's covariance from known noise wants the noise in the frame of the estimate. There is no difference on points
   // and rotations, and directions carry it along; for frames measured elsewhere the residuals speak instead.
-  const bool least_squares = m.criterion == MeanCriterion::lsq || m.criterion == MeanCriterion::wlsq;
+  const bool least_squares = m.criterion == Criterion::lsq || m.criterion == Criterion::wlsq;
   m.known_noise =
-      maha || (has_covariances && least_squares && (!isFrame(m.feature) || options.covariance_at == "estimated"));
-  m.covariance_at_matters = m.known_noise && isFrame(m.feature);
+      maha || (has_covariances && least_squares && (!feature.frameMatters() || options.covariance_at == "estimated"));
+  m.covariance_at_matters = m.known_noise && feature.frameMatters();
   if (has_covariances && !m.known_noise) {
     m.notes.emplace_back(least_squares && options.covariance_at == "measured"
                              ? "the file's covariances are not in the frame of the mean: the covariance of the mean "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cli/io/reading.hpp>
+#include <experiments/feature.hpp>
 #include <stats/maha.hpp>
 
 #include <Eigen/Core>
@@ -11,19 +12,8 @@
 
 namespace liestat::cli {
 
-/// What a file's rows are taken for.
-enum class MeanFeature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction };
-
-/// How a mean is taken; the barycentre is the group's, of rigid motions.
-enum class MeanCriterion { lsq, wlsq, maha, barycentre };
-
-/// The names of the options and the JSON fields.
-std::string name(MeanFeature feature);
-std::string name(MeanCriterion criterion);
-std::vector<std::string> meanFeatureNames();
-
-/// Number of degrees of freedom.
-int degreesOfFreedom(MeanFeature feature);
+using experiments::Criterion;
+using experiments::Feature;
 
 /// A part of a feature's tangent vector.
 struct TangentPart {
@@ -35,7 +25,7 @@ struct TangentPart {
   double scale() const;  ///< from the inner unit to people's
   std::string unit() const { return angular ? "deg" : "m"; }
 };
-std::vector<TangentPart> tangentParts(MeanFeature feature);
+std::vector<TangentPart> tangentParts(Feature feature);
 
 /// What the commands that read features are told about them; names as on the command line, empty: decide by the file.
 struct MeasuresOptions {
@@ -48,8 +38,8 @@ struct MeasuresOptions {
 /// The measures of a file and how they are to be averaged.
 struct Measures {
   FeatureFile file;
-  MeanFeature feature = MeanFeature::point;
-  MeanCriterion criterion = MeanCriterion::lsq;
+  Feature feature = Feature::point;
+  Criterion criterion = Criterion::lsq;
   CovarianceAt covariance_at = CovarianceAt::measured;
   bool covariance_at_matters = false;  ///< both models differ for this feature, and covariances are used
   bool likelihood = false;

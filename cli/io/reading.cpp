@@ -15,6 +15,10 @@
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
+
+using experiments::Feature;
+using experiments::Part;
+
 namespace {
 
 constexpr double rounding = 1e-12;
@@ -76,7 +80,7 @@ std::size_t mostRows(std::string_view text, std::size_t columns) {
 
 /// Where the parts of a feature stand in a row.
 struct Layout {
-  FeatureKind kind = FeatureKind::point;
+  Feature kind = Feature::point;
   std::array<int, 4> quaternion{absent, absent, absent, absent};  // x y z w
   std::array<int, 3> rotation_vector{absent, absent, absent};
   std::array<int, 9> matrix{absent, absent, absent, absent, absent, absent, absent, absent, absent};
@@ -276,13 +280,13 @@ class FeatureReader {
     }
 
     if (has_point) {
-      layout_.kind = FeatureKind::point;
+      layout_.kind = Feature::point;
       layout_.vector = point;
     } else if (has_direction) {
-      layout_.kind = FeatureKind::direction;
+      layout_.kind = Feature::direction;
       layout_.vector = direction;
     } else {
-      layout_.kind = has_translation ? FeatureKind::frame : FeatureKind::rotation;
+      layout_.kind = has_translation ? Feature::frame : Feature::rotation;
       layout_.vector = translation;
     }
     layout_.weight = find("weight");
@@ -294,7 +298,7 @@ class FeatureReader {
     const bool any = std::any_of(columns_.begin(), columns_.end(),
                                  [](const std::string& column) { return column.rfind("cov_", 0) == 0; });
     if (!any) return;
-    const int n = layout_.kind == FeatureKind::frame ? 6 : layout_.kind == FeatureKind::direction ? 2 : 3;
+    const int n = experiments::info(layout_.kind).dof;
     const std::string expected =
         fmt::format("the upper triangle cov_00 ... cov_{0}{0} of a {1}", n - 1, name(layout_.kind));
     std::vector<std::string> missing;
@@ -322,8 +326,8 @@ class FeatureReader {
     const std::size_t rows = mostRows(text_, columns_.size());
     file_.kind = layout_.kind;
     file_.lines.reserve(rows);
-    if (layout_.kind == FeatureKind::rotation || layout_.kind == FeatureKind::frame) file_.rotations.reserve(rows);
-    if (layout_.kind != FeatureKind::rotation) file_.vectors.reserve(rows);
+    if (layout_.kind == Feature::rotation || layout_.kind == Feature::frame) file_.rotations.reserve(rows);
+    if (layout_.kind != Feature::rotation) file_.vectors.reserve(rows);
     if (layout_.weight != absent) file_.weights.reserve(rows);
     if (layout_.time != absent) file_.times.reserve(rows);
     values_.resize(columns_.size());
@@ -348,21 +352,10 @@ class FeatureReader {
   double value(int place) const { return values_[static_cast<std::size_t>(place)]; }
 
   void addRow() {
-    switch (layout_.kind) {
-      case FeatureKind::point:
-        file_.vectors.push_back(readVector());
-        break;
-      case FeatureKind::direction:
-        file_.vectors.push_back(readDirection());
-        break;
-      case FeatureKind::rotation:
-        file_.rotations.push_back(readRotation());
-        break;
-      case FeatureKind::frame:
-        file_.rotations.push_back(readRotation());
-        file_.vectors.push_back(readVector());
-        break;
-    }
+    const experiments::Parts& parts = experiments::info(layout_.kind).parts;
+    if (parts.contains(Part::rotation)) file_.rotations.push_back(readRotation());
+    if (parts.contains(Part::position)) file_.vectors.push_back(readVector());
+    if (parts.contains(Part::direction)) file_.vectors.push_back(readDirection());
     if (layout_.weight != absent) {
       const double weight = value(layout_.weight);
       if (!(weight > 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "a positive number");
@@ -472,20 +465,6 @@ class FeatureReader {
 };
 
 }  // namespace
-
-std::string_view name(FeatureKind kind) {
-  switch (kind) {
-    case FeatureKind::point:
-      return "point";
-    case FeatureKind::rotation:
-      return "rotation";
-    case FeatureKind::frame:
-      return "frame";
-    case FeatureKind::direction:
-      return "direction";
-  }
-  return "";
-}
 
 std::string_view name(Format format) {
   switch (format) {

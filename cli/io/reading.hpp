@@ -1,5 +1,7 @@
 #pragma once
 
+#include <experiments/feature.hpp>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
@@ -10,9 +12,6 @@
 
 namespace liestat::cli {
 
-/// What each row of a file is.
-enum class FeatureKind { point, rotation, frame, direction };
-
 /// File formats of features. `automatic` looks at the first lines.
 ///   csv    a header names the columns; see knownColumns()
 ///   tum    t tx ty tz qx qy qz qw, separated by blanks
@@ -21,7 +20,6 @@ enum class FeatureKind { point, rotation, frame, direction };
 enum class Format { automatic, csv, tum, euroc, kitti };
 
 /// Names as the command line and the messages spell them.
-std::string_view name(FeatureKind kind);
 std::string_view name(Format format);
 /// The inverse of name(Format); empty for an unknown name.
 std::optional<Format> formatFromName(std::string_view name);
@@ -34,7 +32,8 @@ using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 /// The features of a file, one entry a row in each list that is not empty.
 struct FeatureFile {
-  FeatureKind kind = FeatureKind::point;
+  /// What each row is: the first feature of the table with exactly the file's parts.
+  experiments::Feature kind = experiments::Feature::point;
   std::vector<Eigen::Quaterniond> rotations;  ///< of rotations and frames, of unit norm
   std::vector<Eigen::Vector3d> vectors;       ///< points, directions (of unit norm) or translations of frames
   std::vector<double> weights;                ///< positive; empty if the file has none

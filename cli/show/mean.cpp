@@ -12,39 +12,19 @@ namespace {
 
 constexpr double degrees = 180 / std::numbers::pi;
 
-const char* plural(MeanFeature feature) {
-  switch (feature) {
-    case MeanFeature::point:
-      return "points";
-    case MeanFeature::rotation:
-      return "rotations";
-    case MeanFeature::frame:
-      return "frames";
-    case MeanFeature::semi_oriented_frame:
-      return "semi-oriented frames";
-    case MeanFeature::non_oriented_frame:
-      return "non-oriented frames";
-    case MeanFeature::se3:
-      return "rigid motions (SE3)";
-    case MeanFeature::direction:
-      return "directions";
-  }
-  return "";
-}
-
 std::string criterionInWords(const Measures& measures) {
   switch (measures.criterion) {
-    case MeanCriterion::lsq:
+    case Criterion::lsq:
       return "least squares";
-    case MeanCriterion::wlsq:
+    case Criterion::wlsq:
       return "weighted least squares";
-    case MeanCriterion::maha:
+    case Criterion::maha:
       return std::string("least Mahalanobis distances") +
              (measures.likelihood ? " with the likelihood's volume term" : "") +
              (!measures.covariance_at_matters                    ? ""
               : measures.covariance_at == CovarianceAt::measured ? ", covariances in the frames of the measures"
                                                                  : ", covariances in the frame of the mean");
-    case MeanCriterion::barycentre:
+    case Criterion::barycentre:
       break;
   }
   return measures.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
@@ -130,9 +110,9 @@ std::string covarianceInWords(const Measures& measures, const MeanAnalysis& anal
 }
 
 std::string measuresInWords(const std::string& source, const Measures& measures) {
-  std::string text =
-      fmt::format("{}: {} {} ({})", source, measures.size(),
-                  measures.size() == 1 ? name(measures.feature) : plural(measures.feature), measures.file.format);
+  const experiments::FeatureInfo& feature = experiments::info(measures.feature);
+  std::string text = fmt::format("{}: {} {} ({})", source, measures.size(),
+                                 measures.size() == 1 ? feature.name : feature.plural, measures.file.format);
   if (measures.file.n_normalised > 0) {
     text += fmt::format(", {} normalised (largest error {:.2g})", measures.file.n_normalised,
                         measures.file.largest_norm_error);
@@ -179,33 +159,33 @@ JsonObject toJson(const FeatureValue& value) {
   return object;
 }
 
-void setCovarianceWords(JsonObject& object, MeanFeature feature) {
+void setCovarianceWords(JsonObject& object, Feature feature) {
   switch (feature) {
-    case MeanFeature::point:
+    case Feature::point:
       object.set("covariance_order", "x y z (m)");
       object.set("covariance_side", "none: the error is added to the point");
       object.set("covariance_frame", "the coordinates of the file");
       return;
-    case MeanFeature::direction:
+    case Feature::direction:
       object.set("covariance_order", "two tangent coordinates (rad)");
       object.set("covariance_side", "right: the error is a tangent vector at the mean, followed along a great circle");
       object.set("covariance_frame",
                  "the tangent plane at the mean, its axes the columns of tangent_basis (the x and y axes turned by the "
                  "smallest rotation that takes z to the mean)");
       return;
-    case MeanFeature::rotation:
+    case Feature::rotation:
       object.set("covariance_order", "rotation x y z (rad)");
       break;
     default:
       object.set("covariance_order", "translation x y z (m), rotation x y z (rad)");
   }
-  object.set("covariance_side", feature == MeanFeature::rotation ? "right: mean * Exp(error)"
-                                : feature == MeanFeature::se3    ? "right: mean * Exp(error), Exp of SE(3)"
-                                                              : "right: translation + R * error_t, R * Exp(error_r)");
+  object.set("covariance_side", feature == Feature::rotation ? "right: mean * Exp(error)"
+                                : feature == Feature::se3    ? "right: mean * Exp(error), Exp of SE(3)"
+                                                             : "right: translation + R * error_t, R * Exp(error_r)");
   object.set("covariance_frame", "the axes of the mean (body frame)");
 }
 
-JsonObject standardDeviations(MeanFeature feature, const Eigen::MatrixXd& covariance) {
+JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance) {
   JsonObject object;
   for (const TangentPart& part : tangentParts(feature)) {
     object.set(part.name + "_" + part.unit(), deviations(part, covariance));

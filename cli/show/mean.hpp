@@ -18,11 +18,11 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measures
 JsonObject toJson(const FeatureValue& value);
 
 /// `covariance_order`, `covariance_side`, `covariance_frame`: how a covariance of a feature is to be read, in words.
-void setCovarianceWords(JsonObject& object, MeanFeature feature);
+void setCovarianceWords(JsonObject& object, Feature feature);
 
 /// Square roots of a covariance's diagonal in degrees and metres: a list for each part of the tangent vector, named
 /// rotation_deg, translation_m and so on.
-JsonObject standardDeviations(MeanFeature feature, const Eigen::MatrixXd& covariance);
+JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance);
 
 /// A feature on one line, for lists of rivals and of halves.
 std::string oneLine(const FeatureValue& value);

@@ -128,8 +128,8 @@ Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentPart& part) {
 }
 
 /// How far from the origin a rotation or direction can be, rad.
-double largestAngle(MeanFeature feature) {
-  return feature == MeanFeature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
+double largestAngle(Feature feature) {
+  return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
 }
 
 /// Where a cloud is much smaller than the space it lives in, the frontier would leave a dot to look at.

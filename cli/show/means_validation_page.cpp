@@ -9,6 +9,7 @@
 #include <utility>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 /// One curve over n of a quantity of the rows of a method.

@@ -8,6 +8,7 @@
 #include <utility>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 /// A curve over the noise of a quantity of a method's rows.

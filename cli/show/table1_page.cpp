@@ -7,6 +7,7 @@
 #include <algorithm>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 std::string label(const Table1Row& row) {

@@ -13,6 +13,7 @@
 #include <cli/show/table.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr double degrees = 180 / EIGEN_PI;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Check = ViInitCheck;

@@ -6,7 +6,8 @@
 #pragma once
 
 #include <fusion/init/closed_form_types.hpp>
-#include <fusion/detail/small_linear.hpp>
+#include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 
 #include <Eigen/Core>
 
@@ -121,31 +122,15 @@ struct EliminatedFeature {
   int rank = 3;
 };
 
-/// The pseudo-inverse of a symmetric positive semi-definite 3×3 matrix; eigenvalues below 1e-12 of the trace are zero.
-inline Eigen::Matrix3d pseudoInverse(const Eigen::Matrix3d& H, int& rank) {
-  const SmallSvd svd(SmallMatrix::of<3, 3>(H));
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
-  rank = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (!(svd.value(k) > 1e-12 * H.trace())) continue;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) inverse(i, j) += svd.v(k, i) * svd.v(k, j) / svd.value(k);
-    }
-    ++rank;
-  }
-  return inverse;
-}
-
-/// The inverse of the same, where the cheap one is accurate.
+/// The covariance of a feature's position, the inverse of its normal matrix: by cofactors where these are accurate, else
+/// the pseudo-inverse.
 inline Eigen::Matrix3d featureCovariance(const Eigen::Matrix3d& H, int& rank) {
-  const Eigen::Vector3d a = H.col(1).cross(H.col(2)), b = H.col(2).cross(H.col(0)), c = H.col(0).cross(H.col(1));
-  const double determinant = H.col(0).dot(a), trace = H.trace();
+  const Eigen::Matrix3d adjugate = cofactors(H);
+  const double determinant = H.col(0).dot(adjugate.col(0)), trace = H.trace();
   // Two eigenvalues are about half the trace: this bounds the smallest one.
   if (!(determinant > 1e-7 * trace * trace * trace)) return pseudoInverse(H, rank);
   rank = 3;
-  Eigen::Matrix3d inverse;
-  inverse << a, b, c;
-  return inverse / determinant;
+  return adjugate / determinant;
 }
 
 /// Takes a feature out by normal equations: moments of I - u uᵀ, because E consists of multiples of I.

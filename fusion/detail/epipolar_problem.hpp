@@ -8,7 +8,7 @@
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>
-#include <fusion/detail/small_linear.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 #include <fusion/imu/window.hpp>
 
 #include <Eigen/Core>

@@ -20,7 +20,7 @@
 // visual-inertial initialisation, section 2; C. Forster et al., "On-manifold preintegration", IEEE T-RO 33, 2017.
 #pragma once
 
-#include <fusion/detail/columns.hpp>
+#include <fusion/detail/step_matrices.hpp>
 #include <fusion/imu/readings.hpp>
 #include <lie/se23.hpp>
 #include <stats/gaussian.hpp>

@@ -8,7 +8,7 @@
 // zero, μ is the square of rounding and still has all its digits.
 #pragma once
 
-#include <fusion/detail/small_linear.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 
 #include <Eigen/Core>
 

@@ -1,6 +1,7 @@
 // From an essential matrix back to rotation and direction, in closed form, and the depths of a point in two views.
 #pragma once
 
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/trig.hpp>
 
 #include <Eigen/Core>
@@ -27,8 +28,7 @@ EssentialParts<S> essentialParts(const Eigen::Matrix<S, 3, 3>& E) {
   using Matrix3 = Eigen::Matrix<S, 3, 3>;
   // Of norm √2, as [d] R has.
   const Matrix3 unit = E * (S(1) / sqrt(S(0.5) * E.squaredNorm()));
-  Matrix3 cofactors;
-  cofactors << unit.col(1).cross(unit.col(2)), unit.col(2).cross(unit.col(0)), unit.col(0).cross(unit.col(1));
+  const Matrix3 cofactors = detail::cofactors(unit);
   Vector3 longest = cofactors.col(0);
   S length = longest.squaredNorm();
   for (int k = 1; k < 3; ++k) {

@@ -2,6 +2,7 @@
 // nearest to any matrix, without singular values.
 #pragma once
 
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/trig.hpp>
 
 #include <Eigen/LU>
@@ -99,8 +100,7 @@ Eigen::Matrix<S, 4, 1> nearestQuaternion(const Eigen::Matrix<S, 3, 3>& matrix) {
   H.diagonal().array() += P.trace();
   const Eigen::Matrix<S, 3, 1> g =
       S(0.5) * Eigen::Matrix<S, 3, 1>(P(2, 1) - P(1, 2), P(0, 2) - P(2, 0), P(1, 0) - P(0, 1));
-  Eigen::Matrix<S, 3, 3> H_adjugate;
-  H_adjugate << H.col(1).cross(H.col(2)), H.col(2).cross(H.col(0)), H.col(0).cross(H.col(1));
+  const Eigen::Matrix<S, 3, 3> H_adjugate = cofactors(H);
   const S determinant = H.col(0).dot(H_adjugate.col(0));
   const auto regular = determinant > S(1e-6);
   const Eigen::Matrix<S, 3, 1> delta =

@@ -68,6 +68,21 @@ class TranslationAccess : public Base {
 
 }  // namespace liestat::detail
 
+namespace liestat {
+
+template <class V>
+struct PointTraits;
+
+/// Views of the library's types stand for the type that owns its parameters.
+template <class T, int Options, class Stride>
+  requires requires { typename detail::ShellTraits<std::remove_const_t<T>>::Plain; }
+struct PointTraits<Eigen::Map<T, Options, Stride>> {
+  using type = typename detail::ShellTraits<std::remove_const_t<T>>::Plain;
+  static type from(const Eigen::Map<T, Options, Stride>& view) { return type(view); }
+};
+
+}  // namespace liestat
+
 /// Inside a class template Type<Scalar_, Options_> derived from Base: storage, default construction (the identity or
 /// origin), copies and conversions from any view of the same type, and construction from raw parameters.
 #define LIESTAT_OWNER(Type, Base)                                                                         \

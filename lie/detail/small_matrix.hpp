@@ -1,9 +1,16 @@
-// Factors of small matrices by plain loops over a fixed size: Cholesky's, the pivoted one for what may be singular, and
-// an inverse. Eigen's own are made for large matrices too: for each size they bring dozens of types of expressions and
-// the blocked kernels of its products with them, which are never run here and cost a compiler seconds.
+// The one house of small matrices. Here: factors by plain loops over a fixed size (Cholesky's, the pivoted one for
+// matrices that may be singular, an inverse) and cofactors. Eigen's own are made for large matrices too: for each size
+// they bring dozens of types of expressions and the blocked kernels of its products with them, which are never run here
+// and cost a compiler seconds. Apart, so that users of a Cholesky factor do not compile them:
+//
+//   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to 13
+//   small_columns.hpp      3×3 blocks in vector registers
+//   nearest_rotation.hpp   the rotation nearest to a 3×3 matrix
+//   trig.hpp               cross-product matrices, beside the coefficients that they are multiplied with
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <array>
 #include <cmath>
@@ -151,6 +158,14 @@ class SemidefiniteRoot {
   Eigen::Matrix<S, N, 1> scale_;
   std::array<int, N> order_;
 };
+
+/// The matrix of cofactors, det(M) M⁻ᵀ: the cross products of M's columns. Also of singular matrices.
+template <class S>
+EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 3> cofactors(const Eigen::Matrix<S, 3, 3>& M) {
+  Eigen::Matrix<S, 3, 3> result;
+  result << M.col(1).cross(M.col(2)), M.col(2).cross(M.col(0)), M.col(0).cross(M.col(1));
+  return result;
+}
 
 /// A⁻¹ by Gauss' and Jordan's elimination with row pivots; infinite or NaN where A is singular.
 template <class S, int N>

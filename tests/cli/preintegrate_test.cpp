@@ -17,6 +17,7 @@
 #include <experiments/preintegration_validation.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Json = nlohmann::json;

@@ -26,7 +26,7 @@ std::string errorIn(const std::string& text, const ReadingOptions& options = {})
 
 TEST(Reading, Points) {
   const FeatureFile file = read("x,y,z\n1,2,3\n-1e-3,+2.5,.5\n");
-  EXPECT_EQ(file.kind, FeatureKind::point);
+  EXPECT_EQ(file.kind, Feature::point);
   EXPECT_EQ(file.format, "csv");
   ASSERT_EQ(file.size(), 2U);
   EXPECT_EQ(file.vectors[0], Eigen::Vector3d(1, 2, 3));
@@ -46,7 +46,7 @@ TEST(Reading, CommentsBlankLinesCarriageReturnsSpacesQuotesAndMark) {
 
 TEST(Reading, ColumnsInAnyOrder) {
   const FeatureFile file = read("weight,qw,qx,t,qy,qz\n2,1,0,7.5,0,0\n");
-  EXPECT_EQ(file.kind, FeatureKind::rotation);
+  EXPECT_EQ(file.kind, Feature::rotation);
   EXPECT_EQ(file.rotations[0].coeffs(), Eigen::Vector4d(0, 0, 0, 1));
   EXPECT_EQ(file.weights, std::vector<double>{2});
   EXPECT_EQ(file.times, std::vector<double>{7.5});
@@ -59,7 +59,7 @@ TEST(Reading, ThreeFormsOfOneRotation) {
   const FeatureFile vectors = read("rx,ry,rz\n1.2091995761561452,1.2091995761561452,1.2091995761561452\n0,0,0\n");
   const FeatureFile matrices = read("r00,r01,r02,r10,r11,r12,r20,r21,r22\n0,0,1,1,0,0,0,1,0\n");
   for (const FeatureFile& file : {quaternions, vectors, matrices}) {
-    EXPECT_EQ(file.kind, FeatureKind::rotation);
+    EXPECT_EQ(file.kind, Feature::rotation);
     EXPECT_EQ(file.n_normalised, 0U);
     EXPECT_LT((file.rotations[0] * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-15);
   }
@@ -68,14 +68,14 @@ TEST(Reading, ThreeFormsOfOneRotation) {
 
 TEST(Reading, Frames) {
   const FeatureFile file = read("tx,ty,tz,rx,ry,rz\n1,2,3,0.1,0,0\n");
-  EXPECT_EQ(file.kind, FeatureKind::frame);
+  EXPECT_EQ(file.kind, Feature::frame);
   EXPECT_EQ(file.vectors[0], Eigen::Vector3d(1, 2, 3));
   EXPECT_DOUBLE_EQ(file.rotations[0].x(), std::sin(0.05));
 }
 
 TEST(Reading, Directions) {
   const FeatureFile file = read("dx,dy,dz,cov_00,cov_01,cov_11\n0,0.6,0.8,4,1,2\n");
-  EXPECT_EQ(file.kind, FeatureKind::direction);
+  EXPECT_EQ(file.kind, Feature::direction);
   EXPECT_LT((file.vectors[0] - Eigen::Vector3d(0, 0.6, 0.8)).norm(), 1e-15);
   const Eigen::Matrix2d expected{{4, 1}, {1, 2}};
   EXPECT_EQ(Eigen::Matrix2d(file.covariances[0]), expected);
@@ -101,7 +101,7 @@ TEST(Reading, Tum) {
   const FeatureFile file =
       read("# timestamp tx ty tz qx qy qz qw\n1305031102.1 1 2 3 0 0 0 1\n1305031102.2\t1  2 4 0 0 1 0\n");
   EXPECT_EQ(file.format, "tum");
-  EXPECT_EQ(file.kind, FeatureKind::frame);
+  EXPECT_EQ(file.kind, Feature::frame);
   ASSERT_EQ(file.size(), 2U);
   EXPECT_EQ(file.vectors[1], Eigen::Vector3d(1, 2, 4));
   EXPECT_EQ(file.rotations[1].z(), 1);
@@ -127,15 +127,15 @@ TEST(Reading, EurocHeaderWithAnotherOrderOfTheQuaternion) {
 TEST(Reading, Kitti) {
   const FeatureFile file = read("0 -1 0 5 1 0 0 6 0 0 1 7\n");
   EXPECT_EQ(file.format, "kitti");
-  EXPECT_EQ(file.kind, FeatureKind::frame);
+  EXPECT_EQ(file.kind, Feature::frame);
   EXPECT_EQ(file.vectors[0], Eigen::Vector3d(5, 6, 7));
   EXPECT_LT((file.rotations[0] * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm(), 1e-15);
   EXPECT_TRUE(file.times.empty());
 }
 
 TEST(Reading, TheFormatCanBeGiven) {
-  EXPECT_EQ(read("1,1,2,3,0,0,0,1\n", {.format = Format::tum}).kind, FeatureKind::frame);
-  EXPECT_EQ(read("1,0,0,5,0,1,0,6,0,0,1,7\n", {.format = Format::kitti}).kind, FeatureKind::frame);
+  EXPECT_EQ(read("1,1,2,3,0,0,0,1\n", {.format = Format::tum}).kind, Feature::frame);
+  EXPECT_EQ(read("1,0,0,5,0,1,0,6,0,0,1,7\n", {.format = Format::kitti}).kind, Feature::frame);
   EXPECT_EQ(errorIn("1 2 3\n", {.format = Format::tum}), "f.csv:1: 3 fields, expected 8 (t tx ty tz qx qy qz qw)");
   EXPECT_EQ(errorIn("1 0 0 5 0 1 0 6 0 0 1\n", {.format = Format::kitti}),
             "f.csv:1: 11 fields, expected 12 (a 3x4 matrix row by row)");
@@ -314,7 +314,7 @@ TEST(Reading, RealGroundTruth) {
   if (data == nullptr) GTEST_SKIP() << "skipped: LIESTAT_DATA does not name the directory of the real measurements";
   const FeatureFile file = readFeatureFile(std::string(data) + "/vi/euroc/V1_02_medium_gt.csv");
   EXPECT_EQ(file.format, "euroc");
-  EXPECT_EQ(file.kind, FeatureKind::frame);
+  EXPECT_EQ(file.kind, Feature::frame);
   EXPECT_EQ(file.size(), 16702U);
   EXPECT_EQ(file.vectors[0], Eigen::Vector3d(0.515356, 1.996773, 0.971104));
   EXPECT_NEAR(file.rotations[0].w(), 0.161996, 2e-6);

@@ -23,6 +23,7 @@
 #include <cli/io/tracks.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Eigen::Vector3d;

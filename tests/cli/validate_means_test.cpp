@@ -8,6 +8,7 @@
 #include <vector>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 MeansValidation mahaOnFrames() {

@@ -16,6 +16,7 @@
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Json = nlohmann::json;

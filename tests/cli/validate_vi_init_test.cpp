@@ -21,6 +21,7 @@
 #include <experiments/table1.hpp>
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 using Json = nlohmann::json;

@@ -17,6 +17,7 @@
 namespace {
 
 using namespace liestat;
+using namespace liestat::experiments;
 using namespace liestat_test;
 using Status = ClosedFormStatus;
 using Motion = SceneMotion;

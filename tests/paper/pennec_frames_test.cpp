@@ -12,6 +12,7 @@
 #include "paper/full_run.hpp"
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr double third = 1.0 / 3;

@@ -16,6 +16,7 @@
 #include "paper/full_run.hpp"
 
 namespace liestat::cli {
+using namespace experiments;
 namespace {
 
 constexpr std::size_t sizes[] = {5, 10, 20, 30, 50, 100};
@@ -33,7 +34,7 @@ const std::vector<ValidationReport>& cell(Noise noise, std::size_t n) {
   return reports;
 }
 
-const ValidationReport& report(Noise noise, std::size_t n, const Method& method) {
+const ValidationReport& report(Noise noise, std::size_t n, Method method) {
   return cell(noise, n)[methodIndex(method)];
 }
 

@@ -1,7 +1,7 @@
 // eᵀ C⁻¹ e for matrices whose size is known at run time.
 #pragma once
 
-#include <fusion/detail/small_linear.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 
 #include <vector>
 

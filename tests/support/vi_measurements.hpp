@@ -6,8 +6,8 @@
 
 namespace liestat_test {
 
-using liestat::measure;
-using liestat::motionsOf;
-using liestat::readingsOf;
+using liestat::experiments::measure;
+using liestat::experiments::motionsOf;
+using liestat::experiments::readingsOf;
 
 }  // namespace liestat_test

@@ -5,11 +5,11 @@
 
 namespace liestat_test {
 
-using Scene = liestat::InertialScene;
-using SceneOptions = liestat::InertialSceneOptions;
-using liestat::SceneLayout;
-using liestat::SceneMotion;
-using liestat::SceneRandom;
-using liestat::SceneTurn;
+using Scene = liestat::experiments::InertialScene;
+using SceneOptions = liestat::experiments::InertialSceneOptions;
+using liestat::experiments::SceneLayout;
+using liestat::experiments::SceneMotion;
+using liestat::experiments::SceneRandom;
+using liestat::experiments::SceneTurn;
 
 }  // namespace liestat_test

@@ -1,7 +1,8 @@
-// Orthogonal factorisations of a few columns, without squaring them: what decides ranks at 1e-12.
+// Orthogonal factorisations of a few columns (singular values, triangular factors), which do not square the matrix and
+// so decide ranks at 1e-12. One of the headers of small matrices, which lie/detail/small_matrix.hpp lists.
 //
-// Sizes are run-time numbers of at most 13 and everything is plain loops: the fixed-size expressions of half a dozen
-// sizes took a compiler forty seconds, and these cost it nothing.
+// Sizes are run-time numbers of at most 13 and everything is plain loops in double: the fixed-size expressions of half
+// a dozen sizes took a compiler forty seconds, and these cost it nothing.
 #pragma once
 
 #include <Eigen/Core>
@@ -169,6 +170,21 @@ struct SmallSvd {
     for (int j = 0; j < n; ++j) u(i, j) = best[static_cast<std::size_t>(j)];
   }
 };
+
+/// The pseudo-inverse of a symmetric positive semi-definite 3×3 matrix; eigenvalues below 1e-12 of the trace are zero.
+inline Eigen::Matrix3d pseudoInverse(const Eigen::Matrix3d& H, int& rank) {
+  const SmallSvd svd(SmallMatrix::of<3, 3>(H));
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  rank = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (!(svd.value(k) > 1e-12 * H.trace())) continue;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) inverse(i, j) += svd.v(k, i) * svd.v(k, j) / svd.value(k);
+    }
+    ++rank;
+  }
+  return inverse;
+}
 
 /// The triangular factor R of rows that come in a few at a time, by Householder reflections: RᵀR is the sum of the
 /// rows' squares, R loses none of their digits.
