@@ -80,7 +80,7 @@ class Initialiser {
     w.known_biases = options_.true_biases ? truth.has_value() : options_.known_biases;
     w.integrated = options_.true_biases && truth ? truth->bias : start;
     w.measured.motions = integrate(w, w.integrated);
-    if (w.fault != RecordingFault::none) return w;
+    if (w.fault != FaultKind::none) return w;
     findMotion(w, number);
     if (options_.refinement) refineWindow(w, 1, w.refined);
     compare(w);
@@ -179,7 +179,7 @@ class Initialiser {
     if (options_.consensus) {
       std::mt19937_64 generator(options_.seed + 0x9E3779B97F4A7C15ULL * number);
       if (w.known_biases) {
-        ClosedFormRansacResult consensus = solveClosedFormRobustly(closedFormWindow(w.measured, w.integrated),
+        ConsensusResult consensus = solveClosedFormRobustly(closedFormWindow(w.measured, w.integrated),
                                                                    generator, {.closed_form = closed_form});
         found.result = std::move(consensus.result);
         found.inliers = std::move(consensus.inliers);
@@ -205,7 +205,7 @@ class Initialiser {
       GyroscopeBiasResult estimate = estimateGyroscopeBias(w.measured, options, integrateAnew);
       found.bias_status = estimate.status;
       found.result = std::move(estimate.result);
-      if (estimate.status == GyroscopeBiasStatus::ok) found.gyroscope_bias = estimate.bias;
+      if (estimate.status == FusionStatus::ok) found.gyroscope_bias = estimate.bias;
     }
     w.integrated.gyroscope = found.gyroscope_bias;
     w.measured.motions = integrate(w, w.integrated);
@@ -220,8 +220,8 @@ class Initialiser {
 
   void refineWindow(ViWindow& w, std::size_t parts, std::optional<RefinementResult>& refined) const {
     const ClosedFormResult& closed = w.closedForm();
-    if (closed.solutions.empty() || closed.status == ClosedFormStatus::stationary ||
-        closed.status == ClosedFormStatus::scale_unobservable) {
+    if (closed.solutions.empty() || closed.status == FusionStatus::stationary ||
+        closed.status == FusionStatus::scale_unobservable) {
       return;
     }
     RefinementOptions options;
@@ -282,7 +282,7 @@ class Initialiser {
       w.closed_form_error = errorOf(s.velocity, s.gravity, only.states());
     }
     w.gyroscope_error = (w.bias().gyroscope - truth[0].bias.gyroscope).norm();
-    if (!w.refined || w.refined->status != RefinementStatus::ok) return;
+    if (!w.refined || w.refined->status != FusionStatus::ok) return;
     w.refined_error = errorOf(w.refined->velocity(), w.refined->gravity, w.refined->states);
     if (options_.gravity) w.nees = neesOf(*w.refined, V, G);
   }
@@ -311,14 +311,14 @@ class Initialiser {
 }  // namespace
 
 ImuBias<double> ViWindow::bias() const {
-  if (refined && refined->status == RefinementStatus::ok) return refined->bias;
+  if (refined && refined->status == FusionStatus::ok) return refined->bias;
   ImuBias<double> best = integrated;
   if (!closedForm().solutions.empty()) best.accelerometer += closedForm().solutions[0].accelerometer_bias;
   return best;
 }
 
 std::vector<SE23d> ViWindow::states() const {
-  if (refined && refined->status == RefinementStatus::ok) return refined->states;
+  if (refined && refined->status == FusionStatus::ok) return refined->states;
   std::vector<SE23d> list;
   if (closedForm().solutions.empty()) return list;
   const ClosedFormSolution& s = closedForm().solutions[0];
@@ -334,19 +334,19 @@ std::vector<SE23d> ViWindow::states() const {
 }
 
 bool ViWindow::ok() const {
-  if (fault != RecordingFault::none || closedForm().status != ClosedFormStatus::ok) return false;
+  if (fault != FaultKind::none || closedForm().status != FusionStatus::ok) return false;
   if (refined) return refined->ok();
   return closedForm().consistent && !found.inliers.empty();
 }
 
 std::string ViWindow::status() const {
-  if (fault != RecordingFault::none) return fault == RecordingFault::gap ? "gap" : "no_readings";
+  if (fault != FaultKind::none) return fault == FaultKind::gap ? "gap" : "no_readings";
   const ClosedFormResult& closed = closedForm();
-  if (tracks.empty() || closed.fault == ClosedFormFault::no_feature) return "no_features";
-  if (closed.status != ClosedFormStatus::ok) return name(closed.status);
+  if (tracks.empty() || closed.fault == FaultKind::no_feature) return "no_features";
+  if (closed.status != FusionStatus::ok) return name(closed.status);
   if (found.inliers.empty()) return "no_consensus";
   if (ok()) return "ok";
-  if (refined && refined->status != RefinementStatus::ok) return "not_refined";
+  if (refined && refined->status != FusionStatus::ok) return "not_refined";
   return "inconsistent";
 }
 

@@ -59,7 +59,7 @@ struct ViError {
 /// One window.
 struct ViWindow {
   double begin = 0, end = 0;  ///< s, of its first and last image
-  RecordingFault fault = RecordingFault::none;
+  Fault fault = FaultKind::none;
   double fault_time = 0;            ///< s
   std::vector<std::size_t> images;  ///< of the recording's
   std::vector<std::size_t> tracks;  ///< of the recording's; features of the results in this order
@@ -80,7 +80,7 @@ struct ViWindow {
   std::vector<SE23d> states() const;
   /// Whether it has one answer that explains the data.
   bool ok() const;
-  /// The status in a word: a name of ClosedFormStatus, or why there is less.
+  /// The status in a word: a name of FusionStatus, or why there is less.
   std::string status() const;
 };
 

@@ -52,7 +52,8 @@ void fly(double noise_factor) {
   std::printf("a sensor with %g times the noise of its data sheet\n", noise_factor);
   std::printf("  window   chi2/dof   gravity deg   gyroscope rad/s   accelerometer m/s2    meeting, 11 expected\n");
 
-  const RefinementOptions options = withSharedPrior({.bearing_noise = pixel}, windows);
+  const InitialisationOptions options = withSharedPrior(
+      {.bearing_noise = pixel, .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}}, windows);
   WindowFusion fusion(InertialScene::g);
   double end = 0;
   for (std::size_t k = 0; k < windows; ++k) {

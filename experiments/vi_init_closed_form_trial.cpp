@@ -16,11 +16,12 @@ std::vector<double> closedFormNeesTrial(const ViInitWindow& size, double noise, 
   InertialScene scene = sceneOf(size, Eigen::Vector3d::Zero(), rng());
   SceneRandom random(rng());
   scene.addNoise(noise * vi_init_bearing_noise, random);
-  const auto r = solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
+  const auto r = solveClosedForm(scene.window,
+                                 {.bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}});
   // A window of which the answer is not one, or that says so, makes no claim. With the wrong noise χ² would say so
   // first, and hide what is to be seen.
   const double none = std::numeric_limits<double>::quiet_NaN();
-  if (r.status != ClosedFormStatus::ok || (noise == 1 && !r.consistent) ||
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
       r.covariance_content != CovarianceContent::image_noise) {
     return {none, none, none};
   }
@@ -31,16 +32,16 @@ std::vector<double> closedFormNeesTrial(const ViInitWindow& size, double noise, 
 }
 
 std::vector<double> closedFormBiasNeesTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
-  const ClosedFormOptions options{
-      .bearing_noise = vi_init_bearing_noise, .estimate_bias = true, .singular_values = false};
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .closed_form = {.estimate_bias = true, .singular_values = false}};
   const std::uint64_t seed = rng();
   SceneRandom random(rng());
-  const Eigen::Vector3d bias = noise * options.bias_deviation * random.normal3();
+  const Eigen::Vector3d bias = noise * options.prior.accelerometer_sigma * random.normal3();
   InertialScene scene = sceneOf(size, bias, seed);
   scene.addNoise(noise * vi_init_bearing_noise, random);
   const auto r = solveClosedForm(scene.window, options);
   const double none = std::numeric_limits<double>::quiet_NaN();
-  if (r.status != ClosedFormStatus::ok || (noise == 1 && !r.consistent) ||
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
       r.covariance_content != CovarianceContent::image_noise_bias_prior) {
     return {none, none, none, none};
   }
@@ -59,10 +60,10 @@ std::vector<double> closedFormErrorsTrial(const ViInitWindow& size, double noise
   scene.addNoise(noise * vi_init_bearing_noise, random);
   std::vector<double> values;
   for (const bool remove : {true, false}) {
-    const ViErrors e = viErrors(solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise,
-                                                               .singular_values = false,
-                                                               .remove_noise_bias = remove}),
-                                scene);
+    const ViErrors e = viErrors(
+        solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise,
+                                       .closed_form = {.singular_values = false, .remove_noise_bias = remove}}),
+        scene);
     values.insert(values.end(), {e.speed, e.gravity, e.scale});
   }
   return values;

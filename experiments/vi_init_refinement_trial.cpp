@@ -26,29 +26,29 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
 }  // namespace
 
 std::vector<double> refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
-  const RefinementOptions options{.bearing_noise = vi_init_bearing_noise};
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}};
   const std::uint64_t seed = rng();
   SceneRandom random(rng());
-  const Eigen::Vector3d accelerometer = noise * options.accelerometer_deviation * random.normal3();
-  const Eigen::Vector3d gyroscope = noise * options.gyroscope_deviation * random.normal3();
+  const Eigen::Vector3d accelerometer = noise * options.prior.accelerometer_sigma * random.normal3();
+  const Eigen::Vector3d gyroscope = noise * options.prior.gyroscope_sigma * random.normal3();
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
                       seed);
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
   const auto readings = readingsOf(scene, simulated, random, gyroscope);
   scene.addNoise(noise * vi_init_bearing_noise, random);
-  const InertialWindow window{motionsOf(scene, readings, {.preintegration = {.noise = vi_init_imu}}),
-                              scene.window.features, scene.options().camera};
+  const InertialWindow window = windowOf(scene, readings, {.preintegration = {.noise = vi_init_imu}});
 
   const double none = std::numeric_limits<double>::quiet_NaN(), lost = std::numeric_limits<double>::infinity();
   const std::vector<double> failed{none, none, none, none, none, none, lost, lost, lost, lost};
-  const auto start =
-      solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
+  const auto start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise,
+                                                                    .closed_form = {.singular_values = false}});
   if (start.solutions.empty()) return failed;
   const RefinementResult r = refine(window, start.solutions[0], {}, options);
   // What a user would throw away for its χ² is left out only where the noise is what the estimator was told: else it
   // would hide what is to be seen.
-  if (r.status != RefinementStatus::ok || (noise == 1 && !r.ok())) return failed;
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.ok())) return failed;
 
   Eigen::Matrix<double, 12, 1> error;
   error << r.velocity() - scene.velocity, r.gravity - scene.gravity, r.bias.gyroscope - gyroscope,
@@ -60,18 +60,18 @@ std::vector<double> refinementTrial(const ViInitWindow& size, double noise, Coun
                    Eigen::Vector3d(body_R_world * scene.speed(end)));
   const Eigen::Matrix<double, 9, 1> last_error = (last.inverse() * r.states.back()).log();
   const ViErrors errors = viErrors(r.velocity(), r.gravity, scene);
-  return {
-      mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
-                                    Eigen::Matrix3d(r.covariance.topLeftCorner<3, 3>())),
-      neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance, r.gravity),
-      neesOnSphere<11>(error, r.covariance, r.gravity),
-      mahalanobisSquared<double, 9>(last_error, Eigen::Matrix<double, 9, 9>(r.last_covariance.topLeftCorner<9, 9>())),
-      r.cost,
-      static_cast<double>(r.degrees_of_freedom),
-      errors.speed,
-      errors.gravity,
-      errors.scale,
-      scaleOfFeatures(r.features, scene)};
+  return {mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
+                                        r.covariance.of<InitialCovariance::first_velocity>()),
+          neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
+          neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
+          mahalanobisSquared<double, 9>(last_error,
+                                        Eigen::Matrix<double, 9, 9>(r.covariance.atLast().topLeftCorner<9, 9>())),
+          r.cost,
+          static_cast<double>(r.degrees_of_freedom),
+          errors.speed,
+          errors.gravity,
+          errors.scale,
+          scaleOfFeatures(r.features, scene)};
 }
 
 }  // namespace liestat::experiments

@@ -14,19 +14,17 @@ std::vector<double> gyroscopeBiasTrial(const ViInitWindow& size, double noise, C
                                    .accelerometer = noise * vi_init_imu.accelerometer};
   const auto readings = readingsOf(scene, simulated, random, bias);
   scene.addNoise(noise * vi_init_bearing_noise, random);
-  const auto integrate = [&](const ImuBias<double>& b) {
-    return motionsOf(scene, readings, {.preintegration = {.bias = b}});
-  };
-  const InertialWindow window{integrate({}), scene.window.features, scene.options().camera};
-  const GyroscopeBiasOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
-  const GyroscopeBiasResult found = estimateGyroscopeBias(window, options, integrate);
+  const InertialWindow window = windowOf(scene, readings);
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .closed_form = {.singular_values = false}};
+  const GyroscopeBiasResult found = estimateGyroscopeBias(window, options);
   ViErrors with;
   double error = std::numeric_limits<double>::infinity();
-  if (found.status == GyroscopeBiasStatus::ok) {
+  if (found.status == FusionStatus::ok) {
     with = viErrors(found.result, scene);
     error = (found.bias - bias).norm();
   }
-  const ViErrors without = viErrors(solveClosedForm(closedFormWindow(window, {}), options.closed_form), scene);
+  const ViErrors without = viErrors(solveClosedForm(closedFormWindow(window, {}), options), scene);
   return {error, with.gravity, with.scale, without.gravity, without.scale};
 }
 
@@ -38,14 +36,15 @@ std::vector<double> driftTrial(const ViInitWindow& size, double noise, CounterRn
   scene.addNoise(noise * vi_init_bearing_noise, random);
   const std::size_t wrong = size.features * 2 / 5;
   scene.addDrift(wrong, 8 * vi_init_bearing_noise, random);
-  const RansacOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
-  const ClosedFormRansacResult robust = solveClosedFormRobustly(scene.window, rng, options);
+  const InitialisationOptions options{
+      .bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}, .consensus = {.seed = rng()}};
+  const ConsensusResult robust = solveClosedFormRobustly(scene.window, options);
   bool exact = robust.inliers.size() == size.features - wrong;
   for (const std::size_t i : robust.inliers) exact = exact && i >= wrong;
-  const ViErrors all = viErrors(solveClosedForm(scene.window, options.closed_form), scene);
+  const ViErrors all = viErrors(solveClosedForm(scene.window, options), scene);
   ClosedFormWindow right = scene.window;
   for (std::size_t i = 0; i < wrong; ++i) right.features[i].clear();
-  const ViErrors oracle = viErrors(solveClosedForm(right, options.closed_form), scene);
+  const ViErrors oracle = viErrors(solveClosedForm(right, options), scene);
   // No consensus is no answer.
   const ViErrors kept = robust.inliers.empty() ? ViErrors{} : viErrors(robust.result, scene);
   return {exact ? 1. : 0., kept.speed,   kept.gravity, kept.scale,  oracle.speed,

@@ -67,6 +67,8 @@ struct Fault {
   /// Whether there is one.
   explicit operator bool() const { return kind != FaultKind::none; }
   friend bool operator==(const Fault&, const Fault&) = default;
+  /// Whether it is of a kind, wherever.
+  friend bool operator==(const Fault& fault, FaultKind kind) { return fault.kind == kind; }
 };
 
 /// The enumerator's name, for files.

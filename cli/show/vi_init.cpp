@@ -24,7 +24,7 @@ struct Best {
   Eigen::Vector3d velocity, gravity;
 
   explicit Best(const ViWindow& w) {
-    if (w.refined && w.refined->status == RefinementStatus::ok) {
+    if (w.refined && w.refined->status == FusionStatus::ok) {
       velocity = w.refined->velocity();
       gravity = w.refined->gravity;
     } else {
@@ -40,7 +40,7 @@ bool hasSolution(const ViWindow& w) { return !w.closedForm().solutions.empty(); 
 
 /// Standard deviation of the length of V over that length: of the scale.
 double scaleDeviation(const ViWindow& w) {
-  if (!w.refined || w.refined->status != RefinementStatus::ok) return w.closedForm().scale_deviation;
+  if (!w.refined || w.refined->status != FusionStatus::ok) return w.closedForm().scale_sigma;
   const Eigen::Vector3d u = w.refined->velocity().normalized();
   return std::sqrt(u.dot(w.refined->covariance.topLeftCorner<3, 3>() * u)) / w.refined->velocity().norm();
 }
@@ -63,10 +63,10 @@ std::string windowTable(const ViInitResult& result, bool with_truth) {
   Table table(headers);
   for (const ViWindow& w : result.windows) {
     std::vector<std::string> cells = {fmt::format("{:.1f}", w.begin), w.status()};
-    if (w.fault == RecordingFault::none && hasSolution(w)) {
+    if (w.fault == FaultKind::none && hasSolution(w)) {
       const Best best(w);
-      const bool has_scale = w.closedForm().status != ClosedFormStatus::scale_unobservable &&
-                             w.closedForm().status != ClosedFormStatus::stationary;
+      const bool has_scale = w.closedForm().status != FusionStatus::scale_unobservable &&
+                             w.closedForm().status != FusionStatus::stationary;
       cells.push_back(has_scale ? fmt::format("{:.2f}", best.velocity.norm()) : "");
       cells.push_back(fmt::format("{:.1f}", degrees * best.roll()));
       cells.push_back(fmt::format("{:.1f}", degrees * best.pitch()));
@@ -147,8 +147,8 @@ struct Summary {
     for (const ViWindow& w : result.windows) {
       ++statuses[w.status()];
       // Of all windows that claim a scale, not only of those that came out well.
-      const ClosedFormStatus status = w.closedForm().status;
-      if (status == ClosedFormStatus::scale_unobservable || status == ClosedFormStatus::stationary) continue;
+      const FusionStatus status = w.closedForm().status;
+      if (status == FusionStatus::scale_unobservable || status == FusionStatus::stationary) continue;
       if (w.closed_form_error) closed_form.add(*w.closed_form_error);
       if (w.refined_error) refined.add(*w.refined_error);
       if (w.refined_error && w.gyroscope_error) gyroscope.push_back(*w.gyroscope_error);
@@ -156,7 +156,7 @@ struct Summary {
         nees += *w.nees;
         ++with_nees;
       }
-      if (w.refined && w.refined->status == RefinementStatus::ok) {
+      if (w.refined && w.refined->status == FusionStatus::ok) {
         cost += w.refined->cost;
         degrees_of_freedom += w.refined->degrees_of_freedom;
       }
@@ -182,7 +182,7 @@ JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vecto
   JsonObject o;
   o.set("status", describe(r.status)).set("consistent", r.consistent()).set("cost", r.cost);
   o.set("degrees_of_freedom", r.degrees_of_freedom).set("features_used", r.features_used);
-  if (r.status != RefinementStatus::ok) return o;
+  if (r.status != FusionStatus::ok) return o;
   o.set("velocity", r.velocity()).set("gravity", r.gravity);
   o.set("gyroscope_bias", r.bias.gyroscope).set("accelerometer_bias", r.bias.accelerometer);
   o.set("covariance", r.covariance);
@@ -212,7 +212,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   JsonObject o;
   o.set("begin", w.begin).set("end", w.end).set("status", w.status()).set("ok", w.ok());
   o.set("images", w.images.size()).set("tracks", w.tracks.size());
-  if (w.fault != RecordingFault::none) return o.set("fault_time", w.fault_time);
+  if (w.fault != FaultKind::none) return o.set("fault_time", w.fault_time);
   const ClosedFormResult& c = w.closedForm();
   o.set("closed_form_status", name(c.status)).set("in_words", describe(c.status)).set("consistent", c.consistent);
   o.set("null_dimension", c.null_dimension).set("singular_values", c.singular_values);
@@ -226,7 +226,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
     JsonObject feature;
     feature.set("track", recording.tracks.track_ids[w.tracks[i]]).set("observations", f.observations);
     feature.set("used", f.used).set("residual", f.residual).set("parallax", f.parallax);
-    feature.set("depth_deviation", f.depth_deviation);
+    feature.set("depth_deviation", f.depth_sigma);
     features.push_back(feature);
   }
   o.set("features", features).set("features_used", c.features_used);
@@ -239,7 +239,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   }
   o.set("covariance_content", describe(c.covariance_content));
   o.set("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
-  o.set("scale_deviation", c.scale_deviation).set("tilt_deviation", c.tilt_deviation);
+  o.set("scale_deviation", c.scale_sigma).set("tilt_deviation", c.tilt_sigma);
   o.set("integrated_gyroscope_bias", w.integrated.gyroscope);
   o.set("integrated_accelerometer_bias", w.integrated.accelerometer);
   o.set("gyroscope_bias", w.found.gyroscope_bias).set("gyroscope_bias_status", describe(w.found.bias_status));

@@ -33,7 +33,7 @@ Series line(std::string name, std::size_t colour, bool dashed = false) {
   return {.name = std::move(name), .style = Style::lines, .colour = colour, .dashed = dashed};
 }
 
-bool isRefined(const ViWindow& w) { return w.refined && w.refined->status == RefinementStatus::ok; }
+bool isRefined(const ViWindow& w) { return w.refined && w.refined->status == FusionStatus::ok; }
 
 /// The rotation that makes gravity point along -z, heading left as it is.
 SO3d levelling(const Eigen::Vector3d& gravity) {
@@ -149,7 +149,7 @@ Panel scalePanel(const ViInitResult& result) {
   Series closed{.name = "closed form", .style = Style::points, .colour = second_colour};
   Series refined{.name = "refined", .style = Style::points, .colour = estimate_colour};
   for (const ViWindow& w : result.windows) {
-    if (w.closed_form_error && w.closedForm().status == ClosedFormStatus::ok) {
+    if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {
       closed.x.push_back(w.begin);
       closed.y.push_back(100 * w.closed_form_error->scale);
     }
@@ -249,7 +249,7 @@ void addSolutions(Report& report, const ViInitResult& result) {
   for (const ViWindow& w : result.windows) {
     if (w.closedForm().solutions.size() < 2) continue;
     windows.push_back(&w);
-    left += w.closedForm().status != ClosedFormStatus::ok;
+    left += w.closedForm().status != FusionStatus::ok;
   }
   report.section("Two solutions");
   if (windows.empty()) {
@@ -258,7 +258,7 @@ void addSolutions(Report& report, const ViInitResult& result) {
   }
   const auto rank = [](const ViWindow* w) {
     const auto& s = w->closedForm().solutions;
-    return std::pair(w->closedForm().status == ClosedFormStatus::ok, s[1].cost - s[0].cost);
+    return std::pair(w->closedForm().status == FusionStatus::ok, s[1].cost - s[0].cost);
   };
   std::stable_sort(windows.begin(), windows.end(),
                    [&](const ViWindow* a, const ViWindow* b) { return rank(a) < rank(b); });

@@ -229,7 +229,8 @@ class ClosedFormSolver {
       }
       candidate.negative += behind;
     }
-    if (hasPrior()) candidate.cost += (gravityScale() / options_.prior.accelerometer_sigma * candidate.y.bias()).squaredNorm();
+    if (hasPrior())
+      candidate.cost += (gravityScale() / options_.prior.accelerometer_sigma * candidate.y.bias()).squaredNorm();
   }
 
   /// Covariance of the scaled motion (V', [b'], G') at a root, with gravity's length fixed where it is known; false

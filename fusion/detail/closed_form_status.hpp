@@ -80,7 +80,7 @@ inline double relativeMotion(const RayTable& table, const Motion& y) {
 
 /// The case of exact data before anything is solved; `ok` where what follows depends on the solutions.
 inline FusionStatus statusOfRanks(const RankDiagnosis& d, const RayTable& table, std::size_t images,
-                                      bool gravity_known) {
+                                  bool gravity_known) {
   using Status = FusionStatus;
   const std::size_t features = table.features();
   const bool bias = d.vectors.front().hasBias();

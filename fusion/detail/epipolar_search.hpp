@@ -20,9 +20,7 @@ namespace liestat::detail {
 class EpipolarSearch {
  public:
   EpipolarSearch(const InertialWindow& window, const InitialisationOptions& options)
-      : options_(options),
-        accelerometer_(window.bias().accelerometer),
-        problem_(window, options.bearing_noise) {}
+      : options_(options), accelerometer_(window.bias().accelerometer), problem_(window, options.bearing_noise) {}
 
   const Eigen::Vector3d& bias() const { return problem_.bias().gyroscope; }
   int starts() const { return starts_; }

@@ -12,7 +12,7 @@ namespace liestat::detail {
 /// What the method needs of a problem, which stands somewhere and can look at one step from there.
 template <class P>
 concept DampedProblem = requires(P& problem, double damping) {
-  { problem.linearise() } -> std::convertible_to<double>;      ///< the cost (χ²) and the normal equations where it stands
+  { problem.linearise() } -> std::convertible_to<double>;  ///< the cost (χ²) and the normal equations where it stands
   { problem.solve(damping) } -> std::convertible_to<bool>;     ///< their step, diagonal times 1 + damping; false: none
   { problem.costAfterStep() } -> std::convertible_to<double>;  ///< infinite or NaN where the step is not allowed
   problem.accept();                                            ///< stands at the end of the step from now on

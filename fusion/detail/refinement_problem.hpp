@@ -90,7 +90,8 @@ class RefinementProblem {
     for (std::size_t i = 0; i < window_.features.size() && i < s.features.size(); ++i) {
       const FeatureTrack& track = window_.features[i];
       const auto isBehind = [&](const TrackedBearing& seen) {
-        return !(bearingInBody(window_.cameras, seen).dot(inCamera(state_.X[seen.image], s.features[i], lever(seen))) > 0);
+        return !(bearingInBody(window_.cameras, seen).dot(inCamera(state_.X[seen.image], s.features[i], lever(seen))) >
+                 0);
       };
       if (track.size() < 2 || !s.features[i].allFinite() || std::any_of(track.begin(), track.end(), isBehind)) continue;
       for (const TrackedBearing& seen : track) {
@@ -156,7 +157,8 @@ class RefinementProblem {
     double cost = 0;
     for (std::size_t k = 0; k < window_.motions().size(); ++k) cost += addMotion(state, k, system);
     const int g = gravityBlock();
-    cost += addPrior(state.bias.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, g + 1, system);
+    cost +=
+        addPrior(state.bias.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, g + 1, system);
     cost += addPrior(state.bias.accelerometer - options_.prior.mean.accelerometer, options_.prior.accelerometer_sigma,
                      g + 2, system);
     if (system && options_.gravity) {
@@ -176,8 +178,8 @@ class RefinementProblem {
       }
       const Eigen::Vector3d b = back * (state.P[seen.feature] - state.X[image].translation());
       ResidualRows rows(2);
-      if (!bearingResidual(b - seen.lever, seen.across, seen.bearing, seen.relative_sigma * options_.bearing_noise, rows,
-                           by_d)) {
+      if (!bearingResidual(b - seen.lever, seen.across, seen.bearing, seen.relative_sigma * options_.bearing_noise,
+                           rows, by_d)) {
         return std::numeric_limits<double>::infinity();
       }
       cost += rows.squared();

@@ -32,7 +32,7 @@ struct RecordingOptions {
 template <class S>
 struct RecordingResult {
   Preintegration<S> motion;
-  Fault fault;      ///< the first of the readings that were used, with the reading's index
+  Fault fault;       ///< the first of the readings that were used, with the reading's index
   S max_gap = S(0);  ///< s, between readings that were used, up to the fault
 
   bool ok() const { return !fault; }

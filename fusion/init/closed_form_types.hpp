@@ -45,7 +45,7 @@ struct TrackedBearing {
   /// Its standard deviation in units of the options' `bearing_noise`, the same in each direction across it. A pixel is
   /// a smaller angle off the axis of a camera, and detectors have scales.
   double relative_sigma = 1;
-  std::size_t camera = 0;             ///< index into the window's cameras
+  std::size_t camera = 0;           ///< index into the window's cameras
   std::optional<double> time = {};  ///< s since the first image; none: that of its image, as it must be to 1 µs so far
 };
 
@@ -65,8 +65,8 @@ struct ClosedFormFeature {
   bool used = false;              ///< false: seen in fewer than two images
   bool depth_determined = false;  ///< false: no parallax; its position is then any point of its line in front
   double parallax = 0;            ///< rad, RMS of its directions about their mean after compensation of the rotation
-  double residual = 0;            ///< rad, RMS over its observations; this and the parallax weighted by 1/relative_sigma²
-  double relative_sigma = 1;      ///< of its bearings: root of the harmonic mean of their squares
+  double residual = 0;        ///< rad, RMS over its observations; this and the parallax weighted by 1/relative_sigma²
+  double relative_sigma = 1;  ///< of its bearings: root of the harmonic mean of their squares
   double depth_sigma = std::numeric_limits<double>::infinity();  ///< m, along its first bearing; image noise only
 };
 
@@ -76,7 +76,7 @@ struct ClosedFormSolution {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();             ///< G (m/s²), downwards
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< m/s², beyond the one that was integrated
   std::vector<Eigen::Vector3d> features;                         ///< P_i (m); NaN for a feature that was not used
-  double cost = 0;  ///< Σ (angle/noise)², and (bias/σ)²; exact data count with a noise of 1e-9 rad
+  double cost = 0;                  ///< Σ (angle/noise)², and (bias/σ)²; exact data count with a noise of 1e-9 rad
   std::size_t negative_depths = 0;  ///< features behind the camera in one of their images
 
   /// Rotation about the body's x axis that levels it, world_R_body = Rz(yaw) Ry(pitch) Rx(roll) with z upwards (rad).

@@ -70,7 +70,8 @@ class MotionConsensus {
     for (double enough = 1; static_cast<double>(tried) < enough && tried < options_.consensus.max_hypotheses; ++tried) {
       draw(random);
       MotionBlock sum(solver_.bias());
-      for (std::size_t k = 0; k < options_.consensus.features_drawn; ++k) sum += solver_.eliminated()[drawable_[k]].block;
+      for (std::size_t k = 0; k < options_.consensus.features_drawn; ++k)
+        sum += solver_.eliminated()[drawable_[k]].block;
       Triangle root = Triangle::cholesky(sum.Q);
       if (solver_.hasPrior()) solver_.addPrior(root);
       for (const MotionCandidate& c : solver_.minimise(root, 1e-12)) {
@@ -201,9 +202,8 @@ inline ConsensusResult solveClosedFormRobustly(const ClosedFormWindow& window, c
   ClosedFormResult& result = robust.result;
   const ConsensusOptions& own = options.consensus;
   result.fault = detail::faultOf(window, options);
-  if (!result.fault &&
-      (!(options.bearing_noise > 0) || !(own.max_residual > 0) || own.features_drawn == 0 ||
-       !(own.misfit_sigmas > 0) || !(own.confidence >= 0 && own.confidence < 1))) {
+  if (!result.fault && (!(options.bearing_noise > 0) || !(own.max_residual > 0) || own.features_drawn == 0 ||
+                        !(own.misfit_sigmas > 0) || !(own.confidence >= 0 && own.confidence < 1))) {
     result.fault = FaultKind::bad_option;
   }
   if (result.fault) return robust;

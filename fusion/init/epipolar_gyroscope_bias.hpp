@@ -76,10 +76,9 @@ inline EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& wi
   found.bias = prior.mean.gyroscope;
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   found.fault = window.fault();
-  if (!found.fault &&
-      (!positive(options.bearing_noise) || !prior.mean.gyroscope.allFinite() || !positive(prior.gyroscope_sigma) ||
-       !(own.min_parallax > 0) || !(own.misfit_sigmas > 0) || !(own.max_sigma > 0) ||
-       !(own.min_consensus > 0 && own.min_consensus <= 1))) {
+  if (!found.fault && (!positive(options.bearing_noise) || !prior.mean.gyroscope.allFinite() ||
+                       !positive(prior.gyroscope_sigma) || !(own.min_parallax > 0) || !(own.misfit_sigmas > 0) ||
+                       !(own.max_sigma > 0) || !(own.min_consensus > 0 && own.min_consensus <= 1))) {
     found.fault = FaultKind::bad_option;
   }
   if (!found.fault && window.size() == 0) found.fault = FaultKind::too_few_images;

@@ -55,8 +55,8 @@ class GyroscopeBiasProblem {
   };
 
   /// Starts at the first solution, with the features that are in front; `base` is the bias of the readings.
-  GyroscopeBiasProblem(const InertialWindow& window, const InitialisationOptions& options, const ClosedFormResult& start,
-                       const Eigen::Vector3d& bias, const ImuBias<double>& base)
+  GyroscopeBiasProblem(const InertialWindow& window, const InitialisationOptions& options,
+                       const ClosedFormResult& start, const Eigen::Vector3d& bias, const ImuBias<double>& base)
       : window_(window), options_(options), base_(base) {
     const ClosedFormSolution& s = start.solutions[0];
     state_ = {s.velocity, s.gravity, bias, s.accelerometer_bias, {}, {}};
@@ -117,7 +117,8 @@ class GyroscopeBiasProblem {
   bool isInFront(const FeatureTrack& track, const Eigen::Vector3d& P) const {
     for (const TrackedBearing& seen : track) {
       const WindowImage& image = state_.images[seen.image].image;
-      const Eigen::Vector3d d = image.rotation.transpose() * fromImage(state_, image, P) - window_.cameras[seen.camera].translation();
+      const Eigen::Vector3d d =
+          image.rotation.transpose() * fromImage(state_, image, P) - window_.cameras[seen.camera].translation();
       if (!(d.dot(bearingInBody(window_.cameras, seen)) > 0)) return false;
     }
     return true;

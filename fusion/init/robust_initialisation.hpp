@@ -34,9 +34,9 @@ struct RobustInitialisation {
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
   /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
   Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;                                           ///< for this bias, of the inliers
-  std::vector<std::size_t> inliers, outliers;                        ///< ascending
-  EpipolarBiasResult epipolar;                                       ///< where it began
+  ClosedFormResult result;                             ///< for this bias, of the inliers
+  std::vector<std::size_t> inliers, outliers;          ///< ascending
+  EpipolarBiasResult epipolar;                         ///< where it began
   FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
   std::size_t hypotheses = 0;
   int rounds = 0;
