@@ -33,6 +33,13 @@ enum class FusionStatus {
   bad_motion,           ///< a motion without a positive definite covariance (no noise was given), or not finite
   not_converged,        ///< the iterations ended before the estimate stayed
 
+  // What keeps a window of a recording from being used (fusion/visual_inertial.hpp).
+  gap,           ///< two readings are too far apart
+  no_readings,   ///< the readings do not serve: see the window's fault
+  no_features,   ///< none was seen in two of its images
+  not_refined,   ///< the refinement did not succeed: see its status
+  inconsistent,  ///< one answer, which does not explain the data
+
   bad_input  ///< the measurements or the options: see the result's fault
 };
 
@@ -110,6 +117,16 @@ inline const char* name(FusionStatus status) {
       return "bad_motion";
     case FusionStatus::not_converged:
       return "not_converged";
+    case FusionStatus::gap:
+      return "gap";
+    case FusionStatus::no_readings:
+      return "no_readings";
+    case FusionStatus::no_features:
+      return "no_features";
+    case FusionStatus::not_refined:
+      return "not_refined";
+    case FusionStatus::inconsistent:
+      return "inconsistent";
     case FusionStatus::bad_input:
       return "bad_input";
   }
@@ -155,6 +172,16 @@ inline const char* describe(FusionStatus status) {
       return "a motion has no positive definite covariance: was the sensor's noise given?";
     case FusionStatus::not_converged:
       return "the iterations ended before the estimate stayed";
+    case FusionStatus::gap:
+      return "two readings are too far apart";
+    case FusionStatus::no_readings:
+      return "the readings do not cover it, or are not usable";
+    case FusionStatus::no_features:
+      return "no feature was seen in two images";
+    case FusionStatus::not_refined:
+      return "the refinement did not succeed";
+    case FusionStatus::inconsistent:
+      return "the solution does not explain the data";
     case FusionStatus::bad_input:
       return "bad input";
   }

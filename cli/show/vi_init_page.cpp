@@ -134,7 +134,8 @@ Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
   for (const ViWindow& w : result.windows) {
     if (!isRefined(w)) continue;
     const Eigen::Vector3d V = w.refined->velocity(), u = V.normalized();
-    addBar(found, w.begin, V.norm(), std::sqrt(u.dot(w.refined->covariance.topLeftCorner<3, 3>() * u)));
+    addBar(found, w.begin, V.norm(),
+           std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)));
   }
   if (!truth.x.empty()) panel.series.push_back(truth);
   panel.series.push_back(found);
@@ -191,13 +192,13 @@ Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool g
   const Series truth = truthLine(recording, result, [&](const GroundTruth& g) { return of(g.bias); });
   for (const ViWindow& w : result.windows) {
     if (!isRefined(w)) continue;
-    const int i = (gyroscope ? 6 : 9) + axis;
-    addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance(i, i)));
+    const int i = (gyroscope ? InitialCovariance::gyroscope_bias : InitialCovariance::accelerometer_bias) + axis;
+    addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance.joint(i, i)));
   }
   for (const ViFusion& f : result.fusions) {
-    if (!f.ok) continue;
+    if (!f.has_state) continue;
     addBar(fused, f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
-           gyroscope ? f.gyroscope_deviation : f.accelerometer_deviation);
+           gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma);
   }
   if (!truth.x.empty()) panel.series.push_back(truth);
   panel.series.push_back(found);
@@ -213,7 +214,7 @@ Panel solutionsPanel(const ViWindow& w) {
               .x = {.label = "body's x, m"},
               .y = {.label = "body's y, m"},
               .equal_aspect = true};
-  const std::vector<BiasedImage> images = biasedImages(w.measured.motions, w.integrated);
+  const std::vector<BiasedImage> images = biasedImages(w.measured.motions(), w.measured.bias());
   double reach = 0.1;
   for (std::size_t k = 0; k < 2; ++k) {
     const ClosedFormSolution& s = closed.solutions[k];
@@ -278,11 +279,11 @@ void addSolutions(Report& report, const ViInitResult& result) {
 }  // namespace
 
 void writeViInitReport(const std::string& directory, const std::string& command_line, const ViRecording& recording,
-                       const ViInitOptions& options, const ViInitResult& result) {
+                       const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   Report report(directory, "Visual-inertial initialisation");
   report.code(command_line);
-  report.code(viInitTable(recording, options, result));
+  report.code(viInitTable(recording, result));
   report.section("Trajectory");
   report.plot({.name = "trajectory",
                .caption = with_truth

@@ -154,7 +154,7 @@ TEST(ClosedFormRansac, RefusesBadInput) {
   bad.consensus.confidence = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(fault(scene.window, bad), FaultKind::bad_option);
   bad = options;
-  bad.misfit_deviations = 0;
+  bad.consensus.misfit_sigmas = 0;
   EXPECT_EQ(fault(scene.window, bad), FaultKind::bad_option);
   ClosedFormWindow window = scene.window;
   window.features[2][1].bearing.setZero();
