@@ -4,7 +4,7 @@
 //
 //   liestat::VisualInertialRecording recording{.readings = readings, .noise = noise, .image_times = times,
 //                                              .cameras = {body_T_camera}};
-//   recording.observations = liestat::bearingsOf(pixels, {camera}, 1.);   // 1 pixel of noise; or bearings of your own
+//   recording.observations = liestat::bearingsOf(pixels, {&camera, 1}, 1.);  // 1 pixel of noise; or bearings of your own
 //   const auto result = liestat::initialiseRecording(recording, {});
 //   for (const auto& window : result.windows) {
 //     if (window.ok()) … window.refined->velocity(), window.refined->gravity, window.refined->covariance
@@ -70,11 +70,11 @@ inline std::vector<BearingMeasurement> bearingsOf(std::span<const PixelMeasureme
 
 /// What the sensors recorded. Times are on one clock (s).
 struct VisualInertialRecording {
-  std::span<const ImuSample<double>> readings;  ///< in the order of time; a view: they must outlive the call
-  ImuNoise<double> noise = {};                  ///< of the inertial sensor; both white densities must be positive
-  std::vector<double> image_times;              ///< ascending
-  std::vector<SE3d> cameras = {SE3d()};         ///< body_T_camera of each camera (m); the body is the inertial sensor
-  std::vector<BearingMeasurement> observations;
+  std::span<const ImuSample<double>> readings = {};  ///< in the order of time; a view: they must outlive the call
+  ImuNoise<double> noise = {};                       ///< of the inertial sensor; both white densities must be positive
+  std::vector<double> image_times = {};              ///< ascending
+  std::vector<SE3d> cameras = {SE3d()};  ///< body_T_camera of each camera (m); the body is the inertial sensor
+  std::vector<BearingMeasurement> observations = {};
 };
 
 struct VisualInertialOptions {

@@ -109,7 +109,7 @@ TEST(BearingDeviation, BiasesAndRefinementAreConsistent) {
     const auto refined = refine(recorded.window, found.result.solutions.at(0), {.gyroscope = found.bias}, refinement);
     ASSERT_EQ(refined.status, FusionStatus::ok) << trial;
     refined_index += squaredDistance(
-        refined.covariance,
+        refined.covariance.atFirst(),
         errorsOf({refined.velocity() - recorded.scene.velocity, refined.gravity - recorded.scene.gravity}), 6,
         refined.gravity);
     cost += refined.cost;
