@@ -5,6 +5,7 @@
 #include <exception>
 #include <new>
 #include <string>
+#include <vector>
 
 #include <cli/commands/commands.hpp>
 #include <cli/io/input_error.hpp>
@@ -13,6 +14,25 @@
 namespace {
 
 using namespace liestat::cli;
+
+using AddCommand = void (*)(CLI::App& parent, Invocation& invocation);
+
+/// Commands that begin with the same word; those of the first group stand by themselves.
+struct Group {
+  const char* name;
+  const char* description;
+  std::vector<AddCommand> commands;
+};
+
+/// All commands, in the order in which the help lists them.
+const Group groups[] = {
+    {"", "", {addMeanCommand, addPreintegrateCommand, addViInitCommand}},
+    {"simulate", "Files of simulated measurements with their truth", {addSimulateViCommand}},
+    {"validate",
+     "Does an estimator keep what its covariance promises?",
+     {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand, addValidateSplitCommand,
+      addValidateViInitCommand}},
+};
 
 int complain(const std::string& message) {
   std::fputs((message + "\n").c_str(), stderr);
@@ -25,19 +45,14 @@ int run(int argc, char** argv) {
   CLI::App app("Statistics of rotations, poses and other geometric features, with their uncertainty.", "liestat");
   app.set_version_flag("--version", "liestat " + std::string(programVersion()));
   app.require_subcommand(1);
-  addMeanCommand(app, invocation);
-  addPreintegrateCommand(app, invocation);
-  addViInitCommand(app, invocation);
-  CLI::App* simulate = app.add_subcommand("simulate", "Files of simulated measurements with their truth");
-  simulate->require_subcommand(1);
-  addSimulateViCommand(*simulate, invocation);
-  CLI::App* validate = app.add_subcommand("validate", "Does an estimator keep what its covariance promises?");
-  validate->require_subcommand(1);
-  addValidateMeansCommand(*validate, invocation);
-  addValidatePreintegrationCommand(*validate, invocation);
-  addValidatePropagationCommand(*validate, invocation);
-  addValidateSplitCommand(*validate, invocation);
-  addValidateViInitCommand(*validate, invocation);
+  for (const Group& group : groups) {
+    CLI::App* parent = &app;
+    if (*group.name != '\0') {
+      parent = app.add_subcommand(group.name, group.description);
+      parent->require_subcommand(1);
+    }
+    for (const AddCommand add : group.commands) add(*parent, invocation);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,39 +1,136 @@
 #include <cli/mean_analysis.hpp>
 
-#include <lie/lie.hpp>
+#include <experiments/feature.hpp>
+#include <experiments/parallel.hpp>
+#include <stats/certified_group_mean.hpp>
+#include <stats/certified_maha.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/dispersion.hpp>
+#include <stats/inference.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
-#include <stats/inference.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace liestat::cli {
-namespace detail {
-
-template <class M>
-MeanAnalysis analyse(const Measures&, const AnalysisOptions&);
-
-}  // namespace detail
-
 namespace {
 
-MeanAnalysis dispatch(const Measures& measures, const AnalysisOptions& options) {
-  switch (measures.feature) {
-    case Feature::point:
-      return detail::analyse<Eigen::Vector3d>(measures, options);
-    case Feature::rotation:
-      return detail::analyse<SO3d>(measures, options);
-    case Feature::semi_oriented_frame:
-      return detail::analyse<SemiOrientedFrame3d>(measures, options);
-    case Feature::non_oriented_frame:
-      return detail::analyse<NonOrientedFrame3d>(measures, options);
-    case Feature::se3:
-      return detail::analyse<SE3d>(measures, options);
-    case Feature::direction:
-      return detail::analyse<S2d>(measures, options);
-    case Feature::frame:
-      break;
+using experiments::ProgramExecutor;
+
+/// Of the features the group that has no metric.
+template <class M>
+inline constexpr bool is_group = !Metric<M>;
+
+UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
+  UniquenessOptions how;
+  how.branch_and_bound = options.certify;
+  how.budget = options.budget;
+  return how;
+}
+
+/// What every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the residuals
+/// or from noise. Returns the mean.
+template <class M, class Iteration, class Certified>
+M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certified& result, const char* from) {
+  analysis.converged = converged(iteration.status);
+  analysis.iterations = iteration.iterations;
+  analysis.residual = iteration.residual;
+  analysis.tolerance = iteration.tolerance;
+  analysis.unique = result.uniqueness.unique;
+  analysis.proof = result.uniqueness.proof;
+  analysis.r_star = result.uniqueness.r_star;
+  analysis.cells = result.uniqueness.cells;
+  for (const M& rival : result.uniqueness.rivals) analysis.rivals.push_back(describe(rival));
+  analysis.cut_locus_mass = result.cut_locus.mass;
+  analysis.status = analysis.covariance_status = result.status;
+  analysis.reason = result.reason;
+  if (result.status == Status::too_few) {
+    // There is a mean, and that is the answer.
+    analysis.status = analysis.covariance_status = Status::not_applicable;
+    analysis.reason = "a covariance from residuals needs more measures than the feature has dimensions";
   }
-  return detail::analyse<Frame3d>(measures, options);
+  if (result.estimate) {
+    analysis.covariance = result.estimate->covariance;
+    analysis.covariance_from = from;
+  }
+  return iteration.mean;
+}
+
+/// LSQ, WLSQ, and the barycentre of a group.
+template <class M>
+M leastSquares(const Measures& measures, const std::vector<M>& samples, const AnalysisOptions& options,
+               MeanAnalysis& analysis) {
+  const ProgramExecutor executor{options.threads};
+  if constexpr (is_group<M>) {
+    CertifiedGroupMeanOptions how;
+    how.uniqueness = uniquenessOptions(options);
+    const auto result = certifiedGroupMean(executor, samples, measures.weights, how);
+    return setEstimate<M>(analysis, result.mean, result, "residuals");
+  } else {
+    CertifiedMeanOptions<M> how;
+    how.uniqueness = uniquenessOptions(options);
+    if (measures.known_noise) how.known_noise = covariancesOf<M>(measures.file);
+    const auto result = certifiedMean(executor, samples, measures.weights, how);
+    return setEstimate<M>(analysis, result.mean, result, measures.known_noise ? "noise" : "residuals");
+  }
+}
+
+template <class M>
+M mahalanobisMean(const Measures& measures, const AnalysisOptions& options, MeanAnalysis& analysis) {
+  CertifiedMahaOptions<M> how;
+  how.maha.likelihood = measures.likelihood;
+  const std::size_t most_cells = how.uniqueness.budget;
+  how.uniqueness = uniquenessOptions(options);
+  how.uniqueness.budget = std::min(options.budget, most_cells);
+  const CertifiedMaha<M> result =
+      certifiedMaha(ProgramExecutor{options.threads}, gaussiansOf<M>(measures.file), measures.covariance_at, how);
+  analysis.fit = result.fit;
+  analysis.fit_dof = result.fit_dof;
+  return setEstimate<M>(analysis, result.maha, result, "noise");
+}
+
+/// Dispersion of the measures about the mean and the farthest of them.
+template <class M>
+void setDispersion(const Measures& measures, const std::vector<M>& samples, const M& y, MeanAnalysis& analysis) {
+  const Dispersion<M> dispersion = dispersionAbout(samples, measures.weights, y);
+  analysis.dispersion = dispersion.covariance;
+  for (const FarthestFeature& f : dispersion.farthest) {
+    analysis.largest.push_back({f.distance, measures.file.lines[f.index]});
+  }
+}
+
+/// The measures in both charts; a rigid motion's are those of its frame, which to first order has the same axes.
+template <class M>
+ChartScatter chartsOf(const Measures& measures, const std::vector<M>& samples, const M& y,
+                      const MeanAnalysis& analysis) {
+  if constexpr (is_group<M>) {
+    return chartsOf<Frame3d>(measures, featuresOf<Frame3d>(measures.file), Frame3d(y), analysis);
+  } else {
+    std::optional<SquareOf<M>> covariance;
+    if (analysis.covariance.size() > 0) covariance = analysis.covariance;
+    return chartScatter(samples, measures.weights, y, SquareOf<M>(analysis.dispersion), covariance);
+  }
+}
+
+template <class M>
+MeanAnalysis analyse(const Measures& measures, const AnalysisOptions& options) {
+  const std::vector<M> samples = featuresOf<M>(measures.file);
+  MeanAnalysis analysis;
+  const M y = measures.criterion == Criterion::maha ? mahalanobisMean<M>(measures, options, analysis)
+                                                    : leastSquares(measures, samples, options, analysis);
+  analysis.mean = describe(y);
+  setDispersion(measures, samples, y, analysis);
+  if constexpr (std::is_same_v<M, S2d>) {
+    analysis.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>();
+  }
+  if (options.charts) analysis.charts = chartsOf(measures, samples, y, analysis);
+  return analysis;
 }
 
 /// Whether the measures leave some direction without any error, whatever the units.
@@ -50,7 +147,8 @@ bool isSingular(const Eigen::MatrixXd& covariance) {
 MeanAnalysis analyseMean(const Measures& measures, const AnalysisOptions& options) {
   AnalysisOptions how = options;
   if (how.budget == 0) how.budget = measures.size() > 100000 ? 2000 : 1000000;
-  MeanAnalysis analysis = dispatch(measures, how);
+  MeanAnalysis analysis =
+      experiments::withFeature(measures.feature, [&]<class M>() { return analyse<M>(measures, how); });
   if (measures.size() == 1) {
     analysis.notes.emplace_back("one measure is its own mean");
   } else if (analysis.dispersion.isZero(0) || !(analysis.dispersion.diagonal().maxCoeff() > 1e-28)) {

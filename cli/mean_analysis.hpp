@@ -1,40 +1,23 @@
 #pragma once
 
+#include <cli/io/feature_values.hpp>
 #include <cli/io/measures.hpp>
+#include <stats/charts.hpp>
 #include <stats/status.hpp>
+#include <stats/uniqueness_types.hpp>
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace liestat::cli {
 
-/// A feature of any kind as files and people see it.
-struct FeatureValue {
-  std::optional<Eigen::Vector4d> quaternion_xyzw = {};  ///< w is not negative
-  std::optional<Eigen::Vector3d> rotation_vector = {};  ///< rad
-  std::optional<Eigen::Vector3d> translation = {};      ///< m
-  std::optional<Eigen::Vector3d> point = {};            ///< m
-  std::optional<Eigen::Vector3d> direction = {};
-};
-
 /// The measure farthest from the mean in one part of the tangent vector.
 struct LargestResidual {
   double value = 0;  ///< rad or m
   std::size_t line = 0;
-};
-
-/// The measures in two charts: the principal one (about the origin) and the one about the mean. Columns are measures,
-/// rows coordinates in the tangent's order.
-struct ChartScatter {
-  Eigen::MatrixXd principal, centred;
-  Eigen::VectorXd mean;                            ///< in the principal chart
-  Eigen::MatrixXd mean_covariance, dispersion;     ///< carried to the principal chart; empty without a covariance
-  Eigen::VectorXd barycentre, barycentre_centred;  ///< the plain mean of the coordinates of the principal chart
-  Eigen::MatrixXd barycentre_covariance, barycentre_covariance_centred;
 };
 
 /// All that is known about a mean.
@@ -52,11 +35,11 @@ struct MeanAnalysis {
   Status covariance_status = Status::ok;
   std::string covariance_from = {};                               ///< residuals or noise
   Eigen::MatrixXd dispersion;                                     ///< of the measures about the mean
-  std::vector<LargestResidual> largest = {};                      ///< one for each of tangentParts()
+  std::vector<LargestResidual> largest = {};                      ///< one for each part of the tangent vector
   std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< of directions: what the coordinates belong to
 
-  std::string unique = "not_certified";  ///< unique, ambiguous or not_certified
-  std::string proof = {};                ///< in words
+  Uniqueness unique = Uniqueness::not_certified;
+  std::string proof = {};  ///< in words
   std::vector<FeatureValue> rivals = {};
   double r_star = 0;
   std::size_t cells = 0;

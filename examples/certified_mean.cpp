@@ -3,7 +3,7 @@
 #include <lie/semi_oriented_frame3.hpp>
 #include <lie/so3.hpp>
 #include <stats/sampling.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <iostream>
 #include <vector>

@@ -1,6 +1,6 @@
 // The mean of four measured rotations, with what is needed to trust it. The README's example.
 #include <lie/so3.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <iostream>
 #include <vector>

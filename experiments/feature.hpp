@@ -15,10 +15,12 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -84,6 +86,7 @@ struct FeatureInfo {
   Feature kind;
   std::string_view name, plural;
   Parts parts;
+  std::span<const TangentBlock> tangent;  ///< what the tangent vectors are made of
   int dof;
   bool has_metric;    ///< a Riemannian manifold, so that lsq and wlsq are there; else a group, with its barycentre
   bool has_isotropy;  ///< some motions leave a feature as it is: no frame is common to all of the manifold's points
@@ -96,14 +99,25 @@ struct FeatureInfo {
 inline constexpr auto features = std::apply(
     []<class... Row>(const Row&... row) {
       return std::array{
-          FeatureInfo{Row::kind, row.name, row.plural, row.parts, ManifoldTraits<typename Row::Type>::DoF,
-                      Metric<typename Row::Type>,
+          FeatureInfo{Row::kind, row.name, row.plural, row.parts, ManifoldTraits<typename Row::Type>::tangent_parts,
+                      ManifoldTraits<typename Row::Type>::DoF, Metric<typename Row::Type>,
                       ManifoldTraits<typename Row::Type>::Group::DoF != ManifoldTraits<typename Row::Type>::DoF}...};
     },
     feature_table);
 
 /// The row of a feature.
 constexpr const FeatureInfo& info(Feature feature) { return features[static_cast<std::size_t>(feature)]; }
+/// The row of a feature by its type.
+template <class M>
+constexpr const FeatureInfo& info() {
+  return std::apply(
+      []<class... Row>(const Row&...) -> const FeatureInfo& {
+        std::size_t i = 0;
+        (void)((std::is_same_v<M, typename Row::Type> || (++i, false)) || ...);
+        return features[i];
+      },
+      feature_table);
+}
 
 static_assert(
     [] {

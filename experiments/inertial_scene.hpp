@@ -1,20 +1,22 @@
 // A simulated scene of visual-inertial initialisation: a body with a camera and an inertial sensor moves among
 // features.
 //
-//   liestat::InertialScene scene({.images = 21, .features = 20}, 1);  // seed 1
-//   liestat::SceneRandom random(2);
+//   liestat::experiments::InertialScene scene({.images = 21, .features = 20}, 1);  // seed 1
+//   liestat::CounterRng random(1, 0, 1);                                           // the same seed, stream 1
 //   scene.addNoise(1. / 450, random);
 //   const auto result = liestat::solveClosedForm(scene.window, {.bearing_noise = 1. / 450});
 //   … (result.solutions[0].velocity - scene.velocity).norm()
 //
 // The motion is analytic (sums of sines, or constant), bearings and the twice integrated force are exact to rounding.
 // What an inertial sensor reads of it: experiments/scene_readings.hpp. The world's z axis points upwards. Each scene is a
-// function of its options and its seed alone, the same with every standard library.
+// function of its options and its seed alone, the same with every standard library: it is drawn from stream 0 of the
+// seed, and noise of another stream is independent of it.
 #pragma once
 
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/imu/readings.hpp>
 #include <lie/so3.hpp>
+#include <stats/random.hpp>
 
 #include <Eigen/Core>
 
@@ -23,32 +25,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <random>
 #include <utility>
 #include <vector>
 
 namespace liestat::experiments {
-
-/// Uniform and normal numbers and directions, the same with every standard library.
-class SceneRandom {
- public:
-  explicit SceneRandom(std::uint64_t seed) : generator_(seed) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
-  }
-  double normal() {
-    const double radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));
-    return radius * std::cos(uniform(0, 6.283185307179586));
-  }
-  Eigen::Vector3d normal3() {
-    const double x = normal(), y = normal(), z = normal();
-    return {x, y, z};
-  }
-  Eigen::Vector3d unit() { return normal3().normalized(); }
-
- private:
-  std::mt19937_64 generator_;
-};
 
 /// How the body moves. Those that vary accelerate by four sines of 0.2 to 1 Hz on top of a velocity of 1 m/s.
 enum class SceneMotion {
@@ -92,10 +72,12 @@ class InertialScene {
  public:
   static constexpr double g = 9.81;  ///< m/s²
 
-  InertialScene(const InertialSceneOptions& options, std::uint64_t seed) : options_(options), random_(seed) {
-    drawMotion();
-    drawTimes();
-    drawFeatures();
+  /// Draws the scene from CounterRng(seed).
+  InertialScene(const InertialSceneOptions& options, std::uint64_t seed) : options_(options) {
+    CounterRng random(seed);
+    drawMotion(random);
+    drawTimes(random);
+    drawFeatures(random);
     build();
   }
 
@@ -131,21 +113,21 @@ class InertialScene {
   }
   const InertialSceneOptions& options() const { return options_; }
   /// Adds to each bearing a noise across it with a standard deviation of so many rad in each direction.
-  void addNoise(double sigma, SceneRandom& random) {
+  void addNoise(double sigma, CounterRng& random) {
     for (auto& track : window.features) {
       for (auto& seen : track) {
-        const Eigen::Vector3d noise = sigma * random.normal3();
+        const Eigen::Vector3d noise = sigma * random.normalVector<3>();
         seen.bearing = (seen.bearing + noise - seen.bearing.dot(noise) * seen.bearing).normalized();
       }
     }
   }
   /// The first `count` features walk away: each from image to image by steps with a standard deviation of so many rad
   /// in each direction.
-  void addDrift(std::size_t count, double step, SceneRandom& random) {
+  void addDrift(std::size_t count, double step, CounterRng& random) {
     for (std::size_t i = 0; i < std::min(count, window.features.size()); ++i) {
       Eigen::Vector3d walk = Eigen::Vector3d::Zero();
       for (TrackedBearing& seen : window.features[i]) {
-        if (seen.image > 0) walk += step * random.normal3();
+        if (seen.image > 0) walk += step * random.normalVector<3>();
         seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
       }
     }
@@ -163,15 +145,15 @@ class InertialScene {
     return a;
   }
 
-  void drawMotion() {
+  void drawMotion(CounterRng& random) {
     using M = SceneMotion;
     const M kind = options_.motion;
-    start_ = SO3d::exp(3 * random_.uniform(0, 1) * random_.unit());
-    velocity_ = random_.unit();
+    start_ = SO3d::exp(3 * random.uniform(0, 1) * random.unitVector<3>());
+    velocity_ = random.unitVector<3>();
     acceleration_ = Eigen::Vector3d::Zero();
-    const Eigen::Vector3d line = random_.unit(), normal = random_.unit();
+    const Eigen::Vector3d line = random.unitVector<3>(), normal = random.unitVector<3>();
     if (kind == M::constant_acceleration) {
-      acceleration_ = options_.acceleration * 1.7 * random_.uniform(0.7, 1.3) * random_.unit();
+      acceleration_ = options_.acceleration * 1.7 * random.uniform(0.7, 1.3) * random.unitVector<3>();
       if (options_.level_acceleration) acceleration_.z() = 0;
     }
     if (kind == M::free_fall) acceleration_ = -g * Eigen::Vector3d::UnitZ();
@@ -181,41 +163,42 @@ class InertialScene {
     };
     const bool restricted = kind == M::straight || kind == M::planar;
     for (int k = 0; k < 4 && (kind == M::varying || restricted); ++k) {
-      const double rate = 6.283185307179586 * random_.uniform(0.2, 1);
-      const Eigen::Vector3d amplitude = options_.acceleration / std::sqrt(2.) / (rate * rate) * random_.normal3();
-      const double phase = random_.uniform(0, 6.283185307179586);
+      const double rate = 6.283185307179586 * random.uniform(0.2, 1);
+      const Eigen::Vector3d amplitude =
+          options_.acceleration / std::sqrt(2.) / (rate * rate) * random.normalVector<3>();
+      const double phase = random.uniform(0, 6.283185307179586);
       move_.push_back({restricted ? flat(amplitude) : amplitude, rate, phase});
     }
     if (restricted) velocity_ = flat(velocity_).normalized();
     if (kind == M::stationary) velocity_.setZero();
     normal_ = normal;
-    const Eigen::Vector3d axis = random_.unit();
+    const Eigen::Vector3d axis = random.unitVector<3>();
     for (int k = 0; k < 3 && options_.turn != SceneTurn::none; ++k) {
-      const double rate = 6.283185307179586 * random_.uniform(0.2, 0.8);
-      Eigen::Vector3d amplitude = options_.turn_rate * std::sqrt(2. / 3) / rate * random_.normal3();
+      const double rate = 6.283185307179586 * random.uniform(0.2, 0.8);
+      Eigen::Vector3d amplitude = options_.turn_rate * std::sqrt(2. / 3) / rate * random.normalVector<3>();
       if (options_.turn == SceneTurn::fixed_axis) amplitude = amplitude.sum() * axis;
       turn_.push_back({amplitude, rate, 0});
     }
   }
 
-  void drawTimes() {
+  void drawTimes(CounterRng& random) {
     const double step = options_.images < 2 ? 0 : options_.window / static_cast<double>(options_.images - 1);
     for (std::size_t j = 0; j < options_.images; ++j) {
-      const double jitter = j == 0 || j + 1 == options_.images ? 0 : random_.uniform(-0.2, 0.2);
+      const double jitter = j == 0 || j + 1 == options_.images ? 0 : random.uniform(-0.2, 0.2);
       times.push_back(step * (static_cast<double>(j) + jitter));
     }
   }
 
-  void drawFeatures() {
-    const Eigen::Vector3d centre = position(0.5 * options_.window), ahead = random_.unit();
-    const Eigen::Vector3d along = random_.unit(), plane = random_.unit();
+  void drawFeatures(CounterRng& random) {
+    const Eigen::Vector3d centre = position(0.5 * options_.window), ahead = random.unitVector<3>();
+    const Eigen::Vector3d along = random.unitVector<3>(), plane = random.unitVector<3>();
     for (std::size_t i = 0; i < options_.features; ++i) {
       // A cone of 80 degrees, 2 to 8 m away.
-      Eigen::Vector3d direction = ahead + 0.7 * random_.uniform(0, 1) * random_.unit();
-      Eigen::Vector3d p = centre + options_.far * random_.uniform(2, 8) * direction.normalized();
+      Eigen::Vector3d direction = ahead + 0.7 * random.uniform(0, 1) * random.unitVector<3>();
+      Eigen::Vector3d p = centre + options_.far * random.uniform(2, 8) * direction.normalized();
       if (options_.layout == SceneLayout::coplanar) p = position(0) + flatten(p - position(0), normal_);
-      if (options_.layout == SceneLayout::plane) p = centre + 4 * ahead + 2 * flatten(random_.normal3(), plane);
-      if (options_.layout == SceneLayout::line) p = centre + 4 * ahead + random_.uniform(-2, 2) * along;
+      if (options_.layout == SceneLayout::plane) p = centre + 4 * ahead + 2 * flatten(random.normalVector<3>(), plane);
+      if (options_.layout == SceneLayout::line) p = centre + 4 * ahead + random.uniform(-2, 2) * along;
       if (options_.layout == SceneLayout::ahead && i == 0) {
         p = position(0) + 10 * (position(options_.window) - position(0)).normalized();
       }
@@ -273,7 +256,6 @@ class InertialScene {
   }
 
   InertialSceneOptions options_;
-  SceneRandom random_;
   SO3d start_;
   Eigen::Vector3d velocity_, acceleration_, normal_;
   std::vector<Wave> move_, turn_;

@@ -1,6 +1,6 @@
+#include <experiments/means_report.hpp>
 #include <experiments/means_trial.hpp>
 #include <experiments/parallel.hpp>
-#include <lie/lie.hpp>
 #include <stats/validation.hpp>
 
 #include <cmath>
@@ -8,47 +8,29 @@
 namespace liestat::experiments {
 namespace {
 
-using Trial = detail::MethodOutcomes (*)(const MeansExperiment&, CounterRng&);
-
-Trial trialOf(Feature feature) {
-  return experiments::withFeature(feature, []<Metric M>() -> Trial { return detail::runTrial<M>; });
-}
-
 /// Logarithm of the ratio of two errors.
 double logRatio(double error, double reference) { return std::log(error / reference); }
 
 /// What the reports are made of, in the order of the methods that are wanted.
-std::vector<TrialOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
-  std::vector<TrialOutcome> list;
+std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
+  std::vector<MeansOutcome> list;
   for (std::size_t m = 0; m < methods.size(); ++m) {
     if (!experiment.wanted[m]) continue;
     const detail::MethodOutcome& o = outcomes[m];
     const bool is_maha = methods[m].criterion == Criterion::maha;
     const detail::MethodOutcome& reference =
         outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
-    TrialOutcome outcome{.mu2 = o.mahalanobis_squared, .iterations = o.iterations};
-    outcome.extra[log_ratio_rotation] = logRatio(o.rotation_error, reference.rotation_error);
-    outcome.extra[log_ratio_translation] = logRatio(o.translation_error, reference.translation_error);
+    MeansOutcome outcome;
+    outcome.mu2 = o.mahalanobis_squared;
+    outcome.iterations = o.iterations;
+    outcome.log_ratio_rotation = logRatio(o.rotation_error, reference.rotation_error);
+    outcome.log_ratio_translation = logRatio(o.translation_error, reference.translation_error);
     list.push_back(outcome);
   }
   return list;
 }
 
 }  // namespace
-
-std::string name(Noise noise) {
-  switch (noise) {
-    case Noise::iid:
-      return "iid";
-    case Noise::isd:
-      return "isd";
-    case Noise::idd:
-      return "idd";
-    case Noise::exp:
-      return "exp";
-  }
-  return "";
-}
 
 std::string name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
 
@@ -62,8 +44,8 @@ std::size_t methodIndex(const Method& method) {
   return i;
 }
 
-std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
-                                  const std::function<void(std::size_t, std::size_t)>& progress) {
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
+                             const std::function<void(std::size_t, std::size_t)>& progress) {
   const int k = degreesOfFreedom(experiment.feature);
   std::vector<ReferenceLaw> laws;
   for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -72,9 +54,8 @@ std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads
                                           : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
   }
   const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
-  const Trial trial = trialOf(experiment.feature);
   return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
-    return wantedOutcomes(experiment, trial(experiment, rng));
+    return wantedOutcomes(experiment, detail::meansTrial(experiment, rng));
   });
 }
 

@@ -11,41 +11,40 @@
 #include <vector>
 
 namespace liestat {
-struct ValidationReport;
+template <class Outcome>
+struct ValidationReportOf;
 }
 
 namespace liestat::experiments {
 
-/// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measures; all criteria on the
-/// same draws, so that their accuracies can be compared trial by trial.
-
-using experiments::Criterion;
-using experiments::Feature;
+/// The simulated experiments of Pennec 1998, section 5: a feature, a noise, a number of measurements; all criteria on
+/// the same draws, so that their accuracies can be compared trial by trial.
 
 /// The features of the experiment: those with a Riemannian metric.
 inline constexpr auto all_features = [] {
   constexpr auto count = [] {
     std::size_t n = 0;
-    for (const experiments::FeatureInfo& row : experiments::features) n += row.has_metric ? 1 : 0;
+    for (const FeatureInfo& row : features) n += row.has_metric ? 1 : 0;
     return n;
   };
   std::array<Feature, count()> list{};
   std::size_t n = 0;
-  for (const experiments::FeatureInfo& row : experiments::features) {
+  for (const FeatureInfo& row : features) {
     if (row.has_metric) list[n++] = row.kind;
   }
   return list;
 }();
 
-/// How the measures' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²), μ ~
-/// U(0,1).
+/// How the measurements' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²),
+/// μ ~ U(0,1).
 enum class Noise { iid, isd, idd, exp };
 inline constexpr std::array all_noises{Noise::iid, Noise::isd, Noise::idd, Noise::exp};
+inline constexpr std::array noise_names{"iid", "isd", "idd", "exp"};  ///< in options and JSON fields
+inline std::string name(Noise noise) { return noise_names[static_cast<std::size_t>(noise)]; }
 
 inline constexpr std::array all_criteria{Criterion::lsq, Criterion::wlsq, Criterion::maha};
 
-/// The names of the program's options and JSON fields.
-std::string name(Noise noise);
+/// The name of the program's option and JSON field.
 std::string name(CovarianceAt at);
 
 /// A way to estimate a mean and its covariance, of those that a trial compares.
@@ -90,15 +89,15 @@ struct MeansExperiment {
   bool certify = false;
 };
 
-/// Where the numbers of a report of run() stand: its `extra` statistics are logarithms of ratios of errors.
-enum ExtraIndex : std::size_t { log_ratio_rotation, log_ratio_translation };
+struct MeansOutcome;
+using MeansReport = ValidationReportOf<MeansOutcome>;  // experiments/means_report.hpp
 
 /// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
 /// each of `methods` that is wanted, in their order; its law is χ²_k for known noise and Hotelling's for residuals. The
 /// ratios compare a method's error with MAHA's of the same trial (the corrected one; the report's for the report's LSQ
 /// and WLSQ), and the report's MAHA with the corrected one; they are absent where that is not wanted. `progress(trials
 /// done, all)` is called from any thread, never twice at the same time.
-std::vector<ValidationReport> run(const MeansExperiment& experiment, int threads,
-                                  const std::function<void(std::size_t, std::size_t)>& progress = {});
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
+                             const std::function<void(std::size_t, std::size_t)>& progress = {});
 
 }  // namespace liestat::experiments

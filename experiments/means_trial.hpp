@@ -13,14 +13,13 @@ inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 /// What one method gave in one trial.
 struct MethodOutcome {
   double mahalanobis_squared = not_a_number;  ///< of the exact feature about the estimate; NaN if the method failed
-  int iterations = 0;                         ///< started at the first measure
+  int iterations = 0;                         ///< started at the first measurement
   double rotation_error = not_a_number;       ///< rad; NaN where the feature has no orientation
   double translation_error = not_a_number;    ///< m; NaN where the feature has no position
 };
 using MethodOutcomes = std::array<MethodOutcome, methods.size()>;
 
-/// One trial: a scene from the generator, and what each of `methods` that is wanted makes of it.
-template <class M>
-MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng);
+/// One trial of an experiment: a scene from the generator, and what each of `methods` that is wanted makes of it.
+MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng);
 
 }  // namespace liestat::experiments::detail

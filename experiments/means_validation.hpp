@@ -1,7 +1,8 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <experiments/means_experiment.hpp>
-#include <stats/validation.hpp>
+#include <experiments/means_report.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -32,32 +33,20 @@ struct MeansValidation {
 /// distances may be from the reference law. Absent: outside the domain, shown but not judged.
 std::optional<ValidationTolerance> promisedTolerance(const MeansExperiment& experiment, const Method& method);
 
-/// One line of the table.
-struct MeansRow {
+/// One line of the table. There is no promise for the report's formulas.
+struct MeansRow : JudgedReport {
   MeansExperiment experiment;
-  Method method;
-  ValidationReport report;
-  std::optional<ValidationTolerance> promise;  ///< absent for the report's formulas, too
-  std::optional<bool> passed;                  ///< the verdict, where there is a promise
+  Method method{};
 
-  /// The index over the mean of its law; NaN where the law has none.
-  double relativeIndex() const;
-  /// exp of the mean and deviation of the logarithm of the error's ratio to MAHA's.
-  double ratio(ExtraIndex index) const;
-  double logDeviation(ExtraIndex index) const;
+  /// exp of the mean and standard deviation of the logarithm of the error's ratio to MAHA's.
+  double ratio(ErrorRatio of) const;
+  double logDeviation(ErrorRatio of) const;
+
+  TrialStatistic rotation_ratio, translation_ratio;  ///< the logarithms
 };
-
-/// False-alarm probability of a whole run, shared by the rows that are judged.
-inline constexpr double run_false_alarm = 1e-5;
 
 /// Runs everything; rows in the order of the lists.
 std::vector<MeansRow> validateMeans(const MeansValidation& validation,
                                     const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
-
-/// The tables for the terminal, the verdict last.
-std::string formatMeansTables(const std::vector<MeansRow>& rows);
-
-/// The report's page.
-void writeMeansReport(const std::string& directory, const std::string& command_line, const std::vector<MeansRow>& rows);
 
 }  // namespace liestat::experiments

@@ -2,24 +2,53 @@
 
 #include <stats/executor.hpp>
 
-#ifdef LIESTAT_HAS_TBB
-#include <stats/compat/tbb.hpp>
-#endif
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
 
 namespace liestat::experiments {
+namespace detail {
 
-/// The executor of the program: threads where it was built with oneTBB, else the calling thread.
+/// How many chunks runInOrder() has under way at most, between evaluate(chunk) and the end of finish(chunk).
+std::size_t mostUnderWay(int threads);
+
+/// Calls evaluate(chunk) for 0 … n_chunks - 1 on several threads, and finish(chunk) after it in the order of the chunks,
+/// never twice at the same time. The first exception leaves it.
+void runInOrder(int threads, std::size_t n_chunks, const std::function<void(std::size_t)>& evaluate,
+                const std::function<void(std::size_t)>& finish);
+
+}  // namespace detail
+
+/// The executor of the program and of its experiments: `threads` threads (0: as many as the machine has) where they were
+/// built with oneTBB, else the calling thread. oneTBB is compiled in one unit and in no header.
 struct ProgramExecutor {
-  int threads = 0;  ///< 0: as many as the machine has
+  int threads = 0;
 
   template <class Map, class Combine>
   auto reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
-#ifdef LIESTAT_HAS_TBB
-    return TbbExecutor{threads}.reduce(n_chunks, map, combine);
-#else
-    return SerialExecutor{}.reduce(n_chunks, map, combine);
-#endif
+    using T = liestat::detail::ChunkResult<Map>;
+    if (n_chunks == 0) return T{};
+    // Chunks leave in the order in which they came, so those under way are consecutive and each has a slot of its own.
+    std::vector<std::optional<T>> slots(std::min(n_chunks, detail::mostUnderWay(threads)));
+    std::optional<T> result;
+    detail::runInOrder(
+        threads, n_chunks, [&](std::size_t chunk) { slots[chunk % slots.size()].emplace(std::invoke(map, chunk)); },
+        [&](std::size_t chunk) {
+          std::optional<T>& part = slots[chunk % slots.size()];
+          if (result) {
+            liestat::detail::combineInto(combine, *result, std::move(*part));
+          } else {
+            result.emplace(std::move(*part));
+          }
+          part.reset();
+        });
+    return T(std::move(*result));
   }
 };
+
+static_assert(Executor<ProgramExecutor>);
 
 }  // namespace liestat::experiments

@@ -1,24 +1,18 @@
 #include <experiments/preintegration_validation.hpp>
 
 #include <experiments/parallel.hpp>
-#include <cli/show/table.hpp>
+#include <experiments/recording.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <stats/random.hpp>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace liestat::experiments {
-using namespace cli;
 namespace {
 
 constexpr double rate = 200;
-// Of the ADIS16448, as its data sheet and EuRoC's calibration have them.
-constexpr ImuNoise<double> adis16448 = {
-    .gyroscope = 1.6968e-4, .accelerometer = 2e-3, .gyroscope_walk = 1.9393e-5, .accelerometer_walk = 3e-3};
 
 /// An agile motion: sums of sines with phases of their own in every trial.
 class Motion {
@@ -81,18 +75,6 @@ double trial(PreintegrationCheck check, double window, double scale, CounterRng&
 
 }  // namespace
 
-std::string name(PreintegrationCheck check) {
-  switch (check) {
-    case PreintegrationCheck::motion:
-      return "motion";
-    case PreintegrationCheck::walk:
-      return "walk";
-    case PreintegrationCheck::motion_and_bias:
-      return "motion_and_bias";
-  }
-  return "";
-}
-
 int degreesOfFreedom(PreintegrationCheck check) { return check == PreintegrationCheck::motion_and_bias ? 15 : 9; }
 
 std::vector<PreintegrationRow> validatePreintegration(
@@ -100,12 +82,17 @@ std::vector<PreintegrationRow> validatePreintegration(
   std::vector<PreintegrationRow> rows;
   for (const PreintegrationCheck check : validation.checks) {
     for (const double window : validation.windows) {
-      for (const double noise : validation.noises)
-        rows.push_back({.check = check, .window = window, .noise = noise, .report = {}, .passed = {}, .reason = {}});
+      for (const double noise : validation.noises) {
+        PreintegrationRow& row = rows.emplace_back();
+        row.check = check;
+        row.window = window;
+        row.noise = noise;
+        if (noise <= preintegration_promise) row.promise = ValidationTolerance{};
+      }
     }
   }
-  const auto promised = [](const PreintegrationRow& row) { return row.noise <= preintegration_promise; };
-  const auto judged = static_cast<double>(std::count_if(rows.begin(), rows.end(), promised));
+  const auto judged = static_cast<double>(
+      std::count_if(rows.begin(), rows.end(), [](const PreintegrationRow& row) { return row.promise.has_value(); }));
   // The amount of work is that of the readings.
   double all = 0, before = 0;
   for (const PreintegrationRow& row : rows) all += row.window;
@@ -127,40 +114,12 @@ std::vector<PreintegrationRow> validatePreintegration(
                       outcome.mu2 = trial(row.check, row.window, row.noise, rng);
                       return std::vector<TrialOutcome>{outcome};
                     });
-    row.report = std::move(reports.front());
-    if (promised(row)) {
-      row.reason = row.report.reasonToFail(preintegration_false_alarm / judged, {});
-      row.passed = row.reason.empty();
-    }
-    row.report.mu2 = {};
+    row.setReport(std::move(reports.front()));
+    row.judge(run_false_alarm / judged);
+    row.forgetDistances();
     before += row.window;
   }
   return rows;
-}
-
-std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows) {
-  Table table({"check", "window s", "noise", "k", "index", "SE", "index/k", "K-S p", "95 % covers", "verdict"});
-  std::size_t judged = 0, failed = 0;
-  std::string reasons;
-  for (const PreintegrationRow& row : rows) {
-    const ValidationReport& r = row.report;
-    table.row({name(row.check), number(row.window), number(row.noise), fmt::format("{}", r.dof), number(r.index),
-               number(r.index_se, 2), fmt::format("{:.3f}", r.index / r.law.mean()), number(r.ks_p_value, 2),
-               fmt::format("{:.1f}", 100 * r.coverage[2].observed),
-               !row.passed   ? ""
-               : *row.passed ? "pass"
-                             : "FAIL"});
-    judged += row.passed.has_value();
-    if (row.passed.value_or(true)) continue;
-    ++failed;
-    reasons += fmt::format("FAILED {} {} s, noise {}: {}\n", name(row.check), row.window, row.noise, row.reason);
-  }
-  return fmt::format(
-      "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n{}\n{}{} of {} rows "
-      "in "
-      "the promised domain (noise up to {:g}) pass; false alarms: one in {:g} runs\n{}\n",
-      table.str(110), reasons, judged - failed, judged, preintegration_promise, 1 / preintegration_false_alarm,
-      failed == 0 ? "PASSED" : "FAILED");
 }
 
 }  // namespace liestat::experiments

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <stats/validation.hpp>
+#include <experiments/judged_report.hpp>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +19,12 @@ enum class PreintegrationCheck {
 };
 inline constexpr std::array all_preintegration_checks = {PreintegrationCheck::motion, PreintegrationCheck::walk,
                                                          PreintegrationCheck::motion_and_bias};
-std::string name(PreintegrationCheck check);
+/// Names in options and JSON fields, in the order of the enumerators.
+inline constexpr std::array preintegration_check_names{"motion", "walk", "motion_and_bias"};
+inline std::string name(PreintegrationCheck check) {
+  return preintegration_check_names[static_cast<std::size_t>(check)];
+}
+/// Degrees of freedom of the error that is judged.
 int degreesOfFreedom(PreintegrationCheck check);
 
 /// What `liestat validate preintegration` runs: the product of the lists, at 200 readings a second.
@@ -32,25 +37,18 @@ struct PreintegrationValidation {
   int threads = 0;
 };
 
-/// One line of the JSON.
-struct PreintegrationRow {
+/// One row. The distances themselves are not kept.
+struct PreintegrationRow : JudgedReport {
   PreintegrationCheck check{};
-  double window = 0, noise = 0;
-  ValidationReport report;
-  std::optional<bool> passed;  ///< the verdict; absent outside the promised domain
-  std::string reason;          ///< why it failed
+  double window = 0;  ///< s
+  double noise = 0;   ///< densities over those of an ADIS16448
 };
 
-/// False-alarm probability of a whole run, shared by the rows that are judged.
-inline constexpr double preintegration_false_alarm = 1e-5;
 /// Up to this multiple of the ADIS16448's noise the laws are promised (docs/preintegration.md).
 inline constexpr double preintegration_promise = 10;
 
 std::vector<PreintegrationRow> validatePreintegration(
     const PreintegrationValidation& validation,
     const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
-
-/// The table for the terminal, the verdict last.
-std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows);
 
 }  // namespace liestat::experiments

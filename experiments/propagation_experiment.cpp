@@ -5,34 +5,6 @@
 
 namespace liestat::experiments {
 
-std::string name(Propagated feature) {
-  switch (feature) {
-    case Propagated::rotation:
-      return "rotation";
-    case Propagated::pose:
-      return "pose";
-    case Propagated::similarity:
-      return "similarity";
-  }
-  return "";
-}
-
-std::string name(Operation operation) {
-  switch (operation) {
-    case Operation::compose:
-      return "compose";
-    case Operation::inverse:
-      return "inverse";
-    case Operation::between:
-      return "between";
-    case Operation::act:
-      return "act";
-    case Operation::chain:
-      return "chain";
-  }
-  return "";
-}
-
 int degreesOfFreedom(Propagated feature, Operation operation) {
   if (operation == Operation::act || feature == Propagated::rotation) return 3;
   return feature == Propagated::pose ? 6 : 7;

@@ -22,9 +22,11 @@ enum class Operation { compose, inverse, between, act, chain };
 inline constexpr std::array all_operations{Operation::compose, Operation::inverse, Operation::between, Operation::act,
                                            Operation::chain};
 
-/// The names of the program's options and JSON fields.
-std::string name(Propagated feature);
-std::string name(Operation operation);
+/// Names in options and JSON fields, in the order of the enumerators.
+inline constexpr std::array propagated_names{"rotation", "pose", "similarity"};
+inline constexpr std::array operation_names{"compose", "inverse", "between", "act", "chain"};
+inline std::string name(Propagated feature) { return propagated_names[static_cast<std::size_t>(feature)]; }
+inline std::string name(Operation operation) { return operation_names[static_cast<std::size_t>(operation)]; }
 
 /// An operation, to first or to fourth order in the noise.
 struct PropagationMethod {

@@ -1,14 +1,10 @@
 #include <experiments/propagation_validation.hpp>
 
-#include <cli/show/table.hpp>
-
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace liestat::experiments {
-using namespace cli;
 
 std::optional<ValidationTolerance> PropagationPromise::at(double noise) const {
   if (!(noise <= spread)) return std::nullopt;
@@ -106,71 +102,14 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
         PropagationRow& row = rows[first + m * spreads.size() + s];
         row.experiment = experiment;
         row.method = methods[m];
-        row.report = std::move(reports[m]);
+        row.setReport(std::move(reports[m]));
         row.promise = propagationPromise(feature, methods[m]).at(spreads[s]);
-        if (row.promise) {
-          row.reason = row.report.reasonToFail(propagation_false_alarm / judged, *row.promise);
-          row.passed = row.reason.empty();
-        }
-        row.histogram = row.report.histogram(30);
-        row.tail = static_cast<double>(row.report.tailCount()) / static_cast<double>(row.report.size());
-        // A hundred rows of a million distances would fill the memory.
-        row.report.mu2 = {};
+        row.judge(run_false_alarm / judged);
+        row.forgetDistances();
       }
     }
   }
   return rows;
-}
-
-std::string formatPropagationTables(const std::vector<PropagationRow>& rows) {
-  std::string text;
-  for (const Propagated feature : all_propagated) {
-    std::vector<PropagationMethod> methods;
-    for (const PropagationMethod& method : propagation_methods) {
-      if (!rowsOf(rows, feature, method).empty()) methods.push_back(method);
-    }
-    if (methods.empty()) continue;
-    std::vector<std::string> headers{"spread"};
-    for (const PropagationMethod& method : methods) headers.push_back(label(method));
-    Table index(headers), coverage(headers);
-    const auto levels = rowsOf(rows, feature, methods.front());
-    for (std::size_t s = 0; s < levels.size(); ++s) {
-      std::vector<std::string> index_cells{number(levels[s]->experiment.spread)}, coverage_cells = index_cells;
-      for (const PropagationMethod& method : methods) {
-        const PropagationRow& row = *rowsOf(rows, feature, method)[s];
-        const char* mark = row.passed.value_or(true) ? "" : " !";
-        index_cells.push_back(std::isfinite(row.relativeIndex()) ? fmt::format("{:.3f}{}", row.relativeIndex(), mark)
-                                                                 : "n/a");
-        coverage_cells.push_back(fmt::format("{:.1f}", 100 * row.report.coverage[2].observed));
-      }
-      index.row(index_cells);
-      coverage.row(coverage_cells);
-    }
-    Table summary({"operation", "k", "consistent up to", "promised up to"});
-    for (const PropagationMethod& method : methods) {
-      const std::optional<double> consistent = consistentUpTo(rows, feature, method);
-      summary.row({label(method), fmt::format("{}", degreesOfFreedom(feature, method.operation)),
-                   consistent ? number(*consistent) : "-", number(propagationPromise(feature, method).spread)});
-    }
-    text += fmt::format(
-        "\n{}\n\nValidation index over k, 1 expected; spread: largest sd of the inputs, rad and m\n{}"
-        "\nTruth inside the 95 % region, %\n{}"
-        "\nSpread up to which the index is within {:.0f} %, and up to which it is judged\n{}",
-        name(feature), index.str(), coverage.str(), 100 * consistent_deviation, summary.str());
-  }
-
-  std::size_t judged = 0, failed = 0;
-  for (const PropagationRow& row : rows) {
-    judged += row.passed.has_value();
-    if (row.passed.value_or(true)) continue;
-    ++failed;
-    text += fmt::format("\nFAILED {} {} spread {:.3g}: {}", name(row.experiment.feature), label(row.method),
-                        row.experiment.spread, row.reason);
-  }
-  if (failed > 0) text += "\n";
-  text += fmt::format("\n{} of {} rows in the promised domain pass; false alarms: one in {:g} runs\n", judged - failed,
-                      judged, 1 / propagation_false_alarm);
-  return text + (failed == 0 ? "PASSED\n" : "FAILED\n");
 }
 
 }  // namespace liestat::experiments

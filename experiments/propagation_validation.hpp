@@ -1,7 +1,7 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <experiments/propagation_experiment.hpp>
-#include <stats/validation.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -32,23 +32,11 @@ struct PropagationPromise {
 };
 PropagationPromise propagationPromise(Propagated feature, const PropagationMethod& method);
 
-/// One line of the JSON. The distances themselves are not kept.
-struct PropagationRow {
+/// One row. The distances themselves are not kept.
+struct PropagationRow : JudgedReport {
   PropagationExperiment experiment;
   PropagationMethod method{};
-  ValidationReport report;
-  std::vector<HistogramBin> histogram;
-  double tail = 0;                             ///< fraction of distances beyond the law's 99.9 % quantile
-  std::optional<ValidationTolerance> promise;  ///< absent outside the domain
-  std::optional<bool> passed;                  ///< the verdict, where there is a promise
-  std::string reason;                          ///< why it failed
-
-  /// The index over its expectation.
-  double relativeIndex() const { return report.index / report.law.mean(); }
 };
-
-/// False-alarm probability of a whole run, shared by the rows that are judged.
-inline constexpr double propagation_false_alarm = 1e-5;
 
 /// An index that is off by less is called consistent.
 inline constexpr double consistent_deviation = 0.05;
@@ -61,13 +49,6 @@ std::optional<double> consistentUpTo(const std::vector<PropagationRow>& rows, Pr
 std::vector<PropagationRow> validatePropagation(
     const PropagationValidation& validation,
     const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
-
-/// The tables for the terminal, the verdict last.
-std::string formatPropagationTables(const std::vector<PropagationRow>& rows);
-
-/// The report's page.
-void writePropagationReport(const std::string& directory, const std::string& command_line,
-                            const std::vector<PropagationRow>& rows);
 
 /// compose, or compose 4th for the fourth order.
 std::string label(const PropagationMethod& method);

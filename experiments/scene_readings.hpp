@@ -21,15 +21,16 @@ namespace liestat::experiments {
 /// What an inertial sensor reads from the first image to beyond the last, `rate` times a second: with white noise, the
 /// scene's bias of the accelerometer (InertialSceneOptions::bias) and one of the gyroscope (rad/s). Biases do not walk.
 inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, const ImuNoise<double>& noise,
-                                                 SceneRandom& random,
+                                                 CounterRng& random,
                                                  const Eigen::Vector3d& gyroscope_bias = Eigen::Vector3d::Zero(),
                                                  double rate = 200) {
   const double step = 1 / rate;
   std::vector<ImuSample<double>> readings;
   for (int k = 0; k <= static_cast<int>(scene.options().window / step) + 1; ++k) {
     readings.push_back(scene.reading(k * step));
-    readings.back().angular_rate += noise.gyroscope / std::sqrt(step) * random.normal3() + gyroscope_bias;
-    readings.back().specific_force += noise.accelerometer / std::sqrt(step) * random.normal3() + scene.options().bias;
+    readings.back().angular_rate += noise.gyroscope / std::sqrt(step) * random.normalVector<3>() + gyroscope_bias;
+    readings.back().specific_force +=
+        noise.accelerometer / std::sqrt(step) * random.normalVector<3>() + scene.options().bias;
   }
   return readings;
 }
@@ -52,7 +53,7 @@ inline std::vector<Preintegration<double>> motionsOf(const InertialScene& scene,
 }
 
 /// Replaces what the images of a scene's window know of the motion by what an inertial sensor at 200 Hz measures of it.
-inline void measure(InertialScene& scene, const ImuNoise<double>& noise, SceneRandom& random) {
+inline void measure(InertialScene& scene, const ImuNoise<double>& noise, CounterRng& random) {
   const auto motions = motionsOf(scene, readingsOf(scene, noise, random));
   Preintegration<double> whole;
   for (std::size_t j = 1; j < scene.times.size(); ++j) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <experiments/recording.hpp>
+#include <experiments/spline_trajectory.hpp>
 #include <fusion/imu/readings.hpp>
 #include <lie/se3.hpp>
 
@@ -7,16 +9,27 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <cli/io/calibration.hpp>
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
-#include <experiments/spline_trajectory.hpp>
-
 namespace liestat::experiments {
-using namespace cli;
+
+/// What was asked for cannot be simulated: what there is, and what would be needed.
+class ImpossibleMotion : public std::invalid_argument {
+ public:
+  ImpossibleMotion(std::string found, std::string expected)
+      : std::invalid_argument(found + ", expected " + expected),
+        found_(std::move(found)),
+        expected_(std::move(expected)) {}
+
+  const std::string& found() const { return found_; }
+  const std::string& expected() const { return expected_; }
+
+ private:
+  std::string found_, expected_;
+};
 
 /// When there are images, and what they see of a world of points on the faces of a box.
 struct ViSceneOptions {
@@ -66,29 +79,22 @@ struct SimulatedRecording {
 SplineTrajectory builtInTrajectory(double duration, std::uint64_t seed);
 
 /// The smooth motion along a ground truth, whose poses every `spacing` seconds are its control points. Throws
-/// InputError (which names `file`) where the truth is too short or has a gap of more than 0.1 s.
-SplineTrajectory trajectoryAlong(const std::vector<GroundTruth>& truth, double spacing, const std::string& file);
+/// ImpossibleMotion where the truth is too short or has a gap of more than 0.1 s.
+SplineTrajectory trajectoryAlong(const std::vector<GroundTruth>& truth, double spacing);
 
 /// Readings and images of a smooth motion from `begin` to `end`, s; its own states are the truth, exactly. The first
 /// image is one reading after the beginning. A camera without a size is taken to be twice as large as its principal
-/// point is far from the corner. Throws InputError where begin and end are not within the motion, where that does not
+/// point is far from the corner. Throws ImpossibleMotion where begin and end are not within the motion, where that does not
 /// fit into the box, and where there are fewer than two images.
 SimulatedRecording simulateMotion(const SplineTrajectory& motion, double begin, double end,
                                   const CameraCalibration& camera, const SyntheticImuOptions& imu,
                                   const ViSceneOptions& scene);
 
 /// Images along a real recording whose readings are kept as they are: the ground truth's rows from `begin` to `end`,
-/// and images at those of them that are nearest to the rate asked for. Throws InputError as simulateMotion does, and
-/// where the two files have no time in common.
-SimulatedRecording simulateImages(const ImuFile& imu, const std::vector<GroundTruth>& truth, double begin, double end,
-                                  const CameraCalibration& camera, const ViSceneOptions& scene);
-
-/// Writes imu.csv, images.csv and truth.csv as EuRoC does, tracks.csv (frame,track,u,v; the frame is the row of
-/// images.csv), calibration.yaml in Kalibr's form and landmarks.csv (track,x,y,z,outlier). Image times are on the
-/// camera's clock. Throws InputError where the directory cannot be written.
-void writeRecording(const SimulatedRecording& recording, const std::string& directory);
-
-/// The command line that initialises from the files of writeRecording.
-std::string nextCommand(const std::string& directory);
+/// and images at those of them that are nearest to the rate asked for. Throws ImpossibleMotion as simulateMotion does, and
+/// where readings and truth have no time in common.
+SimulatedRecording simulateImages(const std::vector<ImuSample<double>>& imu, const std::vector<GroundTruth>& truth,
+                                  double begin, double end, const CameraCalibration& camera,
+                                  const ViSceneOptions& scene);
 
 }  // namespace liestat::experiments

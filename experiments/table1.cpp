@@ -67,9 +67,8 @@ Recognised recognise(const ClosedFormCase& c, CounterRng& rng) {
 
 Recognised recognise(const NoisyClosedFormCase& c, CounterRng& rng) {
   InertialScene scene(c.scene, rng());
-  SceneRandom random(rng());
-  measure(scene, vi_init_imu, random);
-  scene.addNoise(bearing_noise, random);
+  measure(scene, vi_init_imu, rng);
+  scene.addNoise(bearing_noise, rng);
   const ClosedFormResult r =
       solveClosedForm(scene.window, {.bearing_noise = bearing_noise,
                                      .prior = {.accelerometer_sigma = c.bias_sigma},
@@ -246,7 +245,7 @@ std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, i
   for (const Table1Entry& entry : entries) all += entry.exact.size() + 9 * entry.noisy.size();
   std::size_t done = 0;
   const double false_alarm =
-      table1_false_alarm / static_cast<double>(closedFormCases().size() + noisyClosedFormCases().size());
+      run_false_alarm / static_cast<double>(closedFormCases().size() + noisyClosedFormCases().size());
   const auto judge = [&](Table1Row& row, double allowed) {
     row.passed = binomialSurvival(row.wrong, row.scenes, allowed) >= false_alarm;
   };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <fusion/init/closed_form_types.hpp>
 
 #include <array>
@@ -15,6 +16,7 @@ namespace liestat::experiments {
 /// How many solutions a status stands for.
 enum class SolutionCount { one, two, infinite };
 SolutionCount solutionsOf(FusionStatus status);
+
 /// A row of Martinelli's Table 1 (2012), or what his text says beside it.
 struct Table1Entry {
   const char* cases;  ///< the motion, images n and features N
@@ -33,7 +35,7 @@ struct Table1Correction {
 };
 const std::vector<Table1Correction>& table1Corrections();
 
-/// What one case was recognised as.
+/// The outcome of one case: the statuses and solutions that its scenes were recognised to have.
 struct Table1Row {
   std::size_t entry = 0;  ///< of table1Entries()
   std::string name, corrections;
@@ -51,17 +53,8 @@ struct Table1Row {
 
 /// Probability that a scene drawn at random is so near to another case that it counts as that, with exact data.
 inline constexpr double table1_near_another_case = 1e-3;
-/// False-alarm probability of a whole run, shared by the rows.
-inline constexpr double table1_false_alarm = 1e-5;
-
+/// Recognises all cases of the table in so many scenes each; the same for any number of threads.
 std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, int threads,
                                        const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
-
-/// The table for the terminal, with the corrections below and the verdict last.
-std::string formatTable1(const std::vector<Table1Row>& rows);
-
-/// A page with the same.
-void writeTable1Report(const std::string& directory, const std::string& command_line,
-                       const std::vector<Table1Row>& rows);
 
 }  // namespace liestat::experiments

@@ -3,9 +3,10 @@
 #include <fusion/init/closed_form_types.hpp>
 #include <experiments/inertial_scene.hpp>
 
+#include <Eigen/Core>
+
 #include <cstdint>
 #include <optional>
-#include <string>
 
 namespace liestat::experiments {
 
@@ -27,10 +28,10 @@ std::optional<TwoSolutions> twoSolutions(int figure, std::uint64_t seed);
 /// The second solution's lengths over the first's: the mean of the features'.
 double measuredScale(const TwoSolutions& found);
 
-/// For people: both solutions in numbers.
-std::string formatTwoSolutions(const TwoSolutions& found);
+/// Where the body is at a time according to a solution: in its axes at the first image, from there (m).
+Eigen::Vector3d positionAt(const InertialScene& scene, const ClosedFormSolution& solution, double t);
 
-/// A page with the figure.
-void writeTwoSolutionsReport(const std::string& directory, const std::string& command_line, const TwoSolutions& found);
+/// The distance of the farthest feature or position of a solution from the first position (m).
+double extent(const InertialScene& scene, const ClosedFormSolution& solution);
 
 }  // namespace liestat::experiments

@@ -53,10 +53,7 @@ constexpr std::array<Errors, 1> drifting = {
 
 std::optional<ViInitPromise> errorsOf(std::span<const Errors> list, const ViInitRow& row, bool only_note,
                                       std::size_t note_windows) {
-  const auto found = std::find_if(list.begin(), list.end(), [&](const Errors& e) {
-    return e.window.seconds == row.window.seconds && e.window.images == row.window.images &&
-           e.window.features == row.window.features;
-  });
+  const auto found = std::find_if(list.begin(), list.end(), [&](const Errors& e) { return e.window == row.window; });
   if (found == list.end()) return {};
   const bool speed = row.quantity == Quantity::speed, gravity = row.quantity == Quantity::gravity;
   const bool scale = row.quantity == Quantity::scale;
@@ -93,23 +90,20 @@ std::optional<ViInitPromise> distances(const ViInitRow& row) {
 }  // namespace
 
 std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
-  switch (row.quantity) {
-    case Quantity::nees_v:
-    case Quantity::nees_v_g:
-    case Quantity::nees_all:
-    case Quantity::nees_last_state:
+  switch (statistic(row.quantity)) {
+    case ViInitStatistic::distance:
       return distances(row);
-    case Quantity::chi2_per_dof: {
+    case ViInitStatistic::chi_squared: {
       ViInitPromise promise;
       promise.deviation = 0.01;
       return promise;
     }
-    case Quantity::selection: {
+    case ViInitStatistic::fraction: {
       ViInitPromise promise;
       promise.fraction = 0.99;
       return promise;
     }
-    default:
+    case ViInitStatistic::error:
       break;
   }
   switch (row.estimator) {

@@ -25,30 +25,27 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
 
 }  // namespace
 
-std::vector<double> refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
                                       .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}};
   const std::uint64_t seed = rng();
-  SceneRandom random(rng());
-  const Eigen::Vector3d accelerometer = noise * options.prior.accelerometer_sigma * random.normal3();
-  const Eigen::Vector3d gyroscope = noise * options.prior.gyroscope_sigma * random.normal3();
+  const Eigen::Vector3d accelerometer = noise * options.prior.accelerometer_sigma * rng.normalVector<3>();
+  const Eigen::Vector3d gyroscope = noise * options.prior.gyroscope_sigma * rng.normalVector<3>();
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
                       seed);
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
-  const auto readings = readingsOf(scene, simulated, random, gyroscope);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  const auto readings = readingsOf(scene, simulated, rng, gyroscope);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const InertialWindow window = windowOf(scene, readings, {.preintegration = {.noise = vi_init_imu}});
 
-  const double none = std::numeric_limits<double>::quiet_NaN(), lost = std::numeric_limits<double>::infinity();
-  const std::vector<double> failed{none, none, none, none, none, none, lost, lost, lost, lost};
   const auto start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise,
                                                                     .closed_form = {.singular_values = false}});
-  if (start.solutions.empty()) return failed;
+  if (start.solutions.empty()) return {};
   const RefinementResult r = refine(window, start.solutions[0], {}, options);
-  // What a user would throw away for its χ² is left out only where the noise is what the estimator was told: else it
-  // would hide what is to be seen.
-  if (r.status != FusionStatus::ok || (noise == 1 && !r.ok())) return failed;
+  // A window that a user would throw away for its χ² is left out only where the noise is the one that the estimator was
+  // told: else this would hide the distances.
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.ok())) return {};
 
   Eigen::Matrix<double, 12, 1> error;
   error << r.velocity() - scene.velocity, r.gravity - scene.gravity, r.bias.gyroscope - gyroscope,
@@ -59,19 +56,15 @@ std::vector<double> refinementTrial(const ViInitWindow& size, double noise, Coun
                    Eigen::Vector3d(body_R_world * (scene.position(end) - scene.position(0))),
                    Eigen::Vector3d(body_R_world * scene.speed(end)));
   const Eigen::Matrix<double, 9, 1> last_error = (last.inverse() * r.states.back()).log();
-  const ViErrors errors = viErrors(r.velocity(), r.gravity, scene);
-  return {mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
-                                        r.covariance.of<InitialCovariance::first_velocity>()),
-          neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
-          neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
-          mahalanobisSquared<double, 9>(last_error,
-                                        Eigen::Matrix<double, 9, 9>(r.covariance.atLast().topLeftCorner<9, 9>())),
-          r.cost,
-          static_cast<double>(r.degrees_of_freedom),
-          errors.speed,
-          errors.gravity,
-          errors.scale,
-          scaleOfFeatures(r.features, scene)};
+  const Eigen::Matrix<double, 9, 9> last_covariance = r.covariance.atLast().topLeftCorner<9, 9>();
+  return {.nees_v = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
+                                                  r.covariance.of<InitialCovariance::first_velocity>()),
+          .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
+          .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
+          .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
+          .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
+          .errors = viErrors(r.velocity(), r.gravity, scene),
+          .scale_of_features = scaleOfFeatures(r.features, scene)};
 }
 
 }  // namespace liestat::experiments

@@ -6,49 +6,45 @@
 
 namespace liestat::experiments {
 
-std::vector<double> gyroscopeBiasTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds}, rng());
-  SceneRandom random(rng());
-  const Eigen::Vector3d bias = 0.05 * random.unit();
+  const Eigen::Vector3d bias = 0.05 * rng.unitVector<3>();
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
-  const auto readings = readingsOf(scene, simulated, random, bias);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  const auto readings = readingsOf(scene, simulated, rng, bias);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const InertialWindow window = windowOf(scene, readings);
   const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
                                       .closed_form = {.singular_values = false}};
   const GyroscopeBiasResult found = estimateGyroscopeBias(window, options);
-  ViErrors with;
-  double error = std::numeric_limits<double>::infinity();
+  GyroscopeBiasOutcome outcome;
   if (found.status == FusionStatus::ok) {
-    with = viErrors(found.result, scene);
-    error = (found.bias - bias).norm();
+    outcome.estimated = viErrors(found.result, scene);
+    outcome.bias = (found.bias - bias).norm();
   }
-  const ViErrors without = viErrors(solveClosedForm(closedFormWindow(window, {}), options), scene);
-  return {error, with.gravity, with.scale, without.gravity, without.scale};
+  outcome.ignored = viErrors(solveClosedForm(closedFormWindow(window, {}), options), scene);
+  return outcome;
 }
 
-std::vector<double> driftTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+DriftOutcome driftTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds}, rng());
-  SceneRandom random(rng());
-  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer},
-          random);
-  scene.addNoise(noise * vi_init_bearing_noise, random);
+  measure(scene, {.gyroscope = noise * vi_init_imu.gyroscope, .accelerometer = noise * vi_init_imu.accelerometer}, rng);
+  scene.addNoise(noise * vi_init_bearing_noise, rng);
   const std::size_t wrong = size.features * 2 / 5;
-  scene.addDrift(wrong, 8 * vi_init_bearing_noise, random);
+  scene.addDrift(wrong, 8 * vi_init_bearing_noise, rng);
   const InitialisationOptions options{
       .bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}, .consensus = {.seed = rng()}};
   const ConsensusResult robust = solveClosedFormRobustly(scene.window, options);
-  bool exact = robust.inliers.size() == size.features - wrong;
-  for (const std::size_t i : robust.inliers) exact = exact && i >= wrong;
-  const ViErrors all = viErrors(solveClosedForm(scene.window, options), scene);
+  DriftOutcome outcome;
+  outcome.exact_selection = robust.inliers.size() == size.features - wrong;
+  for (const std::size_t i : robust.inliers) outcome.exact_selection = outcome.exact_selection && i >= wrong;
+  outcome.no_selection = viErrors(solveClosedForm(scene.window, options), scene);
   ClosedFormWindow right = scene.window;
   for (std::size_t i = 0; i < wrong; ++i) right.features[i].clear();
-  const ViErrors oracle = viErrors(solveClosedForm(right, options), scene);
+  outcome.oracle = viErrors(solveClosedForm(right, options), scene);
   // No consensus is no answer.
-  const ViErrors kept = robust.inliers.empty() ? ViErrors{} : viErrors(robust.result, scene);
-  return {exact ? 1. : 0., kept.speed,   kept.gravity, kept.scale,  oracle.speed,
-          oracle.gravity,  oracle.scale, all.speed,    all.gravity, all.scale};
+  if (!robust.inliers.empty()) outcome.robust = viErrors(robust.result, scene);
+  return outcome;
 }
 
 }  // namespace liestat::experiments

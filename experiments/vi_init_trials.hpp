@@ -1,11 +1,13 @@
 #pragma once
 
-// The trials behind `liestat validate vi-init`, each in a unit of its own: they are what costs a compiler time.
+// The trials behind `liestat validate vi-init`, each in a unit of its own: they are what costs a compiler time. A trial
+// draws a scene and its measurements, estimates, and compares with the truth. What could not be estimated has NaN
+// distances and infinite errors.
 
 #include <stats/random.hpp>
 
 #include <cstddef>
-#include <vector>
+#include <limits>
 
 namespace liestat::experiments {
 
@@ -13,35 +15,72 @@ namespace liestat::experiments {
 struct ViInitWindow {
   double seconds = 2;
   std::size_t images = 21, features = 20;
+
+  friend bool operator==(const ViInitWindow&, const ViInitWindow&) = default;
 };
 
 /// Bearings: one pixel of a camera with a focal length of 450.
 inline constexpr double vi_init_bearing_noise = 1. / 450;
 
-/// One trial: the numbers of its experiment's columns in their order, NaN for what failed. `noise` multiplies the noise
-/// that is simulated, not the one that the estimators are told.
-using ViInitTrial = std::vector<double> (*)(const ViInitWindow& window, double noise, CounterRng& rng);
+/// Errors of a solution. Infinite for a window without one.
+struct ViErrors {
+  double speed = std::numeric_limits<double>::infinity();    ///< m/s: length of the error of V
+  double gravity = std::numeric_limits<double>::infinity();  ///< degrees: angle to the true one
+  double scale = std::numeric_limits<double>::infinity();    ///< %: length of V over the true one, off 1
+};
 
-/// The refinement, biases drawn from their priors, started at the closed form for biases of zero. NEES of V, of V and
-/// G, of all, of the last state; cost, its degrees of freedom; errors of speed (m/s), gravity (deg), and scale, of V
-/// and of the features (%).
-std::vector<double> refinementTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// A sum of squared residuals and its degrees of freedom; NaN for a window without a solution.
+struct ViChiSquared {
+  double cost = std::numeric_limits<double>::quiet_NaN();
+  double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
+};
 
-/// The closed form with image noise only: NEES of V and G; cost, its degrees of freedom.
-std::vector<double> closedFormNeesTrial(const ViInitWindow& window, double noise, CounterRng& rng);
-/// The same with the accelerometer's bias: NEES of V and G, and of V, G and bias; cost, its degrees of freedom.
-std::vector<double> closedFormBiasNeesTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// What a trial is made of. `noise` multiplies the noise that is simulated, not the one that the estimators are told.
+template <class Outcome>
+using ViInitTrial = Outcome (*)(const ViInitWindow& window, double noise, CounterRng& rng);
 
-/// Image and sensor noise, biases known: speed, gravity, scale of the closed form, then of weighted least squares
-/// alone.
-std::vector<double> closedFormErrorsTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// A refined window: squared Mahalanobis distances of the truth, and errors.
+struct RefinementOutcome {
+  double nees_v = std::numeric_limits<double>::quiet_NaN();           ///< of V, 3 degrees of freedom
+  double nees_v_g = std::numeric_limits<double>::quiet_NaN();         ///< of V and gravity, 5
+  double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< of V, gravity and both biases, 11
+  double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< of the state at the last image, 9
+  ViChiSquared chi2;
+  ViErrors errors;
+  double scale_of_features = std::numeric_limits<double>::infinity();  ///< %: median of their distances, off 1
+};
+/// The refinement, biases drawn from their priors, started at the closed form for biases of zero.
+RefinementOutcome refinementTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
-/// A gyroscope's bias of 0.05 rad/s: error of the bias (rad/s), gravity, scale with the bias estimated; then gravity
-/// and scale with it taken for zero.
-std::vector<double> gyroscopeBiasTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// A window solved in closed form, under its covariance.
+struct ClosedFormOutcome {
+  double nees_v_g = std::numeric_limits<double>::quiet_NaN();  ///< of V and gravity, 5 degrees of freedom
+  double nees_all = std::numeric_limits<double>::quiet_NaN();  ///< with the accelerometer's bias, 8; NaN without it
+  ViChiSquared chi2;
+};
+/// The closed form with image noise only.
+ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// The same with the accelerometer's bias.
+ClosedFormOutcome closedFormBiasNeesTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
-/// 40 % of the tracks drift by a random walk of 8 pixels an image: 1 where exactly the others were kept, else 0; speed,
-/// gravity, scale with those that were kept, with the right ones, with all.
-std::vector<double> driftTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// Image and sensor noise, biases known: the closed form, and weighted least squares alone.
+struct AccuracyOutcome {
+  ViErrors closed_form, least_squares;
+};
+AccuracyOutcome closedFormErrorsTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+
+/// A gyroscope's bias of 0.05 rad/s, estimated, and taken for zero.
+struct GyroscopeBiasOutcome {
+  double bias = std::numeric_limits<double>::infinity();  ///< rad/s: length of the error of the estimated one
+  ViErrors estimated, ignored;
+};
+GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+
+/// 40 % of the tracks drift by a random walk of 8 pixels an image.
+struct DriftOutcome {
+  bool exact_selection = false;           ///< exactly the other tracks were kept
+  ViErrors robust, oracle, no_selection;  ///< with those that were kept, with the right ones, with all
+};
+DriftOutcome driftTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
 }  // namespace liestat::experiments

@@ -3,10 +3,11 @@
 #include <experiments/parallel.hpp>
 #include <stats/executor.hpp>
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <utility>
 
 namespace liestat::experiments {
@@ -16,12 +17,64 @@ using Check = ViInitCheck;
 using Estimator = ViInitEstimator;
 using Quantity = ViInitQuantity;
 
-/// A kind of window and what each of its trials gives. A column of χ² per degree of freedom takes two numbers.
+/// What is known of a quantity, in the order of the enumerators.
+struct QuantityEntry {
+  const char* name;
+  const char* unit;
+  ViInitStatistic statistic;
+};
+constexpr std::array<QuantityEntry, 11> quantities = {{
+    {"nees_v", "", ViInitStatistic::distance},
+    {"nees_v_g", "", ViInitStatistic::distance},
+    {"nees_all", "", ViInitStatistic::distance},
+    {"nees_last_state", "", ViInitStatistic::distance},
+    {"chi2_per_dof", "", ViInitStatistic::chi_squared},
+    {"speed", "m/s", ViInitStatistic::error},
+    {"gravity", "deg", ViInitStatistic::error},
+    {"scale", "%", ViInitStatistic::error},
+    {"scale_of_features", "%", ViInitStatistic::error},
+    {"bias", "rad/s", ViInitStatistic::error},
+    {"selection", "", ViInitStatistic::fraction},
+}};
+static_assert(static_cast<std::size_t>(Quantity::selection) + 1 == quantities.size());
+constexpr std::array estimators = {"refinement",    "closed_form",    "closed_form_with_bias",
+                                   "least_squares", "bias_estimated", "bias_ignored",
+                                   "robust",        "oracle",         "no_selection"};
+static_assert(static_cast<std::size_t>(Estimator::no_selection) + 1 == estimators.size());
+constexpr std::array checks = {"consistency", "closed_form", "accuracy", "gyroscope_bias", "drift"};
+static_assert(all_vi_init_checks.size() == checks.size());
+
+const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
+
+/// The values of one row: one a trial.
+struct Values {
+  std::vector<double> value;
+  std::vector<double> dof;  ///< of χ²; else empty
+};
+
+/// A row of an experiment: who estimated what, and where an outcome has it.
+template <class Outcome>
+struct Column {
+  Estimator estimator;
+  Quantity quantity;
+  double (*value)(const Outcome&);
+  int dof = 0;                                   ///< of a distance
+  double (*chi2_dof)(const Outcome&) = nullptr;  ///< degrees of freedom of a χ²
+};
+
+/// A kind of window and the rows that its trials give.
 struct Experiment {
   Check check;
-  ViInitTrial trial;
   ViInitWindow window;
-  std::vector<std::pair<Estimator, Quantity>> columns;
+  /// A row without results.
+  struct Row {
+    Estimator estimator;
+    Quantity quantity;
+    int dof = 0;  ///< of a distance
+  };
+  std::vector<Row> rows;
+  /// All trials: the values of each row.
+  std::function<std::vector<Values>(const ViInitValidation&, const std::function<void(std::size_t)>& progress)> run;
 
   /// Milliseconds of a trial, about: for the progress bar.
   double work() const {
@@ -30,59 +83,121 @@ struct Experiment {
   }
 };
 
-std::vector<Experiment> experiments(const ViInitValidation& validation) {
-  using Q = Quantity;
-  const auto errorsOf = [](std::vector<Estimator> estimators) {
-    std::vector<std::pair<Estimator, Quantity>> columns;
-    for (const Estimator e : estimators) {
-      for (const Q q : {Q::speed, Q::gravity, Q::scale}) columns.emplace_back(e, q);
+template <class Outcome>
+std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window,
+                               const ViInitValidation& validation, const std::function<void(std::size_t)>& progress) {
+  using Outcomes = std::vector<Outcome>;
+  const std::size_t n_chunks = chunkCount(validation.trials, 8);
+  return ProgramExecutor{validation.threads}.reduce(
+      n_chunks,
+      [&](std::size_t chunk) {
+        Outcomes part;
+        const ChunkRange range = chunkRange(validation.trials, n_chunks, chunk);
+        for (std::size_t i = range.begin; i < range.end; ++i) {
+          CounterRng rng(validation.seed, i);
+          part.push_back(trial(window, validation.noise, rng));
+        }
+        return part;
+      },
+      [&](Outcomes& done, const Outcomes& next) {
+        done.insert(done.end(), next.begin(), next.end());
+        progress(done.size());
+      });
+}
+
+template <class Outcome>
+Experiment experiment(Check check, ViInitTrial<Outcome> trial, const ViInitWindow& window,
+                      const std::vector<Column<Outcome>>& columns) {
+  Experiment e{.check = check, .window = window, .rows = {}, .run = {}};
+  for (const Column<Outcome>& c : columns) e.rows.push_back({c.estimator, c.quantity, c.dof});
+  e.run = [trial, window, columns](const ViInitValidation& validation,
+                                   const std::function<void(std::size_t)>& progress) {
+    std::vector<Values> values(columns.size());
+    for (const Outcome& outcome : runTrials(trial, window, validation, progress)) {
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        values[k].value.push_back(columns[k].value(outcome));
+        if (columns[k].chi2_dof != nullptr) values[k].dof.push_back(columns[k].chi2_dof(outcome));
+      }
     }
-    return columns;
+    return values;
   };
+  return e;
+}
+
+/// The rows of the errors of one estimator: speed, gravity, scale.
+template <auto errors, class Outcome>
+void addErrors(std::vector<Column<Outcome>>& columns, Estimator estimator) {
+  columns.push_back({estimator, Quantity::speed, [](const Outcome& o) { return (o.*errors).speed; }});
+  columns.push_back({estimator, Quantity::gravity, [](const Outcome& o) { return (o.*errors).gravity; }});
+  columns.push_back({estimator, Quantity::scale, [](const Outcome& o) { return (o.*errors).scale; }});
+}
+/// The row of a distance with so many degrees of freedom.
+template <auto member, class Outcome>
+void addDistance(std::vector<Column<Outcome>>& columns, Estimator estimator, Quantity quantity, int dof) {
+  columns.push_back({estimator, quantity, [](const Outcome& o) { return o.*member; }, dof});
+}
+template <class Outcome>
+void addChiSquared(std::vector<Column<Outcome>>& columns, Estimator estimator) {
+  columns.push_back({estimator, Quantity::chi2_per_dof, [](const Outcome& o) { return o.chi2.cost; }, 0,
+                     [](const Outcome& o) { return o.chi2.degrees_of_freedom; }});
+}
+
+std::vector<Experiment> experiments(const ViInitValidation& validation) {
   std::vector<Experiment> list;
-  const Estimator refinement = Estimator::refinement;
+
+  std::vector<Column<RefinementOutcome>> refined;
+  using R = RefinementOutcome;
+  addDistance<&R::nees_v>(refined, Estimator::refinement, Quantity::nees_v, 3);
+  addDistance<&R::nees_v_g>(refined, Estimator::refinement, Quantity::nees_v_g, 5);
+  addDistance<&R::nees_all>(refined, Estimator::refinement, Quantity::nees_all, 11);
+  addDistance<&R::nees_last_state>(refined, Estimator::refinement, Quantity::nees_last_state, 9);
+  addChiSquared(refined, Estimator::refinement);
+  addErrors<&R::errors>(refined, Estimator::refinement);
+  refined.push_back(
+      {Estimator::refinement, Quantity::scale_of_features, [](const R& o) { return o.scale_of_features; }});
   for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 11, 20}, ViInitWindow{2, 21, 20},
                                      ViInitWindow{3, 16, 20}, ViInitWindow{2, 21, 50}}) {
-    list.push_back({Check::consistency,
-                    refinementTrial,
-                    window,
-                    {{refinement, Q::nees_v},
-                     {refinement, Q::nees_v_g},
-                     {refinement, Q::nees_all},
-                     {refinement, Q::nees_last_state},
-                     {refinement, Q::chi2_per_dof},
-                     {refinement, Q::speed},
-                     {refinement, Q::gravity},
-                     {refinement, Q::scale},
-                     {refinement, Q::scale_of_features}}});
+    list.push_back(experiment(Check::consistency, refinementTrial, window, refined));
   }
-  const Estimator plain = Estimator::closed_form, with_bias = Estimator::closed_form_with_bias;
+
+  std::vector<Column<ClosedFormOutcome>> plain, with_bias;
+  using C = ClosedFormOutcome;
+  addDistance<&C::nees_v_g>(plain, Estimator::closed_form, Quantity::nees_v_g, 5);
+  addChiSquared(plain, Estimator::closed_form);
+  addDistance<&C::nees_v_g>(with_bias, Estimator::closed_form_with_bias, Quantity::nees_v_g, 5);
+  addDistance<&C::nees_all>(with_bias, Estimator::closed_form_with_bias, Quantity::nees_all, 8);
+  addChiSquared(with_bias, Estimator::closed_form_with_bias);
   for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}, ViInitWindow{4, 41, 20}}) {
-    list.push_back({Check::closed_form, closedFormNeesTrial, window, {{plain, Q::nees_v_g}, {plain, Q::chi2_per_dof}}});
+    list.push_back(experiment(Check::closed_form, closedFormNeesTrial, window, plain));
   }
   for (const ViInitWindow& window : {ViInitWindow{2, 21, 20}, ViInitWindow{3, 31, 20}, ViInitWindow{4, 41, 20}}) {
-    list.push_back({Check::closed_form,
-                    closedFormBiasNeesTrial,
-                    window,
-                    {{with_bias, Q::nees_v_g}, {with_bias, Q::nees_all}, {with_bias, Q::chi2_per_dof}}});
+    list.push_back(experiment(Check::closed_form, closedFormBiasNeesTrial, window, with_bias));
   }
+
+  std::vector<Column<AccuracyOutcome>> accuracy;
+  addErrors<&AccuracyOutcome::closed_form>(accuracy, Estimator::closed_form);
+  addErrors<&AccuracyOutcome::least_squares>(accuracy, Estimator::least_squares);
   for (const ViInitWindow& window :
        {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}, ViInitWindow{3, 31, 20}, ViInitWindow{4, 41, 20}}) {
-    list.push_back({Check::accuracy, closedFormErrorsTrial, window, errorsOf({plain, Estimator::least_squares})});
+    list.push_back(experiment(Check::accuracy, closedFormErrorsTrial, window, accuracy));
   }
-  const Estimator estimated = Estimator::bias_estimated, ignored = Estimator::bias_ignored;
-  list.push_back({Check::gyroscope_bias,
-                  gyroscopeBiasTrial,
-                  {2, 21, 20},
-                  {{estimated, Q::bias},
-                   {estimated, Q::gravity},
-                   {estimated, Q::scale},
-                   {ignored, Q::gravity},
-                   {ignored, Q::scale}}});
-  Experiment drift{
-      Check::drift, driftTrial, {2, 21, 40}, errorsOf({Estimator::robust, Estimator::oracle, Estimator::no_selection})};
-  drift.columns.insert(drift.columns.begin(), {Estimator::robust, Q::selection});
-  list.push_back(std::move(drift));
+
+  using G = GyroscopeBiasOutcome;
+  list.push_back(
+      experiment<G>(Check::gyroscope_bias, gyroscopeBiasTrial, {2, 21, 20},
+                    {{Estimator::bias_estimated, Quantity::bias, [](const G& o) { return o.bias; }},
+                     {Estimator::bias_estimated, Quantity::gravity, [](const G& o) { return o.estimated.gravity; }},
+                     {Estimator::bias_estimated, Quantity::scale, [](const G& o) { return o.estimated.scale; }},
+                     {Estimator::bias_ignored, Quantity::gravity, [](const G& o) { return o.ignored.gravity; }},
+                     {Estimator::bias_ignored, Quantity::scale, [](const G& o) { return o.ignored.scale; }}}));
+
+  using D = DriftOutcome;
+  std::vector<Column<D>> drift{
+      {Estimator::robust, Quantity::selection, [](const D& o) { return o.exact_selection ? 1. : 0.; }}};
+  addErrors<&D::robust>(drift, Estimator::robust);
+  addErrors<&D::oracle>(drift, Estimator::oracle);
+  addErrors<&D::no_selection>(drift, Estimator::no_selection);
+  list.push_back(experiment(Check::drift, driftTrial, {2, 21, 40}, drift));
 
   const auto unwanted = [&](const Experiment& e) {
     return std::find(validation.checks.begin(), validation.checks.end(), e.check) == validation.checks.end() ||
@@ -91,43 +206,6 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
   };
   list.erase(std::remove_if(list.begin(), list.end(), unwanted), list.end());
   return list;
-}
-
-/// All trials, one after the other.
-std::vector<std::vector<double>> run(const Experiment& e, const ViInitValidation& validation,
-                                     const std::function<void(std::size_t)>& progress) {
-  using Trials = std::vector<std::vector<double>>;
-  const std::size_t n_chunks = chunkCount(validation.trials, 8);
-  return ProgramExecutor{validation.threads}.reduce(
-      n_chunks,
-      [&](std::size_t chunk) {
-        Trials part;
-        const ChunkRange range = chunkRange(validation.trials, n_chunks, chunk);
-        for (std::size_t i = range.begin; i < range.end; ++i) {
-          CounterRng rng(validation.seed, i);
-          part.push_back(e.trial(e.window, validation.noise, rng));
-        }
-        return part;
-      },
-      [&](Trials& done, const Trials& next) {
-        done.insert(done.end(), next.begin(), next.end());
-        progress(done.size());
-      });
-}
-
-int degreesOfFreedom(Estimator estimator, Quantity quantity) {
-  switch (quantity) {
-    case Quantity::nees_v:
-      return 3;
-    case Quantity::nees_v_g:
-      return 5;
-    case Quantity::nees_all:
-      return estimator == Estimator::refinement ? 11 : 8;
-    case Quantity::nees_last_state:
-      return 9;
-    default:
-      return 0;
-  }
 }
 
 ValidationReport reportOf(const std::vector<double>& distances, int dof) {
@@ -165,147 +243,77 @@ std::string judgeErrors(const std::vector<double>& sorted, const ViInitPromise& 
   return {};
 }
 
-bool isError(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::speed:
-    case Quantity::gravity:
-    case Quantity::scale:
-    case Quantity::scale_of_features:
-    case Quantity::bias:
-      return true;
-    default:
-      return false;
+void evaluateErrors(ViInitRow& row, std::vector<double> values, double false_alarm) {
+  std::sort(values.begin(), values.end());
+  row.median = quantile(values, 0.5);
+  row.p95 = quantile(values, 0.95);
+  if (row.promise) row.reason = judgeErrors(values, *row.promise, false_alarm);
+}
+
+void evaluateDistances(ViInitRow& row, const std::vector<double>& values, int dof, double false_alarm) {
+  row.report = reportOf(values, dof);
+  if (row.promise) row.reason = reason(row.report->verdict(false_alarm, row.promise->tolerance));
+  row.report->mu2 = {};
+}
+
+void evaluateChiSquared(ViInitRow& row, const Values& values, double false_alarm) {
+  double cost = 0, all = 0;
+  for (std::size_t i = 0; i < values.value.size(); ++i) {
+    if (!std::isfinite(values.value[i])) continue;
+    cost += values.value[i];
+    all += values.dof[i];
+  }
+  row.value = cost / all;
+  row.value_se = std::sqrt(2 / all);
+  if (!row.promise) return;
+  if (!(chiSquaredSurvival(cost / (1 + row.promise->deviation), all) >= false_alarm / 2)) {
+    row.reason = "χ² is too large for its degrees of freedom";
+  } else if (!(chiSquaredCdf(cost / (1 - row.promise->deviation), all) >= false_alarm / 2)) {
+    row.reason = "χ² is too small for its degrees of freedom";
   }
 }
 
-/// Fills in a row from its column, and judges it if `false_alarm` is given.
-void evaluate(ViInitRow& row, std::vector<double> values, const std::vector<double>& dofs, double false_alarm) {
-  row.trials = values.size();
-  row.failures =
-      static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [](double x) { return !std::isfinite(x); }));
-  const bool judged = row.promise.has_value();
-  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
-  if (isError(row.quantity)) {
-    std::sort(values.begin(), values.end());
-    row.median = quantile(values, 0.5);
-    row.p95 = quantile(values, 0.95);
-    if (judged) row.reason = judgeErrors(values, promise, false_alarm);
-  } else if (const int dof = degreesOfFreedom(row.estimator, row.quantity); dof > 0) {
-    row.report = reportOf(values, dof);
-    if (judged) row.reason = row.report->reasonToFail(false_alarm, promise.tolerance);
-    row.report->mu2 = {};
-  } else if (row.quantity == Quantity::chi2_per_dof) {
-    double cost = 0, all = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!std::isfinite(values[i])) continue;
-      cost += values[i];
-      all += dofs[i];
-    }
-    row.value = cost / all;
-    row.value_se = std::sqrt(2 / all);
-    if (judged && !(chiSquaredSurvival(cost / (1 + promise.deviation), all) >= false_alarm / 2)) {
-      row.reason = "χ² is too large for its degrees of freedom";
-    } else if (judged && !(chiSquaredCdf(cost / (1 - promise.deviation), all) >= false_alarm / 2)) {
-      row.reason = "χ² is too small for its degrees of freedom";
-    }
-  } else {
-    const auto n = static_cast<double>(values.size());
-    const auto exact = static_cast<double>(std::count(values.begin(), values.end(), 1.));
-    row.value = exact / n;
-    row.value_se = std::sqrt(promise.fraction * (1 - promise.fraction) / n);
-    const std::size_t wrong = values.size() - static_cast<std::size_t>(exact);
-    if (judged && !(binomialSurvival(wrong, values.size(), 1 - promise.fraction) >= false_alarm)) {
-      row.reason = "the right tracks were kept too seldom";
-    }
+void evaluateFraction(ViInitRow& row, const std::vector<double>& values, double false_alarm) {
+  const double promised = row.promise.value_or(ViInitPromise{}).fraction;
+  const auto n = static_cast<double>(values.size());
+  const auto exact = static_cast<double>(std::count(values.begin(), values.end(), 1.));
+  row.value = exact / n;
+  row.value_se = std::sqrt(promised * (1 - promised) / n);
+  const std::size_t wrong = values.size() - static_cast<std::size_t>(exact);
+  if (row.promise && !(binomialSurvival(wrong, values.size(), 1 - promised) >= false_alarm)) {
+    row.reason = "the right tracks were kept too seldom";
   }
-  if (judged) row.passed = row.reason.empty();
+}
+
+/// Fills in a row from the values of its trials, and judges it if anything is promised.
+void evaluate(ViInitRow& row, const Values& values, int dof, double false_alarm) {
+  row.trials = values.value.size();
+  row.failures = static_cast<std::size_t>(
+      std::count_if(values.value.begin(), values.value.end(), [](double x) { return !std::isfinite(x); }));
+  switch (statistic(row.quantity)) {
+    case ViInitStatistic::distance:
+      evaluateDistances(row, values.value, dof, false_alarm);
+      break;
+    case ViInitStatistic::chi_squared:
+      evaluateChiSquared(row, values, false_alarm);
+      break;
+    case ViInitStatistic::error:
+      evaluateErrors(row, values.value, false_alarm);
+      break;
+    case ViInitStatistic::fraction:
+      evaluateFraction(row, values.value, false_alarm);
+      break;
+  }
+  if (row.promise) row.passed = row.reason.empty();
 }
 
 }  // namespace
 
-std::string name(ViInitCheck check) {
-  switch (check) {
-    case Check::consistency:
-      return "consistency";
-    case Check::closed_form:
-      return "closed_form";
-    case Check::accuracy:
-      return "accuracy";
-    case Check::gyroscope_bias:
-      return "gyroscope_bias";
-    case Check::drift:
-      return "drift";
-  }
-  return "";
-}
-
-std::string name(ViInitEstimator estimator) {
-  switch (estimator) {
-    case Estimator::refinement:
-      return "refinement";
-    case Estimator::closed_form:
-      return "closed_form";
-    case Estimator::closed_form_with_bias:
-      return "closed_form_with_bias";
-    case Estimator::least_squares:
-      return "least_squares";
-    case Estimator::bias_estimated:
-      return "bias_estimated";
-    case Estimator::bias_ignored:
-      return "bias_ignored";
-    case Estimator::robust:
-      return "robust";
-    case Estimator::oracle:
-      return "oracle";
-    case Estimator::no_selection:
-      return "no_selection";
-  }
-  return "";
-}
-
-std::string name(ViInitQuantity quantity) {
-  switch (quantity) {
-    case Quantity::nees_v:
-      return "nees_v";
-    case Quantity::nees_v_g:
-      return "nees_v_g";
-    case Quantity::nees_all:
-      return "nees_all";
-    case Quantity::nees_last_state:
-      return "nees_last_state";
-    case Quantity::chi2_per_dof:
-      return "chi2_per_dof";
-    case Quantity::speed:
-      return "speed";
-    case Quantity::gravity:
-      return "gravity";
-    case Quantity::scale:
-      return "scale";
-    case Quantity::scale_of_features:
-      return "scale_of_features";
-    case Quantity::bias:
-      return "bias";
-    case Quantity::selection:
-      return "selection";
-  }
-  return "";
-}
-
-std::string unit(ViInitQuantity quantity) {
-  switch (quantity) {
-    case Quantity::speed:
-      return "m/s";
-    case Quantity::gravity:
-      return "deg";
-    case Quantity::scale:
-    case Quantity::scale_of_features:
-      return "%";
-    case Quantity::bias:
-      return "rad/s";
-    default:
-      return "";
-  }
-}
+std::string name(ViInitCheck check) { return checks.at(static_cast<std::size_t>(check)); }
+std::string name(ViInitEstimator estimator) { return estimators.at(static_cast<std::size_t>(estimator)); }
+std::string name(ViInitQuantity quantity) { return entry(quantity).name; }
+std::string unit(ViInitQuantity quantity) { return entry(quantity).unit; }
+ViInitStatistic statistic(ViInitQuantity quantity) { return entry(quantity).statistic; }
 
 std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
                                       const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
@@ -314,35 +322,25 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   double all = 0, before = 0;
   for (const Experiment& e : list) {
     all += e.work();
-    for (const auto& [estimator, quantity] : e.columns) {
+    for (const Experiment::Row& of : e.rows) {
       ViInitRow row;
       row.check = e.check;
-      row.estimator = estimator;
-      row.quantity = quantity;
+      row.estimator = of.estimator;
+      row.quantity = of.quantity;
       row.window = e.window;
       row.promise = viInitPromise(row);
       rows.push_back(std::move(row));
     }
   }
   const auto judged = std::count_if(rows.begin(), rows.end(), [](const ViInitRow& row) { return row.promise; });
-  const double false_alarm = vi_init_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
+  const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
   auto row = rows.begin();
   for (const Experiment& e : list) {
-    const auto trials = run(e, validation, [&](std::size_t done) {
+    const std::vector<Values> values = e.run(validation, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(validation.trials);
       if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work()) / all), 1000000);
     });
-    const auto column = [&](std::size_t k) {
-      std::vector<double> values;
-      for (const auto& trial : trials) values.push_back(trial[k]);
-      return values;
-    };
-    std::size_t k = 0;
-    for (std::size_t c = 0; c < e.columns.size(); ++c, ++row) {
-      const bool two = row->quantity == Quantity::chi2_per_dof;
-      evaluate(*row, column(k), two ? column(k + 1) : std::vector<double>{}, false_alarm);
-      k += two ? 2 : 1;
-    }
+    for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);
     before += e.work();
   }
   return rows;

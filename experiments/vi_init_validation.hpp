@@ -1,5 +1,6 @@
 #pragma once
 
+#include <experiments/judged_report.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <stats/validation.hpp>
 
@@ -13,7 +14,7 @@
 
 namespace liestat::experiments {
 
-/// What is asked of visual-inertial initialisation.
+/// The questions that are asked of visual-inertial initialisation.
 enum class ViInitCheck {
   consistency,     ///< the refinement under its covariance, and its errors
   closed_form,     ///< the closed form under its covariance, with image noise alone
@@ -26,7 +27,7 @@ inline constexpr std::array all_vi_init_checks = {ViInitCheck::consistency, ViIn
                                                   ViInitCheck::drift};
 std::string name(ViInitCheck check);
 
-/// What was estimated, or left out of it.
+/// The estimator that a row is about, and what it leaves out.
 enum class ViInitEstimator {
   refinement,
   closed_form,
@@ -40,7 +41,7 @@ enum class ViInitEstimator {
 };
 std::string name(ViInitEstimator estimator);
 
-/// What a row is about.
+/// The quantity that a row is about.
 enum class ViInitQuantity {
   nees_v,           ///< squared Mahalanobis distance of V, 3 degrees of freedom
   nees_v_g,         ///< of V and gravity, 5
@@ -55,10 +56,19 @@ enum class ViInitQuantity {
   selection  ///< fraction of the windows in which exactly the right tracks were kept
 };
 std::string name(ViInitQuantity quantity);
-/// Empty for what has none.
+/// Its unit; empty for a pure number.
 std::string unit(ViInitQuantity quantity);
 
-/// What is promised of a row (docs/validation.md), and what the design note has. Infinite: nothing.
+/// How a quantity is judged.
+enum class ViInitStatistic {
+  distance,     ///< squared distances, against their law
+  chi_squared,  ///< a sum of squared residuals over its degrees of freedom
+  error,        ///< by median and 95 % quantile
+  fraction      ///< of the windows
+};
+ViInitStatistic statistic(ViInitQuantity quantity);
+
+/// The promise made about a row (docs/validation.md), and the figures of the design note. Infinite: none.
 struct ViInitPromise {
   ValidationTolerance tolerance = {};  ///< of distances; `failure_fraction` also of all others
   double median = std::numeric_limits<double>::infinity();
@@ -71,7 +81,7 @@ struct ViInitPromise {
   double fraction = 0;   ///< at least
 };
 
-/// What `liestat validate vi-init` runs.
+/// A run of `liestat validate vi-init`.
 struct ViInitValidation {
   std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
@@ -81,7 +91,7 @@ struct ViInitValidation {
   int threads = 0;
 };
 
-/// One line of the JSON. What does not apply is NaN.
+/// One line of the JSON. Numbers that do not apply are NaN.
 struct ViInitRow {
   ViInitCheck check{};
   ViInitEstimator estimator{};
@@ -98,20 +108,11 @@ struct ViInitRow {
   std::string reason;          ///< why it failed
 };
 
-/// False-alarm probability of a whole run, shared by the rows that are judged.
-inline constexpr double vi_init_false_alarm = 1e-5;
-
-/// What is promised of a row, if anything.
+/// The promise made about a row, if there is one.
 std::optional<ViInitPromise> viInitPromise(const ViInitRow& row);
 
+/// Runs the checks; rows in the order of the checks, windows and quantities. The same for any number of threads.
 std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
                                       const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
-
-/// The tables for the terminal, the verdict last.
-std::string formatViInitTables(const std::vector<ViInitRow>& rows);
-
-/// A page with plots.
-void writeViInitReport(const std::string& directory, const std::string& command_line,
-                       const std::vector<ViInitRow>& rows);
 
 }  // namespace liestat::experiments

@@ -11,6 +11,7 @@
 
 #include <cli/io/imu_file.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/numeric_table.hpp>
 #include <cli/io/reading.hpp>
 
 namespace {
@@ -25,19 +26,18 @@ bool isAbsentOrFull(const List& list, std::size_t n) {
 }
 
 void check(const liestat::cli::FeatureFile& file) {
-  using liestat::experiments::Feature;
+  using liestat::experiments::Part;
   const std::size_t n = file.size();
-  const bool rotates = file.kind == Feature::rotation || file.kind == Feature::frame;
+  const auto& parts = liestat::experiments::info(file.kind).parts;
   require(n > 0);
-  require(file.rotations.size() == (rotates ? n : 0));
-  require(file.vectors.size() == (file.kind == Feature::rotation ? 0 : n));
+  require(file.rotations.size() == (parts.contains(Part::rotation) ? n : 0));
+  require(file.positions.size() == (parts.contains(Part::position) ? n : 0));
+  require(file.directions.size() == (parts.contains(Part::direction) ? n : 0));
   require(isAbsentOrFull(file.weights, n) && isAbsentOrFull(file.times, n) && isAbsentOrFull(file.covariances, n));
   require(file.n_normalised <= n);
   for (const auto& rotation : file.rotations) require(std::abs(rotation.norm() - 1) < 1e-14);
-  for (const auto& vector : file.vectors) {
-    require(vector.allFinite());
-    if (file.kind == Feature::direction) require(std::abs(vector.norm() - 1) < 1e-14);
-  }
+  for (const auto& position : file.positions) require(position.allFinite());
+  for (const auto& direction : file.directions) require(std::abs(direction.norm() - 1) < 1e-14);
   for (const double weight : file.weights) require(weight > 0 && std::isfinite(weight));
   for (const double time : file.times) require(std::isfinite(time));
   for (const auto& covariance : file.covariances) require(covariance.allFinite() && covariance(0, 0) > 0);
@@ -46,9 +46,8 @@ void check(const liestat::cli::FeatureFile& file) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using liestat::cli::Format;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  for (const Format format : {Format::automatic, Format::csv, Format::tum, Format::euroc, Format::kitti}) {
+  for (const std::string& format : liestat::cli::formatNames()) {
     try {
       check(liestat::cli::readFeatures(text, "fuzz", {.format = format}));
     } catch (const liestat::cli::InputError& error) {

@@ -26,6 +26,7 @@
 #include <Eigen/Core>
 
 #include <concepts>
+#include <optional>
 
 namespace liestat {
 
@@ -89,11 +90,134 @@ concept Quotient = Homogeneous<M> && requires(const M& x) {
 };
 
 /// A manifold whose traits take it apart: factors(x) is a std::tuple of features of other manifolds, fromFactors(tuple)
-/// goes back, and where there is a metric the squared distance is the sum of the factors'. Means, their starts and
-/// their certificates of uniqueness are then those of the factors.
+/// goes back, and where there is a metric the squared distance is the sum of the factors', whose tangent coordinates
+/// stand one after the other in the order of the tuple. Means, their starts and their certificates of uniqueness are
+/// then those of the factors.
 template <class M>
 concept Factored = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::fromFactors(ManifoldTraits<M>::factors(x)) } -> std::convertible_to<M>;
+};
+
+// What statistics may be told about a manifold besides. All of it is optional: without it means start at the best of
+// several data, and the certificates of uniqueness are those that need distances alone. Statistics ask for these traits
+// and never for members of a type or for its layout in memory.
+
+/// The compact space on which means of a manifold can fail to be unique.
+enum class CompactFactor {
+  none,      ///< the manifold is flat: a mean is always unique
+  circle,    ///< SO(2)
+  sphere,    ///< S²
+  rotation,  ///< SO(3), or its quotient by half-turns where the manifold is a Quotient
+  unknown    ///< nothing is known: the default
+};
+
+/// A Metric manifold that is the product of one such space and a flat one: d² is the angle between compact parts,
+/// squared, plus a squared Euclidean distance. It says compact_factor, and unless that is none
+///   compact_begin          where its coordinates (rad; 1 of the circle, 2 of the sphere, 3 of SO(3)) begin in the
+///                          tangent vector; exp along them moves nothing else
+///   compactCoordinates(x)  the compact part as a unit vector: (cos, sin); a point of the sphere, the origin being
+///                          (0, 0, 1); the unit quaternion x y z w of either sign. Of expOrigin(v) it is the
+///                          exponential of v's compact coordinates, and the action of the group turns it
+template <class M>
+concept HasCompactFactor = Homogeneous<M> && requires {
+  { ManifoldTraits<M>::compact_factor } -> std::convertible_to<CompactFactor>;
+};
+
+namespace detail {
+
+/// compact_factor, or unknown where the traits do not say it.
+template <Homogeneous M>
+constexpr CompactFactor compactFactor() {
+  if constexpr (HasCompactFactor<M>) {
+    static_assert(
+        ManifoldTraits<M>::compact_factor == CompactFactor::none ||
+            ManifoldTraits<M>::compact_factor == CompactFactor::unknown ||
+            requires(const M& x) {
+              ManifoldTraits<M>::compact_begin;
+              ManifoldTraits<M>::compactCoordinates(x);
+            },
+        "ManifoldTraits with a compact_factor also say compact_begin and compactCoordinates(x)");
+    return ManifoldTraits<M>::compact_factor;
+  } else {
+    return CompactFactor::unknown;
+  }
+}
+
+}  // namespace detail
+
+/// A manifold embedded in a linear space, where features can be averaged: ChordalMoments is default constructible,
+/// add(x, p) adds a feature of weight p, mean() is the feature nearest to the average, or nothing where none is. The
+/// mean of one feature is that feature, and acting on all features acts on a mean that is unique. Iterations for means
+/// start there.
+template <class M>
+concept HasChordalMoments = Homogeneous<M> && requires(typename ManifoldTraits<M>::ChordalMoments sums, const M& x,
+                                                       const typename ManifoldTraits<M>::Scalar& weight) {
+  sums.add(x, weight);
+  { sums.mean() } -> std::convertible_to<std::optional<M>>;
+};
+
+/// SO(3), SO(3) × R³ under the product metric with the tangent order (translation, rotation), and their Quotients, in
+/// memory: parameters(x) points to the quaternion of compactCoordinates(x), followed by the position of x in the axes
+/// of the world. Sums over many features are then made several at a time.
+template <class M>
+concept HasRotationParameters = HasCompactFactor<M> && requires(const M& x) {
+  { ManifoldTraits<M>::parameters(x) } -> std::convertible_to<const typename ManifoldTraits<M>::Scalar*>;
+  requires ManifoldTraits<M>::compact_factor == CompactFactor::rotation;
+  requires(ManifoldTraits<M>::DoF == 3 && ManifoldTraits<M>::compact_begin == 0) ||
+      (ManifoldTraits<M>::DoF == 6 && ManifoldTraits<M>::compact_begin == 3);
+};
+
+/// What a part of a tangent vector measures.
+enum class TangentPart {
+  translation,  ///< m
+  rotation,     ///< rad
+  velocity,     ///< m/s
+  log_scale,    ///< natural logarithm of a scale
+  point,        ///< of R^n: m, or whatever unit the coordinates have
+  direction     ///< of S²: rad
+};
+
+/// The name used in files and messages.
+constexpr const char* name(TangentPart part) {
+  switch (part) {
+    case TangentPart::translation:
+      return "translation";
+    case TangentPart::rotation:
+      return "rotation";
+    case TangentPart::velocity:
+      return "velocity";
+    case TangentPart::log_scale:
+      return "log_scale";
+    case TangentPart::point:
+      return "point";
+    case TangentPart::direction:
+      return "direction";
+  }
+  return "unknown";
+}
+
+/// True of rotations and directions, whose coordinates are in rad.
+constexpr bool isAngular(TangentPart part) { return part == TangentPart::rotation || part == TangentPart::direction; }
+
+/// Some successive coordinates of a tangent vector and what they measure.
+struct TangentBlock {
+  TangentPart part = TangentPart::point;
+  int begin = 0, size = 0;
+};
+
+/// A manifold whose traits say what its tangent vectors are made of: tangent_parts is an array of TangentBlock, each
+/// beginning where the one before ends, that covers all coordinates.
+template <class M>
+concept HasTangentParts = Homogeneous<M> && requires {
+  { ManifoldTraits<M>::tangent_parts[0] } -> std::convertible_to<TangentBlock>;
+};
+
+/// A manifold without a metric that has a Metric twin of the same dimension: metricTwin(x) and fromMetricTwin(y) are
+/// inverses of each other and keep the rotation. Where the rotation of a mean is the twin's (the barycentre of SE(3)),
+/// the certificates of the twin's mean are its own. Metric manifolds are their own twins.
+template <class M>
+concept HasMetricTwin = Homogeneous<M> && requires(const M& x) {
+  { ManifoldTraits<M>::fromMetricTwin(ManifoldTraits<M>::metricTwin(x)) } -> std::convertible_to<M>;
 };
 
 }  // namespace liestat

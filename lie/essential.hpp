@@ -219,6 +219,7 @@ struct ManifoldTraits<Essential<S, O>> {
     v.hessian = diagonal(direction.hessian, rotation.hessian);
     return v;
   }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::direction, 0, 2}, {TangentPart::rotation, 2, 3}};
   /// Direction and rotation, of which the squared distance is the sum.
   static std::tuple<S2<S>, SO3<S>> factors(const M& x) { return {x.direction(), x.so3()}; }
   static M fromFactors(const std::tuple<S2<S>, SO3<S>>& f) { return M(std::get<1>(f), std::get<0>(f)); }

@@ -90,6 +90,12 @@ struct ManifoldTraits<Frame2<S, O>> : TrivialIsotropy<Frame2<S, O>, SE2<S>> {
     return m;
   }
   static detail::VolumeElement<S, 3> logVolume(const Tangent&) { return {}; }
+
+  using ChordalMoments = detail::ComplexMoments<M>;
+  static constexpr CompactFactor compact_factor = CompactFactor::circle;
+  static constexpr int compact_begin = 2;
+  static Eigen::Matrix<S, 2, 1> compactCoordinates(const M& x) { return Math::complex(x.params()); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 2}, {TangentPart::rotation, 2, 1}};
 };
 
 }  // namespace liestat

@@ -4,10 +4,9 @@
 // Tangent        (translation m, rotation rad), in the frame: exp(x, v) = (t + R v_t, R·Exp(v_r))
 // Action         of SE3 from the left
 // Origin         the identity
-// Metric         d² = |translation|² + rotation angle², left-invariant; sectional curvature at most 1/4, injectivity
-// radius
-//                pi in the rotation. Its mean is (mean rotation, arithmetic mean of translations). SE3 has another
-//                exponential (the screw) and no such metric.
+// Metric         d² = |translation|² + rotation angle², left-invariant; sectional curvature at most 1/4,
+//                injectivity radius pi in the rotation. Its mean is (mean rotation, arithmetic mean of translations).
+//                SE3 has another exponential (the screw) and no such metric.
 // Bad input      NaN in, NaN out
 // Source         Pennec 1998, sections 2 and 5
 #pragma once
@@ -134,6 +133,12 @@ struct FrameManifold : TrivialIsotropy<M, SE3<typename M::Scalar>> {
   static Square dlogFeatureTransposed(const Tangent& z, const Tangent& a) { return Math::dlogFeatureTransposed(z, a); }
   static Square dlogBaseTransposed(const Tangent& z, const Tangent& a) { return Math::dlogBaseTransposed(z, a); }
   static VolumeElement<Scalar, 6> logVolume(const Tangent& z) { return Math::logVolume(z); }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 3;
+  static Eigen::Matrix<Scalar, 4, 1> compactCoordinates(const M& x) { return x.params().template head<4>(); }
+  static const Scalar* parameters(const M& x) { return x.data(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}};
 };
 
 }  // namespace detail
@@ -149,6 +154,8 @@ struct ManifoldTraits<Frame3<S, O>> : detail::FrameManifold<Frame3<S, O>> {
     return detail::FrameMath<S>::dlog(detail::So3Math<S>::log(x.params().template head<4>()));
   }
   static S injectivityRadius() { return S(EIGEN_PI); }
+
+  using ChordalMoments = detail::QuaternionMoments<Frame3<S, O>>;
 };
 
 }  // namespace liestat

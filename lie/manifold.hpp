@@ -68,6 +68,9 @@ struct TrivialIsotropy {
   static constexpr int DoF = Group::DoF;
   using Tangent = Eigen::Matrix<Scalar, DoF, 1>;
   using Square = Eigen::Matrix<Scalar, DoF, DoF>;
+  /// isotropy, originProjection and placementJacobian are the identity. What follows from them below leaves these
+  /// factors out, so a specialisation that defines one of the three again says false here.
+  static constexpr bool trivial_isotropy = true;
 
   static M origin() { return M(); }
   static Square isotropy(const Group&, const M&) { return Square::Identity(); }
@@ -92,6 +95,15 @@ struct GroupManifold : TrivialIsotropy<G, G> {
   static Square dexpOrigin(const Tangent& v) { return G::rightJacobian(v); }
   static Square dlogOrigin(const G& x) { return G::rightJacobianInverse(x.log()); }
 };
+
+namespace detail {
+
+template <class M>
+concept HasTrivialIsotropy = requires {
+  requires ManifoldTraits<M>::trivial_isotropy;
+};
+
+}  // namespace detail
 
 /// f⋆x
 template <Homogeneous M>
@@ -129,7 +141,12 @@ SquareOf<M> actionFeatureJacobian(const typename ManifoldTraits<M>::Group& f, co
 template <Homogeneous M>
 auto actionTransformationJacobian(const typename ManifoldTraits<M>::Group& f, const M& x) {
   using T = ManifoldTraits<M>;
-  return (T::isotropy(f, x) * T::originProjection() * T::placement(x).inverse().Adj()).eval();
+  if constexpr (detail::HasTrivialIsotropy<M>) {
+    return SquareOf<M>(T::placement(x).inverse().Adj());
+  } else {
+    const auto projected = (T::isotropy(f, x) * T::originProjection()).eval();
+    return (projected * T::placement(x).inverse().Adj()).eval();
+  }
 }
 
 /// Error vector z = log(y, x) with its exact derivatives: ∂z/∂x for x ← exp(x, ξ), ∂z/∂y for y ← exp(y, ω) (frames
@@ -157,11 +174,16 @@ typename ManifoldTraits<M>::Group transvection(const M& p) {
 template <Homogeneous M>
 SquareOf<M> logBaseJacobian(const M& p, const SquareOf<M>& dlog) {
   using T = ManifoldTraits<M>;
-  const auto by_group = (dlog * T::originProjection() * T::placement(p).inverse().Adj()).eval();
-  if constexpr (requires { T::transvectionJacobian(); }) {
-    return -(by_group * T::transvectionJacobian());
+  if constexpr (detail::HasTrivialIsotropy<M>) {
+    return -(dlog * T::placement(p).inverse().Adj());
   } else {
-    return -(by_group * T::placementJacobian(T::origin()));
+    const auto projected = (dlog * T::originProjection()).eval();
+    const auto by_group = (projected * T::placement(p).inverse().Adj()).eval();
+    if constexpr (requires { T::transvectionJacobian(); }) {
+      return -(by_group * T::transvectionJacobian());
+    } else {
+      return -(by_group * T::placementJacobian(T::origin()));
+    }
   }
 }
 
@@ -172,7 +194,11 @@ ErrorVector<M> errorVector(const M& y, const M& x) {
   const typename T::Group f = T::placement(y).inverse();
   const M p = T::act(f, x);
   const SquareOf<M> dlog = T::dlogOrigin(p);
-  return {T::logOrigin(p), dlog * T::isotropy(f, x), logBaseJacobian(p, dlog)};
+  if constexpr (detail::HasTrivialIsotropy<M>) {
+    return {T::logOrigin(p), dlog, logBaseJacobian(p, dlog)};
+  } else {
+    return {T::logOrigin(p), dlog * T::isotropy(f, x), logBaseJacobian(p, dlog)};
+  }
 }
 
 /// J(f_x) of the report: derivative of the principal chart, logOrigin(exp(x, v)), with respect to v at zero; exact.
@@ -206,14 +232,18 @@ M interpolate(const M& x, const M& y, const ScalarOf<M>& s) {
 template <Homogeneous M>
 SquareOf<M> frameTransport(const M& x, const M& y) {
   using T = ManifoldTraits<M>;
-  const M p = between(x, y);
-  // placement(x)·transvection(p) carries the origin to y along the exponential; its frame differs from placement(y)'s
-  // by an isotropy element.
-  const SquareOf<M> turn = T::isotropy(T::placement(x), p);
-  if constexpr (requires { T::transvection(p); }) {
-    return turn * T::isotropy(T::transvection(p), T::origin());
+  if constexpr (detail::HasTrivialIsotropy<M>) {
+    return SquareOf<M>::Identity();
   } else {
-    return turn;
+    const M p = between(x, y);
+    // placement(x)·transvection(p) carries the origin to y along the exponential; its frame differs from
+    // placement(y)'s by an isotropy element.
+    const SquareOf<M> turn = T::isotropy(T::placement(x), p);
+    if constexpr (requires { T::transvection(p); }) {
+      return turn * T::isotropy(T::transvection(p), T::origin());
+    } else {
+      return turn;
+    }
   }
 }
 

@@ -7,8 +7,8 @@
 // Action         of SE3 from the left: (R p + t, R d)
 // Origin         (0, 0, 0) with the direction (0, 0, 1)
 // Placement      (R, p): smooth but at the direction (0, 0, -1). What leaves the origin is the turn about the
-// direction. Metric         d² = |position|² + angle of the directions², invariant; sectional curvature at most 1,
-// injectivity
+//                direction.
+// Metric         d² = |position|² + angle of the directions², invariant; sectional curvature at most 1, injectivity
 //                radius pi in the direction. Its mean is (arithmetic mean of positions, mean direction).
 // Bad input      NaN in, NaN out; constructors normalise the direction, a zero vector gives NaN
 #pragma once
@@ -166,6 +166,7 @@ struct ManifoldTraits<OrientedPoint<S, O>> {
     v.hessian.template bottomRightCorner<2, 2>() = direction.hessian;
     return v;
   }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::point, 0, 3}, {TangentPart::direction, 3, 2}};
   /// Position and direction, of which the squared distance is the sum.
   static std::tuple<Vector3, S2<S>> factors(const M& x) { return {x.position(), x.direction()}; }
   static M fromFactors(const std::tuple<Vector3, S2<S>>& f) { return M(std::get<0>(f), std::get<1>(f)); }

@@ -15,6 +15,8 @@
 #include <lie/detail/product_representatives.hpp>
 #include <lie/rn.hpp>
 
+#include <array>
+#include <iterator>
 #include <limits>
 #include <tuple>
 
@@ -118,6 +120,25 @@ concept DifferentiatesDlog = requires(const typename ManifoldTraits<M>::Tangent&
   ManifoldTraits<M>::dlogFeatureTransposed(z, z);
   ManifoldTraits<M>::dlogBaseTransposed(z, z);
 };
+/// The parts' tangent blocks, one part after the other; none unless every part says them.
+template <class... Ms>
+struct ProductTangentParts {};
+template <class... Ms>
+  requires(HasTangentParts<Ms>&&...)
+struct ProductTangentParts<Ms...> {
+  static constexpr auto tangent_parts = [] {
+    std::array<TangentBlock, (std::size(ManifoldTraits<Ms>::tangent_parts) + ...)> all;
+    std::size_t k = 0;
+    int begin = 0;
+    const auto append = [&](const auto& parts, int dimension) {
+      for (const TangentBlock& b : parts) all[k++] = {b.part, begin + b.begin, b.size};
+      begin += dimension;
+    };
+    (append(ManifoldTraits<Ms>::tangent_parts, ManifoldTraits<Ms>::DoF), ...);
+    return all;
+  }();
+};
+
 template <class M>
 concept CovarianceModelsCoincide = requires {
   requires ManifoldTraits<M>::covariance_models_coincide;
@@ -125,8 +146,8 @@ concept CovarianceModelsCoincide = requires {
 
 /// Traits of a product M of the manifolds Ms: what each part's traits say, side by side.
 template <class M, class... Ms>
-struct ProductManifold
-    : std::conditional_t<(Quotient<Ms> || ...), ProductRepresentatives<M, Ms...>, NoRepresentatives> {
+struct ProductManifold : std::conditional_t<(Quotient<Ms> || ...), ProductRepresentatives<M, Ms...>, NoRepresentatives>,
+                         ProductTangentParts<Ms...> {
   using Group = ProductGroup<typename ManifoldTraits<Ms>::Group...>;
   using Scalar = typename M::Scalar;
   static constexpr int DoF = M::DoF;
@@ -137,6 +158,7 @@ struct ProductManifold
   using Sizes = typename M::Sizes;
   using GroupSizes = typename Group::Sizes;
 
+  static constexpr bool trivial_isotropy = (HasTrivialIsotropy<Ms> && ...);
   static constexpr bool covariance_models_coincide = (CovarianceModelsCoincide<Ms> && ...);
   /// The parts, in whose criteria that of the product separates, and back.
   static const std::tuple<Ms...>& factors(const M& x) { return x.parts(); }

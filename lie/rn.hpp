@@ -6,6 +6,7 @@
 // Metric         Euclidean
 #pragma once
 
+#include <lie/detail/chordal.hpp>
 #include <lie/manifold.hpp>
 
 #include <limits>
@@ -67,6 +68,10 @@ struct FlatManifold : TrivialIsotropy<M, Translation<S, N>> {
   static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static VolumeElement<S, N> logVolume(const Tangent&) { return {}; }
   static constexpr bool covariance_models_coincide = true;
+
+  using ChordalMoments = FlatMoments<M>;
+  static constexpr CompactFactor compact_factor = CompactFactor::none;
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::point, 0, N}};
 };
 
 }  // namespace detail

@@ -88,6 +88,8 @@ class RxSO2Base : public detail::GroupBase<Derived> {
  public:
   using typename Base::Math, typename Base::Plain, typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using RxSO2Product = typename Base::template GroupProduct<Other>;
   using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
   using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
 
@@ -164,6 +166,11 @@ struct ManifoldTraits<RxSO2<S, O>> : GroupManifold<RxSO2<S, O>> {
   static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static detail::VolumeElement<S, 2> logVolume(const Tangent&) { return {}; }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::circle;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 2, 1> compactCoordinates(const RxSO2<S, O>& x) { return x.params().normalized(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 1}, {TangentPart::log_scale, 1, 1}};
 };
 
 }  // namespace liestat

@@ -116,6 +116,8 @@ class RxSO3Base : public detail::GroupBase<Derived> {
  public:
   using typename Base::Math, typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
   using Base::operator*;
+  template <class Other>
+  using RxSO3Product = typename Base::template GroupProduct<Other>;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 
@@ -188,6 +190,9 @@ class RxSO3 : public RxSO3Base<RxSO3<Scalar_, Options_>> {
     this->setScale(scale);
   }
   RxSO3(const Scalar_& scale, const Matrix3& R) : RxSO3(scale, SO3<Scalar_>(R)) {}
+  /// From a scale s > 0 and a quaternion of any positive norm, which is normalised.
+  template <class D>
+  RxSO3(const Scalar_& scale, const Eigen::QuaternionBase<D>& q) : RxSO3(scale, SO3<Scalar_>(q)) {}
 };
 
 /// R⁺ × SO(3) under its bi-invariant metric.
@@ -218,6 +223,11 @@ struct ManifoldTraits<RxSO3<S, O>> : GroupManifold<RxSO3<S, O>> {
     v.hessian.template topLeftCorner<3, 3>() = rotation.hessian;
     return v;
   }
+
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 4, 1> compactCoordinates(const RxSO3<S, O>& x) { return x.params().normalized(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 3}, {TangentPart::log_scale, 3, 1}};
 };
 
 }  // namespace liestat

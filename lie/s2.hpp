@@ -5,8 +5,7 @@
 // Action         of SO3 from the left
 // Origin         (0, 0, 1)
 // Placement      the rotation of least angle from the origin to the point: smooth but at (0, 0, -1). No continuous
-// placement
-//                exists on a sphere: tangent vectors and covariances belong to this one.
+//                placement exists on a sphere: tangent vectors and covariances belong to this one.
 // Metric         distance = angle, sectional curvature 1, injectivity radius pi
 // Bad input      NaN in, NaN out; the constructor normalises, a zero vector gives NaN
 #pragma once
@@ -162,6 +161,12 @@ struct ManifoldTraits<S2<S, O>> {
     return {log(h.sinc * h.cos), c * z,
             c * Square::Identity() - S(16) * detail::cotangentExcessSlope(S(S(4) * t)) * z * z.transpose()};
   }
+
+  using ChordalMoments = detail::DirectionMoments<M>;
+  static constexpr CompactFactor compact_factor = CompactFactor::sphere;
+  static constexpr int compact_begin = 0;
+  static Vector3 compactCoordinates(const M& x) { return x.params(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::direction, 0, 2}};
 };
 
 }  // namespace liestat

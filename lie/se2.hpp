@@ -144,6 +144,8 @@ class SE2Base : public detail::PlanarPoseAccess<Derived, detail::GroupBase<Deriv
  public:
   using typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using SE2Product = typename Base::template GroupProduct<Other>;
 
   /// The first two rows of matrix().
   Eigen::Matrix<Scalar, 2, 3> matrix2x3() const { return this->matrix().template topRows<2>(); }
@@ -181,7 +183,10 @@ class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
   explicit SE2(const Eigen::Matrix<Scalar_, 3, 3>& T)
       : SE2(SO2<Scalar_>(Eigen::Matrix<Scalar_, 2, 2>(T.template topLeftCorner<2, 2>())),
             Vector2(T.template topRightCorner<2, 1>())) {}
-  SE2(const Eigen::Matrix<Scalar_, 2, 2>& R, const Vector2& translation) : SE2(SO2<Scalar_>(R), translation) {}
+  /// From a complex number of any positive norm or a rotation matrix, and a translation (m).
+  template <class D>
+    requires(D::RowsAtCompileTime == 2 && (D::ColsAtCompileTime == 1 || D::ColsAtCompileTime == 2))
+  SE2(const Eigen::MatrixBase<D>& rotation, const Vector2& translation) : SE2(SO2<Scalar_>(rotation), translation) {}
   /// Translations along the axes, m.
   static SE2 trans(const Vector2& t) { return SE2(SO2<Scalar_>(), t); }
   static SE2 trans(const Scalar_& x, const Scalar_& y) { return trans(Vector2(x, y)); }
@@ -192,6 +197,9 @@ class SE2 : public SE2Base<SE2<Scalar_, Options_>> {
   /// From any matrix with a translation in its last column: its rotation is the nearest.
   static SE2 fitToSE2(const Eigen::Matrix<Scalar_, 3, 3>& T) { return SE2(T); }
 };
+
+template <class Scalar_, int Options_>
+class Frame2;
 
 /// SE(2) is homogeneous under itself, not Metric.
 template <class S, int O>
@@ -206,6 +214,12 @@ struct ManifoldTraits<SE2<S, O>> : GroupManifold<SE2<S, O>> {
     v.hessian(2, 2) = c - S(2) * detail::cotangentExcessSlope(t) * t;
     return v;
   }
+
+  using ChordalMoments = detail::ComplexMoments<SE2<S, O>>;
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 2}, {TangentPart::rotation, 2, 1}};
+  /// The same data under the product metric, of lie/frame2.hpp.
+  static Frame2<S, 0> metricTwin(const SE2<S, O>& x) { return Frame2<S, 0>(x); }
+  static SE2<S, O> fromMetricTwin(const Frame2<S, 0>& x) { return SE2<S, O>::fromParams(x.params()); }
 };
 
 }  // namespace liestat

@@ -201,6 +201,10 @@ struct ManifoldTraits<SE23<S, O>> : GroupManifold<SE23<S, O>> {
     v.hessian.template block<3, 3>(3, 3) = S(3) * rotation.hessian;
     return v;
   }
+
+  using ChordalMoments = detail::QuaternionMoments<SE23<S, O>>;
+  static constexpr TangentBlock tangent_parts[] = {
+      {TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}, {TangentPart::velocity, 6, 3}};
 };
 
 }  // namespace liestat

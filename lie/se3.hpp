@@ -180,6 +180,8 @@ class SE3Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
  public:
   using typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using SE3Product = typename Base::template GroupProduct<Other>;
 
   /// The first three rows of matrix().
   Eigen::Matrix<Scalar, 3, 4> matrix3x4() const { return this->matrix().template topRows<3>(); }
@@ -235,6 +237,9 @@ class SE3 : public SE3Base<SE3<Scalar_, Options_>> {
   static SE3 rotZ(const Scalar_& a) { return SE3(SO3<Scalar_>::rotZ(a), Vector3::Zero()); }
 };
 
+template <class Scalar_, int Options_>
+class Frame3;
+
 /// SE(3) is homogeneous under itself; it is not Metric (no invariant Riemannian metric has exp as its geodesics).
 template <class S, int O>
 struct ManifoldTraits<SE3<S, O>> : GroupManifold<SE3<S, O>> {
@@ -247,6 +252,12 @@ struct ManifoldTraits<SE3<S, O>> : GroupManifold<SE3<S, O>> {
     v.hessian.template bottomRightCorner<3, 3>() = S(2) * rotation.hessian;
     return v;
   }
+
+  using ChordalMoments = detail::QuaternionMoments<SE3<S, O>>;
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}};
+  /// The same data under the product metric, of lie/frame3.hpp.
+  static Frame3<S, 0> metricTwin(const SE3<S, O>& x) { return Frame3<S, 0>(x); }
+  static SE3<S, O> fromMetricTwin(const Frame3<S, 0>& x) { return SE3<S, O>::fromParams(x.params()); }
 };
 
 }  // namespace liestat

@@ -134,6 +134,8 @@ class Sim2Base : public detail::TranslationAccess<Derived, detail::GroupBase<Der
   using Base::data;
   using typename Base::Math, typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using Sim2Product = typename Base::template GroupProduct<Other>;
   using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
   using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
 
@@ -189,7 +191,10 @@ class Sim2 : public Sim2Base<Sim2<Scalar_, Options_>> {
 
 /// Sim(2) is homogeneous under itself, not Metric.
 template <class S, int O>
-struct ManifoldTraits<Sim2<S, O>> : GroupManifold<Sim2<S, O>> {};
+struct ManifoldTraits<Sim2<S, O>> : GroupManifold<Sim2<S, O>> {
+  static constexpr TangentBlock tangent_parts[] = {
+      {TangentPart::translation, 0, 2}, {TangentPart::rotation, 2, 1}, {TangentPart::log_scale, 3, 1}};
+};
 
 }  // namespace liestat
 

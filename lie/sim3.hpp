@@ -149,6 +149,8 @@ class Sim3Base : public detail::TranslationAccess<Derived, detail::GroupBase<Der
   using Base::data;
   using typename Base::Math, typename Base::Scalar;
   using Base::operator*;
+  template <class Other>
+  using Sim3Product = typename Base::template GroupProduct<Other>;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 
@@ -199,6 +201,10 @@ class Sim3 : public Sim3Base<Sim3<Scalar_, Options_>> {
   template <class D>
   Sim3(const Eigen::QuaternionBase<D>& q, const Vector3& translation)
       : storage_(Shell::Math::join(q.coeffs(), translation)) {}
+  /// From a scale s > 0, a quaternion of any positive norm, which is normalised, and a translation (m).
+  template <class D>
+  Sim3(const Scalar_& scale, const Eigen::QuaternionBase<D>& q, const Vector3& translation)
+      : Sim3(RxSO3<Scalar_>(scale, q), translation) {}
   /// From a homogeneous matrix with a scaled rotation.
   explicit Sim3(const Eigen::Matrix<Scalar_, 4, 4>& T)
       : Sim3(RxSO3<Scalar_>(T.template topLeftCorner<3, 3>()), Vector3(T.template topRightCorner<3, 1>())) {}
@@ -206,7 +212,10 @@ class Sim3 : public Sim3Base<Sim3<Scalar_, Options_>> {
 
 /// Sim(3) is homogeneous under itself, not Metric.
 template <class S, int O>
-struct ManifoldTraits<Sim3<S, O>> : GroupManifold<Sim3<S, O>> {};
+struct ManifoldTraits<Sim3<S, O>> : GroupManifold<Sim3<S, O>> {
+  static constexpr TangentBlock tangent_parts[] = {
+      {TangentPart::translation, 0, 3}, {TangentPart::rotation, 3, 3}, {TangentPart::log_scale, 6, 1}};
+};
 
 }  // namespace liestat
 

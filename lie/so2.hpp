@@ -9,6 +9,7 @@
 // Bad input      NaN in, NaN out
 #pragma once
 
+#include <lie/detail/chordal.hpp>
 #include <lie/detail/group_base.hpp>
 #include <lie/manifold.hpp>
 
@@ -89,6 +90,8 @@ class SO2Base : public detail::GroupBase<Derived> {
   using typename Base::Math, typename Base::Plain, typename Base::Scalar, typename Base::Tangent;
   using typename Base::Transformation;
   using Base::operator*;
+  template <class Other>
+  using SO2Product = typename Base::template GroupProduct<Other>;
   /// The complex number (cos, sin), viewed in place.
   Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>> unit_complex() const {
     return Eigen::Map<const Eigen::Matrix<Scalar, 2, 1>>(this->data());
@@ -163,6 +166,12 @@ struct ManifoldTraits<SO2<S, O>> : GroupManifold<SO2<S, O>> {
   static Square dlogFeatureTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static Square dlogBaseTransposed(const Tangent&, const Tangent&) { return Square::Zero(); }
   static detail::VolumeElement<S, 1> logVolume(const Tangent&) { return {}; }
+
+  using ChordalMoments = detail::ComplexMoments<SO2<S, O>>;
+  static constexpr CompactFactor compact_factor = CompactFactor::circle;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 2, 1> compactCoordinates(const SO2<S, O>& x) { return x.params(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 1}};
 };
 
 }  // namespace liestat

@@ -9,6 +9,7 @@
 // Bad input      NaN in, NaN out; constructors from quaternions normalise; fitToSO3 and checkedFrom… are for data
 #pragma once
 
+#include <lie/detail/chordal.hpp>
 #include <lie/detail/arccosine.hpp>
 #include <lie/detail/group_base.hpp>
 #include <lie/detail/nearest_rotation.hpp>
@@ -160,6 +161,8 @@ class SO3Base : public detail::GroupBase<Derived> {
   using typename Base::Scalar, typename Base::Plain, typename Base::Math, typename Base::Tangent;
   using Quaternion = Eigen::Quaternion<Scalar>;
   using Base::operator*;
+  template <class Other>
+  using SO3Product = typename Base::template GroupProduct<Other>;
 
   /// A rotation vector and its norm (rad).
   struct TangentAndTheta {
@@ -232,7 +235,7 @@ class SO3 : public SO3Base<SO3<Scalar_, Options_>> {
   /// From an angle (rad) about an axis of norm one.
   explicit SO3(const Eigen::AngleAxis<Scalar_>& a) : SO3(Shell::exp(Tangent(a.angle() * a.axis()))) {}
   /// From a rotation matrix, orthogonal up to rounding; largest of the four pivots, so exact near half-turns.
-  explicit SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
+  SO3(const Matrix3& R) : storage_(Shell::Math::normalized(detail::quaternionOf<Scalar_>(R))) {}
   /// The rotation nearest to any matrix in the Frobenius norm, of positive determinant or not.
   static SO3 fitToSO3(const Matrix3& M) { return fromParams(detail::nearestQuaternion<Scalar_>(M)); }
   /// From a rotation matrix read from data: nothing if |RᵀR - I| exceeds the tolerance or det R < 0 or NaN.
@@ -276,6 +279,13 @@ struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
     return -Math::inverseJacobianSlope(z, a, S(1));
   }
   static detail::VolumeElement<S, 3> logVolume(const Tangent& z) { return Math::logVolume(z); }
+
+  using ChordalMoments = detail::QuaternionMoments<SO3<S, O>>;
+  static constexpr CompactFactor compact_factor = CompactFactor::rotation;
+  static constexpr int compact_begin = 0;
+  static Eigen::Matrix<S, 4, 1> compactCoordinates(const SO3<S, O>& x) { return x.params(); }
+  static const S* parameters(const SO3<S, O>& x) { return x.data(); }
+  static constexpr TangentBlock tangent_parts[] = {{TangentPart::rotation, 0, 3}};
 };
 
 /// A quaternion, view or expression of one, stands for its rotation; its norm does not matter.

@@ -26,25 +26,40 @@ SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
   return G * S * G.transpose();
 }
 
+/// States in one sentence what is wrong with a range of covariances; `ok` where nothing is.
+template <Metric M, AnyRange V>
+struct RequireMatrices {
+  static constexpr bool ok = std::convertible_to<ElementOf<V>, SquareOf<M>>;
+  static_assert(ok, "liestat: noise is a range of covariances, DoF x DoF matrices of the features' scalar type.");
+};
+
 }  // namespace detail
 
 /// Covariance of the mean when the noise is known: V_i is the covariance of z_i = log(mean, x_i), that is of the noise
 /// in the frame of the estimate (for x_i = exp(x, e_i), Cov(e_i)). H⁻¹ (Σ p_i² V_i) H⁻¹. Squared distances follow χ²_k.
-template <Metric M, std::ranges::random_access_range V>
-SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, const V& noise) {
-  eigen_assert(std::ranges::size(noise) == result.n);
+/// noise is any range of such matrices, weights of numbers.
+template <Metric M, detail::AnyRange V>
+SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, V&& noise) {
   SquareOf<M> sum = SquareOf<M>::Zero();
-  for (const SquareOf<M>& v : noise) sum += v;
+  if constexpr (detail::RequireMatrices<M, V>::ok) {
+    std::size_t n = 0;
+    for (const auto& v : noise) sum += v, ++n;
+    eigen_assert(n == result.n);
+  }
   return detail::sandwich(result, sum);
 }
-template <Metric M, std::ranges::random_access_range W, std::ranges::random_access_range V>
-SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, const W& weights, const V& noise) {
-  eigen_assert(std::ranges::size(noise) == result.n && std::ranges::size(weights) == result.n);
+template <Metric M, detail::AnyRange W, detail::AnyRange V>
+SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, W&& weights, V&& noise) {
   SquareOf<M> sum = SquareOf<M>::Zero();
-  for (std::size_t i = 0; i < result.n; ++i) {
-    const auto k = static_cast<std::ptrdiff_t>(i);
-    const ScalarOf<M> p = ScalarOf<M>(weights[k]);
-    sum += p * p * noise[k];
+  if constexpr (detail::RequireMatrices<M, V>::ok && detail::RequireWeights<W>::ok) {
+    const auto p = detail::asWeights(weights);
+    eigen_assert(p.size() == result.n);
+    std::size_t i = 0;
+    for (const auto& v : noise) {
+      const ScalarOf<M> weight = static_cast<ScalarOf<M>>(p[i++]);
+      sum += weight * weight * v;
+    }
+    eigen_assert(i == result.n);
   }
   return detail::sandwich(result, sum);
 }
@@ -70,16 +85,20 @@ SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result, ResidualNoise n
 
 /// Empirical covariance of the data about a given feature y, (1/n) Σ log(y, x_i) log(y, x_i)ᵀ: eq. (1) of the report in
 /// the local frame at y. principalChartCovariance converts it to the report's chart.
-template <std::ranges::random_access_range R, Homogeneous M = std::ranges::range_value_t<R>>
-SquareOf<M> empiricalCovariance(const R& samples, const M& y) {
-  using T = ManifoldTraits<M>;
-  const typename T::Group to_y = T::placement(y).inverse();
+template <detail::AnyRange R, class M = detail::SampleInSignature<R>>
+SquareOf<M> empiricalCovariance(R&& samples, const std::type_identity_t<M>& y) {
   SquareOf<M> sum = SquareOf<M>::Zero();
-  for (const M& x : samples) {
-    const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
-    sum += z * z.transpose();
+  std::size_t n = 0;
+  if constexpr (detail::RequireSamples<R>::ok) {
+    using T = ManifoldTraits<M>;
+    const typename T::Group to_y = T::placement(y).inverse();
+    for (const M& x : detail::asSamples(samples)) {
+      const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
+      sum += z * z.transpose();
+      ++n;
+    }
   }
-  return sum / ScalarOf<M>(std::ranges::size(samples));
+  return sum / ScalarOf<M>(n);
 }
 
 }  // namespace liestat

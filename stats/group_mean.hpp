@@ -46,6 +46,12 @@ struct GroupMeanSums {
     scatter += other.scatter;
     weight += other.weight;
   }
+  std::vector<double> pack() const { return packed(sum, jacobian, scatter, weight); }
+  static GroupMeanSums unpack(std::span<const double> list) {
+    GroupMeanSums s;
+    unpackInto(list, s.sum, s.jacobian, s.scatter, s.weight);
+    return s;
+  }
 };
 
 template <LieGroup G, Executor E, class R, class W>
@@ -62,7 +68,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     const G to_mean = y.inverse();
     const auto sums = sumOverData<GroupMeanSums<G>>(executor, result.n, [&](std::size_t k, GroupMeanSums<G>& s) {
       const S p = S(weights[k]);
-      const TangentOf<G> z = (to_mean * samples[static_cast<std::ptrdiff_t>(k)]).log();
+      const TangentOf<G> z = (to_mean * samples[k]).log();
       s.sum += p * z;
       s.jacobian += p * G::leftJacobianInverse(z);
       s.scatter += p * z * z.transpose();
@@ -83,17 +89,44 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
   return result;
 }
 
+/// States in one sentence why a range of features has no exponential barycentre; `ok` where it has one.
+template <AnyRange R>
+struct RequireGroupMean : RequireSamples<R> {
+  static constexpr bool ok = RequireSamples<R>::ok && LieGroup<SampleInSignature<R>>;
+  static_assert(LieGroup<SampleInSignature<R>>,
+                "groupMean needs elements of a Lie group; features of another manifold have mean and maha.");
+};
+template <class R>
+using GroupInSignature = std::conditional_t<LieGroup<SampleInSignature<R>>, SampleInSignature<R>, SO3<double>>;
+
 }  // namespace detail
 
-/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few.
-template <std::ranges::random_access_range R, LieGroup G = std::ranges::range_value_t<R>>
-GroupMeanResult<G> groupMean(const R& samples, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, detail::UnitWeights{}, start);
+/// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. The same
+/// bits on any executor. What may be passed is said at mean().
+template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(const E& executor, R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
+  if constexpr (detail::RequireGroupMean<R>::ok) {
+    return detail::groupBarycentre<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, start);
+  } else {
+    return {};
+  }
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W,
-          LieGroup G = std::ranges::range_value_t<R>>
-GroupMeanResult<G> groupMean(const R& samples, const W& weights, const std::optional<G>& start = {}) {
-  return detail::groupBarycentre<G>(SerialExecutor{}, samples, weights, start);
+template <detail::AnyRange R, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
+  return groupMean(SerialExecutor{}, samples, start);
+}
+template <Executor E, detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(const E& executor, R&& samples, W&& weights,
+                             const std::optional<std::type_identity_t<G>>& start = {}) {
+  if constexpr (detail::RequireGroupMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::groupBarycentre<G>(executor, detail::asSamples(samples), detail::asWeights(weights), start);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+GroupMeanResult<G> groupMean(R&& samples, W&& weights, const std::optional<std::type_identity_t<G>>& start = {}) {
+  return groupMean(SerialExecutor{}, samples, weights, start);
 }
 
 }  // namespace liestat

@@ -5,18 +5,23 @@
 // Two models that coincide on points, rotations and every group, and differ on frames:
 //   CovarianceAt::measured   S_i lives in the frame of the measure x_i (a sensor's): w = log(x_i, y), μ² = wᵀ S_i⁻¹ w
 //   CovarianceAt::estimated  V_i lives in the frame of the estimate (an object's): z = log(y, x_i), μ² = zᵀ V_i⁻¹ z;
-//   the noise
-//                            x_i = exp(x, e_i), Cov(e_i) = V_i, of the report's experiments
+//                            the noise x_i = exp(x, e_i), Cov(e_i) = V_i, of the report's experiments
 // Feeding noise of one model to the other gives a wrong answer, not a rough one: the caller says which it is.
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/packing.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
 #include <stats/start.hpp>
 #include <stats/status.hpp>
 
+#include <concepts>
+#include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -84,6 +89,12 @@ struct MahaSums {
     gauss_newton += other.gauss_newton;
     hessian += other.hessian;
   }
+  std::vector<double> pack() const { return packed(cost, gradient, gauss_newton, hessian); }
+  static MahaSums unpack(std::span<const double> list) {
+    MahaSums s;
+    unpackInto(list, s.cost, s.gradient, s.gauss_newton, s.hessian);
+    return s;
+  }
 };
 
 /// The manifold differentiates its Jacobians, so the exact Hessian costs one pass.
@@ -107,7 +118,7 @@ struct MahaProblem {
 
   /// One measure's part of the sums at y.
   void add(std::size_t i, const M& y, MahaSums<M>& sums) const {
-    const M& x = samples[static_cast<std::ptrdiff_t>(i)].mean;
+    const M& x = samples[i].mean;
     const bool measured = at == CovarianceAt::measured;
     const ErrorVector<M> e = measured ? errorVector(x, y) : errorVector(y, x);
     const SquareOf<M>& J = measured ? e.by_feature : e.by_base;
@@ -165,14 +176,8 @@ struct MahaProblem {
   }
 };
 
-}  // namespace detail
-
-/// Mahalanobis mean of a range of Gaussian<M>. Status ill_defined if a covariance is not positive definite, too_few for
-/// an empty range, not_converged if the data are not finite, not_applicable for CovarianceAt::estimated with an
-/// anisotropic covariance on a manifold without a continuous placement (directions) and for likelihood where a user's
-/// manifold has no logVolume.
-template <Executor E, std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const MahaOptions<M>& options = {}) {
+template <Homogeneous M, Executor E, class R>
+MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt at, const MahaOptions<M>& options) {
   using T = ManifoldTraits<M>;
   using S = ScalarOf<M>;
   MahaResult<M> result;
@@ -185,13 +190,13 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
     }
   }
 
-  detail::MahaProblem<M, R> problem{samples, {}, at, options.likelihood};
+  MahaProblem<M, R> problem{samples, {}, at, options.likelihood};
   problem.information.reserve(result.n);
   std::vector<S> weights;
   std::vector<M> features;
   if (!options.start) weights.reserve(result.n), features.reserve(result.n);
   for (const Gaussian<M>& g : samples) {
-    const detail::Cholesky<S, T::DoF> factor(g.covariance);
+    const Cholesky<S, T::DoF> factor(g.covariance);
     const bool finite = g.covariance.allFinite();
     if (finite && !factor.ok()) {
       result.status = Status::ill_defined;
@@ -208,22 +213,23 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
     if (!options.start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
   }
 
-  M y = options.start ? *options.start : startOfMean<M>(features, weights);
-  detail::MahaSums<M> sums = problem.evaluate(executor, y);
+  M y =
+      options.start ? *options.start : startOfMean<M>(Samples<M>(std::move(features)), Samples<S>(std::move(weights)));
+  MahaSums<M> sums = problem.evaluate(executor, y);
   {
     double scale = 1 + static_cast<double>(T::logOrigin(y).norm());
-    result.tolerance = options.tolerance.value_or(detail::automaticTolerance<S>(scale));
+    result.tolerance = options.tolerance.value_or(automaticTolerance<S>(scale));
   }
   result.status = Status::not_converged;
   while (result.iterations < options.max_iterations) {
     TangentOf<M> step;
     bool newton = false;
-    if (detail::MahaProblem<M, R>::second_order && options.method == MahaMethod::newton) {
-      const detail::Cholesky<S, T::DoF> factor(sums.hessian);
+    if (MahaProblem<M, R>::second_order && options.method == MahaMethod::newton) {
+      const Cholesky<S, T::DoF> factor(sums.hessian);
       newton = factor.ok();
       if (newton) step = -factor.solve(sums.gradient);
     }
-    if (!newton) step = -detail::Cholesky<S, T::DoF>(sums.gauss_newton).solve(sums.gradient);
+    if (!newton) step = -Cholesky<S, T::DoF>(sums.gauss_newton).solve(sums.gradient);
     const double previous = result.iterations > 0 ? result.residual : std::numeric_limits<double>::infinity();
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
@@ -236,7 +242,7 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
     // Halving until the cost decreases keeps the iteration from cycling between two sets of representatives.
     const S rounding = S(16) * std::numeric_limits<S>::epsilon() * (S(1) + std::abs(sums.cost));
     M next = exp(y, step);
-    detail::MahaSums<M> next_sums = problem.evaluate(executor, next);
+    MahaSums<M> next_sums = problem.evaluate(executor, next);
     bool accepted = next_sums.cost <= sums.cost + rounding;
     for (int halving = 0; !accepted && halving < 30; ++halving) {
       step *= S(0.5);
@@ -262,7 +268,7 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
   result.gauss_newton = sums.gauss_newton;
   if (!result.converged) return result;
   result.hessian = problem.hessian(executor, y, sums);
-  const detail::Cholesky<S, T::DoF> factor(result.hessian);
+  const Cholesky<S, T::DoF> factor(result.hessian);
   result.status = factor.ok() ? Status::ok : Status::ill_defined;
   if (result.status == Status::ok) {
     const SquareOf<M> inverse = factor.inverse();
@@ -270,26 +276,73 @@ MahaResult<M> maha(const E& executor, const R& samples, CovarianceAt at, const M
   }
   return result;
 }
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-MahaResult<M> maha(const R& samples, CovarianceAt at, const MahaOptions<M>& options = {}) {
+/// The manifold of a range of features with covariances; for other ranges something that compiles, and RequireGaussians
+/// says what is wrong.
+template <class>
+struct FeatureOfGaussian {
+  using type = SO3<double>;
+};
+template <class M>
+struct FeatureOfGaussian<Gaussian<M>> {
+  using type = M;
+};
+template <AnyRange R>
+using FeatureInSignature = typename FeatureOfGaussian<ElementOf<R>>::type;
+
+/// States in one sentence why a range has no Mahalanobis mean; `ok` where it has one. `ModelGiven`: the caller said in
+/// which frame the covariances are.
+template <AnyRange R, bool ModelGiven = true>
+struct RequireGaussians {
+  using M = FeatureInSignature<R>;
+  static constexpr bool gaussians = std::same_as<ElementOf<R>, Gaussian<M>>;
+  static constexpr bool one_model = requires { requires ManifoldTraits<M>::covariance_models_coincide; };
+  static constexpr bool ok = MultiPass<R> && gaussians && (ModelGiven || one_model);
+  static_assert(MultiPass<R>, "liestat: the data can be gone through only once; copy them into a std::vector first.");
+  static_assert(gaussians, "liestat: maha and fuse take a range of liestat::Gaussian, features with their covariance.");
+  static_assert(ModelGiven || one_model,
+                "liestat: on this manifold the frame of the covariances matters: say CovarianceAt::measured (a "
+                "sensor's, in the frame of the measurement) or CovarianceAt::estimated (an object's, in the frame of "
+                "the estimate).");
+};
+
+}  // namespace detail
+
+/// Mahalanobis mean of a range of Gaussian<M>. Status ill_defined if a covariance is not positive definite, too_few for
+/// an empty range, not_converged if the data are not finite, not_applicable for CovarianceAt::estimated with an
+/// anisotropic covariance on a manifold without a continuous placement (directions) and for likelihood where a user's
+/// manifold has no logVolume.
+template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+MahaResult<M> maha(const E& executor, R&& samples, CovarianceAt at,
+                   const MahaOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::mahalanobisMean<M>(executor, detail::asValues<Gaussian<M>>(samples), at, options);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+MahaResult<M> maha(R&& samples, CovarianceAt at, const MahaOptions<std::type_identity_t<M>>& options = {}) {
   return maha(SerialExecutor{}, samples, at, options);
 }
 /// The same where both models coincide (points, rotations, groups); elsewhere it does not compile.
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-  requires(ManifoldTraits<M>::covariance_models_coincide)
-MahaResult<M> maha(const R& samples, const MahaOptions<M>& options = {}) {
-  return maha(SerialExecutor{}, samples, CovarianceAt::measured, options);
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireGaussians<R, false>::ok) {
+    return maha(SerialExecutor{}, samples, CovarianceAt::measured, options);
+  } else {
+    return {};
+  }
 }
 
 /// A range of Gaussians to one: mean and covariance of maha(). The covariance is NaN if there is no trustworthy
 /// estimate.
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-Gaussian<M> fuse(const R& samples, CovarianceAt at) {
-  const MahaResult<M> result = maha(samples, at);
-  return result.estimate();
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+Gaussian<M> fuse(R&& samples, CovarianceAt at) {
+  return maha(samples, at).estimate();
 }
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-  requires(ManifoldTraits<M>::covariance_models_coincide)
-Gaussian<M> fuse(const R& samples) { return fuse(samples, CovarianceAt::measured); }
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+Gaussian<M> fuse(R&& samples) {
+  return maha(samples).estimate();
+}
 
 }  // namespace liestat

@@ -6,6 +6,8 @@
 
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/packing.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/detail/rotation_sums.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>
@@ -17,13 +19,11 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <type_traits>
+#include <vector>
 
 namespace liestat {
-
-/// A random-access range of features.
-template <class R, class M = std::ranges::range_value_t<R>>
-concept FeatureRange = std::ranges::random_access_range<R> && std::ranges::sized_range<R> && Homogeneous<M>;
 
 enum class MeanMethod {
   newton,      ///< exact Hessian; falls back on a step of eq. (4) that decreases the criterion where Newton's does not
@@ -73,6 +73,16 @@ namespace detail {
 struct UnitWeights {
   double operator[](std::size_t) const { return 1; }
 };
+
+/// Whether there is a weight for every datum.
+template <class R, class W>
+bool haveOneSize(const R& samples, const W& weights) {
+  if constexpr (std::is_same_v<W, UnitWeights>) {
+    return true;
+  } else {
+    return std::ranges::size(samples) == std::ranges::size(weights);
+  }
+}
 
 /// What one pass over the data returns at a candidate mean.
 template <Homogeneous M>
@@ -130,6 +140,16 @@ struct MeanPass {
     sums += other.sums;
     scatter += other.scatter;
   }
+  std::vector<double> pack() const {
+    return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
+                  scatter.largest, scatter.smallest_gap);
+  }
+  static MeanPass unpack(std::span<const double> list) {
+    MeanPass p;
+    unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
+               p.scatter.largest, p.scatter.smallest_gap);
+    return p;
+  }
 };
 
 /// The terms of the features in a range of indices, by the manifold's own operations.
@@ -143,7 +163,7 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
   const TangentOf<M> metric = T::metricWeights();
   for (std::size_t i = range.begin; i < range.end; ++i) {
     const S p = S(weights[i]);
-    const M at_mean = T::act(to_mean, M(samples[static_cast<std::ptrdiff_t>(i)]));
+    const M at_mean = T::act(to_mean, M(samples[i]));
     const TangentOf<M> z = T::logOrigin(at_mean);
     const TangentOf<M> wz = metric.cwiseProduct(z);
     const S squared_distance = z.dot(wz);
@@ -215,12 +235,8 @@ double automaticTolerance(double scale) {
   return std::max(1e-12, 4 * static_cast<double>(std::numeric_limits<S>::epsilon()) * scale);
 }
 
-template <Homogeneous M, Executor E, class R, class W>
+template <Metric M, Executor E, class R, class W>
 MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights, const MeanOptions<M>& options) {
-  static_assert(
-      Metric<M>,
-      "the Frechet mean needs an invariant Riemannian metric; this type has none. Use Frame3 or Frame2 for poses, or "
-      "groupMean (the exponential barycentre) or maha.");
   using T = ManifoldTraits<M>;
   using S = ScalarOf<M>;
   MeanResult<M> result;
@@ -295,31 +311,56 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
   return result;
 }
 
+/// States in one sentence why a range of features has no Fréchet mean; `ok` where it has one.
+template <AnyRange R>
+struct RequireMean : RequireSamples<R> {
+  static constexpr bool ok = RequireSamples<R>::ok && Metric<SampleInSignature<R>>;
+  static_assert(
+      Metric<SampleInSignature<R>>,
+      "the Frechet mean needs an invariant Riemannian metric; this type has none. Use Frame3 or Frame2 for poses, or "
+      "groupMean (the exponential barycentre) or maha.");
+};
+
 }  // namespace detail
 
 /// Fréchet mean of a range of features (LSQ). No features: status too_few. Not finite: not_converged. For manifolds
 /// with an invariant metric; SE3 and its like have groupMean and maha.
-template <Executor E, std::ranges::random_access_range R>
-auto mean(const E& executor, const R& samples, const MeanOptions<std::ranges::range_value_t<R>>& options = {}) {
-  return detail::frechetMean<std::ranges::range_value_t<R>>(executor, samples, detail::UnitWeights{}, options);
+///
+/// The features are any range that can be gone through more than once, of points or of what stands for them: views
+/// (Eigen::Map<const SO3d>), columns (Matrix3Xd::colwise()), unit quaternions. The result is of the owning type. Values in
+/// random-access memory are used where they are, others are copied once.
+template <Executor E, detail::AnyRange R>
+MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples,
+                                              const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::frechetMean<SampleOf<R>>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+  } else {
+    return {};
+  }
 }
-template <std::ranges::random_access_range R>
-  requires Homogeneous<std::ranges::range_value_t<R>>
-auto mean(const R& samples, const MeanOptions<std::ranges::range_value_t<R>>& options = {}) {
+template <detail::AnyRange R>
+MeanResult<detail::SampleInSignature<R>> mean(R&& samples,
+                                              const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
   return mean(SerialExecutor{}, samples, options);
 }
 
-/// Weighted Fréchet mean (WLSQ): minimises ½ Σ p_i d²(y, x_i). Weights are positive, one for each feature; what they
-/// mean for the covariance is said in stats/covariance.hpp.
-template <Executor E, std::ranges::random_access_range R, std::ranges::random_access_range W>
-auto mean(const E& executor, const R& samples, const W& weights,
-          const MeanOptions<std::ranges::range_value_t<R>>& options = {}) {
-  eigen_assert(std::ranges::size(samples) == std::ranges::size(weights));
-  return detail::frechetMean<std::ranges::range_value_t<R>>(executor, samples, weights, options);
+/// Weighted Fréchet mean (WLSQ): minimises ½ Σ p_i d²(y, x_i). Weights are positive, one for each feature, in any range
+/// of numbers (std::vector, Eigen::VectorXd …); what they mean for the covariance is said in stats/covariance.hpp.
+template <Executor E, detail::AnyRange R, detail::AnyRange W>
+MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples, W&& weights,
+                                              const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    const auto features = detail::asSamples(samples);
+    const auto numbers = detail::asWeights(weights);
+    eigen_assert(features.size() == numbers.size());
+    return detail::frechetMean<SampleOf<R>>(executor, features, numbers, options);
+  } else {
+    return {};
+  }
 }
-template <std::ranges::random_access_range R, std::ranges::random_access_range W>
-  requires Homogeneous<std::ranges::range_value_t<R>>
-auto mean(const R& samples, const W& weights, const MeanOptions<std::ranges::range_value_t<R>>& options = {}) {
+template <detail::AnyRange R, detail::AnyRange W>
+MeanResult<detail::SampleInSignature<R>> mean(R&& samples, W&& weights,
+                                              const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
   return mean(SerialExecutor{}, samples, weights, options);
 }
 

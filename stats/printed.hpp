@@ -12,15 +12,17 @@ namespace liestat::printed {
 
 /// LSQ or WLSQ covariance, known noise, sections 3.3 and 4.1: Σ p_i² Σ_zz / (Σ p_i)² with Σ_zz = D S_i Dᵀ, S_i the
 /// covariance attached to the measured feature x_i.
-template <std::ranges::random_access_range R, class W, class V, Metric M = std::ranges::range_value_t<R>>
-SquareOf<M> covarianceFromNoise(const R& samples, const W& weights, const V& noise, const M& mean) {
+template <SampleRange R, WeightRange W, std::ranges::forward_range V, Metric M = SampleOf<R>>
+SquareOf<M> covarianceFromNoise(R&& samples, W&& weights, V&& noise, const std::type_identity_t<M>& mean) {
+  const auto x = detail::asSamples(samples);
+  const auto numbers = detail::asWeights(weights);
+  const auto covariances = detail::asValues<SquareOf<M>>(noise);
   SquareOf<M> sum = SquareOf<M>::Zero();
   ScalarOf<M> weight(0);
-  for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-    const auto k = static_cast<std::ptrdiff_t>(i);
-    const ScalarOf<M> p = ScalarOf<M>(weights[i]);
-    const SquareOf<M> D = errorVector(mean, M(samples[k])).by_feature;
-    sum += p * p * D * noise[i] * D.transpose();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const ScalarOf<M> p = ScalarOf<M>(numbers[i]);
+    const SquareOf<M> D = errorVector(mean, x[i]).by_feature;
+    sum += p * p * D * covariances[i] * D.transpose();
     weight += p;
   }
   return sum / (weight * weight);
@@ -48,12 +50,13 @@ SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result) {
 
 /// MAHA of section 4.2 with the printed Φ = Σ Lᵀ Σ_zz⁻¹ z, H = Σ Lᵀ Σ_zz⁻¹ L, Σ_zz = D S Dᵀ, covariance H⁻¹. No
 /// safeguard, as in the report: it may not converge.
-template <std::ranges::random_access_range R, class M = decltype(std::ranges::range_value_t<R>::mean)>
-MahaResult<M> maha(const R& samples, const MahaOptions<M>& options = {}) {
+template <std::ranges::forward_range R, class M = detail::FeatureInSignature<R>>
+MahaResult<M> maha(R&& range, const MahaOptions<std::type_identity_t<M>>& options = {}) {
+  const auto samples = detail::asValues<Gaussian<M>>(range);
   MahaResult<M> result;
-  result.n = std::ranges::size(samples);
+  result.n = samples.size();
   if (result.n == 0) return result;
-  M y = options.start ? *options.start : M(samples[0].mean);
+  M y = options.start ? *options.start : samples[0].mean;
   result.tolerance = options.tolerance.value_or(1e-10);
   result.status = Status::not_converged;
   SquareOf<M> H;

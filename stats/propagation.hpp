@@ -172,7 +172,7 @@ Gaussian<G> composeFourthOrder(const Gaussian<G>& a, const Gaussian<G>& b) {
   const Square& Q = b.covariance;
   // Σ_j P_ij ad(e_j), and then E[ad(p) ad(p)] = A_P, likewise A_Q, and E[ad(p) q qᵀ ad(p)ᵀ] = B.
   Square A_P = Square::Zero(), A_Q = Square::Zero(), B = Square::Zero();
-  std::array<Square, n> basis;
+  std::array<Square, static_cast<std::size_t>(n)> basis;
   for (int i = 0; i < n; ++i) {
     basis[static_cast<std::size_t>(i)] = G::ad(TangentOf<G>(TangentOf<G>::Unit(i)));
   }

@@ -54,6 +54,9 @@ class CounterRng {
   /// about 1/2. (One more bit would round the largest value to 1.)
   double uniform() { return (static_cast<double>((*this)() >> 12) + 0.5) * 0x1p-52; }
 
+  /// Uniform between two numbers.
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
   /// Standard normal, by Random123's own Box-Muller transform: unlike std::normal_distribution it is the same function
   /// with every standard library. Pairs are made from two words; the second of a pair is kept for the next call.
   double normal() {
@@ -76,6 +79,16 @@ class CounterRng {
     Eigen::Matrix<double, N, 1> v;
     for (int i = 0; i < N; ++i) v[i] = normal();
     return v;
+  }
+
+  /// A unit vector uniform on the sphere of N - 1 dimensions: N normals, normalised.
+  template <int N>
+  Eigen::Matrix<double, N, 1> unitVector() {
+    for (;;) {
+      const Eigen::Matrix<double, N, 1> v = normalVector<N>();
+      // Box-Muller's radius is exactly zero once in 2^54 words: the direction is then undefined, draw again.
+      if (const double norm = v.norm(); norm > 0) return v / norm;
+    }
   }
 
   /// A rotation uniform under the Haar measure, as a unit quaternion: four normals, normalised (the normal density

@@ -13,6 +13,11 @@ enum class Status {
   not_applicable  ///< the question has no answer for these data
 };
 
+/// Whether an iteration that ended with this status found a minimum, whatever else there is to say about it.
+constexpr bool converged(Status status) {
+  return status == Status::ok || status == Status::ambiguous || status == Status::ill_defined;
+}
+
 /// The name used in files and messages.
 constexpr const char* name(Status status) {
   switch (status) {

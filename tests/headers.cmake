@@ -1,5 +1,6 @@
 # Each public header compiles by itself, with no package but those which headers.txt grants it. A header that no line
-# names, or a line without its header, fails the test headers_listed, so that the list cannot fall behind.
+# names, a line without its header, or a header that no test covers fails the test headers_listed, so that the list
+# cannot fall behind.
 set(list ${CMAKE_CURRENT_SOURCE_DIR}/headers.txt)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
 
@@ -33,9 +34,25 @@ foreach(line IN LISTS lines)
     continue()
   endif()
   list(APPEND listed ${header})
+  set(covering ${words})
+  list(FILTER covering INCLUDE REGEX "^covered_by:")
+  list(FILTER words EXCLUDE REGEX "^covered_by:")
   if(NOT EXISTS ${PROJECT_SOURCE_DIR}/${header})
     string(APPEND complaints "tests/headers.txt names ${header}, which does not exist. ")
     continue()
+  endif()
+  # The test of its name, the contract's, or the one that the line names.
+  string(REGEX REPLACE "^([a-z]+)/.*$" "\\1" room ${header})
+  get_filename_component(stem ${header} NAME_WE)
+  file(GLOB_RECURSE named ${CMAKE_CURRENT_SOURCE_DIR}/${room}/${stem}_test.cpp)
+  string(FIND "${content}" "|${header}|" in_contract)
+  if(covering)
+    string(REPLACE "covered_by:" "" covering ${covering})
+    if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${covering}.cpp)
+      string(APPEND complaints "tests/headers.txt says that ${header} is covered by ${covering}, which does not exist. ")
+    endif()
+  elseif(NOT named AND in_contract EQUAL -1)
+    string(APPEND complaints "${header} has no test of its name; its line should end in covered_by:<test>. ")
   endif()
   liestat_missing(missing ${words})
   if(missing)
@@ -76,8 +93,8 @@ foreach(header IN LISTS headers)
   endif()
 endforeach()
 if(complaints)
-  message(WARNING "${complaints}A line there is a header and the packages that it needs besides Eigen (of "
-                  "${LIESTAT_DEPENDENCIES}).")
+  message(WARNING "${complaints}A line there is a header, the packages that it needs besides Eigen (of "
+                  "${LIESTAT_DEPENDENCIES}), and covered_by:<test> where no test has its name.")
   add_test(NAME headers_listed COMMAND bash -c "echo \"$1\"; exit 1" headers_listed "${complaints}")
 else()
   add_test(NAME headers_listed COMMAND ${CMAKE_COMMAND} -E true)

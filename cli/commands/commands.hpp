@@ -24,6 +24,10 @@ struct Invocation {
   std::function<int()> run;  ///< does the work and returns the exit code; may throw InputError
 };
 
+/// A subcommand of `parent`. CLI::App::add_subcommand makes every unit that calls it compile all of CLI11 (its classes
+/// are inline and have virtual functions): four seconds each.
+CLI::App* addCommand(CLI::App& parent, const std::string& name, const std::string& description);
+
 void addMeanCommand(CLI::App& app, Invocation& invocation);
 void addPreintegrateCommand(CLI::App& app, Invocation& invocation);
 void addSimulateViCommand(CLI::App& simulate, Invocation& invocation);

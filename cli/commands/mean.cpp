@@ -2,8 +2,6 @@
 #include <cli/show/mean.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <cstdio>
 #include <memory>
@@ -44,8 +42,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addMeanCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("mean", "Mean, covariance, dispersion and uniqueness of the features in a file");
+  CLI::App* command = addCommand(app, "mean", "Mean, covariance, dispersion and uniqueness of the features in a file");
   options->input.declare(*command, true);
   command->add_flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
   command

@@ -9,8 +9,8 @@ namespace liestat::cli {
 void MeasuresInput::declare(CLI::App& app, bool file_required) {
   CLI::Option* path = app.add_option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path->required();
-  app.add_option("--format", format, "auto, csv, tum, euroc or kitti (default auto)")
-      ->check(CLI::IsMember({"auto", "csv", "tum", "euroc", "kitti"}));
+  app.add_option("--format", format, "The file's format (default auto: by its first lines)")
+      ->check(CLI::IsMember(formatNames()));
   app.add_option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
       ->check(CLI::IsMember(experiments::featureNames()));
   app.add_option("--criterion", options.criterion,
@@ -27,7 +27,7 @@ void MeasuresInput::declare(CLI::App& app, bool file_required) {
 
 Measures MeasuresInput::read(const std::string& command) const {
   ReadingOptions how;
-  how.format = formatFromName(format).value_or(Format::automatic);
+  if (!format.empty()) how.format = format;
   how.norm_tolerance = norm_tolerance;
   return chooseMeasures(readFeatureFile(file, how), options, command);
 }

@@ -10,8 +10,6 @@
 #include <fusion/imu/factor.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -207,8 +205,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
+  CLI::App* command = addCommand(
+      app, "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
   addImuOptions(*command, options->imu, " (default 0, or the truth's)");
   command->add_option("--calibration", options->calibration,
                       "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");

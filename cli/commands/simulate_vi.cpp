@@ -1,14 +1,14 @@
-#include <cli/io/calibration.hpp>
 #include <cli/commands/commands.hpp>
+#include <cli/io/calibration.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/io/input_error.hpp>
-#include <experiments/simulate_vi.hpp>
+#include <cli/io/recording_files.hpp>
 #include <cli/io/text.hpp>
+#include <cli/show/simulated_recording.hpp>
+#include <experiments/simulate_vi.hpp>
 #include <stats/random.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -35,24 +35,9 @@ struct Options {
   double imu_rate = 200, imu_noise = 1, spacing = 0.1, gravity = 9.81;
 };
 
-/// Of the sensor in EuRoC's recordings, ADIS16448.
-constexpr ImuNoise<double> usual_noise{
-    .gyroscope = 1.6968e-4, .accelerometer = 2e-3, .gyroscope_walk = 1.9393e-5, .accelerometer_walk = 3e-3};
-
-/// What is used without a calibration: a pinhole that looks along the body's x axis.
-CameraCalibration usualCamera() {
-  CameraCalibration camera;
-  camera.name = "cam0";
-  camera.camera = {.fu = 450, .fv = 450, .cu = 376, .cv = 240, .width = 752, .height = 480};
-  Eigen::Matrix3d imu_R_cam;
-  imu_R_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  camera.imu_T_cam = SE3d(imu_R_cam, Eigen::Vector3d(0.05, 0.02, 0.01));
-  return camera;
-}
-
 struct Sensors {
-  CameraCalibration camera = usualCamera();
-  std::optional<ImuNoise<double>> noise = usual_noise;
+  CameraCalibration camera = defaultCamera();
+  std::optional<ImuNoise<double>> noise = adis16448;
 };
 
 Sensors sensorsOf(const Options& options) {
@@ -90,7 +75,8 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
     const double begin = options.begin.value_or(std::max(imu.samples.front().time, truth.front().time));
     const double end = options.end.value_or(std::min(imu.samples.back().time, truth.back().time));
     checkSize(options, end - begin);
-    SimulatedRecording recording = simulateImages(imu, truth, begin, end, sensors.camera, options.scene);
+    SimulatedRecording recording = simulateImages(imu.samples, truth, begin, end, sensors.camera, options.scene);
+    recording.start_ns = imu.start_ns;
     recording.noise = sensors.noise;
     return recording;
   }
@@ -102,7 +88,7 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
     throw InputError(joined(options.calibration, ", "), 0, "there is no IMU, whose noise would be simulated",
                      "a file with imu0 too, or --imu-noise 0");
   }
-  const ImuNoise<double> nominal = sensors.noise.value_or(usual_noise);
+  const ImuNoise<double> nominal = sensors.noise.value_or(adis16448);
   const double s = options.imu_noise;
   imu.noise = {.gyroscope = s * nominal.gyroscope,
                .accelerometer = s * nominal.accelerometer,
@@ -122,7 +108,12 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
   } else {
     const TextFile file = loadText(options.truth);
     start_ns = firstStamp(file.text, file.name);
-    motion = trajectoryAlong(parseGroundTruth(file.text, file.name, start_ns), options.spacing, file.name);
+    const std::vector<GroundTruth> truth = parseGroundTruth(file.text, file.name, start_ns);
+    try {
+      motion = trajectoryAlong(truth, options.spacing);
+    } catch (const ImpossibleMotion& complaint) {
+      throw InputError(file.name, 0, complaint.found(), complaint.expected());
+    }
     // A simulator's clock may begin at zero; stamps so small are not known for nanoseconds.
     if (start_ns < least_start_ns) start_ns = usual_start_ns;
   }
@@ -134,35 +125,6 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
   // Exact readings: no program can do with a noise of zero.
   if (s == 0) recording.noise = nominal;
   return recording;
-}
-
-void summarise(const Options& options, const SimulatedRecording& recording) {
-  const auto print = [](const std::string& line) { std::fputs((line + "\n").c_str(), stdout); };
-  const auto listed = [](const Eigen::Vector3d& v) {
-    return fmt::format("{:.4g}, {:.4g}, {:.4g}", v.x(), v.y(), v.z());
-  };
-  const double duration = recording.imu.back().time - recording.imu.front().time;
-  print(fmt::format("{:.4g} s: {} readings {}, {} images at {:g} Hz", duration, recording.imu.size(),
-                    options.imu.empty() ? "simulated" : "as recorded", recording.image_times.size(),
-                    options.scene.image_rate));
-  std::vector<std::size_t> lengths;
-  std::size_t outliers = 0;
-  for (const SimulatedTrack& track : recording.tracks) {
-    if (track.images > 0) lengths.push_back(track.images);
-    outliers += track.outlier ? 1 : 0;
-  }
-  std::sort(lengths.begin(), lengths.end());
-  print(fmt::format("{} landmarks on a box of {:.4g} x {:.4g} x {:.4g} m", options.scene.landmarks, recording.box.x(),
-                    recording.box.y(), recording.box.z()));
-  print(fmt::format(
-      "{} tracks of {} images in the median, {:.3g} an image, {} that drift", lengths.size(),
-      lengths.empty() ? 0 : lengths[lengths.size() / 2],
-      static_cast<double>(recording.observations.size()) / static_cast<double>(recording.image_times.size()),
-      outliers));
-  const ImuBias<double>& bias = recording.truth.front().bias;
-  print(
-      fmt::format("biases at the beginning {} rad/s and {} m/s^2", listed(bias.gyroscope), listed(bias.accelerometer)));
-  print("\n" + nextCommand(options.output));
 }
 
 /// The ranges of the parser let what is not a number through.
@@ -185,9 +147,15 @@ int runCommand(Options options) {
                      fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),
                      "an end after the beginning");
   }
-  const SimulatedRecording recording = simulate(options, sensorsOf(options));
-  writeRecording(recording, options.output);
-  summarise(options, recording);
+  const Sensors sensors = sensorsOf(options);
+  try {
+    const SimulatedRecording recording = simulate(options, sensors);
+    writeRecording(recording, options.output);
+    std::fputs(formatSimulatedRecording(recording, options.scene, !options.imu.empty(), options.output).c_str(),
+               stdout);
+  } catch (const ImpossibleMotion& complaint) {
+    throw InputError(command_name, 0, complaint.found(), complaint.expected());
+  }
   return exit_fine;
 }
 
@@ -196,8 +164,8 @@ int runCommand(Options options) {
 void addSimulateViCommand(CLI::App& simulate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   ViSceneOptions& scene = options->scene;
-  CLI::App* command = simulate.add_subcommand(
-      "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
+  CLI::App* command = addCommand(
+      simulate, "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
   command->add_option("--output", options->output, "Directory for the files")->required();
   command->add_option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
   command->add_option("--imu", options->imu,

@@ -1,12 +1,9 @@
 #include <cli/commands/commands.hpp>
-#include <experiments/means_validation.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/show/means_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
-#include <cmath>
 #include <memory>
 
 namespace liestat::cli {
@@ -24,32 +21,6 @@ struct Options {
   int threads = 0;
   bool certify = false, full = false;
 };
-
-JsonObject toJson(const MeansRow& row) {
-  const MeansExperiment& e = row.experiment;
-  const ValidationReport& r = row.report;
-  const bool frame = e.feature == Feature::frame || e.feature == Feature::semi_oriented_frame ||
-                     e.feature == Feature::non_oriented_frame;
-  JsonObject o;
-  o.set("feature", name(e.feature)).set("noise", name(e.noise)).set("criterion", name(row.method.criterion));
-  if (frame && row.method.criterion == Criterion::maha) {
-    o.set("covariance_at", name(e.covariance_at));
-  } else {
-    o.set("covariance_at", nullptr);
-  }
-  o.set("formula", row.method.corrected ? "corrected" : "printed").set("known_noise", row.method.known_noise);
-  o.set("in_domain", row.promise.has_value());
-  o.set("n", e.n).set("spread", e.spread);
-  setStatistics(o, r);
-  o.set("tail", static_cast<double>(r.tailCount()) / static_cast<double>(r.size()));
-  o.set("iterations", r.mean_iterations).set("failures", r.failures);
-  o.set("ratio_rotation", row.ratio(log_ratio_rotation))
-      .set("ratio_rotation_logsd", row.logDeviation(log_ratio_rotation));
-  o.set("ratio_translation", row.ratio(log_ratio_translation));
-  o.set("ratio_translation_logsd", row.logDeviation(log_ratio_translation));
-  o.set("passed", row.passed);
-  return o;
-}
 
 int runCommand(const Options& options, const Invocation& invocation) {
   MeansValidation validation;
@@ -76,7 +47,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand("means", "Means of features: Monte-Carlo validation of their covariances");
+  CLI::App* app = addCommand(validate, "means", "Means of features: Monte-Carlo validation of their covariances");
   app->add_option("--feature", options->features, "Features, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_features)));
@@ -86,7 +57,7 @@ void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
   app->add_option("--criterion", options->criteria, "Criteria, a comma list")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_criteria)));
-  app->add_option("--n", options->n, "Numbers of measures, a comma list (default 5,10,20,30,50,100)")
+  app->add_option("--n", options->n, "Numbers of measurements, a comma list (default 5,10,20,30,50,100)")
       ->delimiter(',')
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000000}));
   app->add_option("--spread", options->spreads,

@@ -1,10 +1,8 @@
 #include <cli/commands/commands.hpp>
-#include <experiments/propagation_validation.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/show/propagation_validation.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 
 #include <memory>
 
@@ -19,17 +17,6 @@ struct Options {
   ValidationOutput output;
 };
 
-JsonObject toJson(const PropagationRow& row) {
-  const ValidationReport& r = row.report;
-  JsonObject o;
-  o.set("feature", name(row.experiment.feature)).set("operation", name(row.method.operation));
-  o.set("order", row.method.fourth_order ? 4 : 1).set("in_domain", row.promise.has_value());
-  o.set("spread", row.experiment.spread);
-  setStatistics(o, r);
-  o.set("tail", row.tail).set("failures", r.failures).set("passed", row.passed);
-  return o;
-}
-
 int runCommand(const Options& options, const Invocation& invocation) {
   PropagationValidation validation = options.validation;
   validation.features = chosen(all_propagated, options.features);
@@ -38,16 +25,17 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
   const std::vector<PropagationRow> rows = withProgressBar(
       "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
-  return publish(options.output, invocation, validation.seed, propagation_false_alarm, rows, formatPropagationTables,
-                 toJson, writePropagationReport);
+  return publish(options.output, invocation, validation.seed, run_false_alarm, rows, formatPropagationTables, toJson,
+                 writePropagationReport);
 }
 
 }  // namespace
 
 void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = validate.add_subcommand(
-      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  CLI::App* app =
+      addCommand(validate, "propagation",
+                 "Composition, inverse and action of uncertain features: up to which noise is first order right?");
   app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(names(all_propagated)));

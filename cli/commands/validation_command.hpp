@@ -6,7 +6,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/progress.hpp>
-#include <stats/validation.hpp>
 
 #include <CLI/App.hpp>
 
@@ -48,13 +47,6 @@ auto withProgressBar(const std::string& label, const Run& run) {
     if (now > bar.done()) bar.advance(now - bar.done());
   };
   return run(progress);
-}
-
-/// The fields of a row that are the same in every validation.
-inline void setStatistics(JsonObject& o, const ValidationReport& r) {
-  o.set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
-  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
-  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
 }
 
 /// Where the rows go besides the terminal; empty for nowhere.

@@ -7,8 +7,6 @@
 #include <cli/show/vi_init.hpp>
 
 #include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -163,8 +161,8 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
   VisualInertialOptions& how = options->how;
   InitialisationOptions& steps = how.initialisation;
-  CLI::App* command = app.add_subcommand(
-      "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
+  CLI::App* command = addCommand(
+      app, "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
   addImuOptions(*command, options->imu, ": as it is expected (default 0)");
   command->add_option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s")
       ->required();

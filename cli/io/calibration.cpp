@@ -1,82 +1,24 @@
 #include <cli/io/calibration.hpp>
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
 #include <cli/io/text.hpp>
+#include <cli/io/yaml_values.hpp>
 
 namespace liestat::cli {
 namespace {
 
-/// Files print four digits at least; what is farther from a rotation than that is none.
-constexpr double rotation_tolerance = 1e-3;
 /// T_cam_imu and T_imu_cam of one file may differ by this, rad and m: they are rounded each for itself.
 constexpr double pose_tolerance = 1e-3;
 
 constexpr std::array densities = {"gyroscope_noise_density", "accelerometer_noise_density", "gyroscope_random_walk",
                                   "accelerometer_random_walk"};
-
-std::size_t lineOf(const YAML::Node& node) { return static_cast<std::size_t>(node.Mark().line + 1); }
-
-std::string shown(const YAML::Node& node) {
-  if (node.IsScalar()) return "'" + printable(node.Scalar()) + "'";
-  return node.IsSequence() ? "a list" : node.IsMap() ? "a map" : "empty";
-}
-
-/// A value and what messages call it by.
-struct Named {
-  YAML::Node node;
-  const std::string& file;
-  std::string name;
-
-  std::size_t line() const { return lineOf(node); }
-  [[noreturn]] void complain(const std::string& found, const std::string& expected) const {
-    throw InputError(file, line(), name + " " + found, expected);
-  }
-  double number(const std::string& expected) const {
-    double value = 0;
-    if (!node.IsScalar() || parseNumber(node.Scalar(), value) != NumberKind::finite)
-      complain("is " + shown(node), expected);
-    return value;
-  }
-};
-
-/// A map whose keys appear once: of two, one would be lost.
-struct Section {
-  YAML::Node node;
-  const std::string& file;
-  std::string name;  ///< cam0; empty for the file as a whole
-
-  Section(const YAML::Node& map, const std::string& file_name, std::string section)
-      : node(map), file(file_name), name(std::move(section)) {
-    std::set<std::string> keys;
-    for (const auto& entry : node) {
-      if (entry.first.IsScalar() && !keys.insert(entry.first.Scalar()).second) {
-        throw InputError(file, lineOf(entry.first), "'" + printable(entry.first.Scalar()) + "' appears twice",
-                         "it once");
-      }
-    }
-  }
-  std::string nameOf(const char* key) const { return name.empty() ? key : name + "'s " + key; }
-  std::size_t line() const { return name.empty() ? 0 : lineOf(node); }
-  bool has(const char* key) const { return node[key].IsDefined(); }
-  std::optional<Named> find(const char* key) const {
-    const YAML::Node value = node[key];
-    if (!value.IsDefined() || value.IsNull()) return std::nullopt;
-    return Named{value, file, nameOf(key)};
-  }
-  [[noreturn]] void complainMissing(const std::string& what, const std::string& expected) const {
-    throw InputError(file, line(), name.empty() ? "there is no " + what : name + " has no " + what, expected);
-  }
-};
 
 double density(const Section& sensor, const char* key) {
   const auto value = sensor.find(key);
@@ -96,71 +38,6 @@ ImuNoise<double> imuNoise(const Section& sensor) {
           .accelerometer = density(sensor, densities[1]),
           .gyroscope_walk = density(sensor, densities[2]),
           .accelerometer_walk = density(sensor, densities[3])};
-}
-
-/// A list of numbers.
-std::vector<double> numbers(const Named& list, const std::string& expected) {
-  if (!list.node.IsSequence()) list.complain("is " + shown(list.node), expected);
-  std::vector<double> values;
-  for (const YAML::Node& node : list.node) values.push_back(Named{node, list.file, list.name}.number(expected));
-  return values;
-}
-
-/// A rigid motion as rows (4x4, or 3x4), as 16 or 12 numbers in a row, or as OpenCV's map of rows, cols and data.
-SE3d rigidMotion(const Named& matrix) {
-  const std::string expected = "4 rows of 4 numbers, the last 0 0 0 1";
-  const auto complainSize = [&](const std::string& found) { matrix.complain(found, expected); };
-  const YAML::Node& map = matrix.node;
-  if (map.IsMap()) {
-    const YAML::Node rows = map["rows"], cols = map["cols"], list = map["data"];
-    if (!rows || !cols || !list || !list.IsSequence()) complainSize("is a map without rows, cols and data");
-    const double r = Named{rows, matrix.file, matrix.name + ": rows"}.number("4");
-    const double c = Named{cols, matrix.file, matrix.name + ": cols"}.number("4");
-    if ((r != 3 && r != 4) || c != 4) complainSize(fmt::format("is {} by {}", r, c));
-    if (list.size() != static_cast<std::size_t>(4 * r)) complainSize(fmt::format("has {} numbers", list.size()));
-  }
-  const YAML::Node data = map.IsMap() ? map["data"] : map;
-  if (!data.IsSequence()) complainSize("is " + shown(data));
-  std::vector<std::pair<double, std::size_t>> values;  // and their lines
-  const auto take = [&](const YAML::Node& node) {
-    values.emplace_back(Named{node, matrix.file, matrix.name}.number("numbers"), lineOf(node));
-  };
-  const bool in_rows = data.size() <= 4;
-  for (const YAML::Node& row : data) {
-    if (!in_rows) {
-      take(row);
-      continue;
-    }
-    if (!row.IsSequence() || row.size() != 4) {
-      throw InputError(matrix.file, lineOf(row),
-                       fmt::format("a row of {} {}", matrix.name,
-                                   row.IsSequence() ? fmt::format("has {} numbers", row.size()) : "is " + shown(row)),
-                       expected);
-    }
-    for (const YAML::Node& cell : row) take(cell);
-  }
-  if (values.size() != 16 && values.size() != 12) {
-    complainSize(in_rows ? fmt::format("has {} rows", data.size()) : fmt::format("has {} numbers", values.size()));
-  }
-  Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation;
-  for (int k = 0; k < 12; ++k) {
-    const double value = values[static_cast<std::size_t>(k)].first;
-    (k % 4 == 3 ? translation[k / 4] : rotation(k / 4, k % 4)) = value;
-  }
-  for (std::size_t k = 12; k < values.size(); ++k) {
-    if (std::abs(values[k].first - (k == 15 ? 1 : 0)) > 1e-9) {
-      throw InputError(matrix.file, values[k].second,
-                       fmt::format("the last row of {} is {} {} {} {}", matrix.name, values[12].first, values[13].first,
-                                   values[14].first, values[15].first),
-                       "0 0 0 1");
-    }
-  }
-  try {
-    return SE3d(nearestRotation(rotation, rotation_tolerance, matrix.file, matrix.line()).rotation, translation);
-  } catch (const InputError& error) {
-    throw InputError(matrix.file, matrix.line(), matrix.name + ": " + error.found(), error.expected());
-  }
 }
 
 Distortion distortionOf(const Section& section) {
@@ -282,21 +159,6 @@ std::string directoryOf(const std::string& path) {
 void addImu(const Section& section, Parsed& parsed) {
   parsed.calibration.imu = imuNoise(section);
   if (const auto T_BS = section.find("T_BS")) parsed.body_T_imu = rigidMotion(*T_BS);
-}
-
-/// Calls a function with the file's root; what yaml-cpp throws becomes an InputError.
-template <class Function>
-auto withRoot(std::string_view text, const std::string& name, Function&& function) {
-  // OpenCV's directive is none of YAML's; as a comment it keeps the numbers of the lines.
-  std::string yaml(text);
-  if (yaml.rfind("%YAML:", 0) == 0) yaml[0] = '#';
-  try {
-    const YAML::Node root = YAML::Load(yaml);
-    if (!root.IsMap()) throw InputError(name, 0, "this is no YAML file of named values");
-    return function(Section(root, name, ""));
-  } catch (const YAML::Exception& error) {
-    throw InputError(name, static_cast<std::size_t>(error.mark.line + 1), "YAML: " + printable(error.msg, 200));
-  }
 }
 
 Parsed parseFile(std::string_view text, const std::string& name) {

@@ -1,24 +1,16 @@
 #pragma once
 
+#include <experiments/recording.hpp>
 #include <fusion/imu/readings.hpp>
-#include <lie/se3.hpp>
 
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <cli/io/camera.hpp>
-
 namespace liestat::cli {
 
-/// A camera and where it sits on the inertial sensor.
-struct CameraCalibration {
-  std::string name;  ///< as the file calls it, cam0
-  Camera camera;
-  SE3d imu_T_cam;                ///< takes the camera's coordinates to the sensor's, m
-  double timeshift_cam_imu = 0;  ///< s: t_imu = t_cam + this
-};
+using experiments::CameraCalibration;
 
 /// What calibration files say.
 struct Calibration {

@@ -8,8 +8,7 @@
 #include <utility>
 
 #include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
-#include <cli/io/stamped_rows.hpp>
+#include <cli/io/numeric_table.hpp>
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <experiments/recording.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -8,14 +10,7 @@
 
 namespace liestat::cli {
 
-/// A feature in an image, in pixels.
-struct PixelObservation {
-  std::size_t image = 0;  ///< counts the images from 0
-  std::size_t track = 0;  ///< counts the tracks from 0
-  double u = 0;
-  double v = 0;
-  std::size_t line = 0;  ///< of the file
-};
+using experiments::PixelObservation;
 
 /// What a camera saw over time.
 struct ImageTracks {

@@ -7,8 +7,7 @@
 #include <utility>
 
 #include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
-#include <cli/io/stamped_rows.hpp>
+#include <cli/io/numeric_table.hpp>
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
@@ -107,23 +106,6 @@ std::int64_t firstStamp(std::string_view text, const std::string& name) {
   StampedRows rows(text, name, {});
   if (!rows.next()) throw InputError(name, 0, "the file has no data");
   return rows.stamp();
-}
-
-std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time) {
-  const auto next =
-      std::lower_bound(truth.begin(), truth.end(), time, [](const GroundTruth& g, double t) { return g.time < t; });
-  if (next == truth.end() || (next == truth.begin() && next->time > time)) return std::nullopt;
-  if (next->time == time) return *next;
-  const GroundTruth& before = *(next - 1);
-  const double h = next->time - before.time;
-  if (h > 0.1) return std::nullopt;
-  const double s = (time - before.time) / h;
-  GroundTruth at = before;
-  at.time = time;
-  at.state = SE23d(interpolate(SO3d(before.state.so3()), SO3d(next->state.so3()), s),
-                   Eigen::Vector3d((1 - s) * before.state.translation() + s * next->state.translation()),
-                   Eigen::Vector3d((1 - s) * before.state.velocity() + s * next->state.velocity()));
-  return at;
 }
 
 }  // namespace liestat::cli

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <experiments/recording.hpp>
 #include <fusion/imu/readings.hpp>
-#include <lie/se23.hpp>
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,12 +30,8 @@ ImuFile readImu(const std::string& path);
 /// The same from memory.
 ImuFile parseImu(std::string_view text, std::string name);
 
-/// Where a body was, and the biases of its sensor.
-struct GroundTruth {
-  double time = 0;  ///< s, since the start that readGroundTruth was given
-  SE23d state;      ///< world_T_body with the velocity in the world
-  ImuBias<double> bias;
-};
+using experiments::GroundTruth;
+using experiments::truthAt;
 
 /// Reads EuRoC's ground truth: timestamp [ns], p x y z, q w x y z, v x y z and, if there, b_w x y z, b_a x y z. Throws
 /// InputError.
@@ -46,9 +41,5 @@ std::vector<GroundTruth> parseGroundTruth(std::string_view text, const std::stri
 
 /// The time stamp of the first row of one of EuRoC's files, ns. Throws InputError.
 std::int64_t firstStamp(std::string_view text, const std::string& name);
-
-/// The state at a time, between its two neighbours: linear, and along the geodesic of the rotations. Empty outside of
-/// the rows and where these are more than 0.1 s apart.
-std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time);
 
 }  // namespace liestat::cli

@@ -4,15 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include <cli/io/input_error.hpp>
 
 namespace liestat::cli {
-
-using experiments::Part;
 
 namespace {
 
@@ -25,23 +22,6 @@ double weightOf(const Covariance& covariance) {
 }
 
 }  // namespace
-
-double TangentPart::scale() const { return angular ? 180 / std::numbers::pi : 1; }
-
-std::vector<TangentPart> tangentParts(Feature feature) {
-  const experiments::Parts& parts = experiments::info(feature).parts;
-  std::vector<TangentPart> list;
-  int begin = 0;
-  const auto add = [&](std::string part_name, int size, bool angular) {
-    list.push_back({std::move(part_name), begin, size, angular});
-    begin += size;
-  };
-  // In tangent vectors positions come first, whatever the order of the parameters.
-  if (parts.contains(Part::position)) add(parts.contains(Part::rotation) ? "translation" : "point", 3, false);
-  if (parts.contains(Part::rotation)) add("rotation", 3, true);
-  if (parts.contains(Part::direction)) add("direction", 2, true);
-  return list;
-}
 
 Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const std::string& command) {
   const auto refuse = [&](const std::string& why) { throw InputError(command, 0, why); };

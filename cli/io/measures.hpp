@@ -15,18 +15,6 @@ namespace liestat::cli {
 using experiments::Criterion;
 using experiments::Feature;
 
-/// A part of a feature's tangent vector.
-struct TangentPart {
-  std::string name;  ///< rotation, translation, point or direction
-  int begin = 0;
-  int size = 3;
-  bool angular = false;  ///< rad inside, degrees for people; else m
-
-  double scale() const;  ///< from the inner unit to people's
-  std::string unit() const { return angular ? "deg" : "m"; }
-};
-std::vector<TangentPart> tangentParts(Feature feature);
-
 /// What the commands that read features are told about them; names as on the command line, empty: decide by the file.
 struct MeasuresOptions {
   std::string feature = {};

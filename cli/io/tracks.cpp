@@ -10,7 +10,8 @@
 #include <utility>
 
 #include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
+#include <cli/io/numeric_table.hpp>
+#include <cli/io/rotation_matrix.hpp>
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
@@ -82,7 +83,7 @@ std::vector<CameraPose> readCameraPoses(const std::string& path) {
     pose.t = table(row, 1);
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = table(row, static_cast<std::size_t>(2 + i));
-    pose.R_camera_world = nearestRotation(matrix, rotation_tolerance, table.file(), table.line(row)).rotation;
+    pose.R_camera_world = nearestRotation(matrix, rotation_tolerance, table.file(), table.line(row)).rotation.matrix();
     pose.c = Eigen::Vector3d(table(row, 11), table(row, 12), table(row, 13));
     poses.push_back(pose);
   }

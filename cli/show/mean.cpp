@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
+#include <span>
 
 #include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
 
 namespace liestat::cli {
 namespace {
-
-constexpr double degrees = 180 / std::numbers::pi;
 
 std::string criterionInWords(const Measures& measures) {
   switch (measures.criterion) {
@@ -30,10 +29,10 @@ std::string criterionInWords(const Measures& measures) {
   return measures.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
 }
 
-std::vector<double> deviations(const TangentPart& part, const Eigen::MatrixXd& covariance) {
+std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance) {
   std::vector<double> list;
   for (int i = part.begin; i < part.begin + part.size; ++i) {
-    list.push_back(part.scale() * std::sqrt(std::max(0.0, covariance(i, i))));
+    list.push_back(unitOf(part).scale * std::sqrt(std::max(0.0, covariance(i, i))));
   }
   return list;
 }
@@ -46,18 +45,18 @@ std::vector<std::string> triple(const std::string& what, const Eigen::Vector3d& 
 
 std::vector<std::vector<std::string>> deviationRows(const Measures& measures, const MeanAnalysis& analysis) {
   std::vector<std::vector<std::string>> rows;
-  const auto add = [&](const std::string& what, const TangentPart& part, const Eigen::MatrixXd& covariance) {
-    std::vector<std::string> row{fmt::format("{}, {}", what, part.name)};
+  const auto add = [&](const std::string& what, const TangentBlock& part, const Eigen::MatrixXd& covariance) {
+    std::vector<std::string> row{fmt::format("{}, {}", what, name(part.part))};
     for (const double sd : deviations(part, covariance)) row.push_back(number(sd));
     row.resize(4);
-    row.push_back(part.unit());
+    row.push_back(unitOf(part).name);
     rows.push_back(row);
   };
-  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
   if (analysis.covariance.size() > 0) {
-    for (const TangentPart& part : parts) add("sd of the mean", part, analysis.covariance);
+    for (const TangentBlock& part : parts) add("sd of the mean", part, analysis.covariance);
   }
-  for (const TangentPart& part : parts) add("dispersion", part, analysis.dispersion);
+  for (const TangentBlock& part : parts) add("dispersion", part, analysis.dispersion);
   return rows;
 }
 
@@ -85,8 +84,8 @@ std::vector<std::vector<std::string>> valueRows(const FeatureValue& value) {
 }
 
 std::string uniquenessInWords(const MeanAnalysis& analysis) {
-  const bool certified = analysis.unique != "not_certified";
-  std::string text = (certified ? analysis.unique : "not certified") + ": ";
+  const bool certified = analysis.unique != Uniqueness::not_certified;
+  std::string text = std::string(certified ? name(analysis.unique) : "not certified") + ": ";
   if (!analysis.proof.empty()) {
     text += analysis.proof;
   } else if (analysis.cells > 0) {
@@ -136,10 +135,11 @@ std::string formatMean(const std::string& source, const Measures& measures, cons
   text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
   text += "covariance   " + covarianceInWords(measures, analysis) + "\n";
-  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
   for (std::size_t p = 0; measures.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
-    text += fmt::format("farthest     {} {} in {}, line {}\n", number(parts[p].scale() * analysis.largest[p].value),
-                        parts[p].unit(), parts[p].name, analysis.largest[p].line);
+    text +=
+        fmt::format("farthest     {} {} in {}, line {}\n", number(unitOf(parts[p]).scale * analysis.largest[p].value),
+                    unitOf(parts[p]).name, name(parts[p].part), analysis.largest[p].line);
   }
   for (const std::string& note : measures.notes) text += "note         " + note + "\n";
   for (const std::string& note : analysis.notes) text += "note         " + note + "\n";
@@ -187,8 +187,8 @@ void setCovarianceWords(JsonObject& object, Feature feature) {
 
 JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance) {
   JsonObject object;
-  for (const TangentPart& part : tangentParts(feature)) {
-    object.set(part.name + "_" + part.unit(), deviations(part, covariance));
+  for (const TangentBlock& part : experiments::info(feature).tangent) {
+    object.set(std::string(name(part.part)) + "_" + unitOf(part).name, deviations(part, covariance));
   }
   return object;
 }
@@ -234,16 +234,16 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measures
   object.set("dispersion", analysis.dispersion);
   object.set("dispersion_standard_deviations", standardDeviations(measures.feature, analysis.dispersion));
   std::vector<JsonObject> farthest;
-  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     JsonObject entry;
-    entry.set("part", parts[p].name).set("distance", parts[p].scale() * analysis.largest[p].value);
-    entry.set("unit", parts[p].unit()).set("line", analysis.largest[p].line);
+    entry.set("part", name(parts[p].part)).set("distance", unitOf(parts[p]).scale * analysis.largest[p].value);
+    entry.set("unit", unitOf(parts[p]).name).set("line", analysis.largest[p].line);
     farthest.push_back(entry);
   }
   object.set("farthest", farthest);
 
-  object.set("unique", analysis.unique).set("proof", uniquenessInWords(analysis));
+  object.set("unique", name(analysis.unique)).set("proof", uniquenessInWords(analysis));
   std::vector<JsonObject> rivals;
   for (const FeatureValue& rival : analysis.rivals) rivals.push_back(toJson(rival));
   object.set("rivals", rivals).set("r_star", analysis.r_star).set("cells", analysis.cells);

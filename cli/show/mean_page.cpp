@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 namespace liestat::cli {
 namespace {
@@ -122,7 +123,7 @@ Panel panelOf(const ChartPanel& chart, Plane plane) {
   return panel;
 }
 
-Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentPart& part) {
+Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentBlock& part) {
   if (m.size() == 0) return {};
   return m.block(part.begin, part.begin, part.size, part.size);
 }
@@ -140,7 +141,7 @@ bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& princi
 }
 
 /// Figure 2 of Pennec 1998.
-void plotAngles(Report& report, const Measures& measures, const MeanAnalysis& analysis, const TangentPart& part) {
+void plotAngles(Report& report, const Measures& measures, const MeanAnalysis& analysis, const TangentBlock& part) {
   const ChartScatter& charts = *analysis.charts;
   const Eigen::MatrixXd principal = charts.principal.middleRows(part.begin, part.size);
   const Eigen::MatrixXd centred = charts.centred.middleRows(part.begin, part.size);
@@ -182,7 +183,7 @@ void plotAngles(Report& report, const Measures& measures, const MeanAnalysis& an
 }
 
 /// Points, or the translations of frames, in the coordinates of the file.
-void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentPart& part) {
+void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBlock& part) {
   const ChartScatter& charts = *analysis.charts;
   const Eigen::MatrixXd data = charts.principal.middleRows(part.begin, part.size);
   const ChartPanel chart{.title = {},
@@ -193,10 +194,10 @@ void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentPa
                          .dispersion = blockOf(charts.dispersion, part),
                          .barycentre = {},
                          .barycentre_covariance = {}};
-  report.plot({.name = part.name + "s",
+  report.plot({.name = std::string(name(part.part)) + "s",
                .caption = fmt::format("The {}s in the file's coordinates with their mean, its covariance ellipsoid at "
                                       "chi-square {:g} and, dashed, the dispersion at {:g}.",
-                                      part.name, ellipsoid_chi2, dispersion_chi2),
+                                      name(part.part), ellipsoid_chi2, dispersion_chi2),
                .panels = {panelOf(chart, {0, 1}), panelOf(chart, {0, 2})}});
 }
 
@@ -207,10 +208,10 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
   Report report(directory, "Mean of the measures in " + source);
   report.paragraph(measuresInWords(source, measures) + ".");
   report.code(command_line);
-  const std::vector<TangentPart> parts = tangentParts(measures.feature);
+  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
   if (analysis.charts) {
     for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
-      if (part->angular) {
+      if (isAngular(part->part)) {
         plotAngles(report, measures, analysis, *part);
       } else {
         plotPositions(report, analysis, *part);

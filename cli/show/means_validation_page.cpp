@@ -1,6 +1,7 @@
+#include <cli/show/means_validation.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
-#include <experiments/means_validation.hpp>
+#include <cli/show/validation.hpp>
 
 #include <fmt/format.h>
 
@@ -43,23 +44,6 @@ Series curveWithBars(const std::vector<const MeansRow*>& rows, const Method& met
 
 void addIfAny(std::vector<Series>& list, Series series) {
   if (!series.x.empty()) list.push_back(std::move(series));
-}
-
-/// Histogram of the squared distances with the density that they should have.
-Panel histogramPanel(const MeansRow& row, const std::string& title) {
-  Panel panel{.title = title,
-              .x = {.label = "squared Mahalanobis distance", .low = 0.0},
-              .y = {.label = "density", .low = 0.0}};
-  const auto bins = row.report.histogram(30);
-  Series boxes{.name = "trials", .style = Style::boxes}, density{.name = row.report.law.name(), .style = Style::lines};
-  for (const HistogramBin& bin : bins) {
-    boxes.x.push_back(0.5 * (bin.lower + bin.upper));
-    boxes.y.push_back(bin.density);
-    density.x.push_back(0.5 * (bin.lower + bin.upper));
-    density.y.push_back(bin.expected);
-  }
-  panel.series = {boxes, density};
-  return panel;
 }
 
 }  // namespace
@@ -138,7 +122,7 @@ void writeMeansReport(const std::string& directory, const std::string& command_l
       residual_confidence.references = {{.at = 0.01}};
 
       Panel accuracy{.title = "errors over MAHA's", .x = n_axis, .y = {.label = "ratio"}};
-      const ExtraIndex kind = feature == Feature::point ? log_ratio_translation : log_ratio_rotation;
+      const ErrorRatio kind = feature == Feature::point ? log_ratio_translation : log_ratio_rotation;
       for (const Criterion criterion : {Criterion::lsq, Criterion::wlsq}) {
         addIfAny(
             accuracy.series,
@@ -181,9 +165,7 @@ void writeMeansReport(const std::string& directory, const std::string& command_l
                        fmt::format("{}", row.report.trials), number(row.report.index), number(row.report.index_se, 2),
                        number(row.report.law.mean()), number(row.report.ks_p_value, 2),
                        number(100 * row.report.coverage[2].observed, 4), fmt::format("{}", row.report.failures),
-                       !row.passed   ? ""
-                       : *row.passed ? "pass"
-                                     : "FAIL"});
+                       verdictCell(row.passed)});
     }
     report.table({"noise", "n", "criterion", "formula", "noise is", "trials", "index", "SE", "expected", "K-S p",
                   "95 % covers", "failures", "verdict"},

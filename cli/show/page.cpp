@@ -11,6 +11,7 @@
 #include <numbers>
 #include <utility>
 
+#include <cli/io/run_program.hpp>
 #include <cli/show/plots.hpp>
 #include <cli/show/json.hpp>
 #include <cli/io/output_file.hpp>

@@ -18,15 +18,4 @@ inline constexpr std::size_t most_points_drawn = 5000;
 /// texts of the plot hold, gnuplot takes it as text.
 std::string plotScript(const Plot& plot, const std::string& name);
 
-/// How a program ended.
-struct ProgramResult {
-  bool found = false;  ///< false: it is not installed
-  int status = -1;     ///< its exit code, 128 and more for a signal
-  std::string errors;  ///< what it wrote to standard error
-};
-
-/// Runs a program found by PATH in a directory and waits for it. No shell takes part. It reads nothing from standard
-/// input.
-ProgramResult runProgram(const std::vector<std::string>& arguments, const std::string& directory);
-
 }  // namespace liestat::cli

@@ -1,6 +1,7 @@
 #include <cli/show/page.hpp>
+#include <cli/show/propagation_validation.hpp>
 #include <cli/show/table.hpp>
-#include <experiments/propagation_validation.hpp>
+#include <cli/show/validation.hpp>
 
 #include <fmt/format.h>
 
@@ -24,21 +25,6 @@ Series curve(const std::vector<const PropagationRow*>& rows, const PropagationMe
     series.y.push_back(value(*row));
   }
   return series;
-}
-
-/// Histogram of the squared distances with the density that they should have.
-Panel histogramPanel(const PropagationRow& row) {
-  Panel panel{.title = fmt::format("{}, spread {:.3g}", label(row.method), row.experiment.spread),
-              .x = {.label = "squared Mahalanobis distance", .low = 0.0},
-              .y = {.label = "density", .low = 0.0}};
-  Series boxes{.name = "trials", .style = Style::boxes}, density{.name = row.report.law.name(), .style = Style::lines};
-  for (const HistogramBin& bin : row.histogram) {
-    for (Series* series : {&boxes, &density}) series->x.push_back(0.5 * (bin.lower + bin.upper));
-    boxes.y.push_back(bin.density);
-    density.y.push_back(bin.expected);
-  }
-  panel.series = {boxes, density};
-  return panel;
 }
 
 }  // namespace
@@ -77,13 +63,13 @@ void writePropagationReport(const std::string& directory, const std::string& com
       // Where the covariance is still right, and where it is most wrong.
       const std::optional<double> consistent = consistentUpTo(rows, feature, method);
       for (const PropagationRow* row : list) {
-        if (row->experiment.spread == consistent || row == list.back()) histograms.push_back(histogramPanel(*row));
+        if (row->experiment.spread == consistent || row == list.back())
+          histograms.push_back(
+              histogramPanel(*row, fmt::format("{}, spread {:.3g}", label(row->method), row->experiment.spread)));
         table.push_back({label(method), number(row->experiment.spread), fmt::format("{}", row->report.trials),
                          number(row->report.index), number(row->report.index_se, 2), number(row->report.law.mean()),
                          number(row->report.ks_p_value, 2), number(100 * row->report.coverage[2].observed),
-                         !row->passed   ? ""
-                         : *row->passed ? "pass"
-                                        : "FAIL"});
+                         verdictCell(row->passed)});
       }
     }
     if (table.empty()) continue;

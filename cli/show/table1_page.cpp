@@ -1,6 +1,6 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
-#include <experiments/table1.hpp>
+#include <cli/show/table1.hpp>
 
 #include <fmt/format.h>
 
@@ -100,8 +100,27 @@ std::string formatTable1(const std::vector<Table1Row>& rows) {
   return text + fmt::format(
                     "\n{} of {} cases are recognised as the corrected table says; false alarms: one in {:g} "
                     "runs\n{}\n",
-                    rows.size() - static_cast<std::size_t>(failed), rows.size(), 1 / table1_false_alarm,
+                    rows.size() - static_cast<std::size_t>(failed), rows.size(), 1 / run_false_alarm,
                     failed == 0 ? "PASSED" : "FAILED");
+}
+
+JsonObject toJson(const Table1Row& row) {
+  JsonObject o;
+  const Table1Entry& entry = table1Entries()[row.entry];
+  o.set("row", row.entry + 1).set("cases", entry.cases).set("paper", entry.paper).set("case", row.name);
+  o.set("corrections", row.corrections).set("data", row.noisy ? "noise" : "exact");
+  o.set("images", row.images).set("features", row.features).set("bias", row.bias).set("scenes", row.scenes);
+  o.set("null", row.noisy ? std::nullopt : std::optional<int>(row.null));
+  o.set("null_right", row.noisy ? std::nullopt : std::optional<std::size_t>(row.null_right));
+  o.set("one_solution", row.solutions[0]).set("two_solutions", row.solutions[1]);
+  o.set("infinite_solutions", row.solutions[2]);
+  JsonObject statuses;
+  for (const auto& [status, count] : row.statuses) statuses.set(name(status), count);
+  o.set("recognised", statuses);
+  std::vector<std::string> expected;
+  for (const FusionStatus status : row.expected) expected.push_back(name(status));
+  o.set("expected", expected).set("otherwise", row.wrong).set("passed", row.passed);
+  return o;
 }
 
 void writeTable1Report(const std::string& directory, const std::string& command_line,

@@ -1,6 +1,7 @@
+#include <cli/show/validation.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
-#include <experiments/vi_init_validation.hpp>
+#include <cli/show/vi_init_validation.hpp>
 
 #include <fmt/format.h>
 
@@ -44,8 +45,7 @@ std::vector<Group> groups(const std::vector<ViInitRow>& rows, Check check) {
     if (row.check != check) continue;
     const auto belongs = [&](const Group& g) {
       const ViInitRow& other = g.first();
-      return other.estimator == row.estimator && other.window.seconds == row.window.seconds &&
-             other.window.images == row.window.images && other.window.features == row.window.features;
+      return other.estimator == row.estimator && other.window == row.window;
     };
     auto group = std::find_if(list.begin(), list.end(), belongs);
     if (group == list.end()) group = list.insert(list.end(), Group{});
@@ -133,11 +133,6 @@ Table errorsTable(const std::vector<Group>& list) {
     if (std::any_of(note.begin() + 2, note.end(), [](const std::string& s) { return !s.empty(); })) table.row(note);
   }
   return table;
-}
-
-std::string verdict(const ViInitRow& row) {
-  if (!row.passed) return "";
-  return *row.passed ? "pass" : "FAIL";
 }
 
 /// A panel of curves over the windows' length, one for each estimator, of those windows that have 20 features and an
@@ -229,16 +224,36 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
     if (check != Check::closed_form) text += errorsTable(list).str() + "\n";
   }
-  std::size_t judged = 0, failed = 0;
   for (const ViInitRow& row : rows) {
-    judged += row.passed.has_value();
     if (row.passed.value_or(true)) continue;
-    ++failed;
     text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
                         name(row.quantity), row.window.seconds, row.window.images, row.window.features, row.reason);
   }
-  return text + fmt::format("{} of {} rows with a promise pass; false alarms: one in {:g} runs\n{}\n", judged - failed,
-                            judged, 1 / vi_init_false_alarm, failed == 0 ? "PASSED" : "FAILED");
+  return text + verdictLines(tally(rows), "with a promise");
+}
+
+JsonObject toJson(const ViInitRow& row) {
+  JsonObject o;
+  o.set("check", name(row.check)).set("estimator", name(row.estimator)).set("quantity", name(row.quantity));
+  o.set("unit", unit(row.quantity));
+  o.set("window", row.window.seconds).set("images", row.window.images).set("features", row.window.features);
+  o.set("in_domain", row.promise.has_value());
+  if (row.report) {
+    setStatistics(o, *row.report);
+  } else {
+    o.set("trials", row.trials);
+    for (const char* field :
+         {"dof", "law", "index", "index_se", "index_expected", "variance", "ks_statistic", "ks_p", "coverage95"}) {
+      o.set(field, nullptr);
+    }
+  }
+  o.set("failures", row.failures).set("median", row.median).set("p95", row.p95);
+  o.set("value", row.value).set("value_se", row.value_se);
+  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
+  o.set("promised_median", promise.median).set("promised_p95", promise.p95);
+  o.set("note_median", promise.note_median).set("note_p95", promise.note_p95);
+  o.set("passed", row.passed);
+  return o;
 }
 
 void writeViInitReport(const std::string& directory, const std::string& command_line,
@@ -310,7 +325,7 @@ void writeViInitReport(const std::string& directory, const std::string& command_
                          law ? number(row->report->law.mean()) : "", law ? number(row->report->ks_p_value, 2) : "",
                          law ? number(100 * row->report->coverage[2].observed) : "",
                          error ? number(row->median, 3) : "", error ? number(row->p95, 3) : "", unit(row->quantity),
-                         verdict(*row)});
+                         verdictCell(row->passed)});
       }
     }
     report.table({"estimator", "T, images, features", "quantity", "trials", "lost", "index or value", "SE", "expected",

@@ -2,8 +2,7 @@
 //
 //   problem.AddParameterBlock(state.data(), 10, new liestat::CeresManifold<liestat::SE23d>);   // lie/compat/ceres.hpp
 //   problem.AddResidualBlock(new liestat::PreintegrationCost(motion), nullptr, first.data(), second.data(),
-//   bias.data(),
-//                            gravity.data());
+//                            bias.data(), gravity.data());
 //   problem.SetParameterBlockConstant(gravity.data());
 //
 // States are the parameters of SE23 (quaternion x y z w, position, velocity), biases six numbers (gyroscope rad/s,

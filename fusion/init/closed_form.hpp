@@ -23,21 +23,6 @@
 
 namespace liestat {
 
-/// The factor γ₂ by which the second solution's scene and motion are the first one's scaled, for an acceleration that
-/// is constant or seen by three images only: A the specific force (with three images its mean, meanSpecificForce), G
-/// gravity (m/s²). The second solution is (γ₂ P, γ₂ (V + L) - L, γ₂ (A + G) - A), L = S₂/dt₂ - A dt₂/2, which is 0 for
-/// a constant acceleration. γ₂ = 1: a double root; γ₂ ≤ 0 (|A| ≤ |G|): the second has its features behind the camera. A
-/// camera away from the body's origin (p_c) fixes the scale and voids it where the body rotates. Design note 3.3.
-inline double secondSolutionScale(const Eigen::Vector3d& specific_force, const Eigen::Vector3d& gravity) {
-  return (specific_force.squaredNorm() - gravity.squaredNorm()) / (specific_force + gravity).squaredNorm();
-}
-
-/// The mean specific force in the body's axes at the first image that three images feel: the second divided difference
-/// of S at the first, second and third. Any accelerations.
-inline Eigen::Vector3d meanSpecificForce(const WindowImage& second, const WindowImage& third) {
-  return 2 / (third.time - second.time) * (third.displacement / third.time - second.displacement / second.time);
-}
-
 /// Velocity, gravity and features of a window. Input that can't be used gives bad_input with a fault, never a crash.
 inline ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const InitialisationOptions& options = {}) {
   ClosedFormResult result;

@@ -51,6 +51,16 @@ class GroupBase : public Shell<Derived> {
   using Line = Eigen::ParametrizedLine<Scalar, Dim>;
   using Hyperplane = Eigen::Hyperplane<Scalar, Dim>;
 
+  // Types of results under Sophus' names; Other is a group's element or an Eigen vector.
+  template <class Other>
+  using ReturnScalar = CommonScalar<Scalar, typename Other::Scalar>;
+  template <class Other>
+  using GroupProduct = Rebind<ReturnScalar<Other>>;  ///< SO3Product, SE3Product … of the groups
+  template <class Other>
+  using PointProduct = Eigen::Matrix<ReturnScalar<Other>, Dim, 1>;
+  template <class Other>
+  using HomogeneousPointProduct = Eigen::Matrix<ReturnScalar<Other>, Dim + 1, 1>;
+
   /// Group product, also between scalars that Eigen lets meet (double and Jet). No square root is taken: call
   /// normalize() after long chains of products in double.
   template <class Other>

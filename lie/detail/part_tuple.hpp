@@ -80,10 +80,18 @@ constexpr int sumOfFirst(std::size_t k) {
 template <class S, int... Rows, int... Columns, class Block>
 auto blockDiagonal(std::integer_sequence<int, Rows...>, std::integer_sequence<int, Columns...>, const Block& block) {
   using Matrix = Eigen::Matrix<S, (Rows + ...), (Columns + ...)>;
-  Matrix m = Matrix::Zero();
-  forEachIndex<sizeof...(Rows)>([&](auto i) {
-    constexpr int r = sumOfFirst<Rows...>(i), c = sumOfFirst<Columns...>(i);
-    m.template block<sumOfFirst<Rows...>(i + 1) - r, sumOfFirst<Columns...>(i + 1) - c>(r, c) = block(i);
+  Matrix m;
+  // As loops: each block and each matrix would be an expression of its own for the compiler.
+  for (int j = 0; j < Matrix::ColsAtCompileTime; ++j) {
+    for (int i = 0; i < Matrix::RowsAtCompileTime; ++i) m(i, j) = S(0);
+  }
+  forEachIndex<sizeof...(Rows)>([&](auto part) {
+    constexpr int r = sumOfFirst<Rows...>(part), c = sumOfFirst<Columns...>(part);
+    constexpr int rows = sumOfFirst<Rows...>(part + 1) - r, columns = sumOfFirst<Columns...>(part + 1) - c;
+    const Eigen::Matrix<S, rows, columns> b = block(part);
+    for (int j = 0; j < columns; ++j) {
+      for (int i = 0; i < rows; ++i) m(r + i, c + j) = b(i, j);
+    }
   });
   return m;
 }

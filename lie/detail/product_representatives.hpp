@@ -5,6 +5,7 @@
 #include <lie/detail/trig.hpp>
 
 #include <array>
+#include <cstddef>
 #include <iterator>
 #include <limits>
 
@@ -33,8 +34,8 @@ struct ProductRepresentative {
 template <class M, class... Ms>
 struct ProductRepresentatives {
   static constexpr int num_representatives = (representativeCount<Ms>() * ...);
-  static constexpr std::array<int, num_representatives> representatives = [] {
-    std::array<int, num_representatives> list{};
+  static constexpr std::array<int, static_cast<std::size_t>(num_representatives)> representatives = [] {
+    std::array<int, static_cast<std::size_t>(num_representatives)> list{};
     for (int i = 0; i < num_representatives; ++i) list[static_cast<std::size_t>(i)] = i;
     return list;
   }();

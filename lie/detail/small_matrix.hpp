@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <array>
+#include <cstddef>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -156,7 +156,7 @@ class SemidefiniteRoot {
  private:
   Eigen::Matrix<S, N, N> L_;  // its transpose, above the diagonal
   Eigen::Matrix<S, N, 1> scale_;
-  std::array<int, N> order_;
+  Eigen::Matrix<int, N, 1> order_;
 };
 
 /// The matrix of cofactors, det(M) M⁻ᵀ: the cross products of M's columns. Also of singular matrices.

@@ -34,8 +34,8 @@ constexpr auto branch(bool mask, F&& f, G&& g) {
 
 /// (-1)^k / (2k + offset)!, k = 0 … N-1, times a polynomial factor in k.
 template <int N, class Factor>
-constexpr std::array<double, N> factorialSeries(int offset, Factor factor) {
-  std::array<double, N> coefficients{};
+constexpr std::array<double, static_cast<std::size_t>(N)> factorialSeries(int offset, Factor factor) {
+  std::array<double, static_cast<std::size_t>(N)> coefficients{};
   for (int k = 0; k < N; ++k) {
     long double factorial = 1;
     for (int i = 2; i <= 2 * k + offset; ++i) factorial *= i;

@@ -7,7 +7,7 @@
 #pragma once
 
 #include <lie/detail/arccosine.hpp>
-#include <lie/frame3.hpp>
+#include <lie/so3.hpp>
 
 #include <array>
 #include <cmath>
@@ -69,10 +69,11 @@ inline constexpr RotationPolynomials<21, 22, 11> any_rotation{0.5};
 inline constexpr RotationPolynomials<13, 13, 7> small_rotation{0.1465};
 inline constexpr double small_rotation_cosine = 0.7072;
 
-/// Manifolds whose sums are made here: SO3, Frame3 and the quotients of Frame3, in double.
+/// Manifolds whose sums are made here: SO3, Frame3, the quotients of Frame3 and whatever else shows its parameters, in
+/// double.
 template <class M>
-concept HasRotationSums = std::same_as < typename ManifoldTraits<M>::Scalar,
-double > &&(std::derived_from<M, SO3Base<M>> || std::derived_from<ManifoldTraits<M>, FrameManifold<M>>);
+concept HasRotationSums = HasRotationParameters<M> && std::same_as < typename ManifoldTraits<M>::Scalar,
+double > ;
 
 /// Σ over some features about a reference y, in the frame of y. The Hessian is exact where the scatter is asked for,
 /// else good to eight digits, as Newton's method needs it.
@@ -107,8 +108,8 @@ class RotationSums {
     for (std::size_t i = begin; i < end; i += block) {
       const std::size_t count = end - i < block ? end - i : block;
       for (std::size_t j = 0; j < count; ++j) {
-        const M& x = samples[static_cast<std::ptrdiff_t>(i + j)];
-        const double* const p = x.data();
+        const M& x = samples[i + j];
+        const double* const p = T::parameters(x);
         for (std::size_t c = 0; c < 4; ++c) data[c][j] = p[c];
         if constexpr (Weighted) weight += data[4][j] = static_cast<double>(weights[i + j]);
         if constexpr (frame) {
@@ -134,7 +135,7 @@ class RotationSums {
         for (std::size_t j = 0; j < count; ++j) {
           const double b = best[j], s = second[j];
           if (b * s + std::sqrt(std::abs((1 - b * b) * (1 - s * s))) < gap_cosine) continue;
-          const M at_y = T::act(reference.to_y, M(samples[static_cast<std::ptrdiff_t>(i + j)]));
+          const M at_y = T::act(reference.to_y, M(samples[i + j]));
           const double gap = T::nearestRepresentative(at_y).gap();
           smallest_gap = gap < smallest_gap ? gap : smallest_gap;
           gap_cosine = std::cos(0.5 * smallest_gap) - 1e-4;
@@ -149,8 +150,8 @@ class RotationSums {
  private:
   struct Reference {
     explicit Reference(const M& y) : to_y(T::placement(y).inverse()) {
-      std::memcpy(q, y.data(), sizeof q);
-      if constexpr (frame) std::memcpy(translation, y.data() + 4, sizeof translation);
+      std::memcpy(q, T::parameters(y), sizeof q);
+      if constexpr (frame) std::memcpy(translation, T::parameters(y) + 4, sizeof translation);
     }
     typename T::Group to_y;
     double q[4], translation[3] = {};
@@ -255,7 +256,7 @@ class RotationSums {
     }
     static constexpr std::size_t column(std::size_t entry) { return entry - row(entry) * (row(entry) + 1) / 2; }
     template <std::size_t N, std::size_t... Entry>
-    static void addOuter(Pack (&sums)[N], const Pack (&a)[k], const Pack (&b)[k], std::index_sequence<Entry...>) {
+    static void addOuter(Pack (&sums)[N], const Pack (&a)[static_cast<std::size_t>(k)], const Pack (&b)[static_cast<std::size_t>(k)], std::index_sequence<Entry...>) {
       ((sums[Entry] += a[row(Entry)] * b[column(Entry)]), ...);
     }
     static Square symmetric(const Pack (&sums)[entries]) {
@@ -287,7 +288,8 @@ class RotationSums {
     }
     if constexpr (frame) {
       hessian.template topLeftCorner<3, 3>() = weight * Matrix3::Identity();
-      const Matrix3 to_y = reference.to_y.so3().matrix();
+      const double(&q)[4] = reference.q;
+      const Matrix3 to_y = So3Math<double>::matrix(Eigen::Vector4d(-q[0], -q[1], -q[2], q[3]));
       gradient.template head<3>() = (to_y * gradient.template head<3>()).eval();
       if constexpr (Scatter) {
         for (Square* m : {&scatter, &squared}) {

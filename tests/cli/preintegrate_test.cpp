@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <cli/io/calibration.hpp>
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/temporary_directory.hpp>
-#include <experiments/preintegration_validation.hpp>
+#include <cli/show/preintegration_validation.hpp>
 
 namespace liestat::cli {
 using namespace experiments;
@@ -155,7 +155,7 @@ TEST(ValidatePreintegration, JudgesWhatIsPromised) {
     EXPECT_EQ(row.report.trials, 200U);
     EXPECT_EQ(row.report.dof, row.check == PreintegrationCheck::motion_and_bias ? 15 : 9);
     EXPECT_EQ(row.passed.has_value(), row.noise == 1) << "promised up to ten times the sensor's noise";
-    EXPECT_TRUE(row.passed.value_or(true)) << row.reason;
+    EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
   }
   const std::string table = formatPreintegrationTable(rows);
   EXPECT_NE(table.find("3 of 3 rows in the promised domain (noise up to 10) pass"), std::string::npos) << table;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include <cli/io/run_program.hpp>
 #include <cli/show/plots.hpp>
 #include <cli/temporary_directory.hpp>
 

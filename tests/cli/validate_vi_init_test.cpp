@@ -1,7 +1,7 @@
 // `liestat validate vi-init`: each check, what it can't pass, the paper's table and figures, and what the program
 // writes.
 
-#include <experiments/vi_init_validation.hpp>
+#include <cli/show/vi_init_validation.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,10 +15,11 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/temporary_directory.hpp>
 #include <experiments/two_solutions.hpp>
-#include <experiments/table1.hpp>
+#include <cli/show/table1.hpp>
+#include <experiments/vi_init_trials.hpp>
 
 namespace liestat::cli {
 using namespace experiments;
@@ -102,18 +103,33 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
   const ViInitWindow two_images{2, 2, 20};
   CounterRng rng(1);
   const double infinite = std::numeric_limits<double>::infinity();
-  for (const ViInitTrial trial : {closedFormNeesTrial, closedFormBiasNeesTrial}) {
-    for (const double value : trial(two_images, 1, rng)) EXPECT_TRUE(std::isnan(value));
+  const auto expectNone = [](std::initializer_list<double> distances) {
+    for (const double distance : distances) EXPECT_TRUE(std::isnan(distance));
+  };
+  const auto expectLost = [&](const ViErrors& errors) {
+    for (const double error : {errors.speed, errors.gravity, errors.scale}) EXPECT_EQ(error, infinite);
+  };
+  for (const ViInitTrial<ClosedFormOutcome> trial : {closedFormNeesTrial, closedFormBiasNeesTrial}) {
+    const ClosedFormOutcome closed = trial(two_images, 1, rng);
+    expectNone({closed.nees_v_g, closed.nees_all, closed.chi2.cost, closed.chi2.degrees_of_freedom});
   }
-  const std::vector<double> refined = refinementTrial(two_images, 1, rng);
-  ASSERT_EQ(refined.size(), 10U);
-  for (std::size_t k = 0; k < 6; ++k) EXPECT_TRUE(std::isnan(refined[k]));
-  for (std::size_t k = 6; k < 10; ++k) EXPECT_EQ(refined[k], infinite);
-  for (const double error : closedFormErrorsTrial(two_images, 1, rng)) EXPECT_EQ(error, infinite);
-  for (const double error : gyroscopeBiasTrial(two_images, 1, rng)) EXPECT_EQ(error, infinite);
-  const std::vector<double> drift = driftTrial(two_images, 1, rng);
-  EXPECT_EQ(drift[0], 0);
-  for (std::size_t k = 1; k < drift.size(); ++k) EXPECT_EQ(drift[k], infinite);
+  const RefinementOutcome refined = refinementTrial(two_images, 1, rng);
+  expectNone({refined.nees_v, refined.nees_v_g, refined.nees_all, refined.nees_last_state, refined.chi2.cost,
+              refined.chi2.degrees_of_freedom});
+  expectLost(refined.errors);
+  EXPECT_EQ(refined.scale_of_features, infinite);
+  const AccuracyOutcome accuracy = closedFormErrorsTrial(two_images, 1, rng);
+  expectLost(accuracy.closed_form);
+  expectLost(accuracy.least_squares);
+  const GyroscopeBiasOutcome gyroscope = gyroscopeBiasTrial(two_images, 1, rng);
+  EXPECT_EQ(gyroscope.bias, infinite);
+  expectLost(gyroscope.estimated);
+  expectLost(gyroscope.ignored);
+  const DriftOutcome drift = driftTrial(two_images, 1, rng);
+  EXPECT_FALSE(drift.exact_selection);
+  expectLost(drift.robust);
+  expectLost(drift.oracle);
+  expectLost(drift.no_selection);
 }
 
 TEST(ValidateViInit, doesNotDependOnThreads) {

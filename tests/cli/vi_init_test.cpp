@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/plots.hpp>
+#include <cli/io/run_program.hpp>
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {

@@ -31,21 +31,10 @@ InitialisationOptions drawnFrom(std::uint64_t seed) {
 
 Scene noisyScene(const SceneOptions& scene_options, std::uint64_t seed) {
   Scene scene(scene_options, seed);
-  SceneRandom random(seed + 1000003);
+  CounterRng random(seed, 0, 1);
   measure(scene, {1.7e-4, 2e-3}, random);
   scene.addNoise(pixel, random);
   return scene;
-}
-
-/// The first features walk away, by `step` rad an image in each direction.
-void drift(Scene& scene, std::size_t count, double step, SceneRandom& random) {
-  for (std::size_t i = 0; i < count; ++i) {
-    Eigen::Vector3d walk = Eigen::Vector3d::Zero();
-    for (TrackedBearing& seen : scene.window.features[i]) {
-      if (seen.image > 0) walk += step * random.normal3();
-      seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
-    }
-  }
 }
 
 double median(std::vector<double> values) {
@@ -64,8 +53,8 @@ TEST(ClosedFormRansac, LeavesOutDriftingTracks) {
     std::vector<double> robust_error, oracle_error, plain_error;
     for (std::size_t trial = 0; trial < trials; ++trial) {
       Scene scene = noisyScene({.images = 21, .features = features}, 120000 + trial);
-      SceneRandom random(130000 + trial);
-      drift(scene, wrong, pixels * pixel, random);
+      CounterRng random(120000 + trial, 0, 2);
+      scene.addDrift(wrong, pixels * pixel, random);
       const auto robust = solveClosedFormRobustly(scene.window, drawnFrom(trial));
       hypotheses += robust.hypotheses;
       ok += robust.ok();
@@ -115,8 +104,8 @@ TEST(ClosedFormRansac, TakesAllWhereAllAreRight) {
 
 TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
   Scene scene = noisyScene({.images = 21, .features = 40}, 5);
-  SceneRandom random(6);
-  drift(scene, 16, 8 * pixel, random);
+  CounterRng random(5, 0, 2);
+  scene.addDrift(16, 8 * pixel, random);
   const auto solve = [&](std::uint64_t seed) { return solveClosedFormRobustly(scene.window, drawnFrom(seed)); };
   const auto first = solve(3), again = solve(3), other = solve(4);
   EXPECT_EQ(first.inliers, again.inliers);
@@ -133,8 +122,8 @@ TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
 
 TEST(ClosedFormRansac, SaysWhenThereIsNoConsensus) {
   Scene scene = noisyScene({.images = 21, .features = 20}, 8);
-  SceneRandom random(9);
-  drift(scene, 20, 0.05, random);
+  CounterRng random(8, 0, 2);
+  scene.addDrift(20, 0.05, random);
   const auto robust = solveClosedFormRobustly(scene.window, options);
   EXPECT_TRUE(robust.inliers.empty());
   EXPECT_EQ(robust.hypotheses, options.consensus.max_hypotheses);

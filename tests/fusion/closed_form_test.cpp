@@ -293,7 +293,7 @@ TEST(Elimination, BlocksAddUpAndGiveTheBestPositions) {
   ClosedFormResult counts;
   const detail::RayTable table = detail::rayTable(scene.window, counts);
   for (const bool bias : {false, true}) {
-    SceneRandom random(7);
+    CounterRng random(7);
     detail::Motion y(bias);
     for (int k = 0; k + 1 < y.size; ++k) y[k] = random.normal();
     detail::MotionBlock sum(bias), most(bias);
@@ -312,7 +312,7 @@ TEST(Elimination, BlocksAddUpAndGiveTheBestPositions) {
       };
       const Vector3 P = detail::apply(e.by_motion, y);
       EXPECT_NEAR(e.block.cost(y), residual(P), 1e-11 * residual(Vector3::Zero()));
-      for (int k = 0; k < 10; ++k) EXPECT_GE(residual(P + 0.01 * random.unit()), residual(P));
+      for (int k = 0; k < 10; ++k) EXPECT_GE(residual(P + 0.01 * random.unitVector<3>()), residual(P));
       cost += residual(P);
       if (i != 2) cost_of_most += residual(P);
       // The orthogonal way has the same root and the same position.

@@ -35,7 +35,7 @@ struct Recorded {
   ClosedFormResult start;
 
   Recorded(SceneOptions scene_options, std::uint64_t seed, const ImuNoise<double>& noise = imu, double sigma = pixel)
-      : Recorded(scene_options, seed, noise, sigma, SceneRandom(seed + 1000003)) {}
+      : Recorded(scene_options, seed, noise, sigma, CounterRng(seed, 0, 1)) {}
 
   /// The state at the last image, in t0's frame.
   SE23d last() const {
@@ -47,9 +47,10 @@ struct Recorded {
 
  private:
   Recorded(SceneOptions scene_options, std::uint64_t seed, const ImuNoise<double>& noise, double sigma,
-           SceneRandom random)
-      : scene((scene_options.bias = options.prior.accelerometer_sigma * random.normal3(), scene_options), seed) {
-    bias = {options.prior.gyroscope_sigma * random.normal3(), scene.options().bias};
+           CounterRng random)
+      : scene((scene_options.bias = options.prior.accelerometer_sigma * random.normalVector<3>(), scene_options),
+              seed) {
+    bias = {options.prior.gyroscope_sigma * random.normalVector<3>(), scene.options().bias};
     readings = readingsOf(scene, noise, random, bias.gyroscope);
     scene.addNoise(sigma, random);
     window = InertialWindow(motionsOf(scene, readings, {.preintegration = {.noise = imu}}), scene.window.features,

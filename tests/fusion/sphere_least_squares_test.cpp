@@ -15,9 +15,10 @@ using namespace liestat;
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
 
-Matrix3 someMatrix(liestat_test::SceneRandom& random, double spread) {
+Matrix3 someMatrix(CounterRng& random, double spread) {
   Matrix3 R;
-  for (int k = 0; k < 3; ++k) R.row(k) = std::pow(10., random.uniform(-spread, 0)) * random.normal3().transpose();
+  for (int k = 0; k < 3; ++k)
+    R.row(k) = std::pow(10., random.uniform(-spread, 0)) * random.normalVector<3>().transpose();
   return R;
 }
 
@@ -33,14 +34,14 @@ double stationarity(const Matrix3& R, const Vector3& r, const Vector3& x) {
 // looks like that, so they are followed downhill, and only where the matrix is not too far from round; the global
 // minimum is compared always.
 TEST(SphereMinima, AgreeWithDenseSampling) {
-  liestat_test::SceneRandom random(5);
+  CounterRng random(5);
   constexpr int n = 60;
   int two = 0;
   for (int trial = 0; trial < 150; ++trial) {
     const bool round = trial % 2 == 0;
     const Matrix3 R = someMatrix(random, round ? 0.5 : 2);
     const double radius = random.uniform(0.3, 3);
-    const Vector3 r = -R * (radius * random.uniform(0, 2) * random.unit()) + 0.1 * random.normal3();
+    const Vector3 r = -R * (radius * random.uniform(0, 2) * random.unitVector<3>()) + 0.1 * random.normalVector<3>();
     const SphereMinima minima = minimiseOnSphere(R, r, radius);
     ASSERT_GE(minima.count, 1);
     EXPECT_LE(minima.cost[0], minima.cost[minima.count - 1]);
@@ -50,7 +51,7 @@ TEST(SphereMinima, AgreeWithDenseSampling) {
       EXPECT_LE(stationarity(R, r, minima.point[k]), 1e-11) << trial << " minimum " << k;
       // A minimum: dearer all around.
       for (int j = 0; j < 20; ++j) {
-        const Vector3 near = radius * (minima.point[k] + 1e-3 * radius * random.unit()).normalized();
+        const Vector3 near = radius * (minima.point[k] + 1e-3 * radius * random.unitVector<3>()).normalized();
         EXPECT_GE(cost(R, r, near), minima.cost[k] * (1 - 1e-12)) << trial << " minimum " << k;
       }
     }
@@ -79,7 +80,7 @@ TEST(SphereMinima, AgreeWithDenseSampling) {
         Vector3 x = at(i, j);
         double step = 0.05;
         for (int k = 0; k < 4000 && step > 1e-9; ++k) {
-          const Vector3 next = radius * (x + step * radius * random.unit()).normalized();
+          const Vector3 next = radius * (x + step * radius * random.unitVector<3>()).normalized();
           if (cost(R, r, next) < cost(R, r, x)) {
             x = next;
             step *= 2;
@@ -115,12 +116,12 @@ TEST(SphereMinima, OfDataWithoutAPreferredSideAreTwo) {
 
 TEST(SphereMinima, KeepTheirDigitsWhereRankIsLostToRounding) {
   // The singular value along a direction is rounding, and so is the data's opinion on it: both minima to 1e-13.
-  liestat_test::SceneRandom random(6);
+  CounterRng random(6);
   for (int trial = 0; trial < 200; ++trial) {
     Matrix3 R = someMatrix(random, 1);
-    const Vector3 null = random.unit();
+    const Vector3 null = random.unitVector<3>();
     R -= (R * null) * null.transpose();
-    const Vector3 truth = 2 * random.unit();
+    const Vector3 truth = 2 * random.unitVector<3>();
     const double along = truth.dot(null);
     if (std::abs(along) < 0.1) continue;
     const SphereMinima minima = minimiseOnSphere(R, -R * truth, truth.norm());

@@ -27,7 +27,7 @@ struct Flight {
   VisualInertialRecording recording;
 
   Flight() {
-    SceneRandom random(3);
+    CounterRng random(3);
     readings = readingsOf(scene, imu, random, bias.gyroscope);
     scene.addNoise(pixel, random);
     recording = {.readings = readings,

@@ -176,6 +176,44 @@ TEST(SophusSO2, Members) {
   EXPECT_NEAR(SO2d::fitToSO2(3 * SO2d(1.2).matrix()).angle(), 1.2, 2 * eps);
 }
 
+TEST(Sophus, ConstructorsFromComplexNumbersQuaternionsAndMatrices) {
+  const Eigen::Vector2d z(3, 4), p(1, -2);
+  const SE2d planar(z, p);
+  EXPECT_LT((planar.unit_complex() - z / 5).norm(), eps);
+  EXPECT_EQ(planar.translation(), p);
+  EXPECT_EQ(SE2d(Eigen::Vector2d::UnitY(), p).so2().angle(), SO2d(Eigen::Vector2d(0, 1)).angle());
+  EXPECT_EQ(SE2d(planar.rotationMatrix(), p).params(), planar.params());
+  static_assert(!std::is_constructible_v<SE2d, Eigen::Vector3d, Eigen::Vector2d>);
+  static_assert(!std::is_constructible_v<SE2d, Eigen::Matrix3d, Eigen::Vector2d>);
+
+  const Eigen::Quaterniond q(0.1, -0.7, 0.2, 0.4);
+  const Eigen::Vector3d t(1, 2, 3);
+  const RxSO3d scaled(2.5, q);
+  EXPECT_NEAR(scaled.scale(), 2.5, 4 * eps);
+  EXPECT_LT((scaled.so3().inverse() * SO3d(q)).log().norm(), 4 * eps);
+  const Sim3d similarity(2.5, q, t);
+  EXPECT_EQ(similarity.rxso3().params(), scaled.params());
+  EXPECT_EQ(similarity.translation(), t);
+
+  const SO3d from_matrix = SO3d(q).matrix();
+  EXPECT_LT((from_matrix.inverse() * SO3d(q)).log().norm(), 4 * eps);
+  static_assert(std::is_convertible_v<Eigen::Matrix3d, SO3d>);
+}
+
+TEST(Sophus, NestedTypesOfResults) {
+  static_assert(std::is_same_v<SO3d::SO3Product<SO3d>, SO3d>);
+  static_assert(std::is_same_v<SE3f::SE3Product<SE3f>, SE3f>);
+  static_assert(std::is_same_v<SO2d::SO2Product<Eigen::Map<const SO2d>>, SO2d>);
+  static_assert(std::is_same_v<SE2d::SE2Product<SE2d>, SE2d>);
+  static_assert(std::is_same_v<RxSO2d::RxSO2Product<RxSO2d>, RxSO2d>);
+  static_assert(std::is_same_v<RxSO3d::RxSO3Product<RxSO3d>, RxSO3d>);
+  static_assert(std::is_same_v<Sim2d::Sim2Product<Sim2d>, Sim2d>);
+  static_assert(std::is_same_v<Eigen::Map<Sim3d>::Sim3Product<Sim3d>, Sim3d>);
+  static_assert(std::is_same_v<SE3d::ReturnScalar<Eigen::Vector3d>, double>);
+  static_assert(std::is_same_v<SE3d::PointProduct<Eigen::Vector3d>, Eigen::Vector3d>);
+  static_assert(std::is_same_v<SE3d::HomogeneousPointProduct<Eigen::Vector4d>, Eigen::Vector4d>);
+}
+
 TEST(SophusSO3, Members) {
   for (const double a : {0., 1e-9, 0.7, 3.1, double(EIGEN_PI)}) {
     EXPECT_EQ(SO3d::rotX(a).params(), SO3d::exp(Eigen::Vector3d(a, 0, 0)).params());

@@ -1,10 +1,17 @@
-// The checkers themselves: a sphere with one defect at a time, each of which must be found, by name.
+// The checkers themselves: a sphere with one defect at a time, each of which must be found, by name; and records of
+// operations of which each in turn is a little wrong.
 
 #include <lie/s2.hpp>
+#include <lie/se2.hpp>
+#include <lie/semi_oriented_frame3.hpp>
 #include <lie/testing.hpp>
+
+#include <support/turned_s2.hpp>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -128,6 +135,120 @@ TEST(ContractCheckers, FindEveryDefectByName) {
 TEST(ContractCheckers, PassWithoutADefect) {
   const liestat::ContractReport report = liestat::checkContract<Sphere>();
   EXPECT_TRUE(report.ok()) << report;
+}
+
+using Operations = liestat::ManifoldOperations;
+
+// What a wrong operation of each kind says: a little too much, or a place a little aside.
+Eigen::MatrixXd spoilt(const Operations&, const Eigen::MatrixXd& m) {
+  return m + Eigen::MatrixXd::Constant(m.rows(), m.cols(), 1e-4);
+}
+Eigen::VectorXd spoilt(const Operations&, const Eigen::VectorXd& v) {
+  return v + Eigen::VectorXd::Constant(v.size(), 1e-4);
+}
+double spoilt(const Operations&, double x) { return 1.001 * x; }
+Operations::Point spoilt(const Operations& good, const Operations::Point& x) {
+  return good.exp(x, Eigen::VectorXd::Constant(good.dimension, 1e-4));
+}
+Operations::Element spoilt(const Operations& good, const Operations::Element& f) {
+  return good.group.product(f, good.group.exp(Eigen::VectorXd::Constant(good.group.dimension, 1e-4)));
+}
+
+/// The record with one operation spoilt must fail, and did not before.
+template <class Owner, class Result, class... Arguments>
+void expectFound(const Operations& good, Owner& (*owner)(Operations&),
+                 std::function<Result(const Arguments&...)> Owner::*operation, const char* name) {
+  Operations bad = good;
+  const std::function<Result(const Arguments&...)> right = owner(bad).*operation;
+  ASSERT_TRUE(right) << name << " is not in the record";
+  owner(bad).*operation = [&](const Arguments&... arguments) { return Result(spoilt(good, right(arguments...))); };
+  liestat::ContractOptions few;
+  few.samples = 1;
+  EXPECT_TRUE(liestat::checkContract(good, few).ok()) << name;
+  EXPECT_FALSE(liestat::checkContract(bad, few).ok()) << name << " is wrong, and nothing noticed";
+}
+
+#define EXPECT_FOUND(record, name) \
+  expectFound(                     \
+      record, +[](Operations& m) -> Operations& { return m; }, &Operations::name, #name)
+#define EXPECT_FOUND_IN_GROUP(record, name) \
+  expectFound(                              \
+      record, +[](Operations& m) -> Operations::Group& { return m.group; }, &Operations::Group::name, "group." #name)
+
+TEST(ContractCheckers, FindEachOperationOfAGroup) {
+  const Operations se2 = liestat::operationsOf<liestat::SE2d>();
+  EXPECT_FOUND_IN_GROUP(se2, identity);
+  EXPECT_FOUND_IN_GROUP(se2, product);
+  EXPECT_FOUND_IN_GROUP(se2, inverse);
+  EXPECT_FOUND_IN_GROUP(se2, exp);
+  EXPECT_FOUND_IN_GROUP(se2, log);
+  EXPECT_FOUND_IN_GROUP(se2, Adj);
+  EXPECT_FOUND_IN_GROUP(se2, leftJacobian);
+  EXPECT_FOUND_IN_GROUP(se2, leftJacobianInverse);
+  EXPECT_FOUND_IN_GROUP(se2, rightJacobian);
+  EXPECT_FOUND_IN_GROUP(se2, rightJacobianInverse);
+  EXPECT_FOUND_IN_GROUP(se2, ad);
+  EXPECT_FOUND_IN_GROUP(se2, matrix);
+  EXPECT_FOUND_IN_GROUP(se2, hat);
+  EXPECT_FOUND_IN_GROUP(se2, vee);
+}
+
+TEST(ContractCheckers, FindEachOperationOfAManifold) {
+  // A placement that does not carry frames in parallel, so that transvection matters.
+  const Operations sphere = liestat::operationsOf<liestat_test::TurnedS2<double>>();
+  EXPECT_FOUND(sphere, act);
+  EXPECT_FOUND(sphere, placement);
+  EXPECT_FOUND(sphere, expOrigin);
+  EXPECT_FOUND(sphere, logOrigin);
+  EXPECT_FOUND(sphere, dexpOrigin);
+  EXPECT_FOUND(sphere, dlogOrigin);
+  EXPECT_FOUND(sphere, isotropy);
+  EXPECT_FOUND(sphere, originProjection);
+  EXPECT_FOUND(sphere, placementJacobian);
+  EXPECT_FOUND(sphere, exp);
+  EXPECT_FOUND(sphere, log);
+  EXPECT_FOUND(sphere, actionFeatureJacobian);
+  EXPECT_FOUND(sphere, actionTransformationJacobian);
+  EXPECT_FOUND(sphere, principalChartJacobian);
+  EXPECT_FOUND(sphere, logBaseJacobian);
+  EXPECT_FOUND(sphere, frameTransport);
+  EXPECT_FOUND(sphere, errorVector);
+  EXPECT_FOUND(sphere, errorByFeature);
+  EXPECT_FOUND(sphere, errorByBase);
+  EXPECT_FOUND(sphere, metricWeights);
+  EXPECT_FOUND(sphere, hessianHalfSquaredDistance);
+  EXPECT_FOUND(sphere, distance);
+}
+
+TEST(ContractCheckers, FindEachOperationOfAQuotient) {
+  const Operations frame = liestat::operationsOf<liestat::SemiOrientedFrame3d>();
+  EXPECT_FOUND(frame, representative);
+  EXPECT_FOUND(frame, representativeJacobian);
+  EXPECT_FOUND(frame, dlogFeatureTransposed);
+  EXPECT_FOUND(frame, dlogBaseTransposed);
+}
+
+/// The sphere with a transvection that does not carry frames in parallel.
+struct Twisted : liestat_test::TurnedS2<double> {};
+
+}  // namespace
+
+template <>
+struct liestat::ManifoldTraits<Twisted> : ManifoldTraits<liestat_test::TurnedS2<double>> {
+  using Base = ManifoldTraits<liestat_test::TurnedS2<double>>;
+  static Twisted origin() { return {}; }
+  static Twisted act(const Group& f, const Twisted& x) { return {Base::act(f, x)}; }
+  static Twisted expOrigin(const Tangent& v) { return {Base::expOrigin(v)}; }
+  static Group transvection(const Twisted& x) { return Base::placement(x); }
+};
+
+namespace {
+
+TEST(ContractCheckers, FindAWrongTransvection) {
+  const liestat::ContractReport report = liestat::checkContract<Twisted>();
+  const auto failed = std::count_if(report.checks().begin(), report.checks().end(),
+                                    [](const liestat::ContractCheck& check) { return !check.ok(); });
+  EXPECT_GE(failed, 1) << report;
 }
 
 TEST(ContractReport, KeepsTheWorstInputOfEachInvariant) {

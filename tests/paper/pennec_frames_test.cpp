@@ -3,7 +3,7 @@
 // errors.
 
 #include <experiments/means_experiment.hpp>
-#include <stats/validation.hpp>
+#include <experiments/means_report.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,7 @@
 
 #include "paper/full_run.hpp"
 
-namespace liestat::cli {
-using namespace experiments;
+namespace liestat::experiments {
 namespace {
 
 constexpr double third = 1.0 / 3;
@@ -32,10 +31,10 @@ void expectNear(double ours, double our_se, double reference, double reference_s
   EXPECT_NEAR(ours, reference, 4 * std::hypot(our_se, reference_se)) << what << ", our SE " << our_se;
 }
 
-double ratio(const ValidationReport& report, ExtraIndex index) { return std::exp(report.extra[index].mean); }
-double ratioError(const ValidationReport& report, ExtraIndex index) {
-  const ExtraStatistic& s = report.extra[index];
-  return ratio(report, index) * s.deviation / std::sqrt(static_cast<double>(s.count));
+double ratio(const MeansReport& report, ErrorRatio index) { return std::exp(report.of(index).mean); }
+double ratioError(const MeansReport& report, ErrorRatio index) {
+  const TrialStatistic s = report.of(index);
+  return ratio(report, index) * s.standard_deviation / std::sqrt(static_cast<double>(s.count));
 }
 
 TEST(PennecFrames, leastSquaresAtModerateSpread) {
@@ -148,4 +147,4 @@ TEST(PennecFrames, quotientsAreIllDefinedAtTheReportsSpread) {
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

@@ -5,7 +5,7 @@
 // fresh seed; the seeds are fixed.
 
 #include <experiments/means_experiment.hpp>
-#include <stats/validation.hpp>
+#include <experiments/means_report.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +15,7 @@
 
 #include "paper/full_run.hpp"
 
-namespace liestat::cli {
-using namespace experiments;
+namespace liestat::experiments {
 namespace {
 
 constexpr std::size_t sizes[] = {5, 10, 20, 30, 50, 100};
@@ -24,8 +23,8 @@ constexpr std::size_t sizes[] = {5, 10, 20, 30, 50, 100};
 std::size_t fullTrials(std::size_t n) { return n <= 30 ? 4000 : n == 50 ? 3000 : 2000; }
 
 /// All methods on rotations at the report's spread; computed once for the tests of this file.
-const std::vector<ValidationReport>& cell(Noise noise, std::size_t n) {
-  static std::map<std::pair<Noise, std::size_t>, std::vector<ValidationReport>> cells;
+const std::vector<MeansReport>& cell(Noise noise, std::size_t n) {
+  static std::map<std::pair<Noise, std::size_t>, std::vector<MeansReport>> cells;
   auto& reports = cells[{noise, n}];
   if (reports.empty()) {
     reports =
@@ -34,7 +33,7 @@ const std::vector<ValidationReport>& cell(Noise noise, std::size_t n) {
   return reports;
 }
 
-const ValidationReport& report(Noise noise, std::size_t n, Method method) {
+const MeansReport& report(Noise noise, std::size_t n, Method method) {
   return cell(noise, n)[methodIndex(method)];
 }
 
@@ -48,7 +47,7 @@ Estimate pooledIndex(Noise noise, const Method& method) {
   double sum = 0, squares = 0, count = 0;
   for (const std::size_t n : sizes) {
     if (n == 5) continue;
-    const ValidationReport& r = report(noise, n, method);
+    const MeansReport& r = report(noise, n, method);
     EXPECT_EQ(r.failures, method.criterion == Criterion::maha && !method.corrected ? r.failures : 0u);
     for (const double mu2 : r.mu2) sum += mu2, squares += mu2 * mu2, count += 1;
   }
@@ -99,7 +98,7 @@ TEST(PennecRotations, distancesFollowChiSquared) {
     for (const std::size_t n : sizes) {
       if (n == 5) continue;
       for (const Criterion criterion : all_criteria) {
-        const ValidationReport& r = report(noise, n, {criterion, true, true});
+        const MeansReport& r = report(noise, n, {criterion, true, true});
         EXPECT_LT(r.ks_statistic, 1.63 / std::sqrt(static_cast<double>(r.size())) + 0.02)
             << name(noise) << " " << name(criterion) << " n = " << n;
       }
@@ -110,7 +109,7 @@ TEST(PennecRotations, distancesFollowChiSquared) {
 TEST(PennecRotations, residualsFollowHotelling) {
   for (const Noise noise : {Noise::iid, Noise::isd, Noise::idd}) {
     for (const std::size_t n : sizes) {
-      const ValidationReport& r = report(noise, n, {Criterion::lsq, true, false});
+      const MeansReport& r = report(noise, n, {Criterion::lsq, true, false});
       if (noise == Noise::iid) {
         EXPECT_GT(r.ks_p_value, 1e-3) << "n = " << n;
       }
@@ -152,9 +151,9 @@ TEST(PennecRotations, relativeAccuracy) {
       {Noise::exp, 20, {2.75, 0.04}, {2.26, 0.03}},     {Noise::exp, 50, {2.80, 0.04}, {2.34, 0.03}}};
   for (const RatioRow& row : rows) {
     const auto ratio = [&](Criterion criterion) {
-      const ExtraStatistic& s = report(row.noise, row.n, {criterion, true, true}).extra[log_ratio_rotation];
+      const TrialStatistic s = report(row.noise, row.n, {criterion, true, true}).of(log_ratio_rotation);
       const double value = std::exp(s.mean);
-      return Estimate{value, value * s.deviation / std::sqrt(static_cast<double>(s.count))};
+      return Estimate{value, value * s.standard_deviation / std::sqrt(static_cast<double>(s.count))};
     };
     const std::string what = name(row.noise) + " n = " + std::to_string(row.n);
     expectNear(ratio(Criterion::lsq), row.lsq, what + " LSQ/MAHA");
@@ -173,7 +172,7 @@ TEST(PennecRotations, smallSpreadIsTrueForLeastSquares) {
                               .seed = 7},
                              0);
     const auto index = [&](const Method& method) {
-      const ValidationReport& r = reports[methodIndex(method)];
+      const MeansReport& r = reports[methodIndex(method)];
       return Estimate{r.index, r.index_se};
     };
     expectNear(index({Criterion::lsq, true, true}), {noise == Noise::iid ? 3.03 : 3.02, 0.04}, name(noise) + " LSQ");
@@ -192,11 +191,11 @@ TEST(PennecRotations, likelihoodClosesTheGapOfMaha) {
                                .maha_likelihood = true};
     experiment.wanted = {};
     experiment.wanted[methodIndex({Criterion::maha, true, true})] = true;
-    const ValidationReport r = run(experiment, 0).front();
+    const MeansReport r = run(experiment, 0).front();
     expectNear({r.index, r.index_se}, {noise == Noise::iid ? 3.08 : 3.10, 0.065}, name(noise));
     EXPECT_EQ(r.failures, 0u);
   }
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat::experiments

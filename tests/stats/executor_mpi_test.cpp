@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "executor_test_data.hpp"
+#include "front_doors.hpp"
 #include "mpi_test_main.hpp"
 
 namespace {
@@ -117,6 +118,12 @@ TEST(MpiExecutor, aFailureStopsTheOtherRanks) {
                    std::plus<>()),
                std::runtime_error);
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
+}
+
+TEST(MpiExecutor, givesTheBitsOfTheSerialExecutorAtEveryFrontDoor) {
+  EXPECT_EQ(liestat::test::firstDifference(liestat::test::frontDoors(MpiExecutor{}),
+                                           liestat::test::frontDoors(SerialExecutor{})),
+            "");
 }
 
 }  // namespace

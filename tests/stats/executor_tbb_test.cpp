@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "executor_test_data.hpp"
+#include "front_doors.hpp"
 
 namespace {
 
@@ -110,6 +111,15 @@ TEST(TbbExecutor, mayBeNested) {
         10, [](std::size_t chunk) { return chunk; }, std::plus<>());
   };
   EXPECT_EQ(TbbExecutor{2}.reduce(20, inner, std::plus<>()), 20u * 45u);
+}
+
+TEST(TbbExecutor, givesTheBitsOfTheSerialExecutorAtEveryFrontDoor) {
+  const auto serial = liestat::test::frontDoors(SerialExecutor{});
+  EXPECT_GT(serial.size(), 100u);
+  for (int threads : {1, 3}) {
+    EXPECT_EQ(liestat::test::firstDifference(liestat::test::frontDoors(TbbExecutor{threads}), serial), "")
+        << threads << " threads";
+  }
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <stats/random.hpp>
 #include <stats/sampling.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <lie/lie.hpp>
 

@@ -184,6 +184,29 @@ TEST(CounterRng, normalVectorIsTheSameSequence) {
   for (int i = 0; i < 6; ++i) EXPECT_EQ(second[i], b.normal());
 }
 
+TEST(CounterRng, uniformBetweenIsTheSameSequence) {
+  CounterRng a(17, 0), b(17, 0);
+  for (int i = 0; i < 1000; ++i) {
+    const double x = a.uniform(-2, 5);
+    EXPECT_EQ(x, -2 + 7 * b.uniform());
+    EXPECT_TRUE(x > -2 && x < 5);
+  }
+}
+
+TEST(CounterRng, unitVectorIsUniformOnTheSphere) {
+  CounterRng rng(18, 0);
+  const int n = 100000;
+  for (int i = 0; i < 1000; ++i) EXPECT_NEAR(rng.unitVector<3>().norm(), 1, 4e-16);
+  // On S^2 a coordinate is uniform on [-1, 1] (Archimedes); on the circle E x^2 = 1/2, E x^4 = 3/8.
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_MEAN(n, 0, rng.unitVector<3>()[i]);
+    EXPECT_MEAN(n, 1. / 3, std::pow(rng.unitVector<3>()[i], 2));
+    EXPECT_MEAN(n, 1. / 5, std::pow(rng.unitVector<3>()[i], 4));
+  }
+  EXPECT_MEAN(n, 1. / 2, std::pow(rng.unitVector<2>()[1], 2));
+  EXPECT_MEAN(n, 3. / 8, std::pow(rng.unitVector<2>()[0], 4));
+}
+
 TEST(CounterRng, unitQuaternionIsHaarUniform) {
   CounterRng rng(16, 0);
   const int n = 100000;

@@ -1,7 +1,7 @@
 // Certificates of uniqueness, the global search against brute force, and the rule by which a covariance is withheld.
 // Statistical tests have fixed seeds.
 
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <lie/lie.hpp>
 #include <stats/random.hpp>
@@ -158,7 +158,7 @@ TEST(BranchAndBound, lowerBoundsAreBelowTheCriterionInTheirBalls) {
 
 template <class M>
 void sightingsAgree() {
-  const auto space = detail::rotationSpace<M>();
+  const auto space = detail::searchSpace<M>();
   CounterRng rng(11);
   for (int k = 0; k < 1000; ++k) {
     const M x = sampleUniform<M>(rng), y = sampleUniform<M>(rng);

@@ -33,23 +33,17 @@ struct RecordedScene {
   liestat::InertialWindow window;
 
   RecordedScene(const RecordedOptions& o, std::uint64_t seed) : options(o), scene(o.scene, seed) {
-    SceneRandom random(seed + 1000003);
-    bias = o.bias * random.unit();
+    CounterRng random(seed, 0, 1);
+    bias = o.bias * random.unitVector<3>();
     readings = readingsOf(scene, o.noise, random, bias);
     for (liestat::FeatureTrack& track : scene.window.features) {
       for (liestat::TrackedBearing& seen : track) {
         seen.relative_sigma = o.spread == 1 ? 1 : std::pow(o.spread, random.uniform(-1, 1));
-        const Eigen::Vector3d noise = o.sigma * seen.relative_sigma * random.normal3();
+        const Eigen::Vector3d noise = o.sigma * seen.relative_sigma * random.normalVector<3>();
         seen.bearing = (seen.bearing + noise - seen.bearing.dot(noise) * seen.bearing).normalized();
       }
     }
-    for (std::size_t i = 0; i < o.drifting; ++i) {
-      Eigen::Vector3d walk = Eigen::Vector3d::Zero();
-      for (liestat::TrackedBearing& seen : scene.window.features[i]) {
-        if (seen.image > 0) walk += o.drift * random.normal3();
-        seen.bearing = (seen.bearing + walk - seen.bearing.dot(walk) * seen.bearing).normalized();
-      }
-    }
+    scene.addDrift(o.drifting, o.drift, random);
     window = windowOf(scene, readings, {.preintegration = {.noise = options.noise}});
   }
 };

@@ -6,10 +6,10 @@
 namespace liestat_test {
 
 using Scene = liestat::experiments::InertialScene;
+using liestat::CounterRng;
 using SceneOptions = liestat::experiments::InertialSceneOptions;
 using liestat::experiments::SceneLayout;
 using liestat::experiments::SceneMotion;
-using liestat::experiments::SceneRandom;
 using liestat::experiments::SceneTurn;
 
 }  // namespace liestat_test

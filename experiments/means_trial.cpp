@@ -1,6 +1,5 @@
-#pragma once
-
-// One trial for one type of feature; the types are compiled in features.cpp, the harness around them is not.
+// The trials for every type of feature, in one unit: they share nearly all that they instantiate, so that a second type
+// costs a compiler an eighth of the first. The harness around them is elsewhere.
 
 #include <experiments/means_trial.hpp>
 #include <lie/lie.hpp>
@@ -8,11 +7,15 @@
 #include <stats/maha.hpp>
 #include <stats/printed.hpp>
 #include <stats/sampling.hpp>
-#include <stats/uniqueness.hpp>
+#include <stats/certified_mean.hpp>
 
 #include <cmath>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
 
 namespace liestat::experiments::detail {
+namespace {
 
 /// The report's covariance Σ of a feature, in the library's tangent order.
 template <class M>
@@ -30,13 +33,13 @@ SquareOf<M> reportCovariance(double spread) {
   return sd.cwiseAbs2().asDiagonal();
 }
 
-/// Measures of one feature.
+/// Measurements of one feature.
 template <class M>
 struct Scene {
   M exact;
-  std::vector<M> measures;
+  std::vector<M> measurements;
   std::vector<SquareOf<M>> noise;     ///< V_i, in the frame of the exact feature
-  std::vector<Gaussian<M>> attached;  ///< the measures with the covariances that MAHA is given
+  std::vector<Gaussian<M>> attached;  ///< the measurements with the covariances that MAHA is given
   std::vector<double> weights;        ///< of WLSQ
 };
 
@@ -59,7 +62,7 @@ Scene<M> drawScene(const MeansExperiment& experiment, CounterRng& rng) {
     M x = exp(scene.exact, e);
     SquareOf<M> attached = V;
     if constexpr (T::Group::DoF == T::DoF) {
-      // Gaussian in the measure's own frame: log(x_i, x) = e.
+      // Gaussian in the measurement's own frame: log(x_i, x) = e.
       if (experiment.covariance_at == CovarianceAt::measured) {
         x = T::act(T::placement(scene.exact) * T::placement(T::expOrigin(e)).inverse(), T::origin());
       }
@@ -76,10 +79,10 @@ Scene<M> drawScene(const MeansExperiment& experiment, CounterRng& rng) {
         }
       }
     } else {
-      // No frame is common to all points: the covariance travels to the measure by parallel transport.
+      // No frame is common to all points: the covariance travels to the measurement by parallel transport.
       attached = transport(Gaussian<M>{scene.exact, V}, x).covariance;
     }
-    scene.measures.push_back(x);
+    scene.measurements.push_back(x);
     scene.noise.push_back(V);
     scene.attached.push_back({x, attached});
     scene.weights.push_back(experiment.noise == Noise::iid   ? 1.0
@@ -102,17 +105,17 @@ void setErrors(const M& estimate, const M& exact, MethodOutcome& outcome) {
   }
 }
 
-/// Mean from the first measure and from the exact feature, the better of the two.
+/// Mean from the first measurement and from the exact feature, the better of the two.
 template <class M, class W>
 MeanResult<M> globalMean(const Scene<M>& scene, const W& weights, bool certify, int& iterations_from_first) {
-  MeanOptions<M> options{.tolerance = 1e-10, .start = scene.measures.front()};
-  MeanResult<M> best = mean(scene.measures, weights, options);
+  MeanOptions<M> options{.tolerance = 1e-10, .start = scene.measurements.front()};
+  MeanResult<M> best = mean(scene.measurements, weights, options);
   iterations_from_first = best.iterations;
   options.start = scene.exact;
-  const MeanResult<M> other = mean(scene.measures, weights, options);
+  const MeanResult<M> other = mean(scene.measurements, weights, options);
   if (!best.converged || (other.converged && other.cost < best.cost)) best = other;
   if (certify) {
-    const auto certified = certifiedMean(scene.measures, weights);
+    const auto certified = certifiedMean(scene.measurements, weights);
     if (certified.mean.converged && certified.mean.cost < best.cost) best = certified.mean;
   }
   return best;
@@ -141,7 +144,7 @@ void leastSquares(const MeansExperiment& experiment, const Scene<M>& scene, cons
     if (result.converged) o.mahalanobis_squared = mahalanobisSquared(Gaussian<M>{result.mean, covariance}, scene.exact);
   };
   set(true, true, covarianceFromNoise(result, weights, noise));
-  set(false, true, printed::covarianceFromNoise(scene.measures, weights, attached, result.mean));
+  set(false, true, printed::covarianceFromNoise(scene.measurements, weights, attached, result.mean));
   set(true, false, covarianceFromResiduals(result));
   set(false, false, printed::covarianceFromResiduals(result));
 }
@@ -149,7 +152,7 @@ void leastSquares(const MeansExperiment& experiment, const Scene<M>& scene, cons
 template <class M>
 void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, bool corrected,
                       MethodOutcome& outcome) {
-  // On directions the covariances are attached to the measures, whatever the option says for frames.
+  // On directions the covariances are attached to the measurements, whatever the option says for frames.
   constexpr bool measured_only = ManifoldTraits<M>::Group::DoF != ManifoldTraits<M>::DoF;
   const CovarianceAt at = measured_only ? CovarianceAt::measured : experiment.covariance_at;
   const auto from = [&](const M& start) {
@@ -157,7 +160,7 @@ void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, 
         .method = experiment.maha_method, .tolerance = 1e-10, .start = start, .likelihood = experiment.maha_likelihood};
     return corrected ? maha(scene.attached, at, options) : printed::maha(scene.attached, options);
   };
-  MahaResult<M> best = from(scene.measures.front());
+  MahaResult<M> best = from(scene.measurements.front());
   outcome.iterations = best.iterations;
   const MahaResult<M> other = from(scene.exact);
   if (best.status != Status::ok || (other.status == Status::ok && other.cost < best.cost)) best = other;
@@ -166,7 +169,7 @@ void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, 
 }
 
 template <class M>
-MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
+MethodOutcomes trial(const MeansExperiment& experiment, CounterRng& rng) {
   const Scene<M> scene = drawScene<M>(experiment, rng);
   MethodOutcomes outcomes{};
   const auto wanted = [&](Criterion criterion) {
@@ -194,6 +197,12 @@ MethodOutcomes runTrial(const MeansExperiment& experiment, CounterRng& rng) {
     if (experiment.wanted[m]) mahalanobisMeans(experiment, scene, corrected, outcomes[m]);
   }
   return outcomes;
+}
+
+}  // namespace
+
+MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng) {
+  return withFeature(experiment.feature, [&]<Metric M>() { return trial<M>(experiment, rng); });
 }
 
 }  // namespace liestat::experiments::detail

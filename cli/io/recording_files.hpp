@@ -1,0 +1,14 @@
+#pragma once
+
+#include <experiments/simulate_vi.hpp>
+
+#include <string>
+
+namespace liestat::cli {
+
+/// Writes imu.csv, images.csv and truth.csv as EuRoC does, tracks.csv (frame,track,u,v; the frame is the row of
+/// images.csv), calibration.yaml in Kalibr's form and landmarks.csv (track,x,y,z,outlier). Image times are on the
+/// camera's clock. Throws InputError where the directory cannot be written.
+void writeRecording(const experiments::SimulatedRecording& recording, const std::string& directory);
+
+}  // namespace liestat::cli

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <lie/so3.hpp>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <string>
+
+namespace liestat::cli {
+
+/// The rotation nearest to a matrix, and how far the matrix is from it.
+struct NearestRotation {
+  SO3d rotation;
+  double error;  ///< half the Frobenius norm of RᵀR − I of the matrix that was given
+};
+
+/// The rotation matrix that a file means: the nearest one. Throws InputError where the matrix is a reflection or off by
+/// more than the tolerance.
+NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance, const std::string& file,
+                                std::size_t line);
+
+}  // namespace liestat::cli

@@ -1,0 +1,93 @@
+#include <cli/show/page.hpp>
+#include <cli/show/split.hpp>
+#include <cli/show/table.hpp>
+#include <stats/gaussian.hpp>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+namespace liestat::cli {
+namespace {
+
+const std::vector<std::string> headers{"track", "n", "random", "blocks", "factor", "survey (mm)", "squared distance"};
+
+std::vector<std::vector<std::string>> cells(const LandmarkSplits& split) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LandmarkSplit& row : split.landmarks) {
+    rows.push_back({fmt::format("{}", row.track), fmt::format("{}", row.split.n), number(row.split.random.index),
+                    number(row.split.by_blocks.index), number(row.split.by_blocks.factor()),
+                    number(1000 * row.surveyDistance()), number(row.squaredSurveyDistance())});
+  }
+  return rows;
+}
+
+}  // namespace
+
+double LandmarkSplit::surveyDistance() const {
+  return survey ? (*whole.mean.point - *survey).norm() : std::numeric_limits<double>::quiet_NaN();
+}
+
+double LandmarkSplit::squaredSurveyDistance() const {
+  if (!survey || whole.covariance.rows() != 3) return std::numeric_limits<double>::quiet_NaN();
+  return mahalanobisSquared(Gaussian<Eigen::Vector3d>{*whole.mean.point, Eigen::Matrix3d(whole.covariance)}, *survey);
+}
+
+double LandmarkSplits::surveyRms() const {
+  double squares = 0;
+  for (const LandmarkSplit& row : landmarks) squares += std::pow(row.surveyDistance(), 2);
+  return std::sqrt(squares / static_cast<double>(landmarks.size()));
+}
+
+double LandmarkSplits::surveySquaredDistance() const {
+  double sum = 0;
+  for (const LandmarkSplit& row : landmarks) sum += row.squaredSurveyDistance();
+  return sum / static_cast<double>(landmarks.size());
+}
+
+std::string formatSplit(const LandmarkSplits& split) {
+  std::string text = split.description + "\n";
+  text += fmt::format("means by {}, covariances from {}\n\n", name(split.criterion),
+                      split.known_noise ? "the stereo geometry and the pixels' variances" : "the residuals");
+  Table table(headers);
+  for (const auto& row : cells(split)) table.row(row);
+  text += table.str() + "\n";
+  if (split.surveyed) {
+    text += fmt::format("to the survey: {} mm RMS, mean squared distance {} where 3 is expected\n",
+                        number(1000 * split.surveyRms()), number(split.surveySquaredDistance()));
+  }
+  return text + splitVerdict(split);
+}
+
+JsonObject toJson(const LandmarkSplits& split, const std::string& command_line) {
+  JsonObject object = splitEnvelope(split, command_line);
+  object.set("criterion", name(split.criterion)).set("skipped", split.skipped);
+  if (split.surveyed) {
+    object.set("survey_rms", split.surveyRms()).set("survey_squared_distance", split.surveySquaredDistance());
+  } else {
+    object.set("survey_rms", nullptr).set("survey_squared_distance", nullptr);
+  }
+  std::vector<JsonObject> list;
+  for (const LandmarkSplit& row : split.landmarks) {
+    JsonObject o;
+    o.set("track", row.track).set("n", row.split.n).set("random", row.split.random.index);
+    o.set("by_blocks", row.split.by_blocks.index).set("inflation", row.split.by_blocks.factor());
+    o.set("mean", *row.whole.mean.point).set("squared_distance", row.split.squared_distance);
+    o.set("survey_distance", row.surveyDistance()).set("survey_squared_distance", row.squaredSurveyDistance());
+    list.push_back(std::move(o));
+  }
+  return object.set("landmarks", list);
+}
+
+void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split) {
+  Report report(directory, "Split of the landmarks in " + split.source);
+  report.paragraph(split.description + ".");
+  report.code(command_line);
+  report.code(formatSplit(split));
+  report.table(headers, cells(split), "Indices of the splits, and the mean of all measures against the survey.");
+  plotSplits(report, split);
+  report.write();
+}
+
+}  // namespace liestat::cli

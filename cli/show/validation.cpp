@@ -1,0 +1,39 @@
+#include <cli/show/validation.hpp>
+
+#include <fmt/format.h>
+
+namespace liestat::cli {
+
+using namespace experiments;
+
+void setStatistics(JsonObject& o, const ValidationReport& r) {
+  o.set("trials", r.trials).set("dof", r.dof).set("law", r.law.name());
+  o.set("index", r.index).set("index_se", r.index_se).set("index_expected", r.law.mean()).set("variance", r.variance);
+  o.set("ks_statistic", r.ks_statistic).set("ks_p", r.ks_p_value).set("coverage95", r.coverage[2].observed);
+}
+
+std::string verdictCell(const std::optional<bool>& passed) {
+  if (!passed) return "";
+  return *passed ? "pass" : "FAIL";
+}
+
+std::string verdictLines(const Tally& tally, const std::string& where) {
+  return fmt::format("{} of {} rows {} pass; false alarms: one in {:g} runs\n{}\n", tally.judged - tally.failed,
+                     tally.judged, where, 1 / run_false_alarm, tally.failed == 0 ? "PASSED" : "FAILED");
+}
+
+Panel histogramPanel(const JudgedReport& row, const std::string& title) {
+  Panel panel{.title = title,
+              .x = {.label = "squared Mahalanobis distance", .low = 0.0},
+              .y = {.label = "density", .low = 0.0}};
+  Series boxes{.name = "trials", .style = Style::boxes}, density{.name = row.report.law.name(), .style = Style::lines};
+  for (const HistogramBin& bin : row.histogram) {
+    for (Series* series : {&boxes, &density}) series->x.push_back(0.5 * (bin.lower + bin.upper));
+    boxes.y.push_back(bin.density);
+    density.y.push_back(bin.expected);
+  }
+  panel.series = {boxes, density};
+  return panel;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,27 @@
+#pragma once
+
+// What the views of the validations have in common.
+
+#include <cli/show/json.hpp>
+#include <cli/show/page.hpp>
+#include <experiments/judged_report.hpp>
+
+#include <optional>
+#include <string>
+
+namespace liestat::cli {
+
+/// The fields of a row in JSON that are the same in every validation.
+void setStatistics(JsonObject& o, const ValidationReport& report);
+
+/// A cell of a table: pass, FAIL, or empty where nothing was judged.
+std::string verdictCell(const std::optional<bool>& passed);
+
+/// The last lines on the terminal: how many of the judged rows pass, where they are (`in the promised domain`), and
+/// PASSED or FAILED.
+std::string verdictLines(const experiments::Tally& tally, const std::string& where);
+
+/// Histogram of the squared distances with the density that they should have.
+Panel histogramPanel(const experiments::JudgedReport& row, const std::string& title);
+
+}  // namespace liestat::cli

@@ -1,0 +1,94 @@
+// Averages in the linear spaces that manifolds are embedded in: the ChordalMoments of the library's ManifoldTraits
+// (lie/concepts.hpp), where the iterations for means start.
+#pragma once
+
+#include <lie/concepts.hpp>
+
+#include <Eigen/Core>
+
+#include <optional>
+
+namespace liestat::detail {
+
+/// Unit eigenvector of the largest eigenvalue of a symmetric positive semi-definite 4×4 matrix, by repeated squaring of
+/// the normalised matrix: its powers tend to the projector on the dominant eigenvectors. Ties give one of them.
+template <class S>
+Eigen::Matrix<S, 4, 1> dominantEigenvector(Eigen::Matrix<S, 4, 4> A) {
+  for (int i = 0; i < 24; ++i) {
+    const S trace = A.trace();
+    if (!(trace > S(0))) break;
+    A /= trace;
+    A = (A * A).eval();
+  }
+  Eigen::Index column = 0;
+  A.diagonal().maxCoeff(&column);
+  return A.col(column).normalized();
+}
+
+/// R^n: the mean itself.
+template <class M>
+struct FlatMoments {
+  using T = ManifoldTraits<M>;
+  using S = typename T::Scalar;
+  typename T::Tangent sum = T::Tangent::Zero();
+  S weight = S(0);
+
+  void add(const M& x, const S& p) { sum += p * T::logOrigin(x), weight += p; }
+  M mean() const { return T::expOrigin(typename T::Tangent(sum / weight)); }
+};
+
+/// Types whose parameters are a unit quaternion followed by vectors (translation, velocity): the dominant eigenvector
+/// of Σ p q qᵀ, which is the rotation nearest to the average of the matrices, and the averages of the vectors.
+template <class M>
+struct QuaternionMoments {
+  using S = typename M::Scalar;
+  static constexpr int vectors = M::num_parameters - 4;
+  Eigen::Matrix<S, 4, 4> rotation = Eigen::Matrix<S, 4, 4>::Zero();
+  Eigen::Matrix<S, vectors, 1> vector = Eigen::Matrix<S, vectors, 1>::Zero();
+  S weight = S(0);
+
+  void add(const M& x, const S& p) {
+    const Eigen::Matrix<S, 4, 1> q = x.params().template head<4>();
+    rotation.noalias() += p * q * q.transpose();
+    weight += p;
+    vector += p * x.params().template tail<vectors>();
+  }
+  M mean() const {
+    typename M::Params params;
+    params.template head<4>() = dominantEigenvector<S>(rotation);
+    if constexpr (vectors > 0) params.template tail<vectors>() = vector / weight;
+    return M::fromParams(params);
+  }
+};
+
+/// Types whose parameters are (cos, sin) followed by vectors: all averaged. Angles that cancel have no mean.
+template <class M>
+struct ComplexMoments {
+  using S = typename M::Scalar;
+  typename M::Params sum = M::Params::Zero();
+  S weight = S(0);
+
+  void add(const M& x, const S& p) { sum += p * x.params(), weight += p; }
+  std::optional<M> mean() const {
+    if (!(sum.template head<2>().norm() > S(0))) return std::nullopt;
+    typename M::Params params = sum / weight;
+    params.template head<2>().normalize();
+    return M::fromParams(params);
+  }
+};
+
+/// Directions: the average of the vectors. Those that cancel have no mean.
+template <class M>
+struct DirectionMoments {
+  using S = typename M::Scalar;
+  Eigen::Matrix<S, 3, 1> sum = Eigen::Matrix<S, 3, 1>::Zero();
+  S count = S(0);
+
+  void add(const M& x, const S& p) { sum += p * x.params(), count += S(1); }
+  std::optional<M> mean() const {
+    if (!(sum.norm() > S(1e-6) * count)) return std::nullopt;
+    return M(sum);
+  }
+};
+
+}  // namespace liestat::detail

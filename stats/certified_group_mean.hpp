@@ -1,0 +1,119 @@
+// certifiedGroupMean: the exponential barycentre of a Lie group with what is known about its uniqueness, and its
+// covariance where that can be trusted. Needs Eigen alone.
+//
+// The rotation of a barycentre of rigid motions is the Riemannian mean of the rotations, and the translation follows
+// from that by linear equations: it is unique if the mean of the metric twin is (Frame3 for SE3, Frame2 for SE2;
+// HasMetricTwin in lie/concepts.hpp). A group with a metric of its own (SO3) is its own twin. Nothing is certified of
+// the others (SE23, Sim3).
+#pragma once
+
+#include <lie/frame2.hpp>
+#include <lie/frame3.hpp>
+#include <stats/detail/ranges.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/detail/metric_twin.hpp>
+#include <stats/group_mean.hpp>
+
+#include <optional>
+#include <ranges>
+
+namespace liestat {
+
+/// Options of certifiedGroupMean().
+struct CertifiedGroupMeanOptions {
+  UniquenessOptions uniqueness = {};
+  /// The covariance is withdrawn when kinks may change the Hessian of the twin's mean by more than this, relative.
+  double largest_hessian_change = liestat::largest_hessian_change;
+};
+
+/// A barycentre with all that is known about it.
+template <LieGroup G>
+struct CertifiedGroupMean {
+  GroupMeanResult<G> mean;
+  UniquenessResult<G> uniqueness;  ///< of the twin's mean, its rivals as barycentres; cost is the twin's
+  CutLocusMass cut_locus;          ///< of the twin's mean
+  /// The barycentre with its covariance from residuals; none unless status is ok.
+  std::optional<Gaussian<G>> estimate;
+  Status status = Status::too_few;
+  const char* reason = "";  ///< why there is no estimate, in words
+};
+
+namespace detail {
+
+template <LieGroup G, Executor E, class R, class W>
+CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples, const W& weights,
+                                             const CertifiedGroupMeanOptions& options) {
+  eigen_assert(haveOneSize(samples, weights));
+  CertifiedGroupMean<G> result;
+  const auto without = [&](Status status, const char* reason) {
+    result.status = status;
+    result.reason = reason;
+    return result;
+  };
+  const auto from = [&](const std::optional<G>& start) {
+    return groupBarycentre<G>(executor, samples, weights, start);
+  };
+  Status twin_status = Status::ok;
+  const char* twin_reason = "";
+  if constexpr (has_metric_twin<G>) {
+    using Twin = MetricTwinOf<G>;
+    CertifiedMeanOptions<Twin> how;
+    how.uniqueness = options.uniqueness;
+    how.largest_hessian_change = options.largest_hessian_change;
+    const std::vector<Twin> twins = metricTwins<G>(samples);
+    const CertifiedMean<Twin> twin = findCertifiedMean<Twin>(executor, twins, weights, how);
+    result.mean = from(fromTwin<G>(twin.mean.mean));
+    result.uniqueness = {twin.uniqueness.unique,
+                         {},
+                         twin.uniqueness.improved,
+                         twin.uniqueness.cost,
+                         {},
+                         twin.uniqueness.r_star,
+                         twin.uniqueness.cells,
+                         twin.uniqueness.proof};
+    for (const Twin& rival : twin.uniqueness.rivals) {
+      result.uniqueness.rivals.push_back(from(fromTwin<G>(rival)).mean);
+    }
+    result.cut_locus = twin.cut_locus;
+    twin_status = twin.status;
+    twin_reason = twin.reason;
+  } else {
+    result.mean = from(std::nullopt);
+    if (result.mean.n <= static_cast<std::size_t>(G::DoF)) twin_status = Status::too_few, twin_reason = too_few_reason;
+  }
+  result.uniqueness.minimiser = result.mean.mean;
+  if (result.mean.n == 0) return without(Status::too_few, "there are no features");
+  if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
+  if (twin_status != Status::ok) return without(twin_status, twin_reason);
+  const SquareOf<G> covariance = result.mean.covarianceFromResiduals();
+  if (!covariance.allFinite()) return without(Status::ill_defined, "the equations of the barycentre are singular");
+  result.estimate = Gaussian<G>{result.mean.mean, covariance};
+  result.status = Status::ok;
+  return result;
+}
+
+}  // namespace detail
+
+/// The exponential barycentre of a range of group elements, weighted or not, certified by the mean of its metric twin,
+/// with its covariance from the residuals where that can be trusted: status ok. The same bits on any executor.
+template <Executor E, SampleRange R, LieGroup G = SampleOf<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples,
+                                         const CertifiedGroupMeanOptions& options = {}) {
+  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+}
+template <SampleRange R, LieGroup G = SampleOf<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const CertifiedGroupMeanOptions& options = {}) {
+  return certifiedGroupMean(SerialExecutor{}, samples, options);
+}
+template <Executor E, SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples, const W& weights,
+                                         const CertifiedGroupMeanOptions& options = {}) {
+  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+}
+template <SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const W& weights,
+                                         const CertifiedGroupMeanOptions& options = {}) {
+  return certifiedGroupMean(SerialExecutor{}, samples, weights, options);
+}
+
+}  // namespace liestat

@@ -1,0 +1,191 @@
+// certifiedMaha: the Mahalanobis mean (stats/maha.hpp) from several starts, with the rivals that they lead to, and its
+// covariance where that can be trusted. Needs Eigen alone.
+//
+// No certificate is known for the minimum of this criterion. The weighted least-squares mean of the same data (of their
+// metric twins: Frame3 for SE3; lie/concepts.hpp) with its certified search is the first start, its rivals are others,
+// and so are some of the data; the mean also says where the cut locus would spoil a covariance.
+#pragma once
+
+#include <lie/frame2.hpp>
+#include <lie/frame3.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/detail/metric_twin.hpp>
+#include <stats/maha.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <ranges>
+#include <vector>
+
+namespace liestat {
+
+/// Options of certifiedMaha().
+template <Homogeneous M>
+struct CertifiedMahaOptions {
+  MahaOptions<M> maha = {};         ///< its start, if there is one, is tried first
+  UniquenessOptions uniqueness = {  ///< of the least-squares mean that gives the starts
+      .budget = 100'000};
+  std::size_t starts_from_data = 6;  ///< features, spread over the data, that are starts too
+  double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
+  double distinct = 1e-4;            ///< and they are this far apart, rad and m
+  /// The covariance is withdrawn when kinks may change the Hessian of the least-squares mean by more than this, relative.
+  double largest_hessian_change = liestat::largest_hessian_change;
+};
+
+/// A Mahalanobis mean with all that is known about it.
+template <Homogeneous M>
+struct CertifiedMaha {
+  MahaResult<M> maha;              ///< the best of all starts; of equals the first
+  UniquenessResult<M> uniqueness;  ///< unique on flat manifolds only; ambiguous if there are rivals
+  std::size_t starts = 0;          ///< iterations that were made
+  CutLocusMass cut_locus;          ///< of the weighted least-squares mean
+  /// The mean with its covariance; none unless status is ok.
+  std::optional<Gaussian<M>> estimate;
+  double fit = 0;  ///< Σ μ_i² at the mean, which follows χ² of `fit_dof` degrees of freedom if the covariances are true
+  double fit_dof = 0;  ///< k (n - 1)
+  Status status = Status::too_few;
+  const char* reason = "";  ///< why there is no estimate, in words
+};
+
+namespace detail {
+
+/// Manifolds on which every criterion of a mean has one minimum.
+template <Homogeneous M>
+constexpr bool isFlat() {
+  if constexpr (Factored<M>) {
+    return []<std::size_t... I>(std::index_sequence<I...>) {
+      return (isFlat<std::tuple_element_t<I, FactorsOf<M>>>() && ...);
+    }
+    (std::make_index_sequence<std::tuple_size_v<FactorsOf<M>>>{});
+  } else {
+    return compactFactor<M>() == CompactFactor::none;
+  }
+}
+
+}  // namespace detail
+
+/// Squared Mahalanobis distance of a measurement from a mean, its covariance attached as `at` says.
+template <Homogeneous M>
+ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
+  const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
+  return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
+}
+
+namespace detail {
+
+template <Homogeneous M, Executor E, class R>
+CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, CovarianceAt at,
+                                   const CertifiedMahaOptions<M>& options) {
+  CertifiedMaha<M> result;
+  const auto without = [&](Status status, const char* reason) {
+    result.status = status;
+    result.reason = reason;
+    return result;
+  };
+  const std::size_t n = std::ranges::size(samples);
+  if (n == 0) return without(Status::too_few, "there are no features");
+  std::vector<M> features;
+  std::vector<ScalarOf<M>> weights;
+  features.reserve(n), weights.reserve(n);
+  for (const Gaussian<M>& g : samples) {
+    features.push_back(g.mean);
+    weights.push_back(scalarWeight(g.covariance));
+  }
+
+  std::vector<std::optional<M>> starts;
+  if (options.maha.start) starts.push_back(options.maha.start);
+  Status twin_status = Status::ok;
+  if constexpr (has_metric_twin<M>) {
+    using Twin = MetricTwinOf<M>;
+    CertifiedMeanOptions<Twin> how;
+    how.uniqueness = options.uniqueness;
+    how.largest_hessian_change = options.largest_hessian_change;
+    const auto twin = findCertifiedMean<Twin>(executor, metricTwins<M>(features), weights, how);
+    result.cut_locus = twin.cut_locus;
+    twin_status = twin.status;
+    starts.push_back(fromTwin<M>(twin.mean.mean));
+    for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
+  } else {
+    starts.push_back(std::nullopt);  // the one that maha() chooses
+  }
+  if constexpr (!isFlat<M>()) {
+    constexpr std::size_t many = 20000;  // whose criterion is smooth, and dear
+    const std::size_t several = n > many ? 1 : std::min(options.starts_from_data, n);
+    for (std::size_t i = 0; i < several; ++i) starts.push_back(features[i * n / several]);
+  }
+
+  std::vector<MahaResult<M>> results;
+  for (const std::optional<M>& start : starts) {
+    MahaOptions<M> how = options.maha;
+    how.start = start;
+    results.push_back(maha(executor, samples, at, how));
+  }
+  result.starts = results.size();
+  const auto better = [](const MahaResult<M>& a, const MahaResult<M>& b) {
+    if (converged(a.status) != converged(b.status)) return converged(a.status);
+    return a.cost < b.cost;
+  };
+  // The first of equals is the one from the weighted mean.
+  result.maha = *std::min_element(results.begin(), results.end(), better);
+  const MahaResult<M>& best = result.maha;
+  using std::abs;
+  std::vector<M> minima{best.mean};
+  for (const MahaResult<M>& other : results) {
+    const double limit = static_cast<double>(best.cost) + options.tie_tolerance * (1 + std::abs(double(best.cost)));
+    if (other.status != Status::ok || !(static_cast<double>(other.cost) <= limit)) continue;
+    const bool known = std::any_of(minima.begin(), minima.end(), [&](const M& m) {
+      return static_cast<double>(log(m, other.mean).norm()) < options.distinct;
+    });
+    if (!known) minima.push_back(other.mean);
+  }
+  result.uniqueness.minimiser = best.mean;
+  result.uniqueness.cost = best.cost;
+  result.uniqueness.rivals.assign(minima.begin() + 1, minima.end());
+  if constexpr (isFlat<M>()) {
+    result.uniqueness.unique = Uniqueness::unique;
+    result.uniqueness.proof = "the manifold is flat";
+    result.uniqueness.r_star = std::numeric_limits<double>::infinity();
+  } else if (minima.size() > 1) {
+    result.uniqueness.unique = Uniqueness::ambiguous;
+    result.uniqueness.proof = "several minima of equal cost";
+  } else {
+    result.uniqueness.proof = "the best minimum from several starts; there is no certificate for maha";
+  }
+  for (const Gaussian<M>& g : samples) result.fit += static_cast<double>(mahalanobisSquared(g, best.mean, at));
+  result.fit_dof = ManifoldTraits<M>::DoF * (static_cast<double>(n) - 1);
+
+  if (best.status == Status::not_converged) return without(best.status, not_converged_reason);
+  if (best.status == Status::ill_defined) return without(best.status, hessian_reason);
+  if (best.status != Status::ok) return without(best.status, "this criterion has no answer for these measurements");
+  if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
+  if (twin_status == Status::ill_defined) return without(Status::ill_defined, cut_locus_reason);
+  result.estimate = best.estimate();
+  result.status = Status::ok;
+  return result;
+}
+
+}  // namespace detail
+
+/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance where that can be trusted:
+/// status ok. It is withheld, with the reason in words, when the iteration did not converge, when several minima are
+/// equally low (ambiguous), and when the Hessian is singular or the mass near the cut locus makes the mean ill-defined.
+/// Statuses of maha() besides. The same bits on any executor.
+template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
+                               const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::findCertifiedMaha<M>(executor, detail::asValues<Gaussian<M>>(samples), at, options);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+CertifiedMaha<M> certifiedMaha(R&& samples, CovarianceAt at,
+                               const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
+  return certifiedMaha(SerialExecutor{}, samples, at, options);
+}
+
+}  // namespace liestat

@@ -1,0 +1,140 @@
+// certifiedMean: a Fréchet mean with what is known about its uniqueness, and its covariance where that can be trusted.
+// Needs Eigen alone.
+#pragma once
+
+#include <stats/detail/ranges.hpp>
+#include <stats/covariance.hpp>
+#include <stats/cut_locus.hpp>
+#include <stats/executor.hpp>
+#include <stats/gaussian.hpp>
+#include <stats/mean.hpp>
+#include <stats/status.hpp>
+#include <stats/uniqueness.hpp>
+
+#include <cstddef>
+#include <optional>
+#include <ranges>
+#include <vector>
+
+namespace liestat {
+
+/// Options of certifiedMean().
+template <Metric M>
+struct CertifiedMeanOptions {
+  MeanOptions<M> mean = {};
+  UniquenessOptions uniqueness = {};
+  ResidualNoise noise = ResidualNoise::scaled;  ///< of a covariance from residuals
+  /// Covariances of the features' errors where they are known: one for each feature, in its frame (it is carried to the
+  /// mean along the geodesic, which changes nothing but on directions and the like), or a single one, in the frame of
+  /// the mean, that all of them have. Empty: the covariance comes from the residuals.
+  std::vector<SquareOf<M>> known_noise = {};
+  /// The covariance is withdrawn when kinks may change the Hessian by more than this, relative.
+  double largest_hessian_change = liestat::largest_hessian_change;
+};
+
+/// A mean with all that is known about it.
+template <Metric M>
+struct CertifiedMean {
+  MeanResult<M> mean;  ///< the improved one if the search found a lower minimum
+  UniquenessResult<M> uniqueness;
+  CutLocusMass cut_locus;
+  /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
+  std::optional<Gaussian<M>> estimate;
+  Status status = Status::too_few;
+  const char* reason = "";  ///< why there is no estimate, in words
+};
+
+namespace detail {
+
+inline constexpr const char* not_converged_reason = "the iteration for the mean did not converge";
+inline constexpr const char* rival_reason = "another feature explains the data as well";
+inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
+inline constexpr const char* hessian_reason = "the Hessian of the criterion is not positive definite at the mean";
+inline constexpr const char* cut_locus_reason =
+    "too many features lie near the cut locus of the mean, where the squared distance has a kink: no first-order "
+    "covariance is right";
+
+/// The covariance of a mean from the noise that the options know.
+template <Metric M, class R, class W>
+SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const MeanResult<M>& mean,
+                                     const std::vector<SquareOf<M>>& noise) {
+  eigen_assert(noise.size() == 1 || noise.size() == mean.n);
+  using S = ScalarOf<M>;
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (std::size_t i = 0; i < mean.n; ++i) {
+    const M x = samples[i];
+    const S p = S(weights[i]);
+    sum += p * p * (noise.size() == mean.n ? transport(Gaussian<M>{x, noise[i]}, mean.mean).covariance : noise[0]);
+  }
+  return sandwich(mean, sum);
+}
+
+template <Metric M, Executor E, class R, class W>
+CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W& weights,
+                                   const CertifiedMeanOptions<M>& options) {
+  eigen_assert(haveOneSize(samples, weights));
+  CertifiedMean<M> result;
+  const auto without = [&](Status status, const char* reason) {
+    result.status = status;
+    result.reason = reason;
+    return result;
+  };
+  result.mean = frechetMean<M>(executor, samples, weights, options.mean);
+  if (result.mean.n == 0) return without(Status::too_few, "there are no features");
+  result.uniqueness = findUniqueness(executor, samples, weights, result.mean, options.uniqueness);
+  if (result.uniqueness.improved) {
+    MeanOptions<M> from_there = options.mean;
+    from_there.start = result.uniqueness.minimiser;
+    result.mean = frechetMean<M>(executor, samples, weights, from_there);
+  }
+  if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
+  if (result.uniqueness.unique == Uniqueness::ambiguous) return without(Status::ambiguous, rival_reason);
+
+  // The cut locus is looked at within the confidence region that the residuals show, whatever the noise is said to be;
+  // within that of the known noise where there are too few residuals.
+  const bool known = !options.known_noise.empty();
+  const bool have_residuals = result.mean.n > static_cast<std::size_t>(ManifoldTraits<M>::DoF);
+  if (!have_residuals && !known) return without(Status::too_few, too_few_reason);
+  SquareOf<M> covariance = have_residuals
+                               ? covarianceFromResiduals(result.mean, options.noise)
+                               : covarianceFromKnownNoise(samples, weights, result.mean, options.known_noise);
+  if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
+  result.cut_locus = findCutLocusNearby(samples, weights, result.mean, covariance);
+  if (isIllDefined(result.cut_locus, options.largest_hessian_change)) {
+    return without(Status::ill_defined, cut_locus_reason);
+  }
+  if (known && have_residuals) {
+    covariance = covarianceFromKnownNoise(samples, weights, result.mean, options.known_noise);
+    if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
+  }
+  result.estimate = Gaussian<M>{result.mean.mean, covariance};
+  result.status = Status::ok;
+  return result;
+}
+
+}  // namespace detail
+
+/// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, where that
+/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well
+/// (ambiguous), when the mass near the cut locus makes the mean of quotient frames or of very scattered rotations
+/// ill-defined (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
+/// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
+template <Executor E, SampleRange R, Metric M = SampleOf<R>>
+CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const CertifiedMeanOptions<M>& options = {}) {
+  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+}
+template <SampleRange R, Metric M = SampleOf<R>>
+CertifiedMean<M> certifiedMean(const R& samples, const CertifiedMeanOptions<M>& options = {}) {
+  return certifiedMean(SerialExecutor{}, samples, options);
+}
+template <Executor E, SampleRange R, WeightRange W, Metric M = SampleOf<R>>
+CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const W& weights,
+                               const CertifiedMeanOptions<M>& options = {}) {
+  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+}
+template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
+CertifiedMean<M> certifiedMean(const R& samples, const W& weights, const CertifiedMeanOptions<M>& options = {}) {
+  return certifiedMean(SerialExecutor{}, samples, weights, options);
+}
+
+}  // namespace liestat

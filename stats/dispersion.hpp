@@ -1,0 +1,68 @@
+// How features scatter about one of them: their dispersion, and which of them is farthest in each part of the tangent
+// vector. Needs Eigen alone.
+#pragma once
+
+#include <lie/manifold.hpp>
+#include <stats/detail/ranges.hpp>
+#include <stats/mean.hpp>
+
+#include <cstddef>
+#include <ranges>
+#include <vector>
+
+namespace liestat {
+
+/// The feature that is farthest from another in one part of the tangent vector.
+struct FarthestFeature {
+  TangentBlock block;
+  double distance = 0;    ///< norm of these coordinates, rad, m or whatever they are in
+  std::size_t index = 0;  ///< in the range; the first of equals
+};
+
+/// What dispersionAbout() returns.
+template <Homogeneous M>
+struct Dispersion {
+  SquareOf<M> covariance = SquareOf<M>::Zero();  ///< Σ p_i z_i z_iᵀ / Σ p_i, z_i = log(y, x_i)
+  std::vector<FarthestFeature> farthest = {};    ///< one for each of the type's tangent_parts, none if it says none
+};
+
+namespace detail {
+
+template <Homogeneous M, class R, class W>
+Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
+  using T = ManifoldTraits<M>;
+  using S = ScalarOf<M>;
+  eigen_assert(haveOneSize(samples, weights));
+  Dispersion<M> result;
+  if constexpr (HasTangentParts<M>) {
+    for (const TangentBlock& block : T::tangent_parts) result.farthest.push_back({block, 0, 0});
+  }
+  const typename T::Group to_y = T::placement(y).inverse();
+  S weight(0);
+  for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
+    const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
+    const S p = S(weights[i]);
+    result.covariance += p * z * z.transpose();
+    weight += p;
+    for (FarthestFeature& f : result.farthest) {
+      const double size = static_cast<double>(z.segment(f.block.begin, f.block.size).norm());
+      if (size > f.distance || i == 0) f.distance = size, f.index = i;
+    }
+  }
+  result.covariance /= weight;
+  return result;
+}
+
+}  // namespace detail
+
+/// Dispersion of a range of features about y, weighted or not, in the local frame at y. NaN for an empty range.
+template <SampleRange R, Homogeneous M = SampleOf<R>>
+Dispersion<M> dispersionAbout(const R& samples, const M& y) {
+  return detail::findDispersion(detail::asSamples(samples), detail::UnitWeights{}, y);
+}
+template <SampleRange R, WeightRange W, Homogeneous M = SampleOf<R>>
+Dispersion<M> dispersionAbout(const R& samples, const W& weights, const M& y) {
+  return detail::findDispersion(detail::asSamples(samples), detail::asWeights(weights), y);
+}
+
+}  // namespace liestat

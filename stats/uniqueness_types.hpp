@@ -1,0 +1,57 @@
+// What uniqueness() of stats/uniqueness.hpp is told and what it returns.
+#pragma once
+
+#include <lie/manifold.hpp>
+
+#include <cstddef>
+#include <vector>
+
+namespace liestat {
+
+/// What is known about the minimum of the criterion.
+enum class Uniqueness {
+  unique,        ///< proven: no other feature has as small a cost
+  ambiguous,     ///< there are others of equal cost, up to the tolerance
+  not_certified  ///< neither was proven within the budget
+};
+
+/// The name used in files and messages.
+constexpr const char* name(Uniqueness uniqueness) {
+  switch (uniqueness) {
+    case Uniqueness::unique:
+      return "unique";
+    case Uniqueness::ambiguous:
+      return "ambiguous";
+    case Uniqueness::not_certified:
+      return "not_certified";
+  }
+  return "unknown";
+}
+
+/// Options of uniqueness().
+struct UniquenessOptions {
+  /// Search globally where the cheap certificates fail. Its time grows with the cells and with the data (bins of them
+  /// where there are thousands): microseconds for tight data, seconds at the budget.
+  bool branch_and_bound = true;
+  std::size_t budget = 1'000'000;  ///< cells
+  /// Minima are rivals if their costs differ by less than this, relative (at least 64 eps of the scalar), and they are
+  /// 1e-3 rad apart: the search does not resolve nearer ones.
+  double tie_tolerance = 1e-9;
+  std::size_t max_rivals = 16;  ///< the search stops when it has found so many
+};
+
+/// What uniqueness() returns.
+template <Homogeneous M>
+struct UniquenessResult {
+  Uniqueness unique = Uniqueness::not_certified;
+  /// The best minimum that was found: the given mean, unless `improved`.
+  M minimiser = ManifoldTraits<M>::origin();
+  bool improved = false;   ///< the given mean is not the minimum: `minimiser` is lower
+  ScalarOf<M> cost = 0;    ///< C at the minimiser
+  std::vector<M> rivals;   ///< the other minimisers of equal cost that were found
+  double r_star = 0;       ///< radius about the minimiser in which it is the only minimum, rad
+  std::size_t cells = 0;   ///< of the global search; 0: it was not needed
+  const char* proof = "";  ///< which certificate holds, in words
+};
+
+}  // namespace liestat
