@@ -1,4 +1,5 @@
 #include <cli/io/calibration.hpp>
+#include <cli/io/camera.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <cli/io/input_error.hpp>
