@@ -3,7 +3,7 @@
 //
 //   for (const liestat::ClosedFormCase& c : liestat::closedFormCases()) {
 //     const liestat::InertialScene scene(c.scene, seed);
-//     const auto result = liestat::solveClosedForm(scene.window, {.estimate_bias = c.bias});
+//     const auto result = liestat::solveClosedForm(scene.window, {.closed_form = {.estimate_bias = c.bias}});
 //     … result.status == c.status || result.status == c.or_status, result.null_dimension == c.null
 //   }
 #pragma once
@@ -39,14 +39,14 @@ struct ClosedFormCase {
   InertialSceneOptions scene;
   bool bias = false;  ///< the bias of the accelerometer is an unknown too
   int null = 0;       ///< dimension of the system's null space
-  ClosedFormStatus status = ClosedFormStatus::ok;
-  ClosedFormStatus or_status = ClosedFormStatus::ok;  ///< the other status that scenes of this row may have
-  bool solved = true;                                 ///< the truth is among the solutions
+  FusionStatus status = FusionStatus::ok;
+  FusionStatus or_status = FusionStatus::ok;  ///< the other status that scenes of this row may have
+  bool solved = true;                         ///< the truth is among the solutions
 };
 
 /// All cases of the design note, and those that its rows stand for.
 inline const std::vector<ClosedFormCase>& closedFormCases() {
-  using S = ClosedFormStatus;
+  using S = FusionStatus;
   using Motion = SceneMotion;
   using Turn = SceneTurn;
   using Layout = SceneLayout;
@@ -215,15 +215,15 @@ inline const std::vector<ClosedFormCase>& closedFormCases() {
 struct NoisyClosedFormCase {
   const char* name;  ///< its own
   InertialSceneOptions scene;
-  std::vector<ClosedFormStatus> expected;
+  std::vector<FusionStatus> expected;
   double share = 0.97;  ///< of the windows that must be among these, at least
   bool bias = false;    ///< the bias of the accelerometer is an unknown too
-  double bias_deviation = 0.1;
+  double bias_sigma = 0.1;
 };
 
 /// All of them. Windows have the images that decide; where the case itself is one of few images, those.
 inline const std::vector<NoisyClosedFormCase>& noisyClosedFormCases() {
-  using S = ClosedFormStatus;
+  using S = FusionStatus;
   using Motion = SceneMotion;
   using Turn = SceneTurn;
   using Layout = SceneLayout;

@@ -231,7 +231,7 @@ class InertialScene {
     const SO3d body_R_world = attitude(0).inverse();
     velocity = body_R_world * speed(0);
     gravity = body_R_world * Eigen::Vector3d(0, 0, -g);
-    window.camera = options_.camera;
+    window.cameras = {SE3d(SO3d(), options_.camera)};
     for (const double t : times) {
       WindowImage image;
       image.time = t;

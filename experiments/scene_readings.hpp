@@ -1,14 +1,14 @@
 // What an inertial sensor reads of a simulated scene (experiments/inertial_scene.hpp), and what a window makes of it.
 //
 //   const auto readings = liestat::readingsOf(scene, noise, random, gyroscope_bias);
-//   const liestat::InertialWindow window{liestat::motionsOf(scene, readings, {.preintegration = {.noise = noise}}),
-//                                        scene.window.features, scene.options().camera};
+//   const auto window = liestat::experiments::windowOf(scene, readings, {.preintegration = {.noise = noise}});
 #pragma once
 
 #include <fusion/imu/readings.hpp>
 #include <experiments/inertial_scene.hpp>
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/preintegration.hpp>
+#include <fusion/imu/window.hpp>
 
 #include <Eigen/Core>
 
@@ -35,7 +35,13 @@ inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, con
   return readings;
 }
 
-/// The motions from each image of a scene to the next (InertialWindow::motions).
+/// A scene's window with these readings.
+inline InertialWindow windowOf(const InertialScene& scene, const std::vector<ImuSample<double>>& readings,
+                               const RecordingOptions<double>& options = {}) {
+  return {readings, scene.times, options, scene.window.features, scene.window.cameras};
+}
+
+/// The motions from each image of a scene to the next.
 inline std::vector<Preintegration<double>> motionsOf(const InertialScene& scene,
                                                      const std::vector<ImuSample<double>>& readings,
                                                      const RecordingOptions<double>& options = {}) {

@@ -15,7 +15,7 @@
 namespace liestat::experiments {
 namespace {
 
-using S = ClosedFormStatus;
+using S = FusionStatus;
 constexpr double bearing_noise = 1. / 450;
 
 /// What a scene came out as.
@@ -47,7 +47,7 @@ SolutionCount countOf(const ClosedFormResult& r) {
 
 Recognised recognise(const ClosedFormCase& c, CounterRng& rng) {
   const InertialScene scene(c.scene, rng());
-  const ClosedFormResult r = solveClosedForm(scene.window, {.estimate_bias = c.bias});
+  const ClosedFormResult r = solveClosedForm(scene.window, {.closed_form = {.estimate_bias = c.bias}});
   Recognised found{.status = r.status, .solutions = countOf(r), .null_right = r.null_dimension == c.null};
   found.wrong = !found.null_right || (r.status != c.status && r.status != c.or_status);
   if (c.solved) {
@@ -69,10 +69,10 @@ Recognised recognise(const NoisyClosedFormCase& c, CounterRng& rng) {
   InertialScene scene(c.scene, rng());
   measure(scene, vi_init_imu, rng);
   scene.addNoise(bearing_noise, rng);
-  const ClosedFormResult r = solveClosedForm(scene.window, {.bearing_noise = bearing_noise,
-                                                            .estimate_bias = c.bias,
-                                                            .bias_deviation = c.bias_deviation,
-                                                            .singular_values = false});
+  const ClosedFormResult r =
+      solveClosedForm(scene.window, {.bearing_noise = bearing_noise,
+                                     .prior = {.accelerometer_sigma = c.bias_sigma},
+                                     .closed_form = {.estimate_bias = c.bias, .singular_values = false}});
   Recognised found{.status = r.status, .solutions = countOf(r)};
   found.wrong = std::find(c.expected.begin(), c.expected.end(), r.status) == c.expected.end();
   return found;
@@ -116,7 +116,7 @@ void fill(Table1Row& row, const Case& c, std::size_t scenes, std::uint64_t seed,
 
 }  // namespace
 
-SolutionCount solutionsOf(ClosedFormStatus status) {
+SolutionCount solutionsOf(FusionStatus status) {
   switch (status) {
     case S::ok:
       return SolutionCount::one;

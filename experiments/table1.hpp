@@ -15,7 +15,7 @@ namespace liestat::experiments {
 
 /// How many solutions a status stands for.
 enum class SolutionCount { one, two, infinite };
-SolutionCount solutionsOf(ClosedFormStatus status);
+SolutionCount solutionsOf(FusionStatus status);
 
 /// A row of Martinelli's Table 1 (2012), or what his text says beside it.
 struct Table1Entry {
@@ -45,8 +45,8 @@ struct Table1Row {
   int null = -1;               ///< dimension of the null space as it must be; exact data only
   std::size_t null_right = 0;  ///< scenes in which it was found
   std::array<std::size_t, 3> solutions = {};
-  std::vector<std::pair<ClosedFormStatus, std::size_t>> statuses;  ///< by number of scenes
-  std::vector<ClosedFormStatus> expected;
+  std::vector<std::pair<FusionStatus, std::size_t>> statuses;  ///< by number of scenes
+  std::vector<FusionStatus> expected;
   std::size_t wrong = 0;       ///< scenes that came out otherwise than corrected
   std::optional<bool> passed;  ///< always there
 };

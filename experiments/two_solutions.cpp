@@ -52,7 +52,7 @@ std::optional<TwoSolutions> twoSolutions(int figure, std::uint64_t seed) {
   for (std::uint64_t i = 0; i < 1000; ++i) {
     InertialScene scene(optionsOf(figure), seed + i);
     ClosedFormResult result = solveClosedForm(scene.window);
-    if (result.status != ClosedFormStatus::ambiguous || result.solutions.size() != 2) continue;
+    if (result.status != FusionStatus::ambiguous || result.solutions.size() != 2) continue;
     if (!canBeDrawn(scene, result)) continue;
     const auto off = [&](std::size_t k) { return (result.solutions[k].velocity - scene.velocity).norm(); };
     const std::size_t truth = off(0) <= off(1) ? 0 : 1;

@@ -15,10 +15,11 @@ InertialScene sceneOf(const ViInitWindow& size, const Eigen::Vector3d& bias, std
 ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   InertialScene scene = sceneOf(size, Eigen::Vector3d::Zero(), rng());
   scene.addNoise(noise * vi_init_bearing_noise, rng);
-  const auto r = solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
+  const auto r = solveClosedForm(scene.window,
+                                 {.bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}});
   // A window without a single consistent answer makes no claim. With the wrong noise χ² would say so first, and hide the
   // distances.
-  if (r.status != ClosedFormStatus::ok || (noise == 1 && !r.consistent) ||
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
       r.covariance_content != CovarianceContent::image_noise) {
     return {};
   }
@@ -30,14 +31,14 @@ ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& size, double noise, Co
 }
 
 ClosedFormOutcome closedFormBiasNeesTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
-  const ClosedFormOptions options{
-      .bearing_noise = vi_init_bearing_noise, .estimate_bias = true, .singular_values = false};
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .closed_form = {.estimate_bias = true, .singular_values = false}};
   const std::uint64_t seed = rng();
-  const Eigen::Vector3d bias = noise * options.bias_deviation * rng.normalVector<3>();
+  const Eigen::Vector3d bias = noise * options.prior.accelerometer_sigma * rng.normalVector<3>();
   InertialScene scene = sceneOf(size, bias, seed);
   scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto r = solveClosedForm(scene.window, options);
-  if (r.status != ClosedFormStatus::ok || (noise == 1 && !r.consistent) ||
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
       r.covariance_content != CovarianceContent::image_noise_bias_prior) {
     return {};
   }
@@ -55,8 +56,8 @@ AccuracyOutcome closedFormErrorsTrial(const ViInitWindow& size, double noise, Co
   scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto errors = [&](bool remove_noise_bias) {
     return viErrors(solveClosedForm(scene.window, {.bearing_noise = vi_init_bearing_noise,
-                                                   .singular_values = false,
-                                                   .remove_noise_bias = remove_noise_bias}),
+                                                   .closed_form = {.singular_values = false,
+                                                                   .remove_noise_bias = remove_noise_bias}}),
                     scene);
   };
   return {.closed_form = errors(true), .least_squares = errors(false)};

@@ -26,26 +26,26 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
 }  // namespace
 
 RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
-  const RefinementOptions options{.bearing_noise = vi_init_bearing_noise};
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}};
   const std::uint64_t seed = rng();
-  const Eigen::Vector3d accelerometer = noise * options.accelerometer_deviation * rng.normalVector<3>();
-  const Eigen::Vector3d gyroscope = noise * options.gyroscope_deviation * rng.normalVector<3>();
+  const Eigen::Vector3d accelerometer = noise * options.prior.accelerometer_sigma * rng.normalVector<3>();
+  const Eigen::Vector3d gyroscope = noise * options.prior.gyroscope_sigma * rng.normalVector<3>();
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
                       seed);
   const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
                                    .accelerometer = noise * vi_init_imu.accelerometer};
   const auto readings = readingsOf(scene, simulated, rng, gyroscope);
   scene.addNoise(noise * vi_init_bearing_noise, rng);
-  const InertialWindow window{motionsOf(scene, readings, {.preintegration = {.noise = vi_init_imu}}),
-                              scene.window.features, scene.options().camera};
+  const InertialWindow window = windowOf(scene, readings, {.preintegration = {.noise = vi_init_imu}});
 
-  const auto start =
-      solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise, .singular_values = false});
+  const auto start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise,
+                                                                    .closed_form = {.singular_values = false}});
   if (start.solutions.empty()) return {};
   const RefinementResult r = refine(window, start.solutions[0], {}, options);
   // A window that a user would throw away for its χ² is left out only where the noise is the one that the estimator was
   // told: else this would hide the distances.
-  if (r.status != RefinementStatus::ok || (noise == 1 && !r.ok())) return {};
+  if (r.status != FusionStatus::ok || (noise == 1 && !r.ok())) return {};
 
   Eigen::Matrix<double, 12, 1> error;
   error << r.velocity() - scene.velocity, r.gravity - scene.gravity, r.bias.gyroscope - gyroscope,
@@ -56,11 +56,11 @@ RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, Counte
                    Eigen::Vector3d(body_R_world * (scene.position(end) - scene.position(0))),
                    Eigen::Vector3d(body_R_world * scene.speed(end)));
   const Eigen::Matrix<double, 9, 1> last_error = (last.inverse() * r.states.back()).log();
-  const Eigen::Matrix<double, 9, 9> last_covariance = r.last_covariance.topLeftCorner<9, 9>();
+  const Eigen::Matrix<double, 9, 9> last_covariance = r.covariance.atLast().topLeftCorner<9, 9>();
   return {.nees_v = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
-                                                  Eigen::Matrix3d(r.covariance.topLeftCorner<3, 3>())),
-          .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance, r.gravity),
-          .nees_all = neesOnSphere<11>(error, r.covariance, r.gravity),
+                                                  r.covariance.of<InitialCovariance::first_velocity>()),
+          .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
+          .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
           .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
           .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
           .errors = viErrors(r.velocity(), r.gravity, scene),

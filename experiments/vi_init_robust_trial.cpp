@@ -13,18 +13,16 @@ GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& size, double noise, 
                                    .accelerometer = noise * vi_init_imu.accelerometer};
   const auto readings = readingsOf(scene, simulated, rng, bias);
   scene.addNoise(noise * vi_init_bearing_noise, rng);
-  const auto integrate = [&](const ImuBias<double>& b) {
-    return motionsOf(scene, readings, {.preintegration = {.bias = b}});
-  };
-  const InertialWindow window{integrate({}), scene.window.features, scene.options().camera};
-  const GyroscopeBiasOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
-  const GyroscopeBiasResult found = estimateGyroscopeBias(window, options, integrate);
+  const InertialWindow window = windowOf(scene, readings);
+  const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .closed_form = {.singular_values = false}};
+  const GyroscopeBiasResult found = estimateGyroscopeBias(window, options);
   GyroscopeBiasOutcome outcome;
-  if (found.status == GyroscopeBiasStatus::ok) {
+  if (found.status == FusionStatus::ok) {
     outcome.estimated = viErrors(found.result, scene);
     outcome.bias = (found.bias - bias).norm();
   }
-  outcome.ignored = viErrors(solveClosedForm(closedFormWindow(window, {}), options.closed_form), scene);
+  outcome.ignored = viErrors(solveClosedForm(closedFormWindow(window, {}), options), scene);
   return outcome;
 }
 
@@ -34,15 +32,16 @@ DriftOutcome driftTrial(const ViInitWindow& size, double noise, CounterRng& rng)
   scene.addNoise(noise * vi_init_bearing_noise, rng);
   const std::size_t wrong = size.features * 2 / 5;
   scene.addDrift(wrong, 8 * vi_init_bearing_noise, rng);
-  const RansacOptions options{.closed_form = {.bearing_noise = vi_init_bearing_noise, .singular_values = false}};
-  const ClosedFormRansacResult robust = solveClosedFormRobustly(scene.window, rng, options);
+  const InitialisationOptions options{
+      .bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}, .consensus = {.seed = rng()}};
+  const ConsensusResult robust = solveClosedFormRobustly(scene.window, options);
   DriftOutcome outcome;
   outcome.exact_selection = robust.inliers.size() == size.features - wrong;
   for (const std::size_t i : robust.inliers) outcome.exact_selection = outcome.exact_selection && i >= wrong;
-  outcome.no_selection = viErrors(solveClosedForm(scene.window, options.closed_form), scene);
+  outcome.no_selection = viErrors(solveClosedForm(scene.window, options), scene);
   ClosedFormWindow right = scene.window;
   for (std::size_t i = 0; i < wrong; ++i) right.features[i].clear();
-  outcome.oracle = viErrors(solveClosedForm(right, options.closed_form), scene);
+  outcome.oracle = viErrors(solveClosedForm(right, options), scene);
   // No consensus is no answer.
   if (!robust.inliers.empty()) outcome.robust = viErrors(robust.result, scene);
   return outcome;

@@ -59,7 +59,7 @@ ClosedFormWindow makeWindow(const benchmark::State& state, double sigma) {
 
 void pass(benchmark::State& state) {
   const ClosedFormWindow window = makeWindow(state, noise);
-  const ClosedFormOptions options{.gravity = Eigen::Vector3d(1, 2, -9.5).norm(), .bearing_noise = noise};
+  const InitialisationOptions options{.bearing_noise = noise, .gravity = Eigen::Vector3d(1, 2, -9.5).norm()};
   ClosedFormResult result;
   detail::RayTable table = detail::rayTable(window, result);
   detail::ClosedFormSolver solver(table, options);
@@ -73,7 +73,7 @@ void pass(benchmark::State& state) {
   state.SetComplexityN(state.range(0) * state.range(1));
 }
 
-void solve(benchmark::State& state, const ClosedFormOptions& options, double sigma) {
+void solve(benchmark::State& state, const InitialisationOptions& options, double sigma) {
   const ClosedFormWindow window = makeWindow(state, sigma);
   for (auto _ : state) {
     auto result = solveClosedForm(window, options);
@@ -86,14 +86,15 @@ void solve(benchmark::State& state, const ClosedFormOptions& options, double sig
 const double gravity_length = Eigen::Vector3d(1, 2, -9.5).norm();
 
 void noisy(benchmark::State& state) {
-  solve(state, {.gravity = gravity_length, .bearing_noise = noise, .singular_values = false}, noise);
+  solve(state, {.bearing_noise = noise, .gravity = gravity_length, .closed_form = {.singular_values = false}}, noise);
 }
 void exact(benchmark::State& state) { solve(state, {.gravity = gravity_length}, 0); }
 void bias(benchmark::State& state) {
   // The prior decides: only the time is of interest.
   const ClosedFormWindow window = makeWindow(state, noise);
-  const ClosedFormOptions options{
-      .gravity = gravity_length, .bearing_noise = noise, .estimate_bias = true, .singular_values = false};
+  const InitialisationOptions options{.bearing_noise = noise,
+                                      .gravity = gravity_length,
+                                      .closed_form = {.estimate_bias = true, .singular_values = false}};
   for (auto _ : state) {
     auto result = solveClosedForm(window, options);
     benchmark::DoNotOptimize(result);
@@ -109,13 +110,12 @@ void ransac(benchmark::State& state) {
     for (TrackedBearing& seen : window.features[i]) seen.bearing += walk += 8 * noise * random.normal<3>();
   }
   // A confidence that is never reached: all hypotheses are tried.
-  const RansacOptions options{
-      .closed_form = {.gravity = gravity_length, .bearing_noise = noise, .singular_values = false},
-      .most_hypotheses = 50,
-      .confidence = 1 - 1e-16};
-  std::mt19937_64 generator(1);
+  const InitialisationOptions options{.bearing_noise = noise,
+                                      .gravity = gravity_length,
+                                      .closed_form = {.singular_values = false},
+                                      .consensus = {.max_hypotheses = 50, .confidence = 1 - 1e-16}};
   for (auto _ : state) {
-    auto robust = solveClosedFormRobustly(window, generator, options);
+    auto robust = solveClosedFormRobustly(window, options);
     if (robust.hypotheses != 50) state.SkipWithError("not fifty hypotheses");
     benchmark::DoNotOptimize(robust);
   }
@@ -132,7 +132,7 @@ struct Measured {
     const int readings = 400 / static_cast<int>(images - 1);
     const Eigen::Vector3d off(0.006, -0.008, 0);
     SO3d turned;
-    std::vector<Preintegration<double>> truth;
+    std::vector<Preintegration<double>> truth, motions;
     for (std::size_t j = 1; j < images; ++j) {
       const PreintegrationOptions<double> options{.noise = {.gyroscope = 1.7e-4, .accelerometer = 2e-3}};
       Preintegration<double> exact(options), measured(options);
@@ -147,8 +147,9 @@ struct Measured {
         turned *= SO3d::exp(h * rate);
       }
       truth.push_back(exact);
-      window.motions.push_back(measured);
+      motions.push_back(measured);
     }
+    window = InertialWindow(motions);
     const auto seen_from = biasedImages(truth, {});
     for (std::size_t i = 0; i < features; ++i) {
       const Eigen::Vector3d P = Eigen::Vector3d(0, 0, 5) + 1.5 * random.normal<3>();
@@ -161,17 +162,17 @@ struct Measured {
       window.features.push_back(track);
     }
   }
-  ClosedFormOptions options() const {
-    return {.gravity = gravity.norm(), .bearing_noise = noise, .singular_values = false};
+  InitialisationOptions options() const {
+    return {.bearing_noise = noise, .gravity = gravity.norm(), .closed_form = {.singular_values = false}};
   }
 };
 
 void gyroscopeBias(benchmark::State& state) {
   const Measured measured(state);
-  const GyroscopeBiasOptions options{.closed_form = measured.options()};
+  const InitialisationOptions options = measured.options();
   for (auto _ : state) {
     auto found = estimateGyroscopeBias(measured.window, options);
-    if (found.status != GyroscopeBiasStatus::ok) state.SkipWithError("not found");
+    if (found.status != FusionStatus::ok) state.SkipWithError("not found");
     benchmark::DoNotOptimize(found);
   }
 }
@@ -198,11 +199,10 @@ void epipolarBias(benchmark::State& state) {
 void robustInitialisation(benchmark::State& state) {
   const Measured measured(state);
   const InertialWindow window = withDrift(measured.window);
-  const RobustInitialisationOptions options{.ransac = {.closed_form = measured.options()}};
-  std::mt19937_64 generator(1);
+  const InitialisationOptions options = measured.options();
   for (auto _ : state) {
-    auto found = initialiseRobustly(window, generator, options);
-    if (found.status != RobustInitialisationStatus::ok) state.SkipWithError(describe(found.status));
+    auto found = initialiseRobustly(window, options);
+    if (found.status != FusionStatus::ok) state.SkipWithError(describe(found.status));
     benchmark::DoNotOptimize(found);
   }
 }

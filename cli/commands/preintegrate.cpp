@@ -40,20 +40,22 @@ struct Window {
   double squared_distance = 0;                       ///< of the error under the covariance
 };
 
-std::string describe(RecordingFault fault) {
-  switch (fault) {
-    case RecordingFault::none:
+std::string statusOf(const Fault& fault) {
+  switch (fault.kind) {
+    case FaultKind::none:
       return "ok";
-    case RecordingFault::bad_interval:
+    case FaultKind::bad_interval:
       return "bad interval";
-    case RecordingFault::not_covered:
+    case FaultKind::not_covered:
       return "not covered";
-    case RecordingFault::not_ascending:
+    case FaultKind::not_ascending:
       return "times not ascending";
-    case RecordingFault::not_finite:
+    case FaultKind::not_finite:
       return "not finite";
-    case RecordingFault::gap:
+    case FaultKind::gap:
       return "gap";
+    default:
+      break;
   }
   return "unknown";
 }
@@ -65,8 +67,8 @@ double largest(const Eigen::Vector3d& v) { return v.maxCoeff(); }
 
 JsonObject toJson(const Window& w, bool with_noise) {
   JsonObject o;
-  o.set("begin", w.begin).set("status", describe(w.result.fault)).set("duration", w.result.motion.duration());
-  o.set("largest_gap", w.result.largest_gap);
+  o.set("begin", w.begin).set("status", statusOf(w.result.fault)).set("duration", w.result.motion.duration());
+  o.set("largest_gap", w.result.max_gap);
   if (!w.result.ok()) return o;
   const SE23d& x = w.result.motion.increment();
   o.set("quaternion_xyzw", Eigen::Vector4d(x.so3().params())).set("rotation_vector", Eigen::Vector3d(x.so3().log()));
@@ -93,7 +95,7 @@ void print(const std::vector<Window>& windows, bool with_noise, bool with_truth)
   for (const Window& w : windows) {
     const SE23d& x = w.result.motion.increment();
     if (!w.result.ok()) {
-      table.row({number(w.begin), describe(w.result.fault)});
+      table.row({number(w.begin), statusOf(w.result.fault)});
       continue;
     }
     std::vector<std::string> cells = {number(w.begin), number(w.result.motion.duration()),
@@ -140,7 +142,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   const ImuFile imu = readImu(options.imu.file);
   RecordingOptions<double> how;
   how.scheme = options.imu.scheme;
-  how.largest_gap = options.imu.largest_gap;
+  how.max_gap = options.imu.largest_gap;
   ImuNoise<double>& noise = how.preintegration.noise;
   noise = options.imu.noiseOver(options.calibration.empty() ? ImuNoise<double>{} : readImuNoise(options.calibration));
   const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;

@@ -1,9 +1,10 @@
 #include <cli/io/calibration.hpp>
+#include <cli/io/camera.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/vi_init.hpp>
+#include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
 
 #include <CLI/App.hpp>
@@ -12,6 +13,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
 namespace liestat::cli {
 namespace {
@@ -23,9 +28,9 @@ struct Options {
   std::string tracks, image_times, truth, json, report, camera;
   std::vector<std::string> calibration;
   std::vector<double> intrinsics;
-  bool free_gravity = false, no_consensus = false, no_refinement = false;
-  double gravity = 9.81;
-  ViInitOptions how;
+  bool free_gravity = false, no_consensus = false, no_refinement = false, known_biases = false, true_biases = false;
+  double gravity = 9.81, noise_factor = 1, pixel_noise = 1;
+  VisualInertialOptions how;
 };
 
 CameraCalibration cameraOf(const Options& options, const Calibration& calibration) {
@@ -61,30 +66,92 @@ ViRecording recordingOf(const Options& options) {
                      "--calibration with an imu0, or --noise gyroscope,accelerometer");
   }
   if (!options.truth.empty()) recording.truth = readGroundTruth(options.truth, recording.imu.start_ns);
-  if (options.how.true_biases && recording.truth.empty()) {
+  if (options.true_biases && recording.truth.empty()) {
     throw InputError(command_name, 0, "--true-biases without --truth");
   }
   return recording;
 }
 
-int runCommand(const Options& options, const Invocation& invocation) {
-  ViInitOptions how = options.how;
-  how.gravity = options.free_gravity ? std::nullopt : std::optional(options.gravity);
-  how.prior = options.imu.bias();
+/// What the library needs of a recording, which must outlive it.
+VisualInertialRecording measurementsOf(const ViRecording& recording, const Options& options) {
+  VisualInertialRecording measured;
+  measured.readings = recording.imu.samples;
+  measured.noise = recording.noise;
+  for (double* density : {&measured.noise.gyroscope, &measured.noise.accelerometer, &measured.noise.gyroscope_walk,
+                          &measured.noise.accelerometer_walk}) {
+    *density *= options.noise_factor;
+  }
+  for (const double t : recording.tracks.times) {
+    measured.image_times.push_back(t + recording.camera.timeshift_cam_imu);
+  }
+  measured.cameras = {recording.camera.imu_T_cam};
+  std::vector<PixelMeasurement> pixels;
+  pixels.reserve(recording.tracks.observations.size());
+  for (const PixelObservation& seen : recording.tracks.observations) {
+    pixels.push_back({.image = seen.image, .track = seen.track, .pixel = {seen.u, seen.v}});
+  }
+  measured.observations = bearingsOf(pixels, std::span(&recording.camera.camera, 1), options.pixel_noise);
+  return measured;
+}
+
+VisualInertialOptions optionsOf(const ViRecording& recording, const Options& options) {
+  VisualInertialOptions how = options.how;
+  InitialisationOptions& steps = how.initialisation;
+  steps.gravity = options.free_gravity ? std::nullopt : std::optional(options.gravity);
+  steps.prior.mean = options.imu.bias();
   how.scheme = options.imu.scheme;
-  how.largest_gap = options.imu.largest_gap;
+  how.max_gap = options.imu.largest_gap;
   how.consensus = !options.no_consensus;
   how.refinement = !options.no_refinement;
+  if (options.true_biases) {
+    // Where there is no truth at the time, its biases are not known.
+    how.known_bias = [&recording](double time) {
+      const auto truth = truthAt(recording.truth, time);
+      return truth ? std::optional(truth->bias) : std::nullopt;
+    };
+  } else if (options.known_biases) {
+    how.known_bias = [bias = steps.prior.mean](double) { return std::optional(bias); };
+  }
+  return how;
+}
+
+/// What is wrong with a recording as a whole.
+void throwFault(const VisualInertialResult& result, const VisualInertialRecording& measured,
+                const VisualInertialOptions& how) {
+  if (!result.fault) return;
+  const std::vector<double>& times = measured.image_times;
+  if (result.fault == FaultKind::too_few_images) {
+    throw InputError(command_name, 0,
+                     fmt::format("no window of {} s fits: {} images from {:.6g} to {:.6g} s, {} of them outside of the "
+                                 "readings' {:.6g} to {:.6g} s",
+                                 how.window, times.size(), times.front(), times.back(), result.images_outside,
+                                 measured.readings.front().time, measured.readings.back().time),
+                     "images that the readings cover, on the same clock");
+  }
+  const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
+  const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
+  throw InputError(command_name, 0, fmt::format("{:.3g} windows from {} to {} s", windows, begin, end),
+                   fmt::format("at most {}", how.max_windows));
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
-  const ViInitResult result =
-      withProgressBar("vi-init", [&](const auto& progress) { return initialise(recording, how, progress); });
-  if (options.json != "-") std::fputs(viInitTable(recording, how, result).c_str(), stdout);
+  const VisualInertialRecording measured = measurementsOf(recording, options);
+  const VisualInertialOptions how = optionsOf(recording, options);
+  VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
+    return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
+  });
+  throwFault(found, measured, how);
+  ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
+  result.biases_given = options.known_biases || options.true_biases;
+  result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
+  if (options.json != "-") std::fputs(viInitTable(recording, result).c_str(), stdout);
   if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, how.seed);
-    setViInit(object, recording, how, result);
+    JsonObject object = jsonEnvelope(invocation.command_line, how.initialisation.consensus.seed);
+    setViInit(object, recording, result);
     writeJson(options.json, object);
   }
-  if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, how, result);
+  if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
   const bool any = std::any_of(result.windows.begin(), result.windows.end(), [](const ViWindow& w) { return w.ok(); });
   return any ? exit_fine : exit_not_trusted;
 }
@@ -93,7 +160,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 void addViInitCommand(CLI::App& app, Invocation& invocation) {
   auto options = std::make_shared<Options>();
-  ViInitOptions& how = options->how;
+  VisualInertialOptions& how = options->how;
+  InitialisationOptions& steps = how.initialisation;
   CLI::App* command = addCommand(
       app, "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
   addImuOptions(*command, options->imu, ": as it is expected (default 0)");
@@ -106,28 +174,28 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
   command->add_option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's")
       ->delimiter(',')
       ->expected(4);
-  command->add_option("--noise-factor", how.noise_factor, "Multiplies these densities (default 1)")
+  command->add_option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)")
       ->check(CLI::Range(1e-3, 1e6));
-  command->add_option("--pixel-noise", how.pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
+  command->add_option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
       ->check(CLI::Range(1e-6, 1e3));
   command->add_option("--window", how.window, "s (default 2)")->check(CLI::Range(0.1, 60.));
   command->add_option("--stride", how.stride, "s from one window's start to the next (default: the window)")
       ->check(CLI::Range(1e-3, 1e4));
   command->add_option("--image-rate", how.image_rate, "Hz: images that are used, at most (default 10; 0: all)")
       ->check(CLI::Range(0., 1e4));
-  command->add_option("--features", how.features, "A window, at most (default 50; 0: all)");
-  command->add_option("--least-observations", how.least_observations, "Of a feature in a window (default 4)")
+  command->add_option("--features", how.max_features, "A window, at most (default 50; 0: all)");
+  command->add_option("--least-observations", how.min_observations, "Of a feature in a window (default 4)")
       ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
   command->add_option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)")->check(CLI::Range(1e-3, 1e3));
   command->add_flag("--free-gravity", options->free_gravity, "|G| is not known");
-  command->add_option("--gyroscope-deviation", how.gyroscope_deviation, "rad/s, of its expected bias (default 0.1)")
+  command->add_option("--gyroscope-deviation", steps.prior.gyroscope_sigma, "rad/s, of its expected bias (default 0.1)")
       ->check(CLI::Range(1e-9, 10.));
   command
-      ->add_option("--accelerometer-deviation", how.accelerometer_deviation,
+      ->add_option("--accelerometer-deviation", steps.prior.accelerometer_sigma,
                    "m/s^2, of its expected bias (default 0.15)")
       ->check(CLI::Range(1e-9, 100.));
-  command->add_flag("--known-biases", how.known_biases, "Biases are as they are expected: nothing is estimated");
-  command->add_flag("--true-biases", how.true_biases, "Those of the ground truth are used: nothing is estimated");
+  command->add_flag("--known-biases", options->known_biases, "Biases are as they are expected: nothing is estimated");
+  command->add_flag("--true-biases", options->true_biases, "Those of the ground truth are used: nothing is estimated");
   command->add_flag("--no-consensus", options->no_consensus, "All tracks are right");
   command->add_flag("--no-refinement", options->no_refinement, "The closed form alone");
   command->add_option("--fuse", how.stretch, "s: disjoint windows of such stretches are fused (default 12; 0: none)")
@@ -136,7 +204,7 @@ void addViInitCommand(CLI::App& app, Invocation& invocation) {
                       "s since the first reading, or the file's seconds (default: the first image)");
   command->add_option("--end", how.end, "The same (default: the last image)");
   command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with");
-  command->add_option("--seed", how.seed, "Of the consensus");
+  command->add_option("--seed", steps.consensus.seed, "Of the consensus");
   command->add_option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
   command->add_option("--report", options->report, "Write a page with plots into this directory");
   command->callback(

@@ -118,7 +118,7 @@ JsonObject toJson(const Table1Row& row) {
   for (const auto& [status, count] : row.statuses) statuses.set(name(status), count);
   o.set("recognised", statuses);
   std::vector<std::string> expected;
-  for (const ClosedFormStatus status : row.expected) expected.push_back(name(status));
+  for (const FusionStatus status : row.expected) expected.push_back(name(status));
   o.set("expected", expected).set("otherwise", row.wrong).set("passed", row.passed);
   return o;
 }

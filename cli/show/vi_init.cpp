@@ -24,7 +24,7 @@ struct Best {
   Eigen::Vector3d velocity, gravity;
 
   explicit Best(const ViWindow& w) {
-    if (w.refined && w.refined->status == RefinementStatus::ok) {
+    if (w.refined && w.refined->status == FusionStatus::ok) {
       velocity = w.refined->velocity();
       gravity = w.refined->gravity;
     } else {
@@ -40,9 +40,10 @@ bool hasSolution(const ViWindow& w) { return !w.closedForm().solutions.empty(); 
 
 /// Standard deviation of the length of V over that length: of the scale.
 double scaleDeviation(const ViWindow& w) {
-  if (!w.refined || w.refined->status != RefinementStatus::ok) return w.closedForm().scale_deviation;
+  if (!w.refined || w.refined->status != FusionStatus::ok) return w.closedForm().scale_sigma;
   const Eigen::Vector3d u = w.refined->velocity().normalized();
-  return std::sqrt(u.dot(w.refined->covariance.topLeftCorner<3, 3>() * u)) / w.refined->velocity().norm();
+  return std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)) /
+         w.refined->velocity().norm();
 }
 
 double costPerDegree(const ViWindow& w) {
@@ -62,11 +63,11 @@ std::string windowTable(const ViInitResult& result, bool with_truth) {
   if (with_truth) headers.insert(headers.end(), {"off m/s", "deg", "%"});
   Table table(headers);
   for (const ViWindow& w : result.windows) {
-    std::vector<std::string> cells = {fmt::format("{:.1f}", w.begin), w.status()};
-    if (w.fault == RecordingFault::none && hasSolution(w)) {
+    std::vector<std::string> cells = {fmt::format("{:.1f}", w.begin), std::string(name(w.verdict()))};
+    if (!w.fault && hasSolution(w)) {
       const Best best(w);
-      const bool has_scale = w.closedForm().status != ClosedFormStatus::scale_unobservable &&
-                             w.closedForm().status != ClosedFormStatus::stationary;
+      const bool has_scale = w.closedForm().status != FusionStatus::scale_unobservable &&
+                             w.closedForm().status != FusionStatus::stationary;
       cells.push_back(has_scale ? fmt::format("{:.2f}", best.velocity.norm()) : "");
       cells.push_back(fmt::format("{:.1f}", degrees * best.roll()));
       cells.push_back(fmt::format("{:.1f}", degrees * best.pitch()));
@@ -89,15 +90,15 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
   if (with_truth) headers.insert(headers.end(), {"off m/s", "deg", "rad/s", "m/s2"});
   Table table(headers);
   for (const ViFusion& f : result.fusions) {
-    if (!f.ok) continue;
+    if (!f.has_state) continue;
     const std::size_t dof = f.degrees_of_freedom;
     std::vector<std::string> cells = {fmt::format("{:.1f}", f.end),
                                       fmt::format("{}", f.windows.size()),
                                       dof == 0 ? "" : fmt::format("{:.2f}", f.chi2 / static_cast<double>(dof)),
                                       dof == 0 ? "" : fmt::format("{:.1g}", f.p_value),
-                                      fmt::format("{:.2f}", degrees * f.down_deviation),
-                                      fmt::format("{:.4f}", f.gyroscope_deviation),
-                                      fmt::format("{:.3f}", f.accelerometer_deviation)};
+                                      fmt::format("{:.2f}", degrees * f.down_sigma),
+                                      fmt::format("{:.4f}", f.gyroscope_sigma),
+                                      fmt::format("{:.3f}", f.accelerometer_sigma)};
     if (f.speed_error) {
       cells.push_back(fmt::format("{:.3f}", *f.speed_error));
       cells.push_back(fmt::format("{:.2f}", degrees * *f.gravity_error));
@@ -145,10 +146,10 @@ struct Summary {
 
   explicit Summary(const ViInitResult& result) {
     for (const ViWindow& w : result.windows) {
-      ++statuses[w.status()];
+      ++statuses[std::string(name(w.verdict()))];
       // Of all windows that claim a scale, not only of those that came out well.
-      const ClosedFormStatus status = w.closedForm().status;
-      if (status == ClosedFormStatus::scale_unobservable || status == ClosedFormStatus::stationary) continue;
+      const FusionStatus status = w.closedForm().status;
+      if (status == FusionStatus::scale_unobservable || status == FusionStatus::stationary) continue;
       if (w.closed_form_error) closed_form.add(*w.closed_form_error);
       if (w.refined_error) refined.add(*w.refined_error);
       if (w.refined_error && w.gyroscope_error) gyroscope.push_back(*w.gyroscope_error);
@@ -156,7 +157,7 @@ struct Summary {
         nees += *w.nees;
         ++with_nees;
       }
-      if (w.refined && w.refined->status == RefinementStatus::ok) {
+      if (w.refined && w.refined->status == FusionStatus::ok) {
         cost += w.refined->cost;
         degrees_of_freedom += w.refined->degrees_of_freedom;
       }
@@ -180,16 +181,18 @@ JsonObject toJson(const ClosedFormSolution& s) {
 
 JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vector<double>& times) {
   JsonObject o;
-  o.set("status", describe(r.status)).set("consistent", r.consistent()).set("cost", r.cost);
+  o.set("status", r.status == FusionStatus::ok ? "refined" : describe(r.status))
+      .set("consistent", r.consistent())
+      .set("cost", r.cost);
   o.set("degrees_of_freedom", r.degrees_of_freedom).set("features_used", r.features_used);
-  if (r.status != RefinementStatus::ok) return o;
+  if (r.status != FusionStatus::ok) return o;
   o.set("velocity", r.velocity()).set("gravity", r.gravity);
   o.set("gyroscope_bias", r.bias.gyroscope).set("accelerometer_bias", r.bias.accelerometer);
-  o.set("covariance", r.covariance);
+  o.set("covariance", r.covariance.atFirst());
   o.set("covariance_order", "velocity gravity gyroscope_bias accelerometer_bias");
   o.set("covariance_frame", "axes of the body at the first image, m/s m/s^2 rad/s m/s^2");
   o.set("covariance_content", "image noise, inertial noise and the priors of the biases");
-  o.set("last_covariance", r.last_covariance);
+  o.set("last_covariance", r.covariance.atLast());
   o.set("last_covariance_order", "position rotation velocity gravity gyroscope_bias accelerometer_bias");
   o.set("last_covariance_side", "right: of the last state in its own axes; gravity in those of the first image");
   std::vector<JsonObject> states;
@@ -210,9 +213,9 @@ JsonObject toJson(const ViError& e) {
 
 JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::vector<double>& times) {
   JsonObject o;
-  o.set("begin", w.begin).set("end", w.end).set("status", w.status()).set("ok", w.ok());
+  o.set("begin", w.begin).set("end", w.end).set("status", std::string(name(w.verdict()))).set("ok", w.ok());
   o.set("images", w.images.size()).set("tracks", w.tracks.size());
-  if (w.fault != RecordingFault::none) return o.set("fault_time", w.fault_time);
+  if (w.fault) return o.set("fault_time", w.fault_time);
   const ClosedFormResult& c = w.closedForm();
   o.set("closed_form_status", name(c.status)).set("in_words", describe(c.status)).set("consistent", c.consistent);
   o.set("null_dimension", c.null_dimension).set("singular_values", c.singular_values);
@@ -226,7 +229,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
     JsonObject feature;
     feature.set("track", recording.tracks.track_ids[w.tracks[i]]).set("observations", f.observations);
     feature.set("used", f.used).set("residual", f.residual).set("parallax", f.parallax);
-    feature.set("depth_deviation", f.depth_deviation);
+    feature.set("depth_deviation", f.depth_sigma);
     features.push_back(feature);
   }
   o.set("features", features).set("features_used", c.features_used);
@@ -239,10 +242,12 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   }
   o.set("covariance_content", describe(c.covariance_content));
   o.set("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
-  o.set("scale_deviation", c.scale_deviation).set("tilt_deviation", c.tilt_deviation);
-  o.set("integrated_gyroscope_bias", w.integrated.gyroscope);
-  o.set("integrated_accelerometer_bias", w.integrated.accelerometer);
-  o.set("gyroscope_bias", w.found.gyroscope_bias).set("gyroscope_bias_status", describe(w.found.bias_status));
+  o.set("scale_deviation", c.scale_sigma).set("tilt_deviation", c.tilt_sigma);
+  o.set("integrated_gyroscope_bias", w.measured.bias().gyroscope);
+  o.set("integrated_accelerometer_bias", w.measured.bias().accelerometer);
+  o.set("gyroscope_bias", w.found.gyroscope_bias)
+      .set("gyroscope_bias_status",
+           w.found.bias_status == FusionStatus::ok ? "the gyroscope's bias was found" : describe(w.found.bias_status));
   if (w.refined) {
     o.set("refined", toJson(*w.refined, w, times));
   } else {
@@ -258,10 +263,10 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
 JsonObject toJson(const ViFusion& f) {
   JsonObject o;
   o.set("begin", f.begin).set("end", f.end).set("windows", f.windows.size()).set("chi2", f.chi2);
-  o.set("degrees_of_freedom", f.degrees_of_freedom).set("p", f.p_value).set("ok", f.ok);
-  if (!f.ok) return o;
+  o.set("degrees_of_freedom", f.degrees_of_freedom).set("p", f.p_value).set("ok", f.has_state);
+  if (!f.has_state) return o;
   o.set("gravity_direction", f.down).set("velocity", f.velocity).set("gyroscope_bias", f.gyroscope_bias);
-  o.set("accelerometer_bias", f.accelerometer_bias).set("covariance", f.covariance);
+  o.set("accelerometer_bias", f.accelerometer_bias).set("covariance", f.state.covariance);
   o.set("covariance_order", "gravity_direction(2) velocity gyroscope_bias resting_force");
   o.set("covariance_frame", "axes of the body at the end; the direction's in the frame of its placement");
   o.set("speed_error", f.speed_error).set("gravity_error", f.gravity_error);
@@ -271,7 +276,7 @@ JsonObject toJson(const ViFusion& f) {
 
 }  // namespace
 
-std::string viInitTable(const ViRecording& recording, const ViInitOptions& options, const ViInitResult& result) {
+std::string viInitTable(const ViRecording& recording, const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   std::string text = windowTable(result, with_truth);
   const Summary summary(result);
@@ -279,7 +284,7 @@ std::string viInitTable(const ViRecording& recording, const ViInitOptions& optio
   for (const auto& [status, count] : summary.statuses) text += fmt::format(" {} {}", count, status);
   text += "\n";
   if (with_truth) {
-    const bool with_biases = options.known_biases || options.true_biases;
+    const bool with_biases = result.biases_given;
     if (summary.closed_form.size() > 0) {
       text += "closed form, median / 95 %: " + summary.closed_form.str() + "\n";
     }
@@ -318,13 +323,12 @@ std::string viInitTable(const ViRecording& recording, const ViInitOptions& optio
   return text;
 }
 
-void setViInit(JsonObject& object, const ViRecording& recording, const ViInitOptions& options,
-               const ViInitResult& result) {
+void setViInit(JsonObject& object, const ViRecording& recording, const ViInitResult& result) {
   object.set("readings", recording.imu.samples.size()).set("start_ns", recording.imu.start_ns);
   object.set("images", recording.tracks.times.size()).set("tracks", recording.tracks.track_ids.size());
   object.set("tracks_seen_once", recording.tracks.seen_once).set("images_outside", result.images_outside);
   object.set("observations_outside", result.observations_outside).set("bearing_noise", result.bearing_noise);
-  object.set("gravity", options.gravity);
+  object.set("gravity", result.gravity);
   const Summary summary(result);
   JsonObject statuses;
   for (const auto& [status, count] : summary.statuses) statuses.set(status, count);

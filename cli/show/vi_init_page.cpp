@@ -33,7 +33,7 @@ Series line(std::string name, std::size_t colour, bool dashed = false) {
   return {.name = std::move(name), .style = Style::lines, .colour = colour, .dashed = dashed};
 }
 
-bool isRefined(const ViWindow& w) { return w.refined && w.refined->status == RefinementStatus::ok; }
+bool isRefined(const ViWindow& w) { return w.refined && w.refined->status == FusionStatus::ok; }
 
 /// The rotation that makes gravity point along -z, heading left as it is.
 SO3d levelling(const Eigen::Vector3d& gravity) {
@@ -134,7 +134,8 @@ Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
   for (const ViWindow& w : result.windows) {
     if (!isRefined(w)) continue;
     const Eigen::Vector3d V = w.refined->velocity(), u = V.normalized();
-    addBar(found, w.begin, V.norm(), std::sqrt(u.dot(w.refined->covariance.topLeftCorner<3, 3>() * u)));
+    addBar(found, w.begin, V.norm(),
+           std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)));
   }
   if (!truth.x.empty()) panel.series.push_back(truth);
   panel.series.push_back(found);
@@ -149,7 +150,7 @@ Panel scalePanel(const ViInitResult& result) {
   Series closed{.name = "closed form", .style = Style::points, .colour = second_colour};
   Series refined{.name = "refined", .style = Style::points, .colour = estimate_colour};
   for (const ViWindow& w : result.windows) {
-    if (w.closed_form_error && w.closedForm().status == ClosedFormStatus::ok) {
+    if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {
       closed.x.push_back(w.begin);
       closed.y.push_back(100 * w.closed_form_error->scale);
     }
@@ -191,13 +192,13 @@ Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool g
   const Series truth = truthLine(recording, result, [&](const GroundTruth& g) { return of(g.bias); });
   for (const ViWindow& w : result.windows) {
     if (!isRefined(w)) continue;
-    const int i = (gyroscope ? 6 : 9) + axis;
-    addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance(i, i)));
+    const int i = (gyroscope ? InitialCovariance::gyroscope_bias : InitialCovariance::accelerometer_bias) + axis;
+    addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance.joint(i, i)));
   }
   for (const ViFusion& f : result.fusions) {
-    if (!f.ok) continue;
+    if (!f.has_state) continue;
     addBar(fused, f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
-           gyroscope ? f.gyroscope_deviation : f.accelerometer_deviation);
+           gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma);
   }
   if (!truth.x.empty()) panel.series.push_back(truth);
   panel.series.push_back(found);
@@ -213,7 +214,7 @@ Panel solutionsPanel(const ViWindow& w) {
               .x = {.label = "body's x, m"},
               .y = {.label = "body's y, m"},
               .equal_aspect = true};
-  const std::vector<BiasedImage> images = biasedImages(w.measured.motions, w.integrated);
+  const std::vector<BiasedImage> images = biasedImages(w.measured.motions(), w.measured.bias());
   double reach = 0.1;
   for (std::size_t k = 0; k < 2; ++k) {
     const ClosedFormSolution& s = closed.solutions[k];
@@ -249,7 +250,7 @@ void addSolutions(Report& report, const ViInitResult& result) {
   for (const ViWindow& w : result.windows) {
     if (w.closedForm().solutions.size() < 2) continue;
     windows.push_back(&w);
-    left += w.closedForm().status != ClosedFormStatus::ok;
+    left += w.closedForm().status != FusionStatus::ok;
   }
   report.section("Two solutions");
   if (windows.empty()) {
@@ -258,7 +259,7 @@ void addSolutions(Report& report, const ViInitResult& result) {
   }
   const auto rank = [](const ViWindow* w) {
     const auto& s = w->closedForm().solutions;
-    return std::pair(w->closedForm().status == ClosedFormStatus::ok, s[1].cost - s[0].cost);
+    return std::pair(w->closedForm().status == FusionStatus::ok, s[1].cost - s[0].cost);
   };
   std::stable_sort(windows.begin(), windows.end(),
                    [&](const ViWindow* a, const ViWindow* b) { return rank(a) < rank(b); });
@@ -278,11 +279,11 @@ void addSolutions(Report& report, const ViInitResult& result) {
 }  // namespace
 
 void writeViInitReport(const std::string& directory, const std::string& command_line, const ViRecording& recording,
-                       const ViInitOptions& options, const ViInitResult& result) {
+                       const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   Report report(directory, "Visual-inertial initialisation");
   report.code(command_line);
-  report.code(viInitTable(recording, options, result));
+  report.code(viInitTable(recording, result));
   report.section("Trajectory");
   report.plot({.name = "trajectory",
                .caption = with_truth

@@ -20,7 +20,7 @@
 
 namespace liestat::detail {
 
-/// An image as the system sees it.
+/// An image of one camera as the system sees it.
 struct ScaledImage {
   double tau = 0;
   Eigen::Vector3d s;
@@ -28,7 +28,7 @@ struct ScaledImage {
 };
 
 /// An observation: where to, from which image, 1/(standard deviation of the row), in 1/m, and 1/(the bearing's own
-/// relative deviation).
+/// relative sigma).
 struct Ray {
   Eigen::Vector3d u;
   std::size_t image = 0;
@@ -39,12 +39,18 @@ struct Ray {
 /// The observations of all features that are used, one after the other.
 struct RayTable {
   double window = 0;
-  std::vector<ScaledImage> images;
+  std::vector<ScaledImage> images;  ///< all of the first camera, then all of the next
+  std::size_t cameras = 1;
   std::vector<Ray> rays;
   std::vector<std::size_t> begin{0};  ///< of the rays of each feature, and their end
   std::vector<std::size_t> feature;   ///< its number in the window
 
   std::size_t features() const { return feature.size(); }
+  /// Times at which images were taken, and the one of a ray.
+  std::size_t times() const { return images.size() / cameras; }
+  std::size_t timeOf(const Ray& ray) const { return ray.image % times(); }
+  /// The images of the first camera.
+  std::span<const ScaledImage> firstCamera() const { return {images.data(), times()}; }
   std::span<const Ray> of(std::size_t i) const { return {rays.data() + begin[i], begin[i + 1] - begin[i]}; }
 };
 
@@ -131,7 +137,7 @@ inline Eigen::Matrix3d featureCovariance(const Eigen::Matrix3d& H, int& rank) {
 ///
 /// Bearings with a noise of σ in each of two directions make E[I - u uᵀ] larger than the true one by 2 σ² u uᵀ: a
 /// feature at depth z seems to leave a residual of √2 σ z, and least squares shrink the scene to make it smaller. With
-/// `noise` = σ (of a bearing of relative deviation one) that is taken off, which makes the minimum consistent: the
+/// `noise` = σ (of a bearing of relative sigma one) that is taken off, which makes the minimum consistent: the
 /// matrix may then be indefinite.
 inline EliminatedFeature eliminateFeature(std::span<const Ray> rays, std::span<const ScaledImage> images, bool bias,
                                           double noise = 0) {

@@ -12,44 +12,52 @@
 
 namespace liestat::detail {
 
-/// The first fault of a window, with its index. Comparisons are written so that NaN is a fault.
-inline ClosedFormFault faultOf(const ClosedFormWindow& window, const ClosedFormOptions& options, std::size_t& index) {
-  using Fault = ClosedFormFault;
-  index = 0;
+/// The first fault of a window. Comparisons are written so that NaN is a fault.
+inline Fault faultOf(const ClosedFormWindow& window, const InitialisationOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   if ((options.gravity && !positive(*options.gravity)) || !(options.bearing_noise >= 0) ||
-      !std::isfinite(options.bearing_noise) || (options.estimate_bias && !(options.bias_deviation > 0)) ||
-      !window.camera.allFinite()) {
-    return Fault::bad_option;
+      !std::isfinite(options.bearing_noise) ||
+      (options.closed_form.estimate_bias && !(options.prior.accelerometer_sigma > 0))) {
+    return FaultKind::bad_option;
   }
-  if (window.images.size() < 2) return Fault::too_few_images;
-  for (; index < window.images.size(); ++index) {
-    const WindowImage& image = window.images[index];
+  for (const SE3d& camera : window.cameras) {
+    if (!camera.matrix().allFinite()) return FaultKind::bad_option;
+  }
+  if (window.images.size() < 2) return FaultKind::too_few_images;
+  for (std::size_t j = 0; j < window.images.size(); ++j) {
+    const WindowImage& image = window.images[j];
     if (!std::isfinite(image.time) || !image.rotation.allFinite() || !image.displacement.allFinite() ||
         !image.displacement_by_bias.allFinite()) {
-      return Fault::image_not_finite;
+      return {FaultKind::image_not_finite, j};
     }
-    if (index == 0 ? image.time != 0 : !(image.time > window.images[index - 1].time)) return Fault::image_order;
+    if (j == 0 ? image.time != 0 : !(image.time > window.images[j - 1].time)) return {FaultKind::image_order, j};
     const Eigen::Matrix3d error = image.rotation.transpose() * image.rotation - Eigen::Matrix3d::Identity();
     if (!(error.norm() < 1e-6) ||
         !(image.rotation.col(0).cross(image.rotation.col(1)).dot(image.rotation.col(2)) > 0)) {
-      return Fault::not_a_rotation;
+      return {FaultKind::not_a_rotation, j};
     }
   }
-  for (index = 0; index < window.features.size(); ++index) {
-    for (const TrackedBearing& seen : window.features[index]) {
-      if (seen.image >= window.images.size()) return Fault::wrong_index;
+  for (std::size_t i = 0; i < window.features.size(); ++i) {
+    for (const TrackedBearing& seen : window.features[i]) {
+      if (seen.image >= window.images.size() || seen.camera >= window.cameras.size()) {
+        return {FaultKind::wrong_index, i};
+      }
       const double norm = seen.bearing.norm();
-      if (!(norm > 0) || !std::isfinite(norm) || !positive(seen.deviation)) return Fault::bad_bearing;
+      if (!(norm > 0) || !std::isfinite(norm) || !positive(seen.relative_sigma)) return {FaultKind::bad_bearing, i};
+      if (seen.time && !(std::abs(*seen.time - window.images[seen.image].time) <= 1e-6)) {
+        return {FaultKind::bearing_time, i};
+      }
     }
   }
-  index = 0;
-  return Fault::none;
+  return {};
 }
 
 /// The observations of features that two images have seen, turned into t0, with the counts of the result.
 inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& result) {
   RayTable table;
+  table.cameras = std::max<std::size_t>(1, window.cameras.size());
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const SE3d& camera : window.cameras) rotations.push_back(camera.so3().matrix());
   result.features.assign(window.features.size(), {});
   std::vector<bool> seen(window.images.size(), false);
   std::size_t observations = 0;
@@ -66,9 +74,9 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double weights = 0;
     for (const TrackedBearing& b : track) {
-      const Eigen::Vector3d u = window.images[b.image].rotation * b.bearing.normalized();
-      const double precision = 1 / b.deviation;
-      table.rays.push_back({u, b.image, 1, precision});
+      const Eigen::Vector3d u = window.images[b.image].rotation * (rotations[b.camera] * b.bearing.normalized());
+      const double precision = 1 / b.relative_sigma;
+      table.rays.push_back({u, b.camera * window.images.size() + b.image, 1, precision});
       seen[b.image] = true;
       sum += (precision * precision) * u;
       weights += precision * precision;
@@ -81,7 +89,7 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
       square += ray.precision * ray.precision * (ray.u - mean).squaredNorm();
     }
     feature.parallax = std::sqrt(square / weights);
-    feature.deviation = std::sqrt(static_cast<double>(track.size()) / weights);
+    feature.relative_sigma = std::sqrt(static_cast<double>(track.size()) / weights);
     table.begin.push_back(table.rays.size());
     table.feature.push_back(i);
   }
@@ -93,27 +101,31 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
   result.window = table.window;
   result.features_used = table.features();
   result.observations_used = table.rays.size();
-  for (const WindowImage& image : window.images) {
-    const double scale = 2 / (table.window * table.window);
-    table.images.push_back({image.time / table.window, image.displacement + image.rotation * window.camera,
-                            scale * image.displacement_by_bias});
+  const double scale = 2 / (table.window * table.window);
+  for (const SE3d& camera : window.cameras) {
+    const Eigen::Vector3d lever = camera.translation();
+    for (const WindowImage& image : window.images) {
+      table.images.push_back(
+          {image.time / table.window, image.displacement + image.rotation * lever, scale * image.displacement_by_bias});
+    }
   }
   return table;
 }
 
-/// Whether a feature's parallax is at least so much (rad, for bearings of a deviation of one).
-inline bool hasParallax(const ClosedFormFeature& feature, double least) {
-  return feature.parallax >= least * feature.deviation;
+/// Whether a feature's parallax is at least so much (rad, for bearings of a relative sigma of one).
+inline bool hasParallax(const ClosedFormFeature& feature, double min_parallax) {
+  return feature.parallax >= min_parallax * feature.relative_sigma;
 }
 
-/// The features of a table whose parallax is at least so much (rad, for bearings of a deviation of one).
-inline RayTable withParallax(const RayTable& table, const ClosedFormResult& result, double least) {
+/// The features of a table whose parallax is at least so much (rad, for bearings of a relative sigma of one).
+inline RayTable withParallax(const RayTable& table, const ClosedFormResult& result, double min_parallax) {
   RayTable kept;
   kept.window = table.window;
   kept.images = table.images;
+  kept.cameras = table.cameras;
   kept.rays.reserve(table.rays.size());
   for (std::size_t i = 0; i < table.features(); ++i) {
-    if (!hasParallax(result.features[table.feature[i]], least)) continue;
+    if (!hasParallax(result.features[table.feature[i]], min_parallax)) continue;
     const std::span<const Ray> rays = table.of(i);
     kept.rays.insert(kept.rays.end(), rays.begin(), rays.end());
     kept.begin.push_back(kept.rays.size());

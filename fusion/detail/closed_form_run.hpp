@@ -21,12 +21,12 @@ namespace liestat::detail {
 /// One solve: a class only to hold what its steps share.
 class ClosedFormRun {
  public:
-  ClosedFormRun(RayTable& table, const ClosedFormOptions& options, ClosedFormResult& result)
+  ClosedFormRun(RayTable& table, const InitialisationOptions& options, ClosedFormResult& result)
       : table_(table), options_(options), result_(result), solver_(table, options) {}
 
   void run() {
     const bool exact = !(options_.bearing_noise > 0);
-    if (exact || options_.singular_values) {
+    if (exact || options_.closed_form.singular_values) {
       const RankDiagnosis ranks = solver_.diagnose();
       result_.null_dimension = ranks.motion_null + ranks.feature_null;
       result_.largest_singular_value = ranks.largest;
@@ -41,7 +41,7 @@ class ClosedFormRun {
   using Candidate = MotionCandidate;
   /// Measured (docs/closed_form.md): at constant velocity or acceleration 0.91 and more in 1800 windows.
   static constexpr double lost_share = 0.8;
-  using Status = ClosedFormStatus;
+  using Status = FusionStatus;
 
   void solveExactly(const RankDiagnosis& ranks) {
     Status& status = result_.status;
@@ -86,7 +86,7 @@ class ClosedFormRun {
 
   void solveNoisy() {
     // What has no parallax says nothing on the motion but that it is small, which is wrong.
-    RayTable near = withParallax(table_, result_, options_.least_parallax * solver_.sigma());
+    RayTable near = withParallax(table_, result_, options_.closed_form.min_parallax * solver_.sigma());
     if (near.features() == 0) {
       result_.status = solveAtRest() ? Status::stationary : Status::no_parallax;
       return;
@@ -109,7 +109,7 @@ class ClosedFormRun {
     candidates_ = minima(share.root);
     // Each minimiser with the weights of its own depths; one with most features behind the camera is beyond help.
     for (Candidate& c : candidates_) {
-      for (int pass = 1; pass < options_.weight_passes && isInFront(c); ++pass) {
+      for (int pass = 1; pass < options_.closed_form.weight_passes && isInFront(c); ++pass) {
         solver_.setWeights(c);
         const std::vector<Candidate> next = minima(solver_.withoutNoise().root);
         if (next.empty()) break;
@@ -127,7 +127,7 @@ class ClosedFormRun {
     for (std::size_t i = 0; i < table_.features(); ++i) {
       lost_features_.push_back(solver_.feature(i, share.directions[0]));
     }
-    deviations();
+    predict();
     classify(share);
     withhold(least_squares, share);
   }
@@ -149,8 +149,8 @@ class ClosedFormRun {
   void countUsed() {
     for (ClosedFormFeature& feature : result_.features) feature.used = false;
     for (const std::size_t i : table_.feature) result_.features[i].used = true;
-    std::vector<bool> seen(table_.images.size(), false);
-    for (const Ray& ray : table_.rays) seen[ray.image] = true;
+    std::vector<bool> seen(table_.times(), false);
+    for (const Ray& ray : table_.rays) seen[table_.timeOf(ray)] = true;
     result_.images_used = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true));
     result_.features_used = table_.features();
     result_.observations_used = table_.rays.size();
@@ -227,8 +227,8 @@ class ClosedFormRun {
     for (Eigen::Vector3d& p : c.P) p *= factor;
   }
 
-  /// Predicted deviations and covariances at the first minimiser.
-  void deviations() {
+  /// Predicted standard deviations and covariances at the first minimiser.
+  void predict() {
     const Candidate& best = candidates_[0];
     Triangle root = Triangle::cholesky(solver_.eliminatePredicted(best).Q);
     if (solver_.hasPrior()) solver_.addPrior(root);
@@ -236,13 +236,13 @@ class ClosedFormRun {
     const bool determined = solver_.covariance(root, best.y, scaled);
     const int m = solver_.motionSize();
     if (determined) {
-      // The larger of the two deviations across G.
+      // The larger of the two sigmas across G.
       const Eigen::Vector3d G = best.y.gravity();
       const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
       const Eigen::Matrix2d tilt = across * scaled.matrix3(m - 3, m - 3) * across.transpose();
       const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)),
                    spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
-      result_.tilt_deviation = std::sqrt(half + spread) / G.norm();
+      result_.tilt_sigma = std::sqrt(half + spread) / G.norm();
 
       // From (V', [b'], G') to (V, G, [b]).
       result_.covariance.resize(m, m);
@@ -266,11 +266,11 @@ class ClosedFormRun {
           variance += u.dot(e.by_motion.vector3(0, a)) * scaled(a, b) * u.dot(e.by_motion.vector3(0, b));
         }
       }
-      feature.depth_deviation = std::sqrt(variance);
+      feature.depth_sigma = std::sqrt(variance);
       feature.depth_determined = true;
-      relative.push_back(feature.depth_deviation / std::abs(u.dot(best.P[i])));
+      relative.push_back(feature.depth_sigma / std::abs(u.dot(best.P[i])));
     }
-    if (!relative.empty()) result_.scale_deviation = median(relative);
+    if (!relative.empty()) result_.scale_sigma = median(relative);
   }
 
   /// The case with noise. A direction of the motion is lost where noise is nearly all that is known of it.
@@ -280,15 +280,15 @@ class ClosedFormRun {
     const Motion& weak = share.directions[0];
     const bool lost = share.shares[0] > lost_share;
     // Plain least squares never quite fit, and that says nothing on the case.
-    const bool misfit = options_.remove_noise_bias && !isConsistent();
+    const bool misfit = options_.closed_form.remove_noise_bias && !isConsistent();
     // What gravity gains a bias may make up for.
     const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > 0.1 * weak.velocity().norm();
     const Eigen::Vector3d G = candidates_[0].y.gravity(), along = weak.gravity().normalized();
     // Where the lost direction leaves the sphere of gravity again: the other solution.
     const Eigen::Vector3d other = G - 2 * G.dot(along) * along;
     const double chord = std::atan2(G.cross(other).norm(), G.dot(other));
-    // Without a lost direction two minima within a deviation are one, not quite converged.
-    if (candidates_.size() == 2 && !lost && gravityAngle(candidates_[0], candidates_[1]) < result_.tilt_deviation) {
+    // Without a lost direction two minima within a sigma are one, not quite converged.
+    if (candidates_.size() == 2 && !lost && gravityAngle(candidates_[0], candidates_[1]) < result_.tilt_sigma) {
       candidates_.pop_back();
     }
     const bool rival = hasRival() && isInFront(candidates_[1]);
@@ -300,18 +300,18 @@ class ClosedFormRun {
       return Status::gravity_undetermined;
     }
     if (rival && solver_.bias() && isMirror()) return Status::mirror_gravity;
-    if (lost && !(chord > 5 * result_.tilt_deviation)) return Status::double_root;
+    if (lost && !(chord > 5 * result_.tilt_sigma)) return Status::double_root;
     if (rival) return Status::ambiguous;
-    if (!(result_.tilt_deviation <= options_.largest_tilt_deviation)) return Status::gravity_undetermined;
-    if (!(result_.scale_deviation <= options_.largest_scale_deviation)) return Status::scale_unobservable;
+    if (!(result_.tilt_sigma <= options_.closed_form.max_tilt_sigma)) return Status::gravity_undetermined;
+    if (!(result_.scale_sigma <= options_.closed_form.max_scale_sigma)) return Status::scale_unobservable;
     return biasRestsOnPrior() ? Status::bias_unobservable : Status::ok;
   }
 
   /// Keeps of the solutions what the status promises.
   void withhold(const Candidate& least_squares, const NoiseShare& share) {
     const Status status = result_.status;
-    const bool vague = !(result_.tilt_deviation <= options_.largest_tilt_deviation) ||
-                       !(result_.scale_deviation <= options_.largest_scale_deviation);
+    const bool vague = !(result_.tilt_sigma <= options_.closed_form.max_tilt_sigma) ||
+                       !(result_.scale_sigma <= options_.closed_form.max_scale_sigma);
     if (status == Status::gravity_undetermined || (status == Status::coplanar && vague)) candidates_.clear();
     if (status == Status::scale_unobservable) {
       candidates_.resize(1);
@@ -331,7 +331,7 @@ class ClosedFormRun {
       result_.covariance_content = CovarianceContent::none;
       for (ClosedFormFeature& feature : result_.features) {
         feature.depth_determined = false;
-        feature.depth_deviation = std::numeric_limits<double>::infinity();
+        feature.depth_sigma = std::numeric_limits<double>::infinity();
       }
     }
   }
@@ -343,7 +343,7 @@ class ClosedFormRun {
         3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
     return rows > unknowns ? rows - unknowns : 0;
   }
-  /// Whether the first minimiser's cost is one of noise: five deviations of χ², and the same for none.
+  /// Whether the first minimiser's cost is one of noise: five sigmas of χ², and the same for none.
   bool isConsistent() const {
     const double dof = static_cast<double>(degreesOfFreedom());
     return candidates_[0].cost <= dof + 5 * std::sqrt(2 * dof) + 12;
@@ -358,7 +358,7 @@ class ClosedFormRun {
   bool biasRestsOnPrior() const {
     if (!solver_.hasPrior() || result_.covariance.rows() != 9) return false;
     const SmallSvd svd(SmallMatrix::of<3, 3>(Eigen::Matrix3d(result_.covariance.block<3, 3>(6, 6))));
-    return std::sqrt(svd.value(1)) > 0.98 * options_.bias_deviation;
+    return std::sqrt(svd.value(1)) > 0.98 * options_.prior.accelerometer_sigma;
   }
 
   void report() {
@@ -385,12 +385,12 @@ class ClosedFormRun {
         square += ray.precision * ray.precision * ray.u.cross(d).squaredNorm() / d.squaredNorm();
       }
       ClosedFormFeature& feature = result_.features[table_.feature[i]];
-      feature.residual = feature.deviation * std::sqrt(square / static_cast<double>(table_.of(i).size()));
+      feature.residual = feature.relative_sigma * std::sqrt(square / static_cast<double>(table_.of(i).size()));
     }
   }
 
   RayTable& table_;
-  const ClosedFormOptions& options_;
+  const InitialisationOptions& options_;
   ClosedFormResult& result_;
   ClosedFormSolver solver_;
   std::vector<Candidate> candidates_;

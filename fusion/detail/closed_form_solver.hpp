@@ -56,7 +56,7 @@ struct NoiseShare {
 
 class ClosedFormSolver {
  public:
-  ClosedFormSolver(RayTable& table, const ClosedFormOptions& options)
+  ClosedFormSolver(RayTable& table, const InitialisationOptions& options)
       : table_(table), options_(options), sigma_(options.bearing_noise > 0 ? options.bearing_noise : exact_noise) {}
 
   double sigma() const { return sigma_; }
@@ -64,9 +64,9 @@ class ClosedFormSolver {
   /// V' = V T and so on: what a scaled unknown is worth.
   double gravityScale() const { return 2 / (table_.window * table_.window); }
   double rankTolerance() const { return bias() ? 1e-12 : 1e-10; }
-  bool bias() const { return options_.estimate_bias; }
+  bool bias() const { return options_.closed_form.estimate_bias; }
   /// A prior that says something.
-  bool hasPrior() const { return bias() && std::isfinite(options_.bias_deviation); }
+  bool hasPrior() const { return bias() && std::isfinite(options_.prior.accelerometer_sigma); }
   /// Unknowns of the motion.
   int motionSize() const { return bias() ? 9 : 6; }
 
@@ -143,7 +143,7 @@ class ClosedFormSolver {
     std::vector<EliminatedFeature> of_clean = std::move(features_);
     const MotionBlock noisy = eliminate(0);
     // Features go with the problem that is solved.
-    if (options_.remove_noise_bias) features_ = std::move(of_clean);
+    if (options_.closed_form.remove_noise_bias) features_ = std::move(of_clean);
     const int m = motionSize(), n = m + 1;
     Triangle root = Triangle::cholesky(noisy.Q);
     if (hasPrior()) addPrior(root);
@@ -158,7 +158,7 @@ class ClosedFormSolver {
     NoiseShare result{Triangle(n), {}, {}};
     SmallMatrix rows(n, n);
     for (int k = 0; k < n; ++k) {
-      const double left = options_.remove_noise_bias ? std::sqrt(std::max(0., 1 - share.value(k))) : 1;
+      const double left = options_.closed_form.remove_noise_bias ? std::sqrt(std::max(0., 1 - share.value(k))) : 1;
       for (int j = 0; j < n; ++j) {
         for (int i = 0; i <= j; ++i) rows(k, j) += left * share.v(k, i) * root.r(i, j);
       }
@@ -184,7 +184,7 @@ class ClosedFormSolver {
   /// The prior of the bias as rows of the motion's problem.
   void addPrior(Triangle& root) const {
     SmallMatrix rows(3, root.size());
-    for (int k = 0; k < 3; ++k) rows(k, 3 + k) = gravityScale() / options_.bias_deviation;
+    for (int k = 0; k < 3; ++k) rows(k, 3 + k) = gravityScale() / options_.prior.accelerometer_sigma;
     root.add(rows);
   }
 
@@ -229,7 +229,8 @@ class ClosedFormSolver {
       }
       candidate.negative += behind;
     }
-    if (hasPrior()) candidate.cost += (gravityScale() / options_.bias_deviation * candidate.y.bias()).squaredNorm();
+    if (hasPrior())
+      candidate.cost += (gravityScale() / options_.prior.accelerometer_sigma * candidate.y.bias()).squaredNorm();
   }
 
   /// Covariance of the scaled motion (V', [b'], G') at a root, with gravity's length fixed where it is known; false
@@ -328,7 +329,7 @@ class ClosedFormSolver {
   static Eigen::Vector3d apply3(const SmallMatrix& column) { return column.vector3(0, 0); }
 
   RayTable& table_;
-  const ClosedFormOptions& options_;
+  const InitialisationOptions& options_;
   double sigma_;
   std::vector<EliminatedFeature> features_;
 };

@@ -24,7 +24,7 @@ inline int genericNullDimension(std::size_t images, std::size_t features, bool b
 }
 
 /// The largest sine of the angle between a direction and the plane that holds them best, over the direction's relative
-/// deviation; 0 for fewer than three.
+/// sigma; 0 for fewer than three.
 inline double outOfPlane(const std::vector<Ray>& rays) {
   // The normal of the two that differ most from the first and from one another: nothing is squared.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -72,16 +72,16 @@ inline NullShape nullShape(const RankDiagnosis& d) {
 inline double relativeMotion(const RayTable& table, const Motion& y) {
   double most = 0;
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), first = relativePosition(table.images.front(), zero, y);
-  for (const ScaledImage& image : table.images) {
+  for (const ScaledImage& image : table.firstCamera()) {
     most = std::max(most, (relativePosition(image, zero, y) - first).norm());
   }
   return most / y.gravity().norm();
 }
 
 /// The case of exact data before anything is solved; `ok` where what follows depends on the solutions.
-inline ClosedFormStatus statusOfRanks(const RankDiagnosis& d, const RayTable& table, std::size_t images,
-                                      bool gravity_known) {
-  using Status = ClosedFormStatus;
+inline FusionStatus statusOfRanks(const RankDiagnosis& d, const RayTable& table, std::size_t images,
+                                  bool gravity_known) {
+  using Status = FusionStatus;
   const std::size_t features = table.features();
   const bool bias = d.vectors.front().hasBias();
   const int generic = genericNullDimension(images, features, bias);
@@ -109,7 +109,7 @@ inline std::optional<Eigen::Vector3d> gravityAtRest(const RayTable& table, const
                                                     double scale) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double squares = 0;
-  for (const ScaledImage& image : table.images) {
+  for (const ScaledImage& image : table.firstCamera()) {
     const double t = image.tau * image.tau;
     sum -= t * (image.s - table.images[0].s);
     squares += t * t;
@@ -117,7 +117,7 @@ inline std::optional<Eigen::Vector3d> gravityAtRest(const RayTable& table, const
   const Eigen::Vector3d G = sum / squares;
   const double length = G.norm(), expected = gravity ? *gravity / scale : length;
   if (!(std::abs(length - expected) <= 0.02 * expected)) return std::nullopt;
-  for (const ScaledImage& image : table.images) {
+  for (const ScaledImage& image : table.firstCamera()) {
     const Eigen::Vector3d moved = image.s - table.images[0].s + image.tau * image.tau * G;
     if (!(moved.norm() <= 0.01 * expected)) return std::nullopt;
   }

@@ -34,7 +34,7 @@ inline bool invertPositive(const Eigen::Matrix3d& H, Eigen::Matrix3d& inverse) {
 class EpipolarProblem {
  public:
   struct Sight {
-    std::size_t image;
+    std::size_t image;        ///< its time
     Eigen::Vector3d bearing;  ///< in the body
     Eigen::Vector3d u;        ///< in t0
     double variance;          ///< rad²
@@ -43,7 +43,7 @@ class EpipolarProblem {
     std::size_t track, first, second;  ///< sights
   };
   struct Pair {
-    std::size_t first, second;  ///< images
+    std::size_t first, second;  ///< images of one camera
     std::size_t begin, end;     ///< matches
     Eigen::Vector3d t;          ///< direction of the translation
     bool used;
@@ -57,14 +57,15 @@ class EpipolarProblem {
 
   EpipolarProblem(const InertialWindow& window, double bearing_noise)
       : weight(window.features.size(), 1.), square(weight.size(), 0.), count(weight.size(), 0), window_(&window) {
-    slot_.assign(images() * weight.size(), 0);
+    slot_.assign(cameras() * images() * weight.size(), 0);
     for (std::size_t i = 0; i < weight.size(); ++i) {
       for (const TrackedBearing& seen : window.features[i]) {
-        std::size_t& own = slot_[i * images() + seen.image];
+        std::size_t& own = slot_[(i * cameras() + seen.camera) * images() + seen.image];
         // Twice in an image: the first.
         if (own != 0) continue;
-        const double sigma = bearing_noise * seen.deviation;
-        sights_.push_back({seen.image, seen.bearing.normalized(), seen.bearing, sigma * sigma});
+        const double sigma = bearing_noise * seen.relative_sigma;
+        const Eigen::Vector3d bearing = bearingInBody(window.cameras, seen);
+        sights_.push_back({seen.image, bearing, bearing, sigma * sigma});
         own = sights_.size();
       }
     }
@@ -76,14 +77,16 @@ class EpipolarProblem {
     pairs_.clear();
     matches_.clear();
     for (std::size_t step = shortest; step <= longest; step *= 2) {
-      for (std::size_t j = 0; j + step < images(); ++j) {
-        Pair pair{j, j + step, matches_.size(), 0, Eigen::Vector3d::UnitX(), true};
-        for (std::size_t i = 0; i < weight.size(); ++i) {
-          const std::size_t a = slot(i, j), b = slot(i, j + step);
-          if (a != 0 && b != 0) matches_.push_back({i, a - 1, b - 1});
+      for (std::size_t c = 0; c < cameras(); ++c) {
+        for (std::size_t j = 0; j + step < images(); ++j) {
+          Pair pair{j, j + step, matches_.size(), 0, Eigen::Vector3d::UnitX(), true};
+          for (std::size_t i = 0; i < weight.size(); ++i) {
+            const std::size_t a = slot(i, c, j), b = slot(i, c, j + step);
+            if (a != 0 && b != 0) matches_.push_back({i, a - 1, b - 1});
+          }
+          pair.end = matches_.size();
+          if (pair.end > pair.begin) pairs_.push_back(pair);
         }
-        pair.end = matches_.size();
-        if (pair.end > pair.begin) pairs_.push_back(pair);
       }
     }
   }
@@ -93,7 +96,9 @@ class EpipolarProblem {
     for (std::size_t step = 1; step < images(); step *= 2) {
       std::size_t matches = 0;
       for (std::size_t i = 0; i < weight.size(); ++i) {
-        for (std::size_t j = 0; j + step < images(); ++j) matches += slot(i, j) != 0 && slot(i, j + step) != 0;
+        for (std::size_t c = 0; c < cameras(); ++c) {
+          for (std::size_t j = 0; j + step < images(); ++j) matches += slot(i, c, j) != 0 && slot(i, c, j + step) != 0;
+        }
       }
       if (matches * step > most) {
         most = matches * step;
@@ -126,7 +131,9 @@ class EpipolarProblem {
   /// Degrees of freedom of a track's residuals: pairs share its bearings, which are independent.
   double freedom(std::size_t i) const {
     double seen = 0;
-    for (std::size_t j = 0; j < images(); ++j) seen += slot(i, j) != 0;
+    for (std::size_t c = 0; c < cameras(); ++c) {
+      for (std::size_t j = 0; j < images(); ++j) seen += slot(i, c, j) != 0;
+    }
     return std::max(1., seen - 1);
   }
   /// Another recording of the same window, integrated anew.
@@ -134,7 +141,7 @@ class EpipolarProblem {
 
   void setBias(const ImuBias<double>& bias) {
     bias_ = bias;
-    images_ = biasedImages(window_->motions, bias);
+    images_ = biasedImages(window_->motions(), bias);
     for (Sight& s : sights_) s.u = images_[s.image].image.rotation * s.bearing;
   }
   const ImuBias<double>& bias() const { return bias_; }
@@ -160,10 +167,10 @@ class EpipolarProblem {
       }
     }
   }
-  /// Leaves out pairs whose directions move, beyond what any rotation explains, by less than `least` deviations (RMS of
+  /// Leaves out pairs whose directions move, beyond what any rotation explains, by less than `min` sigmas (RMS of
   /// tracks, by their weights), or that have too few of them to say anything beside their translation. What a rotation
   /// may explain does not count, so that a wrong bias neither brings parallax nor takes it away.
-  void selectByParallax(double least) {
+  void selectByParallax(double min) {
     for (Pair& pair : pairs_) {
       Eigen::Matrix3d H = Eigen::Matrix3d::Zero(), inverse;
       Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -178,8 +185,8 @@ class EpipolarProblem {
         most = std::max(most, w);
       }
       pair.used = weights > 2.5 * most;
-      if (least > 0 && pair.used) {
-        pair.used = invertPositive(H, inverse) && sum - g.dot(inverse * g) > 2 * least * least * weights;
+      if (min > 0 && pair.used) {
+        pair.used = invertPositive(H, inverse) && sum - g.dot(inverse * g) > 2 * min * min * weights;
       }
     }
   }
@@ -276,10 +283,10 @@ class EpipolarProblem {
       const Eigen::Vector3d along = of_sight[i] * s.u;
       sum += s.variance * (of_sight[i] * of_sight[i].transpose() - along * along.transpose());
     }
-    for (std::size_t k = 0; k < window_->motions.size(); ++k) {
+    for (std::size_t k = 0; k < window_->motions().size(); ++k) {
       // In the axes of the motion's end.
       const Matrix3 D = of_motion[k] * images_[k + 1].image.rotation;
-      sum += D * window_->motions[k].gaussian().covariance.template block<3, 3>(3, 3) * D.transpose();
+      sum += D * window_->motions()[k].gaussian().covariance.template block<3, 3>(3, 3) * D.transpose();
     }
     return sum;
   }
@@ -293,8 +300,11 @@ class EpipolarProblem {
   }
 
  private:
-  std::size_t images() const { return window_->motions.size() + 1; }
-  std::size_t slot(std::size_t track, std::size_t image) const { return slot_[track * images() + image]; }
+  std::size_t images() const { return window_->motions().size() + 1; }
+  std::size_t cameras() const { return window_->cameras.size(); }
+  std::size_t slot(std::size_t track, std::size_t camera, std::size_t image) const {
+    return slot_[(track * cameras() + camera) * images() + image];
+  }
 
   /// What is left of a pair when its translation is taken out: t = t - acrossᵀ (offset + gainᵀ δb).
   struct Part {
@@ -312,7 +322,7 @@ class EpipolarProblem {
   Eigen::Matrix3d turn(const Pair& pair) const {
     return images_[pair.second].rotation_by_gyroscope - images_[pair.first].rotation_by_gyroscope;
   }
-  /// s². Straight ahead, within some deviations of the translation, a normal has no direction: it counts for less.
+  /// s². Straight ahead, within some sigmas of the translation, a normal has no direction: it counts for less.
   static double varianceAlong(const Sight& a, const Sight& b, const Eigen::Vector3d& t) {
     const double x = a.u.dot(t), y = b.u.dot(t);
     return a.variance * (1 - y * y) + b.variance * (1 - x * x) + 100 * a.variance * b.variance;
@@ -389,7 +399,7 @@ class EpipolarProblem {
   ImuBias<double> bias_;
   std::vector<BiasedImage> images_;
   std::vector<Sight> sights_;
-  std::vector<std::size_t> slot_;  ///< of a track and image: its sight + 1, or 0
+  std::vector<std::size_t> slot_;  ///< of a track, camera and image: its sight + 1, or 0
   std::vector<Pair> pairs_;
   std::vector<Match> matches_;
   std::vector<Part> parts_;

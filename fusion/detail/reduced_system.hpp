@@ -1,11 +1,12 @@
-// Nonlinear least squares over a few shared unknowns and many features, each of which is eliminated by itself:
-// Levenberg's and Marquardt's method on the reduced normal equations.
+// Nonlinear least squares over a few shared unknowns and many features, each of which is eliminated by itself: the
+// reduced normal equations.
 //
 // Unknowns come in blocks of three. Sizes are run-time numbers and everything is plain loops, which a compiler reads in
 // no time; buffers are made once.
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/detail/levenberg_marquardt.hpp>
 
 #include <Eigen/Core>
 
@@ -18,7 +19,7 @@
 
 namespace liestat::detail {
 
-/// Up to nine residuals, in deviations, with their derivatives by up to nine blocks of three shared unknowns.
+/// Up to nine residuals, in sigmas, with their derivatives by up to nine blocks of three shared unknowns.
 struct ResidualRows {
   static constexpr int most = 9;
   int rows = 0, terms = 0;
@@ -242,51 +243,30 @@ class ReducedSystem {
   std::vector<Feature> features_;
 };
 
-/// How a minimisation ended.
-struct DampedSummary {
-  double cost = std::numeric_limits<double>::infinity();
-  int iterations = 0;
-  bool converged = false;
-};
-
-/// What Levenberg's and Marquardt's method needs of a problem: cost and derivatives where it stands, the cost after a
-/// step (infinite where that is not allowed), and to stay there.
+/// A problem over a reduced system for minimiseDamped(): `problem` has linearise(system), which fills it and returns
+/// the cost, costAfter(system), which takes its step, and accept().
 template <class Problem>
-DampedSummary minimiseDamped(Problem& problem, ReducedSystem& system, int most_iterations, double least_decrease) {
-  DampedSummary summary;
-  summary.cost = problem.linearise(system);
-  double damping = 1e-4;
-  while (summary.iterations < most_iterations && std::isfinite(summary.cost)) {
-    ++summary.iterations;
-    double next = std::numeric_limits<double>::infinity();
-    if (system.factor(damping)) {
-      system.solve();
-      next = problem.costAfter(system);
-    }
-    // Written so that NaN is no progress.
-    if (!(next < summary.cost)) {
-      // At the minimum rounding decides.
-      if (next <= summary.cost + 1e-9 * (1 + summary.cost)) {
-        summary.converged = true;
-        return summary;
-      }
-      damping *= 10;
-      if (damping > 1e10) return summary;
-      continue;
-    }
-    const double decrease = summary.cost - next;
-    problem.accept();
-    summary.cost = problem.linearise(system);
-    damping = std::max(1e-10, 0.1 * damping);
-    if (decrease < least_decrease && damping < 1) {
-      summary.converged = true;
-      return summary;
-    }
+struct OnReducedSystem {
+  Problem& problem;
+  ReducedSystem& system;
+
+  double linearise() { return problem.linearise(system); }
+  bool solve(double damping) {
+    if (!system.factor(damping)) return false;
+    system.solve();
+    return true;
   }
-  return summary;
+  double costAfterStep() { return problem.costAfter(system); }
+  void accept() { problem.accept(); }
+  void reject() {}
+};
+template <class Problem>
+DampedSummary minimiseDamped(Problem& problem, ReducedSystem& system, const DampedOptions& options) {
+  OnReducedSystem<Problem> both{problem, system};
+  return minimiseDamped(both, options);
 }
 
-/// A bearing's residual, across the measured direction in deviations σ, of a feature at d in the camera; with its 2×3
+/// A bearing's residual, across the measured direction in units of σ, of a feature at d in the camera; with its 2×3
 /// derivative by d. False where the feature is not in front.
 inline bool bearingResidual(const Eigen::Vector3d& d, const Eigen::Matrix<double, 2, 3>& across,
                             const Eigen::Vector3d& bearing, double sigma, ResidualRows& rows,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fusion/imu/preintegration.hpp>
+#include <fusion/status.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -24,28 +25,17 @@ template <class S>
 struct RecordingOptions {
   PreintegrationOptions<S> preintegration = {};
   ImuScheme scheme = ImuScheme::averaged;
-  S largest_gap = S(0.1);  ///< s; readings further apart than this make the result not usable
-};
-
-/// Why an increment over a recording is not to be used.
-enum class RecordingFault {
-  none,
-  bad_interval,   ///< the end is not after the start
-  not_covered,    ///< the readings do not reach from start to end
-  not_ascending,  ///< a time is not later than the one before
-  not_finite,     ///< a time, rate or force is NaN or infinite
-  gap             ///< two readings are further apart than options.largest_gap
+  S max_gap = S(0.1);  ///< s; readings further apart than this make the result not usable
 };
 
 /// What preintegrate() returns. Only a result without fault is to be used.
 template <class S>
 struct RecordingResult {
   Preintegration<S> motion;
-  RecordingFault fault = RecordingFault::none;
-  std::size_t sample = 0;  ///< the reading at which the fault is
-  S largest_gap = S(0);    ///< s, between readings that were used, up to the fault
+  Fault fault;       ///< the first of the readings that were used, with the reading's index
+  S max_gap = S(0);  ///< s, between readings that were used, up to the fault
 
-  bool ok() const { return fault == RecordingFault::none; }
+  bool ok() const { return !fault; }
 };
 
 namespace detail {
@@ -107,22 +97,21 @@ template <class S>
 RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& begin, const S& end,
                                 const RecordingOptions<S>& options = {}) {
   using Vector3 = Eigen::Matrix<S, 3, 1>;
-  RecordingResult<S> result{Preintegration<S>(options.preintegration)};
-  const auto fault = [&result](RecordingFault what, std::size_t at) {
-    result.fault = what;
-    result.sample = at;
+  RecordingResult<S> result{Preintegration<S>(options.preintegration), {}, S(0)};
+  const auto fault = [&result](FaultKind what, std::size_t at) {
+    result.fault = {what, at};
     return result;
   };
   // Written so that NaN is a fault too.
-  if (!(end > begin) || !std::isfinite(end - begin)) return fault(RecordingFault::bad_interval, 0);
-  if (samples.size() < 2 || samples.front().time > begin) return fault(RecordingFault::not_covered, 0);
-  if (samples.back().time < end) return fault(RecordingFault::not_covered, samples.size() - 1);
+  if (!(end > begin) || !std::isfinite(end - begin)) return fault(FaultKind::bad_interval, 0);
+  if (samples.size() < 2 || samples.front().time > begin) return fault(FaultKind::not_covered, 0);
+  if (samples.back().time < end) return fault(FaultKind::not_covered, samples.size() - 1);
 
   // The last reading at or before the beginning: bisection ends between one that is and one that is not, in any order.
   const auto after = std::partition_point(samples.begin(), samples.end(),
                                           [&](const ImuSample<S>& sample) { return sample.time <= begin; });
   // Only a time that is not a number is neither after the beginning nor at or before it.
-  if (after == samples.begin()) return fault(RecordingFault::not_finite, 0);
+  if (after == samples.begin()) return fault(FaultKind::not_finite, 0);
   std::size_t k = static_cast<std::size_t>(after - samples.begin()) - 1;
   const bool held = options.scheme == ImuScheme::held;
   const std::size_t points = options.scheme == ImuScheme::cubic ? 4 : 2;
@@ -133,13 +122,13 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
     for (; checked < at.end(); ++checked) {
       const ImuSample<S>& s = samples[checked];
       if (!std::isfinite(s.time) || !s.angular_rate.allFinite() || !s.specific_force.allFinite()) {
-        return fault(RecordingFault::not_finite, checked);
+        return fault(FaultKind::not_finite, checked);
       }
       if (checked == foremost) continue;
       const S gap = s.time - samples[checked - 1].time;
-      if (!(gap > S(0))) return fault(RecordingFault::not_ascending, checked);
-      result.largest_gap = std::max(result.largest_gap, gap);
-      if (gap > options.largest_gap) return fault(RecordingFault::gap, checked);
+      if (!(gap > S(0))) return fault(FaultKind::not_ascending, checked);
+      result.max_gap = std::max(result.max_gap, gap);
+      if (gap > options.max_gap) return fault(FaultKind::gap, checked);
     }
     const S from = std::max(begin, samples[k].time), to = std::min(end, samples[k + 1].time), h = to - from;
     if (!(h > S(0))) continue;
@@ -164,7 +153,7 @@ RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& 
     }
   }
   // The last reading was beyond the end, and is not where times do not ascend.
-  if (samples[k].time < end) return fault(RecordingFault::not_covered, k);
+  if (samples[k].time < end) return fault(FaultKind::not_covered, k);
   return result;
 }
 

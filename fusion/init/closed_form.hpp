@@ -24,13 +24,13 @@
 namespace liestat {
 
 /// Velocity, gravity and features of a window. Input that can't be used gives bad_input with a fault, never a crash.
-inline ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const ClosedFormOptions& options = {}) {
+inline ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const InitialisationOptions& options = {}) {
   ClosedFormResult result;
-  result.fault = detail::faultOf(window, options, result.fault_index);
-  if (result.fault != ClosedFormFault::none) return result;
+  result.fault = detail::faultOf(window, options);
+  if (result.fault) return result;
   detail::RayTable table = detail::rayTable(window, result);
   if (table.features() == 0) {
-    result.fault = ClosedFormFault::no_feature;
+    result.fault = FaultKind::no_feature;
     return result;
   }
   detail::ClosedFormRun(table, options, result).run();

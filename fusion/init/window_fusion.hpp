@@ -2,7 +2,7 @@
 // estimate meets what the windows before it have said, carried to its first image by the inertial sensor, in a
 // Mahalanobis mean of stats/; χ² says whether the two agree.
 //
-//   liestat::WindowFusion fusion(9.81);
+//   liestat::WindowFusion fusion(9.81);  // |G|
 //   for (…) {  // disjoint windows, in the order of time, refined withSharedPrior(options, n)
 //     const auto meeting = fusion.add(liestat::windowStates(refined, window), integrate_gap);  // meeting.chi2 ~ χ²(11)
 //   }
@@ -135,14 +135,9 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
     states.last.covariance = states.first.covariance;
     return states;
   };
-  if (refined.status != RefinementStatus::ok) return none();
+  if (refined.status != FusionStatus::ok) return none();
   // The refinement's unknowns: V (3), the last state (9: position, rotation, velocity), G, both biases.
-  Eigen::Matrix<double, 21, 21> covariance;
-  const Eigen::Matrix<double, 9, 3> with_last = refined.last_velocity_covariance;
-  covariance << refined.covariance.topLeftCorner<3, 3>(), with_last.transpose(),
-      refined.covariance.topRightCorner<3, 9>(), with_last, refined.last_covariance.topLeftCorner<9, 9>(),
-      refined.last_covariance.topRightCorner<9, 9>(), refined.covariance.bottomLeftCorner<9, 3>(),
-      refined.last_covariance.bottomLeftCorner<9, 9>(), refined.last_covariance.bottomRightCorner<9, 9>();
+  const Eigen::Matrix<double, 21, 21>& covariance = refined.covariance.joint;
   const SE23d& last = refined.states.back();
   const Eigen::Matrix3d back = last.so3().inverse().matrix();
   const double length = refined.gravity.norm();
@@ -172,7 +167,7 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
   states.last.mean = state(G, V);
   const Eigen::Matrix<double, 11, 21> A = tangent(states.first.mean, at_first), B = tangent(states.last.mean, at_last);
   Eigen::Matrix<double, 11, 1> walked = Eigen::Matrix<double, 11, 1>::Zero();
-  for (const Preintegration<double>& motion : window.motions) {
+  for (const Preintegration<double>& motion : window.motions()) {
     const ImuNoise<double>& noise = motion.options().noise;
     walked.segment<3>(5).array() += noise.gyroscope_walk * noise.gyroscope_walk * motion.duration();
     walked.tail<3>().array() += noise.accelerometer_walk * noise.accelerometer_walk * motion.duration();
@@ -181,7 +176,7 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
   states.last.covariance = B * covariance * B.transpose();
   states.first.covariance.diagonal() += walked / 3;
   states.last.covariance.diagonal() += walked / 3;
-  // In deviations, because those differ by factors of thousands.
+  // In sigmas, because those differ by factors of thousands.
   const Eigen::Matrix<double, 11, 1> unit = states.first.covariance.diagonal().cwiseSqrt();
   detail::Matrix11 both = A * covariance * B.transpose();
   both.diagonal() -= walked / 6;
@@ -240,8 +235,13 @@ class WindowFusion {
     return meeting;
   }
 
-  /// Whether there is a state. Whether windows are compatible is chi2's to say.
-  bool ok() const { return windows_ > 0; }
+  /// Whether there is a state.
+  bool hasState() const { return windows_ > 0; }
+  /// Whether there is one and the windows do not contradict each other: five sigmas of χ².
+  bool ok() const {
+    const double dof = static_cast<double>(degrees_of_freedom_);
+    return hasState() && chi2_ <= dof + 5 * std::sqrt(2 * dof) + 12;
+  }
   /// At the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }

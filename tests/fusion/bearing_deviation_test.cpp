@@ -24,7 +24,7 @@ using namespace liestat;
 using namespace liestat_test;
 
 constexpr double pixel = 1. / 450;
-const ClosedFormOptions closed_form{.bearing_noise = pixel, .singular_values = false};
+const InitialisationOptions options{.bearing_noise = pixel, .closed_form = {.singular_values = false}};
 
 /// eᵀ C⁻¹ e of the first n unknowns, the second three of which are a gravity of known length: the covariance has no
 /// part along it, nor has the error to first order.
@@ -59,8 +59,8 @@ TEST(BearingDeviation, TheClosedFormIsConsistent) {
     const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .spread = 2},
                                  300000 + static_cast<std::uint64_t>(trial));
     ClosedFormWindow window = closedFormWindow(recorded.window, {});
-    const auto result = solveClosedForm(window, closed_form);
-    ASSERT_EQ(result.status, ClosedFormStatus::ok);
+    const auto result = solveClosedForm(window, options);
+    ASSERT_EQ(result.status, FusionStatus::ok);
     const ClosedFormSolution& s = result.solutions[0];
     const Eigen::Vector3d off = s.velocity - recorded.scene.velocity;
     speed.push_back(off.norm());
@@ -70,13 +70,13 @@ TEST(BearingDeviation, TheClosedFormIsConsistent) {
     for (std::size_t i = 0; i < window.features.size(); ++i) {
       if (!result.features[i].used) continue;
       const Eigen::Vector3d u = window.features[i].front().bearing;
-      depth += std::pow(u.dot(s.features[i] - recorded.scene.features[i]) / result.features[i].depth_deviation, 2);
+      depth += std::pow(u.dot(s.features[i] - recorded.scene.features[i]) / result.features[i].depth_sigma, 2);
       ++depths;
     }
     for (FeatureTrack& track : window.features) {
-      for (TrackedBearing& seen : track) seen.deviation = 1;
+      for (TrackedBearing& seen : track) seen.relative_sigma = 1;
     }
-    const auto plain = solveClosedForm(window, closed_form);
+    const auto plain = solveClosedForm(window, options);
     ignored.push_back(plain.solutions.empty() ? 10 : (plain.solutions[0].velocity - recorded.scene.velocity).norm());
   }
   index /= trials;
@@ -94,21 +94,22 @@ TEST(BearingDeviation, TheClosedFormIsConsistent) {
 TEST(BearingDeviation, BiasesAndRefinementAreConsistent) {
   constexpr int trials = 60;
   constexpr ImuNoise<double> adis{1.7e-4, 2e-3};
-  const RefinementOptions refinement{.bearing_noise = pixel, .gyroscope_deviation = 0.03};
+  const InitialisationOptions refinement{.bearing_noise = pixel,
+                                         .prior = {.gyroscope_sigma = 0.03, .accelerometer_sigma = 0.05}};
   double rotation = 0, outer = 0, refined_index = 0, cost = 0, degrees = 0;
   for (int trial = 0; trial < trials; ++trial) {
     const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .spread = 2},
                                  310000 + static_cast<std::uint64_t>(trial));
-    const auto start = estimateEpipolarGyroscopeBias(recorded.window, {.bearing_noise = pixel}, recorded.integrator());
+    const auto start = estimateEpipolarGyroscopeBias(recorded.window, {.bearing_noise = pixel});
     ASSERT_TRUE(start.ok()) << trial;
     rotation += squaredDistance(start.covariance, errorsOf({start.bias - recorded.bias}), 3, Eigen::Vector3d::UnitZ());
-    const auto found = estimateGyroscopeBias(recorded.window, {.closed_form = closed_form}, recorded.integrator());
-    ASSERT_EQ(found.status, GyroscopeBiasStatus::ok) << trial;
+    const auto found = estimateGyroscopeBias(recorded.window, options);
+    ASSERT_EQ(found.status, FusionStatus::ok) << trial;
     outer += squaredDistance(found.covariance, errorsOf({found.bias - recorded.bias}), 3, Eigen::Vector3d::UnitZ());
     const auto refined = refine(recorded.window, found.result.solutions.at(0), {.gyroscope = found.bias}, refinement);
-    ASSERT_EQ(refined.status, RefinementStatus::ok) << trial;
+    ASSERT_EQ(refined.status, FusionStatus::ok) << trial;
     refined_index += squaredDistance(
-        refined.covariance,
+        refined.covariance.atFirst(),
         errorsOf({refined.velocity() - recorded.scene.velocity, refined.gravity - recorded.scene.gravity}), 6,
         refined.gravity);
     cost += refined.cost;
@@ -133,9 +134,9 @@ TEST(BearingDeviation, ConsensusKnowsNoiseFromDrift) {
     const RecordedScene recorded(
         {.scene = {.images = 21, .features = features}, .noise = {1.7e-4, 2e-3}, .spread = 2, .drifting = drifting},
         320000 + trial);
-    std::mt19937_64 generator(trial);
-    const auto robust =
-        solveClosedFormRobustly(closedFormWindow(recorded.window, {}), generator, {.closed_form = closed_form});
+    InitialisationOptions drawn = options;
+    drawn.consensus.seed = trial;
+    const auto robust = solveClosedFormRobustly(closedFormWindow(recorded.window, {}), drawn);
     for (const std::size_t i : robust.inliers) ++(i < drifting ? wrong : right);
   }
   EXPECT_EQ(wrong, 0u);
@@ -149,12 +150,10 @@ TEST(BearingDeviation, ACommonFactorIsThatOfTheNoise) {
       17);
   InertialWindow twice = recorded.window;
   for (FeatureTrack& track : twice.features) {
-    for (TrackedBearing& seen : track) seen.deviation *= 2;
+    for (TrackedBearing& seen : track) seen.relative_sigma *= 2;
   }
   const auto solve = [&](const InertialWindow& window, double noise) {
-    std::mt19937_64 generator(1);
-    return initialiseRobustly(window, generator, {.ransac = {.closed_form = {.bearing_noise = noise}}},
-                              recorded.integrator());
+    return initialiseRobustly(window, {.bearing_noise = noise});
   };
   const auto one = solve(recorded.window, pixel), other = solve(twice, pixel / 2);
   ASSERT_TRUE(one.ok());
@@ -172,14 +171,14 @@ TEST(BearingDeviation, ACommonFactorIsThatOfTheNoise) {
   for (std::size_t i = 0; i < a.features.size(); ++i) {
     EXPECT_NEAR(a.features[i].residual, b.features[i].residual, 1e-9) << "angles are angles";
     EXPECT_NEAR(a.features[i].parallax, b.features[i].parallax, 1e-9);
-    EXPECT_NEAR(a.features[i].used ? 2 * a.features[i].deviation : 1, b.features[i].deviation, 1e-12);
+    EXPECT_NEAR(a.features[i].used ? 2 * a.features[i].relative_sigma : 1, b.features[i].relative_sigma, 1e-12);
   }
   const auto refined = [&](const InertialWindow& window, double noise) {
     return refine(window, a.solutions[0], {.gyroscope = one.gyroscope_bias}, {.bearing_noise = noise});
   };
   const auto first = refined(recorded.window, pixel), second = refined(twice, pixel / 2);
   EXPECT_NEAR(first.cost / second.cost, 1, 1e-8);
-  EXPECT_NEAR((first.covariance - second.covariance).norm() / first.covariance.norm(), 0, 1e-6);
+  EXPECT_NEAR((first.covariance.joint - second.covariance.joint).norm() / first.covariance.joint.norm(), 0, 1e-6);
 }
 
 TEST(BearingDeviation, MustBePositive) {
@@ -187,16 +186,16 @@ TEST(BearingDeviation, MustBePositive) {
   for (const double bad :
        {0., -1., std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     InertialWindow window = recorded.window;
-    window.features[5][2].deviation = bad;
+    window.features[5][2].relative_sigma = bad;
     const ClosedFormWindow closed = closedFormWindow(window, {});
-    const auto result = solveClosedForm(closed, closed_form);
-    EXPECT_EQ(result.fault, ClosedFormFault::bad_bearing);
-    EXPECT_EQ(result.fault_index, 5u);
-    EXPECT_EQ(estimateEpipolarGyroscopeBias(window, {.bearing_noise = pixel}).fault, ClosedFormFault::bad_bearing);
-    EXPECT_EQ(estimateGyroscopeBias(window, {.closed_form = closed_form}).result.fault, ClosedFormFault::bad_bearing);
+    const auto result = solveClosedForm(closed, options);
+    EXPECT_EQ(result.fault, FaultKind::bad_bearing);
+    EXPECT_EQ(result.fault.index, 5u);
+    EXPECT_EQ(estimateEpipolarGyroscopeBias(window, {.bearing_noise = pixel}).fault, FaultKind::bad_bearing);
+    EXPECT_EQ(estimateGyroscopeBias(window, options).result.fault, FaultKind::bad_bearing);
     ClosedFormSolution start;
     start.gravity = {0, 0, -9.81};
-    EXPECT_EQ(refine(window, start, {}, {.bearing_noise = pixel}).fault, ClosedFormFault::bad_bearing);
+    EXPECT_EQ(refine(window, start, {}, {.bearing_noise = pixel}).fault, FaultKind::bad_bearing);
   }
 }
 

@@ -22,7 +22,7 @@ namespace {
 using namespace liestat;
 using namespace liestat::experiments;
 using namespace liestat_test;
-using Status = ClosedFormStatus;
+using Status = FusionStatus;
 using Motion = SceneMotion;
 
 constexpr double pixel = 1. / 450;
@@ -72,7 +72,8 @@ TEST(ClosedFormWindows, MeetTheTableAndBeatItWithoutTheBiasOfNoise) {
       const Scene scene = noisyScene({.images = images, .features = 20, .window = row.window}, 20000 + trial);
       for (const bool plain : {false, true}) {
         const auto result = solveClosedForm(
-            scene.window, {.bearing_noise = pixel, .singular_values = false, .remove_noise_bias = !plain});
+            scene.window,
+            {.bearing_noise = pixel, .closed_form = {.singular_values = false, .remove_noise_bias = !plain}});
         ASSERT_FALSE(result.solutions.empty());
         ok += !plain && result.ok();
         const ClosedFormSolution& s = result.solutions[0];
@@ -117,15 +118,15 @@ TEST(ClosedFormNoise, DecidesTheCases) {
   using S = Status;
   constexpr int trials = 100;
   for (const NoisyClosedFormCase& row : noisyClosedFormCases()) {
-    int counts[12] = {};
+    int counts[static_cast<int>(Status::bad_input) + 1] = {};
     int among = 0;
     Sample known, directions;
     for (int trial = 0; trial < trials; ++trial) {
       const Scene scene = noisyScene(row.scene, 50000 + trial);
-      const auto result = solveClosedForm(scene.window, {.bearing_noise = pixel,
-                                                         .estimate_bias = row.bias,
-                                                         .bias_deviation = row.bias_deviation,
-                                                         .singular_values = false});
+      const auto result =
+          solveClosedForm(scene.window, {.bearing_noise = pixel,
+                                         .prior = {.accelerometer_sigma = row.bias_sigma},
+                                         .closed_form = {.estimate_bias = row.bias, .singular_values = false}});
       ++counts[static_cast<int>(result.status)];
       among += static_cast<int>(std::count(row.expected.begin(), row.expected.end(), result.status));
       // Where the status says that gravity is known, it is.
@@ -164,7 +165,7 @@ TEST(ClosedFormNoise, AMisfitIsNotOk) {
   for (int trial = 0; trial < trials; ++trial) {
     const SceneOptions options{.images = 21, .features = 20};
     Scene scene = noisyScene(options, 70000 + trial);
-    const ClosedFormOptions solve{.bearing_noise = pixel, .singular_values = false};
+    const InitialisationOptions solve{.bearing_noise = pixel, .closed_form = {.singular_values = false}};
     right += solveClosedForm(scene.window, solve).ok();
     // A gyroscope that is off by 0.05 rad/s.
     ClosedFormWindow turned = scene.window;
@@ -193,7 +194,8 @@ TEST(ClosedFormNoise, OkIsRight) {
                                       .features = 20,
                                       .motion = constant ? Motion::constant_acceleration : Motion::varying},
                                      80000 + trial);
-      const auto result = solveClosedForm(scene.window, {.bearing_noise = pixel, .singular_values = false});
+      const auto result =
+          solveClosedForm(scene.window, {.bearing_noise = pixel, .closed_form = {.singular_values = false}});
       if (result.ok()) {
         const double deviation = std::sqrt(result.covariance.topLeftCorner<3, 3>().trace());
         error.add((result.solutions.at(0).velocity - scene.velocity).norm() / deviation);
@@ -239,7 +241,8 @@ TEST(ClosedFormNoise, TheCovarianceIsThatOfImageNoise) {
       SceneOptions options{.images = 21, .features = 20};
       CounterRng random(90000 + static_cast<std::uint64_t>(trial), 0, 2);
       if (bias) options.bias = 0.1 * random.normalVector<3>();
-      const ClosedFormOptions solve{.bearing_noise = pixel, .estimate_bias = bias, .singular_values = false};
+      const InitialisationOptions solve{.bearing_noise = pixel,
+                                        .closed_form = {.estimate_bias = bias, .singular_values = false}};
       const Scene scene = noisyScene(options, 90000 + trial, false);
       const auto result = solveClosedForm(scene.window, solve);
       ASSERT_EQ(result.covariance_content,

@@ -20,7 +20,14 @@ using namespace liestat;
 using namespace liestat_test;
 
 constexpr double pixel = 1. / 450;
-const RansacOptions options{.closed_form = {.bearing_noise = pixel, .singular_values = false}};
+const InitialisationOptions options{.bearing_noise = pixel, .closed_form = {.singular_values = false}};
+
+/// The options with a seed.
+InitialisationOptions drawnFrom(std::uint64_t seed) {
+  InitialisationOptions o = options;
+  o.consensus.seed = seed;
+  return o;
+}
 
 Scene noisyScene(const SceneOptions& scene_options, std::uint64_t seed) {
   Scene scene(scene_options, seed);
@@ -48,8 +55,7 @@ TEST(ClosedFormRansac, LeavesOutDriftingTracks) {
       Scene scene = noisyScene({.images = 21, .features = features}, 120000 + trial);
       CounterRng random(120000 + trial, 0, 2);
       scene.addDrift(wrong, pixels * pixel, random);
-      std::mt19937_64 generator(trial);
-      const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+      const auto robust = solveClosedFormRobustly(scene.window, drawnFrom(trial));
       hypotheses += robust.hypotheses;
       ok += robust.ok();
       for (const std::size_t i : robust.inliers) ++(i < wrong ? kept_wrong : kept_right);
@@ -58,11 +64,11 @@ TEST(ClosedFormRansac, LeavesOutDriftingTracks) {
       ASSERT_FALSE(robust.result.solutions.empty());
       robust_error.push_back((robust.result.solutions[0].velocity - scene.velocity).norm());
 
-      const auto plain = solveClosedForm(scene.window, options.closed_form);
+      const auto plain = solveClosedForm(scene.window, options);
       const bool none = plain.solutions.empty();
       plain_error.push_back(none ? 10 : (plain.solutions[0].velocity - scene.velocity).norm());
       for (std::size_t i = 0; i < wrong; ++i) scene.window.features[i].clear();
-      const auto oracle = solveClosedForm(scene.window, options.closed_form);
+      const auto oracle = solveClosedForm(scene.window, options);
       oracle_error.push_back((oracle.solutions.at(0).velocity - scene.velocity).norm());
     }
     const double precision = static_cast<double>(kept_right) / static_cast<double>(kept_right + kept_wrong);
@@ -86,8 +92,7 @@ TEST(ClosedFormRansac, TakesAllWhereAllAreRight) {
   std::size_t kept = 0, all = 0, hypotheses = 0;
   for (std::size_t trial = 0; trial < 100; ++trial) {
     const Scene scene = noisyScene({.images = 11, .features = 20, .window = 1}, 140000 + trial);
-    std::mt19937_64 generator(trial);
-    const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+    const auto robust = solveClosedFormRobustly(scene.window, drawnFrom(trial));
     kept += robust.inliers.size();
     all += 20;
     hypotheses += robust.hypotheses;
@@ -101,8 +106,8 @@ TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
   Scene scene = noisyScene({.images = 21, .features = 40}, 5);
   CounterRng random(5, 0, 2);
   scene.addDrift(16, 8 * pixel, random);
-  const auto solve = [&](auto generator) { return solveClosedFormRobustly(scene.window, generator, options); };
-  const auto first = solve(std::mt19937_64(3)), again = solve(std::mt19937_64(3)), other = solve(std::minstd_rand(4));
+  const auto solve = [&](std::uint64_t seed) { return solveClosedFormRobustly(scene.window, drawnFrom(seed)); };
+  const auto first = solve(3), again = solve(3), other = solve(4);
   EXPECT_EQ(first.inliers, again.inliers);
   EXPECT_EQ(first.hypotheses, again.hypotheses);
   EXPECT_EQ(first.result.solutions.at(0).velocity, again.result.solutions.at(0).velocity);
@@ -119,41 +124,39 @@ TEST(ClosedFormRansac, SaysWhenThereIsNoConsensus) {
   Scene scene = noisyScene({.images = 21, .features = 20}, 8);
   CounterRng random(8, 0, 2);
   scene.addDrift(20, 0.05, random);
-  std::mt19937_64 generator(1);
-  const auto robust = solveClosedFormRobustly(scene.window, generator, options);
+  const auto robust = solveClosedFormRobustly(scene.window, options);
   EXPECT_TRUE(robust.inliers.empty());
-  EXPECT_EQ(robust.hypotheses, options.most_hypotheses);
+  EXPECT_EQ(robust.hypotheses, options.consensus.max_hypotheses);
   EXPECT_FALSE(robust.ok());
 }
 
 TEST(ClosedFormRansac, RefusesBadInput) {
   Scene scene = noisyScene({.images = 6, .features = 8}, 1);
-  std::mt19937_64 generator(1);
-  const auto fault = [&](const ClosedFormWindow& window, const RansacOptions& o) {
-    return solveClosedFormRobustly(window, generator, o).result.fault;
+  const auto fault = [&](const ClosedFormWindow& window, const InitialisationOptions& o) {
+    return solveClosedFormRobustly(window, o).result.fault;
   };
-  EXPECT_EQ(fault(scene.window, {}), ClosedFormFault::bad_option);
-  RansacOptions bad = options;
-  bad.features_drawn = 0;
-  EXPECT_EQ(fault(scene.window, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(scene.window, {}), FaultKind::bad_option);
+  InitialisationOptions bad = options;
+  bad.consensus.features_drawn = 0;
+  EXPECT_EQ(fault(scene.window, bad), FaultKind::bad_option);
   bad = options;
-  bad.confidence = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(fault(scene.window, bad), ClosedFormFault::bad_option);
+  bad.consensus.confidence = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fault(scene.window, bad), FaultKind::bad_option);
   bad = options;
-  bad.misfit_deviations = 0;
-  EXPECT_EQ(fault(scene.window, bad), ClosedFormFault::bad_option);
+  bad.consensus.misfit_sigmas = 0;
+  EXPECT_EQ(fault(scene.window, bad), FaultKind::bad_option);
   ClosedFormWindow window = scene.window;
   window.features[2][1].bearing.setZero();
-  EXPECT_EQ(fault(window, options), ClosedFormFault::bad_bearing);
+  EXPECT_EQ(fault(window, options), FaultKind::bad_bearing);
   window.features.assign(3, {});
-  EXPECT_EQ(fault(window, options), ClosedFormFault::no_feature);
+  EXPECT_EQ(fault(window, options), FaultKind::no_feature);
   // Too few to choose from: all are taken.
   window = scene.window;
   window.features.resize(4);
-  const auto few = solveClosedFormRobustly(window, generator, options);
+  const auto few = solveClosedFormRobustly(window, options);
   EXPECT_EQ(few.hypotheses, 0u);
   EXPECT_EQ(few.inliers.size(), 4u);
-  EXPECT_EQ(few.result.fault, ClosedFormFault::none);
+  EXPECT_EQ(few.result.fault, FaultKind::none);
 }
 
 }  // namespace

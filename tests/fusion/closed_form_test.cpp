@@ -19,7 +19,7 @@ namespace {
 using namespace liestat;
 using namespace liestat::experiments;
 using namespace liestat_test;
-using Status = ClosedFormStatus;
+using Status = FusionStatus;
 using Motion = SceneMotion;
 using Turn = SceneTurn;
 using Layout = SceneLayout;
@@ -95,8 +95,8 @@ TEST(ClosedFormCases, EveryRowOfTheTable) {
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
       SCOPED_TRACE(std::string(row.name) + ", scene " + std::to_string(seed));
       const Scene scene(row.scene, seed);
-      const ClosedFormResult result = solveClosedForm(scene.window, {.estimate_bias = row.bias});
-      EXPECT_EQ(result.fault, ClosedFormFault::none);
+      const ClosedFormResult result = solveClosedForm(scene.window, {.closed_form = {.estimate_bias = row.bias}});
+      EXPECT_EQ(result.fault, FaultKind::none);
       EXPECT_EQ(result.null_dimension, row.null);
       EXPECT_TRUE(result.status == row.status || result.status == row.or_status) << describe(result.status);
       EXPECT_EQ(result.solutions.empty(), !row.solved && row.status != Status::scale_unobservable);
@@ -268,7 +268,8 @@ TEST(Bias, TurnsGravityIntoItsMirrorImageAboutOneAxis) {
     const Vector3 axis = (scene.attitude(0).inverse() * scene.attitude(scene.times[3])).log().normalized();
     const Vector3 mirrored = scene.gravity - 2 * scene.gravity.dot(axis) * axis;
     const double infinite = std::numeric_limits<double>::infinity();
-    const auto open = solveClosedForm(scene.window, {.estimate_bias = true, .bias_deviation = infinite});
+    const auto open = solveClosedForm(
+        scene.window, {.prior = {.accelerometer_sigma = infinite}, .closed_form = {.estimate_bias = true}});
     EXPECT_EQ(open.null_dimension, 1);
     ASSERT_EQ(open.status, Status::mirror_gravity) << seed;
     ASSERT_EQ(open.solutions.size(), 2u);
@@ -278,7 +279,7 @@ TEST(Bias, TurnsGravityIntoItsMirrorImageAboutOneAxis) {
     EXPECT_LE((other.gravity - mirrored).norm(), 1e-7);
     EXPECT_LE((other.gravity - truth.gravity - (other.accelerometer_bias - truth.accelerometer_bias)).norm(), 1e-7);
     // A bias of 2 |G·u| is one that a prior refuses, unless the axis is level.
-    const auto closed = solveClosedForm(scene.window, {.estimate_bias = true, .bias_deviation = 0.1});
+    const auto closed = solveClosedForm(scene.window, {.closed_form = {.estimate_bias = true}});
     if (std::abs(2 * scene.gravity.dot(axis)) < 0.5) continue;
     ++decided;
     EXPECT_TRUE(closed.ok());
@@ -369,17 +370,17 @@ TEST(Window, FeaturesComeAndGo) {
 
 TEST(BadInput, IsNamed) {
   const Scene scene({.images = 5, .features = 4}, 1);
-  using Fault = ClosedFormFault;
+  using Fault = FaultKind;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto expectFault = [&](Fault fault, std::size_t index, auto&& spoil, ClosedFormOptions options = {}) {
+  const auto expectFault = [&](Fault fault, std::size_t index, auto&& spoil, InitialisationOptions options = {}) {
     ClosedFormWindow window = scene.window;
     spoil(window);
     const auto result = solveClosedForm(window, options);
     EXPECT_EQ(result.status, Status::bad_input);
-    EXPECT_EQ(result.fault, fault) << describeFault(result);
-    EXPECT_EQ(result.fault_index, index) << describeFault(result);
+    EXPECT_EQ(result.fault, fault) << describe(result.fault);
+    EXPECT_EQ(result.fault.index, index) << describe(result.fault);
     EXPECT_TRUE(result.solutions.empty());
-    EXPECT_FALSE(describeFault(result).empty());
+    EXPECT_FALSE(describe(result.fault).empty());
   };
   const auto nothing = [](ClosedFormWindow&) {};
   expectFault(Fault::too_few_images, 0, [](ClosedFormWindow& w) { w.images.resize(1); });
@@ -398,11 +399,12 @@ TEST(BadInput, IsNamed) {
   expectFault(Fault::no_feature, 0, [](ClosedFormWindow& w) {
     for (auto& track : w.features) track.resize(1);
   });
-  expectFault(Fault::bad_option, 0, [&](ClosedFormWindow& w) { w.camera[0] = nan; });
+  expectFault(Fault::bad_option, 0, [&](ClosedFormWindow& w) { w.cameras[0].translation()[0] = nan; });
   expectFault(Fault::bad_option, 0, nothing, {.gravity = 0.});
   expectFault(Fault::bad_option, 0, nothing, {.bearing_noise = -1});
   expectFault(Fault::bad_option, 0, nothing, {.bearing_noise = nan});
-  expectFault(Fault::bad_option, 0, nothing, {.estimate_bias = true, .bias_deviation = 0});
+  expectFault(Fault::bad_option, 0, nothing,
+              {.prior = {.accelerometer_sigma = 0}, .closed_form = {.estimate_bias = true}});
   // Everything at the origin of time: an observation in one image only.
   expectFault(Fault::no_feature, 0, [](ClosedFormWindow& w) {
     for (auto& track : w.features) track = {track[2], track[2]};

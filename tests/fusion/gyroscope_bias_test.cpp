@@ -18,10 +18,10 @@ namespace {
 
 using namespace liestat;
 using namespace liestat_test;
-using Status = GyroscopeBiasStatus;
+using Status = FusionStatus;
 
 constexpr double pixel = 1. / 450;
-const GyroscopeBiasOptions options{.closed_form = {.bearing_noise = pixel, .singular_values = false}};
+const InitialisationOptions options{.bearing_noise = pixel, .closed_form = {.singular_values = false}};
 
 struct Recorded {
   Scene scene;
@@ -36,10 +36,7 @@ struct Recorded {
     bias = size * random.unitVector<3>();
     readings = readingsOf(scene, noise, random, bias);
     scene.addNoise(sigma, random);
-    window = {motionsOf(scene, readings), scene.window.features, scene_options.camera};
-  }
-  auto integrate() const {
-    return [this](const ImuBias<double>& at) { return motionsOf(scene, readings, {.preintegration = {.bias = at}}); };
+    window = windowOf(scene, readings);
   }
 };
 
@@ -54,7 +51,7 @@ TEST(BiasedImages, AreWhatIntegrationGives) {
   // The largest distance of updated images from integrated ones, for a part of a change.
   const auto distance = [&](double part) {
     const ImuBias<double> bias{part * recorded.bias, part * Eigen::Vector3d(0.05, -0.1, 0.02)};
-    const auto updated = biasedImages(recorded.window.motions, bias);
+    const auto updated = biasedImages(recorded.window.motions(), bias);
     const auto anew = motionsOf(recorded.scene, recorded.readings, {.preintegration = {.bias = bias}});
     Preintegration<double> whole({.bias = bias});
     double most = 0;
@@ -73,21 +70,21 @@ TEST(BiasedImages, AreWhatIntegrationGives) {
   EXPECT_LE(distance(1), 1e-3);
 
   const ImuBias<double> truth{recorded.bias, {0.05, -0.1, 0.02}};
-  const auto updated = biasedImages(recorded.window.motions, truth);
+  const auto updated = biasedImages(recorded.window.motions(), truth);
   // Derivatives against central differences of the same function.
   constexpr double h = 1e-6;
   for (int k = 0; k < 3; ++k) {
     ImuBias<double> more = truth, less = truth, pushed = truth, pulled = truth;
     more.gyroscope[k] += h, less.gyroscope[k] -= h;
     pushed.accelerometer[k] += h, pulled.accelerometer[k] -= h;
-    const BiasedImage high = biasedImages(recorded.window.motions, more).back(),
-                      low = biasedImages(recorded.window.motions, less).back(), &at = updated.back();
+    const BiasedImage high = biasedImages(recorded.window.motions(), more).back(),
+                      low = biasedImages(recorded.window.motions(), less).back(), &at = updated.back();
     const Eigen::Vector3d turn = (SO3d(high.image.rotation) * SO3d(low.image.rotation).inverse()).log() / (2 * h);
     EXPECT_LE((turn - at.rotation_by_gyroscope.col(k)).norm(), 1e-8);
     const Eigen::Vector3d moved = (high.image.displacement - low.image.displacement) / (2 * h);
     EXPECT_LE((moved - at.displacement_by_gyroscope.col(k)).norm(), 1e-7);
-    const Eigen::Vector3d slid = (biasedImages(recorded.window.motions, pushed).back().image.displacement -
-                                  biasedImages(recorded.window.motions, pulled).back().image.displacement) /
+    const Eigen::Vector3d slid = (biasedImages(recorded.window.motions(), pushed).back().image.displacement -
+                                  biasedImages(recorded.window.motions(), pulled).back().image.displacement) /
                                  (2 * h);
     EXPECT_LE((slid - at.image.displacement_by_bias.col(k)).norm(), 1e-7);
   }
@@ -96,7 +93,7 @@ TEST(BiasedImages, AreWhatIntegrationGives) {
 TEST(GyroscopeBias, IsFoundWithoutNoise) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Recorded recorded({.images = 21, .features = 12, .camera = {0.05, -0.1, 0.02}}, 0.05, 0, {}, 300 + seed);
-    const auto found = estimateGyroscopeBias(recorded.window, options, recorded.integrate());
+    const auto found = estimateGyroscopeBias(recorded.window, options);
     EXPECT_EQ(found.status, Status::ok) << seed;
     // The prior pulls by covariance · bias / 0.1²; averaged readings are wrong by 1e-5 rad in a second; an update of
     // first order by 0.05 rad/s, just below what is integrated anew, by 8e-6 rad in 0.2 s (design note, 2.2).
@@ -111,12 +108,12 @@ TEST(GyroscopeBias, MeetsTheTarget) {
   for (int trial = 0; trial < trials; ++trial) {
     const Recorded recorded({.images = 21, .features = 20}, 0.05, pixel, {1.7e-4, 2e-3}, 150000 + trial);
     const Scene& scene = recorded.scene;
-    const auto found = estimateGyroscopeBias(recorded.window, options, recorded.integrate());
+    const auto found = estimateGyroscopeBias(recorded.window, options);
     ok += found.ok();
     integrations += found.integrations;
     iterations += found.iterations;
     rounds += found.rounds;
-    const auto plain = solveClosedForm(closedFormWindow(recorded.window, {}), options.closed_form);
+    const auto plain = solveClosedForm(closedFormWindow(recorded.window, {}), options);
     for (const bool first : {true, false}) {
       const auto& result = first ? plain : found.result;
       // What has no solution counts as lost.
@@ -149,7 +146,7 @@ TEST(GyroscopeBias, CovarianceIsThatOfImageNoise) {
   double nees = 0, cost = 0, degrees = 0;
   for (int trial = 0; trial < trials; ++trial) {
     const Recorded recorded({.images = 21, .features = 20}, 0.02, pixel, {}, 160000 + trial);
-    const auto found = estimateGyroscopeBias(recorded.window, options, recorded.integrate());
+    const auto found = estimateGyroscopeBias(recorded.window, options);
     ASSERT_EQ(found.status, Status::ok) << trial;
     const Eigen::Vector3d error = found.bias - recorded.bias;
     nees += error.dot(found.covariance.llt().solve(error)) / trials;
@@ -172,13 +169,13 @@ TEST(GyroscopeBias, WithTheAccelerometersOrLarge) {
     CounterRng random(seed, 0, 2);
     const Recorded both({.images = 21, .features = 20, .bias = 0.1 * random.unitVector<3>()}, 0.05, pixel,
                         {1.7e-4, 2e-3}, seed);
-    GyroscopeBiasOptions with = options;
+    InitialisationOptions with = options;
     with.closed_form.estimate_bias = true;
-    const auto found = estimateGyroscopeBias(both.window, with, both.integrate());
+    const auto found = estimateGyroscopeBias(both.window, with);
     error.push_back((found.bias - both.bias).norm());
 
     const Recorded far({.images = 21, .features = 20}, 0.2, pixel, {1.7e-4, 2e-3}, seed);
-    const auto from_zero = estimateGyroscopeBias(far.window, options, far.integrate());
+    const auto from_zero = estimateGyroscopeBias(far.window, options);
     // What has not been found must not be called so.
     if (from_zero.ok()) large.push_back((from_zero.bias - far.bias).norm());
   }
@@ -193,42 +190,44 @@ TEST(GyroscopeBias, WithTheAccelerometersOrLarge) {
 
 TEST(GyroscopeBias, IsNotAskedOfAShortWindow) {
   const Recorded recorded({.images = 11, .features = 20, .window = 1}, 0.02, pixel, {1.7e-4, 2e-3}, 4);
-  const auto refused = estimateGyroscopeBias(recorded.window, options, recorded.integrate());
+  const auto refused = estimateGyroscopeBias(recorded.window, options);
   EXPECT_EQ(refused.status, Status::window_too_short);
   EXPECT_FALSE(refused.ok());
   // A prior from rest.
-  GyroscopeBiasOptions from_rest = options;
-  from_rest.prior = recorded.bias + Eigen::Vector3d(0.003, -0.002, 0.001);
-  from_rest.prior_deviation = 0.003;
-  const auto found = estimateGyroscopeBias(recorded.window, from_rest, recorded.integrate());
+  InitialisationOptions from_rest = options;
+  from_rest.prior.mean.gyroscope = recorded.bias + Eigen::Vector3d(0.003, -0.002, 0.001);
+  from_rest.prior.gyroscope_sigma = 0.003;
+  const auto found = estimateGyroscopeBias(recorded.window, from_rest);
   EXPECT_EQ(found.status, Status::ok);
   EXPECT_LE((found.bias - recorded.bias).norm(), 0.01);
 }
 
 TEST(GyroscopeBias, RefusesBadInput) {
   const Recorded recorded({.images = 6, .features = 8}, 0.02, pixel, {}, 4);
-  const auto fault = [&](const InertialWindow& window, const GyroscopeBiasOptions& o) {
+  const auto fault = [&](const InertialWindow& window, const InitialisationOptions& o) {
     const auto found = estimateGyroscopeBias(window, o);
-    return found.status == Status::bad_input ? found.result.fault : ClosedFormFault::none;
+    return found.status == Status::bad_input ? found.result.fault : FaultKind::none;
   };
-  EXPECT_EQ(fault(recorded.window, options), ClosedFormFault::none);
-  EXPECT_EQ(fault(recorded.window, {}), ClosedFormFault::bad_option);  // no noise
-  GyroscopeBiasOptions bad = options;
-  bad.prior_deviation = 0;
-  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(recorded.window, options), FaultKind::none);
+  EXPECT_EQ(fault(recorded.window, {}), FaultKind::bad_option);  // no noise
+  InitialisationOptions bad = options;
+  bad.prior.gyroscope_sigma = 0;
+  EXPECT_EQ(fault(recorded.window, bad), FaultKind::bad_option);
   bad = options;
-  bad.prior[1] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
-  EXPECT_EQ(fault({}, options), ClosedFormFault::too_few_images);
+  bad.prior.mean.gyroscope[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fault(recorded.window, bad), FaultKind::bad_option);
+  EXPECT_EQ(fault({}, options), FaultKind::too_few_images);
   InertialWindow window = recorded.window;
   window.features[1][2].image = 77;
-  EXPECT_EQ(fault(window, options), ClosedFormFault::wrong_index);
+  EXPECT_EQ(fault(window, options), FaultKind::wrong_index);
   window = recorded.window;
-  window.motions[2] = Preintegration<double>();  // of no duration
-  EXPECT_EQ(fault(window, options), ClosedFormFault::image_order);
+  std::vector<Preintegration<double>> motions = window.motions();
+  motions[2] = Preintegration<double>();  // of no duration
+  window = InertialWindow(motions, window.features);
+  EXPECT_EQ(fault(window, options), FaultKind::image_order);
   // At rest there is nothing to tell a bias from.
   const Recorded still({.images = 21, .features = 12, .motion = SceneMotion::stationary}, 0, pixel, {}, 4);
-  EXPECT_EQ(estimateGyroscopeBias(still.window, options).status, Status::no_closed_form);
+  EXPECT_EQ(estimateGyroscopeBias(still.window, options).status, Status::no_start);
 }
 
 }  // namespace

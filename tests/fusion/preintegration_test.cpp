@@ -333,7 +333,7 @@ TEST(Recordings, HeldReadingsAreDeltaAngles) {
   Preintegration<double> expected;
   expected.add(0.1, list[0].angular_rate, list[0].specific_force);
   expected.add(0.05, list[1].angular_rate, list[1].specific_force);
-  const auto result = preintegrate<double>(list, 0., 0.15, {.scheme = ImuScheme::held, .largest_gap = 0.2});
+  const auto result = preintegrate<double>(list, 0., 0.15, {.scheme = ImuScheme::held, .max_gap = 0.2});
   ASSERT_TRUE(result.ok());
   EXPECT_LE(difference(expected.increment(), result.motion.increment()).norm(), 1e-15);
 }
@@ -342,32 +342,32 @@ TEST(Recordings, FaultsAreNamed) {
   auto list = AnalyticMotion::samples(200);
   const auto fault = [&](double begin, double end) {
     const auto result = preintegrate<double>(list, begin, end);
-    return std::pair(result.fault, result.sample);
+    return std::pair(result.fault.kind, result.fault.index);
   };
-  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::none);
-  EXPECT_EQ(fault(0.4, 0.2).first, RecordingFault::bad_interval);
-  EXPECT_EQ(fault(0.4, 0.4).first, RecordingFault::bad_interval);
-  EXPECT_EQ(fault(std::nan(""), 0.4).first, RecordingFault::bad_interval);
-  EXPECT_EQ(fault(-1, 0.4).first, RecordingFault::not_covered);
-  EXPECT_EQ(fault(0.2, 9), std::pair(RecordingFault::not_covered, list.size() - 1));
+  EXPECT_EQ(fault(0.2, 0.4).first, FaultKind::none);
+  EXPECT_EQ(fault(0.4, 0.2).first, FaultKind::bad_interval);
+  EXPECT_EQ(fault(0.4, 0.4).first, FaultKind::bad_interval);
+  EXPECT_EQ(fault(std::nan(""), 0.4).first, FaultKind::bad_interval);
+  EXPECT_EQ(fault(-1, 0.4).first, FaultKind::not_covered);
+  EXPECT_EQ(fault(0.2, 9), std::pair(FaultKind::not_covered, list.size() - 1));
   const auto good = list;
   list[50].specific_force[1] = std::nan("");
-  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{50}));
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(FaultKind::not_finite, std::size_t{50}));
   list = good;
   list[50].time = std::nan("");
-  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_finite, std::size_t{50}));
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(FaultKind::not_finite, std::size_t{50}));
   list = good;
   list[50].time = list[49].time;
-  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::not_ascending, std::size_t{50})) << "duplicated";
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(FaultKind::not_ascending, std::size_t{50})) << "duplicated";
   list = good;
   std::swap(list[60], list[61]);
-  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::not_ascending);
+  EXPECT_EQ(fault(0.2, 0.4).first, FaultKind::not_ascending);
   list = good;
   list.erase(list.begin() + 50, list.begin() + 80);
-  EXPECT_EQ(fault(0.2, 0.4), std::pair(RecordingFault::gap, std::size_t{50}));
-  EXPECT_EQ(fault(0.01, 0.2).first, RecordingFault::none) << "the gap is elsewhere";
+  EXPECT_EQ(fault(0.2, 0.4), std::pair(FaultKind::gap, std::size_t{50}));
+  EXPECT_EQ(fault(0.01, 0.2).first, FaultKind::none) << "the gap is elsewhere";
   list.clear();
-  EXPECT_EQ(fault(0.2, 0.4).first, RecordingFault::not_covered);
+  EXPECT_EQ(fault(0.2, 0.4).first, FaultKind::not_covered);
 }
 
 // A recording may be long and its windows many: what they do not use is not looked at.
@@ -390,8 +390,8 @@ TEST(Recordings, OnlyWhatIsUsedIsChecked) {
       list[i].angular_rate[2] = std::nan("");
       const auto result = preintegrate<double>(list, begin, end, {.scheme = scheme});
       if (i + more >= first && i <= last + more) {
-        EXPECT_EQ(result.fault, RecordingFault::not_finite) << i;
-        EXPECT_EQ(result.sample, i);
+        EXPECT_EQ(result.fault, FaultKind::not_finite) << i;
+        EXPECT_EQ(result.fault.index, i);
       } else {
         ASSERT_TRUE(result.ok()) << i;
         EXPECT_TRUE(result.motion.increment().matrix() == expected.motion.increment().matrix()) << i;
@@ -401,7 +401,7 @@ TEST(Recordings, OnlyWhatIsUsedIsChecked) {
     auto list = good;
     for (std::size_t i = 0; i < first; ++i) list[i].time -= 0.2;
     EXPECT_EQ(preintegrate<double>(list, begin, end, {.scheme = scheme}).fault,
-              more ? RecordingFault::gap : RecordingFault::none);
+              more ? FaultKind::gap : FaultKind::none);
   }
 }
 
@@ -428,7 +428,7 @@ TEST(Recordings, InAnyOrderThereIsNoWrongAnswer) {
     }
     // No reading is counted twice or left out without a gap that shows.
     EXPECT_NEAR(result.motion.duration(), 0.2, 1e-12);
-    EXPECT_LE(result.largest_gap, 0.1);
+    EXPECT_LE(result.max_gap, 0.1);
   }
   EXPECT_GE(faults, 1000u);
   EXPECT_LT(faults, 2000u);

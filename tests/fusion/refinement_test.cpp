@@ -19,11 +19,12 @@ namespace {
 
 using namespace liestat;
 using namespace liestat_test;
-using Status = RefinementStatus;
+using Status = FusionStatus;
 
 constexpr double pixel = 1. / 450;
 const ImuNoise<double> imu{1.7e-4, 2e-3};
-const RefinementOptions options{.bearing_noise = pixel};
+const InitialisationOptions options{.bearing_noise = pixel,
+                                    .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}};
 
 /// A window with biases out of their priors, and the closed form for biases of zero.
 struct Recorded {
@@ -47,13 +48,15 @@ struct Recorded {
  private:
   Recorded(SceneOptions scene_options, std::uint64_t seed, const ImuNoise<double>& noise, double sigma,
            CounterRng random)
-      : scene((scene_options.bias = options.accelerometer_deviation * random.normalVector<3>(), scene_options), seed) {
-    bias = {options.gyroscope_deviation * random.normalVector<3>(), scene.options().bias};
+      : scene((scene_options.bias = options.prior.accelerometer_sigma * random.normalVector<3>(), scene_options),
+              seed) {
+    bias = {options.prior.gyroscope_sigma * random.normalVector<3>(), scene.options().bias};
     readings = readingsOf(scene, noise, random, bias.gyroscope);
     scene.addNoise(sigma, random);
-    window = {motionsOf(scene, readings, {.preintegration = {.noise = imu}}), scene.window.features,
-              scene.options().camera};
-    start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = pixel, .singular_values = false});
+    window = InertialWindow(motionsOf(scene, readings, {.preintegration = {.noise = imu}}), scene.window.features,
+                            scene.window.cameras);
+    start = solveClosedForm(closedFormWindow(window, {}),
+                            {.bearing_noise = pixel, .closed_form = {.singular_values = false}});
   }
 };
 
@@ -77,7 +80,7 @@ struct Consistency {
     append(error, gravity);
     append(error, r.bias.gyroscope - truth.bias.gyroscope);
     append(error, r.bias.accelerometer - truth.bias.accelerometer);
-    detail::SmallMatrix covariance = detail::SmallMatrix::of<12, 12>(r.covariance);
+    detail::SmallMatrix covariance = detail::SmallMatrix::of<12, 12>(r.covariance.atFirst());
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) covariance(3 + i, 3 + j) += along[i] * along[j];
     }
@@ -87,7 +90,7 @@ struct Consistency {
     const Eigen::Matrix<double, 9, 1> last = (truth.last().inverse() * r.states.back()).log();
     detail::SmallMatrix of_last(9, 9);
     for (int i = 0; i < 9; ++i) {
-      for (int j = 0; j < 9; ++j) of_last(i, j) = r.last_covariance(i, j);
+      for (int j = 0; j < 9; ++j) of_last(i, j) = r.covariance.atLast()(i, j);
     }
     of[3] = normalised(of_last, std::vector<double>(last.data(), last.data() + 9), 9);
   }
@@ -105,14 +108,13 @@ TEST(Refinement, FindsExactMotion) {
     Recorded recorded({.images = 11, .features = 12, .camera = {0.05, -0.1, 0.02}}, 400 + seed, {}, 0);
     // The scheme that is good to 1e-6 m/s and 6e-7 m in a second, at the true biases: an update of first order from
     // those of zero, where the refinement starts, leaves 1e-5 rad.
-    recorded.window.motions =
-        motionsOf(recorded.scene, recorded.readings,
-                  {.preintegration = {.noise = imu, .bias = recorded.bias}, .scheme = ImuScheme::cubic});
+    recorded.window = windowOf(recorded.scene, recorded.readings,
+                               {.preintegration = {.noise = imu, .bias = recorded.bias}, .scheme = ImuScheme::cubic});
     ASSERT_FALSE(recorded.start.solutions.empty());
-    RefinementOptions exact = options;
+    InitialisationOptions exact = options;
     // Priors at the truth do not pull.
-    exact.prior = recorded.bias;
-    exact.least_decrease = 1e-9;
+    exact.prior.mean = recorded.bias;
+    exact.refinement.min_decrease = 1e-9;
     const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, exact);
     EXPECT_EQ(refined.status, Status::ok);
     EXPECT_TRUE(refined.ok());
@@ -133,8 +135,8 @@ TEST(Refinement, FindsExactMotion) {
     EXPECT_EQ(free.status, Status::ok);
     EXPECT_EQ(free.degrees_of_freedom + 1, refined.degrees_of_freedom);
     EXPECT_NEAR(free.gravity.norm(), Scene::g, 1e-3);
-    EXPECT_GT(free.gravity.dot(free.covariance.block<3, 3>(3, 3) * free.gravity),
-              100 * refined.gravity.dot(refined.covariance.block<3, 3>(3, 3) * refined.gravity));
+    EXPECT_GT(free.gravity.dot(free.covariance.of<InitialCovariance::gravity>() * free.gravity),
+              100 * refined.gravity.dot(refined.covariance.of<InitialCovariance::gravity>() * refined.gravity));
   }
 }
 
@@ -143,25 +145,27 @@ TEST(Refinement, CovariancesBelongTogether) {
   ASSERT_FALSE(recorded.start.solutions.empty());
   const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, options);
   ASSERT_EQ(refined.status, Status::ok);
+  const Eigen::Matrix<double, 12, 12> at_first = refined.covariance.atFirst();
+  const Eigen::Matrix<double, 18, 18> at_last = refined.covariance.atLast();
   double symmetric = 0, same = 0;
   for (int i = 0; i < 9; ++i) {
     for (int j = 0; j < 9; ++j) {
-      same = std::max(same, std::abs(refined.covariance(3 + i, 3 + j) - refined.last_covariance(9 + i, 9 + j)));
-      symmetric = std::max(symmetric, std::abs(refined.last_covariance(i, j) - refined.last_covariance(j, i)));
+      same = std::max(same, std::abs(at_first(3 + i, 3 + j) - at_last(9 + i, 9 + j)));
+      symmetric = std::max(symmetric, std::abs(at_last(i, j) - at_last(j, i)));
     }
   }
   EXPECT_LE(same, 1e-14);
   EXPECT_LE(symmetric, 1e-12);
   // Noise that is called larger is: biases alone keep their priors.
-  RefinementOptions rough = options;
+  InitialisationOptions rough = options;
   rough.inertial_noise_factor = 10;
   const auto inflated = refine(recorded.window, recorded.start.solutions[0], {}, rough);
   EXPECT_EQ(inflated.status, Status::ok);
-  EXPECT_GT(inflated.covariance(0, 0), refined.covariance(0, 0));
-  EXPECT_LE(inflated.covariance(9, 9), std::pow(options.accelerometer_deviation, 2));
+  EXPECT_GT(inflated.covariance.joint(0, 0), refined.covariance.joint(0, 0));
+  EXPECT_LE(inflated.covariance.atFirst()(9, 9), std::pow(options.prior.accelerometer_sigma, 2));
   // Too few iterations are said to be.
-  RefinementOptions hasty = options;
-  hasty.most_iterations = 1;
+  InitialisationOptions hasty = options;
+  hasty.refinement.max_iterations = 1;
   EXPECT_EQ(refine(recorded.window, recorded.start.solutions[0], {}, hasty).status, Status::not_converged);
 }
 
@@ -170,43 +174,43 @@ TEST(Refinement, RefusesBadInput) {
   ASSERT_FALSE(recorded.start.solutions.empty());
   const ClosedFormSolution& start = recorded.start.solutions[0];
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto fault = [&](const InertialWindow& w, const ClosedFormSolution& s, const RefinementOptions& o) {
+  const auto fault = [&](const InertialWindow& w, const ClosedFormSolution& s, const InitialisationOptions& o) {
     const auto refined = refine(w, s, {}, o);
     EXPECT_EQ(refined.status, Status::bad_input);
     EXPECT_FALSE(refined.ok());
     return refined.fault;
   };
-  EXPECT_EQ(fault(recorded.window, start, {}), ClosedFormFault::bad_option);
-  RefinementOptions bad = options;
-  bad.gyroscope_deviation = 0;
-  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(recorded.window, start, {}), FaultKind::bad_option);
+  InitialisationOptions bad = options;
+  bad.prior.gyroscope_sigma = 0;
+  EXPECT_EQ(fault(recorded.window, start, bad), FaultKind::bad_option);
   bad = options;
   bad.inertial_noise_factor = nan;
-  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(recorded.window, start, bad), FaultKind::bad_option);
   bad = options;
   bad.gravity = -9.81;
-  EXPECT_EQ(fault(recorded.window, start, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(recorded.window, start, bad), FaultKind::bad_option);
   ClosedFormSolution wrong = start;
   wrong.velocity[1] = nan;
-  EXPECT_EQ(fault(recorded.window, wrong, options), ClosedFormFault::bad_option);
-  EXPECT_EQ(fault({}, start, options), ClosedFormFault::too_few_images);
+  EXPECT_EQ(fault(recorded.window, wrong, options), FaultKind::bad_option);
+  EXPECT_EQ(fault({}, start, options), FaultKind::too_few_images);
   InertialWindow window = recorded.window;
   window.features[3][1].image = 60;
-  EXPECT_EQ(fault(window, start, options), ClosedFormFault::wrong_index);
+  EXPECT_EQ(fault(window, start, options), FaultKind::wrong_index);
   // No noise was given for the motions.
   window = recorded.window;
-  window.motions = motionsOf(recorded.scene, recorded.readings);
+  window = windowOf(recorded.scene, recorded.readings);
   EXPECT_EQ(refine(window, start, {}, options).status, Status::bad_motion);
   // Features behind the camera are no start.
   wrong = start;
   for (Eigen::Vector3d& P : wrong.features) P *= -1;
-  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_feature);
+  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_start);
   wrong.features.clear();
-  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_feature);
+  EXPECT_EQ(refine(recorded.window, wrong, {}, options).status, Status::no_start);
   // Biases that are far from those of the readings.
   bad = options;
-  bad.prior.gyroscope = Eigen::Vector3d(0.2, 0, 0);
-  bad.gyroscope_deviation = 1e-4;
+  bad.prior.mean.gyroscope = Eigen::Vector3d(0.2, 0, 0);
+  bad.prior.gyroscope_sigma = 1e-4;
   EXPECT_TRUE(refine(recorded.window, start, {}, bad).must_reintegrate);
 }
 

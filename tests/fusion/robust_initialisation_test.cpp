@@ -18,16 +18,16 @@ namespace {
 
 using namespace liestat;
 using namespace liestat_test;
-using Status = RobustInitialisationStatus;
+using Status = FusionStatus;
 
 constexpr double pixel = 1. / 450;
 constexpr ImuNoise<double> adis{1.7e-4, 2e-3};
-const RobustInitialisationOptions options{
-    .ransac = {.closed_form = {.bearing_noise = pixel, .singular_values = false}}};
+const InitialisationOptions options{.bearing_noise = pixel, .closed_form = {.singular_values = false}};
 
 RobustInitialisation initialise(const RecordedScene& recorded, std::uint64_t seed) {
-  std::mt19937_64 generator(seed);
-  return initialiseRobustly(recorded.window, generator, options, recorded.integrator());
+  InitialisationOptions drawn = options;
+  drawn.consensus.seed = seed;
+  return initialiseRobustly(recorded.window, drawn);
 }
 double speedError(const ClosedFormResult& result, const Scene& scene) {
   return result.solutions.empty() ? 10 : (result.solutions[0].velocity - scene.velocity).norm();
@@ -64,10 +64,10 @@ TEST(RobustInitialisation, IsAsGoodAsWithTheRightTracks) {
       // The same with the right tracks, and a prior around the true bias.
       InertialWindow kept = recorded.window;
       for (std::size_t i = 0; i < drifting; ++i) kept.features[i].clear();
-      GyroscopeBiasOptions told{.closed_form = options.ransac.closed_form};
-      told.start = recorded.bias;
-      told.least_window = 0;
-      oracle.push_back(speedError(estimateGyroscopeBias(kept, told, recorded.integrator()).result, recorded.scene));
+      InitialisationOptions told = options;
+      told.gyroscope_bias.start = recorded.bias;
+      told.gyroscope_bias.min_window = 0;
+      oracle.push_back(speedError(estimateGyroscopeBias(kept, told).result, recorded.scene));
     }
     const double precision = static_cast<double>(right) / static_cast<double>(right + wrong);
     const double recall = static_cast<double>(right) / static_cast<double>(trials * (features - drifting));
@@ -98,8 +98,9 @@ TEST(RobustInitialisation, AtRestAndAtConstantVelocity) {
     const RecordedScene still(recorded_options, seed);
     const auto rest = initialise(still, seed);
     EXPECT_EQ(rest.status, Status::bias_from_rotations);
-    EXPECT_EQ(rest.epipolar.status, EpipolarBiasStatus::no_parallax);
-    EXPECT_EQ(rest.result.status, ClosedFormStatus::stationary);
+    EXPECT_EQ(rest.epipolar.status, FusionStatus::ok);
+    EXPECT_TRUE(rest.epipolar.without_parallax);
+    EXPECT_EQ(rest.result.status, FusionStatus::stationary);
     EXPECT_FALSE(rest.ok());
     EXPECT_EQ(rest.inliers.size(), 18u);
     EXPECT_EQ(rest.result.features[0].observations, 21u);
@@ -119,8 +120,7 @@ TEST(RobustInitialisation, AtRestAndAtConstantVelocity) {
 TEST(RobustInitialisation, WithoutReadingsOrTracks) {
   const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6},
                                3);
-  std::mt19937_64 generator(1);
-  const auto found = initialiseRobustly(recorded.window, generator, options);
+  const auto found = initialiseRobustly(InertialWindow(recorded.window.motions(), recorded.window.features), options);
   EXPECT_TRUE(found.ok()) << describe(found.status);
   EXPECT_LE((found.gyroscope_bias - recorded.bias).norm(), 0.01);
 
@@ -128,21 +128,21 @@ TEST(RobustInitialisation, WithoutReadingsOrTracks) {
   const auto lost = initialise(wrong, 1);
   EXPECT_FALSE(lost.ok());
 
-  const auto fault = [&](const InertialWindow& window, const RobustInitialisationOptions& o) {
-    const auto refused = initialiseRobustly(window, generator, o);
+  const auto fault = [&](const InertialWindow& window, const InitialisationOptions& o) {
+    const auto refused = initialiseRobustly(window, o);
     EXPECT_EQ(refused.status, Status::bad_input);
     return refused.result.fault;
   };
-  EXPECT_EQ(fault(recorded.window, {}), ClosedFormFault::bad_option);
-  EXPECT_EQ(fault({}, options), ClosedFormFault::too_few_images);
-  RobustInitialisationOptions bad = options;
-  bad.ransac.features_drawn = 0;
-  EXPECT_EQ(fault(recorded.window, bad), ClosedFormFault::bad_option);
+  EXPECT_EQ(fault(recorded.window, {}), FaultKind::bad_option);
+  EXPECT_EQ(fault({}, options), FaultKind::too_few_images);
+  InitialisationOptions bad = options;
+  bad.consensus.features_drawn = 0;
+  EXPECT_EQ(fault(recorded.window, bad), FaultKind::bad_option);
   InertialWindow window = recorded.window;
   window.features[7][3].bearing.setZero();
-  EXPECT_EQ(fault(window, options), ClosedFormFault::bad_bearing);
+  EXPECT_EQ(fault(window, options), FaultKind::bad_bearing);
   window.features.assign(3, {});
-  EXPECT_EQ(fault(window, options), ClosedFormFault::no_feature);
+  EXPECT_EQ(fault(window, options), FaultKind::no_feature);
 }
 
 }  // namespace

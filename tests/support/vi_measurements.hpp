@@ -9,5 +9,6 @@ namespace liestat_test {
 using liestat::experiments::measure;
 using liestat::experiments::motionsOf;
 using liestat::experiments::readingsOf;
+using liestat::experiments::windowOf;
 
 }  // namespace liestat_test

@@ -38,19 +38,13 @@ struct RecordedScene {
     readings = readingsOf(scene, o.noise, random, bias);
     for (liestat::FeatureTrack& track : scene.window.features) {
       for (liestat::TrackedBearing& seen : track) {
-        seen.deviation = o.spread == 1 ? 1 : std::pow(o.spread, random.uniform(-1, 1));
-        const Eigen::Vector3d noise = o.sigma * seen.deviation * random.normalVector<3>();
+        seen.relative_sigma = o.spread == 1 ? 1 : std::pow(o.spread, random.uniform(-1, 1));
+        const Eigen::Vector3d noise = o.sigma * seen.relative_sigma * random.normalVector<3>();
         seen.bearing = (seen.bearing + noise - seen.bearing.dot(noise) * seen.bearing).normalized();
       }
     }
     scene.addDrift(o.drifting, o.drift, random);
-    window = {integrate({}), scene.window.features, o.scene.camera};
-  }
-  std::vector<liestat::Preintegration<double>> integrate(const liestat::ImuBias<double>& at) const {
-    return motionsOf(scene, readings, {.preintegration = {.noise = options.noise, .bias = at}});
-  }
-  auto integrator() const {
-    return [this](const liestat::ImuBias<double>& at) { return integrate(at); };
+    window = windowOf(scene, readings, {.preintegration = {.noise = options.noise}});
   }
 };
 

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cli/io/calibration.hpp>
+#include <cli/io/image_tracks.hpp>
+#include <cli/io/imu_file.hpp>
+#include <fusion/visual_inertial.hpp>
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace liestat::cli {
+
+/// What `liestat vi-init` works on. Times of images are on the inertial sensor's clock.
+struct ViRecording {
+  ImuFile imu;
+  ImageTracks tracks;
+  CameraCalibration camera;
+  ImuNoise<double> noise;
+  std::vector<GroundTruth> truth;  ///< empty: not known
+};
+
+/// How far an estimate is from the ground truth.
+struct ViError {
+  double speed = 0;    ///< m/s, of the velocity at the first image
+  double gravity = 0;  ///< rad, of its direction
+  double scale = 0;    ///< relative, of the trajectory of the window: (Σ p·p_true)/(Σ p_true²) − 1
+};
+
+/// One window, compared with the ground truth where that is known.
+struct ViWindow : InitialisedWindow {
+  std::optional<ViError> closed_form_error, refined_error;
+  std::optional<double> gyroscope_error;  ///< rad/s, of the best known bias
+  std::optional<double> nees;             ///< of the refined V and G, 5 degrees of freedom
+};
+
+/// What disjoint windows say together, compared with the ground truth where that is known.
+struct ViFusion : FusedStretch {
+  double p_value = 1;  ///< that windows which agree are so far apart
+  /// In the body's axes: a unit vector, m/s, rad/s, m/s², with the RMS of the standard deviations of their coordinates.
+  Eigen::Vector3d down, velocity, gyroscope_bias, accelerometer_bias;
+  double down_sigma = 0, velocity_sigma = 0, gyroscope_sigma = 0, accelerometer_sigma = 0;
+  std::optional<double> speed_error, gravity_error, gyroscope_error, accelerometer_error;  ///< m/s, rad, rad/s, m/s²
+  std::optional<double> nees;                                                              ///< 11 degrees of freedom
+};
+
+/// What the command shows.
+struct ViInitResult {
+  std::vector<ViWindow> windows;
+  std::vector<ViFusion> fusions;
+  std::optional<double> gravity;         ///< |G| that was given, m/s²
+  bool biases_given = false;             ///< and not estimated
+  double bearing_noise = 0;              ///< rad
+  std::size_t images_outside = 0;        ///< that the readings do not cover
+  std::size_t observations_outside = 0;  ///< pixels that the lens' model can't explain
+};
+
+/// Compares what was found with the recording's ground truth; gravity's length in m/s², none: it was not known.
+ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& recording, std::optional<double> gravity);
+
+}  // namespace liestat::cli

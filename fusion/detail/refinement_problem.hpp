@@ -1,0 +1,240 @@
+// The posterior of a window as a function of states, gravity, biases and features, for the refinement.
+#pragma once
+
+#include <fusion/detail/reduced_system.hpp>
+#include <fusion/imu/factor.hpp>
+#include <fusion/imu/window.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// The rows of a motion between two images: the residual's covariance, whitened.
+struct MotionWeight {
+  Eigen::Matrix<double, 9, 9> root;  ///< lower triangular, rootᵀ root = covariance⁻¹
+
+  /// False where the covariance is not positive definite.
+  bool set(const Eigen::Matrix<double, 9, 9>& covariance, double factor) {
+    Eigen::Matrix<double, 9, 9> L = Eigen::Matrix<double, 9, 9>::Zero();
+    root.setZero();
+    for (int i = 0; i < 9; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        double sum = covariance(i, j);
+        for (int k = 0; k < j; ++k) sum -= L(i, k) * L(j, k);
+        if (i == j && (!(sum > 0) || !std::isfinite(sum))) return false;
+        L(i, j) = i == j ? std::sqrt(sum) : sum / L(j, j);
+      }
+    }
+    for (int c = 0; c < 9; ++c) {
+      for (int i = c; i < 9; ++i) {
+        double sum = i == c ? 1 / factor : 0;
+        for (int k = c; k < i; ++k) sum -= L(i, k) * root(k, c);
+        root(i, c) = sum / L(i, i);
+      }
+    }
+    return true;
+  }
+  /// root times a matrix of nine rows, from its column on.
+  template <class Matrix>
+  Eigen::Matrix<double, 9, 3> times(const Matrix& J, int column) const {
+    Eigen::Matrix<double, 9, 3> result = Eigen::Matrix<double, 9, 3>::Zero();
+    for (int k = 0; k < 9; ++k) {
+      for (int i = k; i < 9; ++i) {
+        for (int c = 0; c < 3; ++c) result(i, c) += root(i, k) * J(k, column + c);
+      }
+    }
+    return result;
+  }
+};
+
+/// The posterior as a function of states, G, biases and features. Blocks: v of all images, then (p, φ) of each but the
+/// first, then G, b_g, b_a: velocities, which only motions tie to other unknowns, are eliminated while rows are sparse.
+class RefinementProblem {
+ public:
+  struct State {
+    std::vector<SE23d> X;
+    Eigen::Vector3d gravity;
+    ImuBias<double> bias;
+    std::vector<Eigen::Vector3d> P;
+  };
+
+  RefinementProblem(const InertialWindow& window, const InitialisationOptions& options)
+      : window_(window), options_(options) {}
+
+  /// False where a motion has no covariance.
+  bool setWeights() {
+    for (const Preintegration<double>& motion : window_.motions()) {
+      weights_.emplace_back();
+      if (!weights_.back().set(motion.gaussian().covariance, options_.inertial_noise_factor)) return false;
+    }
+    return true;
+  }
+  /// Starts at a solution; features that are not in front of all their cameras are left out.
+  void start(const ClosedFormSolution& s, const ImuBias<double>& bias) {
+    state_.bias = bias;
+    state_.gravity = s.gravity;
+    if (options_.gravity) state_.gravity *= *options_.gravity / s.gravity.norm();
+    for (const BiasedImage& b : biasedImages(window_.motions(), bias)) {
+      const double t = b.image.time;
+      state_.X.emplace_back(SO3d(b.image.rotation),
+                            Eigen::Vector3d(t * s.velocity + (0.5 * t * t) * state_.gravity + b.image.displacement),
+                            Eigen::Vector3d(s.velocity + t * state_.gravity + b.speed));
+    }
+    for (std::size_t i = 0; i < window_.features.size() && i < s.features.size(); ++i) {
+      const FeatureTrack& track = window_.features[i];
+      const auto isBehind = [&](const TrackedBearing& seen) {
+        return !(bearingInBody(window_.cameras, seen).dot(inCamera(state_.X[seen.image], s.features[i], lever(seen))) >
+                 0);
+      };
+      if (track.size() < 2 || !s.features[i].allFinite() || std::any_of(track.begin(), track.end(), isBehind)) continue;
+      for (const TrackedBearing& seen : track) {
+        const Eigen::Vector3d bearing = bearingInBody(window_.cameras, seen);
+        observations_.push_back(
+            {state_.P.size(), seen.image, bearing, tangentRows(bearing), lever(seen), seen.relative_sigma});
+      }
+      state_.P.push_back(s.features[i]);
+      feature_.push_back(i);
+    }
+  }
+
+  const State& state() const { return state_; }
+  const std::vector<std::size_t>& features() const { return feature_; }
+  std::size_t observations() const { return observations_.size(); }
+  int blocks() const { return gravityBlock() + 3; }
+  int gravityBlock() const { return 3 * static_cast<int>(state_.X.size()) - 2; }
+  /// Of the part of a state: 0 position, 1 rotation, 2 velocity. The first state has the velocity alone.
+  int stateBlock(std::size_t j, int part) const {
+    const int images = static_cast<int>(state_.X.size()), image = static_cast<int>(j);
+    return part == 2 ? image : images + 2 * (image - 1) + part;
+  }
+
+  double linearise(ReducedSystem& system) {
+    system.clear();
+    return run(state_, &system);
+  }
+  double costAfter(const ReducedSystem& system) {
+    next_ = state_;
+    next_.X[0].velocity() += system.shared(stateBlock(0, 2));
+    for (std::size_t j = 1; j < next_.X.size(); ++j) {
+      Eigen::Matrix<double, 9, 1> step;
+      step << system.shared(stateBlock(j, 0)), system.shared(stateBlock(j, 1)), system.shared(stateBlock(j, 2));
+      if (!step.allFinite()) return std::numeric_limits<double>::infinity();
+      next_.X[j] *= SE23d::exp(step);
+    }
+    const int g = gravityBlock();
+    next_.gravity += system.shared(g);
+    if (options_.gravity) next_.gravity *= *options_.gravity / next_.gravity.norm();
+    next_.bias.gyroscope += system.shared(g + 1);
+    next_.bias.accelerometer += system.shared(g + 2);
+    for (std::size_t i = 0; i < next_.P.size(); ++i) next_.P[i] += system.feature(i);
+    return run(next_, nullptr);
+  }
+  void accept() { std::swap(state_, next_); }
+
+ private:
+  struct Observation {
+    std::size_t feature, image;
+    Eigen::Vector3d bearing;
+    Eigen::Matrix<double, 2, 3> across;
+    Eigen::Vector3d lever;  ///< the camera's centre in the body
+    double relative_sigma;
+  };
+
+  Eigen::Vector3d lever(const TrackedBearing& seen) const { return window_.cameras[seen.camera].translation(); }
+  /// From a camera to a feature, in the body's axes.
+  static Eigen::Vector3d inCamera(const SE23d& X, const Eigen::Vector3d& P, const Eigen::Vector3d& lever) {
+    return X.so3().inverse() * Eigen::Vector3d(P - X.translation()) - lever;
+  }
+
+  double run(const State& state, ReducedSystem* system) const {
+    double cost = 0;
+    for (std::size_t k = 0; k < window_.motions().size(); ++k) cost += addMotion(state, k, system);
+    const int g = gravityBlock();
+    cost +=
+        addPrior(state.bias.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, g + 1, system);
+    cost += addPrior(state.bias.accelerometer - options_.prior.mean.accelerometer, options_.prior.accelerometer_sigma,
+                     g + 2, system);
+    if (system && options_.gravity) {
+      // A stiff row along G: its length has no freedom.
+      ResidualRows rows(1);
+      rows.value[0] = 0;
+      rows.add(g, Eigen::Matrix<double, 1, 3>(1e6 * state.gravity.normalized().transpose()));
+      system->add(rows);
+    }
+    Eigen::Matrix<double, 2, 3> by_d;
+    std::size_t image = state.X.size();
+    Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // of the image last seen
+    for (const Observation& seen : observations_) {
+      if (seen.image != image) {
+        image = seen.image;
+        back = state.X[image].so3().matrix().transpose();
+      }
+      const Eigen::Vector3d b = back * (state.P[seen.feature] - state.X[image].translation());
+      ResidualRows rows(2);
+      if (!bearingResidual(b - seen.lever, seen.across, seen.bearing, seen.relative_sigma * options_.bearing_noise,
+                           rows, by_d)) {
+        return std::numeric_limits<double>::infinity();
+      }
+      cost += rows.squared();
+      if (!system) continue;
+      if (image > 0) {
+        // X Exp(δ): the point moves by -δp + b × δφ in the body.
+        rows.add(stateBlock(image, 0), Eigen::Matrix<double, 2, 3>(-by_d));
+        rows.add(stateBlock(image, 1), Eigen::Matrix<double, 2, 3>(by_d * skew(b)));
+      }
+      system->add(rows, seen.feature, Eigen::Matrix<double, 2, 3>(by_d * back));
+    }
+    return cost;
+  }
+
+  double addMotion(const State& state, std::size_t k, ReducedSystem* system) const {
+    const SE23d &from = state.X[k], &to = state.X[k + 1];
+    const MotionWeight& weight = weights_[k];
+    ResidualRows rows(9);
+    const auto set = [&](const Eigen::Matrix<double, 9, 1>& value) {
+      for (int i = 0; i < 9; ++i) {
+        double sum = 0;
+        for (int j = 0; j <= i; ++j) sum += weight.root(i, j) * value[j];
+        rows.value[static_cast<std::size_t>(i)] = sum;
+      }
+      return rows.squared();
+    };
+    if (!system) {
+      return set(preintegrationError<double>(window_.motions()[k], from, to, state.bias, state.gravity));
+    }
+    const PreintegrationResidual<double> r =
+        preintegrationResidual<double>(window_.motions()[k], from, to, state.bias, state.gravity);
+    const double cost = set(r.value);
+    for (int c = k == 0 ? 2 : 0; c < 3; ++c) rows.add(stateBlock(k, c), weight.times(r.by_first, 3 * c));
+    for (int c = 0; c < 3; ++c) rows.add(stateBlock(k + 1, c), weight.times(r.by_second, 3 * c));
+    rows.add(gravityBlock(), weight.times(r.by_gravity, 0));
+    rows.add(gravityBlock() + 1, weight.times(r.by_bias, 0));
+    rows.add(gravityBlock() + 2, weight.times(r.by_bias, 3));
+    system->add(rows);
+    return cost;
+  }
+
+  static double addPrior(const Eigen::Vector3d& error, double sigma, int block, ReducedSystem* system) {
+    ResidualRows rows(3);
+    rows.add(block, Eigen::Matrix3d(Eigen::Matrix3d::Identity() / sigma));
+    for (int k = 0; k < 3; ++k) rows.value[static_cast<std::size_t>(k)] = error[k] / sigma;
+    if (system) system->add(rows);
+    return rows.squared();
+  }
+
+  const InertialWindow& window_;
+  const InitialisationOptions& options_;
+  State state_, next_;
+  std::vector<MotionWeight> weights_;
+  std::vector<Observation> observations_;
+  std::vector<std::size_t> feature_;
+};
+
+}  // namespace liestat::detail

@@ -1,0 +1,105 @@
+// The options of visual-inertial initialisation, of all its steps in one tree: noise, gravity and the priors of the
+// biases are stated once, and each step adds the numbers that only it needs.
+//
+//   const liestat::InitialisationOptions options{.bearing_noise = 1. / 450, .closed_form = {.estimate_bias = true}};
+//
+// Every function of fusion/init/ takes the whole tree and reads its part.
+#pragma once
+
+#include <fusion/imu/readings.hpp>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace liestat {
+
+/// What is known of the biases beforehand: normal about `mean`, with these standard deviations in each axis.
+struct BiasPrior {
+  ImuBias<double> mean = {};
+  double gyroscope_sigma = 0.1;      ///< rad/s
+  double accelerometer_sigma = 0.1;  ///< m/s²; for the closed form infinite means none
+};
+
+/// fusion/init/closed_form.hpp
+struct ClosedFormOptions {
+  /// Also the accelerometer's bias, as a correction of the one that was integrated, with a prior N(0, σ²) about that.
+  bool estimate_bias = false;
+  int weight_passes = 3;          ///< passes with weights 1/depth² after the first; exact data need none
+  bool singular_values = true;    ///< the diagnosis of ranks; exact data always have it
+  double min_parallax = 4;        ///< with noise: RMS parallax of a feature that is used, in sigmas of a bearing
+  bool remove_noise_bias = true;  ///< with noise: take off what noise adds to the system. Without, scale is too small
+  /// What counts as determined, with noise: the scale to 30 %, the vertical to 0.2 rad.
+  double max_scale_sigma = 0.3;
+  double max_tilt_sigma = 0.2;
+};
+
+/// fusion/init/consensus.hpp
+struct ConsensusOptions {
+  double max_residual = 3;         ///< RMS angle of an inlier, in sigmas of a bearing
+  double misfit_sigmas = 5;        ///< of a feature's χ², beyond which it is dropped from the solution in the end
+  std::size_t features_drawn = 4;  ///< a hypothesis
+  std::size_t max_hypotheses = 300;
+  double confidence = 0.9999;    ///< drawing ends when an all-inlier sample was missed with 1 - this probability
+  std::size_t local_passes = 3;  ///< of solving again for those that agree with the best hypothesis so far
+  std::uint64_t seed = 1;        ///< of the draws: the same seed gives the same result
+};
+
+/// fusion/init/epipolar_gyroscope_bias.hpp
+struct EpipolarBiasOptions {
+  /// Of a pair of images that is used: RMS by which its directions move, beyond what a rotation explains, in sigmas.
+  double min_parallax = 4;
+  double misfit_sigmas = 5;    ///< of a track's χ², beyond which it is rejected
+  double min_consensus = 0.4;  ///< fraction of the tracks that must agree
+  double max_sigma = 0.02;     ///< rad/s, predicted, of the bias's least known direction
+  int max_iterations = 30;     ///< of the last stage
+};
+
+/// fusion/init/gyroscope_bias.hpp
+struct GyroscopeBiasOptions {
+  std::optional<Eigen::Vector3d> start = {};  ///< rad/s, where to begin; none: at the prior
+  double max_step = 0.2;                      ///< rad/s
+  /// A window of at most so many seconds is only solved with a prior as good as one from rest.
+  double min_window = 1;
+  double sigma_from_rest = 0.02;  ///< rad/s
+  int max_rounds = 8;             ///< each from the closed form for the last one's bias
+  int max_iterations = 20;        ///< in a round
+};
+
+/// fusion/init/refinement.hpp
+struct RefinementOptions {
+  int max_iterations = 50;
+  double min_decrease = 1e-3;  ///< of the cost (χ²): below it, it has converged
+  int max_integrations = 3;    ///< how often the readings are integrated anew for biases that have gone too far
+};
+
+/// All of them.
+struct InitialisationOptions {
+  /// Standard deviation of a bearing in each direction across it, in rad (pixel noise over focal length), times the
+  /// bearing's own relative_sigma. 0: exact data, which only the closed form takes; its status is then decided by ranks.
+  double bearing_noise = 0;
+  std::optional<double> gravity = 9.81;  ///< |G| in m/s²; none: its length is an unknown too
+  BiasPrior prior = {};
+  /// Scales the standard deviations of the preintegrated motions in the refinement: data sheets tell the noise of a
+  /// sensor at rest, and on real recordings errors are larger (scale factors, vibration, time stamps).
+  double inertial_noise_factor = 1;
+  int max_rounds = 3;  ///< of consensus and gyroscope's bias, in initialiseRobustly()
+
+  ClosedFormOptions closed_form = {};
+  ConsensusOptions consensus = {};
+  EpipolarBiasOptions epipolar = {};
+  GyroscopeBiasOptions gyroscope_bias = {};
+  RefinementOptions refinement = {};
+};
+
+/// What each of n windows that are to be fused (fusion/init/window_fusion.hpp) is refined with, so that all together
+/// count the prior of the biases once: standard deviations √n times as large.
+inline InitialisationOptions withSharedPrior(InitialisationOptions options, std::size_t n) {
+  const double root = std::sqrt(static_cast<double>(n));
+  options.prior.gyroscope_sigma *= root;
+  options.prior.accelerometer_sigma *= root;
+  return options;
+}
+
+}  // namespace liestat

@@ -1,0 +1,158 @@
+// The front door: a recording in, windows and what they say together out; several cameras; what can't be used.
+
+#include <fusion/visual_inertial.hpp>
+#include <support/vi_measurements.hpp>
+#include <support/vi_scene.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+
+constexpr double pixel = 1. / 450;
+const ImuNoise<double> imu{1.7e-4, 2e-3};
+
+/// Seven seconds at ten images a second.
+struct Flight {
+  ImuBias<double> bias{{0.02, -0.01, 0.015}, {0.05, -0.04, 0.03}};
+  Scene scene{{.images = 71, .features = 25, .window = 7, .bias = bias.accelerometer}, 7};
+  std::vector<ImuSample<double>> readings;
+  VisualInertialRecording recording;
+
+  Flight() {
+    CounterRng random(3);
+    readings = readingsOf(scene, imu, random, bias.gyroscope);
+    scene.addNoise(pixel, random);
+    recording = {.readings = readings,
+                 .noise = imu,
+                 .image_times = scene.times,
+                 .cameras = scene.window.cameras,
+                 .observations = {}};
+    for (std::size_t i = 0; i < scene.window.features.size(); ++i) {
+      for (const TrackedBearing& seen : scene.window.features[i]) {
+        recording.observations.push_back({.image = seen.image, .track = i, .bearing = seen.bearing, .sigma = pixel});
+      }
+    }
+  }
+};
+
+TEST(VisualInertial, InitialisesARecording) {
+  const Flight flight;
+  std::size_t progress = 0;
+  const VisualInertialOptions options{.stride = 2.5};
+  const auto result = initialiseRecording(flight.recording, options, [&](std::size_t, std::size_t) { ++progress; });
+  EXPECT_FALSE(result.fault) << describe(result.fault);
+  ASSERT_EQ(result.windows.size(), 3u);
+  EXPECT_EQ(progress, 3u);
+  EXPECT_NEAR(result.bearing_noise, pixel, 1e-15);
+  for (const InitialisedWindow& w : result.windows) {
+    EXPECT_TRUE(w.ok()) << describe(w.verdict());
+    ASSERT_TRUE(w.isRefined());
+    const SO3d back = flight.scene.attitude(w.begin).inverse();
+    // Far beyond the standard deviations of a window of two seconds (0.02 m/s, 0.3 deg).
+    EXPECT_LE((w.refined->velocity() - back * flight.scene.speed(w.begin)).norm(), 0.15);
+    EXPECT_LE((w.refined->gravity - back * Eigen::Vector3d(0, 0, -Scene::g)).norm(), 0.3);
+    EXPECT_EQ(w.states().size(), w.images.size());
+    // A window is integrated with the gyroscope's bias that it found.
+    EXPECT_EQ(w.measured.bias().gyroscope, w.found.gyroscope_bias);
+  }
+  ASSERT_EQ(result.stretches.size(), 1u);
+  const FusedStretch& all = result.stretches[0];
+  ASSERT_TRUE(all.has_state);
+  EXPECT_EQ(all.windows.size(), 3u);
+  EXPECT_EQ(all.degrees_of_freedom, 22u);
+  EXPECT_LE(all.chi2, 22 + 5 * std::sqrt(44.));
+  EXPECT_LE((all.state.mean.get<2>() - flight.bias.gyroscope).norm(), 0.003);
+  // The same seed gives the same result.
+  const auto again = initialiseRecording(flight.recording, options);
+  EXPECT_EQ(again.windows[1].refined->cost, result.windows[1].refined->cost);
+  EXPECT_EQ(again.stretches[0].chi2, all.chi2);
+}
+
+TEST(VisualInertial, KnownBiasesAreNotEstimated) {
+  const Flight flight;
+  VisualInertialOptions options{.window = 2, .end = 2.05};
+  options.known_bias = [&](double) { return std::optional(flight.bias); };
+  const auto result = initialiseRecording(flight.recording, options);
+  ASSERT_EQ(result.windows.size(), 1u);
+  EXPECT_TRUE(result.windows[0].ok());
+  EXPECT_TRUE(result.windows[0].known_biases);
+  EXPECT_LE((result.windows[0].bias().gyroscope - flight.bias.gyroscope).norm(), 1e-5);
+}
+
+TEST(VisualInertial, SaysWhatCannotBeUsed) {
+  Flight flight;
+  VisualInertialRecording bad = flight.recording;
+  bad.observations[5].image = 200;
+  EXPECT_EQ(initialiseRecording(bad, {}).fault, Fault(FaultKind::wrong_index, 5));
+  bad = flight.recording;
+  bad.observations[9].camera = 1;
+  EXPECT_EQ(initialiseRecording(bad, {}).fault, Fault(FaultKind::wrong_index, 9));
+  bad = flight.recording;
+  bad.noise = {};
+  EXPECT_EQ(initialiseRecording(bad, {}).fault, FaultKind::bad_option);
+  bad = flight.recording;
+  std::swap(bad.image_times[3], bad.image_times[4]);
+  EXPECT_EQ(initialiseRecording(bad, {}).fault, FaultKind::bad_option);
+  EXPECT_EQ(initialiseRecording(flight.recording, {.window = 30}).fault, FaultKind::too_few_images);
+  EXPECT_EQ(initialiseRecording(flight.recording, {.stride = 0.1, .max_windows = 10}).fault, FaultKind::bad_option);
+  EXPECT_EQ(initialiseRecording({}, {}).fault, FaultKind::bad_option);
+  // A gap in the readings is the window's.
+  flight.readings.erase(flight.readings.begin() + 500, flight.readings.begin() + 540);
+  bad = flight.recording;
+  bad.readings = flight.readings;
+  const auto gap = initialiseRecording(bad, {});
+  EXPECT_FALSE(gap.fault);
+  ASSERT_EQ(gap.windows.size(), 3u);
+  EXPECT_TRUE(gap.windows[0].ok());
+  EXPECT_EQ(gap.windows[1].verdict(), FusionStatus::gap);
+  EXPECT_EQ(gap.windows[1].fault, Fault(FaultKind::gap, 500));
+  EXPECT_NEAR(gap.windows[1].fault_time, 2.7, 1e-9);
+  // Bearings at times of their own are for later.
+  bad = flight.recording;
+  for (BearingMeasurement& seen : bad.observations) seen.time = bad.image_times[seen.image] + 0.01;
+  EXPECT_EQ(initialiseRecording(bad, {.end = 2.05}).windows.at(0).found.result.fault, FaultKind::bearing_time);
+}
+
+// Two cameras that look elsewhere from other places: exact bearings give the exact motion, features that only one of
+// them sees included.
+TEST(SeveralCameras, SolveTheClosedForm) {
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    const Scene scene({.images = 8, .features = 8}, seed);
+    ClosedFormWindow window = scene.window;
+    window.cameras = {SE3d(SO3d::exp(Eigen::Vector3d(0.1, -0.2, 0.3)), Eigen::Vector3d(0.1, 0, 0.05)),
+                      SE3d(SO3d::exp(Eigen::Vector3d(-0.3, 0.1, 1)), Eigen::Vector3d(-0.1, 0.2, 0))};
+    for (std::size_t i = 0; i < window.features.size(); ++i) {
+      FeatureTrack track;
+      for (const TrackedBearing& seen : window.features[i]) {
+        const double t = window.images[seen.image].time;
+        const Eigen::Vector3d moved =
+            scene.attitude(0).inverse() * Eigen::Vector3d(scene.position(t) - scene.position(0));
+        const Eigen::Vector3d d =
+            window.images[seen.image].rotation.transpose() * Eigen::Vector3d(scene.features[i] - moved);
+        for (std::size_t c = 0; c < 2; ++c) {
+          if (i % 3 == c) continue;
+          const Eigen::Vector3d bearing = window.cameras[c].inverse() * d;
+          track.push_back({.image = seen.image, .bearing = bearing, .camera = c, .time = t});
+        }
+      }
+      window.features[i] = track;
+    }
+    const auto result = solveClosedForm(window);
+    ASSERT_EQ(result.status, FusionStatus::ok) << seed;
+    EXPECT_LE((result.solutions[0].velocity - scene.velocity).norm(), 1e-8) << seed;
+    EXPECT_LE((result.solutions[0].gravity - scene.gravity).norm(), 1e-8) << seed;
+    EXPECT_EQ(result.images_used, 8u);
+    window.features[2][0].camera = 2;
+    EXPECT_EQ(solveClosedForm(window).fault, Fault(FaultKind::wrong_index, 2));
+  }
+}
+
+}  // namespace
