@@ -6,6 +6,7 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/mean.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <ranges>
@@ -48,7 +49,11 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
     result.covariance += p * z * z.transpose();
     weight += p;
     for (FarthestFeature& f : result.farthest) {
-      const double size = static_cast<double>(z.segment(f.block.begin, f.block.size).norm());
+      double squares = 0;
+      for (int k = f.block.begin; k < f.block.begin + f.block.size; ++k) {
+        squares += static_cast<double>(z[k]) * static_cast<double>(z[k]);
+      }
+      const double size = std::sqrt(squares);
       if (size > f.distance * (1 + tie) || i == 0) f.distance = size, f.index = i;
     }
   }
