@@ -17,5 +17,6 @@
 #include <lie/semi_oriented_frame3.hpp>
 #include <lie/sim2.hpp>
 #include <lie/sim3.hpp>
+#include <lie/simple_manifold.hpp>
 #include <lie/so2.hpp>
 #include <lie/so3.hpp>

@@ -10,6 +10,7 @@
 #include <lie/frame3.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
+#include <stats/detail/ranges.hpp>
 #include <stats/maha.hpp>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -88,11 +90,11 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   const std::size_t n = std::ranges::size(samples);
   if (n == 0) return without(Status::too_few, "there are no features");
   std::vector<M> features;
-  std::vector<ScalarOf<M>> weights;
+  std::vector<double> weights;
   features.reserve(n), weights.reserve(n);
   for (const Gaussian<M>& g : samples) {
     features.push_back(g.mean);
-    weights.push_back(scalarWeight(g.covariance));
+    weights.push_back(static_cast<double>(scalarWeight(g.covariance)));
   }
 
   std::vector<std::optional<M>> starts;
@@ -103,10 +105,16 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     CertifiedMeanOptions<Twin> how;
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
-    const auto twin = findCertifiedMean<Twin>(executor, metricTwins<M>(features), weights, how);
+    // Of the types that the front door of certifiedMean has, so that both share what they compile.
+    const Samples<Twin> twins(metricTwins<M>(features));
+    const Samples<double> numbers(std::move(weights));
+    const auto twin = findCertifiedMean<Twin>(executor, twins, numbers, how);
     result.cut_locus = twin.cut_locus;
     twin_status = twin.status;
-    starts.push_back(fromTwin<M>(twin.mean.mean));
+    // Exact to rounding and not only to its tolerance, or the number of steps from there would hang on the last digits.
+    MeanOptions<Twin> once_more;
+    once_more.start = twin.mean.mean;
+    starts.push_back(fromTwin<M>(frechetMean<Twin>(executor, twins, numbers, once_more).mean));
     for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
   } else {
     starts.push_back(std::nullopt);  // the one that maha() chooses

@@ -45,7 +45,9 @@ SquareOf<M> worldAxes(const M& x) {
   const SquareOf<M> Adj = T::placement(x).Adj();
   SquareOf<M> J = SquareOf<M>::Zero();
   for (const TangentBlock& b : T::tangent_parts) {
-    J.block(b.begin, b.begin, b.size, b.size) = Adj.block(b.begin, b.begin, b.size, b.size);
+    for (int i = b.begin; i < b.begin + b.size; ++i) {
+      for (int j = b.begin; j < b.begin + b.size; ++j) J(i, j) = Adj(i, j);
+    }
   }
   return J;
 }

@@ -6,7 +6,9 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/mean.hpp>
 
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <ranges>
 #include <vector>
 
@@ -16,7 +18,7 @@ namespace liestat {
 struct FarthestFeature {
   TangentBlock block;
   double distance = 0;    ///< norm of these coordinates, rad, m or whatever they are in
-  std::size_t index = 0;  ///< in the range; the first of equals
+  std::size_t index = 0;  ///< in the range; the first of those that are equal but for rounding
 };
 
 /// What dispersionAbout() returns.
@@ -39,14 +41,20 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   }
   const typename T::Group to_y = T::placement(y).inverse();
   S weight(0);
+  // Two features are equally far from their midpoint: rounding is not to choose.
+  const double tie = 64 * static_cast<double>(std::numeric_limits<S>::epsilon());
   for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
     const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
     const S p = S(weights[i]);
     result.covariance += p * z * z.transpose();
     weight += p;
     for (FarthestFeature& f : result.farthest) {
-      const double size = static_cast<double>(z.segment(f.block.begin, f.block.size).norm());
-      if (size > f.distance || i == 0) f.distance = size, f.index = i;
+      double squares = 0;
+      for (int k = f.block.begin; k < f.block.begin + f.block.size; ++k) {
+        squares += static_cast<double>(z[k]) * static_cast<double>(z[k]);
+      }
+      const double size = std::sqrt(squares);
+      if (size > f.distance * (1 + tie) || i == 0) f.distance = size, f.index = i;
     }
   }
   result.covariance /= weight;

@@ -15,6 +15,8 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -109,6 +111,19 @@ struct ManifoldOperations {
 
   // Optional: derivatives of dlogOrigin (see checkSecondDerivatives).
   Function<Matrix, Vector, Vector> dlogFeatureTransposed, dlogBaseTransposed;
+
+  /// What the traits tell statistics; empty where they say nothing.
+  struct Statistics {
+    CompactFactor compact_factor = CompactFactor::unknown;
+    int compact_begin = 0;
+    Function<Vector, Point> compactCoordinates, parameters;
+    Function<std::vector<Point>, std::vector<Point>, Vector> chordalMean;  ///< of weighted points; one or, if they
+                                                                           ///< cancel, none
+    std::vector<TangentBlock> tangent_parts;
+    Function<Point, Point> throughMetricTwin, throughFactors;  ///< there and back
+    std::vector<int> factor_sizes;
+    Function<Vector, Point, Point> factorDistances;
+  } statistics;
 };
 
 namespace detail {
@@ -181,6 +196,72 @@ ManifoldOperations::Group groupOperations() {
     g.vee = +[](const Matrix& m) { return contractVector(G::vee(contractNarrow<Square>(m))); };
   }
   return g;
+}
+
+}  // namespace detail
+
+namespace detail {
+
+/// What M's traits tell statistics.
+template <Homogeneous M>
+ManifoldOperations::Statistics statisticsOperationsOf() {
+  using T = ManifoldTraits<M>;
+  using Vector = ManifoldOperations::Vector;
+  using Point = ManifoldOperations::Point;
+  ManifoldOperations::Statistics s;
+  s.compact_factor = compactFactor<M>();
+  if constexpr (compactFactor<M>() != CompactFactor::none && compactFactor<M>() != CompactFactor::unknown) {
+    s.compact_begin = T::compact_begin;
+    s.compactCoordinates = +[](const Point& x) { return contractVector(T::compactCoordinates(x.as<M>())); };
+  }
+  if constexpr (HasChordalMoments<M>) {
+    s.chordalMean = +[](const std::vector<Point>& points, const Vector& weights) {
+      typename T::ChordalMoments sums;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        sums.add(points[i].as<M>(), static_cast<typename T::Scalar>(weights[static_cast<Eigen::Index>(i)]));
+      }
+      const std::optional<M> mean = sums.mean();
+      return mean ? std::vector<Point>{Point::of<M>(*mean)} : std::vector<Point>{};
+    };
+  }
+  if constexpr (HasRotationParameters<M>) {
+    s.parameters = +[](const Point& x) {
+      const auto* p = T::parameters(x.as<M>());
+      Vector v(T::DoF == 3 ? 4 : 7);
+      for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = static_cast<double>(p[i]);
+      return v;
+    };
+  }
+  if constexpr (HasTangentParts<M>) {
+    for (const TangentBlock& b : T::tangent_parts) s.tangent_parts.push_back(b);
+  }
+  if constexpr (HasMetricTwin<M>) {
+    s.throughMetricTwin = +[](const Point& x) { return Point::of<M>(T::fromMetricTwin(T::metricTwin(x.as<M>()))); };
+  }
+  if constexpr (Factored<M>) {
+    using Factors = std::decay_t<decltype(T::factors(std::declval<const M&>()))>;
+    s.throughFactors = +[](const Point& x) { return Point::of<M>(T::fromFactors(T::factors(x.as<M>()))); };
+    std::apply(
+        [&](const auto&... f) { (s.factor_sizes.push_back(ManifoldTraits<std::decay_t<decltype(f)>>::DoF), ...); },
+        Factors(T::factors(M(T::origin()))));
+    if constexpr (Metric<M>) {
+      s.factorDistances = +[](const Point& x, const Point& y) {
+        return std::apply(
+            [&](const auto&... a) {
+              return std::apply(
+                  [&](const auto&... b) {
+                    Vector d(sizeof...(a));
+                    Eigen::Index i = 0;
+                    ((d[i++] = static_cast<double>(liestat::distance(a, b))), ...);
+                    return d;
+                  },
+                  Factors(T::factors(y.as<M>())));
+            },
+            Factors(T::factors(x.as<M>())));
+      };
+    }
+  }
+  return s;
 }
 
 }  // namespace detail
@@ -273,6 +354,7 @@ ManifoldOperations operationsOf() {
       return contractMatrix(T::dlogBaseTransposed(contractNarrow<Tangent>(z), contractNarrow<Tangent>(a)));
     };
   }
+  m.statistics = detail::statisticsOperationsOf<M>();
   return m;
 }
 

@@ -79,7 +79,7 @@ Eigen::Matrix<S, 4, 1> nearestQuaternion(const Eigen::Matrix<S, 3, 3>& matrix) {
   const S linear = S(-8) * M.col(0).dot(M.col(1).cross(M.col(2)));
   const Eigen::Matrix<S, 4, 4> adjugate_of_K = symmetricAdjugate(K);
   const S constant = K.col(0).dot(adjugate_of_K.col(0));
-  S lambda(std::sqrt(3.));
+  S lambda = static_cast<S>(std::sqrt(3.));
   for (int i = 0; i < 24; ++i) {
     const S l2 = lambda * lambda;
     const S value = (l2 - S(2)) * l2 + linear * lambda + constant, slope = S(4) * (l2 - S(1)) * lambda + linear;

@@ -19,7 +19,7 @@ struct ScaleRange {
 /// The logarithm of a scale, at least and at most what the range admits.
 template <class S>
 inline S saturatedLogarithm(const S& sigma) {
-  const S low(ScaleRange<S>::least_logarithm), high(-ScaleRange<S>::least_logarithm);
+  const S low = static_cast<S>(ScaleRange<S>::least_logarithm), high = -low;
   const S above = select(sigma < low, low, sigma);
   return select(above > high, high, above);
 }

@@ -42,7 +42,7 @@ Eigen::Matrix<S, N, 1> uniformInCube(Generator& generator) {
 /// A point of the unit circle, uniform.
 template <class S, class Generator>
 Eigen::Matrix<S, 2, 1> uniformOnCircle(Generator& generator) {
-  const double angle = EIGEN_PI * (2 * uniform01(generator) - 1);
+  const double angle = static_cast<double>(EIGEN_PI * (2 * uniform01(generator) - 1));
   return Eigen::Matrix<S, 2, 1>(S(std::cos(angle)), S(std::sin(angle)));
 }
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds and runs one tiny program in each way that a user can take liestat: in place, by add_subdirectory, by
 # find_package and by pkg-config from an installed tree. Usage: run.sh [WORK_DIRECTORY]; CXX and CMAKE are obeyed.
-# Without pkg-config its part is left out, and said to be: nothing else of liestat needs it.
+# Without pkg-config its part is left out, and said to be: nothing else of liestat needs it. Before that, what its own unit
+# gets to see: no warning, and one sentence for a mistake.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -45,6 +46,45 @@ eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/
 # shellcheck disable=SC2086 # several flags in one variable
 quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
 built_and_ran ./in_place "in place"
+
+# No warning from the headers in a user's unit, with each compiler that there is; Boost's and Random123's own headers are
+# the system's.
+for compiler in g++ clang++; do
+  command -v "$compiler" >/dev/null || {
+    echo "consumers: warnings: $compiler SKIPPED, it is not installed"
+    continue
+  }
+  for unit in "$here"/warnings_*.cpp; do
+    if [ "$(basename "$unit")" = warnings_validation.cpp ] &&
+      ! printf '#include <boost/math/special_functions/beta.hpp>\n#include <Random123/philox.h>\n' |
+        $compiler -std=c++20 -E -x c++ - >/dev/null 2>&1; then
+      echo "consumers: warnings: $(basename "$unit") SKIPPED, Boost.Math or Random123 is not installed"
+      continue
+    fi
+    # shellcheck disable=SC2086
+    quietly $compiler -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror \
+      -I"$root" ${eigen//-I/-isystem } "$unit"
+    echo "consumers: $compiler: $(basename "$unit"): no warning"
+  done
+done
+
+# A mistake is answered by one error, and that is a sentence of ours. Program 0 has none and compiles. With g++ where it
+# is there: clang 14 cannot use the views of its standard library.
+first=$(command -v g++ || echo "$CXX")
+for mistake in 0 1 2 3 4 5 6 7; do
+  # shellcheck disable=SC2086
+  errors=$($first -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen "$here/sentences.cpp" 2>&1 |
+    grep -E '(^|[ :])error:' || true)
+  expected=1
+  [ "$mistake" != 0 ] || expected=0
+  [ "$(printf '%s' "$errors" | grep -c .)" = $expected ] &&
+    [ "$(printf '%s' "$errors" | grep -c 'liestat: \|Frechet mean needs\|groupMean needs')" = $expected ] || {
+    echo "$errors"
+    echo "consumers: failed: mistake $mistake of sentences.cpp is not answered by one sentence" >&2
+    exit 1
+  }
+done
+echo "consumers: mistakes are answered by one sentence each"
 
 quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
 quietly "$CMAKE" --build add_subdirectory
