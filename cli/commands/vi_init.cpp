@@ -6,6 +6,7 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
+#include <fusion/visual_inertial.hpp>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>

@@ -3,7 +3,7 @@
 #include <cli/io/calibration.hpp>
 #include <cli/io/image_tracks.hpp>
 #include <cli/io/imu_file.hpp>
-#include <fusion/visual_inertial.hpp>
+#include <fusion/visual_inertial_types.hpp>
 
 #include <cstddef>
 #include <optional>
