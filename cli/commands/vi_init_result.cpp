@@ -1,5 +1,6 @@
 #include <cli/commands/vi_init_result.hpp>
 
+#include <experiments/vi_init_errors.hpp>
 #include <stats/inference.hpp>
 
 #include <cmath>
@@ -15,14 +16,9 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 /// Of V and G, G on its sphere.
 double neesOf(const RefinementResult& refined, const Eigen::Vector3d& V, const Eigen::Vector3d& G) {
-  Eigen::Matrix<double, 5, 6> J = Eigen::Matrix<double, 5, 6>::Zero();
-  J.topLeftCorner<3, 3>().setIdentity();
-  // Two axes across gravity.
-  J.bottomRightCorner<2, 3>() = ManifoldTraits<S2d>::placement(S2d(refined.gravity)).matrix().leftCols<2>().transpose();
   Eigen::Matrix<double, 6, 1> error;
   error << refined.velocity() - V, refined.gravity - G;
-  const auto covariance = refined.covariance.of<InitialCovariance::first_velocity, InitialCovariance::gravity>();
-  return mahalanobisSquared<double, 5>(J * error, Eigen::Matrix<double, 5, 5>(J * covariance * J.transpose()));
+  return experiments::neesOnSphere<5>(error, refined.covariance.atFirst(), refined.gravity);
 }
 
 void compare(ViWindow& w, const ViRecording& recording, std::optional<double> gravity) {

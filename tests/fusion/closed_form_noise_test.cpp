@@ -3,6 +3,7 @@
 
 #include <fusion/init/closed_form.hpp>
 #include <experiments/closed_form_cases.hpp>
+#include <experiments/vi_init_errors.hpp>
 #include <fusion/imu/preintegrate.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
@@ -218,17 +219,10 @@ TEST(ClosedFormNoise, OkIsRight) {
 /// NEES of (V, G) or (V, G, b) of a result, with G on its sphere.
 double nees(const ClosedFormResult& result, const Scene& scene, const Eigen::Vector3d& bias) {
   const ClosedFormSolution& s = result.solutions.at(0);
-  const Eigen::Index n = result.covariance.rows();
-  Eigen::VectorXd error(n), along = Eigen::VectorXd::Zero(n);
-  error.head(3) = s.velocity - scene.velocity;
-  error.segment(3, 3) = s.gravity - scene.gravity;
-  if (n == 9) error.tail(3) = s.accelerometer_bias - bias;
-  // The covariance has no part along G, nor has the error to first order: give both one.
-  along.segment(3, 3) = s.gravity.normalized();
-  Eigen::MatrixXd covariance = result.covariance;
-  error -= along.dot(error) * along;
-  covariance += covariance.trace() * along * along.transpose();
-  return error.dot(covariance.ldlt().solve(error));
+  Eigen::Matrix<double, 9, 1> error;
+  error << s.velocity - scene.velocity, s.gravity - scene.gravity, s.accelerometer_bias - bias;
+  if (result.covariance.rows() == 9) return experiments::neesOnSphere<8>(error, result.covariance, s.gravity);
+  return experiments::neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), result.covariance, s.gravity);
 }
 
 // Without the inertial sensor's noise, what the covariance says it contains is all there is.
@@ -254,7 +248,7 @@ TEST(ClosedFormNoise, TheCovarianceIsThatOfImageNoise) {
         if (!result.features[i].used) continue;
         const Eigen::Vector3d u = scene.window.features[i].front().bearing;
         const double error = u.dot(result.solutions[0].features[i] - scene.features[i]);
-        depth += std::pow(error / result.features[i].depth_deviation, 2);
+        depth += std::pow(error / result.features[i].depth_sigma, 2);
         ++depths;
       }
       const Scene measured = noisyScene(options, 90000 + trial);
