@@ -4,8 +4,7 @@
 #include <cli/commands/imu_options.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/show/json.hpp>
-#include <experiments/summary.hpp>
-#include <cli/show/table.hpp>
+#include <cli/show/preintegration.hpp>
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/factor.hpp>
 
@@ -31,112 +30,6 @@ struct Options {
   std::optional<double> begin, end, window;
   double gravity = 9.81;
 };
-
-/// One interval, and how far it is from the truth where that is known.
-struct Window {
-  double begin = 0;
-  RecordingResult<double> result;
-  std::optional<Eigen::Matrix<double, 9, 1>> error;  ///< position, rotation, velocity
-  double squared_distance = 0;                       ///< of the error under the covariance
-};
-
-std::string statusOf(const Fault& fault) {
-  switch (fault.kind) {
-    case FaultKind::none:
-      return "ok";
-    case FaultKind::bad_interval:
-      return "bad interval";
-    case FaultKind::not_covered:
-      return "not covered";
-    case FaultKind::not_ascending:
-      return "times not ascending";
-    case FaultKind::not_finite:
-      return "not finite";
-    case FaultKind::gap:
-      return "gap";
-    default:
-      break;
-  }
-  return "unknown";
-}
-
-Eigen::Vector3d deviations(const Window& w, int block) {
-  return w.result.motion.gaussian().covariance.diagonal().segment<3>(3 * block).cwiseSqrt();
-}
-double largest(const Eigen::Vector3d& v) { return v.maxCoeff(); }
-
-JsonObject toJson(const Window& w, bool with_noise) {
-  JsonObject o;
-  o.set("begin", w.begin).set("status", statusOf(w.result.fault)).set("duration", w.result.motion.duration());
-  o.set("largest_gap", w.result.max_gap);
-  if (!w.result.ok()) return o;
-  const SE23d& x = w.result.motion.increment();
-  o.set("quaternion_xyzw", Eigen::Vector4d(x.so3().params())).set("rotation_vector", Eigen::Vector3d(x.so3().log()));
-  o.set("position", Eigen::Vector3d(x.translation())).set("velocity", Eigen::Vector3d(x.velocity()));
-  if (with_noise) {
-    o.set("covariance", w.result.motion.gaussian().covariance);
-  } else {
-    o.set("covariance", nullptr);
-  }
-  o.set("bias_jacobian", w.result.motion.biasJacobian());
-  if (w.error) {
-    o.set("error", *w.error);
-    if (with_noise) o.set("squared_distance", w.squared_distance);
-  }
-  return o;
-}
-
-void print(const std::vector<Window>& windows, bool with_noise, bool with_truth) {
-  std::vector<std::string> headers = {"begin s", "duration", "turn deg", "velocity m/s", "position m"};
-  if (with_noise) headers.insert(headers.end(), {"sd turn deg", "sd velocity", "sd position"});
-  if (with_truth) headers.insert(headers.end(), {"error deg", "error m/s", "error m"});
-  Table table(headers);
-  const double degrees = 180 / EIGEN_PI;
-  for (const Window& w : windows) {
-    const SE23d& x = w.result.motion.increment();
-    if (!w.result.ok()) {
-      table.row({number(w.begin), statusOf(w.result.fault)});
-      continue;
-    }
-    std::vector<std::string> cells = {number(w.begin), number(w.result.motion.duration()),
-                                      number(degrees * x.so3().log().norm()), number(x.velocity().norm()),
-                                      number(x.translation().norm())};
-    if (with_noise) {
-      for (const double sd :
-           {degrees * largest(deviations(w, 1)), largest(deviations(w, 2)), largest(deviations(w, 0))}) {
-        cells.push_back(number(sd, 3));
-      }
-    }
-    if (with_truth && w.error) {
-      for (const double e :
-           {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
-        cells.push_back(number(e, 3));
-    }
-    table.row(cells);
-  }
-  std::fputs(table.str().c_str(), stdout);
-}
-
-void printSummary(const std::vector<Window>& windows, bool with_noise) {
-  std::vector<double> rotation, velocity, position;
-  double index = 0;
-  for (const Window& w : windows) {
-    if (!w.error) continue;
-    rotation.push_back(w.error->segment<3>(3).norm());
-    velocity.push_back(w.error->tail<3>().norm());
-    position.push_back(w.error->head<3>().norm());
-    index += w.squared_distance;
-  }
-  if (rotation.empty()) return;
-  std::fputs(fmt::format("\nagainst the truth, {} windows: medians {:.3g} rad, {:.3g} m/s, {:.3g} m\n", rotation.size(),
-                         quantile(rotation, 0.5), quantile(velocity, 0.5), quantile(position, 0.5))
-                 .c_str(),
-             stdout);
-  if (!with_noise) return;
-  const double mean = index / static_cast<double>(rotation.size());
-  std::fputs(fmt::format("squared distance under the covariance: {:.4g} in the mean, 9 expected\n", mean).c_str(),
-             stdout);
-}
 
 int runCommand(const Options& options, const Invocation& invocation) {
   const ImuFile imu = readImu(options.imu.file);
@@ -166,9 +59,12 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   const auto count = static_cast<std::size_t>(fit);
   const Eigen::Vector3d gravity(0, 0, -options.gravity);
-  std::vector<Window> windows;
+  PreintegrationResult result;
+  result.with_noise = with_noise;
+  result.with_truth = !truth.empty();
+  std::vector<PreintegratedWindow>& windows = result.windows;
   for (std::size_t i = 0; i < count; ++i) {
-    Window w;
+    PreintegratedWindow w;
     w.begin = begin + static_cast<double>(i) * length;
     const double until = i + 1 == count && !options.window ? end : w.begin + length;
     const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
@@ -183,21 +79,17 @@ int runCommand(const Options& options, const Invocation& invocation) {
     windows.push_back(w);
   }
   if (options.json != "-") {
-    print(windows, with_noise, !truth.empty());
-    printSummary(windows, with_noise);
+    std::fputs(formatPreintegration(result).c_str(), stdout);
   }
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
     object.set("file", options.imu.file).set("format", imu.format).set("readings", imu.samples.size());
     object.set("start_ns", imu.start_ns);
-    object.set("covariance_order", "position rotation velocity").set("covariance_side", "right");
-    object.set("covariance_frame", "axes of the body at the end of the window, m rad m/s");
-    std::vector<JsonObject> list;
-    for (const Window& w : windows) list.push_back(toJson(w, with_noise));
-    object.set("windows", list);
+    setPreintegration(object, result);
     writeJson(options.json, object);
   }
-  const bool any = std::any_of(windows.begin(), windows.end(), [](const Window& w) { return w.result.ok(); });
+  const bool any =
+      std::any_of(windows.begin(), windows.end(), [](const PreintegratedWindow& w) { return w.result.ok(); });
   return any ? exit_fine : exit_not_trusted;
 }
 

@@ -7,7 +7,7 @@
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
 #include <cli/show/split.hpp>
-#include <cli/split.hpp>
+#include <cli/commands/split.hpp>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>

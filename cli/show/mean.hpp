@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cli/show/json.hpp>
-#include <cli/mean_analysis.hpp>
+#include <cli/commands/mean_analysis.hpp>
 
 #include <string>
 

@@ -3,9 +3,9 @@
 // Views of `liestat validate split`, of the measurements in a file and of landmarks that a stereo camera saw.
 
 #include <cli/io/measures.hpp>
-#include <cli/mean_analysis.hpp>
+#include <cli/commands/mean_analysis.hpp>
 #include <cli/show/json.hpp>
-#include <cli/split.hpp>
+#include <cli/commands/split.hpp>
 
 #include <Eigen/Core>
 #include <cstddef>

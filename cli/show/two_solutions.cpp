@@ -1,3 +1,4 @@
+#include <cli/show/units.hpp>
 #include <cli/show/two_solutions.hpp>
 
 #include <cli/show/page.hpp>
@@ -16,7 +17,6 @@ namespace {
 
 using Vector3 = Eigen::Vector3d;
 
-constexpr double degrees = 57.29577951308232;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// t0's axes turned so that the true vertical is z and the features are ahead, in the plane of x and z.

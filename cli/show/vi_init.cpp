@@ -1,3 +1,4 @@
+#include <cli/show/units.hpp>
 #include <cli/show/vi_init.hpp>
 
 #include <fmt/format.h>
@@ -16,7 +17,6 @@ namespace liestat::cli {
 using namespace experiments;
 namespace {
 
-constexpr double degrees = 180 / EIGEN_PI;
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 /// What a line says of a window, refined or not.

@@ -7,13 +7,13 @@
 #include <limits>
 #include <utility>
 
+#include <cli/show/units.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/vi_init.hpp>
 
 namespace liestat::cli {
 namespace {
 
-constexpr double degrees = 180 / EIGEN_PI;
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
 // The palette's colours by what they stand for.
 constexpr std::size_t estimate_colour = 0, second_colour = 1, fused_colour = 2, truth_colour = 6;

@@ -1,4 +1,4 @@
-#include <cli/mean_analysis.hpp>
+#include <cli/commands/mean_analysis.hpp>
 
 #include <experiments/feature.hpp>
 #include <experiments/parallel.hpp>

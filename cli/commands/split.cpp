@@ -1,4 +1,4 @@
-#include <cli/split.hpp>
+#include <cli/commands/split.hpp>
 
 #include <experiments/feature.hpp>
 #include <experiments/parallel.hpp>

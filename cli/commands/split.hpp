@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/mean_analysis.hpp>
+#include <cli/commands/mean_analysis.hpp>
 #include <stats/split_validation.hpp>
 
 #include <cstddef>
