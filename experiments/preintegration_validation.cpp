@@ -4,6 +4,7 @@
 #include <experiments/recording.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <stats/random.hpp>
+#include <stats/validation.hpp>
 
 #include <algorithm>
 #include <cmath>
