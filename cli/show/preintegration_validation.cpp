@@ -21,7 +21,8 @@ std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows
                number(r.index_se, 2), fmt::format("{:.3f}", row.relativeIndex()), number(r.ks_p_value, 2),
                fmt::format("{:.1f}", 100 * r.coverage[2].observed), verdictCell(row.passed)});
     if (row.passed.value_or(true)) continue;
-    reasons += fmt::format("FAILED {} {} s, noise {}: {}\n", name(row.check), row.window, row.noise, reason(row.verdict));
+    reasons +=
+        fmt::format("FAILED {} {} s, noise {}: {}\n", name(row.check), row.window, row.noise, reason(row.verdict));
   }
   return fmt::format(
       "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n{}\n{}{}",

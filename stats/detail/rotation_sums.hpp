@@ -256,7 +256,8 @@ class RotationSums {
     }
     static constexpr std::size_t column(std::size_t entry) { return entry - row(entry) * (row(entry) + 1) / 2; }
     template <std::size_t N, std::size_t... Entry>
-    static void addOuter(Pack (&sums)[N], const Pack (&a)[static_cast<std::size_t>(k)], const Pack (&b)[static_cast<std::size_t>(k)], std::index_sequence<Entry...>) {
+    static void addOuter(Pack (&sums)[N], const Pack (&a)[static_cast<std::size_t>(k)],
+                         const Pack (&b)[static_cast<std::size_t>(k)], std::index_sequence<Entry...>) {
       ((sums[Entry] += a[row(Entry)] * b[column(Entry)]), ...);
     }
     static Square symmetric(const Pack (&sums)[entries]) {

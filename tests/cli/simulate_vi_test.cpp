@@ -264,8 +264,7 @@ TEST(SimulateVi, WhatCannotBeMadeIsSaid) {
   EXPECT_EQ(message(0, 0.05, {}), "there is one image at 10 Hz, expected two at least");
   ViSceneOptions small;
   small.box = Vector3d(0.1, 10, 10);
-  EXPECT_EQ(message(0, 3, small).substr(0, 54),
-            "the box of 0.1 x 10 x 10 m has no room for the motion,");
+  EXPECT_EQ(message(0, 3, small).substr(0, 54), "the box of 0.1 x 10 x 10 m has no room for the motion,");
   std::vector<GroundTruth> truth(30);
   for (std::size_t i = 0; i < truth.size(); ++i) truth[i].time = 0.1 * static_cast<double>(i) + (i > 20 ? 0.5 : 0);
   EXPECT_EQ(complaintOf([&] { trajectoryAlong(truth, 0.1); }),
@@ -314,8 +313,7 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
   EXPECT_EQ(complaint({"--truth", "none"}), "none: no such file\n");
   EXPECT_EQ(complaint({"--drift", "nan"}),
             "liestat simulate vi: an option is not a finite number, expected finite ones\n");
-  EXPECT_EQ(complaint({"--begin", "4"}),
-            "the interval is from 4 to 3 s, expected an end after the beginning\n");
+  EXPECT_EQ(complaint({"--begin", "4"}), "the interval is from 4 to 3 s, expected an end after the beginning\n");
   EXPECT_EQ(complaint({"--box", "0.1,10,10"}).find("liestat simulate vi: the box of 0.1 x 10 x 10 m has no room"), 0U);
   EXPECT_EQ(complaint({"--truth", "a/truth.csv", "--knots", "9"}),
             "a/truth.csv: the truth is 3 s long, expected 45 s at least, for control points every 9 s\n");

@@ -33,9 +33,7 @@ const std::vector<MeansReport>& cell(Noise noise, std::size_t n) {
   return reports;
 }
 
-const MeansReport& report(Noise noise, std::size_t n, Method method) {
-  return cell(noise, n)[methodIndex(method)];
-}
+const MeansReport& report(Noise noise, std::size_t n, Method method) { return cell(noise, n)[methodIndex(method)]; }
 
 /// A number with its standard error.
 struct Estimate {
