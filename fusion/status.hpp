@@ -75,7 +75,7 @@ struct Fault {
   explicit operator bool() const { return kind != FaultKind::none; }
   friend bool operator==(const Fault&, const Fault&) = default;
   /// Whether it is of a kind, wherever.
-  friend bool operator==(const Fault& fault, FaultKind kind) { return fault.kind == kind; }
+  friend bool operator==(const Fault& fault, FaultKind of_kind) { return fault.kind == of_kind; }
 };
 
 /// The enumerator's name, for files.
