@@ -254,7 +254,7 @@ TEST(ClosedFormNoise, TheCovarianceIsThatOfImageNoise) {
         if (!result.features[i].used) continue;
         const Eigen::Vector3d u = scene.window.features[i].front().bearing;
         const double error = u.dot(result.solutions[0].features[i] - scene.features[i]);
-        depth += std::pow(error / result.features[i].depth_deviation, 2);
+        depth += std::pow(error / result.features[i].depth_sigma, 2);
         ++depths;
       }
       const Scene measured = noisyScene(options, 90000 + trial);
