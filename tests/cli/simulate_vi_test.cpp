@@ -313,7 +313,8 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
   EXPECT_EQ(complaint({"--truth", "none"}), "none: no such file\n");
   EXPECT_EQ(complaint({"--drift", "nan"}),
             "liestat simulate vi: an option is not a finite number, expected finite ones\n");
-  EXPECT_EQ(complaint({"--begin", "4"}), "the interval is from 4 to 3 s, expected an end after the beginning\n");
+  EXPECT_EQ(complaint({"--begin", "4"}),
+            "liestat simulate vi: the interval is from 4 to 3 s, expected an end after the beginning\n");
   EXPECT_EQ(complaint({"--box", "0.1,10,10"}).find("liestat simulate vi: the box of 0.1 x 10 x 10 m has no room"), 0U);
   EXPECT_EQ(complaint({"--truth", "a/truth.csv", "--knots", "9"}),
             "a/truth.csv: the truth is 3 s long, expected 45 s at least, for control points every 9 s\n");
