@@ -35,8 +35,7 @@ class RecordingRun {
       tracks_ = std::max(tracks_, seen.track + 1);
     }
     if (!sigmas.empty()) {
-      const auto middle =
-          sigmas.begin() + static_cast<std::ptrdiff_t>(0.5 * static_cast<double>(sigmas.size() - 1) + 0.5);
+      const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
       std::nth_element(sigmas.begin(), middle, sigmas.end());
       bearing_noise_ = *middle;
     }
@@ -77,6 +76,7 @@ class RecordingRun {
     const std::optional<ImuBias<double>> known = options_.known_bias ? options_.known_bias(w.begin) : std::nullopt;
     w.known_biases = known.has_value();
     std::vector<double> image_times;
+    image_times.reserve(images.size());
     for (const std::size_t j : images) image_times.push_back(times()[j]);
     std::vector<FeatureTrack> tracks = chooseTracks(w);
     w.measured = InertialWindow(recording_.readings, std::move(image_times), how(known.value_or(start)),

@@ -61,8 +61,8 @@ class Samples {
   Samples(Iterator begin, std::size_t size) : begin_(begin), size_(size) {}
   explicit Samples(std::vector<T> values) requires std::same_as<Iterator, const T*>
       : values_(std::move(values)), begin_(values_.data()), size_(values_.size()) {}
-  Samples(Samples&&) = default;
-  Samples& operator=(Samples&&) = default;
+  Samples(Samples&&) noexcept = default;
+  Samples& operator=(Samples&&) noexcept = default;
 
   std::size_t size() const { return size_; }
   Iterator begin() const { return begin_; }

@@ -7,6 +7,7 @@ set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../.." && pwd)
+chosen=${CXX:-}
 CXX=${CXX:-c++}
 CMAKE=${CMAKE:-cmake}
 export CXX
@@ -47,9 +48,9 @@ eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/
 quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
 built_and_ran ./in_place "in place"
 
-# No warning from the headers in a user's unit, with each compiler that there is; Boost's and Random123's own headers are
-# the system's.
-for compiler in g++ clang++; do
+# No warning from the headers in a user's unit, with the compiler that CXX names, else with each that there is; Boost's
+# and Random123's own headers are the system's.
+for compiler in ${chosen:-g++ clang++}; do
   command -v "$compiler" >/dev/null || {
     echo "consumers: warnings: $compiler SKIPPED, it is not installed"
     continue
