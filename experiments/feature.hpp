@@ -81,7 +81,7 @@ inline constexpr std::tuple feature_table{
     FeatureRow<Feature::direction, S2d>{"direction", "directions", Parts(Part::direction)},
 };
 
-/// What is known about a feature at run time.
+/// A feature's row at run time.
 struct FeatureInfo {
   Feature kind;
   std::string_view name, plural;

@@ -1,4 +1,4 @@
-// What the validations of the program have in common: a report, what is promised of it, and the verdict.
+// The parts that the program's validations share: a report, what is promised of it, and the verdict.
 #pragma once
 
 #include <stats/validation_report.hpp>

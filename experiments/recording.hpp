@@ -1,4 +1,4 @@
-// What recordings of an inertial sensor and a camera consist of, whether they are simulated or read from files.
+// The data of a recording of an inertial sensor and a camera, whether they are simulated or read from files.
 #pragma once
 
 #include <fusion/camera.hpp>

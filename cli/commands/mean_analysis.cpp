@@ -23,7 +23,7 @@ namespace {
 
 using experiments::ProgramExecutor;
 
-/// Of the features the group that has no metric.
+/// A feature that is a group without an invariant metric.
 template <class M>
 inline constexpr bool is_group = !Metric<M>;
 
@@ -34,7 +34,7 @@ UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
   return how;
 }
 
-/// What every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the residuals
+/// Copies what every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the residuals
 /// or from noise. Returns the mean.
 template <class M, class Iteration, class Certified>
 M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certified& result, const char* from) {
@@ -133,7 +133,7 @@ MeanAnalysis analyse(const Measures& measures, const AnalysisOptions& options) {
   return analysis;
 }
 
-/// Whether the measures leave some direction without any error, whatever the units.
+/// True if the measurements leave some direction without any error, whatever the units.
 bool isSingular(const Eigen::MatrixXd& covariance) {
   const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
   if (!(sd.minCoeff() > 0)) return true;

@@ -22,7 +22,7 @@ struct HalfMean {
   Eigen::MatrixXd covariance = {};  ///< empty if there is none
 };
 
-/// What splitMeasures returns: a SplitValidation whatever the feature.
+/// The result of splitMeasures: a SplitValidation whatever the feature.
 struct SplitResult {
   std::size_t n = 0;
   SplitSeries random, by_blocks;

@@ -73,7 +73,7 @@ ViRecording recordingOf(const Options& options) {
   return recording;
 }
 
-/// What the library needs of a recording, which must outlive it.
+/// The library's view of a recording, which must outlive it.
 VisualInertialRecording measurementsOf(const ViRecording& recording, const Options& options) {
   VisualInertialRecording measured;
   measured.readings = recording.imu.samples;
@@ -116,7 +116,7 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
-/// What is wrong with a recording as a whole.
+/// The fault of a recording as a whole.
 void throwFault(const VisualInertialResult& result, const VisualInertialRecording& measured,
                 const VisualInertialOptions& how) {
   if (!result.fault) return;

@@ -34,7 +34,7 @@ struct ViWindow : InitialisedWindow {
   std::optional<double> nees;             ///< of the refined V and G, 5 degrees of freedom
 };
 
-/// What disjoint windows say together, compared with the ground truth where that is known.
+/// The state that disjoint windows give together, compared with the ground truth where that is known.
 struct ViFusion : FusedStretch {
   double p_value = 1;  ///< that windows which agree are so far apart
   /// In the body's axes: a unit vector, m/s, rad/s, m/s², with the RMS of the standard deviations of their coordinates.
@@ -44,7 +44,7 @@ struct ViFusion : FusedStretch {
   std::optional<double> nees;                                                              ///< 11 degrees of freedom
 };
 
-/// What the command shows.
+/// The result that the command shows.
 struct ViInitResult {
   std::vector<ViWindow> windows;
   std::vector<ViFusion> fusions;

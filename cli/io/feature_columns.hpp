@@ -11,7 +11,7 @@
 
 namespace liestat::cli {
 
-/// What says a column that is not there.
+/// The index of a column that is not there.
 inline constexpr int absent = -1;
 
 /// The columns of features, in words.

@@ -52,7 +52,7 @@ NumericTable parseTable(std::string_view text, std::string name, const std::vect
 /// Throws InputError where a text is empty, encoded in UTF-16 or no text at all.
 void requireText(std::string_view text, const std::string& file);
 
-/// Whether all fields are numbers or empty, so that they cannot be a header.
+/// True if all fields are numbers or empty, so that they cannot be a header.
 bool looksNumeric(const std::vector<std::string_view>& fields);
 
 /// The names of a header; throws InputError where one is empty or appears twice.
@@ -63,7 +63,7 @@ std::vector<std::string> readHeader(const std::vector<std::string_view>& fields,
 [[noreturn]] void throwWrongWidth(std::size_t found, std::size_t expected, std::string_view why,
                                   const std::string& file, std::size_t line);
 
-/// Whether a field looks like a time stamp in nanoseconds since 1970. EuRoC's files have no header but a comment, so
+/// True if a field looks like a time stamp in nanoseconds since 1970. EuRoC's files have no header but a comment, so
 /// this is how they are told from CSV.
 bool isNanoseconds(std::string_view field);
 

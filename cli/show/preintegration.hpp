@@ -1,4 +1,4 @@
-// What `liestat preintegrate` shows: motions between two times, their noise, and how far they are from a truth.
+// The view of `liestat preintegrate`: motions between two times, their noise, and how far they are from a truth.
 #pragma once
 
 #include <cli/show/json.hpp>

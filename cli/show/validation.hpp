@@ -1,6 +1,6 @@
 #pragma once
 
-// What the views of the validations have in common.
+// The parts that the views of the validations share.
 
 #include <cli/show/json.hpp>
 #include <cli/show/page.hpp>

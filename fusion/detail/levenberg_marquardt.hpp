@@ -9,7 +9,7 @@
 
 namespace liestat::detail {
 
-/// What the method needs of a problem, which stands somewhere and can look at one step from there.
+/// A problem that the method can solve, which stands somewhere and can look at one step from there.
 template <class P>
 concept DampedProblem = requires(P& problem, double damping) {
   { problem.linearise() } -> std::convertible_to<double>;  ///< the cost (χ²) and the normal equations where it stands

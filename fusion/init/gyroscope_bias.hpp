@@ -26,7 +26,7 @@
 
 namespace liestat {
 
-/// What estimateGyroscopeBias() found.
+/// The result of estimateGyroscopeBias().
 struct GyroscopeBiasResult {
   /// ok, not_converged, no_start (then see result.status), window_too_short or bad_input (then see result.fault).
   FusionStatus status = FusionStatus::bad_input;

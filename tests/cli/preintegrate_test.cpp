@@ -144,19 +144,13 @@ TEST(Preintegrate, WhatCannotBeUsedIsSaid) {
   EXPECT_EQ(preintegrate(directory, {"--imu", "none.csv"}).status, 2);
 }
 
-TEST(ValidatePreintegration, JudgesWhatIsPromised) {
+// The rows themselves: tests/experiments/preintegration_validation_test.cpp.
+TEST(ValidatePreintegration, TheTableCountsWhatIsPromised) {
   PreintegrationValidation validation;
   validation.trials = 200;
   validation.windows = {0.1};
   validation.noises = {1, 100};
   const std::vector<PreintegrationRow> rows = validatePreintegration(validation);
-  ASSERT_EQ(rows.size(), all_preintegration_checks.size() * 2);
-  for (const PreintegrationRow& row : rows) {
-    EXPECT_EQ(row.report.trials, 200U);
-    EXPECT_EQ(row.report.dof, row.check == PreintegrationCheck::motion_and_bias ? 15 : 9);
-    EXPECT_EQ(row.passed.has_value(), row.noise == 1) << "promised up to ten times the sensor's noise";
-    EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
-  }
   const std::string table = formatPreintegrationTable(rows);
   EXPECT_NE(table.find("3 of 3 rows in the promised domain (noise up to 10) pass"), std::string::npos) << table;
 }

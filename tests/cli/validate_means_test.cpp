@@ -4,22 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <support/means_validations.hpp>
+
 #include <string>
 #include <vector>
 
 namespace liestat::cli {
 using namespace experiments;
 namespace {
-
-MeansValidation mahaOnFrames() {
-  MeansValidation validation;
-  validation.features = {Feature::semi_oriented_frame, Feature::non_oriented_frame};
-  validation.noises = {Noise::idd};
-  validation.criteria = {Criterion::maha};
-  validation.n = {10};
-  validation.trials = 200;
-  return validation;
-}
 
 TEST(ValidateMeans, anyNumberOfTrialsPasses) {
   for (const std::size_t trials : {1U, 3U, 10U, 40U}) {
@@ -33,7 +25,7 @@ TEST(ValidateMeans, anyNumberOfTrialsPasses) {
 }
 
 TEST(ValidateMeans, whatIsJudgedIsCounted) {
-  MeansValidation validation = mahaOnFrames();
+  MeansValidation validation = liestat_test::mahaOnFrames();
   validation.trials = 20;
   validation.n = {5, 10};
   std::size_t judged = 0;

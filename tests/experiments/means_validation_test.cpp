@@ -4,27 +4,19 @@
 
 #include <gtest/gtest.h>
 
+#include <support/means_validations.hpp>
+
 #include <vector>
 
 namespace liestat::experiments {
 namespace {
-
-MeansValidation mahaOnFrames() {
-  MeansValidation validation;
-  validation.features = {Feature::semi_oriented_frame, Feature::non_oriented_frame};
-  validation.noises = {Noise::idd};
-  validation.criteria = {Criterion::maha};
-  validation.n = {10};
-  validation.trials = 200;
-  return validation;
-}
 
 // Trial 117 has a datum that is known to 3 mm along one axis. At its lever arm, known to 2.5 m, the mean's orientation,
 // known to 0.03 rad, moves that axis by centimetres, which no covariance of first order contains: the truth is at a
 // squared distance of 371 under it, with a likelihood ratio of 2.8. A noise of which some variance is U(0, 1) has no
 // bound on such distances.
 TEST(MeansValidation, aCovarianceOfFirstOrderMayBeFarTooSmallNowAndThen) {
-  for (const MeansRow& row : validateMeans(mahaOnFrames())) {
+  for (const MeansRow& row : validateMeans(liestat_test::mahaOnFrames())) {
     if (!row.method.corrected) continue;
     EXPECT_GT(row.report.mu2.back(), 300) << "this seed shows it no more: find another";
     EXPECT_GT(row.report.index, 7.5);
@@ -49,7 +41,7 @@ TEST(MeansValidation, anyNumberOfTrialsPasses) {
 }
 
 TEST(MeansValidation, whatIsJudgedIsCounted) {
-  MeansValidation validation = mahaOnFrames();
+  MeansValidation validation = liestat_test::mahaOnFrames();
   validation.trials = 20;
   validation.n = {5, 10};
   const std::vector<MeansRow> rows = validateMeans(validation);
