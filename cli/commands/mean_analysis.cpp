@@ -34,8 +34,8 @@ UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
   return how;
 }
 
-/// Copies what every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the residuals
-/// or from noise. Returns the mean.
+/// Copies what every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the
+/// residuals or from noise. Returns the mean.
 template <class M, class Iteration, class Certified>
 M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certified& result, const char* from) {
   analysis.converged = converged(iteration.status);
