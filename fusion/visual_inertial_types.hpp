@@ -6,9 +6,8 @@
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/options.hpp>
-#include <fusion/init/refinement.hpp>
-#include <fusion/init/robust_initialisation.hpp>
-#include <fusion/init/window_fusion.hpp>
+#include <fusion/init/inertial_state.hpp>
+#include <fusion/init/results.hpp>
 #include <fusion/status.hpp>
 
 #include <Eigen/Core>

@@ -1,6 +1,9 @@
 // How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
 #pragma once
 
+#include <fusion/init/refinement.hpp>
+#include <fusion/init/robust_initialisation.hpp>
+#include <fusion/init/window_fusion.hpp>
 #include <fusion/visual_inertial_types.hpp>
 #include <stats/random.hpp>
 

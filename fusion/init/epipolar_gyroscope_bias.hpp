@@ -27,7 +27,7 @@
 #include <fusion/detail/closed_form_input.hpp>
 #include <fusion/detail/epipolar_search.hpp>
 #include <fusion/imu/window.hpp>
-#include <fusion/init/closed_form_types.hpp>
+#include <fusion/init/results.hpp>
 
 #include <Eigen/Core>
 
@@ -36,36 +36,6 @@
 #include <vector>
 
 namespace liestat {
-
-/// Indices are the window's. Tracks that no pair of images in use has in common are in neither list.
-struct EpipolarBiasResult {
-  /// ok, undetermined (too few tracks, or hardly any parallax: the bias is the one that makes directions stay best),
-  /// no_consensus, not_converged or bad_input (then see fault).
-  FusionStatus status = FusionStatus::bad_input;
-  Fault fault;
-  /// Found by directions that stay: the body did not move, or features are far (then see covariance).
-  bool without_parallax = false;
-
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< rad/s, whole: not the change of the one that was integrated
-  /// From the noise of the accepted tracks, of the gyroscope where the motions were integrated with it, and the prior;
-  /// to first order. Pairs of images share bearings: it is not the inverse of the normal equations. Without parallax a
-  /// parallax that is too small or too even to be seen is not in it: the bias is then off by speed over distance.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  std::vector<std::size_t> inliers, outliers;  ///< ascending; a drift along the epipolar lines is not seen
-  std::vector<double> residuals;               ///< of each track, RMS in sigmas; infinite in neither list
-  /// Other biases for which many tracks agree, the best first: what else to try where this one turns out to be wrong.
-  std::vector<Eigen::Vector3d> others;
-  std::size_t pairs_used = 0;  ///< of images
-  int starts = 0, iterations = 0;
-  int integrations = 0;  ///< how often the readings were integrated anew
-
-  /// Whether the residuals of the accepted tracks are noise, by χ², and their features in front of the camera. If not:
-  /// the minimum may be a wrong one, or there is more noise than was said.
-  bool consistent = false;
-
-  /// Exactly one answer, converged, that explains the data.
-  bool ok() const { return status == FusionStatus::ok && consistent; }
-};
 
 /// The bias that the rotations between images say. The window is integrated anew where a first-order update will not do.
 inline EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window,

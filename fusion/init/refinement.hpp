@@ -14,7 +14,7 @@
 #include <fusion/detail/closed_form_input.hpp>
 #include <fusion/detail/refinement_problem.hpp>
 #include <fusion/imu/window.hpp>
-#include <fusion/init/closed_form_types.hpp>
+#include <fusion/init/results.hpp>
 
 #include <Eigen/Core>
 
@@ -24,76 +24,6 @@
 #include <vector>
 
 namespace liestat {
-
-/// The joint covariance of all that a refinement tells but the states between the first and the last: 21 unknowns in
-/// blocks of three. The last state's are its right tangent; gravity is in the axes of t0, and singular along itself
-/// where its length is known. Position and heading of t0's frame are exact by definition.
-struct InitialCovariance {
-  /// The first row of each block.
-  enum Block {
-    first_velocity = 0,      ///< V, at t0 (m/s)
-    last_position = 3,       ///< m
-    last_rotation = 6,       ///< rad
-    last_velocity = 9,       ///< m/s
-    gravity = 12,            ///< G (m/s²)
-    gyroscope_bias = 15,     ///< rad/s
-    accelerometer_bias = 18  ///< m/s²
-  };
-  Eigen::Matrix<double, 21, 21> joint = Eigen::Matrix<double, 21, 21>::Zero();
-
-  Eigen::Matrix3d block(Block row, Block column) const { return joint.block<3, 3>(row, column); }
-  /// Of some blocks, in their order.
-  template <Block... blocks>
-  Eigen::Matrix<double, 3 * sizeof...(blocks), 3 * sizeof...(blocks)> of() const {
-    constexpr int n = sizeof...(blocks);
-    constexpr Block list[] = {blocks...};
-    Eigen::Matrix<double, 3 * n, 3 * n> part;
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) part.template block<3, 3>(3 * i, 3 * j) = block(list[i], list[j]);
-    }
-    return part;
-  }
-  /// Of (V, G, gyroscope's bias, accelerometer's bias) at t0.
-  Eigen::Matrix<double, 12, 12> atFirst() const {
-    return of<first_velocity, gravity, gyroscope_bias, accelerometer_bias>();
-  }
-  /// Of the last state (position, rotation, velocity), then G and both biases: what a filter starts from.
-  Eigen::Matrix<double, 18, 18> atLast() const { return joint.bottomRightCorner<18, 18>(); }
-};
-
-/// Everything is in the body's axes at the first image, t0.
-struct RefinementResult {
-  /// ok, not_converged, undetermined, no_start (the start has no feature in front of its cameras), bad_motion or
-  /// bad_input (then see fault).
-  FusionStatus status = FusionStatus::bad_input;
-  Fault fault;
-
-  std::vector<SE23d> states;  ///< at each image: orientation, position, velocity; the first at the identity and 0
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
-  ImuBias<double> bias;                   ///< whole: not the change of the one that was integrated
-  std::vector<Eigen::Vector3d> features;  ///< NaN for a feature that was not used
-
-  /// Of the state from which a filter starts, and of what came before it.
-  InitialCovariance covariance;
-
-  double cost = 0;  ///< χ² of bearings, motions and priors
-  std::size_t degrees_of_freedom = 0;
-  std::size_t features_used = 0, observations_used = 0;
-  int iterations = 0;
-  int integrations = 0;           ///< how often the readings were integrated anew
-  bool must_reintegrate = false;  ///< the biases have gone too far for a first-order update, and the window can't help
-
-  Eigen::Vector3d velocity() const {
-    return states.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(states[0].velocity());
-  }
-  /// Whether the cost is one of noise: five sigmas of χ².
-  bool consistent() const {
-    const double dof = static_cast<double>(degrees_of_freedom);
-    return cost <= dof + 5 * std::sqrt(2 * dof) + 12;
-  }
-  /// Exactly one answer, converged, that explains the data.
-  bool ok() const { return status == FusionStatus::ok && consistent() && !must_reintegrate; }
-};
 
 namespace detail {
 

@@ -12,6 +12,7 @@
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <fusion/init/gyroscope_bias.hpp>
+#include <fusion/init/results.hpp>
 
 #include <Eigen/Core>
 
@@ -21,30 +22,6 @@
 #include <vector>
 
 namespace liestat {
-
-/// Indices are the window's.
-struct RobustInitialisation {
-  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
-  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
-  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
-  /// are the inliers.
-  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
-  /// bad_input: see result.fault.
-  FusionStatus status = FusionStatus::bad_input;
-  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
-  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
-  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;                             ///< for this bias, of the inliers
-  std::vector<std::size_t> inliers, outliers;          ///< ascending
-  EpipolarBiasResult epipolar;                         ///< where it began
-  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
-  std::size_t hypotheses = 0;
-  int rounds = 0;
-  int integrations = 0;  ///< how often the readings were integrated anew
-
-  /// Exactly one answer, which explains the data of the inliers.
-  bool ok() const { return status == FusionStatus::ok && result.ok(); }
-};
 
 /// Velocity, gravity, features and the gyroscope's bias of a window. Bad input: see result.fault.
 inline RobustInitialisation initialiseRobustly(InertialWindow window, const InitialisationOptions& options) {

@@ -1,6 +1,7 @@
 // What windows say together: consistent where their covariances are, and the prior of the biases counted once.
 
 #include <fusion/init/closed_form.hpp>
+#include <fusion/init/refinement.hpp>
 #include <fusion/init/window_fusion.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

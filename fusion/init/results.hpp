@@ -1,0 +1,148 @@
+// What the steps of a visual-inertial initialisation return, for units that only look at it: the estimators cost a
+// compiler more than the rest of the library. The closed form's results are in closed_form_types.hpp.
+#pragma once
+
+#include <fusion/imu/readings.hpp>
+#include <fusion/init/closed_form_types.hpp>
+#include <fusion/status.hpp>
+#include <lie/se23.hpp>
+
+#include <Eigen/Core>
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace liestat {
+
+// estimateEpipolarGyroscopeBias(), in epipolar_gyroscope_bias.hpp
+
+/// Indices are the window's. Tracks that no pair of images in use has in common are in neither list.
+struct EpipolarBiasResult {
+  /// ok, undetermined (too few tracks, or hardly any parallax: the bias is the one that makes directions stay best),
+  /// no_consensus, not_converged or bad_input (then see fault).
+  FusionStatus status = FusionStatus::bad_input;
+  Fault fault;
+  /// Found by directions that stay: the body did not move, or features are far (then see covariance).
+  bool without_parallax = false;
+
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< rad/s, whole: not the change of the one that was integrated
+  /// From the noise of the accepted tracks, of the gyroscope where the motions were integrated with it, and the prior;
+  /// to first order. Pairs of images share bearings: it is not the inverse of the normal equations. Without parallax a
+  /// parallax that is too small or too even to be seen is not in it: the bias is then off by speed over distance.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  std::vector<std::size_t> inliers, outliers;  ///< ascending; a drift along the epipolar lines is not seen
+  std::vector<double> residuals;               ///< of each track, RMS in sigmas; infinite in neither list
+  /// Other biases for which many tracks agree, the best first: what else to try where this one turns out to be wrong.
+  std::vector<Eigen::Vector3d> others;
+  std::size_t pairs_used = 0;  ///< of images
+  int starts = 0, iterations = 0;
+  int integrations = 0;  ///< how often the readings were integrated anew
+
+  /// Whether the residuals of the accepted tracks are noise, by χ², and their features in front of the camera. If not:
+  /// the minimum may be a wrong one, or there is more noise than was said.
+  bool consistent = false;
+
+  /// Exactly one answer, converged, that explains the data.
+  bool ok() const { return status == FusionStatus::ok && consistent; }
+};
+
+// initialiseRobustly(), in robust_initialisation.hpp
+
+/// Indices are the window's.
+struct RobustInitialisation {
+  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
+  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
+  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
+  /// are the inliers.
+  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
+  /// bad_input: see result.fault.
+  FusionStatus status = FusionStatus::bad_input;
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
+  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
+  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
+  ClosedFormResult result;                             ///< for this bias, of the inliers
+  std::vector<std::size_t> inliers, outliers;          ///< ascending
+  EpipolarBiasResult epipolar;                         ///< where it began
+  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
+  std::size_t hypotheses = 0;
+  int rounds = 0;
+  int integrations = 0;  ///< how often the readings were integrated anew
+
+  /// Exactly one answer, which explains the data of the inliers.
+  bool ok() const { return status == FusionStatus::ok && result.ok(); }
+};
+
+// refine(), in refinement.hpp
+
+/// The joint covariance of all that a refinement tells but the states between the first and the last: 21 unknowns in
+/// blocks of three. The last state's are its right tangent; gravity is in the axes of t0, and singular along itself
+/// where its length is known. Position and heading of t0's frame are exact by definition.
+struct InitialCovariance {
+  /// The first row of each block.
+  enum Block {
+    first_velocity = 0,      ///< V, at t0 (m/s)
+    last_position = 3,       ///< m
+    last_rotation = 6,       ///< rad
+    last_velocity = 9,       ///< m/s
+    gravity = 12,            ///< G (m/s²)
+    gyroscope_bias = 15,     ///< rad/s
+    accelerometer_bias = 18  ///< m/s²
+  };
+  Eigen::Matrix<double, 21, 21> joint = Eigen::Matrix<double, 21, 21>::Zero();
+
+  Eigen::Matrix3d block(Block row, Block column) const { return joint.block<3, 3>(row, column); }
+  /// Of some blocks, in their order.
+  template <Block... blocks>
+  Eigen::Matrix<double, 3 * sizeof...(blocks), 3 * sizeof...(blocks)> of() const {
+    constexpr int n = sizeof...(blocks);
+    constexpr Block list[] = {blocks...};
+    Eigen::Matrix<double, 3 * n, 3 * n> part;
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) part.template block<3, 3>(3 * i, 3 * j) = block(list[i], list[j]);
+    }
+    return part;
+  }
+  /// Of (V, G, gyroscope's bias, accelerometer's bias) at t0.
+  Eigen::Matrix<double, 12, 12> atFirst() const {
+    return of<first_velocity, gravity, gyroscope_bias, accelerometer_bias>();
+  }
+  /// Of the last state (position, rotation, velocity), then G and both biases: what a filter starts from.
+  Eigen::Matrix<double, 18, 18> atLast() const { return joint.bottomRightCorner<18, 18>(); }
+};
+
+/// Everything is in the body's axes at the first image, t0.
+struct RefinementResult {
+  /// ok, not_converged, undetermined, no_start (the start has no feature in front of its cameras), bad_motion or
+  /// bad_input (then see fault).
+  FusionStatus status = FusionStatus::bad_input;
+  Fault fault;
+
+  std::vector<SE23d> states;  ///< at each image: orientation, position, velocity; the first at the identity and 0
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
+  ImuBias<double> bias;                   ///< whole: not the change of the one that was integrated
+  std::vector<Eigen::Vector3d> features;  ///< NaN for a feature that was not used
+
+  /// Of the state from which a filter starts, and of what came before it.
+  InitialCovariance covariance;
+
+  double cost = 0;  ///< χ² of bearings, motions and priors
+  std::size_t degrees_of_freedom = 0;
+  std::size_t features_used = 0, observations_used = 0;
+  int iterations = 0;
+  int integrations = 0;           ///< how often the readings were integrated anew
+  bool must_reintegrate = false;  ///< the biases have gone too far for a first-order update, and the window can't help
+
+  Eigen::Vector3d velocity() const {
+    return states.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(states[0].velocity());
+  }
+  /// Whether the cost is one of noise: five sigmas of χ².
+  bool consistent() const {
+    const double dof = static_cast<double>(degrees_of_freedom);
+    return cost <= dof + 5 * std::sqrt(2 * dof) + 12;
+  }
+  /// Exactly one answer, converged, that explains the data.
+  bool ok() const { return status == FusionStatus::ok && consistent() && !must_reintegrate; }
+};
+
+}  // namespace liestat
