@@ -2,9 +2,10 @@
 # and no more. A subject's sources are one translation unit each library, for most of what they cost a compiler is the
 # headers that they share; those listed as HEAVY hold templates of the estimators and are compiled by themselves.
 
-# liestat_part(TARGET SOURCES patterns… [HEAVY sources…] [USES targets…] [OPT -O1] [HEAVY_OPT -O2])
+# liestat_part(TARGET SOURCES patterns… [HEAVY sources…] [USES targets…] [OPT -O1] [HEAVY_OPT -O2] [LONG])
+# LONG: runs for minutes where the sanitizers watch code that is not optimised.
 function(liestat_part target)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "OPT;HEAVY_OPT" "SOURCES;HEAVY;USES")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "LONG" "OPT;HEAVY_OPT" "SOURCES;HEAVY;USES")
   file(GLOB sources CONFIGURE_DEPENDS ${ARG_SOURCES})
   set(heavy)
   foreach(source IN LISTS ARG_HEAVY)
@@ -18,11 +19,18 @@ function(liestat_part target)
   # Options of its own keep a source out of the common unit.
   set_source_files_properties(${heavy} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON
                                                   COMPILE_OPTIONS $<$<CONFIG:Release>:${ARG_HEAVY_OPT}>)
+  set(precompiled TRUE)
   if(LIESTAT_SANITIZED)
-    # Instrumented and without optimisation these would run for minutes. The precompiled header is one without it.
+    # The precompiled header is one without optimisation.
     set_source_files_properties(${heavy} PROPERTIES COMPILE_OPTIONS -O1 SKIP_PRECOMPILE_HEADERS ON)
+    if(ARG_LONG)
+      target_compile_options(${target} PRIVATE -O1)
+      set(precompiled FALSE)
+    endif()
   endif()
-  target_precompile_headers(${target} REUSE_FROM liestat_precompiled)
+  if(precompiled)
+    target_precompile_headers(${target} REUSE_FROM liestat_precompiled)
+  endif()
   set_property(DIRECTORY APPEND PROPERTY LIESTAT_PART_SOURCES ${sources} ${heavy})
   set_property(DIRECTORY APPEND PROPERTY LIESTAT_PARTS ${target})
 endfunction()
