@@ -3,11 +3,11 @@
 int main(int argc, char** argv) {
   using namespace liestat::cli;
   // In the order in which the help lists them.
-  return runProgram(argc, argv,
-                    {{"", "", {addMeanCommand, addPreintegrateCommand, addViInitCommand}},
-                     {"simulate", "Files of simulated measurements with their truth", {addSimulateViCommand}},
-                     {"validate",
-                      validate_description,
-                      {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,
-                       addValidateSplitCommand, addValidateViInitCommand}}});
+  return runCommandLine(argc, argv,
+                        {{"", "", {addMeanCommand, addPreintegrateCommand, addViInitCommand}},
+                         {"simulate", "Files of simulated measurements with their truth", {addSimulateViCommand}},
+                         {"validate",
+                          validate_description,
+                          {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,
+                           addValidateSplitCommand, addValidateViInitCommand}}});
 }

@@ -52,6 +52,8 @@ struct JudgedReport {
 /// How many rows were judged, and how many of these failed.
 struct Tally {
   std::size_t judged = 0, failed = 0;
+  /// A run in which nothing was judged has not passed.
+  bool passed() const { return judged > 0 && failed == 0; }
 };
 template <class Row>
 Tally tally(const std::vector<Row>& rows) {

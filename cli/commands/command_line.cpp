@@ -6,14 +6,48 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <fmt/format.h>
 
+#include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <optional>
+#include <type_traits>
 
 namespace liestat::cli {
+namespace {
+
+/// Refuses what the conversion to a number would take and nobody means: NaN, which passes every comparison with a bound,
+/// and a sign before an unsigned number, which wraps.
+template <class T>
+CLI::Validator meantAsNumber() {
+  return CLI::Validator(
+      [](const std::string& text) -> std::string {
+        if constexpr (std::is_unsigned_v<T>) {
+          if (!text.empty() && text.front() == '-') return printable(text) + " is negative";
+        }
+        double number = 0;
+        if (CLI::detail::lexical_cast(text, number) && std::isnan(number)) return printable(text) + " is not a number";
+        return {};
+      },
+      std::string());
+}
+
+/// The number of an option, or of each element of a list; void for words.
+template <class T>
+struct NumberOf {
+  using type = std::conditional_t<std::is_arithmetic_v<T>, T, void>;
+};
+template <class T>
+struct NumberOf<std::vector<T>> : NumberOf<T> {};
+template <class T>
+struct NumberOf<std::optional<T>> : NumberOf<T> {};
+
+}  // namespace
 
 Option Option::required() const {
   option_->required();
@@ -21,7 +55,13 @@ Option Option::required() const {
 }
 template <class T>
 Option Option::range(T least, T most) const {
-  option_->check(CLI::Range(least, most));
+  const CLI::Validator range = CLI::Range(least, most);
+  option_->check(CLI::Validator(
+      [range, least, most](std::string text) {
+        return range(text).empty() ? std::string()
+                                   : fmt::format("{} is not between {} and {}", printable(text), least, most);
+      },
+      range.get_description()));
   return *this;
 }
 Option Option::positive() const {
@@ -64,7 +104,10 @@ template Option Option::range(unsigned long long, unsigned long long) const;
 
 template <class T>
 Option Command::option(const std::string& name, T& value, const std::string& description) const {
-  return Option(app_->add_option(name, value, description));
+  CLI::Option* option = app_->add_option(name, value, description);
+  using Number = typename NumberOf<T>::type;
+  if constexpr (!std::is_void_v<Number>) option->check(meantAsNumber<Number>());
+  return Option(option);
 }
 template Option Command::option(const std::string&, int&, const std::string&) const;
 template Option Command::option(const std::string&, double&, const std::string&) const;
@@ -118,12 +161,17 @@ int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) 
     if (error.get_exit_code() == 0) return app.exit(error);
     return complain("liestat: " + printable(error.what(), 1000) + " (liestat --help explains the usage)");
   }
-  return (*chosen)({commandLine(argc, argv)});
+  const int code = (*chosen)({commandLine(argc, argv)});
+  // A result that nobody could read is no success: the disk is full, or the pipe is closed.
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    return complain(std::string("standard output: cannot be written: ") + std::strerror(errno));
+  }
+  return code;
 }
 
 }  // namespace
 
-int runProgram(int argc, char** argv, const std::vector<CommandGroup>& groups) {
+int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& groups) {
   try {
     return parseAndRun(argc, argv, groups);
   } catch (const InputError& error) {

@@ -106,6 +106,6 @@ struct CommandGroup {
 
 /// The whole program: parses the command line, runs the command that was asked for and returns its exit code. Errors are
 /// a line on standard error.
-int runProgram(int argc, char** argv, const std::vector<CommandGroup>& groups);
+int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& groups);
 
 }  // namespace liestat::cli

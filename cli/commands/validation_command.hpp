@@ -6,6 +6,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/progress.hpp>
+#include <experiments/judged_report.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -79,8 +80,7 @@ int publish(const ValidationOutput& output, const Invocation& invocation, std::u
     writeJson(output.json, object);
   }
   if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
-  const bool passed = std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row.passed.value_or(true); });
-  return passed ? exit_fine : exit_validation_failed;
+  return experiments::tally(rows).passed() ? exit_fine : exit_validation_failed;
 }
 
 }  // namespace liestat::cli

@@ -112,11 +112,12 @@ TextFile loadText(const std::string& path) {
 
 LineReader::LineReader(std::string_view text) : rest_(text) {
   if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);
+  if (rest_.find('\n') == std::string_view::npos) line_end_ = '\r';
 }
 
 bool LineReader::next() {
   while (!rest_.empty()) {
-    const std::size_t end = rest_.find('\n');
+    const std::size_t end = rest_.find(line_end_);
     const std::string_view whole = rest_.substr(0, end);
     rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
     ++number_;

@@ -36,6 +36,7 @@ class LineReader {
 
  private:
   std::string_view rest_;
+  char line_end_ = '\n';  ///< '\r' where no line ends otherwise
   std::string_view line_;
   std::string_view comment_;
   std::size_t number_ = 0;

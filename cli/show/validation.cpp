@@ -18,8 +18,9 @@ std::string verdictCell(const std::optional<bool>& passed) {
 }
 
 std::string verdictLines(const Tally& tally, const std::string& where) {
+  if (tally.judged == 0) return fmt::format("no row is {}: nothing was judged\nFAILED\n", where);
   return fmt::format("{} of {} rows {} pass; false alarms: one in {:g} runs\n{}\n", tally.judged - tally.failed,
-                     tally.judged, where, 1 / run_false_alarm, tally.failed == 0 ? "PASSED" : "FAILED");
+                     tally.judged, where, 1 / run_false_alarm, tally.passed() ? "PASSED" : "FAILED");
 }
 
 Panel histogramPanel(const JudgedReport& row, const std::string& title) {

@@ -18,7 +18,7 @@ void setStatistics(JsonObject& o, const ValidationReport& report);
 std::string verdictCell(const std::optional<bool>& passed);
 
 /// The last lines on the terminal: how many of the judged rows pass, where they are (`in the promised domain`), and
-/// PASSED or FAILED.
+/// PASSED or FAILED, which a run without a judged row has too.
 std::string verdictLines(const experiments::Tally& tally, const std::string& where);
 
 /// Histogram of the squared distances with the density that they should have.

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -125,12 +126,40 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
                                                     {"mean", "f.csv", "--feature", "line"},
                                                     {"mean", "f.csv", "--threads", "-1"},
                                                     {"mean", "f.csv", "--norm-tolerance", "much"},
+                                                    {"mean", "f.csv", "--norm-tolerance", "nan"},
+                                                    {"mean", "f.csv", "--budget", "-1"},
+                                                    {"validate", "means", "--seed", "-1"},
+                                                    {"validate", "means", "--spread", "1,-nan"},
+                                                    {"vi-init", "--imu", "i", "--tracks", "t", "--largest-gap", "nan"},
+                                                    {"simulate", "vi", "--output", "d", "--box", "1,nan,1"},
                                                     {"validate", "split"},
                                                     {"validate", "split", "f.csv", "--blocks", "3"}}) {
     const ProgramRun r = run(arguments);
     EXPECT_EQ(r.status, 2) << ::testing::PrintToString(arguments);
     EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
   }
+}
+
+TEST_F(Program, BoundsOfAnOptionAreSaid) {
+  EXPECT_EQ(run({"validate", "means", "--spread", "0"}).errors,
+            "liestat: --spread: 0 is not between 1e-09 and 10 (liestat --help explains the usage)\n");
+  EXPECT_EQ(run({"validate", "means", "--seed", "-1"}).errors,
+            "liestat: --seed: -1 is negative (liestat --help explains the usage)\n");
+}
+
+TEST_F(Program, AValidationThatJudgesNothingHasNotPassed) {
+  const ProgramRun r =
+      run({"validate", "means", "--feature", "frame", "--n", "2", "--criterion", "lsq", "--trials", "50"});
+  EXPECT_EQ(r.status, 1);
+  EXPECT_NE(r.output.find("nothing was judged"), std::string::npos) << r.output;
+}
+
+TEST_F(Program, AFullDiskIsNoSuccess) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  std::ofstream(directory_ / "f.csv") << "x,y,z\n1,2,3\n1,2,4\n2,2,3\n1,3,3\n";
+  const std::string command = "cd '" + directory_.path().string() + "' && '" LIESTAT_PROGRAM "' mean f.csv ";
+  EXPECT_EQ(WEXITSTATUS(std::system((command + ">/dev/null 2>&1").c_str())), 0);
+  EXPECT_EQ(WEXITSTATUS(std::system((command + ">/dev/full 2>&1").c_str())), 2);
 }
 
 TEST_F(Program, MissingFile) {

@@ -29,6 +29,14 @@ std::string errorIn(const std::string& text, const ReadingOptions& options = {})
   return errorOf([&] { read(text, options); });
 }
 
+TEST(Reading, LinesMayEndInCarriageReturns) {
+  for (const char* end : {"\n", "\r\n", "\r"}) {
+    const std::string text = std::string("x,y,z") + end + "1,2,3" + end + "4,5,6" + end;
+    EXPECT_EQ(read(text).size(), 2U) << ::testing::PrintToString(end);
+    EXPECT_EQ(errorIn(std::string("x,y,z") + end + "1,2,3" + end + "4,five,6" + end).substr(0, 8), "f.csv:3:");
+  }
+}
+
 TEST(Reading, Points) {
   const FeatureFile file = read("x,y,z\n1,2,3\n-1e-3,+2.5,.5\n");
   EXPECT_EQ(file.kind, Feature::point);
