@@ -2,7 +2,7 @@
 
 // Views of `liestat validate split`, of the measurements in a file and of landmarks that a stereo camera saw.
 
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
 #include <cli/show/json.hpp>
 #include <cli/commands/split.hpp>

@@ -1,4 +1,4 @@
-#include <cli/commands/measures_options.hpp>
+#include <cli/commands/measurement_options.hpp>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -6,7 +6,7 @@
 
 namespace liestat::cli {
 
-void MeasuresInput::declare(CLI::App& app, bool file_required) {
+void MeasurementInput::declare(CLI::App& app, bool file_required) {
   CLI::Option* path = app.add_option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path->required();
   app.add_option("--format", format, "The file's format (default auto: by its first lines)")
@@ -16,8 +16,9 @@ void MeasuresInput::declare(CLI::App& app, bool file_required) {
   app.add_option("--criterion", options.criterion,
                  "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
       ->check(CLI::IsMember({"lsq", "wlsq", "maha"}));
-  app.add_option("--covariance-at", options.covariance_at,
-                 "Where covariances of frames belong: measured (the frame of each measure) or estimated (of the mean)")
+  app.add_option(
+         "--covariance-at", options.covariance_at,
+         "Where covariances of frames belong: measured (the frame of each measurement) or estimated (of the mean)")
       ->check(CLI::IsMember({"measured", "estimated"}));
   app.add_flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
   app.add_option("--norm-tolerance", norm_tolerance,
@@ -25,11 +26,11 @@ void MeasuresInput::declare(CLI::App& app, bool file_required) {
       ->check(CLI::Range(0.0, 0.5));
 }
 
-Measures MeasuresInput::read(const std::string& command) const {
+Measurements MeasurementInput::read(const std::string& command) const {
   ReadingOptions how;
   if (!format.empty()) how.format = format;
   how.norm_tolerance = norm_tolerance;
-  return chooseMeasures(readFeatureFile(file, how), options, command);
+  return chooseMeasurements(readFeatureFile(file, how), options, command);
 }
 
 }  // namespace liestat::cli
