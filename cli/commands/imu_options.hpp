@@ -2,12 +2,10 @@
 
 // What the commands that read an inertial sensor have in common on the command line.
 
+#include <cli/commands/command_line.hpp>
 #include <cli/io/calibration.hpp>
 #include <fusion/imu/preintegrate.hpp>
 
-#include <CLI/App.hpp>
-
-#include <map>
 #include <string>
 #include <vector>
 
@@ -41,26 +39,20 @@ struct ImuOptions {
 
 /// Declares --imu, --noise, both biases, --scheme and --largest-gap. `bias` says what a bias is taken for that is not
 /// given.
-inline void addImuOptions(CLI::App& command, ImuOptions& options, const std::string& bias) {
-  static const std::map<std::string, ImuScheme> schemes = {
-      {"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}};
+inline void addImuOptions(const Command& command, ImuOptions& options, const std::string& bias) {
+  command.option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
+      .required();
   command
-      .add_option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
-      ->required();
-  command
-      .add_option("--noise", options.noise,
-                  "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
-      ->delimiter(',')
-      ->expected(2, 4)
-      ->check(CLI::NonNegativeNumber);
-  command.add_option("--gyroscope-bias", options.gyroscope_bias, "rad/s, x,y,z" + bias)->delimiter(',')->expected(3);
-  command.add_option("--accelerometer-bias", options.accelerometer_bias, "m/s^2, x,y,z" + bias)
-      ->delimiter(',')
-      ->expected(3);
-  command.add_option("--scheme", options.scheme, "Of integration: averaged (default), held, cubic")
-      ->transform(CLI::CheckedTransformer(schemes));
-  command.add_option("--largest-gap", options.largest_gap, "s between two readings (default 0.1)")
-      ->check(CLI::PositiveNumber);
+      .option("--noise", options.noise,
+              "Densities: gyroscope rad/s/rtHz, accelerometer m/s^2/rtHz, and their walks; go before the file's")
+      .list(2, 4)
+      .notNegative();
+  command.option("--gyroscope-bias", options.gyroscope_bias, "rad/s, x,y,z" + bias).list(3, 3);
+  command.option("--accelerometer-bias", options.accelerometer_bias, "m/s^2, x,y,z" + bias).list(3, 3);
+  command.choice<ImuScheme>("--scheme", options.scheme,
+                            {{"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}},
+                            "Of integration: averaged (default), held, cubic");
+  command.option("--largest-gap", options.largest_gap, "s between two readings (default 0.1)").positive();
 }
 
 }  // namespace liestat::cli

@@ -1,8 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
 
-#include <CLI/App.hpp>
-
 #include <cstdio>
 #include <memory>
 
@@ -40,20 +38,19 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addMeanCommand(CLI::App& app, Invocation& invocation) {
+void addMeanCommand(const CommandList& app) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = addCommand(app, "mean", "Mean, covariance, dispersion and uniqueness of the features in a file");
-  options->input.declare(*command, true);
-  command->add_flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
+  const Command command = app.add("mean", "Mean, covariance, dispersion and uniqueness of the features in a file");
+  options->input.declare(command, true);
+  command.flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
   command
-      ->add_option("--budget", options->analysis.budget,
-                   "Cells of branch and bound (default 1000000, with more than 100000 measurements 2000)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000000}));
-  command->add_option("--threads", options->analysis.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
-  command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
-  command->add_option("--report", options->report, "Write a page with plots into this directory");
-  command->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+      .option("--budget", options->analysis.budget,
+              "Cells of branch and bound (default 1000000, with more than 100000 measurements 2000)")
+      .range(std::size_t{1}, std::size_t{1000000000});
+  command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);
+  command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Write a page with plots into this directory");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

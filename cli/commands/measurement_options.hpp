@@ -1,12 +1,9 @@
 #pragma once
 
+#include <cli/commands/command_line.hpp>
 #include <cli/io/measurements.hpp>
 
 #include <string>
-
-namespace CLI {
-class App;
-}
 
 namespace liestat::cli {
 
@@ -18,7 +15,7 @@ struct MeasurementInput {
   MeasurementOptions options;
 
   /// Declares FILE, --format, --feature, --criterion, --covariance-at, --likelihood and --norm-tolerance.
-  void declare(CLI::App& app, bool file_required);
+  void declare(const Command& app, bool file_required);
   /// Reads the file; throws InputError. `command` begins the messages about options.
   Measurements read(const std::string& command) const;
 };

@@ -8,7 +8,6 @@
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/factor.hpp>
 
-#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -95,24 +94,20 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addPreintegrateCommand(CLI::App& app, Invocation& invocation) {
+void addPreintegrateCommand(const CommandList& app) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = addCommand(
-      app, "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
-  addImuOptions(*command, options->imu, " (default 0, or the truth's)");
-  command->add_option("--calibration", options->calibration,
-                      "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
-  command->add_option("--begin", options->begin,
-                      "s since the first reading, or the file's seconds (default: the first)");
-  command->add_option("--end", options->end, "The same (default: the last)");
-  command
-      ->add_option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
-  command->add_option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");
-  command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
-  command->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  const Command command = app.add(
+      "preintegrate", "Relative motion, covariance and bias derivatives from the readings of an inertial sensor");
+  addImuOptions(command, options->imu, " (default 0, or the truth's)");
+  command.option("--calibration", options->calibration, "YAML with the densities of noise (EuRoC, Kalibr, OpenVINS)");
+  command.option("--begin", options->begin, "s since the first reading, or the file's seconds (default: the first)");
+  command.option("--end", options->end, "The same (default: the last)");
+  command.option("--window", options->window, "s: one after the other, a line each (default: one, from begin to end)")
+      .positive();
+  command.option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
+  command.option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");
+  command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

@@ -8,7 +8,6 @@
 #include <experiments/simulate_vi.hpp>
 #include <stats/random.hpp>
 
-#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -161,53 +160,43 @@ int runCommand(Options options) {
 
 }  // namespace
 
-void addSimulateViCommand(CLI::App& simulate, Invocation& invocation) {
+void addSimulateViCommand(const CommandList& simulate) {
   auto options = std::make_shared<Options>();
   ViSceneOptions& scene = options->scene;
-  CLI::App* command = addCommand(
-      simulate, "vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
-  command->add_option("--output", options->output, "Directory for the files")->required();
-  command->add_option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
-  command->add_option("--imu", options->imu,
-                      "EuRoC's imu0/data.csv that belongs to it: kept as it is (default: simulated along a spline)");
-  command->add_option(
-      "--calibration", options->calibration,
-      "YAML of the first camera and the IMU's noise, one file or several (default: a pinhole, ADIS16448)");
-  command->add_option("--begin", options->begin,
-                      "s since the first reading, or the truth's first row (default: as early as there is a truth)");
-  command->add_option("--end", options->end, "The same (default: as late as there is a truth; 20 without)");
-  command->add_option("--image-rate", scene.image_rate, "Hz (default 10)")->check(CLI::Range(1e-3, 1e4));
-  command->add_option("--pixel-noise", scene.pixel_noise, "Standard deviation, pixels (default 1)")
-      ->check(CLI::Range(0.0, 1e4));
-  command->add_option("--landmarks", scene.landmarks, "Points on the box (default 2000)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
-  command->add_option("--features", scene.features, "At most so many tracks an image (default 40)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
-  command->add_option("--box", options->box, "x,y,z: edges of the box around the motion, m (default 10,10,4 or larger)")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(CLI::PositiveNumber);
-  command->add_option("--outliers", scene.outliers, "Fraction of the tracks that drift (default 0)")
-      ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--drift", scene.drift, "Of their random walk, pixels an image (default 8)")
-      ->check(CLI::Range(0.0, 1e4));
-  command->add_option("--imu-rate", options->imu_rate, "Hz, of simulated readings (default 200)")
-      ->check(CLI::Range(1.0, 1e5));
-  command->add_option("--imu-noise", options->imu_noise, "Times the calibration's densities (default 1; 0: exact)")
-      ->check(CLI::Range(0.0, 1e6));
-  command->add_option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z (default: drawn, deviation 0.01)")
-      ->delimiter(',')
-      ->expected(3);
-  command
-      ->add_option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default: drawn, deviation 0.05)")
-      ->delimiter(',')
-      ->expected(3);
-  command->add_option("--knots", options->spacing, "s between the spline's control points (default 0.1)")
-      ->check(CLI::Range(1e-3, 10.0));
-  command->add_option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)")
-      ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--seed", scene.seed, "Seed; the same seed gives the same files (default 1)");
-  command->callback([options, &invocation] { invocation.run = [options] { return runCommand(*options); }; });
+  const Command command =
+      simulate.add("vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
+  command.option("--output", options->output, "Directory for the files").required();
+  command.option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
+  command.option("--imu", options->imu,
+                 "EuRoC's imu0/data.csv that belongs to it: kept as it is (default: simulated along a spline)");
+  command.option("--calibration", options->calibration,
+                 "YAML of the first camera and the IMU's noise, one file or several (default: a pinhole, ADIS16448)");
+  command.option("--begin", options->begin,
+                 "s since the first reading, or the truth's first row (default: as early as there is a truth)");
+  command.option("--end", options->end, "The same (default: as late as there is a truth; 20 without)");
+  command.option("--image-rate", scene.image_rate, "Hz (default 10)").range(1e-3, 1e4);
+  command.option("--pixel-noise", scene.pixel_noise, "Standard deviation, pixels (default 1)").range(0.0, 1e4);
+  command.option("--landmarks", scene.landmarks, "Points on the box (default 2000)")
+      .range(std::size_t{1}, std::size_t{1000000});
+  command.option("--features", scene.features, "At most so many tracks an image (default 40)")
+      .range(std::size_t{1}, std::size_t{1000000});
+  command.option("--box", options->box, "x,y,z: edges of the box around the motion, m (default 10,10,4 or larger)")
+      .list(3, 3)
+      .positive();
+  command.option("--outliers", scene.outliers, "Fraction of the tracks that drift (default 0)").range(0.0, 1.0);
+  command.option("--drift", scene.drift, "Of their random walk, pixels an image (default 8)").range(0.0, 1e4);
+  command.option("--imu-rate", options->imu_rate, "Hz, of simulated readings (default 200)").range(1.0, 1e5);
+  command.option("--imu-noise", options->imu_noise, "Times the calibration's densities (default 1; 0: exact)")
+      .range(0.0, 1e6);
+  command.option("--gyroscope-bias", options->gyroscope_bias, "rad/s, x,y,z (default: drawn, deviation 0.01)")
+      .list(3, 3);
+  command.option("--accelerometer-bias", options->accelerometer_bias, "m/s^2, x,y,z (default: drawn, deviation 0.05)")
+      .list(3, 3);
+  command.option("--knots", options->spacing, "s between the spline's control points (default 0.1)").range(1e-3, 10.0);
+  command.option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)")
+      .range(0.0, 100.0);
+  command.option("--seed", scene.seed, "Seed; the same seed gives the same files (default 1)");
+  command.run([options](const Invocation&) { return runCommand(*options); });
 }
 
 }  // namespace liestat::cli

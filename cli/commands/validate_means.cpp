@@ -2,8 +2,6 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/show/means_validation.hpp>
 
-#include <CLI/App.hpp>
-
 #include <memory>
 
 namespace liestat::cli {
@@ -45,34 +43,26 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addValidateMeansCommand(CLI::App& validate, Invocation& invocation) {
+void addValidateMeansCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = addCommand(validate, "means", "Means of features: Monte-Carlo validation of their covariances");
-  app->add_option("--feature", options->features, "Features, a comma list")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_features)));
-  app->add_option("--noise", options->noises, "Noises, a comma list")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_noises)));
-  app->add_option("--criterion", options->criteria, "Criteria, a comma list")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_criteria)));
-  app->add_option("--n", options->n, "Numbers of measurements, a comma list (default 5,10,20,30,50,100)")
-      ->delimiter(',')
-      ->check(CLI::Range(std::size_t{2}, std::size_t{1000000}));
-  app->add_option("--spread", options->spreads,
-                  "Factors of the report's standard deviations, a comma list (default 1, frames 1/3)")
-      ->delimiter(',')
-      ->check(CLI::Range(1e-9, 10.0));
-  app->add_option("--covariance-at", options->covariance_at,
-                  "Frame in which the noise of frames is Gaussian and MAHA takes its covariances")
-      ->check(CLI::IsMember({"estimated", "measured"}));
-  addRunOptions(*app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
-  app->add_flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
-  app->add_flag("--full", options->full,
-                "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
-  app->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  const Command app = validate.add("means", "Means of features: Monte-Carlo validation of their covariances");
+  app.option("--feature", options->features, "Features, a comma list").list().oneOf(names(all_features));
+  app.option("--noise", options->noises, "Noises, a comma list").list().oneOf(names(all_noises));
+  app.option("--criterion", options->criteria, "Criteria, a comma list").list().oneOf(names(all_criteria));
+  app.option("--n", options->n, "Numbers of measurements, a comma list (default 5,10,20,30,50,100)")
+      .list()
+      .range(std::size_t{2}, std::size_t{1000000});
+  app.option("--spread", options->spreads,
+             "Factors of the report's standard deviations, a comma list (default 1, frames 1/3)")
+      .list()
+      .range(1e-9, 10.0);
+  app.option("--covariance-at", options->covariance_at,
+             "Frame in which the noise of frames is Gaussian and MAHA takes its covariances")
+      .oneOf({"estimated", "measured"});
+  addRunOptions(app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
+  app.flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
+  app.flag("--full", options->full, "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
+  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

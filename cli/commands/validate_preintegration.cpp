@@ -2,8 +2,6 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/show/preintegration_validation.hpp>
 
-#include <CLI/App.hpp>
-
 #include <memory>
 
 namespace liestat::cli {
@@ -30,23 +28,20 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addValidatePreintegrationCommand(CLI::App& validate, Invocation& invocation) {
+void addValidatePreintegrationCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = addCommand(validate, "preintegration",
-                             "Motions preintegrated from noisy inertial readings: are their covariances true?");
-  app->add_option("--check", options->checks, "motion, walk, motion_and_bias: a comma list (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_preintegration_checks)));
-  app->add_option("--window", options->windows, "Seconds, a comma list (default 0.1,0.5,1,2)")
-      ->delimiter(',')
-      ->check(CLI::Range(0.005, 100.0));
-  app->add_option("--noise", options->noises, "Multiples of an ADIS16448's noise, a comma list (default 1,10,100)")
-      ->delimiter(',')
-      ->check(CLI::Range(1e-3, 1e4));
-  addRunOptions(*app, "2000", options->validation.trials, options->validation.seed, options->validation.threads,
+  const Command app =
+      validate.add("preintegration", "Motions preintegrated from noisy inertial readings: are their covariances true?");
+  app.option("--check", options->checks, "motion, walk, motion_and_bias: a comma list (default: all)")
+      .list()
+      .oneOf(names(all_preintegration_checks));
+  app.option("--window", options->windows, "Seconds, a comma list (default 0.1,0.5,1,2)").list().range(0.005, 100.0);
+  app.option("--noise", options->noises, "Multiples of an ADIS16448's noise, a comma list (default 1,10,100)")
+      .list()
+      .range(1e-3, 1e4);
+  addRunOptions(app, "2000", options->validation.trials, options->validation.seed, options->validation.threads,
                 options->output);
-  app->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

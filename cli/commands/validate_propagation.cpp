@@ -2,8 +2,6 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/show/propagation_validation.hpp>
 
-#include <CLI/App.hpp>
-
 #include <memory>
 
 namespace liestat::cli {
@@ -31,26 +29,24 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addValidatePropagationCommand(CLI::App& validate, Invocation& invocation) {
+void addValidatePropagationCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
-  CLI::App* app =
-      addCommand(validate, "propagation",
-                 "Composition, inverse and action of uncertain features: up to which noise is first order right?");
-  app->add_option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_propagated)));
-  app->add_option("--operation", options->operations,
-                  "compose, inverse, between, act, chain (of ten factors): a comma list (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_operations)));
-  app->add_option("--spread", options->spreads,
-                  "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
-      ->delimiter(',')
-      ->check(CLI::Range(1e-6, 10.0));
-  addRunOptions(*app, "20000", options->validation.trials, options->validation.seed, options->validation.threads,
+  const Command app = validate.add(
+      "propagation", "Composition, inverse and action of uncertain features: up to which noise is first order right?");
+  app.option("--feature", options->features, "rotation, pose, similarity: a comma list (default: all)")
+      .list()
+      .oneOf(names(all_propagated));
+  app.option("--operation", options->operations,
+             "compose, inverse, between, act, chain (of ten factors): a comma list (default: all)")
+      .list()
+      .oneOf(names(all_operations));
+  app.option("--spread", options->spreads,
+             "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
+      .list()
+      .range(1e-6, 10.0);
+  addRunOptions(app, "20000", options->validation.trials, options->validation.seed, options->validation.threads,
                 options->output);
-  app->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

@@ -9,7 +9,6 @@
 #include <cli/show/split.hpp>
 #include <cli/commands/split.hpp>
 
-#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -130,24 +129,23 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addValidateSplitCommand(CLI::App& validate, Invocation& invocation) {
+void addValidateSplitCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = addCommand(
-      validate, "split", "Real measurements split in two, at random and by blocks of time: do the halves agree?");
-  options->input.declare(*command, false);
-  command->add_option("--stereo", options->stereo,
-                      "Instead of FILE: PREFIX_tracks.csv, _poses.csv, _camera.csv and, if there, _landmarks.csv");
-  command->add_option("--splits", options->settings.split.splits, "Splits of each kind (default 200)")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
-  command->add_option("--blocks", options->settings.split.blocks, "Blocks of time, an even number (default 10)")
-      ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
-  command->add_option("--seed", options->settings.split.seed,
-                      "Seed; the same seed gives the same bits on any number of threads");
-  command->add_option("--threads", options->settings.threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
-  command->add_option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
-  command->add_option("--report", options->report, "Write a page with plots into this directory");
-  command->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  const Command command =
+      validate.add("split", "Real measurements split in two, at random and by blocks of time: do the halves agree?");
+  options->input.declare(command, false);
+  command.option("--stereo", options->stereo,
+                 "Instead of FILE: PREFIX_tracks.csv, _poses.csv, _camera.csv and, if there, _landmarks.csv");
+  command.option("--splits", options->settings.split.splits, "Splits of each kind (default 200)")
+      .range(std::size_t{1}, std::size_t{1000000});
+  command.option("--blocks", options->settings.split.blocks, "Blocks of time, an even number (default 10)")
+      .range(std::size_t{2}, std::size_t{1000});
+  command.option("--seed", options->settings.split.seed,
+                 "Seed; the same seed gives the same bits on any number of threads");
+  command.option("--threads", options->settings.threads, "Threads (default: all)").range(0, 4096);
+  command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Write a page with plots into this directory");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

@@ -5,8 +5,6 @@
 #include <cli/show/two_solutions.hpp>
 #include <cli/show/vi_init_validation.hpp>
 
-#include <CLI/App.hpp>
-
 #include <memory>
 
 namespace liestat::cli {
@@ -72,31 +70,30 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addValidateViInitCommand(CLI::App& validate, Invocation& invocation) {
+void addValidateViInitCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
-  CLI::App* app = addCommand(validate, "vi-init",
-                             "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
-  app->add_option("--check", options->checks,
-                  "consistency, closed_form, accuracy, gyroscope_bias, drift: a comma list (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(names(all_vi_init_checks)));
-  app->add_option("--window", options->windows, "Only windows of so many seconds, of 1, 2, 3, 4: a comma list")
-      ->delimiter(',')
-      ->check(CLI::IsMember({1., 2., 3., 4.}));
-  app->add_option("--noise", options->noise,
-                  "Noise that is simulated over the one that the estimators are told (default 1)")
-      ->check(CLI::Range(0.01, 100.0));
-  app->add_flag("--full", options->full, "4000 windows a row; no time limit");
-  auto* table1 = app->add_flag("--table1", options->table1, "The paper's table of cases, as it is recognised");
-  auto* scene = app->add_option("--scene", options->scene,
-                                "fig1, fig2: draws the paper's figure of two solutions into the directory of --report")
-                    ->check(CLI::IsMember({"fig1", "fig2"}));
-  table1->excludes("--check")->excludes("--window")->excludes("--noise");
-  scene->excludes(table1)->excludes("--check")->excludes("--window")->excludes("--noise")->excludes("--full");
-  addRunOptions(*app, "600, with --full 4000; scenes of --table1: 100, 1000", options->trials, options->seed,
+  const Command app =
+      validate.add("vi-init", "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
+  app.option("--check", options->checks,
+             "consistency, closed_form, accuracy, gyroscope_bias, drift: a comma list (default: all)")
+      .list()
+      .oneOf(names(all_vi_init_checks));
+  app.option("--window", options->windows, "Only windows of so many seconds, of 1, 2, 3, 4: a comma list")
+      .list()
+      .oneOfNumbers({1., 2., 3., 4.});
+  app.option("--noise", options->noise, "Noise that is simulated over the one that the estimators are told (default 1)")
+      .range(0.01, 100.0);
+  app.flag("--full", options->full, "4000 windows a row; no time limit");
+  const Option table1 = app.flag("--table1", options->table1, "The paper's table of cases, as it is recognised");
+  const Option scene =
+      app.option("--scene", options->scene,
+                 "fig1, fig2: draws the paper's figure of two solutions into the directory of --report")
+          .oneOf({"fig1", "fig2"});
+  table1.excludes("--check").excludes("--window").excludes("--noise");
+  scene.excludes(table1).excludes("--check").excludes("--window").excludes("--noise").excludes("--full");
+  addRunOptions(app, "600, with --full 4000; scenes of --table1: 100, 1000", options->trials, options->seed,
                 options->threads, options->output);
-  app->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

@@ -7,8 +7,6 @@
 #include <cli/show/json.hpp>
 #include <cli/show/progress.hpp>
 
-#include <CLI/App.hpp>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -26,8 +24,8 @@ std::vector<std::string> names(const List& list) {
   return all;
 }
 
-/// The enumerators with the given names, each once and in their own order; all of them for none. CLI11 has checked the
-/// names.
+/// The enumerators with the given names, each once and in their own order; all of them for none. The command
+/// line has checked the names.
 template <class List>
 auto chosen(const List& list, const std::vector<std::string>& wanted) {
   std::vector<typename List::value_type> values;
@@ -56,14 +54,14 @@ struct ValidationOutput {
 
 /// Declares what every validation takes: its size, its seed, its threads, and where the rows go. `size` says what the
 /// default is.
-inline void addRunOptions(CLI::App& app, const std::string& size, std::size_t& trials, std::uint64_t& seed,
+inline void addRunOptions(const Command& command, const std::string& size, std::size_t& trials, std::uint64_t& seed,
                           int& threads, ValidationOutput& output) {
-  app.add_option("--trials", trials, "Trials a row (default " + size + ")")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{100000000}));
-  app.add_option("--seed", seed, "Seed; the same seed gives the same bits on any number of threads");
-  app.add_option("--threads", threads, "Threads (default: all)")->check(CLI::Range(0, 4096));
-  app.add_option("--json", output.json, "Write the rows to a JSON file ('-': standard output)");
-  app.add_option("--report", output.report, "Write a page with plots into this directory");
+  command.option("--trials", trials, "Trials a row (default " + size + ")")
+      .range(std::size_t{1}, std::size_t{100000000});
+  command.option("--seed", seed, "Seed; the same seed gives the same bits on any number of threads");
+  command.option("--threads", threads, "Threads (default: all)").range(0, 4096);
+  command.option("--json", output.json, "Write the rows to a JSON file ('-': standard output)");
+  command.option("--report", output.report, "Write a page with plots into this directory");
 }
 
 /// Shows rows as format(rows) on the terminal, each as toJson(row) in a JSON file and as a page by writeReport; returns

@@ -8,7 +8,6 @@
 #include <cli/show/vi_init.hpp>
 #include <fusion/visual_inertial.hpp>
 
-#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -159,57 +158,51 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
 }  // namespace
 
-void addViInitCommand(CLI::App& app, Invocation& invocation) {
+void addViInitCommand(const CommandList& app) {
   auto options = std::make_shared<Options>();
   VisualInertialOptions& how = options->how;
   InitialisationOptions& steps = how.initialisation;
-  CLI::App* command = addCommand(
-      app, "vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
-  addImuOptions(*command, options->imu, ": as it is expected (default 0)");
-  command->add_option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s")
-      ->required();
-  command->add_option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
-  command->add_option("--calibration", options->calibration,
-                      "YAML of camera and inertial sensor (Kalibr, OpenVINS, EuRoC); several files are merged");
-  command->add_option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
-  command->add_option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's")
-      ->delimiter(',')
-      ->expected(4);
-  command->add_option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)")
-      ->check(CLI::Range(1e-3, 1e6));
-  command->add_option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
-      ->check(CLI::Range(1e-6, 1e3));
-  command->add_option("--window", how.window, "s (default 2)")->check(CLI::Range(0.1, 60.));
-  command->add_option("--stride", how.stride, "s from one window's start to the next (default: the window)")
-      ->check(CLI::Range(1e-3, 1e4));
-  command->add_option("--image-rate", how.image_rate, "Hz: images that are used, at most (default 10; 0: all)")
-      ->check(CLI::Range(0., 1e4));
-  command->add_option("--features", how.max_features, "A window, at most (default 50; 0: all)");
-  command->add_option("--least-observations", how.min_observations, "Of a feature in a window (default 4)")
-      ->check(CLI::Range(std::size_t{2}, std::size_t{1000}));
-  command->add_option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)")->check(CLI::Range(1e-3, 1e3));
-  command->add_flag("--free-gravity", options->free_gravity, "|G| is not known");
-  command->add_option("--gyroscope-deviation", steps.prior.gyroscope_sigma, "rad/s, of its expected bias (default 0.1)")
-      ->check(CLI::Range(1e-9, 10.));
+  const Command command =
+      app.add("vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
+  addImuOptions(command, options->imu, ": as it is expected (default 0)");
+  command.option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s").required();
+  command.option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
+  command.option("--calibration", options->calibration,
+                 "YAML of camera and inertial sensor (Kalibr, OpenVINS, EuRoC); several files are merged");
+  command.option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
+  command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's").list(4, 4);
+  command.option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)").range(1e-3, 1e6);
+  command.option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
+      .range(1e-6, 1e3);
+  command.option("--window", how.window, "s (default 2)").range(0.1, 60.);
+  command.option("--stride", how.stride, "s from one window's start to the next (default: the window)")
+      .range(1e-3, 1e4);
+  command.option("--image-rate", how.image_rate, "Hz: images that are used, at most (default 10; 0: all)")
+      .range(0., 1e4);
+  command.option("--features", how.max_features, "A window, at most (default 50; 0: all)");
+  command.option("--least-observations", how.min_observations, "Of a feature in a window (default 4)")
+      .range(std::size_t{2}, std::size_t{1000});
+  command.option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)").range(1e-3, 1e3);
+  command.flag("--free-gravity", options->free_gravity, "|G| is not known");
+  command.option("--gyroscope-deviation", steps.prior.gyroscope_sigma, "rad/s, of its expected bias (default 0.1)")
+      .range(1e-9, 10.);
   command
-      ->add_option("--accelerometer-deviation", steps.prior.accelerometer_sigma,
-                   "m/s^2, of its expected bias (default 0.15)")
-      ->check(CLI::Range(1e-9, 100.));
-  command->add_flag("--known-biases", options->known_biases, "Biases are as they are expected: nothing is estimated");
-  command->add_flag("--true-biases", options->true_biases, "Those of the ground truth are used: nothing is estimated");
-  command->add_flag("--no-consensus", options->no_consensus, "All tracks are right");
-  command->add_flag("--no-refinement", options->no_refinement, "The closed form alone");
-  command->add_option("--fuse", how.stretch, "s: disjoint windows of such stretches are fused (default 12; 0: none)")
-      ->check(CLI::Range(0., 1e6));
-  command->add_option("--begin", how.begin,
-                      "s since the first reading, or the file's seconds (default: the first image)");
-  command->add_option("--end", how.end, "The same (default: the last image)");
-  command->add_option("--truth", options->truth, "EuRoC's ground truth, to compare with");
-  command->add_option("--seed", steps.consensus.seed, "Of the consensus");
-  command->add_option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
-  command->add_option("--report", options->report, "Write a page with plots into this directory");
-  command->callback(
-      [options, &invocation] { invocation.run = [options, &invocation] { return runCommand(*options, invocation); }; });
+      .option("--accelerometer-deviation", steps.prior.accelerometer_sigma,
+              "m/s^2, of its expected bias (default 0.15)")
+      .range(1e-9, 100.);
+  command.flag("--known-biases", options->known_biases, "Biases are as they are expected: nothing is estimated");
+  command.flag("--true-biases", options->true_biases, "Those of the ground truth are used: nothing is estimated");
+  command.flag("--no-consensus", options->no_consensus, "All tracks are right");
+  command.flag("--no-refinement", options->no_refinement, "The closed form alone");
+  command.option("--fuse", how.stretch, "s: disjoint windows of such stretches are fused (default 12; 0: none)")
+      .range(0., 1e6);
+  command.option("--begin", how.begin, "s since the first reading, or the file's seconds (default: the first image)");
+  command.option("--end", how.end, "The same (default: the last image)");
+  command.option("--truth", options->truth, "EuRoC's ground truth, to compare with");
+  command.option("--seed", steps.consensus.seed, "Of the consensus");
+  command.option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Write a page with plots into this directory");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
 }  // namespace liestat::cli

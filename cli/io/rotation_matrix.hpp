@@ -8,6 +8,9 @@
 
 namespace liestat::cli {
 
+/// Files of calibrations and cameras print four digits at least; what is farther from a rotation than that is none.
+inline constexpr double rotation_tolerance = 1e-3;
+
 /// The rotation nearest to a matrix, and how far the matrix is from it.
 struct NearestRotation {
   SO3d rotation;

@@ -17,9 +17,6 @@
 namespace liestat::cli {
 namespace {
 
-/// The files are printed with nine digits; more than this is not a rotation.
-constexpr double rotation_tolerance = 1e-3;
-
 struct NamedValue {
   double value;
   std::size_t line;

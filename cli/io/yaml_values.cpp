@@ -12,9 +12,6 @@
 namespace liestat::cli {
 namespace {
 
-/// Files print four digits at least; what is farther from a rotation than that is none.
-constexpr double rotation_tolerance = 1e-3;
-
 }  // namespace
 
 std::string shown(const YAML::Node& node) {

@@ -1,0 +1,138 @@
+#include <cli/commands/command_line.hpp>
+
+#include <cli/io/input_error.hpp>
+#include <cli/show/json.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <cstddef>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <optional>
+
+namespace liestat::cli {
+
+Option Option::required() const {
+  option_->required();
+  return *this;
+}
+template <class T>
+Option Option::range(T least, T most) const {
+  option_->check(CLI::Range(least, most));
+  return *this;
+}
+Option Option::positive() const {
+  option_->check(CLI::PositiveNumber);
+  return *this;
+}
+Option Option::notNegative() const {
+  option_->check(CLI::NonNegativeNumber);
+  return *this;
+}
+Option Option::oneOf(const std::vector<std::string>& values) const {
+  option_->check(CLI::IsMember(values));
+  return *this;
+}
+Option Option::oneOfNumbers(const std::vector<double>& values) const {
+  option_->check(CLI::IsMember(values));
+  return *this;
+}
+Option Option::list() const {
+  option_->delimiter(',');
+  return *this;
+}
+Option Option::list(int least, int most) const {
+  option_->delimiter(',')->expected(least, most);
+  return *this;
+}
+Option Option::excludes(const std::string& other) const {
+  option_->excludes(other);
+  return *this;
+}
+Option Option::excludes(const Option& other) const {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+template Option Option::range(int, int) const;
+template Option Option::range(double, double) const;
+template Option Option::range(unsigned long, unsigned long) const;
+template Option Option::range(unsigned long long, unsigned long long) const;
+
+template <class T>
+Option Command::option(const std::string& name, T& value, const std::string& description) const {
+  return Option(app_->add_option(name, value, description));
+}
+template Option Command::option(const std::string&, int&, const std::string&) const;
+template Option Command::option(const std::string&, double&, const std::string&) const;
+template Option Command::option(const std::string&, unsigned long&, const std::string&) const;
+template Option Command::option(const std::string&, unsigned long long&, const std::string&) const;
+template Option Command::option(const std::string&, std::string&, const std::string&) const;
+template Option Command::option(const std::string&, std::optional<double>&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<double>&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<std::size_t>&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&) const;
+
+Option Command::flag(const std::string& name, bool& value, const std::string& description) const {
+  return Option(app_->add_flag(name, value, description));
+}
+Option Command::word(const std::string& name, const std::vector<std::string>& words,
+                     std::function<void(const std::string&)> take, const std::string& description) const {
+  return Option(app_->add_option_function<std::string>(name, take, description)->check(CLI::IsMember(words)));
+}
+void Command::run(Run work) const {
+  app_->callback([chosen = chosen_, work = std::move(work)] { *chosen = work; });
+}
+
+Command CommandList::add(const std::string& name, const std::string& description) const {
+  return {app_->add_subcommand(name, description), chosen_};
+}
+
+namespace {
+
+int complain(const std::string& message) {
+  std::fputs((message + "\n").c_str(), stderr);
+  return exit_bad_input;
+}
+
+int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) {
+  CLI::App app("Statistics of rotations, poses and other geometric features, with their uncertainty.", "liestat");
+  app.set_version_flag("--version", "liestat " + std::string(programVersion()));
+  app.require_subcommand(1);
+  const auto chosen = std::make_shared<Command::Run>();
+  for (const CommandGroup& group : groups) {
+    CLI::App* parent = &app;
+    if (!group.name.empty()) {
+      parent = app.add_subcommand(group.name, group.description);
+      parent->require_subcommand(1);
+    }
+    for (const auto add : group.commands) add(CommandList(parent, chosen));
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version end the parsing too.
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return complain("liestat: " + printable(error.what(), 1000) + " (liestat --help explains the usage)");
+  }
+  return (*chosen)({commandLine(argc, argv)});
+}
+
+}  // namespace
+
+int runProgram(int argc, char** argv, const std::vector<CommandGroup>& groups) {
+  try {
+    return parseAndRun(argc, argv, groups);
+  } catch (const InputError& error) {
+    return complain(error.what());
+  } catch (const std::bad_alloc&) {
+    return complain("liestat: not enough memory");
+  } catch (const std::exception& error) {
+    return complain(std::string("liestat: internal error: ") + error.what());
+  }
+}
+
+}  // namespace liestat::cli
