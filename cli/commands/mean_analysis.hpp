@@ -23,7 +23,7 @@ struct LargestResidual {
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
-  /// Of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
+  /// The status of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
   Status status = Status::ok;
   std::string reason = {};  ///< in words, where status is not ok
   bool converged = false;
@@ -34,9 +34,9 @@ struct MeanAnalysis {
   Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
   Status covariance_status = Status::ok;
   std::string covariance_from = {};                               ///< residuals or noise
-  Eigen::MatrixXd dispersion;                                     ///< of the measurements about the mean
+  Eigen::MatrixXd dispersion;                                     ///< the measurements' covariance about the mean
   std::vector<LargestResidual> largest = {};                      ///< one for each part of the tangent vector
-  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< of directions: what the coordinates belong to
+  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< directions: the axes of the coordinates
 
   Uniqueness unique = Uniqueness::not_certified;
   std::string proof = {};  ///< in words
@@ -54,7 +54,7 @@ struct MeanAnalysis {
   std::vector<std::string> notes = {};
 };
 
-/// How much is computed.
+/// Options of analyseMean().
 struct AnalysisOptions {
   bool certify = true;     ///< branch and bound where the cheap certificates fail
   std::size_t budget = 0;  ///< its cells; 0: a million, of very many measurements as many as take some seconds

@@ -9,7 +9,7 @@
 
 namespace liestat::cli {
 
-/// How the measurements are split, and on how many threads (0: all).
+/// Options of splitMeasurements(): the splits, and the number of threads (0: all).
 struct SplitSettings {
   SplitOptions split;
   int threads = 0;

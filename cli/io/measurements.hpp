@@ -15,7 +15,7 @@ namespace liestat::cli {
 using experiments::Criterion;
 using experiments::Feature;
 
-/// What the commands that read features are told about them; names as on the command line, empty: decide by the file.
+/// The options of commands that read features; names as on the command line, empty: the file decides.
 struct MeasurementOptions {
   std::string feature = {};
   std::string criterion = {};
@@ -34,7 +34,7 @@ struct Measurements {
   std::vector<double> weights;          ///< one for each measurement, all one where none are used
   bool weighted = false;                ///< some are not one
   bool known_noise = false;             ///< the file's covariances are used
-  std::vector<std::string> notes = {};  ///< what the user should know about these choices
+  std::vector<std::string> notes = {};  ///< for the user, about these choices
 
   std::size_t size() const { return file.size(); }
 };

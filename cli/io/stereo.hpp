@@ -31,7 +31,7 @@ struct LandmarkMeasurements {
   std::size_t track = 0;
   std::vector<MeasuredPoint> points;  ///< in the world
   std::vector<std::size_t> frames;    ///< in which they were seen
-  std::vector<double> times;          ///< of those frames, s
+  std::vector<double> times;          ///< the times of those frames, s
 };
 
 /// Every observation put into the world, sorted by track; tracks without a usable observation are left out, as are

@@ -34,10 +34,10 @@ std::vector<std::vector<std::string>> deviationRows(const Measurements& measurem
 /// "is unique: the data …" and so on.
 std::string uniquenessInWords(const MeanAnalysis& analysis);
 
-/// Where the covariance comes from and how it is to be read, or why there is none.
+/// The origin of the covariance and how it is to be read, or the reason why there is none.
 std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis);
 
-/// What the reader changed and what was read: "50 rotations …".
+/// The data and what the reader changed in them: "50 rotations …".
 std::string measurementsInWords(const std::string& source, const Measurements& measurements);
 
 /// The page: tables, both charts of the rotations or directions (Pennec 1998, fig. 2), the points or translations.

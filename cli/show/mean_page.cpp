@@ -128,12 +128,12 @@ Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentBlock& part) {
   return m.block(part.begin, part.begin, part.size, part.size);
 }
 
-/// How far from the origin a rotation or direction can be, rad.
+/// The largest distance of a rotation or direction from the origin, rad.
 double largestAngle(Feature feature) {
   return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
 }
 
-/// Where a cloud is much smaller than the space it lives in, the frontier would leave a dot to look at.
+/// Whether a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
 bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& principal) {
   const Eigen::VectorXd first = principal.col(0);
   // In the principal chart even a small cloud may lie on both sides of the frontier.

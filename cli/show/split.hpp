@@ -20,7 +20,7 @@ class Report;
 /// The result of a run, whatever the input was.
 struct SplitOutcome {
   std::string source;       ///< a file, or the prefix of several
-  std::string description;  ///< of the measurements, in words
+  std::string description;  ///< the measurements in words
   experiments::Feature feature = experiments::Feature::point;
   experiments::Criterion criterion = experiments::Criterion::maha;
   SplitOptions settings;
