@@ -26,8 +26,8 @@
 
 namespace liestat::experiments {
 
-/// What is measured: `frame` is a rigid motion with the left-invariant metric (lie/frame3.hpp), `se3` the same motion as
-/// an element of the Lie group.
+/// The kind of a feature. `frame` is a rigid motion with the left-invariant metric (lie/frame3.hpp), `se3` the same
+/// motion as an element of the Lie group.
 enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction };
 
 /// The criterion of a mean: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
