@@ -227,7 +227,8 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
   for (const ViInitRow& row : rows) {
     if (row.passed.value_or(true)) continue;
     text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
-                        name(row.quantity), row.window.seconds, row.window.images, row.window.features, row.reason);
+                        name(row.quantity), row.window.seconds, row.window.images, row.window.features,
+                        reason(row.verdict));
   }
   return text + verdictLines(tally(rows), "with a promise");
 }

@@ -60,7 +60,7 @@ TEST(ValidateViInit, eachCheckRunsAndKeepsItsPromises) {
       EXPECT_EQ(row.check, check);
       EXPECT_EQ(row.trials, 24U);
       EXPECT_EQ(row.passed.has_value(), row.promise.has_value());
-      EXPECT_TRUE(row.passed.value_or(true)) << name(row.quantity) << ": " << row.reason;
+      EXPECT_TRUE(row.passed.value_or(true)) << name(row.quantity) << ": " << reason(row.verdict);
       // Each row has its one kind of number.
       EXPECT_EQ(row.report.has_value() + std::isfinite(row.median) + std::isfinite(row.value), 1)
           << name(row.estimator) << " " << name(row.quantity);
