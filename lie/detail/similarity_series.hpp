@@ -6,7 +6,8 @@
 // doubled back:
 //   φ(2A) = φ(A) (e^A + 1)/2,  ψ(2A) = (φ(A)² + 2 ψ(A))/4,
 // with e^A taken anew at every step, so that errors add up but do not double. Everything is a power series in (σ, θ²):
-// derivatives are right at zero too.
+// derivatives are right at zero too. Beyond an angle of eight, where doublings would have to be more and more, θ and
+// |σ + iθ| are far from zero and the closed forms in the plane of rotation lose nothing; along the axis A is σ alone.
 #pragma once
 
 #include <lie/detail/trig.hpp>
@@ -38,6 +39,10 @@ struct Axial {
   static Axial product(const Axial& p, const Axial& q, const S& t) {
     const S cubic = p.b * q.c + p.c * q.b, quartic = p.c * q.c;
     return {p.a * q.a, p.a * q.b + p.b * q.a - t * cubic, p.a * q.c + p.b * q.b + p.c * q.a - t * quartic};
+  }
+  /// The element of which the value on the axis and that on the plane are given.
+  static Axial joined(const S& axis, const S& plane, const S& plane_turned, const S& t) {
+    return {axis, plane_turned, (axis - plane) / t};
   }
   /// 1/p
   static Axial inverse(const Axial& p, const S& t) {
@@ -72,13 +77,14 @@ struct Planar {
   static Planar product(const Planar& p, const Planar& q, const S& t) {
     return {p.a * q.a - t * p.b * q.b, p.a * q.b + p.b * q.a};
   }
+  static Planar joined(const S&, const S& plane, const S& plane_turned, const S&) { return {plane, plane_turned}; }
   static Planar inverse(const Planar& p, const S& t) {
     const S norm = p.a * p.a + t * p.b * p.b;
     return {p.a / norm, -p.b / norm};
   }
 };
 
-/// Doublings that bring σ + iθ with |σ| ≤ 23.03 (the range of the scale) and θ ≤ 3 pi into the unit disc.
+/// Doublings that bring σ + iθ with |σ| ≤ 23.03 (the range of the scale) and θ ≤ 8 into the unit disc.
 inline constexpr int similarity_doublings = 5;
 /// Terms of the series in the unit disc: 1/(n+2)! < eps/4.
 template <class S>
@@ -88,6 +94,12 @@ inline constexpr std::size_t similarity_terms = is_single_precision<S> ? 10 : 18
 template <class S>
 inline auto inUnitDisc(const S& sigma, const S& t) {
   return sigma * sigma + t < S(1);
+}
+
+/// Whether the angle is far enough from zero for the closed forms.
+template <class S>
+inline auto isFarTurned(const S& t) {
+  return S(64) < t;
 }
 
 /// 1/k!
@@ -114,7 +126,35 @@ struct SimilarityIntegrals {
   Element phi, psi;
 };
 
-/// φ(A) and ψ(A), A = σ + x, from σ and t = θ².
+/// Both by doublings, for |σ + iθ| < 32.
+template <class Element, class S>
+inline SimilarityIntegrals<Element> similarityIntegralsByDoubling(const S& sigma, const S& t) {
+  using std::exp;
+  constexpr double shrink = 1.0 / (1 << similarity_doublings);
+  const Element one = Element::constant(S(1));
+  S s = S(shrink) * sigma, u = S(shrink * shrink) * t;
+  Element psi = similaritySeries<Element, 2>(s, u);
+  Element phi = psi.timesArgument(s, u) + one;
+  for (int k = 0; k < similarity_doublings; ++k) {
+    const Element e = Element::exponential(S(exp(s)), u);
+    psi = (S(0.25) * (Element::product(phi, phi, u) + S(2) * psi)).ofTwice();
+    phi = (S(0.5) * Element::product(phi, e + one, u)).ofTwice();
+    s *= S(2), u *= S(4);
+  }
+  return {phi, psi};
+}
+
+/// Both on the plane of rotation in closed form: (e^A - 1)/A and (φ(A) - 1)/A, for large angles.
+template <class S>
+inline SimilarityIntegrals<Planar<S>> planarIntegralsFarTurned(const S& sigma, const S& t) {
+  using std::exp;
+  const Planar<S> one = Planar<S>::constant(S(1)), by_argument = Planar<S>::inverse({sigma, S(1)}, t);
+  const Planar<S> e = Planar<S>::exponential(S(exp(sigma)), t);
+  const Planar<S> phi = Planar<S>::product(e + S(-1) * one, by_argument, t);
+  return {phi, Planar<S>::product(phi + S(-1) * one, by_argument, t)};
+}
+
+/// φ(A) and ψ(A), A = σ + x, from σ and t = θ². The relative error grows with the angle as that of its sine does.
 template <class Element, class S>
 inline SimilarityIntegrals<Element> similarityIntegrals(const S& sigma, const S& t) {
   return branch(
@@ -124,19 +164,15 @@ inline SimilarityIntegrals<Element> similarityIntegrals(const S& sigma, const S&
         return SimilarityIntegrals<Element>{psi.timesArgument(sigma, t) + Element::constant(S(1)), psi};
       },
       [&] {
-        using std::exp;
-        constexpr double shrink = 1.0 / (1 << similarity_doublings);
-        const Element one = Element::constant(S(1));
-        S s = S(shrink) * sigma, u = S(shrink * shrink) * t;
-        Element psi = similaritySeries<Element, 2>(s, u);
-        Element phi = psi.timesArgument(s, u) + one;
-        for (int k = 0; k < similarity_doublings; ++k) {
-          const Element e = Element::exponential(S(exp(s)), u);
-          psi = (S(0.25) * (Element::product(phi, phi, u) + S(2) * psi)).ofTwice();
-          phi = (S(0.5) * Element::product(phi, e + one, u)).ofTwice();
-          s *= S(2), u *= S(4);
-        }
-        return SimilarityIntegrals<Element>{phi, psi};
+        return branch(
+            isFarTurned(t),
+            [&] {
+              const auto axis = similarityIntegralsByDoubling<Planar<S>>(sigma, S(0));
+              const auto plane = planarIntegralsFarTurned(sigma, t);
+              return SimilarityIntegrals<Element>{Element::joined(axis.phi.a, plane.phi.a, plane.phi.b, t),
+                                                  Element::joined(axis.psi.a, plane.psi.a, plane.psi.b, t)};
+            },
+            [&] { return similarityIntegralsByDoubling<Element>(sigma, t); });
       });
 }
 
@@ -189,31 +225,53 @@ inline CouplingForm<S> similarityCouplingInUnitDisc(const S& sigma, const S& t) 
   return sum;
 }
 template <class S>
+inline CouplingForm<S> similarityCouplingByDoubling(const S& sigma, const S& t) {
+  using std::exp;
+  constexpr double shrink = 1.0 / (1 << similarity_doublings);
+  const S zero(0);
+  S s = S(shrink) * sigma, u = S(shrink * shrink) * t;
+  CouplingForm<S> Q = similarityCouplingInUnitDisc(s, u);
+  const CouplingForm<S> V{S(1), zero, zero, zero, zero, zero};
+  const Axial<S> one = Axial<S>::constant(S(1));
+  Axial<S> phi = similaritySeries<Axial<S>, 1>(s, u);
+  for (int k = 0; k < similarity_doublings; ++k) {
+    // The block of φ(2M) = φ(M)(e^M + 1)/2, M = (A, [υ]; 0, [ω]); that of e^M is φ(A)[υ] + Q[ω].
+    const Axial<S> R = Axial<S>::exponential(S(1), u);
+    const Axial<S> e = S(exp(s)) * R;
+    const CouplingForm<S> corner = V.fromLeft(phi, u) + Q.fromRight(u);
+    const CouplingForm<S> twice = S(0.5) * (corner.fromLeft(phi, u) + Q.fromRight(R + one, u));
+    // In υ/2, ω/2 up to here.
+    Q = {S(0.5) * twice.v,     S(0.25) * twice.wv,  S(0.25) * twice.vw,
+         S(0.125) * twice.wwv, S(0.125) * twice.dw, S(0.0625) * twice.dww};
+    phi = (S(0.5) * Axial<S>::product(phi, e + one, u)).ofTwice();
+    s *= S(2), u *= S(4);
+  }
+  return Q;
+}
+/// In closed form, for large angles. Q takes eigenvectors of [ω] to eigenvectors, from the eigenvalue μ to λ, by the
+/// divided difference φ[σ + λ, μ] of φ(z) = (e^z - 1)/z: from the axis to the plane, from the plane to the axis, and,
+/// along the axis of υ, from the plane to itself. None of their denominators is smaller than θ.
+template <class S>
+inline CouplingForm<S> similarityCouplingFarTurned(const S& sigma, const S& t) {
+  const S scaled = similarityIntegralsByDoubling<Planar<S>>(sigma, S(0)).phi.a;  // φ(σ)
+  const Planar<S> turned = planarIntegralsFarTurned(S(0), t).phi;                // φ(iθ)
+  const Planar<S> by_argument = Planar<S>::inverse({sigma, S(1)}, t);            // 1/(σ + iθ)
+  const Planar<S> to_plane = planarIntegralsFarTurned(sigma, t).psi;
+  const Planar<S> to_axis =
+      Planar<S>::product({scaled - turned.a, -turned.b}, Planar<S>::inverse({sigma, S(-1)}, t), t);
+  const Planar<S> along = Planar<S>::product(Planar<S>::exponential(scaled, t) + S(-1) * turned, by_argument, t);
+  const S wwv = (to_axis.a - to_plane.a) / t;
+  return {
+      to_axis.a, to_plane.b, to_axis.b, wwv, (along.a - to_axis.a) / t + wwv, (along.b - to_plane.b - to_axis.b) / t};
+}
+template <class S>
 inline CouplingForm<S> similarityCoupling(const S& sigma, const S& t) {
   return branch(
       inUnitDisc(sigma, t), [&] { return similarityCouplingInUnitDisc(sigma, t); },
       [&] {
-        using std::exp;
-        constexpr double shrink = 1.0 / (1 << similarity_doublings);
-        const S zero(0);
-        S s = S(shrink) * sigma, u = S(shrink * shrink) * t;
-        CouplingForm<S> Q = similarityCouplingInUnitDisc(s, u);
-        const CouplingForm<S> V{S(1), zero, zero, zero, zero, zero};
-        const Axial<S> one = Axial<S>::constant(S(1));
-        Axial<S> phi = similaritySeries<Axial<S>, 1>(s, u);
-        for (int k = 0; k < similarity_doublings; ++k) {
-          // The block of φ(2M) = φ(M)(e^M + 1)/2, M = (A, [υ]; 0, [ω]); that of e^M is φ(A)[υ] + Q[ω].
-          const Axial<S> R = Axial<S>::exponential(S(1), u);
-          const Axial<S> e = S(exp(s)) * R;
-          const CouplingForm<S> corner = V.fromLeft(phi, u) + Q.fromRight(u);
-          const CouplingForm<S> twice = S(0.5) * (corner.fromLeft(phi, u) + Q.fromRight(R + one, u));
-          // In υ/2, ω/2 up to here.
-          Q = {S(0.5) * twice.v,     S(0.25) * twice.wv,  S(0.25) * twice.vw,
-               S(0.125) * twice.wwv, S(0.125) * twice.dw, S(0.0625) * twice.dww};
-          phi = (S(0.5) * Axial<S>::product(phi, e + one, u)).ofTwice();
-          s *= S(2), u *= S(4);
-        }
-        return Q;
+        return branch(
+            isFarTurned(t), [&] { return similarityCouplingFarTurned(sigma, t); },
+            [&] { return similarityCouplingByDoubling(sigma, t); });
       });
 }
 
