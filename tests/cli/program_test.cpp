@@ -148,10 +148,11 @@ TEST_F(Program, BoundsOfAnOptionAreSaid) {
 }
 
 TEST_F(Program, AValidationThatJudgesNothingHasNotPassed) {
-  const ProgramRun r =
-      run({"validate", "means", "--feature", "frame", "--n", "2", "--criterion", "lsq", "--trials", "50"});
-  EXPECT_EQ(r.status, 1);
-  EXPECT_NE(r.output.find("nothing was judged"), std::string::npos) << r.output;
+  const std::string run = "cd '" + directory_.path().string() + "' && '" LIESTAT_PROGRAM
+                          "' validate means --feature frame --n 2 --criterion lsq --trials 50 > out.txt 2>&1";
+  EXPECT_EQ(WEXITSTATUS(std::system(run.c_str())), 1);
+  const std::string text = contentOf(directory_ / "out.txt");
+  EXPECT_NE(text.find("nothing was judged\nFAILED\n"), std::string::npos) << text;
 }
 
 TEST_F(Program, AFullDiskIsNoSuccess) {
