@@ -1,8 +1,8 @@
 // Products of matrices of a fixed size, by plain loops. Each of Eigen's products is a tree of types of its own, for each
 // shape and for each expression that it stands in: a compiler takes a second for the three factors of a transformed
 // covariance, and no time for a loop. Unrolled, and a column summed up in registers, the loops are as fast as Eigen's
-// products of 6×6 and faster from 9×9 on. One of the headers of small
-// matrices, which lie/detail/small_matrix.hpp lists.
+// products of 6×6 and faster from 9×9 on. One of the headers of small matrices, which lie/detail/small_matrix.hpp
+// lists.
 #pragma once
 
 #include <Eigen/Core>
