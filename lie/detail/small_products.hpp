@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
+
 namespace liestat::detail {
 
 template <class Left, class Right>
@@ -23,7 +25,7 @@ auto product(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixBase<Right>
   const typename Right::PlainObject& B = right.derived();
   Eigen::Matrix<S, M, N> C;
   for (int j = 0; j < N; ++j) {
-    S column[M];
+    S column[static_cast<std::size_t>(M)];
 #pragma GCC unroll 12
     for (int i = 0; i < M; ++i) column[i] = A(i, 0) * B(0, j);
     for (int k = 1; k < K; ++k) {
@@ -48,7 +50,7 @@ auto productTransposed(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixB
   const typename Right::PlainObject& B = right.derived();
   Eigen::Matrix<S, M, N> C;
   for (int j = 0; j < N; ++j) {
-    S column[M];
+    S column[static_cast<std::size_t>(M)];
 #pragma GCC unroll 12
     for (int i = 0; i < M; ++i) column[i] = A(i, 0) * B(j, 0);
     for (int k = 1; k < K; ++k) {
