@@ -47,7 +47,7 @@ TEST(ScaledGroups, TheMeanOfScaledRotationsIsThatOfTheFactors) {
     log_scale += std::log(samples.back().scale()) / n;
   }
   const auto all = mean(samples);
-  ASSERT_TRUE(all.converged);
+  ASSERT_TRUE(converged(all.status));
   EXPECT_NEAR(std::log(all.mean.scale()), log_scale, 1e-12);
   EXPECT_LE((all.mean.so3().inverse() * mean(rotations).mean).log().norm(), 1e-11);
 }

@@ -52,7 +52,7 @@ double bruteForce(const std::vector<M>& samples, std::uint64_t trial, int random
     MeanOptions<M> options;
     options.start = start;
     const auto result = mean(samples, options);
-    if (result.converged) best = std::min(best, static_cast<double>(result.cost));
+    if (converged(result.status)) best = std::min(best, static_cast<double>(result.cost));
   };
   for (const M& x : samples) from(x);
   for (int i = 0; i < random_starts; ++i) from(sampleUniform<M>(rng));
