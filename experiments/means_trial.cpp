@@ -47,7 +47,7 @@ template <class M>
 Scene<M> drawScene(const MeansExperiment& experiment, CounterRng& rng) {
   using T = ManifoldTraits<M>;
   Scene<M> scene;
-  scene.exact = sampleUniform<M>(rng, 100);
+  scene.exact = sampleInCube<M>(rng, 100);
   const SquareOf<M> sigma = reportCovariance<M>(experiment.spread);
   for (std::size_t i = 0; i < experiment.n; ++i) {
     SquareOf<M> V = sigma;

@@ -318,6 +318,8 @@ struct RequireMean : RequireSamples<R> {
       "the Frechet mean needs an invariant Riemannian metric; this type has none. Use Frame3 or Frame2 for poses, or "
       "groupMean (the exponential barycentre) or maha.");
 };
+template <class R>
+using MetricInSignature = std::conditional_t<Metric<SampleInSignature<R>>, SampleInSignature<R>, SO3<double>>;
 
 }  // namespace detail
 

@@ -23,7 +23,7 @@ Gaussian<M> draw(CounterRng& rng, double sd) {
   constexpr int k = ManifoldTraits<M>::DoF;
   SquareOf<M> A;
   for (int i = 0; i < k; ++i) A.col(i) = rng.normalVector<k>();
-  return {sampleUniform<M>(rng, 3), sd * sd * (A * A.transpose() / k + 0.2 * SquareOf<M>::Identity())};
+  return {sampleInCube<M>(rng, 3), sd * sd * (A * A.transpose() / k + 0.2 * SquareOf<M>::Identity())};
 }
 
 TYPED_TEST(GaussianTest, distanceIsInvariant) {
@@ -97,7 +97,7 @@ TEST(Gaussian, comparisonOfTwoEstimatesFollowsChiSquared) {
   double sum = 0;
   for (int i = 0; i < n; ++i) {
     CounterRng rng(6, static_cast<std::uint64_t>(i));
-    const SO3d exact = sampleUniform<SO3d>(rng);
+    const SO3d exact = sampleInCube<SO3d>(rng);
     const SO3d a = sample(Gaussian<SO3d>{exact, first}, rng), b = sample(Gaussian<SO3d>{exact, second}, rng);
     sum += mahalanobisSquared(Gaussian<SO3d>{a, first}, Gaussian<SO3d>{b, second});
   }

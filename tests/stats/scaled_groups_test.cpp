@@ -21,7 +21,7 @@ TEST(ScaledGroups, UniformSamplesHaveEveryScale) {
   CounterRng rng(3, 0);
   double sum = 0, squares = 0, largest = 0;
   for (int i = 0; i < n; ++i) {
-    const Sim3d x = sampleUniform<Sim3d>(rng, 10);
+    const Sim3d x = sampleInCube<Sim3d>(rng, 10);
     const double octaves = std::log2(x.scale());
     sum += octaves, squares += octaves * octaves;
     largest = std::max(largest, x.translation().cwiseAbs().maxCoeff());
@@ -56,7 +56,7 @@ TEST(ScaledGroups, TheGroupMeanOfSimilaritiesMovesWithThem) {
   CounterRng rng(5, 0);
   const Gaussian<Sim3d> cloud{Sim3d(RxSO3d(0.5, SO3d::rotZ(2)), Eigen::Vector3d(1, 2, 3)),
                               Eigen::Matrix<double, 7, 7>(0.02 * Eigen::Matrix<double, 7, 7>::Identity())};
-  const Sim3d f = sampleUniform<Sim3d>(rng), g = sampleUniform<Sim3d>(rng);
+  const Sim3d f = sampleInCube<Sim3d>(rng), g = sampleInCube<Sim3d>(rng);
   std::vector<Sim3d> samples, moved;
   for (int i = 0; i < 20; ++i) {
     samples.push_back(sample(cloud, rng));
@@ -74,7 +74,7 @@ TEST(ScaledGroups, TheCovarianceOfMahaIsRight) {
   double index = 0;
   for (std::uint64_t trial = 0; trial < trials; ++trial) {
     CounterRng rng(6, trial);
-    const Sim3d truth = sampleUniform<Sim3d>(rng);
+    const Sim3d truth = sampleInCube<Sim3d>(rng);
     std::vector<Gaussian<Sim3d>> measures;
     for (int i = 0; i < n; ++i) {
       Eigen::Matrix<double, 7, 1> sd;
