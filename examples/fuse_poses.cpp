@@ -1,6 +1,6 @@
 // Fusing measured poses, and why the caller must say where a covariance is attached.
 //
-// A pose is measured thirty times. The noise of a measure is known, and much larger along one axis than along the
+// A pose is measured thirty times. The noise of a measurement is known, and much larger along one axis than along the
 // others, but along whose axis?
 //   CovarianceAt::estimated  the object's: its position is uncertain along its own z axis       x_i = exp(x, e_i)
 //   CovarianceAt::measured   the measured frame's, which is itself turned by the error          exp(x_i, e_i) = x
@@ -35,14 +35,14 @@ int main() {
   std::printf("%-34s %22s %22s\n", "", "model: estimated", "model: measured");
   bool right = true;
   for (const CovarianceAt noise_at : {CovarianceAt::estimated, CovarianceAt::measured}) {
-    std::printf("noise in the frame of the %-9s", noise_at == CovarianceAt::estimated ? "object" : "measure");
+    std::printf("noise in the frame of the %-11s", noise_at == CovarianceAt::estimated ? "object" : "measurement");
     for (const CovarianceAt model : {CovarianceAt::estimated, CovarianceAt::measured}) {
       double index = 0, squared_error = 0;
       for (int trial = 0; trial < trials; ++trial) {
         CounterRng rng(1, static_cast<std::uint64_t>(trial));
-        std::vector<Gaussian<Frame3d>> measures;
-        for (int i = 0; i < n; ++i) measures.push_back({measure(noise_at, rng), noise});
-        const Gaussian<Frame3d> fused = fuse(measures, model);
+        std::vector<Gaussian<Frame3d>> measurements;
+        for (int i = 0; i < n; ++i) measurements.push_back({measure(noise_at, rng), noise});
+        const Gaussian<Frame3d> fused = fuse(measurements, model);
         index += mahalanobisSquared(fused, truth) / trials;
         squared_error += (fused.mean.translation() - truth.translation()).squaredNorm() / trials;
       }

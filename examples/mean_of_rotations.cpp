@@ -13,5 +13,5 @@ int main() {
   std::cout << "status      " << name(result.status) << ", " << name(result.uniqueness.unique) << "\n";
   if (!result.estimate) return 3;  // result.reason says why: ambiguous, too few, near the cut locus …
   std::cout << "mean        " << result.estimate->mean.log().transpose() << " rad\n"
-            << "deviations  " << result.estimate->covariance.diagonal().cwiseSqrt().transpose() << " rad, body axes\n";
+            << "sigma       " << result.estimate->covariance.diagonal().cwiseSqrt().transpose() << " rad, body axes\n";
 }

@@ -105,8 +105,8 @@ std::map<std::size_t, std::vector<MeasuredPoint>> readMeasurements(const std::st
   return landmarks;
 }
 
-/// Σ_b μ²(m_b, m)/(k (b - 1)) over blocks of consecutive measures, m_b their means: 1 is expected if the measures are
-/// independent and their covariances right.
+/// Σ_b μ²(m_b, m)/(k (b - 1)) over blocks of consecutive measurements, m_b their means: 1 is expected if the
+/// measurements are independent and their covariances right.
 double disagreement(const std::vector<MeasuredPoint>& points, std::size_t blocks) {
   const Eigen::Vector3d whole = fuse(points).mean;
   double sum = 0;
@@ -119,7 +119,7 @@ double disagreement(const std::vector<MeasuredPoint>& points, std::size_t blocks
   return sum / (3 * static_cast<double>(blocks - 1));
 }
 
-/// The same measures in another order.
+/// The same measurements in another order.
 std::vector<MeasuredPoint> shuffled(std::vector<MeasuredPoint> points, CounterRng& rng) {
   for (std::size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[rng() % i]);
   return points;

@@ -26,15 +26,15 @@
 
 namespace liestat::experiments {
 
-/// What is measured. `frame` is a rigid motion with the left-invariant metric (lie/frame3.hpp), `se3` the same motion as
-/// an element of the Lie group.
+/// The kind of a feature. `frame` is a rigid motion with the left-invariant metric (lie/frame3.hpp), `se3` the same
+/// motion as an element of the Lie group.
 enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction };
 
-/// How a mean is taken: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
+/// The criterion of a mean: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
 /// group's.
 enum class Criterion { lsq, wlsq, maha, barycentre };
 
-/// What a feature's parameters are made of: a unit quaternion x y z w, a position (m), a unit vector.
+/// A part of a feature's parameters: a unit quaternion x y z w, a position (m), a unit vector.
 enum class Part { rotation, position, direction };
 
 /// One or two parts, in the order of the feature's parameters.
@@ -86,7 +86,7 @@ struct FeatureInfo {
   Feature kind;
   std::string_view name, plural;
   Parts parts;
-  std::span<const TangentBlock> tangent;  ///< what the tangent vectors are made of
+  std::span<const TangentBlock> tangent;  ///< the parts of its tangent vectors
   int dof;
   bool has_metric;    ///< a Riemannian manifold, so that lsq and wlsq are there; else a group, with its barycentre
   bool has_isotropy;  ///< some motions leave a feature as it is: no frame is common to all of the manifold's points

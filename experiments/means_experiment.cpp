@@ -11,7 +11,7 @@ namespace {
 /// Logarithm of the ratio of two errors.
 double logRatio(double error, double reference) { return std::log(error / reference); }
 
-/// What the reports are made of, in the order of the methods that are wanted.
+/// The outcomes of which the reports are made, in the order of the methods that are wanted.
 std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
   std::vector<MeansOutcome> list;
   for (std::size_t m = 0; m < methods.size(); ++m) {

@@ -35,7 +35,7 @@ inline constexpr auto all_features = [] {
   return list;
 }();
 
-/// How the measurements' covariances differ: not at all, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²),
+/// The pattern of the measurements' covariances: equal, Σ/i, each diagonal term times U(0,1), each times exp(-5 μ²),
 /// μ ~ U(0,1).
 enum class Noise { iid, isd, idd, exp };
 inline constexpr std::array all_noises{Noise::iid, Noise::isd, Noise::idd, Noise::exp};

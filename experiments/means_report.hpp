@@ -1,4 +1,4 @@
-// What the trials of the simulated experiments report besides the squared distances.
+// The numbers that the trials of the simulated experiments report besides the squared distances.
 #pragma once
 
 #include <stats/validation_report.hpp>

@@ -40,7 +40,7 @@ struct Scene {
   std::vector<M> measurements;
   std::vector<SquareOf<M>> noise;     ///< V_i, in the frame of the exact feature
   std::vector<Gaussian<M>> attached;  ///< the measurements with the covariances that MAHA is given
-  std::vector<double> weights;        ///< of WLSQ
+  std::vector<double> weights;        ///< WLSQ's
 };
 
 template <class M>

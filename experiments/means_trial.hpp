@@ -10,9 +10,9 @@ namespace liestat::experiments::detail {
 
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// What one method gave in one trial.
+/// The result of one method in one trial.
 struct MethodOutcome {
-  double mahalanobis_squared = not_a_number;  ///< of the exact feature about the estimate; NaN if the method failed
+  double mahalanobis_squared = not_a_number;  ///< the truth's, about the estimate; NaN if the method failed
   int iterations = 0;                         ///< started at the first measurement
   double rotation_error = not_a_number;       ///< rad; NaN where the feature has no orientation
   double translation_error = not_a_number;    ///< m; NaN where the feature has no position

@@ -12,7 +12,7 @@
 
 namespace liestat::experiments {
 
-/// What `liestat validate means` runs: the product of the lists.
+/// The rows of `liestat validate means`: the product of the lists.
 struct MeansValidation {
   std::vector<Feature> features{all_features.begin(), all_features.end()};
   std::vector<Noise> noises{all_noises.begin(), all_noises.end()};
@@ -29,7 +29,7 @@ struct MeansValidation {
   bool all_printed = false;
 };
 
-/// What the documentation promises of an estimate's covariance (docs/validation.md): how far the law of the squared
+/// The tolerances that docs/validation.md promises of an estimate's covariance: how far the law of the squared
 /// distances may be from the reference law. Absent: outside the domain, shown but not judged.
 std::optional<ValidationTolerance> promisedTolerance(const MeansExperiment& experiment, const Method& method);
 

@@ -12,7 +12,7 @@
 namespace liestat::experiments {
 namespace detail {
 
-/// How many chunks runInOrder() has under way at most, between evaluate(chunk) and the end of finish(chunk).
+/// The largest number of chunks that runInOrder() has under way, between evaluate(chunk) and the end of finish(chunk).
 std::size_t mostUnderWay(int threads);
 
 /// Calls evaluate(chunk) for 0 … n_chunks - 1 on several threads, and finish(chunk) after it in the order of the chunks,

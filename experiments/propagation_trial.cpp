@@ -25,7 +25,7 @@ Eigen::Matrix<double, N, N> noise(double spread) {
   return covariance;
 }
 
-/// What is given, and what is true.
+/// The given estimates and the truth.
 template <class M>
 struct Drawn {
   Gaussian<M> given;

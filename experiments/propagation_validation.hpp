@@ -11,7 +11,7 @@
 
 namespace liestat::experiments {
 
-/// What `liestat validate propagation` runs: the product of the lists.
+/// The rows of `liestat validate propagation`: the product of the lists.
 struct PropagationValidation {
   std::vector<Propagated> features{all_propagated.begin(), all_propagated.end()};
   std::vector<Operation> operations{all_operations.begin(), all_operations.end()};
@@ -21,7 +21,7 @@ struct PropagationValidation {
   int threads = 0;
 };
 
-/// What the documentation promises of a propagated covariance (docs/propagation.md).
+/// The tolerances that docs/propagation.md promises of a propagated covariance.
 struct PropagationPromise {
   double spread = 0;  ///< up to here
   /// Tolerances over the square of the spread.

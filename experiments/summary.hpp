@@ -7,8 +7,9 @@
 
 namespace liestat::experiments {
 
-/// The value below which a share p of all values lies, one of them; NaN for none. Values that are not finite must not
-/// be among them.
+/// The p-quantile of some values by the nearest rank: the one of rank p (n - 1) in ascending order, from 0, rounded, so
+/// that it is one of them (of an even number the median is the upper of the middle two). NaN for none. Infinite values
+/// may be among them, NaN may not.
 inline double quantile(std::vector<double> values, double p) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(values.size() - 1) + 0.5);

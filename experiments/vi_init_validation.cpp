@@ -1,6 +1,7 @@
 #include <experiments/vi_init_validation.hpp>
 
 #include <experiments/parallel.hpp>
+#include <experiments/vi_init_evaluation.hpp>
 #include <stats/executor.hpp>
 
 #include <algorithm>
@@ -46,12 +47,6 @@ static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
 
-/// The values of one row: one a trial.
-struct Values {
-  std::vector<double> value;
-  std::vector<double> dof;  ///< of χ²; else empty
-};
-
 /// A row of an experiment: who estimated what, and where an outcome has it.
 template <class Outcome>
 struct Column {
@@ -74,7 +69,8 @@ struct Experiment {
   };
   std::vector<Row> rows;
   /// All trials: the values of each row.
-  std::function<std::vector<Values>(const ViInitValidation&, const std::function<void(std::size_t)>& progress)> run;
+  std::function<std::vector<ViInitValues>(const ViInitValidation&, const std::function<void(std::size_t)>& progress)>
+      run;
 
   /// Milliseconds of a trial, about: for the progress bar.
   double work() const {
@@ -112,7 +108,7 @@ Experiment experiment(Check check, ViInitTrial<Outcome> trial, const ViInitWindo
   for (const Column<Outcome>& c : columns) e.rows.push_back({c.estimator, c.quantity, c.dof});
   e.run = [trial, window, columns](const ViInitValidation& validation,
                                    const std::function<void(std::size_t)>& progress) {
-    std::vector<Values> values(columns.size());
+    std::vector<ViInitValues> values(columns.size());
     for (const Outcome& outcome : runTrials(trial, window, validation, progress)) {
       for (std::size_t k = 0; k < columns.size(); ++k) {
         values[k].value.push_back(columns[k].value(outcome));
@@ -208,105 +204,6 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
   return list;
 }
 
-ValidationReport reportOf(const std::vector<double>& distances, int dof) {
-  return validate(SerialExecutor{}, {.trials = distances.size()}, ReferenceLaw::chiSquared(dof),
-                  [&](CounterRng&, std::uint64_t i) {
-                    TrialOutcome outcome;
-                    outcome.mu2 = distances[static_cast<std::size_t>(i)];
-                    return outcome;
-                  });
-}
-
-/// The value that a share p of the windows is below; lost ones count as infinite.
-double quantile(const std::vector<double>& sorted, double p) {
-  if (sorted.empty()) return std::numeric_limits<double>::quiet_NaN();
-  return sorted[static_cast<std::size_t>(p * static_cast<double>(sorted.size() - 1))];
-}
-
-/// Whether more windows are beyond a bound than a probability of that explains.
-bool exceeds(const std::vector<double>& sorted, double bound, double probability, double false_alarm) {
-  const auto beyond = static_cast<std::size_t>(sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), bound));
-  return !(binomialSurvival(beyond, sorted.size(), std::min(1., probability)) >= false_alarm);
-}
-
-std::string judgeErrors(const std::vector<double>& sorted, const ViInitPromise& promise, double false_alarm) {
-  const double share = false_alarm / 4, n = static_cast<double>(promise.note_windows);
-  if (exceeds(sorted, promise.median, 0.5, share)) return "the median is above the promised one";
-  if (exceeds(sorted, promise.p95, 0.05, share)) return "the 95 % quantile is above the promised one";
-  // The note's figures are those of some windows themselves: four standard errors of their ranks.
-  if (exceeds(sorted, promise.note_median, 0.5 + 4 * std::sqrt(0.25 / n), share)) {
-    return "the median is above the design note's";
-  }
-  if (exceeds(sorted, promise.note_p95, 0.05 + 4 * std::sqrt(0.05 * 0.95 / n), share)) {
-    return "the 95 % quantile is above the design note's";
-  }
-  return {};
-}
-
-void evaluateErrors(ViInitRow& row, std::vector<double> values, double false_alarm) {
-  std::sort(values.begin(), values.end());
-  row.median = quantile(values, 0.5);
-  row.p95 = quantile(values, 0.95);
-  if (row.promise) row.reason = judgeErrors(values, *row.promise, false_alarm);
-}
-
-void evaluateDistances(ViInitRow& row, const std::vector<double>& values, int dof, double false_alarm) {
-  row.report = reportOf(values, dof);
-  if (row.promise) row.reason = reason(row.report->verdict(false_alarm, row.promise->tolerance));
-  row.report->mu2 = {};
-}
-
-void evaluateChiSquared(ViInitRow& row, const Values& values, double false_alarm) {
-  double cost = 0, all = 0;
-  for (std::size_t i = 0; i < values.value.size(); ++i) {
-    if (!std::isfinite(values.value[i])) continue;
-    cost += values.value[i];
-    all += values.dof[i];
-  }
-  row.value = cost / all;
-  row.value_se = std::sqrt(2 / all);
-  if (!row.promise) return;
-  if (!(chiSquaredSurvival(cost / (1 + row.promise->deviation), all) >= false_alarm / 2)) {
-    row.reason = "χ² is too large for its degrees of freedom";
-  } else if (!(chiSquaredCdf(cost / (1 - row.promise->deviation), all) >= false_alarm / 2)) {
-    row.reason = "χ² is too small for its degrees of freedom";
-  }
-}
-
-void evaluateFraction(ViInitRow& row, const std::vector<double>& values, double false_alarm) {
-  const double promised = row.promise.value_or(ViInitPromise{}).fraction;
-  const auto n = static_cast<double>(values.size());
-  const auto exact = static_cast<double>(std::count(values.begin(), values.end(), 1.));
-  row.value = exact / n;
-  row.value_se = std::sqrt(promised * (1 - promised) / n);
-  const std::size_t wrong = values.size() - static_cast<std::size_t>(exact);
-  if (row.promise && !(binomialSurvival(wrong, values.size(), 1 - promised) >= false_alarm)) {
-    row.reason = "the right tracks were kept too seldom";
-  }
-}
-
-/// Fills in a row from the values of its trials, and judges it if anything is promised.
-void evaluate(ViInitRow& row, const Values& values, int dof, double false_alarm) {
-  row.trials = values.value.size();
-  row.failures = static_cast<std::size_t>(
-      std::count_if(values.value.begin(), values.value.end(), [](double x) { return !std::isfinite(x); }));
-  switch (statistic(row.quantity)) {
-    case ViInitStatistic::distance:
-      evaluateDistances(row, values.value, dof, false_alarm);
-      break;
-    case ViInitStatistic::chi_squared:
-      evaluateChiSquared(row, values, false_alarm);
-      break;
-    case ViInitStatistic::error:
-      evaluateErrors(row, values.value, false_alarm);
-      break;
-    case ViInitStatistic::fraction:
-      evaluateFraction(row, values.value, false_alarm);
-      break;
-  }
-  if (row.promise) row.passed = row.reason.empty();
-}
-
 }  // namespace
 
 std::string name(ViInitCheck check) { return checks.at(static_cast<std::size_t>(check)); }
@@ -336,7 +233,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
   auto row = rows.begin();
   for (const Experiment& e : list) {
-    const std::vector<Values> values = e.run(validation, [&](std::size_t done) {
+    const std::vector<ViInitValues> values = e.run(validation, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(validation.trials);
       if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work()) / all), 1000000);
     });

@@ -104,8 +104,8 @@ struct ViInitRow {
   double value = std::numeric_limits<double>::quiet_NaN();     ///< χ² per degree of freedom, fraction
   double value_se = std::numeric_limits<double>::quiet_NaN();  ///< its standard error if the promise is kept
   std::optional<ViInitPromise> promise;
-  std::optional<bool> passed;  ///< the verdict; absent where nothing is promised
-  std::string reason;          ///< why it failed
+  std::optional<bool> passed;         ///< whether it passed, where there is a promise
+  Verdict verdict = Verdict::passed;  ///< the same with the reason
 };
 
 /// The promise made about a row, if there is one.

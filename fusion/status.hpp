@@ -43,6 +43,13 @@ enum class FusionStatus {
   bad_input  ///< the measurements or the options: see the result's fault
 };
 
+/// Whether what ended with this status found its answer, or all of several, whatever else there is to say about it. The
+/// function of the same name for liestat::Status means the same, so that the harness of stats/validation.hpp takes both.
+constexpr bool converged(FusionStatus status) {
+  return status == FusionStatus::ok || status == FusionStatus::ambiguous || status == FusionStatus::double_root ||
+         status == FusionStatus::mirror_gravity || status == FusionStatus::inconsistent;
+}
+
 /// What is wrong with the input.
 enum class FaultKind {
   none,

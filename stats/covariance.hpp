@@ -66,15 +66,15 @@ SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, W&& weights, V&& no
   }
   return detail::sandwich(result, sum);
 }
-/// The same when every measure has the covariance V.
+/// The same when every measurement has the covariance V.
 template <Metric M>
 SquareOf<M> covarianceFromCommonNoise(const MeanResult<M>& result, const SquareOf<M>& V) {
   return detail::sandwich(result, SquareOf<M>(ScalarOf<M>(result.n) * V));
 }
 
 /// Covariance of the mean when the noise is unknown, from the residuals. Squared distances follow Hotelling's law
-/// (stats/inference.hpp), not χ². Rank min(n - 1, k): with fewer than k + 1 measures it is singular. NaN for one
-/// measure.
+/// (stats/inference.hpp), not χ². Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
+/// measurement.
 template <Metric M>
 SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result, ResidualNoise noise = ResidualNoise::scaled) {
   using S = ScalarOf<M>;

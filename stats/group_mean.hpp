@@ -22,7 +22,7 @@ struct GroupMeanResult {
   /// Σ p_i z_i z_iᵀ / Σ p_i
   SquareOf<G> dispersion() const { return scatter / ScalarOf<G>(sum_of_weights); }
   /// Covariance of the barycentre from the residuals, A⁻¹ (Σ p_i z_i z_iᵀ) A⁻ᵀ Σp_i/(n-1), A the jacobian; NaN for one
-  /// measure.
+  /// measurement.
   SquareOf<G> covarianceFromResiduals() const {
     using S = ScalarOf<G>;
     if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());

@@ -1,9 +1,9 @@
-// maha: the feature of least sum of squared Mahalanobis distances to measures that each have their covariance, and
+// maha: the feature of least sum of squared Mahalanobis distances to measurements that each have their covariance, and
 // fuse. Pennec 1998, section 4.2, with the exact gradient and Hessian (means.md, section 4; the report's printed ones
 // are in stats/printed.hpp).
 //
 // Two models that coincide on points, rotations and every group, and differ on frames:
-//   CovarianceAt::measured   S_i lives in the frame of the measure x_i (a sensor's): w = log(x_i, y), μ² = wᵀ S_i⁻¹ w
+//   CovarianceAt::measured   S_i lives in the frame of measurement x_i (a sensor's): w = log(x_i, y), μ² = wᵀ S_i⁻¹ w
 //   CovarianceAt::estimated  V_i lives in the frame of the estimate (an object's): z = log(y, x_i), μ² = zᵀ V_i⁻¹ z;
 //                            the noise x_i = exp(x, e_i), Cov(e_i) = V_i, of the report's experiments
 // Feeding noise of one model to the other gives a wrong answer, not a rough one: the caller says which it is.
@@ -26,7 +26,7 @@
 
 namespace liestat {
 
-/// The frame in which a measure's covariance is expressed.
+/// The frame in which a measurement's covariance is expressed.
 enum class CovarianceAt { measured, estimated };
 
 enum class MahaMethod {
@@ -67,7 +67,7 @@ struct MahaResult {
   Gaussian<M> estimate() const { return {mean, covariance}; }
 };
 
-/// det(Σ)^(-1/k): the weight that WLSQ gives to a measure of covariance Σ (Pennec 1998, section 5.1).
+/// det(Σ)^(-1/k): the weight that WLSQ gives to a measurement of covariance Σ (Pennec 1998, section 5.1).
 template <class S, int N>
 S scalarWeight(const Eigen::Matrix<S, N, N>& covariance) {
   using std::exp;
@@ -103,7 +103,7 @@ concept HasSecondOrder = requires(const TangentOf<M>& z) {
   ManifoldTraits<M>::dlogBaseTransposed(z, z);
 };
 
-/// What maha() iterates on: the measures with their information matrices.
+/// What maha() iterates on: the measurements with their information matrices.
 template <Homogeneous M, class R>
 struct MahaProblem {
   using T = ManifoldTraits<M>;
@@ -115,7 +115,7 @@ struct MahaProblem {
   CovarianceAt at;
   bool likelihood;
 
-  /// One measure's part of the sums at y.
+  /// One measurement's part of the sums at y.
   void add(std::size_t i, const M& y, MahaSums<M>& sums) const {
     const M& x = samples[i].mean;
     const bool measured = at == CovarianceAt::measured;
@@ -233,9 +233,9 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     const double previous = result.iterations > 0 ? result.residual : std::numeric_limits<double>::infinity();
     result.residual = static_cast<double>(step.norm());
     if (!std::isfinite(result.residual)) break;
-    // Where standard deviations differ by factors of hundreds, the rounding of the precise measures moves the estimate
-    // along its less certain directions by more than the tolerance, for ever. Steps that no longer shrink, and are
-    // below √eps standard deviations of the estimate, are such rounding.
+    // Where standard deviations differ by factors of hundreds, the rounding of the precise measurements moves the
+    // estimate along its less certain directions by more than the tolerance, for ever. Steps that no longer shrink,
+    // and are below √eps standard deviations of the estimate, are such rounding.
     const bool stalled =
         result.residual > 0.5 * previous && step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
     ++result.iterations;

@@ -39,7 +39,7 @@ struct MeanOptions {
   std::optional<double> tolerance = {};
   int max_iterations = 100;
   /// Where to start; unset: the chordal mean, or for quotients the best of several data. Never simply the first
-  /// measure.
+  /// measurement.
   std::optional<M> start = {};
 };
 
@@ -327,8 +327,8 @@ using MetricInSignature = std::conditional_t<Metric<SampleInSignature<R>>, Sampl
 /// with an invariant metric; SE3 and its like have groupMean and maha.
 ///
 /// The features are any range that can be gone through more than once, of points or of what stands for them: views
-/// (Eigen::Map<const SO3d>), columns (Matrix3Xd::colwise()), unit quaternions. The result is of the owning type. Values in
-/// random-access memory are used where they are, others are copied once.
+/// (Eigen::Map<const SO3d>), columns (Matrix3Xd::colwise()), unit quaternions. The result is of the owning type. Values
+/// in random-access memory are used where they are, others are copied once.
 template <Executor E, detail::AnyRange R>
 MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples,
                                               const MeanOptions<detail::SampleInSignature<R>>& options = {}) {

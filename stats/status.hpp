@@ -9,7 +9,7 @@ enum class Status {
   not_converged,  ///< the iteration ended elsewhere: the budget ran out, or the data are not finite
   ambiguous,      ///< another feature explains the data as well
   ill_defined,    ///< the criterion has no smooth minimum; a covariance would be wrong and is withheld
-  too_few,        ///< fewer measures than the estimate needs
+  too_few,        ///< fewer measurements than the estimate needs
   not_applicable  ///< the question has no answer for these data
 };
 

@@ -78,7 +78,11 @@ enum class Verdict {
   index_too_large,  ///< covariances are too small
   index_too_small,  ///< covariances are too large
   wrong_law,        ///< the Kolmogorov-Smirnov distance is too large
-  heavy_tail        ///< too many distances beyond the law's 99.9 % quantile
+  heavy_tail,       ///< too many distances beyond the law's 99.9 % quantile
+  // What is promised of errors, which follow no law.
+  median_too_large,
+  quantile_too_large,  ///< the 95 % quantile
+  success_too_seldom   ///< the right answer was not found often enough
 };
 
 /// The name used in files and messages.
@@ -98,6 +102,12 @@ constexpr const char* name(Verdict verdict) {
       return "wrong_law";
     case Verdict::heavy_tail:
       return "heavy_tail";
+    case Verdict::median_too_large:
+      return "median_too_large";
+    case Verdict::quantile_too_large:
+      return "quantile_too_large";
+    case Verdict::success_too_seldom:
+      return "success_too_seldom";
   }
   return "unknown";
 }
@@ -119,6 +129,12 @@ constexpr const char* reason(Verdict verdict) {
       return "the distances do not follow the law";
     case Verdict::heavy_tail:
       return "too many distances are far beyond the law";
+    case Verdict::median_too_large:
+      return "the median of the errors is larger than promised";
+    case Verdict::quantile_too_large:
+      return "the 95 % quantile of the errors is larger than promised";
+    case Verdict::success_too_seldom:
+      return "the right answer was found too seldom";
   }
   return "unknown";
 }

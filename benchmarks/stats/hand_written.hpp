@@ -1,6 +1,6 @@
 // What a careful user writes with Eigen alone: the baselines of the benchmarks of the means. Fixed-size types, nothing
 // recomputed that could be kept, logarithms through atan2 so that all angles come out right; the report's fixed point
-// (eq. 4) from the first measure until the step is below the tolerance, then the covariance of the residuals.
+// (eq. 4) from the first measurement until the step is below the tolerance, then the covariance of the residuals.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -157,7 +157,7 @@ inline Eigen::Matrix3d handWrittenJacobianInverse(const Eigen::Vector3d& v) {
   return Eigen::Matrix3d::Identity() + 0.5 * K + c * K * K;
 }
 
-/// Mahalanobis mean of rotations by Gauss-Newton; the covariances belong to the measures.
+/// Mahalanobis mean of rotations by Gauss-Newton; the covariances belong to the measurements.
 inline HandWrittenMean<Eigen::Quaterniond, 3> handWrittenMaha(const std::vector<Eigen::Quaterniond>& rotations,
                                                               const std::vector<Eigen::Matrix3d>& covariances) {
   HandWrittenMean<Eigen::Quaterniond, 3> result;
@@ -200,10 +200,10 @@ inline HandWrittenMean<HandWrittenFrame, 6> handWrittenMaha(
     Vector6 g = Vector6::Zero();
     H.setZero();
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      const Eigen::Quaterniond to_measure = frames[i].rotation.conjugate();
-      const Eigen::Quaterniond q = to_measure * result.mean.rotation;
+      const Eigen::Quaterniond to_measurement = frames[i].rotation.conjugate();
+      const Eigen::Quaterniond q = to_measurement * result.mean.rotation;
       Vector6 z;
-      z << to_measure * (result.mean.translation - frames[i].translation), handWrittenLog(q);
+      z << to_measurement * (result.mean.translation - frames[i].translation), handWrittenLog(q);
       Matrix6 J = Matrix6::Zero();
       J.topLeftCorner<3, 3>() = q.toRotationMatrix();
       J.bottomRightCorner<3, 3>() = handWrittenJacobianInverse(z.tail<3>());

@@ -1,6 +1,6 @@
 // The Mahalanobis mean with its covariance, beside hand-written Gauss-Newton in Eigen alone. The time that is printed
-// is that of one feature; the counter gives the iterations. Standard deviations around 0.2 rad (m), each measure with a
-// covariance of its own, tolerance 1e-12.
+// is that of one feature; the counter gives the iterations. Standard deviations around 0.2 rad (m), each measurement
+// with a covariance of its own, tolerance 1e-12.
 #include "../inputs.hpp"
 #include "hand_written.hpp"
 
@@ -17,7 +17,7 @@ namespace {
 
 /// A million frames with their covariances are half a gigabyte: the data of one benchmark live at a time.
 template <Homogeneous M>
-std::vector<Gaussian<M>> measures(std::size_t n) {
+std::vector<Gaussian<M>> measurements(std::size_t n) {
   Inputs random;
   const M centre = random.feature<M>();
   std::vector<Gaussian<M>> data;
@@ -37,7 +37,7 @@ void sizes(benchmark::internal::Benchmark* b) { b->Arg(100)->Arg(10000)->Arg(100
 
 template <Homogeneous M, CovarianceAt at>
 void maha(benchmark::State& state) {
-  const auto data = measures<M>(static_cast<std::size_t>(state.range(0)));
+  const auto data = measurements<M>(static_cast<std::size_t>(state.range(0)));
   int iterations = 0;
   while (state.KeepRunningBatch(state.range(0))) {
     const MahaResult<M> result = liestat::maha(data, at);
@@ -51,7 +51,7 @@ template <Homogeneous M, class Convert>
 void handWritten(benchmark::State& state, Convert convert) {
   std::vector<decltype(convert(std::declval<M>()))> features;
   std::vector<SquareOf<M>> covariances;
-  for (const Gaussian<M>& g : measures<M>(static_cast<std::size_t>(state.range(0)))) {
+  for (const Gaussian<M>& g : measurements<M>(static_cast<std::size_t>(state.range(0)))) {
     features.push_back(convert(g.mean));
     covariances.push_back(g.covariance);
   }

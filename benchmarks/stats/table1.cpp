@@ -1,5 +1,5 @@
 // Table 1 of Pennec 1998: what a mean of 100 features costs, by criterion and type of feature, as ratios to points and
-// to LSQ beside the report's own. All criteria start at the first measure, as there. Prints Markdown.
+// to LSQ beside the report's own. All criteria start at the first measurement, as there. Prints Markdown.
 #include "../inputs.hpp"
 #include "hand_written.hpp"
 #include "interleaved.hpp"
@@ -35,10 +35,10 @@ template <Metric M>
 struct Data {
   std::vector<M> features;
   std::vector<double> weights;
-  std::vector<Gaussian<M>> measures;
+  std::vector<Gaussian<M>> measurements;
 };
 
-/// Measures whose noise is known and differs from one to the next (the report's IDD), in the frame of the estimate.
+/// Measurements whose noise is known and differs from one to the next (the report's IDD), in the frame of the estimate.
 template <Metric M>
 std::vector<Data<M>> draw() {
   constexpr int k = ManifoldTraits<M>::DoF;
@@ -49,8 +49,8 @@ std::vector<Data<M>> draw() {
     for (std::size_t i = 0; i < n; ++i) {
       const SquareOf<M> covariance = random.covariance<k>(spread);
       const SquareOf<M> root = covariance.llt().matrixL();
-      data.measures.push_back({exp(centre, TangentOf<M>(root * random.normal<k>())), covariance});
-      data.features.push_back(data.measures.back().mean);
+      data.measurements.push_back({exp(centre, TangentOf<M>(root * random.normal<k>())), covariance});
+      data.features.push_back(data.measurements.back().mean);
       data.weights.push_back(scalarWeight(covariance));
     }
   }
@@ -85,7 +85,7 @@ void add(std::vector<Feature>& features, const std::string& name, const std::arr
                   [=] {
                     const Data<M>& d = next(2);
                     const auto result =
-                        maha(d.measures, CovarianceAt::estimated, MahaOptions<M>{.start = d.features[0]});
+                        maha(d.measurements, CovarianceAt::estimated, MahaOptions<M>{.start = d.features[0]});
                     record(2, result, result.covariance);
                   }};
 }
@@ -108,7 +108,7 @@ int print() {
   const auto time = [&](std::size_t feature, std::size_t criterion) { return ns[3 * feature + criterion]; };
 
   std::printf("Table 1 of Pennec 1998 as ratios: mean and covariance of %zu features, all\n", n);
-  std::printf("started at the first measure, to a step of 1e-12. Noise of each measure its\n");
+  std::printf("started at the first measurement, to a step of 1e-12. Noise of each measurement its\n");
   std::printf("own, %.1f rad (m) in the mean. Medians over 101 interleaved rounds.\n\n", spread);
   std::printf("| criterion | features      |     us | to points | paper | to LSQ | paper | steps |\n");
   std::printf("|-----------|---------------|-------:|----------:|------:|-------:|------:|------:|\n");

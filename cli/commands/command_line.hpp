@@ -22,7 +22,7 @@ enum ExitCode : int {
   exit_not_trusted = 3,  ///< the estimate exists but is not to be trusted
 };
 
-/// What a command is told besides its options.
+/// The circumstances of a command's run, besides its options.
 struct Invocation {
   std::string command_line;  ///< as one could type it again
 };
@@ -87,7 +87,7 @@ class Command {
   std::shared_ptr<Run> chosen_;
 };
 
-/// Where commands are added: the program itself, or a word that several of them begin with.
+/// The place to which commands are added: the program itself, or a word that several of them begin with.
 class CommandList {
  public:
   CommandList(CLI::App* app, std::shared_ptr<Command::Run> chosen) : app_(app), chosen_(std::move(chosen)) {}

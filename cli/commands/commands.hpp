@@ -16,7 +16,7 @@ void addValidatePropagationCommand(const CommandList& validate);
 void addValidateSplitCommand(const CommandList& validate);
 void addValidateViInitCommand(const CommandList& validate);
 
-/// What `liestat --help` says of the commands that begin with `validate`.
+/// The line of `liestat --help` on the commands that begin with `validate`.
 inline constexpr const char* validate_description = "Does an estimator keep what its covariance promises?";
 
 }  // namespace liestat::cli

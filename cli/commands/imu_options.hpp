@@ -1,6 +1,6 @@
 #pragma once
 
-// What the commands that read an inertial sensor have in common on the command line.
+// The options that all commands that read an inertial sensor have.
 
 #include <cli/commands/command_line.hpp>
 #include <cli/io/calibration.hpp>
@@ -18,7 +18,7 @@ struct ImuOptions {
   double largest_gap = 0.1;  ///< s
 
   bool hasBias() const { return !gyroscope_bias.empty() || !accelerometer_bias.empty(); }
-  /// What was given, and zero.
+  /// The biases that were given, else zero.
   ImuBias<double> bias() const {
     const auto vector = [](const std::vector<double>& list) {
       return list.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(list[0], list[1], list[2]);

@@ -4,33 +4,33 @@
 #include <cstdio>
 #include <memory>
 
-#include <cli/commands/measures_options.hpp>
+#include <cli/commands/measurement_options.hpp>
 
 namespace liestat::cli {
 namespace {
 
 struct Options {
-  MeasuresInput input;
+  MeasurementInput input;
   AnalysisOptions analysis;
   bool no_certify = false;
   std::string json, report;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
-  const Measures measures = options.input.read("liestat mean");
+  const Measurements measurements = options.input.read("liestat mean");
   AnalysisOptions how = options.analysis;
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
-  const MeanAnalysis analysis = analyseMean(measures, how);
+  const MeanAnalysis analysis = analyseMean(measurements, how);
   // Whoever asks for JSON on standard output wants nothing else there.
-  if (options.json != "-") std::fputs(formatMean(options.input.file, measures, analysis).c_str(), stdout);
+  if (options.json != "-") std::fputs(formatMean(options.input.file, measurements, analysis).c_str(), stdout);
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
-    setMeanFields(object, options.input.file, measures, analysis);
+    setMeanFields(object, options.input.file, measurements, analysis);
     writeJson(options.json, object);
   }
   if (!options.report.empty()) {
-    writeMeanReport(options.report, invocation.command_line, options.input.file, measures, analysis);
+    writeMeanReport(options.report, invocation.command_line, options.input.file, measurements, analysis);
   }
   const bool trusted = analysis.status == Status::ok || analysis.status == Status::not_applicable;
   return trusted ? exit_fine : exit_not_trusted;
@@ -45,7 +45,7 @@ void addMeanCommand(const CommandList& app) {
   command.flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
   command
       .option("--budget", options->analysis.budget,
-              "Cells of branch and bound (default 1000000, with more than 100000 measures 2000)")
+              "Cells of branch and bound (default 1000000, with more than 100000 measurements 2000)")
       .range(std::size_t{1}, std::size_t{1000000000});
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");

@@ -49,7 +49,7 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
   if (result.status == Status::too_few) {
     // There is a mean, and that is the answer.
     analysis.status = analysis.covariance_status = Status::not_applicable;
-    analysis.reason = "a covariance from residuals needs more measures than the feature has dimensions";
+    analysis.reason = "a covariance from residuals needs more measurements than the feature has dimensions";
   }
   if (result.estimate) {
     analysis.covariance = result.estimate->covariance;
@@ -60,83 +60,84 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
 
 /// LSQ, WLSQ, and the barycentre of a group.
 template <class M>
-M leastSquares(const Measures& measures, const std::vector<M>& samples, const AnalysisOptions& options,
+M leastSquares(const Measurements& measurements, const std::vector<M>& samples, const AnalysisOptions& options,
                MeanAnalysis& analysis) {
   const ProgramExecutor executor{options.threads};
   if constexpr (is_group<M>) {
     CertifiedGroupMeanOptions how;
     how.uniqueness = uniquenessOptions(options);
-    const auto result = certifiedGroupMean(executor, samples, measures.weights, how);
+    const auto result = certifiedGroupMean(executor, samples, measurements.weights, how);
     return setEstimate<M>(analysis, result.mean, result, "residuals");
   } else {
     CertifiedMeanOptions<M> how;
     how.uniqueness = uniquenessOptions(options);
-    if (measures.known_noise) how.known_noise = covariancesOf<M>(measures.file);
-    const auto result = certifiedMean(executor, samples, measures.weights, how);
-    return setEstimate<M>(analysis, result.mean, result, measures.known_noise ? "noise" : "residuals");
+    if (measurements.known_noise) how.known_noise = covariancesOf<M>(measurements.file);
+    const auto result = certifiedMean(executor, samples, measurements.weights, how);
+    return setEstimate<M>(analysis, result.mean, result, measurements.known_noise ? "noise" : "residuals");
   }
 }
 
 template <class M>
-M mahalanobisMean(const Measures& measures, const AnalysisOptions& options, MeanAnalysis& analysis) {
+M mahalanobisMean(const Measurements& measurements, const AnalysisOptions& options, MeanAnalysis& analysis) {
   CertifiedMahaOptions<M> how;
-  how.maha.likelihood = measures.likelihood;
+  how.maha.likelihood = measurements.likelihood;
   const std::size_t most_cells = how.uniqueness.budget;
   how.uniqueness = uniquenessOptions(options);
   how.uniqueness.budget = std::min(options.budget, most_cells);
-  const CertifiedMaha<M> result =
-      certifiedMaha(ProgramExecutor{options.threads}, gaussiansOf<M>(measures.file), measures.covariance_at, how);
+  const CertifiedMaha<M> result = certifiedMaha(ProgramExecutor{options.threads}, gaussiansOf<M>(measurements.file),
+                                                measurements.covariance_at, how);
   analysis.fit = result.fit;
   analysis.fit_dof = result.fit_dof;
   return setEstimate<M>(analysis, result.maha, result, "noise");
 }
 
-/// Dispersion of the measures about the mean and the farthest of them.
+/// Dispersion of the measurements about the mean and the farthest of them.
 template <class M>
-void setDispersion(const Measures& measures, const std::vector<M>& samples, const M& y, MeanAnalysis& analysis) {
-  const Dispersion<M> dispersion = dispersionAbout(samples, measures.weights, y);
+void setDispersion(const Measurements& measurements, const std::vector<M>& samples, const M& y,
+                   MeanAnalysis& analysis) {
+  const Dispersion<M> dispersion = dispersionAbout(samples, measurements.weights, y);
   analysis.dispersion = dispersion.covariance;
   for (const FarthestFeature& f : dispersion.farthest) {
-    analysis.largest.push_back({f.distance, measures.file.lines[f.index]});
+    analysis.largest.push_back({f.distance, measurements.file.lines[f.index]});
   }
 }
 
-/// The measures in both charts; a rigid motion's are those of its frame, which to first order has the same axes.
+/// The measurements in both charts; a rigid motion's are those of its frame, which to first order has the same axes.
 template <class M>
-ChartScatter chartsOf(const Measures& measures, const std::vector<M>& samples, const M& y,
+ChartScatter chartsOf(const Measurements& measurements, const std::vector<M>& samples, const M& y,
                       const MeanAnalysis& analysis) {
   if constexpr (is_group<M>) {
-    return chartsOf<Frame3d>(measures, featuresOf<Frame3d>(measures.file), Frame3d(y), analysis);
+    return chartsOf<Frame3d>(measurements, featuresOf<Frame3d>(measurements.file), Frame3d(y), analysis);
   } else {
     std::optional<SquareOf<M>> covariance;
     if (analysis.covariance.size() > 0) covariance = analysis.covariance;
-    return chartScatter(samples, measures.weights, y, SquareOf<M>(analysis.dispersion), covariance);
+    return chartScatter(samples, measurements.weights, y, SquareOf<M>(analysis.dispersion), covariance);
   }
 }
 
 template <class M>
-MeanAnalysis analyse(const Measures& measures, const AnalysisOptions& options) {
-  const std::vector<M> samples = featuresOf<M>(measures.file);
+MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& options) {
+  const std::vector<M> samples = featuresOf<M>(measurements.file);
   MeanAnalysis analysis;
-  const M y = measures.criterion == Criterion::maha ? mahalanobisMean<M>(measures, options, analysis)
-                                                    : leastSquares(measures, samples, options, analysis);
+  const M y = measurements.criterion == Criterion::maha ? mahalanobisMean<M>(measurements, options, analysis)
+                                                        : leastSquares(measurements, samples, options, analysis);
   analysis.mean = describe(y);
-  setDispersion(measures, samples, y, analysis);
+  setDispersion(measurements, samples, y, analysis);
   if constexpr (std::is_same_v<M, S2d>) {
     analysis.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>();
   }
-  if (options.charts) analysis.charts = chartsOf(measures, samples, y, analysis);
+  if (options.charts) analysis.charts = chartsOf(measurements, samples, y, analysis);
   return analysis;
 }
 
 }  // namespace
 
-MeanAnalysis analyseMean(const Measures& measures, const AnalysisOptions& options) {
+MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options) {
   AnalysisOptions how = options;
-  if (how.budget == 0) how.budget = measures.size() > 100000 ? 2000 : 1000000;
+  if (how.budget == 0) how.budget = measurements.size() > 100000 ? 2000 : 1000000;
   MeanAnalysis analysis =
-      experiments::withFeature(measures.feature, [&]<class M>() { return analyse<M>(measures, how); });
-  explain(analysis, measures.size());
+      experiments::withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, how); });
+  explain(analysis, measurements.size());
   return analysis;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cli/io/feature_values.hpp>
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 #include <stats/charts.hpp>
 #include <stats/status.hpp>
 #include <stats/uniqueness_types.hpp>
@@ -14,7 +14,7 @@
 
 namespace liestat::cli {
 
-/// The measure farthest from the mean in one part of the tangent vector.
+/// The measurement farthest from the mean in one part of the tangent vector.
 struct LargestResidual {
   double value = 0;  ///< rad or m
   std::size_t line = 0;
@@ -23,7 +23,7 @@ struct LargestResidual {
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
-  /// Of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
+  /// The status of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
   Status status = Status::ok;
   std::string reason = {};  ///< in words, where status is not ok
   bool converged = false;
@@ -34,18 +34,18 @@ struct MeanAnalysis {
   Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
   Status covariance_status = Status::ok;
   std::string covariance_from = {};                               ///< residuals or noise
-  Eigen::MatrixXd dispersion;                                     ///< of the measures about the mean
+  Eigen::MatrixXd dispersion;                                     ///< the measurements' covariance about the mean
   std::vector<LargestResidual> largest = {};                      ///< one for each part of the tangent vector
-  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< of directions: what the coordinates belong to
+  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< directions: the axes of the coordinates
 
   Uniqueness unique = Uniqueness::not_certified;
   std::string proof = {};  ///< in words
   std::vector<FeatureValue> rivals = {};
   double r_star = 0;
   std::size_t cells = 0;
-  double cut_locus_mass = 0;  ///< fraction of the measures near the cut locus of the mean
+  double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
 
-  /// Sum of the measures' squared Mahalanobis distances, where their noise is known, and what is expected.
+  /// Sum of the measurements' squared Mahalanobis distances, where their noise is known, and what is expected.
   double fit = 0;
   double fit_dof = 0;  ///< 0: there is none
   double fit_p = 1;    ///< probability of so large a sum
@@ -54,18 +54,18 @@ struct MeanAnalysis {
   std::vector<std::string> notes = {};
 };
 
-/// How much is computed.
+/// Options of analyseMean().
 struct AnalysisOptions {
   bool certify = true;     ///< branch and bound where the cheap certificates fail
-  std::size_t budget = 0;  ///< its cells; 0: a million, of very many measures as many as take some seconds
+  std::size_t budget = 0;  ///< its cells; 0: a million, of very many measurements as many as take some seconds
   int threads = 0;         ///< 0: all
   bool charts = false;     ///< for a report
 };
 
-/// Mean, covariance, dispersion and uniqueness of the measures. The same bits for any number of threads.
-MeanAnalysis analyseMean(const Measures& measures, const AnalysisOptions& options);
+/// Mean, covariance, dispersion and uniqueness of the measurements. The same bits for any number of threads.
+MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options);
 
-/// Adds the p-value of the fit, and notes on what is remarkable about the result, to an analysis of n measures.
+/// Adds the p-value of the fit, and notes on what is remarkable about the result, to an analysis of n measurements.
 void explain(MeanAnalysis& analysis, std::size_t n);
 
 }  // namespace liestat::cli

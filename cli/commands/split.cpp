@@ -16,27 +16,29 @@ HalfMean describeHalf(const SplitPart<M>& part) {
 }
 
 template <class M>
-SplitValidation<M> validate(const Measures& measures, const SplitSettings& settings) {
+SplitValidation<M> validate(const Measurements& measurements, const SplitSettings& settings) {
   const experiments::ProgramExecutor executor{settings.threads};
-  const FeatureFile& file = measures.file;
-  if (measures.criterion == Criterion::maha) {
+  const FeatureFile& file = measurements.file;
+  if (measurements.criterion == Criterion::maha) {
     MahaOptions<M> how;
-    how.likelihood = measures.likelihood;
-    return validateMahaBySplitting(executor, gaussiansOf<M>(file), measures.covariance_at, how, file.times,
+    how.likelihood = measurements.likelihood;
+    return validateMahaBySplitting(executor, gaussiansOf<M>(file), measurements.covariance_at, how, file.times,
                                    settings.split);
   }
   if constexpr (Metric<M>) {
     std::vector<SquareOf<M>> noise;
-    if (measures.known_noise) noise = covariancesOf<M>(file);
-    return validateMeanBySplitting(executor, featuresOf<M>(file), measures.weights, noise, file.times, settings.split);
+    if (measurements.known_noise) noise = covariancesOf<M>(file);
+    return validateMeanBySplitting(executor, featuresOf<M>(file), measurements.weights, noise, file.times,
+                                   settings.split);
   } else {
-    return validateGroupMeanBySplitting(executor, featuresOf<M>(file), measures.weights, file.times, settings.split);
+    return validateGroupMeanBySplitting(executor, featuresOf<M>(file), measurements.weights, file.times,
+                                        settings.split);
   }
 }
 
 template <class M>
-SplitResult split(const Measures& measures, const SplitSettings& settings) {
-  const SplitValidation<M> validation = validate<M>(measures, settings);
+SplitResult split(const Measurements& measurements, const SplitSettings& settings) {
+  const SplitValidation<M> validation = validate<M>(measurements, settings);
   SplitResult result;
   result.n = validation.n;
   result.random = validation.random;
@@ -52,15 +54,15 @@ SplitResult split(const Measures& measures, const SplitSettings& settings) {
 
 }  // namespace
 
-std::size_t fewestMeasures(const Measures& measures, const SplitOptions& options) {
-  return fewestMeasurements(degreesOfFreedom(measures.feature), measures.known_noise, options);
+std::size_t fewestMeasurements(const Measurements& measurements, const SplitOptions& options) {
+  return fewestMeasurements(degreesOfFreedom(measurements.feature), measurements.known_noise, options);
 }
 
-SplitResult splitMeasures(const Measures& measures, const SplitSettings& settings,
-                          const std::function<void()>& advance) {
+SplitResult splitMeasurements(const Measurements& measurements, const SplitSettings& settings,
+                              const std::function<void()>& advance) {
   SplitSettings how = settings;
   how.split.advance = advance;
-  return experiments::withFeature(measures.feature, [&]<class M>() { return split<M>(measures, how); });
+  return experiments::withFeature(measurements.feature, [&]<class M>() { return split<M>(measurements, how); });
 }
 
 }  // namespace liestat::cli

@@ -9,20 +9,20 @@
 
 namespace liestat::cli {
 
-/// How the measures are split, and on how many threads (0: all).
+/// Options of splitMeasurements(): the splits, and the number of threads (0: all).
 struct SplitSettings {
   SplitOptions split;
   int threads = 0;
 };
 
-/// A half of the measures.
+/// A half of the measurements.
 struct HalfMean {
   std::size_t n = 0;
   FeatureValue mean = {};
   Eigen::MatrixXd covariance = {};  ///< empty if there is none
 };
 
-/// The result of splitMeasures: a SplitValidation whatever the feature.
+/// The result of splitMeasurements: a SplitValidation whatever the feature.
 struct SplitResult {
   std::size_t n = 0;
   SplitSeries random, by_blocks;
@@ -33,13 +33,13 @@ struct SplitResult {
   std::string law;  ///< chi2 or hotelling
 };
 
-/// The fewest measures that can be split.
-std::size_t fewestMeasures(const Measures& measures, const SplitOptions& options);
+/// The fewest measurements that can be split.
+std::size_t fewestMeasurements(const Measurements& measurements, const SplitOptions& options);
 
-/// All splits of measures of which there are enough. The order of the rows, or their times, is the order in time.
+/// All splits of measurements of which there are enough. The order of the rows, or their times, is the order in time.
 /// `advance` is called twice a split, on any thread.
-SplitResult splitMeasures(
-    const Measures& measures, const SplitSettings& settings, const std::function<void()>& advance = [] {});
+SplitResult splitMeasurements(
+    const Measurements& measurements, const SplitSettings& settings, const std::function<void()>& advance = [] {});
 
 /// A split fails when the blocks' index is too large by chance with less than this probability.
 inline constexpr double split_false_alarm = 1e-5;

@@ -1,5 +1,5 @@
 #include <cli/commands/commands.hpp>
-#include <cli/commands/measures_options.hpp>
+#include <cli/commands/measurement_options.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/io/stereo.hpp>
 #include <cli/io/tracks.hpp>
@@ -21,37 +21,37 @@ namespace {
 constexpr const char* command_name = "liestat validate split";
 
 struct Options {
-  MeasuresInput input;
+  MeasurementInput input;
   SplitSettings settings;
   std::string stereo, json, report;
 };
 
 FileSplit splitFile(const Options& options) {
-  const Measures measures = options.input.read(command_name);
-  const std::size_t fewest = fewestMeasures(measures, options.settings.split);
-  if (measures.size() < fewest) {
-    throw InputError(options.input.file, 0, fmt::format("{} measures, too few to be split", measures.size()),
+  const Measurements measurements = options.input.read(command_name);
+  const std::size_t fewest = fewestMeasurements(measurements, options.settings.split);
+  if (measurements.size() < fewest) {
+    throw InputError(options.input.file, 0, fmt::format("{} measurements, too few to be split", measurements.size()),
                      fmt::format("{} at least (--blocks is {})", fewest, options.settings.split.blocks));
   }
   FileSplit split;
   split.source = options.input.file;
-  split.description = measuresInWords(options.input.file, measures);
-  split.feature = measures.feature;
-  split.criterion = measures.criterion;
+  split.description = measurementsInWords(options.input.file, measurements);
+  split.feature = measurements.feature;
+  split.criterion = measurements.criterion;
   split.settings = options.settings.split;
-  split.known_noise = measures.known_noise;
-  split.covariance_at_matters = measures.covariance_at_matters;
-  split.covariance_at = measures.covariance_at;
-  split.notes = measures.notes;
+  split.known_noise = measurements.known_noise;
+  split.covariance_at_matters = measurements.covariance_at_matters;
+  split.covariance_at = measurements.covariance_at;
+  split.notes = measurements.notes;
   Progress bar("validate split", 2 * options.settings.split.splits);
-  split.result = splitMeasures(measures, options.settings, [&bar] { bar.advance(); });
+  split.result = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
   split.random = split.result.random;
   split.by_blocks = split.result.by_blocks;
   return split;
 }
 
-/// The measures of one landmark as a file would have them.
-Measures measuresOf(const LandmarkMeasures& landmark, const MeasuresOptions& options) {
+/// The measurements of one landmark as a file would have them.
+Measurements measurementsOf(const LandmarkMeasurements& landmark, const MeasurementOptions& options) {
   FeatureFile file;
   file.kind = Feature::point;
   file.format = "stereo";
@@ -61,7 +61,7 @@ Measures measuresOf(const LandmarkMeasures& landmark, const MeasuresOptions& opt
     file.times.push_back(landmark.times[i]);
     file.lines.push_back(landmark.frames[i]);
   }
-  return chooseMeasures(std::move(file), options, command_name);
+  return chooseMeasurements(std::move(file), options, command_name);
 }
 
 LandmarkSplits splitStereo(const Options& options) {
@@ -70,7 +70,7 @@ LandmarkSplits splitStereo(const Options& options) {
   if (!camera.pixel_variance) {
     throw InputError(prefix + "_camera.csv", 0, "there are no pixel variances", "the rows y_var0 ... y_var3");
   }
-  const std::vector<LandmarkMeasures> landmarks =
+  const std::vector<LandmarkMeasurements> landmarks =
       backProject(readStereoTracks(prefix + "_tracks.csv"), readCameraPoses(prefix + "_poses.csv"), camera);
   std::vector<Eigen::Vector3d> survey;
   if (std::filesystem::exists(prefix + "_landmarks.csv")) survey = readLandmarks(prefix + "_landmarks.csv");
@@ -81,11 +81,11 @@ LandmarkSplits splitStereo(const Options& options) {
   all.surveyed = !survey.empty();
   std::vector<SplitSeries> random, by_blocks;
   Progress bar("validate split", 2 * options.settings.split.splits * landmarks.size());
-  for (const LandmarkMeasures& landmark : landmarks) {
-    const Measures measures = measuresOf(landmark, options.input.options);
-    all.criterion = measures.criterion;
-    all.known_noise = measures.known_noise;
-    if (measures.size() < fewestMeasures(measures, options.settings.split)) {
+  for (const LandmarkMeasurements& landmark : landmarks) {
+    const Measurements measurements = measurementsOf(landmark, options.input.options);
+    all.criterion = measurements.criterion;
+    all.known_noise = measurements.known_noise;
+    if (measurements.size() < fewestMeasurements(measurements, options.settings.split)) {
       ++all.skipped;
       continue;
     }
@@ -93,8 +93,8 @@ LandmarkSplits splitStereo(const Options& options) {
     how.threads = options.settings.threads;
     LandmarkSplit& row = all.landmarks.emplace_back();
     row.track = landmark.track;
-    row.split = splitMeasures(measures, options.settings, [&bar] { bar.advance(); });
-    row.whole = analyseMean(measures, how);
+    row.split = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
+    row.whole = analyseMean(measurements, how);
     if (landmark.track < survey.size()) row.survey = survey[landmark.track];
     random.push_back(row.split.random);
     by_blocks.push_back(row.split.by_blocks);
@@ -132,7 +132,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 void addValidateSplitCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
   const Command command =
-      validate.add("split", "Real measures split in two, at random and by blocks of time: do the halves agree?");
+      validate.add("split", "Real measurements split in two, at random and by blocks of time: do the halves agree?");
   options->input.declare(command, false);
   command.option("--stereo", options->stereo,
                  "Instead of FILE: PREFIX_tracks.csv, _poses.csv, _camera.csv and, if there, _landmarks.csv");

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the commands `validate means`, `validate propagation` and the like have in common: lists of names on the command
+// The common part of the commands `validate means`, `validate propagation` and the like: lists of names on the command
 // line, options of a run, a progress bar, rows in JSON, the exit code.
 
 #include <cli/commands/commands.hpp>
@@ -35,7 +35,7 @@ auto chosen(const List& list, const std::vector<std::string>& wanted) {
   return values;
 }
 
-/// What run(progress) returns, with a bar on the terminal while it runs; progress(done, all) takes amounts of work.
+/// The result of run(progress), with a bar on the terminal while it runs; progress(done, all) takes amounts of work.
 template <class Run>
 auto withProgressBar(const std::string& label, const Run& run) {
   // The bar counts in thousandths, as the amount of work is known only inside.
@@ -47,7 +47,7 @@ auto withProgressBar(const std::string& label, const Run& run) {
   return run(progress);
 }
 
-/// Where the rows go besides the terminal; empty for nowhere.
+/// The places where the rows go besides the terminal; empty: none.
 struct ValidationOutput {
   std::string json, report;
 };

@@ -104,7 +104,7 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   how.consensus = !options.no_consensus;
   how.refinement = !options.no_refinement;
   if (options.true_biases) {
-    // Where there is no truth at the time, its biases are not known.
+    // Without a truth at the time its biases are not known.
     how.known_bias = [&recording](double time) {
       const auto truth = truthAt(recording.truth, time);
       return truth ? std::optional(truth->bias) : std::nullopt;

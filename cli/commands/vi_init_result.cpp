@@ -14,7 +14,7 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// Of V and G, G on its sphere.
+/// The NEES of V and G, G on its sphere.
 double neesOf(const RefinementResult& refined, const Eigen::Vector3d& V, const Eigen::Vector3d& G) {
   Eigen::Matrix<double, 6, 1> error;
   error << refined.velocity() - V, refined.gravity - G;

@@ -11,7 +11,7 @@
 
 namespace liestat::cli {
 
-/// What `liestat vi-init` works on. Times of images are on the inertial sensor's clock.
+/// The input of `liestat vi-init`. Times of images are on the inertial sensor's clock.
 struct ViRecording {
   ImuFile imu;
   ImageTracks tracks;
@@ -20,7 +20,7 @@ struct ViRecording {
   std::vector<GroundTruth> truth;  ///< empty: not known
 };
 
-/// How far an estimate is from the ground truth.
+/// The errors of an estimate against the ground truth.
 struct ViError {
   double speed = 0;    ///< m/s, of the velocity at the first image
   double gravity = 0;  ///< rad, of its direction
@@ -31,7 +31,7 @@ struct ViError {
 struct ViWindow : InitialisedWindow {
   std::optional<ViError> closed_form_error, refined_error;
   std::optional<double> gyroscope_error;  ///< rad/s, of the best known bias
-  std::optional<double> nees;             ///< of the refined V and G, 5 degrees of freedom
+  std::optional<double> nees;             ///< the refined V and G's, 5 degrees of freedom
 };
 
 /// The state that disjoint windows give together, compared with the ground truth where that is known.

@@ -99,10 +99,10 @@ Camera cameraOf(const Section& section) {
   return camera;
 }
 
-/// What one file says. A pose by T_BS is to the body's axes, which another file may set apart from the sensor's.
+/// The contents of one file. A pose by T_BS is to the body's axes, which another file may set apart from the sensor's.
 struct Parsed {
   Calibration calibration;
-  std::vector<bool> to_body;       ///< of each camera: imu_T_cam is body_T_cam still
+  std::vector<bool> to_body;       ///< for each camera: imu_T_cam is still body_T_cam
   std::optional<SE3d> body_T_imu;  ///< where the sensor has a T_BS
   std::string file;
 };
@@ -148,7 +148,7 @@ bool isCameraName(const std::string& key) {
   return key.size() > 3 && key.compare(0, 3, "cam") == 0 && key.find_first_not_of("0123456789", 3) == std::string::npos;
 }
 
-/// What a sensor.yaml is called by: the directory that it lies in.
+/// The name of a sensor.yaml's sensor: the directory that the file lies in.
 std::string directoryOf(const std::string& path) {
   const std::size_t end = path.rfind('/');
   if (end == std::string::npos || end == 0) return {};

@@ -12,7 +12,7 @@ namespace liestat::cli {
 
 using experiments::CameraCalibration;
 
-/// What calibration files say.
+/// The contents of calibration files.
 struct Calibration {
   std::optional<ImuNoise<double>> imu;
   std::vector<CameraCalibration> cameras;  ///< in the order of the files

@@ -18,7 +18,7 @@ inline constexpr int absent = -1;
 inline constexpr std::string_view feature_columns_text =
     "qx,qy,qz,qw or rx,ry,rz or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz";
 
-/// Where the parts of a feature stand in a row. Of the three forms of a rotation at most one is there.
+/// The columns of the parts of a feature. At most one of the three forms of a rotation is there.
 struct FeatureColumns {
   experiments::Feature kind = experiments::Feature::point;
   std::array<int, 4> quaternion{absent, absent, absent, absent};  ///< x y z w
@@ -28,7 +28,7 @@ struct FeatureColumns {
   std::array<int, 3> direction{absent, absent, absent};
   int weight = absent;
   int time = absent;
-  int dimension = 0;                 ///< of the covariance, 0 without one
+  int dimension = 0;                 ///< the covariance's; 0: there is none
   std::vector<int> covariance = {};  ///< upper triangle, row by row
 };
 

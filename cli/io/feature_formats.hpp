@@ -10,11 +10,11 @@
 
 namespace liestat::cli {
 
-/// How the rows of a file are laid out.
+/// The layout of a file's rows.
 struct RowLayout {
   std::vector<std::string> columns;  ///< in the order of the file; those without a name are passed over
   Separator separator = Separator::comma;
-  std::string description;  ///< of the number of columns, for messages
+  std::string description;  ///< the number of columns in words, for messages
   double time_unit = 1;     ///< s
   bool has_header = false;  ///< the first line with content is no row
 };
@@ -29,7 +29,7 @@ struct FirstLine {
 /// A format of files of features.
 struct FeatureFormat {
   std::string_view name;
-  std::string_view without_header;  ///< what a line of numbers is, where the format has no header; for messages
+  std::string_view without_header;  ///< the meaning of a line of numbers, if the format has no header; for messages
   bool (*recognises)(const FirstLine& first);
   /// Reads how the rows are laid out; the reader stands at the first line with content. Throws InputError.
   RowLayout (*reads)(const LineReader& reader, const std::string& file);

@@ -1,7 +1,7 @@
 // Features between files and manifolds: the rows of a file as a type of feature, and a feature as people see it.
 #pragma once
 
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 #include <experiments/feature.hpp>
 #include <stats/gaussian.hpp>
 

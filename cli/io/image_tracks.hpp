@@ -12,14 +12,14 @@ namespace liestat::cli {
 
 using experiments::PixelObservation;
 
-/// What a camera saw over time.
+/// The tracks that a camera saw over time.
 struct ImageTracks {
   std::vector<double> times;                   ///< s since the start that the reader was given, ascending, one an image
-  std::vector<std::size_t> frames;             ///< of each image, its number in the files
+  std::vector<std::size_t> frames;             ///< the number of each image in the files
   std::vector<PixelObservation> observations;  ///< by images, then by tracks
-  std::vector<std::size_t> track_ids;          ///< of each track, its number in the file, ascending
+  std::vector<std::size_t> track_ids;          ///< the number of each track in the file, ascending
   std::size_t seen_once = 0;                   ///< tracks with one observation, which are of no use but kept
-  std::string format;                          ///< of the times: euroc, csv (a file frame,t_s), or t_s (a column)
+  std::string format;                          ///< the times': euroc, csv (a file frame,t_s), or t_s (a column)
 };
 
 /// Reads tracks, CSV with the columns frame, track, u, v (or those of the left of a stereo pair, uL and vL) and, unless

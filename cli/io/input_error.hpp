@@ -24,7 +24,7 @@ inline std::string printable(std::string_view text, std::size_t limit = 40) {
   return result;
 }
 
-/// What is wrong with an input (or an output path) that the user named. `what()` is one line that begins
+/// An error in an input (or an output path) that the user named. `what()` is one line that begins
 /// with `file:line: `, or `file: ` where no line is to blame.
 class InputError : public std::runtime_error {
  public:

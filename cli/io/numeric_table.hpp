@@ -22,7 +22,7 @@ class NumericTable {
   /// The columns that were read: the required ones, then those of the optional ones that the file has.
   const std::vector<std::string>& columns() const { return columns_; }
   bool has(std::string_view column) const;
-  /// Where a column that `has` stands.
+  /// The index of a column that `has` finds.
   std::size_t column(std::string_view column) const;
 
   std::size_t rows() const { return lines_.size(); }

@@ -19,7 +19,7 @@ using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 /// The features of a file, one entry a row in each list that is not empty. Which parts there are is said by `kind`.
 struct FeatureFile {
-  /// What each row is: the first feature of the table with exactly the file's parts.
+  /// The kind of each row: the first feature of the table with exactly the file's parts.
   experiments::Feature kind = experiments::Feature::point;
   std::vector<Eigen::Quaterniond> rotations;  ///< of unit norm
   std::vector<Eigen::Vector3d> positions;     ///< points, or translations of frames
@@ -35,7 +35,7 @@ struct FeatureFile {
   std::size_t size() const { return lines.size(); }
 };
 
-/// How to read.
+/// Options of readFeatureFile().
 struct ReadingOptions {
   std::string format = "auto";  ///< one of formatNames(); `auto` looks at the first lines
   /// A quaternion or direction whose norm is off by less is normalised, one off by more is an error. For rotation

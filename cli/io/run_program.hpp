@@ -5,7 +5,7 @@
 
 namespace liestat::cli {
 
-/// How a program ended.
+/// The end of a program.
 struct ProgramResult {
   bool found = false;  ///< false: it is not installed
   int status = -1;     ///< its exit code, 128 and more for a signal

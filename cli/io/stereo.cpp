@@ -32,28 +32,28 @@ MeasuredPoint toWorld(const CameraPose& pose, const MeasuredPoint& in_camera) {
   return {R_world_camera * in_camera.mean + pose.c, R_world_camera * in_camera.covariance * R_world_camera.transpose()};
 }
 
-std::vector<LandmarkMeasures> backProject(const std::vector<StereoObservation>& observations,
-                                          const std::vector<CameraPose>& poses, const StereoCamera& camera,
-                                          double least_disparity) {
+std::vector<LandmarkMeasurements> backProject(const std::vector<StereoObservation>& observations,
+                                              const std::vector<CameraPose>& poses, const StereoCamera& camera,
+                                              double least_disparity) {
   std::unordered_map<std::size_t, const CameraPose*> pose_of;
   for (const CameraPose& pose : poses) pose_of.emplace(pose.frame, &pose);
 
   std::vector<StereoObservation> ordered = observations;
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const StereoObservation& a, const StereoObservation& b) { return a.frame < b.frame; });
-  std::map<std::size_t, LandmarkMeasures> by_track;
+  std::map<std::size_t, LandmarkMeasurements> by_track;
   for (const StereoObservation& observation : ordered) {
     const auto pose = pose_of.find(observation.frame);
     if (pose == pose_of.end()) continue;
     const std::optional<MeasuredPoint> point = triangulate(camera, observation, least_disparity);
     if (!point) continue;
-    LandmarkMeasures& landmark = by_track[observation.track];
+    LandmarkMeasurements& landmark = by_track[observation.track];
     landmark.track = observation.track;
     landmark.points.push_back(toWorld(*pose->second, *point));
     landmark.frames.push_back(observation.frame);
     landmark.times.push_back(pose->second->t);
   }
-  std::vector<LandmarkMeasures> landmarks;
+  std::vector<LandmarkMeasurements> landmarks;
   landmarks.reserve(by_track.size());
   for (auto& entry : by_track) landmarks.push_back(std::move(entry.second));
   return landmarks;

@@ -27,17 +27,17 @@ std::optional<MeasuredPoint> triangulate(const StereoCamera& camera, const Stere
 MeasuredPoint toWorld(const CameraPose& pose, const MeasuredPoint& in_camera);
 
 /// All that was seen of one landmark, in the order of the frames.
-struct LandmarkMeasures {
+struct LandmarkMeasurements {
   std::size_t track = 0;
   std::vector<MeasuredPoint> points;  ///< in the world
   std::vector<std::size_t> frames;    ///< in which they were seen
-  std::vector<double> times;          ///< of those frames, s
+  std::vector<double> times;          ///< the times of those frames, s
 };
 
 /// Every observation put into the world, sorted by track; tracks without a usable observation are left out, as are
 /// observations in frames without a pose and those of too small a disparity.
-std::vector<LandmarkMeasures> backProject(const std::vector<StereoObservation>& observations,
-                                          const std::vector<CameraPose>& poses, const StereoCamera& camera,
-                                          double least_disparity = 1);
+std::vector<LandmarkMeasurements> backProject(const std::vector<StereoObservation>& observations,
+                                              const std::vector<CameraPose>& poses, const StereoCamera& camera,
+                                              double least_disparity = 1);
 
 }  // namespace liestat::cli

@@ -42,13 +42,13 @@ class LineReader {
   std::size_t comment_number_ = 0;
 };
 
-/// How the fields of a line are told apart.
+/// The separator of a line's fields.
 enum class Separator { comma, blanks, comma_or_blanks };
 
 /// Splits a line into fields without the blanks and the double quotes around them. `fields` is overwritten.
 void splitFields(std::string_view line, Separator separator, std::vector<std::string_view>& fields);
 
-/// What a field turned out to be.
+/// The outcome of reading a field.
 enum class NumberKind { finite, not_finite, no_number };
 
 /// Reads a decimal number that takes up the whole field. Independent of the locale.

@@ -18,7 +18,7 @@ struct StereoObservation {
   double vR = 0;
 };
 
-/// Where the left camera (x right, y down, z forward) was.
+/// The pose of the left camera (x right, y down, z forward).
 struct CameraPose {
   std::size_t frame = 0;
   double t = 0;                                                  ///< s
@@ -33,7 +33,7 @@ struct StereoCamera {
   double cu = 0;
   double cv = 0;
   double b = 0;                                   ///< baseline, m
-  std::optional<Eigen::Vector4d> pixel_variance;  ///< of uL, vL, uR, vR, pixels squared, where the file has them
+  std::optional<Eigen::Vector4d> pixel_variance;  ///< uL, vL, uR, vR; pixels squared, if the file has them
 };
 
 /// Rows `frame,track,uL,vL,uR,vR`. All four readers throw InputError, and `-` is standard input.

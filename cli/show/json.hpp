@@ -73,7 +73,7 @@ class JsonObject {
 /// The version of the fields' names and meanings; grows when one of them changes.
 inline constexpr int schema_version = 1;
 
-/// What every JSON file of the program begins with: schema_version, program, version, command_line, and the seed if
+/// The first fields of every JSON file of the program: schema_version, program, version, command_line, and the seed if
 /// there is one.
 JsonObject jsonEnvelope(std::string_view command_line, std::optional<std::uint64_t> seed = std::nullopt);
 

@@ -11,22 +11,22 @@
 namespace liestat::cli {
 namespace {
 
-std::string criterionInWords(const Measures& measures) {
-  switch (measures.criterion) {
+std::string criterionInWords(const Measurements& measurements) {
+  switch (measurements.criterion) {
     case Criterion::lsq:
       return "least squares";
     case Criterion::wlsq:
       return "weighted least squares";
     case Criterion::maha:
       return std::string("least Mahalanobis distances") +
-             (measures.likelihood ? " with the likelihood's volume term" : "") +
-             (!measures.covariance_at_matters                    ? ""
-              : measures.covariance_at == CovarianceAt::measured ? ", covariances in the frames of the measures"
-                                                                 : ", covariances in the frame of the mean");
+             (measurements.likelihood ? " with the likelihood's volume term" : "") +
+             (!measurements.covariance_at_matters                    ? ""
+              : measurements.covariance_at == CovarianceAt::measured ? ", covariances in the frames of the measurements"
+                                                                     : ", covariances in the frame of the mean");
     case Criterion::barycentre:
       break;
   }
-  return measures.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
+  return measurements.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
 }
 
 std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance) {
@@ -43,7 +43,7 @@ std::vector<std::string> triple(const std::string& what, const Eigen::Vector3d& 
 
 }  // namespace
 
-std::vector<std::vector<std::string>> deviationRows(const Measures& measures, const MeanAnalysis& analysis) {
+std::vector<std::vector<std::string>> deviationRows(const Measurements& measurements, const MeanAnalysis& analysis) {
   std::vector<std::vector<std::string>> rows;
   const auto add = [&](const std::string& what, const TangentBlock& part, const Eigen::MatrixXd& covariance) {
     std::vector<std::string> row{fmt::format("{}, {}", what, name(part.part))};
@@ -52,7 +52,7 @@ std::vector<std::vector<std::string>> deviationRows(const Measures& measures, co
     row.push_back(unitOf(part).name);
     rows.push_back(row);
   };
-  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
+  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
   if (analysis.covariance.size() > 0) {
     for (const TangentBlock& part : parts) add("sd of the mean", part, analysis.covariance);
   }
@@ -96,37 +96,38 @@ std::string uniquenessInWords(const MeanAnalysis& analysis) {
   return analysis.cells > 0 ? text + fmt::format(", {} cells", analysis.cells) : text;
 }
 
-std::string covarianceInWords(const Measures& measures, const MeanAnalysis& analysis) {
+std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis) {
   if (analysis.covariance.size() == 0) {
     return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
   }
-  const int k = degreesOfFreedom(measures.feature);
+  const int k = degreesOfFreedom(measurements.feature);
   const std::string law = analysis.covariance_from == "residuals"
-                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, measures.size())
+                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, measurements.size())
                               : fmt::format("chi-square with {} degrees of freedom", k);
   return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
-                     analysis.covariance_from == "residuals" ? "the residuals" : "the measures' own covariances", law);
+                     analysis.covariance_from == "residuals" ? "the residuals" : "the measurements' own covariances",
+                     law);
 }
 
-std::string measuresInWords(const std::string& source, const Measures& measures) {
-  const experiments::FeatureInfo& feature = experiments::info(measures.feature);
-  std::string text = fmt::format("{}: {} {} ({})", source, measures.size(),
-                                 measures.size() == 1 ? feature.name : feature.plural, measures.file.format);
-  if (measures.file.n_normalised > 0) {
-    text += fmt::format(", {} normalised (largest error {:.2g})", measures.file.n_normalised,
-                        measures.file.largest_norm_error);
+std::string measurementsInWords(const std::string& source, const Measurements& measurements) {
+  const experiments::FeatureInfo& feature = experiments::info(measurements.feature);
+  std::string text = fmt::format("{}: {} {} ({})", source, measurements.size(),
+                                 measurements.size() == 1 ? feature.name : feature.plural, measurements.file.format);
+  if (measurements.file.n_normalised > 0) {
+    text += fmt::format(", {} normalised (largest error {:.2g})", measurements.file.n_normalised,
+                        measurements.file.largest_norm_error);
   }
   return text;
 }
 
-std::string formatMean(const std::string& source, const Measures& measures, const MeanAnalysis& analysis) {
-  std::string text = measuresInWords(source, measures) + "\n";
-  text += fmt::format("mean by {}: {} after {} {}\n\n", criterionInWords(measures),
+std::string formatMean(const std::string& source, const Measurements& measurements, const MeanAnalysis& analysis) {
+  std::string text = measurementsInWords(source, measurements) + "\n";
+  text += fmt::format("mean by {}: {} after {} {}\n\n", criterionInWords(measurements),
                       analysis.converged ? "converged" : "not converged", analysis.iterations,
                       analysis.iterations == 1 ? "step" : "steps");
   Table table({"", "x", "y", "z", "unit"});
   for (auto& row : valueRows(analysis.mean)) table.row(row);
-  for (auto& row : deviationRows(measures, analysis)) table.row(row);
+  for (auto& row : deviationRows(measurements, analysis)) table.row(row);
   text += table.str() + "\n";
   if (analysis.mean.quaternion_xyzw) {
     const Eigen::Vector4d& q = *analysis.mean.quaternion_xyzw;
@@ -134,14 +135,14 @@ std::string formatMean(const std::string& source, const Measures& measures, cons
   }
   text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
-  text += "covariance   " + covarianceInWords(measures, analysis) + "\n";
-  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
-  for (std::size_t p = 0; measures.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
+  text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
+  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
+  for (std::size_t p = 0; measurements.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
     text +=
         fmt::format("farthest     {} {} in {}, line {}\n", number(unitOf(parts[p]).scale * analysis.largest[p].value),
                     unitOf(parts[p]).name, name(parts[p].part), analysis.largest[p].line);
   }
-  for (const std::string& note : measures.notes) text += "note         " + note + "\n";
+  for (const std::string& note : measurements.notes) text += "note         " + note + "\n";
   for (const std::string& note : analysis.notes) text += "note         " + note + "\n";
   if (analysis.status != Status::ok && analysis.status != Status::not_applicable) {
     text += fmt::format("\nNot to be trusted ({}): {}.\n", name(analysis.status), analysis.reason);
@@ -193,18 +194,18 @@ JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance
   return object;
 }
 
-void setMeanFields(JsonObject& object, const std::string& source, const Measures& measures,
+void setMeanFields(JsonObject& object, const std::string& source, const Measurements& measurements,
                    const MeanAnalysis& analysis) {
-  object.set("file", source).set("format", measures.file.format).set("feature", name(measures.feature));
-  object.set("criterion", name(measures.criterion));
-  if (measures.covariance_at_matters) {
-    object.set("covariance_at", measures.covariance_at == CovarianceAt::measured ? "measured" : "estimated");
+  object.set("file", source).set("format", measurements.file.format).set("feature", name(measurements.feature));
+  object.set("criterion", name(measurements.criterion));
+  if (measurements.covariance_at_matters) {
+    object.set("covariance_at", measurements.covariance_at == CovarianceAt::measured ? "measured" : "estimated");
   } else {
     object.set("covariance_at", nullptr);
   }
-  object.set("likelihood", measures.likelihood).set("weighted", measures.weighted);
-  object.set("n", measures.size()).set("n_normalised", measures.file.n_normalised);
-  object.set("largest_norm_error", measures.file.largest_norm_error);
+  object.set("likelihood", measurements.likelihood).set("weighted", measurements.weighted);
+  object.set("n", measurements.size()).set("n_normalised", measurements.file.n_normalised);
+  object.set("largest_norm_error", measurements.file.largest_norm_error);
   object.set("status", name(analysis.status));
   if (analysis.status == Status::ok) {
     object.set("reason", nullptr);
@@ -222,19 +223,19 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measures
     object.set("covariance", nullptr);
   }
   object.set("covariance_status", name(analysis.covariance_status));
-  setCovarianceWords(object, measures.feature);
+  setCovarianceWords(object, measurements.feature);
   if (analysis.tangent_basis) object.set("tangent_basis", *analysis.tangent_basis);
   if (has_covariance) {
     object.set("covariance_from", analysis.covariance_from)
         .set("covariance_law", analysis.covariance_from == "residuals" ? "hotelling" : "chi2");
-    object.set("standard_deviations", standardDeviations(measures.feature, analysis.covariance));
+    object.set("standard_deviations", standardDeviations(measurements.feature, analysis.covariance));
   } else {
     object.set("covariance_from", nullptr).set("covariance_law", nullptr).set("standard_deviations", nullptr);
   }
   object.set("dispersion", analysis.dispersion);
-  object.set("dispersion_standard_deviations", standardDeviations(measures.feature, analysis.dispersion));
+  object.set("dispersion_standard_deviations", standardDeviations(measurements.feature, analysis.dispersion));
   std::vector<JsonObject> farthest;
-  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
+  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     JsonObject entry;
     entry.set("part", name(parts[p].part)).set("distance", unitOf(parts[p]).scale * analysis.largest[p].value);
@@ -254,7 +255,7 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measures
   } else {
     object.set("fit", nullptr).set("fit_dof", nullptr).set("fit_p", nullptr);
   }
-  std::vector<std::string> notes = measures.notes;
+  std::vector<std::string> notes = measurements.notes;
   notes.insert(notes.end(), analysis.notes.begin(), analysis.notes.end());
   object.set("notes", notes);
 }

@@ -8,10 +8,10 @@
 namespace liestat::cli {
 
 /// The result for the terminal.
-std::string formatMean(const std::string& source, const Measures& measures, const MeanAnalysis& analysis);
+std::string formatMean(const std::string& source, const Measurements& measurements, const MeanAnalysis& analysis);
 
 /// The fields of the JSON file, added to an envelope.
-void setMeanFields(JsonObject& object, const std::string& source, const Measures& measures,
+void setMeanFields(JsonObject& object, const std::string& source, const Measurements& measurements,
                    const MeanAnalysis& analysis);
 
 /// `quaternion_xyzw`, `rotation_vector` (rad), `translation` (m), `point` (m), `direction`: what the feature has.
@@ -29,19 +29,19 @@ std::string oneLine(const FeatureValue& value);
 
 /// Rows of a table with the columns name, x, y, z, unit: the feature itself; standard deviations and dispersion.
 std::vector<std::vector<std::string>> valueRows(const FeatureValue& value);
-std::vector<std::vector<std::string>> deviationRows(const Measures& measures, const MeanAnalysis& analysis);
+std::vector<std::vector<std::string>> deviationRows(const Measurements& measurements, const MeanAnalysis& analysis);
 
 /// "is unique: the data …" and so on.
 std::string uniquenessInWords(const MeanAnalysis& analysis);
 
-/// Where the covariance comes from and how it is to be read, or why there is none.
-std::string covarianceInWords(const Measures& measures, const MeanAnalysis& analysis);
+/// The origin of the covariance and how it is to be read, or the reason why there is none.
+std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis);
 
-/// What the reader changed and what was read: "50 rotations …".
-std::string measuresInWords(const std::string& source, const Measures& measures);
+/// The data and what the reader changed in them: "50 rotations …".
+std::string measurementsInWords(const std::string& source, const Measurements& measurements);
 
 /// The page: tables, both charts of the rotations or directions (Pennec 1998, fig. 2), the points or translations.
 void writeMeanReport(const std::string& directory, const std::string& command_line, const std::string& source,
-                     const Measures& measures, const MeanAnalysis& analysis);
+                     const Measurements& measurements, const MeanAnalysis& analysis);
 
 }  // namespace liestat::cli

@@ -14,7 +14,7 @@ namespace liestat::cli {
 namespace {
 
 // The palette's colours by what they stand for.
-constexpr std::size_t mean_colour = 1, measures_colour = 0, barycentre_colour = 2, frontier_colour = 6;
+constexpr std::size_t mean_colour = 1, measurement_colour = 0, barycentre_colour = 2, frontier_colour = 6;
 constexpr double ellipsoid_chi2 = 6, dispersion_chi2 = 5;
 
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
@@ -32,7 +32,7 @@ struct Plane {
 };
 
 Series scatter(const Eigen::MatrixXd& data, Plane plane) {
-  Series series{.name = "measures", .style = Style::points, .colour = measures_colour};
+  Series series{.name = "measurements", .style = Style::points, .colour = measurement_colour};
   for (Eigen::Index i = 0; i < data.cols(); ++i) {
     series.x.push_back(data(plane.a, i));
     series.y.push_back(data(plane.b, i));
@@ -58,7 +58,7 @@ Series coloured(Series series, std::size_t colour, bool dashed = false) {
   return series;
 }
 
-/// One chart: measures, mean and barycentre with their uncertainty, the dispersion.
+/// One chart: measurements, mean and barycentre with their uncertainty, the dispersion.
 struct ChartPanel {
   std::string title;
   std::vector<std::string> labels;
@@ -128,12 +128,12 @@ Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentBlock& part) {
   return m.block(part.begin, part.begin, part.size, part.size);
 }
 
-/// How far from the origin a rotation or direction can be, rad.
+/// The largest distance of a rotation or direction from the origin, rad.
 double largestAngle(Feature feature) {
   return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
 }
 
-/// Where a cloud is much smaller than the space it lives in, the frontier would leave a dot to look at.
+/// Whether a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
 bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& principal) {
   const Eigen::VectorXd first = principal.col(0);
   // In the principal chart even a small cloud may lie on both sides of the frontier.
@@ -141,7 +141,8 @@ bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& princi
 }
 
 /// Figure 2 of Pennec 1998.
-void plotAngles(Report& report, const Measures& measures, const MeanAnalysis& analysis, const TangentBlock& part) {
+void plotAngles(Report& report, const Measurements& measurements, const MeanAnalysis& analysis,
+                const TangentBlock& part) {
   const ChartScatter& charts = *analysis.charts;
   const Eigen::MatrixXd principal = charts.principal.middleRows(part.begin, part.size);
   const Eigen::MatrixXd centred = charts.centred.middleRows(part.begin, part.size);
@@ -149,7 +150,7 @@ void plotAngles(Report& report, const Measures& measures, const MeanAnalysis& an
   const std::vector<std::string> labels =
       direction ? std::vector<std::string>{"first coordinate (rad)", "second coordinate (rad)"}
                 : std::vector<std::string>{"r_x (rad)", "r_y (rad)", "r_z (rad)"};
-  const double frontier = fillsItsSpace(centred, principal) ? largestAngle(measures.feature) : 0;
+  const double frontier = fillsItsSpace(centred, principal) ? largestAngle(measurements.feature) : 0;
   ChartPanel left{.title = "Principal chart",
                   .labels = labels,
                   .data = principal,
@@ -204,15 +205,15 @@ void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBl
 }  // namespace
 
 void writeMeanReport(const std::string& directory, const std::string& command_line, const std::string& source,
-                     const Measures& measures, const MeanAnalysis& analysis) {
-  Report report(directory, "Mean of the measures in " + source);
-  report.paragraph(measuresInWords(source, measures) + ".");
+                     const Measurements& measurements, const MeanAnalysis& analysis) {
+  Report report(directory, "Mean of the measurements in " + source);
+  report.paragraph(measurementsInWords(source, measurements) + ".");
   report.code(command_line);
-  const std::span<const TangentBlock> parts = experiments::info(measures.feature).tangent;
+  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
   if (analysis.charts) {
     for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
       if (isAngular(part->part)) {
-        plotAngles(report, measures, analysis, *part);
+        plotAngles(report, measurements, analysis, *part);
       } else {
         plotPositions(report, analysis, *part);
       }
@@ -220,10 +221,10 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
   }
   report.section("Numbers");
   std::vector<std::vector<std::string>> rows = valueRows(analysis.mean);
-  for (auto& row : deviationRows(measures, analysis)) rows.push_back(std::move(row));
+  for (auto& row : deviationRows(measurements, analysis)) rows.push_back(std::move(row));
   report.table({"", "x", "y", "z", "unit"}, rows);
   report.section("All that the program said");
-  report.code(formatMean(source, measures, analysis));
+  report.code(formatMean(source, measurements, analysis));
   if (analysis.covariance.size() > 0) {
     report.section("Covariance");
     std::vector<std::vector<std::string>> matrix;
@@ -232,7 +233,7 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
       for (Eigen::Index j = 0; j < analysis.covariance.cols(); ++j) row.push_back(number(analysis.covariance(i, j), 6));
       matrix.push_back(std::move(row));
     }
-    report.table(std::vector<std::string>(matrix.size(), ""), matrix, covarianceInWords(measures, analysis));
+    report.table(std::vector<std::string>(matrix.size(), ""), matrix, covarianceInWords(measurements, analysis));
   }
   report.write();
 }

@@ -95,8 +95,8 @@ std::string formatMeansTables(const std::vector<MeansRow>& rows) {
           fmt::format("\nNoise from residuals: index over the mean of Hotelling's law, 1 expected\n{}", residual.str());
     }
     if (any({Criterion::maha, true, true})) {
-      text +=
-          fmt::format("\nErrors over MAHA's (geometric mean), iterations from the first measure\n{}", accuracy.str());
+      text += fmt::format("\nErrors over MAHA's (geometric mean), iterations from the first measurement\n{}",
+                          accuracy.str());
     }
   }
 

@@ -9,7 +9,7 @@
 
 namespace liestat::cli {
 
-/// How a series is drawn.
+/// The style in which a series is drawn.
 enum class Style {
   lines,         ///< through x, y; a NaN breaks the line, so one series may hold several curves
   points,        ///< at x, y
@@ -60,7 +60,7 @@ struct Panel {
 
 /// A figure of one panel or several.
 struct Plot {
-  std::string name;          ///< of its files: letters, digits and `_`; others are replaced
+  std::string name;          ///< the name of its files: letters, digits and `_`; others are replaced
   std::string caption = {};  ///< plain text below the figure
   std::vector<Panel> panels = {};
   std::size_t columns = 2;  ///< panels in a row, if there are several

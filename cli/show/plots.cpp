@@ -261,7 +261,7 @@ std::string plotScript(const Plot& plot, const std::string& name) {
   const std::size_t columns = std::max<std::size_t>(1, std::min(n, plot.columns));
   const std::size_t rows = (n + columns - 1) / columns;
   const int width = n == 1 ? single_width : static_cast<int>(columns) * panel_width;
-  // Where a unit is as long on both axes a square leaves least paper empty.
+  // If a unit is as long on both axes, a square leaves the least paper empty.
   const bool square =
       std::all_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return panel.equal_aspect; });
   const int height = n == 1 ? single_height : static_cast<int>(rows) * (square ? panel_width : panel_height);

@@ -11,7 +11,7 @@ namespace liestat::cli {
 /// gnuplot counts.
 std::string plotCsv(const Plot& plot);
 
-/// How many points of a series are drawn at most.
+/// The largest number of points of a series that are drawn.
 inline constexpr std::size_t most_points_drawn = 5000;
 
 /// A script that draws the CSV of that name into `name`.svg. Empty if there is nothing finite to draw. Whatever the

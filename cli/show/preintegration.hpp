@@ -17,13 +17,13 @@ struct PreintegratedWindow {
   double begin = 0;  ///< s
   RecordingResult<double> result;
   std::optional<Eigen::Matrix<double, 9, 1>> error;  ///< position, rotation, velocity
-  double squared_distance = 0;                       ///< of the error under the covariance
+  double squared_distance = 0;                       ///< the error's, under the covariance
 };
 
 struct PreintegrationResult {
   std::vector<PreintegratedWindow> windows;
-  bool with_noise = false;  ///< whether the sensor's noise is known, so that there are covariances
-  bool with_truth = false;  ///< whether there is a truth to compare with
+  bool with_noise = false;  ///< the sensor's noise is known, so there are covariances
+  bool with_truth = false;  ///< there is a truth to compare with
 };
 
 /// A table, one line per window, and below it the medians of the errors where the truth is known.

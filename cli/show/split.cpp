@@ -66,7 +66,7 @@ std::string splitVerdict(const SplitOutcome& outcome) {
   const bool random_fails = outcome.random.pValue() < split_false_alarm;
   if (random_fails) {
     text += fmt::format(
-        "Already at random the halves differ by {} times the expected squared distance: the measures "
+        "Already at random the halves differ by {} times the expected squared distance: the measurements "
         "scatter more than their covariances say.\n",
         number(outcome.random.factor(), 3));
   }
@@ -78,7 +78,7 @@ std::string splitVerdict(const SplitOutcome& outcome) {
   } else {
     text += fmt::format(
         "FAIL: halves made of blocks of time differ by {} times the expected squared distance{}. The errors of "
-        "successive measures are not independent: multiply the covariance of the mean by {} (95 %: {} to {}), its "
+        "successive measurements are not independent: multiply the covariance of the mean by {} (95 %: {} to {}), its "
         "standard deviations by {}; by more if the errors hold on for longer than a block.\n",
         number(blocks.factor(), 3), random_fails ? "" : ", which halves at random do not show",
         number(blocks.factor(), 3), number(blocks.factorLow(), 3), number(blocks.factorHigh(), 3),
@@ -123,7 +123,7 @@ void plotSplits(Report& report, const SplitOutcome& outcome) {
 std::string formatSplit(const FileSplit& split) {
   std::string text = split.description + "\n";
   text += fmt::format("means by {}, covariances from {}\n\n", name(split.criterion),
-                      split.known_noise ? "the measures' own" : "the residuals");
+                      split.known_noise ? "the measurements' own" : "the residuals");
   for (const auto& row : halfRows(split)) text += fmt::format("{:<12} {} (largest sd {})\n", row[0], row[2], row[3]);
   text += fmt::format("squared distance of both halves {} ({}, p = {})\n\n", number(split.result.squared_distance),
                       split.result.law, number(split.result.p_value, 2));
@@ -148,7 +148,7 @@ JsonObject toJson(const FileSplit& split, const std::string& command_line) {
 }
 
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split) {
-  Report report(directory, "Split of the measures in " + split.source);
+  Report report(directory, "Split of the measurements in " + split.source);
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));

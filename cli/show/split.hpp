@@ -2,7 +2,7 @@
 
 // Views of `liestat validate split`, of the measurements in a file and of landmarks that a stereo camera saw.
 
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
 #include <cli/show/json.hpp>
 #include <cli/commands/split.hpp>
@@ -20,7 +20,7 @@ class Report;
 /// The result of a run, whatever the input was.
 struct SplitOutcome {
   std::string source;       ///< a file, or the prefix of several
-  std::string description;  ///< of the measurements, in words
+  std::string description;  ///< the measurements in words
   experiments::Feature feature = experiments::Feature::point;
   experiments::Criterion criterion = experiments::Criterion::maha;
   SplitOptions settings;

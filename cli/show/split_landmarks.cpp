@@ -85,7 +85,7 @@ void writeSplitReport(const std::string& directory, const std::string& command_l
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));
-  report.table(headers, cells(split), "Indices of the splits, and the mean of all measures against the survey.");
+  report.table(headers, cells(split), "Indices of the splits, and the mean of all measurements against the survey.");
   plotSplits(report, split);
   report.write();
 }

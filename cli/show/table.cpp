@@ -53,7 +53,7 @@ Column makeColumn(const std::string& header, std::vector<std::string> cells) {
   column.numeric = any && std::all_of(cells.begin(), cells.end(),
                                       [](const std::string& cell) { return isNumber(cell) || isGap(cell); });
   if (column.numeric) {
-    // What follows the point is filled up with blanks, so that the points stand below each other.
+    // Fractions are padded with blanks, so that the points stand below each other.
     std::size_t most = 0;
     const auto fraction = [](const std::string& cell) {
       const std::size_t point = cell.find_first_of(".e");

@@ -1,7 +1,7 @@
 #include <cli/show/validation.hpp>
 #include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
 #include <cli/show/vi_init_validation.hpp>
+#include <cli/show/vi_init_validation_groups.hpp>
 
 #include <fmt/format.h>
 
@@ -14,126 +14,7 @@ namespace {
 
 using Check = ViInitCheck;
 using Quantity = ViInitQuantity;
-
-/// The rows of one estimator in one kind of window.
-struct Group {
-  std::vector<const ViInitRow*> rows;
-
-  const ViInitRow& first() const { return *rows.front(); }
-  const ViInitRow* of(Quantity quantity) const {
-    const auto found =
-        std::find_if(rows.begin(), rows.end(), [&](const ViInitRow* row) { return row->quantity == quantity; });
-    return found == rows.end() ? nullptr : *found;
-  }
-  std::string window() const {
-    const ViInitWindow& w = first().window;
-    return fmt::format("{:g} s, {}, {}", w.seconds, w.images, w.features);
-  }
-  std::string verdict() const {
-    bool judged = false, passed = true;
-    for (const ViInitRow* row : rows) {
-      judged = judged || row->passed;
-      passed = passed && row->passed.value_or(true);
-    }
-    return !judged ? "" : passed ? "pass" : "FAIL";
-  }
-};
-
-std::vector<Group> groups(const std::vector<ViInitRow>& rows, Check check) {
-  std::vector<Group> list;
-  for (const ViInitRow& row : rows) {
-    if (row.check != check) continue;
-    const auto belongs = [&](const Group& g) {
-      const ViInitRow& other = g.first();
-      return other.estimator == row.estimator && other.window == row.window;
-    };
-    auto group = std::find_if(list.begin(), list.end(), belongs);
-    if (group == list.end()) group = list.insert(list.end(), Group{});
-    group->rows.push_back(&row);
-  }
-  return list;
-}
-
-std::string index(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.2f}", row->report->index); }
-std::string ratio(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.3f}", row->value); }
-std::string covered(const ViInitRow* row) {
-  return row == nullptr ? "" : fmt::format("{:.1f}", 100 * row->report->coverage[2].observed);
-}
-std::string both(double median, double p95) { return number(median, 2) + " / " + number(p95, 2); }
-std::string errors(const ViInitRow* row) { return row == nullptr ? "" : both(row->median, row->p95); }
-
-/// What a check is about, in a line.
-const char* describe(Check check) {
-  switch (check) {
-    case Check::consistency:
-      return "Refinement under its covariance, biases drawn from their priors: index (degrees of freedom)";
-    case Check::closed_form:
-      return "Closed form under its covariance, image noise alone: index (degrees of freedom)";
-    case Check::accuracy:
-      return "Closed form with the sensor's noise, biases known: errors, median / 95 %";
-    case Check::gyroscope_bias:
-      return "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %";
-    case Check::drift:
-      return "40 % of the tracks drift by 8 px an image: errors, median / 95 %";
-  }
-  return "";
-}
-
-bool hasDistances(Check check) { return check == Check::consistency || check == Check::closed_form; }
-
-Table distancesTable(const std::vector<Group>& list) {
-  const bool refined = list.front().first().check == Check::consistency;
-  std::vector<std::string> headers{"T, n, N"};
-  if (refined) {
-    headers.insert(headers.end(), {"V (3)", "V,G (5)", "all (11)", "last (9)"});
-  } else {
-    headers.insert(headers.end(), {"V,G (5)", "with bias (8)"});
-  }
-  headers.insert(headers.end(), {"χ²/dof", "95 %", "lost", "verdict"});
-  Table table(headers);
-  for (const Group& g : list) {
-    std::vector<std::string> cells{g.window()};
-    if (refined) cells.push_back(index(g.of(Quantity::nees_v)));
-    cells.push_back(index(g.of(Quantity::nees_v_g)));
-    cells.push_back(index(g.of(Quantity::nees_all)));
-    if (refined) cells.push_back(index(g.of(Quantity::nees_last_state)));
-    cells.push_back(ratio(g.of(Quantity::chi2_per_dof)));
-    cells.push_back(covered(g.of(Quantity::nees_v_g)));
-    cells.push_back(fmt::format("{}", g.of(Quantity::nees_v_g)->failures));
-    cells.push_back(g.verdict());
-    table.row(cells);
-  }
-  return table;
-}
-
-/// The errors of a refinement stand below its distances.
-Table errorsTable(const std::vector<Group>& list) {
-  const Check check = list.front().first().check;
-  std::vector<std::string> headers{"estimator", "T, n, N", "speed m/s", "gravity deg", "scale %"};
-  if (check == Check::gyroscope_bias) headers[2] = "bias rad/s";
-  if (check == Check::consistency) headers.push_back("of features");
-  if (check == Check::drift) headers.push_back("selection");
-  Table table(headers);
-  for (const Group& g : list) {
-    const Quantity leading = check == Check::gyroscope_bias ? Quantity::bias : Quantity::speed;
-    std::vector<std::string> cells{name(g.first().estimator), g.window(), errors(g.of(leading)),
-                                   errors(g.of(Quantity::gravity)), errors(g.of(Quantity::scale))};
-    if (check == Check::consistency) cells.push_back(errors(g.of(Quantity::scale_of_features)));
-    if (check == Check::drift) cells.push_back(ratio(g.of(Quantity::selection)));
-    table.row(cells);
-    // What the note has, beside the first estimator of a window.
-    const auto noted = [&](Quantity quantity) {
-      const ViInitRow* row = g.of(quantity);
-      if (row == nullptr || !row->promise || !std::isfinite(row->promise->note_median)) return std::string();
-      return std::isfinite(row->promise->note_p95) ? both(row->promise->note_median, row->promise->note_p95)
-                                                   : number(row->promise->note_median, 2);
-    };
-    const std::vector<std::string> note{"  (the note)", "", noted(leading), noted(Quantity::gravity),
-                                        noted(Quantity::scale)};
-    if (std::any_of(note.begin() + 2, note.end(), [](const std::string& s) { return !s.empty(); })) table.row(note);
-  }
-  return table;
-}
+using Group = ViInitGroup;
 
 /// A panel of curves over the windows' length, one for each estimator, of those windows that have 20 features and an
 /// image every tenth of a second.
@@ -211,50 +92,6 @@ Panel coveragePanel(const std::vector<ViInitRow>& rows, Check check) {
 }
 
 }  // namespace
-
-std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
-  std::string text;
-  for (const Check check : all_vi_init_checks) {
-    const std::vector<Group> list = groups(rows, check);
-    if (list.empty()) continue;
-    if (text.empty()) {
-      text = fmt::format("{} windows a row, of T seconds, n images and N features\n\n", list.front().first().trials);
-    }
-    text += fmt::format("{}\n\n", describe(check));
-    if (hasDistances(check)) text += distancesTable(list).str() + "\n";
-    if (check != Check::closed_form) text += errorsTable(list).str() + "\n";
-  }
-  for (const ViInitRow& row : rows) {
-    if (row.passed.value_or(true)) continue;
-    text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
-                        name(row.quantity), row.window.seconds, row.window.images, row.window.features, row.reason);
-  }
-  return text + verdictLines(tally(rows), "with a promise");
-}
-
-JsonObject toJson(const ViInitRow& row) {
-  JsonObject o;
-  o.set("check", name(row.check)).set("estimator", name(row.estimator)).set("quantity", name(row.quantity));
-  o.set("unit", unit(row.quantity));
-  o.set("window", row.window.seconds).set("images", row.window.images).set("features", row.window.features);
-  o.set("in_domain", row.promise.has_value());
-  if (row.report) {
-    setStatistics(o, *row.report);
-  } else {
-    o.set("trials", row.trials);
-    for (const char* field :
-         {"dof", "law", "index", "index_se", "index_expected", "variance", "ks_statistic", "ks_p", "coverage95"}) {
-      o.set(field, nullptr);
-    }
-  }
-  o.set("failures", row.failures).set("median", row.median).set("p95", row.p95);
-  o.set("value", row.value).set("value_se", row.value_se);
-  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
-  o.set("promised_median", promise.median).set("promised_p95", promise.p95);
-  o.set("note_median", promise.note_median).set("note_p95", promise.note_p95);
-  o.set("passed", row.passed);
-  return o;
-}
 
 void writeViInitReport(const std::string& directory, const std::string& command_line,
                        const std::vector<ViInitRow>& rows) {

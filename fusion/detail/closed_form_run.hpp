@@ -2,7 +2,10 @@
 #pragma once
 
 #include <fusion/init/closed_form_types.hpp>
+#include <fusion/detail/closed_form_candidates.hpp>
 #include <fusion/detail/closed_form_input.hpp>
+#include <fusion/detail/closed_form_ranks.hpp>
+#include <fusion/detail/closed_form_uncertainty.hpp>
 #include <fusion/detail/closed_form_solver.hpp>
 #include <fusion/detail/closed_form_status.hpp>
 
@@ -27,7 +30,7 @@ class ClosedFormRun {
   void run() {
     const bool exact = !(options_.bearing_noise > 0);
     if (exact || options_.closed_form.singular_values) {
-      const RankDiagnosis ranks = solver_.diagnose();
+      const RankDiagnosis ranks = diagnoseRanks(table_, solver_.bias());
       result_.null_dimension = ranks.motion_null + ranks.feature_null;
       result_.largest_singular_value = ranks.largest;
       result_.singular_values = ranks.values;
@@ -61,13 +64,13 @@ class ClosedFormRun {
     candidates_ = solver_.minimise(root, needs_prior ? 1e-13 : solver_.rankTolerance());
     for (Candidate& c : candidates_) {
       if (status == Status::scale_unobservable) addScale(ranks, c);
-      const double reach = 1 + 2 * farthest(c.y);
+      const double reach = 1 + 2 * farthest(table_, c.y);
       for (std::size_t i = 0; i < table_.features(); ++i) {
         c.P.push_back(apply(ranks.by_motion[i], c.y));
         // A depth that is free: anywhere in front of the camera.
         if (ranks.feature_rank[i] < 3) c.P.back() += reach * table_.of(i).front().u;
       }
-      if (status == Status::scale_unobservable) normaliseScale(c);
+      if (status == Status::scale_unobservable) normaliseScale(c, table_);
       solver_.evaluate(c);
     }
     for (std::size_t i = 0; i < table_.features(); ++i) {
@@ -103,13 +106,13 @@ class ClosedFormRun {
     candidates_ = minima(root);
     if (candidates_.empty()) return;                 // not finite
     const Candidate least_squares = candidates_[0];  // the global minimum, whatever its angles
-    order();
+    order(candidates_, table_);
     solver_.setWeights(candidates_[0]);
     NoiseShare share = solver_.withoutNoise();
     candidates_ = minima(share.root);
     // Each minimiser with the weights of its own depths; one with most features behind the camera is beyond help.
     for (Candidate& c : candidates_) {
-      for (int pass = 1; pass < options_.closed_form.weight_passes && isInFront(c); ++pass) {
+      for (int pass = 1; pass < options_.closed_form.weight_passes && isInFront(c, table_); ++pass) {
         solver_.setWeights(c);
         const std::vector<Candidate> next = minima(solver_.withoutNoise().root);
         if (next.empty()) break;
@@ -117,7 +120,7 @@ class ClosedFormRun {
         c = next[second ? 1 : 0];
       }
     }
-    order();
+    order(candidates_, table_);
     // Both may have gone to the same minimum.
     if (candidates_.size() == 2 && gravityAngle(candidates_[0], candidates_[1]) < 1e-6) candidates_.pop_back();
     solver_.setWeights(candidates_[0]);
@@ -127,7 +130,7 @@ class ClosedFormRun {
     for (std::size_t i = 0; i < table_.features(); ++i) {
       lost_features_.push_back(solver_.feature(i, share.directions[0]));
     }
-    predict();
+    predictUncertainty(solver_, table_, candidates_[0], result_);
     classify(share);
     withhold(least_squares, share);
   }
@@ -171,108 +174,24 @@ class ClosedFormRun {
     return true;
   }
 
-  bool isInFront(const Candidate& c) const { return 2 * c.negative < table_.features(); }
-
-  /// The one whose features are in front of the camera, then the cheaper.
-  void order() {
-    if (candidates_.size() < 2) return;
-    const bool first = isInFront(candidates_[0]), second = isInFront(candidates_[1]);
-    if (first != second ? second : candidates_[1].cost < candidates_[0].cost) {
-      std::swap(candidates_[0], candidates_[1]);
-    }
-  }
-
   /// Whether the data decide between the minimisers of exact data with a null space.
   void decideExactly() {
-    order();
+    order(candidates_, table_);
     Status& status = result_.status;
     if (candidates_.empty()) return;
-    if (status == Status::mirror_gravity && !hasRival()) status = Status::ok;
+    if (status == Status::mirror_gravity && !hasRival(candidates_)) status = Status::ok;
     if (status != Status::ambiguous) return;
     // A line that touches the sphere: the two are one to the root of rounding.
     if (candidates_.size() < 2 || gravityAngle(candidates_[0], candidates_[1]) < 1e-5) {
       status = Status::double_root;
-    } else if (!hasRival() || candidates_[1].negative > 0) {
+    } else if (!hasRival(candidates_) || candidates_[1].negative > 0) {
       status = Status::ok;
     }
   }
-  /// Whether the second minimiser explains the data as well as the first.
-  bool hasRival() const {
-    return candidates_.size() == 2 && candidates_[1].cost - candidates_[0].cost <= chi_squared_1_95;
-  }
-
-  /// The largest distance of the camera from t0 (m).
-  double farthest(const Motion& y) const {
-    double most = 0;
-    for (const ScaledImage& image : table_.images) {
-      most = std::max(most, relativePosition(image, Eigen::Vector3d::Zero(), y).norm());
-    }
-    return most;
-  }
-
   /// V and P may be scaled together: a length for both, before it is normalised.
   void addScale(const RankDiagnosis& ranks, Candidate& c) const {
     for (int k = 0; k < solver_.motionSize(); ++k) c.y[k] += ranks.vectors.back()[k];
   }
-  /// Features in front of the camera, at a median distance of one.
-  void normaliseScale(Candidate& c) const {
-    std::vector<double> distances;
-    double front = 0;
-    for (std::size_t i = 0; i < c.P.size(); ++i) {
-      distances.push_back(c.P[i].norm());
-      front += table_.of(i).front().u.dot(c.P[i]);
-    }
-    const double factor = std::copysign(1 / median(distances), front);
-    c.y.set(0, factor * c.y.velocity());
-    for (Eigen::Vector3d& p : c.P) p *= factor;
-  }
-
-  /// Predicted standard deviations and covariances at the first minimiser.
-  void predict() {
-    const Candidate& best = candidates_[0];
-    Triangle root = Triangle::cholesky(solver_.eliminatePredicted(best).Q);
-    if (solver_.hasPrior()) solver_.addPrior(root);
-    SmallMatrix scaled(1, 1);
-    const bool determined = solver_.covariance(root, best.y, scaled);
-    const int m = solver_.motionSize();
-    if (determined) {
-      // The larger of the two sigmas across G.
-      const Eigen::Vector3d G = best.y.gravity();
-      const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
-      const Eigen::Matrix2d tilt = across * scaled.matrix3(m - 3, m - 3) * across.transpose();
-      const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)),
-                   spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
-      result_.tilt_sigma = std::sqrt(half + spread) / G.norm();
-
-      // From (V', [b'], G') to (V, G, [b]).
-      result_.covariance.resize(m, m);
-      const auto from = [m](int i) { return i < 3 ? i : i < 6 ? m - 6 + i : i - 3; };
-      const auto unit = [&](int i) { return i < 3 ? 1 / table_.window : solver_.gravityScale(); };
-      for (int i = 0; i < m; ++i) {
-        for (int j = 0; j < m; ++j) result_.covariance(i, j) = unit(i) * unit(j) * scaled(from(i), from(j));
-      }
-      result_.covariance_content =
-          solver_.hasPrior() ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise;
-    }
-    std::vector<double> relative;
-    for (std::size_t i = 0; i < table_.features(); ++i) {
-      const EliminatedFeature& e = solver_.eliminated()[i];
-      ClosedFormFeature& feature = result_.features[table_.feature[i]];
-      const Eigen::Vector3d u = table_.of(i).front().u;
-      if (!determined || e.rank < 3) continue;
-      double variance = u.dot(e.covariance * u);
-      for (int a = 0; a < m; ++a) {
-        for (int b = 0; b < m; ++b) {
-          variance += u.dot(e.by_motion.vector3(0, a)) * scaled(a, b) * u.dot(e.by_motion.vector3(0, b));
-        }
-      }
-      feature.depth_sigma = std::sqrt(variance);
-      feature.depth_determined = true;
-      relative.push_back(feature.depth_sigma / std::abs(u.dot(best.P[i])));
-    }
-    if (!relative.empty()) result_.scale_sigma = median(relative);
-  }
-
   /// The case with noise. A direction of the motion is lost where noise is nearly all that is known of it.
   void classify(const NoiseShare& share) { result_.status = caseOf(share); }
 
@@ -291,7 +210,7 @@ class ClosedFormRun {
     if (candidates_.size() == 2 && !lost && gravityAngle(candidates_[0], candidates_[1]) < result_.tilt_sigma) {
       candidates_.pop_back();
     }
-    const bool rival = hasRival() && isInFront(candidates_[1]);
+    const bool rival = hasRival(candidates_) && isInFront(candidates_[1], table_);
     if (coplanarityMatters(result_.images_used, table_.features()) && outOfPlane(table_.rays) < 3 * solver_.sigma()) {
       return Status::coplanar;
     }
@@ -299,12 +218,12 @@ class ClosedFormRun {
     if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity || misfit)) {
       return Status::gravity_undetermined;
     }
-    if (rival && solver_.bias() && isMirror()) return Status::mirror_gravity;
+    if (rival && solver_.bias() && isMirror(candidates_)) return Status::mirror_gravity;
     if (lost && !(chord > 5 * result_.tilt_sigma)) return Status::double_root;
     if (rival) return Status::ambiguous;
     if (!(result_.tilt_sigma <= options_.closed_form.max_tilt_sigma)) return Status::gravity_undetermined;
     if (!(result_.scale_sigma <= options_.closed_form.max_scale_sigma)) return Status::scale_unobservable;
-    return biasRestsOnPrior() ? Status::bias_unobservable : Status::ok;
+    return biasRestsOnPrior(result_, options_) ? Status::bias_unobservable : Status::ok;
   }
 
   /// Keeps of the solutions what the status promises.
@@ -323,7 +242,7 @@ class ClosedFormRun {
         c.y.set(0, share.directions[0].velocity());
         for (std::size_t i = 0; i < c.P.size(); ++i) c.P[i] = lost_features_[i];
       }
-      normaliseScale(c);
+      normaliseScale(c, table_);
       solver_.evaluate(c);
     }
     if (candidates_.empty() || status == Status::scale_unobservable) {
@@ -347,18 +266,6 @@ class ClosedFormRun {
   bool isConsistent() const {
     const double dof = static_cast<double>(degreesOfFreedom());
     return candidates_[0].cost <= dof + 5 * std::sqrt(2 * dof) + 12;
-  }
-
-  /// Two gravities that differ by what the biases differ.
-  bool isMirror() const {
-    const Eigen::Vector3d G = candidates_[1].y.gravity() - candidates_[0].y.gravity();
-    return (candidates_[1].y.bias() - candidates_[0].y.bias() - G).norm() < 0.2 * G.norm();
-  }
-  /// Of the three directions of the bias the data improve one at most (with |G| known one comes from its length).
-  bool biasRestsOnPrior() const {
-    if (!solver_.hasPrior() || result_.covariance.rows() != 9) return false;
-    const SmallSvd svd(SmallMatrix::of<3, 3>(Eigen::Matrix3d(result_.covariance.block<3, 3>(6, 6))));
-    return std::sqrt(svd.value(1)) > 0.98 * options_.prior.accelerometer_sigma;
   }
 
   void report() {

@@ -1,8 +1,9 @@
-// The closed form's passes: diagnosis of ranks, weights, minimisers, costs, covariance.
+// The closed form's passes: weights, minimisers, costs, covariance.
 #pragma once
 
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/detail/closed_form_ranks.hpp>
 #include <fusion/init/sphere_least_squares.hpp>
 
 #include <Eigen/Core>
@@ -36,17 +37,6 @@ struct MotionCandidate {
   std::size_t negative = 0;  ///< features behind a camera
 };
 
-/// What the unweighted system says by itself.
-struct RankDiagnosis {
-  Triangle root;
-  std::vector<SmallMatrix> by_motion;
-  std::vector<int> feature_rank;
-  int feature_null = 0, motion_null = 0;
-  double largest = 0;
-  std::vector<double> values;   ///< descending
-  std::vector<Motion> vectors;  ///< motions of unit length with their features, their last entry 0; by values
-};
-
 /// The motion's problem less the noise in it.
 struct NoiseShare {
   Triangle root;
@@ -63,49 +53,13 @@ class ClosedFormSolver {
   const RayTable& table() const { return table_; }
   /// V' = V T and so on: what a scaled unknown is worth.
   double gravityScale() const { return 2 / (table_.window * table_.window); }
-  double rankTolerance() const { return bias() ? 1e-12 : 1e-10; }
+  /// The largest that is zero to rounding, relative.
+  double rankTolerance() const { return detail::rankTolerance(bias()); }
   bool bias() const { return options_.closed_form.estimate_bias; }
   /// A prior that says something.
   bool hasPrior() const { return bias() && std::isfinite(options_.prior.accelerometer_sigma); }
   /// Unknowns of the motion.
   int motionSize() const { return bias() ? 9 : 6; }
-
-  /// Ranks and singular values, in time linear in the observations. With W = (P(y), y), the features that fit a motion
-  /// best, null vectors are W y with R y = 0, R the root of what remains when the features are taken out. The singular
-  /// values of R relative to |W y| are those of the whole system restricted to the range of W: an upper bound for as
-  /// many of its smallest, and zero exactly where the whole has zeros.
-  RankDiagnosis diagnose() const {
-    const int m = motionSize();
-    RankDiagnosis d{Triangle(m + 1), {}, {}, 0, 0, largestSingularValue(), {}, {}};
-    SmallMatrix lengths = SmallMatrix::identity(m);
-    for (std::size_t i = 0; i < table_.features(); ++i) {
-      LeadingElimination e = eliminateOrthogonally(table_.of(i), table_.images, bias(), rankTolerance());
-      d.root.add(e.rest);
-      for (int k = 0; k < 3; ++k) {
-        for (int a = 0; a <= m; ++a) e.gain(k, a) = -e.gain(k, a);
-        for (int a = 0; a < m; ++a) {
-          for (int b = 0; b < m; ++b) lengths(a, b) += e.gain(k, a) * e.gain(k, b);
-        }
-      }
-      d.by_motion.push_back(e.gain);
-      d.feature_rank.push_back(e.rank);
-      d.feature_null += 3 - e.rank;
-    }
-    // R relative to W: R C⁻¹ with WᵀW = CᵀC.
-    const SmallMatrix inverse = Triangle::cholesky(lengths).inverse(m);
-    const SmallSvd svd(d.root.r.block(0, 0, m, m) * inverse);
-    for (int k = 0; k < m; ++k) {
-      d.values.push_back(svd.value(k));
-      d.motion_null += svd.value(k) <= rankTolerance() * d.largest;
-      Motion y(bias());
-      for (int i = 0; i < m; ++i) {
-        for (int j = i; j < m; ++j) y[i] += inverse(i, j) * svd.v(k, j);
-      }
-      y[m] = 0;
-      d.vectors.push_back(y);
-    }
-    return d;
-  }
 
   /// All weights those of a depth of one.
   void resetWeights() {
@@ -284,47 +238,6 @@ class ClosedFormSolver {
   }
 
  private:
-  /// Of the whole system, by the power method on its arrow-shaped normal matrix: a lower bound that is within a few
-  /// per cent, which is all that a relative threshold needs.
-  double largestSingularValue() const {
-    Motion y(bias());
-    const int m = motionSize();
-    y.value.fill(1);
-    std::vector<Eigen::Vector3d> P(table_.features(), Eigen::Vector3d::Ones());
-    double length = 0;
-    for (int pass = 0; pass < 20; ++pass) {
-      y[m] = 0;
-      double square = 0;
-      for (int k = 0; k < m; ++k) square += y[k] * y[k];
-      for (const Eigen::Vector3d& p : P) square += p.squaredNorm();
-      length = std::sqrt(square);
-      Motion unit = y;
-      for (int k = 0; k < m; ++k) unit[k] /= length;
-      y.value.fill(0);
-      Eigen::Vector3d by_velocity = Eigen::Vector3d::Zero(), by_gravity = by_velocity, by_bias = by_velocity;
-      for (std::size_t i = 0; i < P.size(); ++i) {
-        const Eigen::Vector3d p = P[i] / length;
-        P[i].setZero();
-        for (const Ray& ray : table_.of(i)) {
-          const ScaledImage& image = table_.images[ray.image];
-          Eigen::Vector3d d = relativePosition(image, p, unit) + image.s;
-          d -= ray.u.dot(d) * ray.u;
-          P[i] += d;
-          by_velocity -= image.tau * d;
-          by_gravity -= image.tau * image.tau * d;
-          if (bias()) by_bias -= image.bias.transpose() * d;
-        }
-      }
-      y.set(0, by_velocity);
-      if (bias()) y.set(3, by_bias);
-      y.set(m - 3, by_gravity);
-    }
-    // The last vector was of unit length before the matrix was applied twice.
-    double square = 0;
-    for (int k = 0; k < m; ++k) square += y[k] * y[k];
-    for (const Eigen::Vector3d& p : P) square += p.squaredNorm();
-    return std::sqrt(std::sqrt(square));
-  }
   /// The single column of a matrix of three rows.
   static Eigen::Vector3d apply3(const SmallMatrix& column) { return column.vector3(0, 0); }
 

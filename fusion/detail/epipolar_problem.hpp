@@ -8,6 +8,8 @@
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/detail/epipolar_matches.hpp>
+#include <fusion/detail/epipolar_residual.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 #include <fusion/imu/window.hpp>
 
@@ -21,33 +23,12 @@
 
 namespace liestat::detail {
 
-/// The inverse of a symmetric positive definite 3×3 matrix; false where it is not, to rounding.
-inline bool invertPositive(const Eigen::Matrix3d& H, Eigen::Matrix3d& inverse) {
-  const Eigen::Vector3d a = H.col(1).cross(H.col(2)), b = H.col(2).cross(H.col(0)), c = H.col(0).cross(H.col(1));
-  const double determinant = H.col(0).dot(a), trace = H.trace();
-  if (!(H(0, 0) > 0 && c.z() > 0 && determinant > 1e-14 * trace * trace * trace)) return false;
-  inverse << a, b, c;
-  inverse /= determinant;
-  return std::isfinite(determinant);
-}
-
+/// What the bias is a function of, at a bias, with translations and weights of tracks that the caller sets.
 class EpipolarProblem {
  public:
-  struct Sight {
-    std::size_t image;        ///< its time
-    Eigen::Vector3d bearing;  ///< in the body
-    Eigen::Vector3d u;        ///< in t0
-    double variance;          ///< rad²
-  };
-  struct Match {
-    std::size_t track, first, second;  ///< sights
-  };
-  struct Pair {
-    std::size_t first, second;  ///< images of one camera
-    std::size_t begin, end;     ///< matches
-    Eigen::Vector3d t;          ///< direction of the translation
-    bool used;
-  };
+  using Pair = EpipolarPair;
+  using Match = EpipolarMatch;
+  using Sight = EpipolarSight;
   /// The problem of the bias where the translations are the best.
   struct Normal {
     Eigen::Matrix3d H;
@@ -56,66 +37,27 @@ class EpipolarProblem {
   };
 
   EpipolarProblem(const InertialWindow& window, double bearing_noise)
-      : weight(window.features.size(), 1.), square(weight.size(), 0.), count(weight.size(), 0), window_(&window) {
-    slot_.assign(cameras() * images() * weight.size(), 0);
-    for (std::size_t i = 0; i < weight.size(); ++i) {
-      for (const TrackedBearing& seen : window.features[i]) {
-        std::size_t& own = slot_[(i * cameras() + seen.camera) * images() + seen.image];
-        // Twice in an image: the first.
-        if (own != 0) continue;
-        const double sigma = bearing_noise * seen.relative_sigma;
-        const Eigen::Vector3d bearing = bearingInBody(window.cameras, seen);
-        sights_.push_back({seen.image, bearing, bearing, sigma * sigma});
-        own = sights_.size();
-      }
-    }
-  }
+      : weight(window.features.size(), 1.),
+        square(weight.size(), 0.),
+        count(weight.size(), 0),
+        window_(&window),
+        tracks_(window, bearing_noise) {}
 
-  void setAllPairs() { setPairs(1, images() - 1); }
-  /// Pairs whose images are `shortest` steps apart, twice as many, and so on up to `longest`.
-  void setPairs(std::size_t shortest, std::size_t longest) {
-    pairs_.clear();
-    matches_.clear();
-    for (std::size_t step = shortest; step <= longest; step *= 2) {
-      for (std::size_t c = 0; c < cameras(); ++c) {
-        for (std::size_t j = 0; j + step < images(); ++j) {
-          Pair pair{j, j + step, matches_.size(), 0, Eigen::Vector3d::UnitX(), true};
-          for (std::size_t i = 0; i < weight.size(); ++i) {
-            const std::size_t a = slot(i, c, j), b = slot(i, c, j + step);
-            if (a != 0 && b != 0) matches_.push_back({i, a - 1, b - 1});
-          }
-          pair.end = matches_.size();
-          if (pair.end > pair.begin) pairs_.push_back(pair);
-        }
-      }
-    }
-  }
-  /// The step, a power of two, of the pairs that say most: long, and with many tracks that reach.
-  std::size_t bestStep() const {
-    std::size_t best = 1, most = 0;
-    for (std::size_t step = 1; step < images(); step *= 2) {
-      std::size_t matches = 0;
-      for (std::size_t i = 0; i < weight.size(); ++i) {
-        for (std::size_t c = 0; c < cameras(); ++c) {
-          for (std::size_t j = 0; j + step < images(); ++j) matches += slot(i, c, j) != 0 && slot(i, c, j + step) != 0;
-        }
-      }
-      if (matches * step > most) {
-        most = matches * step;
-        best = step;
-      }
-    }
-    return best;
-  }
+  /// See EpipolarMatches.
+  void setAllPairs() { tracks_.setAllPairs(); }
+  void setPairs(std::size_t shortest, std::size_t longest) { tracks_.setPairs(shortest, longest); }
+  std::size_t bestStep() const { return tracks_.bestStep(); }
+  double freedom(std::size_t i) const { return tracks_.freedom(i); }
+
   /// How fast the direction of each track moves at the present bias (rad/s, RMS over pairs), of tracks that are in any.
   std::vector<double> rates() const {
     std::vector<double> sum(weight.size(), 0.), result;
     std::vector<std::size_t> matches(weight.size(), 0);
-    for (const Pair& pair : pairs_) {
+    for (const Pair& pair : tracks_.pairs) {
       const double dt = images_[pair.second].image.time - images_[pair.first].image.time;
       for (std::size_t m = pair.begin; m < pair.end; ++m) {
-        const Match& match = matches_[m];
-        sum[match.track] += (sights_[match.first].u - sights_[match.second].u).squaredNorm() / (dt * dt);
+        const Match& match = tracks_.matches[m];
+        sum[match.track] += (tracks_.sights[match.first].u - tracks_.sights[match.second].u).squaredNorm() / (dt * dt);
         ++matches[match.track];
       }
     }
@@ -128,39 +70,32 @@ class EpipolarProblem {
   std::size_t tracks() const {
     return static_cast<std::size_t>(std::count_if(count.begin(), count.end(), [](std::size_t c) { return c > 0; }));
   }
-  /// Degrees of freedom of a track's residuals: pairs share its bearings, which are independent.
-  double freedom(std::size_t i) const {
-    double seen = 0;
-    for (std::size_t c = 0; c < cameras(); ++c) {
-      for (std::size_t j = 0; j < images(); ++j) seen += slot(i, c, j) != 0;
-    }
-    return std::max(1., seen - 1);
-  }
   /// Another recording of the same window, integrated anew.
   void setWindow(const InertialWindow& window) { window_ = &window; }
 
   void setBias(const ImuBias<double>& bias) {
     bias_ = bias;
     images_ = biasedImages(window_->motions(), bias);
-    for (Sight& s : sights_) s.u = images_[s.image].image.rotation * s.bearing;
+    for (Sight& s : tracks_.sights) s.u = images_[s.image].image.rotation * s.bearing;
   }
   const ImuBias<double>& bias() const { return bias_; }
-  const std::vector<Pair>& pairs() const { return pairs_; }
+  const std::vector<Pair>& pairs() const { return tracks_.pairs; }
   std::size_t usedPairs() const {
-    return static_cast<std::size_t>(std::count_if(pairs_.begin(), pairs_.end(), [](const Pair& p) { return p.used; }));
+    return static_cast<std::size_t>(
+        std::count_if(tracks_.pairs.begin(), tracks_.pairs.end(), [](const Pair& p) { return p.used; }));
   }
 
   /// The translations that fit the present bias best, by the eigenvector of least eigenvalue, twice: with equal
   /// weights, then with those of the noise.
   void fitTranslations() {
-    for (Pair& pair : pairs_) {
+    for (Pair& pair : tracks_.pairs) {
       for (int pass = 0; pass < 2; ++pass) {
         Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
         for (std::size_t m = pair.begin; m < pair.end; ++m) {
-          const Sight &a = sights_[matches_[m].first], &b = sights_[matches_[m].second];
+          const Sight &a = tracks_.sights[tracks_.matches[m].first], &b = tracks_.sights[tracks_.matches[m].second];
           const Eigen::Vector3d n = a.u.cross(b.u);
           const double s2 = pass == 0 ? a.variance + b.variance : varianceAlong(a, b, pair.t);
-          M += (weight[matches_[m].track] / s2) * n * n.transpose();
+          M += (weight[tracks_.matches[m].track] / s2) * n * n.transpose();
         }
         const SmallSvd svd(SmallMatrix::of<3, 3>(M));
         pair.t = Eigen::Vector3d(svd.v(2, 0), svd.v(2, 1), svd.v(2, 2));
@@ -171,13 +106,13 @@ class EpipolarProblem {
   /// tracks, by their weights), or that have too few of them to say anything beside their translation. What a rotation
   /// may explain does not count, so that a wrong bias neither brings parallax nor takes it away.
   void selectByParallax(double min) {
-    for (Pair& pair : pairs_) {
+    for (Pair& pair : tracks_.pairs) {
       Eigen::Matrix3d H = Eigen::Matrix3d::Zero(), inverse;
       Eigen::Vector3d g = Eigen::Vector3d::Zero();
       double sum = 0, weights = 0, most = 0;
       for (std::size_t m = pair.begin; m < pair.end; ++m) {
-        const Sight &a = sights_[matches_[m].first], &b = sights_[matches_[m].second];
-        const double w = weight[matches_[m].track], information = w / (a.variance + b.variance);
+        const Sight &a = tracks_.sights[tracks_.matches[m].first], &b = tracks_.sights[tracks_.matches[m].second];
+        const double w = weight[tracks_.matches[m].track], information = w / (a.variance + b.variance);
         H += information * (Eigen::Matrix3d::Identity() - b.u * b.u.transpose());
         g += information * a.u.cross(b.u);
         sum += information * (a.u - b.u).squaredNorm();
@@ -197,9 +132,9 @@ class EpipolarProblem {
     Normal normal{Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero(), 0};
     std::fill(square.begin(), square.end(), 0.);
     std::fill(count.begin(), count.end(), std::size_t{0});
-    if (!rotation) parts_.resize(pairs_.size());
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      const Pair& pair = pairs_[p];
+    if (!rotation) parts_.resize(tracks_.pairs.size());
+    for (std::size_t p = 0; p < tracks_.pairs.size(); ++p) {
+      const Pair& pair = tracks_.pairs[p];
       if (!pair.used && !rotation) continue;
       const Eigen::Matrix3d A = turn(pair);
       if (rotation) {
@@ -214,31 +149,32 @@ class EpipolarProblem {
   /// Moves the translations to where they are the best, to first order, after a step of the bias.
   void moveTranslations(const Eigen::Vector3d& step) {
     before_.clear();
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      before_.push_back(pairs_[p].t);
-      if (!pairs_[p].used) continue;
+    for (std::size_t p = 0; p < tracks_.pairs.size(); ++p) {
+      before_.push_back(tracks_.pairs[p].t);
+      if (!tracks_.pairs[p].used) continue;
       const Part& part = parts_[p];
       Eigen::Vector2d move = -(part.offset + part.gain.transpose() * step);
       // A translation that is hardly known must not run around.
       move *= std::min(1., 0.3 / std::max(move.norm(), 1e-300));
-      pairs_[p].t = (pairs_[p].t + part.across.transpose() * move).normalized();
+      tracks_.pairs[p].t = (tracks_.pairs[p].t + part.across.transpose() * move).normalized();
     }
   }
   void restoreTranslations() {
-    for (std::size_t p = 0; p < before_.size(); ++p) pairs_[p].t = before_[p];
+    for (std::size_t p = 0; p < before_.size(); ++p) tracks_.pairs[p].t = before_[p];
   }
 
   /// The share of the squared parallax of the pairs in use that is against the rest of its pair: features behind the
   /// camera. Noise has little of it; a wrong rotation, which takes the mean off all parallaxes, up to a half.
   double wrongWay() const {
     double all = 0, wrong = 0;
-    for (const Pair& pair : pairs_) {
+    for (const Pair& pair : tracks_.pairs) {
       if (!pair.used) continue;
       double forward = 0, back = 0;
       for (std::size_t m = pair.begin; m < pair.end; ++m) {
-        const Sight &a = sights_[matches_[m].first], &b = sights_[matches_[m].second];
+        const Sight &a = tracks_.sights[tracks_.matches[m].first], &b = tracks_.sights[tracks_.matches[m].second];
         const double parallax = a.u.cross(b.u).dot(a.u.cross(pair.t));
-        (parallax > 0 ? forward : back) += weight[matches_[m].track] * parallax * parallax / (a.variance + b.variance);
+        (parallax > 0 ? forward : back) +=
+            weight[tracks_.matches[m].track] * parallax * parallax / (a.variance + b.variance);
       }
       all += forward + back;
       wrong += std::min(forward, back);
@@ -250,24 +186,24 @@ class EpipolarProblem {
   /// one: pairs share both. After linearise().
   Eigen::Matrix3d gradientCovariance(bool rotation) const {
     using Matrix3 = Eigen::Matrix3d;
-    std::vector<Matrix3> of_sight(sights_.size(), Matrix3::Zero()), of_motion(images_.size(), Matrix3::Zero());
-    for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      const Pair& pair = pairs_[p];
+    std::vector<Matrix3> of_sight(tracks_.sights.size(), Matrix3::Zero()), of_motion(images_.size(), Matrix3::Zero());
+    for (std::size_t p = 0; p < tracks_.pairs.size(); ++p) {
+      const Pair& pair = tracks_.pairs[p];
       if (!pair.used && !rotation) continue;
       const Matrix3 A = turn(pair);
       Matrix3 by_turn = Matrix3::Zero();
       for (std::size_t m = pair.begin; m < pair.end; ++m) {
-        const Match& match = matches_[m];
+        const Match& match = tracks_.matches[m];
         const double w = weight[match.track];
         if (!(w > 0)) continue;
-        const Sight &a = sights_[match.first], &b = sights_[match.second];
+        const Sight &a = tracks_.sights[match.first], &b = tracks_.sights[match.second];
         if (rotation) {
           const Matrix3 B = (w / (a.variance + b.variance)) * A.transpose();
           of_sight[match.first] -= B * skew(b.u);
           of_sight[match.second] += B * skew(a.u);
           by_turn += B * (Matrix3::Identity() - b.u * b.u.transpose());
         } else {
-          const Row row = rowOf(a, b, pair.t);
+          const EpipolarRow row = rowOf(a, b, pair.t);
           const Part& part = parts_[p];
           const Eigen::Vector3d J = A.transpose() * row.by_turn - part.gain * (part.across * row.by_t);
           of_sight[match.first] += (w * row.scale) * J * b.u.cross(pair.t).transpose();
@@ -278,8 +214,8 @@ class EpipolarProblem {
       for (std::size_t k = pair.first; k < pair.second; ++k) of_motion[k] += by_turn;
     }
     Matrix3 sum = Matrix3::Zero();
-    for (std::size_t i = 0; i < sights_.size(); ++i) {
-      const Sight& s = sights_[i];
+    for (std::size_t i = 0; i < tracks_.sights.size(); ++i) {
+      const Sight& s = tracks_.sights[i];
       const Eigen::Vector3d along = of_sight[i] * s.u;
       sum += s.variance * (of_sight[i] * of_sight[i].transpose() - along * along.transpose());
     }
@@ -300,52 +236,22 @@ class EpipolarProblem {
   }
 
  private:
-  std::size_t images() const { return window_->motions().size() + 1; }
-  std::size_t cameras() const { return window_->cameras.size(); }
-  std::size_t slot(std::size_t track, std::size_t camera, std::size_t image) const {
-    return slot_[(track * cameras() + camera) * images() + image];
-  }
-
   /// What is left of a pair when its translation is taken out: t = t - acrossᵀ (offset + gainᵀ δb).
   struct Part {
     Eigen::Matrix<double, 2, 3> across;
     Eigen::Matrix<double, 3, 2> gain;
     Eigen::Vector2d offset;
   };
-  /// A residual with its derivatives by the translation and by turning the second image.
-  struct Row {
-    double value, scale;
-    Eigen::Vector3d by_t, by_turn;
-  };
-
   /// Rotation of the second image against the first, by the bias.
   Eigen::Matrix3d turn(const Pair& pair) const {
     return images_[pair.second].rotation_by_gyroscope - images_[pair.first].rotation_by_gyroscope;
   }
-  /// s². Straight ahead, within some sigmas of the translation, a normal has no direction: it counts for less.
-  static double varianceAlong(const Sight& a, const Sight& b, const Eigen::Vector3d& t) {
-    const double x = a.u.dot(t), y = b.u.dot(t);
-    return a.variance * (1 - y * y) + b.variance * (1 - x * x) + 100 * a.variance * b.variance;
-  }
-  static Row rowOf(const Sight& a, const Sight& b, const Eigen::Vector3d& t) {
-    Row row;
-    const Eigen::Vector3d n = a.u.cross(b.u);
-    const double x = a.u.dot(t), y = b.u.dot(t);
-    row.scale = 1 / std::sqrt(varianceAlong(a, b, t));
-    row.value = row.scale * t.dot(n);
-    // s depends on t and on the turn of u' too.
-    const double back = row.scale * row.value;
-    row.by_t = row.scale * (n + back * (a.variance * y * b.u + b.variance * x * a.u));
-    row.by_turn = row.scale * (a.u.dot(b.u) * t - y * a.u + (back * a.variance * y) * b.u.cross(t));
-    return row;
-  }
-
   void addRotation(const Pair& pair, const Eigen::Matrix3d& A, Normal& normal) {
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     for (std::size_t m = pair.begin; m < pair.end; ++m) {
-      const Match& match = matches_[m];
-      const Sight &a = sights_[match.first], &b = sights_[match.second];
+      const Match& match = tracks_.matches[m];
+      const Sight &a = tracks_.sights[match.first], &b = tracks_.sights[match.second];
       const double information = 1 / (a.variance + b.variance), w = weight[match.track];
       const double squared = information * (a.u - b.u).squaredNorm();
       square[match.track] += squared;
@@ -366,9 +272,9 @@ class EpipolarProblem {
     Eigen::Vector2d g_t = Eigen::Vector2d::Zero();
     part.across = tangentRows(pair.t);
     for (std::size_t m = pair.begin; m < pair.end; ++m) {
-      const Match& match = matches_[m];
+      const Match& match = tracks_.matches[m];
       const double w = weight[match.track];
-      const Row row = rowOf(sights_[match.first], sights_[match.second], pair.t);
+      const EpipolarRow row = rowOf(tracks_.sights[match.first], tracks_.sights[match.second], pair.t);
       const double squared = row.value * row.value;
       square[match.track] += squared;
       ++count[match.track];
@@ -396,12 +302,9 @@ class EpipolarProblem {
   }
 
   const InertialWindow* window_;
+  EpipolarMatches tracks_;
   ImuBias<double> bias_;
   std::vector<BiasedImage> images_;
-  std::vector<Sight> sights_;
-  std::vector<std::size_t> slot_;  ///< of a track, camera and image: its sight + 1, or 0
-  std::vector<Pair> pairs_;
-  std::vector<Match> matches_;
   std::vector<Part> parts_;
   std::vector<Eigen::Vector3d> before_;
 };

@@ -2,6 +2,8 @@
 // problems of fusion/.
 #pragma once
 
+#include <fusion/status.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -29,7 +31,7 @@ struct DampedOptions {
 struct DampedSummary {
   double cost = std::numeric_limits<double>::infinity();
   int iterations = 0;
-  bool converged = false;
+  FusionStatus status = FusionStatus::not_converged;  ///< or ok
 };
 
 /// Minimises from where the problem stands, and leaves it at the best point that was found.
@@ -47,7 +49,7 @@ DampedSummary minimiseDamped(Problem& problem, const DampedOptions& options) {
       if (solved) problem.reject();
       // At the minimum rounding decides.
       if (next <= summary.cost + 1e-9 * (1 + summary.cost)) {
-        summary.converged = true;
+        summary.status = FusionStatus::ok;
         return summary;
       }
       damping *= 10;
@@ -59,7 +61,7 @@ DampedSummary minimiseDamped(Problem& problem, const DampedOptions& options) {
     summary.cost = problem.linearise();
     damping = std::max(1e-10, 0.1 * damping);
     if (decrease < options.min_decrease && damping < 1) {
-      summary.converged = true;
+      summary.status = FusionStatus::ok;
       return summary;
     }
   }

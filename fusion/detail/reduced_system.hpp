@@ -266,19 +266,4 @@ DampedSummary minimiseDamped(Problem& problem, ReducedSystem& system, const Damp
   return minimiseDamped(both, options);
 }
 
-/// A bearing's residual, across the measured direction in units of σ, of a feature at d in the camera; with its 2×3
-/// derivative by d. False where the feature is not in front.
-inline bool bearingResidual(const Eigen::Vector3d& d, const Eigen::Matrix<double, 2, 3>& across,
-                            const Eigen::Vector3d& bearing, double sigma, ResidualRows& rows,
-                            Eigen::Matrix<double, 2, 3>& by_d) {
-  const double depth = d.norm();
-  if (!(bearing.dot(d) > 0)) return false;
-  const Eigen::Vector3d e = d / depth;
-  const Eigen::Vector2d r = across * e;
-  rows.value[0] = r[0] / sigma;
-  rows.value[1] = r[1] / sigma;
-  by_d = (across - r * e.transpose()) / (sigma * depth);
-  return true;
-}
-
 }  // namespace liestat::detail

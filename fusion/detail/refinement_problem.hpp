@@ -1,6 +1,7 @@
 // The posterior of a window as a function of states, gravity, biases and features, for the refinement.
 #pragma once
 
+#include <fusion/detail/bearing_rows.hpp>
 #include <fusion/detail/reduced_system.hpp>
 #include <fusion/imu/factor.hpp>
 #include <fusion/imu/window.hpp>
@@ -94,11 +95,7 @@ class RefinementProblem {
                  0);
       };
       if (track.size() < 2 || !s.features[i].allFinite() || std::any_of(track.begin(), track.end(), isBehind)) continue;
-      for (const TrackedBearing& seen : track) {
-        const Eigen::Vector3d bearing = bearingInBody(window_.cameras, seen);
-        observations_.push_back(
-            {state_.P.size(), seen.image, bearing, tangentRows(bearing), lever(seen), seen.relative_sigma});
-      }
+      for (const TrackedBearing& seen : track) observations_.emplace_back(window_, seen, state_.P.size());
       state_.P.push_back(s.features[i]);
       feature_.push_back(i);
     }
@@ -129,24 +126,14 @@ class RefinementProblem {
       next_.X[j] *= SE23d::exp(step);
     }
     const int g = gravityBlock();
-    next_.gravity += system.shared(g);
-    if (options_.gravity) next_.gravity *= *options_.gravity / next_.gravity.norm();
+    takeStep(system, g, options_.gravity, next_.gravity, next_.P);
     next_.bias.gyroscope += system.shared(g + 1);
     next_.bias.accelerometer += system.shared(g + 2);
-    for (std::size_t i = 0; i < next_.P.size(); ++i) next_.P[i] += system.feature(i);
     return run(next_, nullptr);
   }
   void accept() { std::swap(state_, next_); }
 
  private:
-  struct Observation {
-    std::size_t feature, image;
-    Eigen::Vector3d bearing;
-    Eigen::Matrix<double, 2, 3> across;
-    Eigen::Vector3d lever;  ///< the camera's centre in the body
-    double relative_sigma;
-  };
-
   Eigen::Vector3d lever(const TrackedBearing& seen) const { return window_.cameras[seen.camera].translation(); }
   /// From a camera to a feature, in the body's axes.
   static Eigen::Vector3d inCamera(const SE23d& X, const Eigen::Vector3d& P, const Eigen::Vector3d& lever) {
@@ -161,25 +148,18 @@ class RefinementProblem {
         addPrior(state.bias.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, g + 1, system);
     cost += addPrior(state.bias.accelerometer - options_.prior.mean.accelerometer, options_.prior.accelerometer_sigma,
                      g + 2, system);
-    if (system && options_.gravity) {
-      // A stiff row along G: its length has no freedom.
-      ResidualRows rows(1);
-      rows.value[0] = 0;
-      rows.add(g, Eigen::Matrix<double, 1, 3>(1e6 * state.gravity.normalized().transpose()));
-      system->add(rows);
-    }
+    if (system && options_.gravity) holdLength(state.gravity, g, *system);
     Eigen::Matrix<double, 2, 3> by_d;
     std::size_t image = state.X.size();
     Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // of the image last seen
-    for (const Observation& seen : observations_) {
+    for (const BearingObservation& seen : observations_) {
       if (seen.image != image) {
         image = seen.image;
         back = state.X[image].so3().matrix().transpose();
       }
       const Eigen::Vector3d b = back * (state.P[seen.feature] - state.X[image].translation());
       ResidualRows rows(2);
-      if (!bearingResidual(b - seen.lever, seen.across, seen.bearing, seen.relative_sigma * options_.bearing_noise,
-                           rows, by_d)) {
+      if (!bearingResidual(b - seen.lever, seen, options_.bearing_noise, rows, by_d)) {
         return std::numeric_limits<double>::infinity();
       }
       cost += rows.squared();
@@ -221,19 +201,11 @@ class RefinementProblem {
     return cost;
   }
 
-  static double addPrior(const Eigen::Vector3d& error, double sigma, int block, ReducedSystem* system) {
-    ResidualRows rows(3);
-    rows.add(block, Eigen::Matrix3d(Eigen::Matrix3d::Identity() / sigma));
-    for (int k = 0; k < 3; ++k) rows.value[static_cast<std::size_t>(k)] = error[k] / sigma;
-    if (system) system->add(rows);
-    return rows.squared();
-  }
-
   const InertialWindow& window_;
   const InitialisationOptions& options_;
   State state_, next_;
   std::vector<MotionWeight> weights_;
-  std::vector<Observation> observations_;
+  std::vector<BearingObservation> observations_;
   std::vector<std::size_t> feature_;
 };
 

@@ -1,10 +1,46 @@
+// What one preintegration step of constant rate and force is made of: coefficients by its angle, and matrices.
 #pragma once
 
 #include <lie/detail/small_columns.hpp>
+#include <lie/detail/trig.hpp>
 
 #include <Eigen/Core>
 
+#include <cstddef>
+
 namespace liestat::detail {
+
+/// 2 d/dt of Σ (-1)^k t^k/(2k + offset - 2)!, the slopes of (1 - cos θ)/θ² (offset 4) and of its integrals.
+template <int offset>
+inline constexpr auto slope_series = factorialSeries<14>(offset, [](int k) { return -2 * (k + 1); });
+inline constexpr auto beta2_series = factorialSeries<14>(2, [](int) { return 1; });
+
+/// Coefficients of a step by the angle t = θ²: b = (1 - cos θ)/θ², c = (θ - sin θ)/θ³, d = (θ²/2 - 1 + cos θ)/θ⁴, and
+/// their derivatives by θ over θ.
+template <class S>
+struct StepCoefficients {
+  S b, c, d, b_slope, c_slope, d_slope;
+
+  explicit StepCoefficients(const S& t) {
+    // The rates of a vehicle turn by hundredths of a radian in a sample: five terms are exact for a quarter.
+    if (t < S(0.0625)) {
+      evaluate<6>(t);
+    } else {
+      evaluate<14>(t);
+    }
+  }
+
+ private:
+  template <std::size_t terms>
+  void evaluate(const S& t) {
+    b = evaluatePolynomial<terms>(beta2_series, t);
+    c = evaluatePolynomial<terms>(beta3_series, t);
+    d = evaluatePolynomial<terms>(beta4_series, t);
+    b_slope = evaluatePolynomial<terms>(slope_series<4>, t);
+    c_slope = evaluatePolynomial<terms>(slope_series<5>, t);
+    d_slope = evaluatePolynomial<terms>(slope_series<6>, t);
+  }
+};
 
 /// The matrices of one preintegration step of constant rate and force, for one rotation vector φ: polynomials in
 /// K = [φ], and derivatives of the integrated force by φ.

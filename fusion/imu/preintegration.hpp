@@ -20,6 +20,7 @@
 // visual-inertial initialisation, section 2; C. Forster et al., "On-manifold preintegration", IEEE T-RO 33, 2017.
 #pragma once
 
+#include <fusion/detail/increment_covariance.hpp>
 #include <fusion/detail/step_matrices.hpp>
 #include <fusion/imu/readings.hpp>
 #include <lie/se23.hpp>
@@ -35,42 +36,6 @@ struct PreintegrationOptions {
   ImuNoise<S> noise = {};
   ImuBias<S> bias = {};  ///< taken off every reading
 };
-
-namespace detail {
-
-/// 2 d/dt of Σ (-1)^k t^k/(2k + offset - 2)!, the slopes of (1 - cos θ)/θ² (offset 4) and of its integrals.
-template <int offset>
-inline constexpr auto slope_series = factorialSeries<14>(offset, [](int k) { return -2 * (k + 1); });
-inline constexpr auto beta2_series = factorialSeries<14>(2, [](int) { return 1; });
-
-/// Coefficients of a step by the angle t = θ²: b = (1 - cos θ)/θ², c = (θ - sin θ)/θ³, d = (θ²/2 - 1 + cos θ)/θ⁴, and
-/// their derivatives by θ over θ.
-template <class S>
-struct StepCoefficients {
-  S b, c, d, b_slope, c_slope, d_slope;
-
-  explicit StepCoefficients(const S& t) {
-    // The rates of a vehicle turn by hundredths of a radian in a sample: five terms are exact for a quarter.
-    if (t < S(0.0625)) {
-      evaluate<6>(t);
-    } else {
-      evaluate<14>(t);
-    }
-  }
-
- private:
-  template <std::size_t terms>
-  void evaluate(const S& t) {
-    b = evaluatePolynomial<terms>(beta2_series, t);
-    c = evaluatePolynomial<terms>(beta3_series, t);
-    d = evaluatePolynomial<terms>(beta4_series, t);
-    b_slope = evaluatePolynomial<terms>(slope_series<4>, t);
-    c_slope = evaluatePolynomial<terms>(slope_series<5>, t);
-    d_slope = evaluatePolynomial<terms>(slope_series<6>, t);
-  }
-};
-
-}  // namespace detail
 
 /// An increment that grows with every reading, with its covariance and its derivatives by the biases; no allocation.
 template <class S>
@@ -209,48 +174,8 @@ class Preintegration {
 
  private:
   using Columns = detail::Columns<S>;
-
-  /// Blocks of position, rotation and velocity, in the axes of the start. pp is not symmetric: half of it and its
-  /// transpose is the covariance, for no other block is made of it.
-  struct Covariance {
-    Columns pp = Columns::zero(), pr = Columns::zero(), pv = Columns::zero();
-    Columns rr = Columns::zero(), vr = Columns::zero(), vv = Columns::zero();
-
-    /// The 9×9 matrix, each block between T and Tᵀ; symmetric to the last bit.
-    Matrix9 assembled(const Matrix3& T) const {
-      const auto turned = [&T](const Columns& block) { return Matrix3(T * block.matrix() * T.transpose()); };
-      Matrix9 m;
-      m << turned(pp), turned(pr), turned(pv), Matrix3::Zero(), turned(rr), turned(vr).transpose(), Matrix3::Zero(),
-          Matrix3::Zero(), turned(vv);
-      for (int j = 0; j < 3; ++j) {
-        for (int i = 0; i < j; ++i) m(i, j) = S(0.5) * (m(i, j) + m(j, i));
-      }
-      for (int j = 0; j < 9; ++j) {
-        for (int i = 0; i < j; ++i) m(j, i) = m(i, j);
-      }
-      return m;
-    }
-  };
-  /// By the biases of gyroscope and accelerometer, in the axes of the start: derivatives, or covariances with them. The
-  /// rotation does not feel the accelerometer.
-  struct BiasBlocks {
-    Columns pg = Columns::zero(), pa = Columns::zero(), rg = Columns::zero();
-    Columns vg = Columns::zero(), va = Columns::zero();
-
-    void operator+=(const BiasBlocks& other) {
-      pg += other.pg, pa += other.pa, rg += other.rg, vg += other.vg, va += other.va;
-    }
-    BiasBlocks scaled(const S& gyroscope, const S& accelerometer) const {
-      return {pg * gyroscope, pa * accelerometer, rg * gyroscope, vg * gyroscope, va * accelerometer};
-    }
-    /// p ← p - U r + h v, then v ← v - W r.
-    void carry(const S& h, const Columns& U, const Columns& W) {
-      pg += vg * h;
-      pg -= U * rg;
-      pa += va * h;
-      vg -= W * rg;
-    }
-  };
+  using BiasBlocks = detail::BiasBlocks<S>;
+  using Covariance = detail::IncrementCovariance<S>;
 
   /// Variance of a bias that has walked for t seconds.
   S gyroscopeWalk(const S& t) const { return options_.noise.gyroscope_walk * options_.noise.gyroscope_walk * t; }
@@ -261,41 +186,16 @@ class Preintegration {
   /// Covariance and Jacobian over a step of h seconds with gains u of position (U = [u]) and w of velocity, in the axes
   /// of the start, without noise.
   void carry(const S& h, const Columns& U, const Columns& W) {
-    Covariance& c = covariance_;
-    // With p' = p - [u] r + h v: pp' = pp + Yᵀ + Y', Y = pr U + h pv of before and Y' of after; pp is kept up to a skew
-    // part, so Yᵀ may be Y. A skew matrix is its own transpose's negative: X Uᵀ = -X U.
-    c.pp.addProduct(c.pr, U);
-    c.pp += c.pv * h;
-    c.pr += c.vr * h;
-    c.pr -= U * c.rr;
-    c.pv += c.vv * h;
-    c.pv -= U.timesTransposed(c.vr);
-    c.pp.addProduct(c.pr, U);
-    c.pp += c.pv * h;
-    // v' = v - [w] r.
-    c.pv.addProduct(c.pr, W);
-    c.vv -= W.timesTransposed(c.vr);
-    c.vr -= W * c.rr;
-    c.vv.addProduct(c.vr, W);
+    covariance_.carry(h, U, W);
     bias_.carry(h, U, W);
     if (has_walk_) walk_.carry(h, U, W);
   }
 
-  /// What biases that have walked for t seconds do through a response J to them: with C their covariance with the
-  /// errors, P += C Jᵀ + J Cᵀ + q t J Jᵀ and C += q t J.
+  /// What biases that have walked for t seconds do through a response J to them.
   void drift(const BiasBlocks& J, const S& t) {
     BiasBlocks now = walk_;
     now += J.scaled(gyroscopeWalk(t), accelerometerWalk(t));
-    Covariance& c = covariance_;
-    c.pp += now.pg.timesTransposed(J.pg) + J.pg.timesTransposed(walk_.pg) + now.pa.timesTransposed(J.pa) +
-            J.pa.timesTransposed(walk_.pa);
-    c.pr += now.pg.timesTransposed(J.rg) + J.pg.timesTransposed(walk_.rg);
-    c.pv += now.pg.timesTransposed(J.vg) + J.pg.timesTransposed(walk_.vg) + now.pa.timesTransposed(J.va) +
-            J.pa.timesTransposed(walk_.va);
-    c.rr += now.rg.timesTransposed(J.rg) + J.rg.timesTransposed(walk_.rg);
-    c.vr += now.vg.timesTransposed(J.rg) + J.vg.timesTransposed(walk_.rg);
-    c.vv += now.vg.timesTransposed(J.vg) + J.vg.timesTransposed(walk_.vg) + now.va.timesTransposed(J.va) +
-            J.va.timesTransposed(walk_.va);
+    covariance_.drift(walk_, now, J);
     walk_ = now;
   }
 

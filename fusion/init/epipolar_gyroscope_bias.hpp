@@ -58,30 +58,31 @@ inline EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& wi
   if (found.fault) return found;
 
   detail::EpipolarSearch search(window, options);
+  detail::EpipolarFit& fit = search.fit();
   found.without_parallax = search.searchRotation();
   bool settled = found.without_parallax || search.searchEpipolar();
   // Motions for the bias that was found, where the change was large.
   InertialWindow anew;
-  const ImuBias<double> bias{search.bias(), accelerometer};
-  if (search.pairs() > 0 && window.hasReadings() && window.isFar(bias)) {
+  const ImuBias<double> bias{fit.bias(), accelerometer};
+  if (fit.pairs() > 0 && window.hasReadings() && window.isFar(bias)) {
     anew = window;
     if (anew.integrateIfFar(bias)) {
       ++found.integrations;
-      search.setWindow(anew);
-      settled = search.settle();
+      fit.setWindow(anew);
+      settled = fit.settle();
     }
   }
-  if (search.pairs() == 0) search.giveUp();
-  found.bias = search.bias();
+  if (fit.pairs() == 0) search.giveUp();
+  found.bias = fit.bias();
   found.others = search.others(8);
   found.starts = search.starts();
-  found.iterations = search.iterations();
-  found.pairs_used = search.pairs();
-  const bool regular = search.covariance(found.covariance);
-  found.consistent = search.isConsistent();
+  found.iterations = fit.iterations();
+  found.pairs_used = fit.pairs();
+  const bool regular = fit.covariance(found.covariance);
+  found.consistent = fit.isConsistent();
   for (std::size_t i = 0; i < window.features.size(); ++i) {
-    found.residuals.push_back(std::sqrt(search.meanSquare(i)));
-    if (std::isfinite(found.residuals.back())) (search.isIn(i) ? found.inliers : found.outliers).push_back(i);
+    found.residuals.push_back(std::sqrt(fit.meanSquare(i)));
+    if (std::isfinite(found.residuals.back())) (fit.isIn(i) ? found.inliers : found.outliers).push_back(i);
   }
   const auto tracks = static_cast<double>(found.inliers.size() + found.outliers.size());
   if (found.pairs_used == 0 || !regular) {

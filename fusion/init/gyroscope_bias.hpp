@@ -11,6 +11,7 @@
 #pragma once
 
 #include <fusion/init/closed_form.hpp>
+#include <fusion/detail/bearing_rows.hpp>
 #include <fusion/detail/reduced_system.hpp>
 #include <fusion/imu/window.hpp>
 
@@ -67,9 +68,7 @@ class GyroscopeBiasProblem {
       }
       state_.P.push_back(s.features[i]);
       for (const TrackedBearing& seen : window.features[i]) {
-        const Eigen::Vector3d bearing = bearingInBody(window.cameras, seen);
-        observations_.push_back({state_.P.size() - 1, seen.image, bearing, tangentRows(bearing),
-                                 window.cameras[seen.camera].translation(), seen.relative_sigma});
+        observations_.emplace_back(window, seen, state_.P.size() - 1);
       }
     }
   }
@@ -87,25 +86,15 @@ class GyroscopeBiasProblem {
     const Eigen::Vector3d turn = system.shared(gyroscope);
     if (!(turn.norm() <= options_.gyroscope_bias.max_step)) return std::numeric_limits<double>::infinity();
     next_.velocity += system.shared(velocity);
-    next_.gravity += system.shared(gravity);
-    if (options_.gravity) next_.gravity *= *options_.gravity / next_.gravity.norm();
+    takeStep(system, gravity, options_.gravity, next_.gravity, next_.P);
     next_.gyroscope += turn;
     if (blocks() == 4) next_.accelerometer += system.shared(accelerometer);
-    for (std::size_t i = 0; i < next_.P.size(); ++i) next_.P[i] += system.feature(i);
     setImages(next_);
     return run(next_, nullptr);
   }
   void accept() { std::swap(state_, next_); }
 
  private:
-  struct Observation {
-    std::size_t feature, image;
-    Eigen::Vector3d bearing;
-    Eigen::Matrix<double, 2, 3> across;
-    Eigen::Vector3d lever;  ///< the camera's centre in the body
-    double relative_sigma;
-  };
-
   void setImages(State& state) const {
     state.images = biasedImages(window_.motions(), {state.gyroscope, base_.accelerometer + state.accelerometer});
   }
@@ -123,26 +112,17 @@ class GyroscopeBiasProblem {
     }
     return true;
   }
-  static void addPrior(const Eigen::Vector3d& error, double sigma, int block, ReducedSystem* system, double& cost) {
-    ResidualRows rows(3);
-    rows.add(block, Eigen::Matrix3d(Eigen::Matrix3d::Identity() / sigma));
-    for (int k = 0; k < 3; ++k) rows.value[static_cast<std::size_t>(k)] = error[k] / sigma;
-    cost += rows.squared();
-    if (system) system->add(rows);
-  }
-
   /// The cost, infinite where a feature is behind its camera; and derivatives, if asked for.
   double run(const State& state, ReducedSystem* system) const {
     double cost = 0;
-    const double sigma = options_.bearing_noise;
     Eigen::Matrix<double, 2, 3> by_d;
-    for (const Observation& seen : observations_) {
+    for (const BearingObservation& seen : observations_) {
       const BiasedImage& biased = state.images[seen.image];
       const WindowImage& image = biased.image;
       const Eigen::Vector3d x = fromImage(state, image, state.P[seen.feature]);
       const Eigen::Vector3d d = image.rotation.transpose() * x - seen.lever;
       ResidualRows rows(2);
-      if (!bearingResidual(d, seen.across, seen.bearing, seen.relative_sigma * sigma, rows, by_d)) {
+      if (!bearingResidual(d, seen, options_.bearing_noise, rows, by_d)) {
         return std::numeric_limits<double>::infinity();
       }
       cost += rows.squared();
@@ -155,17 +135,12 @@ class GyroscopeBiasProblem {
       if (blocks() == 4) rows.add(accelerometer, -J * image.displacement_by_bias);
       system->add(rows, seen.feature, J);
     }
-    addPrior(state.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, gyroscope, system, cost);
+    cost +=
+        addPrior(state.gyroscope - options_.prior.mean.gyroscope, options_.prior.gyroscope_sigma, gyroscope, system);
     if (blocks() == 4 && std::isfinite(options_.prior.accelerometer_sigma)) {
-      addPrior(state.accelerometer, options_.prior.accelerometer_sigma, accelerometer, system, cost);
+      cost += addPrior(state.accelerometer, options_.prior.accelerometer_sigma, accelerometer, system);
     }
-    if (system && options_.gravity) {
-      // A stiff row along G: its length has no freedom.
-      ResidualRows rows(1);
-      rows.value[0] = 0;
-      rows.add(gravity, Eigen::Matrix<double, 1, 3>(1e6 * state.gravity.normalized().transpose()));
-      system->add(rows);
-    }
+    if (system && options_.gravity) holdLength(state.gravity, gravity, *system);
     return cost;
   }
 
@@ -173,7 +148,7 @@ class GyroscopeBiasProblem {
   const InitialisationOptions& options_;
   ImuBias<double> base_;
   State state_, next_;
-  std::vector<Observation> observations_;
+  std::vector<BearingObservation> observations_;
 };
 
 inline bool isUsable(const InitialisationOptions& o) {
@@ -233,7 +208,7 @@ inline GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const In
     }
     closedForm();
     // A tenth of a sigma is nothing.
-    if (summary.converged && regular && change.norm() <= 0.1 * std::sqrt(found.covariance.trace())) {
+    if (converged(summary.status) && regular && change.norm() <= 0.1 * std::sqrt(found.covariance.trace())) {
       found.status = FusionStatus::ok;
       break;
     }

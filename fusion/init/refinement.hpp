@@ -63,7 +63,7 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
     result.status = FusionStatus::undetermined;
     return result;
   }
-  result.status = summary.converged ? FusionStatus::ok : FusionStatus::not_converged;
+  result.status = summary.status;
   const int g = problem.gravityBlock();
   const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
   const std::vector<double> inverse =

@@ -179,7 +179,7 @@ TEST_F(Program, QuaternionsNearUnitNormAreNormalisedAndCounted) {
   EXPECT_EQ(mean(text, {"--norm-tolerance", "1e-4"}).status, 2);
 }
 
-TEST_F(Program, OneMeasureIsItsMean) {
+TEST_F(Program, OneMeasurementIsItsMean) {
   const ProgramRun r = mean("rx,ry,rz\n0.1,0.2,0.3\n");
   EXPECT_EQ(r.status, 0) << r.errors;
   EXPECT_EQ(r.json["n"], 1);
@@ -211,7 +211,7 @@ TEST_F(Program, TwoAntipodalRotationsAreAmbiguous) {
   EXPECT_TRUE(r.json["covariance"].is_null());
 }
 
-TEST_F(Program, IdenticalMeasures) {
+TEST_F(Program, IdenticalMeasurements) {
   std::string text = "qx,qy,qz,qw\n";
   for (int i = 0; i < 20; ++i) text += "0.5,0.5,0.5,0.5\n";
   const ProgramRun r = mean(text);
@@ -353,7 +353,7 @@ TEST_F(Program, ReportIsWritten) {
 }
 
 /// A point measured 2000 times with the covariance that the file says, and, of that variance, a share that changes only
-/// every 400 measures.
+/// every 400 measurements.
 std::string series(double shared) {
   Noise noise;
   std::string text = "t,x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n";
@@ -369,7 +369,7 @@ std::string series(double shared) {
   return text;
 }
 
-TEST_F(Program, SplitsOfIndependentMeasuresPass) {
+TEST_F(Program, SplitsOfIndependentMeasurementsPass) {
   // One false alarm in 1e5 seeds; this one is fixed.
   directory_.write("f.csv", series(0));
   const ProgramRun r =
@@ -401,11 +401,11 @@ TEST_F(Program, SplitsDoNotDependOnThreads) {
   EXPECT_EQ(one.dump(), two.dump());
 }
 
-TEST_F(Program, SplitsNeedEnoughMeasures) {
+TEST_F(Program, SplitsNeedEnoughMeasurements) {
   directory_.write("f.csv", "x,y,z\n1,2,3\n1,2,4\n");
   const ProgramRun r = run({"validate", "split", "f.csv"});
   EXPECT_EQ(r.status, 2);
-  EXPECT_EQ(r.errors, "f.csv: 2 measures, too few to be split, expected 10 at least (--blocks is 10)\n");
+  EXPECT_EQ(r.errors, "f.csv: 2 measurements, too few to be split, expected 10 at least (--blocks is 10)\n");
 }
 
 std::string dataDirectory() {

@@ -52,7 +52,7 @@ Plot everyStyle() {
     density.y.push_back(std::exp(-0.1 * i));
   }
   const Eigen::Matrix2d covariance{{1, 0.5}, {0.5, 0.41}};
-  Series points{.name = "measures", .style = Style::points, .x = {0, 1, nan, 2}, .y = {1, 0, 1, 0.5}};
+  Series points{.name = "measurements", .style = Style::points, .x = {0, 1, nan, 2}, .y = {1, 0, 1, 0.5}};
   const Panel left{.title = "Index",
                    .x = {.label = "n", .logarithmic = true},
                    .y = {.label = "index"},

@@ -31,7 +31,7 @@ TEST(ValidateMeans, whatIsJudgedIsCounted) {
   std::size_t judged = 0;
   const std::vector<MeansRow> rows = validateMeans(validation);
   for (const MeansRow& row : rows) {
-    // The domain of MAHA on frames begins at ten measures; the report's formulas are not judged.
+    // The domain of MAHA on frames begins at ten measurements; the report's formulas are not judged.
     EXPECT_EQ(row.passed.has_value(), row.method.corrected && row.experiment.n == 10);
     judged += row.passed.has_value();
   }

@@ -56,9 +56,13 @@ for compiler in ${chosen:-g++ clang++}; do
     continue
   }
   for unit in "$here"/warnings_*.cpp; do
-    if [ "$(basename "$unit")" = warnings_validation.cpp ] &&
-      ! printf '#include <boost/math/special_functions/beta.hpp>\n#include <Random123/philox.h>\n' |
-        $compiler -std=c++20 -E -x c++ - >/dev/null 2>&1; then
+    case $(basename "$unit") in
+    warnings_validation.cpp) needed='#include <boost/math/special_functions/beta.hpp>\n#include <Random123/philox.h>\n' ;;
+    warnings_visual_inertial.cpp) needed='#include <Random123/philox.h>\n' ;;
+    *) needed= ;;
+    esac
+    # shellcheck disable=SC2059
+    if ! printf "$needed" | $compiler -std=c++20 -E -x c++ - >/dev/null 2>&1; then
       echo "consumers: warnings: $(basename "$unit") SKIPPED, Boost.Math or Random123 is not installed"
       continue
     fi

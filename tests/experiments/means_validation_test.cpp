@@ -46,7 +46,7 @@ TEST(MeansValidation, whatIsJudgedIsCounted) {
   validation.n = {5, 10};
   const std::vector<MeansRow> rows = validateMeans(validation);
   for (const MeansRow& row : rows) {
-    // The domain of MAHA on frames begins at ten measures; the report's formulas are not judged.
+    // The domain of MAHA on frames begins at ten measurements; the report's formulas are not judged.
     EXPECT_EQ(row.passed.has_value(), row.method.corrected && row.experiment.n == 10);
     EXPECT_EQ(row.histogram.size(), 30U);
   }

@@ -214,6 +214,50 @@ TEST(Refinement, RefusesBadInput) {
   EXPECT_TRUE(refine(recorded.window, start, {}, bad).must_reintegrate);
 }
 
+// The readings are integrated anew when the estimate of the bias leaves the region where a first-order update is good:
+// the result is that of readings which were integrated with the true biases from the beginning.
+TEST(Refinement, IntegratesAnewWhereTheBiasHasGone) {
+  for (std::uint64_t seed = 1; seed < 4; ++seed) {
+    Scene scene({.images = 9, .features = 20}, 600 + seed);
+    CounterRng random(600 + seed, 0, 1);
+    // Beyond the 0.05 rad/s of Preintegration::mustReintegrate.
+    const ImuBias<double> truth{0.12 * random.unitVector<3>(), Eigen::Vector3d::Zero()};
+    const auto readings = readingsOf(scene, imu, random, truth.gyroscope);
+    scene.addNoise(pixel, random);
+    const InertialWindow from_zero = windowOf(scene, readings, {.preintegration = {.noise = imu}});
+    const InertialWindow from_truth = windowOf(scene, readings, {.preintegration = {.noise = imu, .bias = truth}});
+    InitialisationOptions wide = options;
+    wide.prior.gyroscope_sigma = 0.2;
+    wide.refinement.min_decrease = 1e-9;
+    const ClosedFormSolution start{.velocity = scene.velocity, .gravity = scene.gravity, .features = scene.features};
+    const RefinementResult expected = refine(from_truth, start, truth, wide);
+    ASSERT_TRUE(expected.ok());
+    EXPECT_EQ(expected.integrations, 0);
+    const RefinementResult found = refine(from_zero, start, {}, wide);
+    EXPECT_TRUE(found.ok());
+    EXPECT_GE(found.integrations, 1);
+    // What is left of the difference are updates of first order over what the estimate is off by, 3e-3 rad/s.
+    const Eigen::Matrix<double, 12, 12> covariance = expected.covariance.atFirst();
+    const auto sigma = [&](int first) { return std::sqrt(covariance.diagonal().segment<3>(first).mean()); };
+    EXPECT_LE((found.velocity() - expected.velocity()).norm(), 0.01 * sigma(0)) << seed;
+    EXPECT_LE((found.gravity - expected.gravity).norm(), 0.01 * sigma(3)) << seed;
+    EXPECT_LE((found.bias.gyroscope - expected.bias.gyroscope).norm(), 0.01 * sigma(6)) << seed;
+    EXPECT_LE((found.covariance.joint - expected.covariance.joint).norm(), 0.01 * expected.covariance.joint.norm());
+    // Without leave to integrate, or without readings, it says that it should have.
+    InitialisationOptions never = wide;
+    never.refinement.max_integrations = 0;
+    for (const InertialWindow& window : {from_zero, InertialWindow(from_zero.motions(), from_zero.features)}) {
+      const RefinementResult kept = refine(window, start, {}, never);
+      EXPECT_EQ(kept.integrations, 0);
+      EXPECT_TRUE(kept.must_reintegrate);
+      EXPECT_FALSE(kept.ok());
+      // The update of first order over the whole bias is what that spares.
+      EXPECT_GT((kept.bias.gyroscope - expected.bias.gyroscope).norm(),
+                10 * (found.bias.gyroscope - expected.bias.gyroscope).norm());
+    }
+  }
+}
+
 TEST(Refinement, MeetsTheTables) {
   struct Row {
     double window;

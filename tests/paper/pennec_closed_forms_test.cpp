@@ -119,7 +119,7 @@ TYPED_TEST(PennecClosedForms, derivativesOfTheMahalanobisCriterion) {
       const MahaResult<TypeParam> result = maha(g, at, {.likelihood = likelihood});
       ASSERT_EQ(result.status, Status::ok);
       detail::MahaProblem<TypeParam, decltype(g)> problem{g, {}, at, likelihood};
-      for (const auto& measure : g) problem.information.push_back(measure.covariance.inverse());
+      for (const auto& measurement : g) problem.information.push_back(measurement.covariance.inverse());
       const auto cost = [&](const TypeParam& y, const Tangent& v) {
         return problem.evaluate(SerialExecutor{}, exp(y, v)).cost;
       };

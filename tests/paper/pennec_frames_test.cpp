@@ -85,7 +85,7 @@ TEST(PennecFrames, mahaInTheEstimatesFrame) {
   }
 }
 
-TEST(PennecFrames, mahaInTheMeasuresFrame) {
+TEST(PennecFrames, mahaInTheMeasurementsFrame) {
   // Noise that is Gaussian in the sensor's frame, M1: indices 5.75 ± 0.12 (IID) and 5.94 ± 0.12 (IDD) with H_GN⁻¹,
   // LSQ/M1 1.02 and 1.70 in rotation, 1.87 and 2.51 in translation.
   for (const Noise noise : {Noise::iid, Noise::idd}) {

@@ -1,5 +1,5 @@
-// Iterations of the means of rotations, started at the first measure and stopped at 1e-10: the table of 2000 to 4000
-// samples a cell that a right implementation shows, within half an iteration.
+// Iterations of the means of rotations, started at the first measurement and stopped at 1e-10: the table of 2000
+// to 4000 samples a cell that a correct implementation shows, within half an iteration.
 
 #include <lie/so3.hpp>
 #include <stats/maha.hpp>

@@ -23,22 +23,22 @@ class StarryNight : public testing::Test {
     if (data == nullptr) GTEST_SKIP() << "skipped: LIESTAT_DATA does not name the directory of the real measurements";
     const std::string files = std::string(data) + "/tracks/starry_night_";
     surveyed = readLandmarks(files + "landmarks.csv");
-    measures = backProject(readStereoTracks(files + "tracks.csv"), readCameraPoses(files + "poses.csv"),
-                           readStereoCamera(files + "camera.csv"));
+    measurements = backProject(readStereoTracks(files + "tracks.csv"), readCameraPoses(files + "poses.csv"),
+                               readStereoCamera(files + "camera.csv"));
   }
 
-  /// RMS distance (mm) between what `estimate` makes of a landmark's measures and its surveyed position.
+  /// RMS distance (mm) between what `estimate` makes of a landmark's measurements and its surveyed position.
   template <class Estimate>
   double rms(const Estimate& estimate) const {
     double sum = 0;
-    for (const LandmarkMeasures& landmark : measures) {
+    for (const LandmarkMeasurements& landmark : measurements) {
       sum += (estimate(landmark.points) - surveyed.at(landmark.track)).squaredNorm();
     }
-    return 1000 * std::sqrt(sum / static_cast<double>(measures.size()));
+    return 1000 * std::sqrt(sum / static_cast<double>(measurements.size()));
   }
 
   std::vector<Eigen::Vector3d> surveyed;
-  std::vector<LandmarkMeasures> measures;
+  std::vector<LandmarkMeasurements> measurements;
 };
 
 std::vector<Eigen::Vector3d> means(const std::vector<MeasuredPoint>& points) {
@@ -48,9 +48,9 @@ std::vector<Eigen::Vector3d> means(const std::vector<MeasuredPoint>& points) {
 }
 
 TEST_F(StarryNight, EveryObservationIsUsed) {
-  ASSERT_EQ(measures.size(), 20U);
+  ASSERT_EQ(measurements.size(), 20U);
   std::size_t n = 0;
-  for (const LandmarkMeasures& landmark : measures) n += landmark.points.size();
+  for (const LandmarkMeasurements& landmark : measurements) n += landmark.points.size();
   EXPECT_EQ(n, 9410U);
 }
 
@@ -66,7 +66,7 @@ TEST_F(StarryNight, MeansAgainstTheSurvey) {
 }
 
 TEST_F(StarryNight, CovariancesOfIndependentErrorsAreFarTooSmall) {
-  for (const LandmarkMeasures& landmark : measures) {
+  for (const LandmarkMeasurements& landmark : measurements) {
     const double mu2 = mahalanobisSquared(fuse(landmark.points), surveyed.at(landmark.track));
     EXPECT_GT(mu2, 11) << "track " << landmark.track;  // χ²_3 is above with a probability of 1 %
     EXPECT_LT(mu2, 400) << "track " << landmark.track;
@@ -83,7 +83,7 @@ double disagreement(const std::vector<std::vector<MeasuredPoint>>& parts, const 
 TEST_F(StarryNight, BlocksOfTimeRevealItWithoutTheSurvey) {
   constexpr std::size_t blocks = 8;
   double by_time = 0, interleaved = 0;
-  for (const LandmarkMeasures& landmark : measures) {
+  for (const LandmarkMeasurements& landmark : measurements) {
     std::vector<std::vector<MeasuredPoint>> consecutive(blocks), every_eighth(blocks);
     const std::size_t n = landmark.points.size();
     for (std::size_t i = 0; i < n; ++i) {
@@ -98,7 +98,7 @@ TEST_F(StarryNight, BlocksOfTimeRevealItWithoutTheSurvey) {
   EXPECT_GT(by_time, 10 * interleaved);
   // Inflated by the common factor, the distances to the survey are of the size that they should have.
   double mu2 = 0;
-  for (const LandmarkMeasures& landmark : measures) {
+  for (const LandmarkMeasurements& landmark : measurements) {
     mu2 += mahalanobisSquared(fuse(landmark.points), surveyed.at(landmark.track)) / 20;
   }
   EXPECT_GT(mu2 / by_time, 1);

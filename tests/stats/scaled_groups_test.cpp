@@ -75,14 +75,14 @@ TEST(ScaledGroups, TheCovarianceOfMahaIsRight) {
   for (std::uint64_t trial = 0; trial < trials; ++trial) {
     CounterRng rng(6, trial);
     const Sim3d truth = sampleInCube<Sim3d>(rng);
-    std::vector<Gaussian<Sim3d>> measures;
+    std::vector<Gaussian<Sim3d>> measurements;
     for (int i = 0; i < n; ++i) {
       Eigen::Matrix<double, 7, 1> sd;
       for (int k = 0; k < 7; ++k) sd[k] = 0.05 * rng.uniform();
       const Matrix7 noise = sd.cwiseAbs2().asDiagonal();
-      measures.push_back({sample(Gaussian<Sim3d>{truth, noise}, rng), noise});
+      measurements.push_back({sample(Gaussian<Sim3d>{truth, noise}, rng), noise});
     }
-    const auto result = maha(measures);
+    const auto result = maha(measurements);
     ASSERT_EQ(result.status, Status::ok);
     index += mahalanobisSquared(result.estimate(), truth) / trials;
   }

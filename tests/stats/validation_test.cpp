@@ -468,7 +468,7 @@ TEST(Validation, statisticsHaveMeanAndStandardDeviation) {
 TEST(Validation, verdictsHaveNamesAndReasons) {
   EXPECT_STREQ(name(Verdict::passed), "passed");
   EXPECT_STREQ(reason(Verdict::passed), "");
-  for (int i = 1; i <= static_cast<int>(Verdict::heavy_tail); ++i) {
+  for (int i = 1; i <= static_cast<int>(Verdict::success_too_seldom); ++i) {
     const auto verdict = static_cast<Verdict>(i);
     EXPECT_STRNE(name(verdict), "unknown") << i;
     EXPECT_GT(std::string(reason(verdict)).size(), 10u) << i;

@@ -1,4 +1,4 @@
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 
 #include <fmt/format.h>
 
@@ -23,9 +23,9 @@ double weightOf(const Covariance& covariance) {
 
 }  // namespace
 
-Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const std::string& command) {
+Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command) {
   const auto refuse = [&](const std::string& why) { throw InputError(command, 0, why); };
-  Measures m;
+  Measurements m;
   m.feature = experiments::featureFromName(options.feature).value_or(file.kind);
   const experiments::FeatureInfo& feature = experiments::info(m.feature);
   const experiments::FeatureInfo& rows = experiments::info(file.kind);
@@ -39,7 +39,7 @@ Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const 
   const bool has_covariances = !file.covariances.empty();
   const bool must_choose = has_covariances && feature.frameMatters() && options.covariance_at.empty();
   const std::string choice =
-      "--covariance-at measured (they are given in the frame of each measure, as a sensor knows them) or "
+      "--covariance-at measured (they are given in the frame of each measurement, as a sensor knows them) or "
       "--covariance-at estimated (in the frame of the mean, as for parts of one object)";
 
   if (!feature.has_metric) {
@@ -68,7 +68,8 @@ Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const 
   }
 
   const bool maha = m.criterion == Criterion::maha;
-  if (maha && !has_covariances) refuse("--criterion maha needs the columns cov_00 ... of the measures' covariances");
+  if (maha && !has_covariances)
+    refuse("--criterion maha needs the columns cov_00 ... of the measurements' covariances");
   if (maha && must_choose) refuse("--criterion maha on frames needs " + choice);
   if (options.likelihood && !maha) refuse("--likelihood is an option of --criterion maha");
   m.likelihood = options.likelihood;

@@ -1,23 +1,23 @@
 #pragma once
 
 #include <cli/commands/command_line.hpp>
-#include <cli/io/measures.hpp>
+#include <cli/io/measurements.hpp>
 
 #include <string>
 
 namespace liestat::cli {
 
 /// The file of features and the options about it that several commands share.
-struct MeasuresInput {
+struct MeasurementInput {
   std::string file;
   std::string format = "auto";
   double norm_tolerance = ReadingOptions{}.norm_tolerance;
-  MeasuresOptions options;
+  MeasurementOptions options;
 
   /// Declares FILE, --format, --feature, --criterion, --covariance-at, --likelihood and --norm-tolerance.
   void declare(const Command& app, bool file_required);
   /// Reads the file; throws InputError. `command` begins the messages about options.
-  Measures read(const std::string& command) const;
+  Measurements read(const std::string& command) const;
 };
 
 }  // namespace liestat::cli

@@ -1,8 +1,8 @@
-#include <cli/commands/measures_options.hpp>
+#include <cli/commands/measurement_options.hpp>
 
 namespace liestat::cli {
 
-void MeasuresInput::declare(const Command& app, bool file_required) {
+void MeasurementInput::declare(const Command& app, bool file_required) {
   const Option path = app.option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path.required();
   app.option("--format", format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
@@ -12,7 +12,7 @@ void MeasuresInput::declare(const Command& app, bool file_required) {
              "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
       .oneOf({"lsq", "wlsq", "maha"});
   app.option("--covariance-at", options.covariance_at,
-             "Where covariances of frames belong: measured (the frame of each measure) or estimated (of the mean)")
+             "Where covariances of frames belong: measured (the frame of each measurement) or estimated (of the mean)")
       .oneOf({"measured", "estimated"});
   app.flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
   app.option("--norm-tolerance", norm_tolerance,
@@ -20,11 +20,11 @@ void MeasuresInput::declare(const Command& app, bool file_required) {
       .range(0.0, 0.5);
 }
 
-Measures MeasuresInput::read(const std::string& command) const {
+Measurements MeasurementInput::read(const std::string& command) const {
   ReadingOptions how;
   if (!format.empty()) how.format = format;
   how.norm_tolerance = norm_tolerance;
-  return chooseMeasures(readFeatureFile(file, how), options, command);
+  return chooseMeasurements(readFeatureFile(file, how), options, command);
 }
 
 }  // namespace liestat::cli

@@ -15,32 +15,32 @@ namespace liestat::cli {
 using experiments::Criterion;
 using experiments::Feature;
 
-/// What the commands that read features are told about them; names as on the command line, empty: decide by the file.
-struct MeasuresOptions {
+/// The options of commands that read features; names as on the command line, empty: the file decides.
+struct MeasurementOptions {
   std::string feature = {};
   std::string criterion = {};
   std::string covariance_at = {};
   bool likelihood = false;
 };
 
-/// The measures of a file and how they are to be averaged.
-struct Measures {
+/// The measurements of a file and how they are to be averaged.
+struct Measurements {
   FeatureFile file;
   Feature feature = Feature::point;
   Criterion criterion = Criterion::lsq;
   CovarianceAt covariance_at = CovarianceAt::measured;
   bool covariance_at_matters = false;  ///< both models differ for this feature, and covariances are used
   bool likelihood = false;
-  std::vector<double> weights;          ///< one for each measure, all one where none are used
+  std::vector<double> weights;          ///< one for each measurement, all one where none are used
   bool weighted = false;                ///< some are not one
   bool known_noise = false;             ///< the file's covariances are used
-  std::vector<std::string> notes = {};  ///< what the user should know about these choices
+  std::vector<std::string> notes = {};  ///< for the user, about these choices
 
   std::size_t size() const { return file.size(); }
 };
 
 /// Decides what is averaged and how. `command` begins the messages. Throws InputError where the wish does not fit the
 /// file.
-Measures chooseMeasures(FeatureFile file, const MeasuresOptions& options, const std::string& command);
+Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command);
 
 }  // namespace liestat::cli
