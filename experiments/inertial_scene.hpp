@@ -8,8 +8,8 @@
 //   … (result.solutions[0].velocity - scene.velocity).norm()
 //
 // The motion is analytic (sums of sines, or constant), bearings and the twice integrated force are exact to rounding.
-// What an inertial sensor reads of it: experiments/scene_readings.hpp. The world's z axis points upwards. Each scene is a
-// function of its options and its seed alone, the same with every standard library: it is drawn from stream 0 of the
+// An inertial sensor's readings of it: experiments/scene_readings.hpp. The world's z axis points upwards. Each scene is
+// a function of its options and its seed alone, the same with every standard library: it is drawn from stream 0 of the
 // seed, and noise of another stream is independent of it.
 #pragma once
 
@@ -51,7 +51,7 @@ enum class SceneLayout {
   ahead      ///< the first feature on the line of a straight motion
 };
 
-/// What is drawn.
+/// The parameters of the drawing.
 struct InertialSceneOptions {
   std::size_t images = 6;    ///< at about equal distances; two at least for a window that can be solved
   std::size_t features = 8;  ///< all are seen in all images

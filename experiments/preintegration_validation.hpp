@@ -11,7 +11,7 @@
 
 namespace liestat::experiments {
 
-/// What is asked of a preintegrated motion.
+/// The question asked of a preintegrated motion.
 enum class PreintegrationCheck {
   motion,          ///< the increment under its 9×9 covariance, biases known and constant
   walk,            ///< the increment under its 9×9 covariance, biases that walk
@@ -27,7 +27,7 @@ inline std::string name(PreintegrationCheck check) {
 /// Degrees of freedom of the error that is judged.
 int degreesOfFreedom(PreintegrationCheck check);
 
-/// What `liestat validate preintegration` runs: the product of the lists, at 200 readings a second.
+/// A run of `liestat validate preintegration`: the product of the lists, at 200 readings a second.
 struct PreintegrationValidation {
   std::vector<PreintegrationCheck> checks{all_preintegration_checks.begin(), all_preintegration_checks.end()};
   std::vector<double> windows{0.1, 0.5, 1.0, 2.0};  ///< s

@@ -24,7 +24,7 @@ struct GroundTruth {
 /// the rows and where these are more than 0.1 s apart. `truth` ascends in time.
 std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time);
 
-/// Noise densities of an ADIS16448, the sensor of EuRoC's recordings, as its data sheet and EuRoC's calibration have them.
+/// Noise densities of an ADIS16448, the sensor of EuRoC's recordings, as its data sheet and EuRoC's calibration say.
 inline constexpr ImuNoise<double> adis16448{
     .gyroscope = 1.6968e-4, .accelerometer = 2e-3, .gyroscope_walk = 1.9393e-5, .accelerometer_walk = 3e-3};
 

@@ -1,4 +1,4 @@
-// What an inertial sensor reads of a simulated scene (experiments/inertial_scene.hpp), and what a window makes of it.
+// The readings that an inertial sensor takes of a simulated scene (experiments/inertial_scene.hpp), and its window.
 //
 //   const auto readings = liestat::readingsOf(scene, noise, random, gyroscope_bias);
 //   const auto window = liestat::experiments::windowOf(scene, readings, {.preintegration = {.noise = noise}});
@@ -18,7 +18,7 @@
 
 namespace liestat::experiments {
 
-/// What an inertial sensor reads from the first image to beyond the last, `rate` times a second: with white noise, the
+/// The readings of an inertial sensor from the first image to beyond the last, `rate` a second: with white noise, the
 /// scene's bias of the accelerometer (InertialSceneOptions::bias) and one of the gyroscope (rad/s). Biases do not walk.
 inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, const ImuNoise<double>& noise,
                                                  CounterRng& random,

@@ -16,7 +16,7 @@
 
 namespace liestat::experiments {
 
-/// What was asked for cannot be simulated: what there is, and what would be needed.
+/// Thrown where a request cannot be simulated: says what there is, and what would be needed.
 class ImpossibleMotion : public std::invalid_argument {
  public:
   ImpossibleMotion(std::string found, std::string expected)
@@ -54,7 +54,7 @@ struct SyntheticImuOptions {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< in the world, m/s²
 };
 
-/// What a track of the simulated images shows.
+/// The point that a track of the simulated images shows.
 struct SimulatedTrack {
   Eigen::Vector3d landmark;  ///< in the world, m
   bool outlier = false;      ///< it drifts
@@ -84,15 +84,15 @@ SplineTrajectory trajectoryAlong(const std::vector<GroundTruth>& truth, double s
 
 /// Readings and images of a smooth motion from `begin` to `end`, s; its own states are the truth, exactly. The first
 /// image is one reading after the beginning. A camera without a size is taken to be twice as large as its principal
-/// point is far from the corner. Throws ImpossibleMotion where begin and end are not within the motion, where that does not
-/// fit into the box, and where there are fewer than two images.
+/// point is far from the corner. Throws ImpossibleMotion where begin and end are not within the motion, where that does
+/// not fit into the box, and where there are fewer than two images.
 SimulatedRecording simulateMotion(const SplineTrajectory& motion, double begin, double end,
                                   const CameraCalibration& camera, const SyntheticImuOptions& imu,
                                   const ViSceneOptions& scene);
 
 /// Images along a real recording whose readings are kept as they are: the ground truth's rows from `begin` to `end`,
-/// and images at those of them that are nearest to the rate asked for. Throws ImpossibleMotion as simulateMotion does, and
-/// where readings and truth have no time in common.
+/// and images at those of them that are nearest to the rate asked for. Throws ImpossibleMotion as simulateMotion does,
+/// and where readings and truth have no time in common.
 SimulatedRecording simulateImages(const std::vector<ImuSample<double>>& imu, const std::vector<GroundTruth>& truth,
                                   double begin, double end, const CameraCalibration& camera,
                                   const ViSceneOptions& scene);

@@ -18,7 +18,7 @@ namespace {
 using S = FusionStatus;
 constexpr double bearing_noise = 1. / 450;
 
-/// What a scene came out as.
+/// The outcome for a scene.
 struct Recognised {
   S status = S::bad_input;
   SolutionCount solutions = SolutionCount::infinite;

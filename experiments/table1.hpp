@@ -21,8 +21,8 @@ SolutionCount solutionsOf(FusionStatus status);
 struct Table1Entry {
   const char* cases;  ///< the motion, images n and features N
   const char* paper;  ///< the paper's number of solutions
-  /// Names of the cases of experiments/closed_form_cases.hpp that stand for it, each with the letters of the corrections
-  /// that concern it.
+  /// Names of the cases of experiments/closed_form_cases.hpp that stand for it, each with the letters of the
+  /// corrections that concern it.
   std::vector<std::pair<const char*, const char*>> exact, noisy;
 };
 const std::vector<Table1Entry>& table1Entries();

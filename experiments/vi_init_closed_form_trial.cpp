@@ -17,8 +17,8 @@ ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& size, double noise, Co
   scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto r = solveClosedForm(scene.window,
                                  {.bearing_noise = vi_init_bearing_noise, .closed_form = {.singular_values = false}});
-  // A window without a single consistent answer makes no claim. With the wrong noise χ² would say so first, and hide the
-  // distances.
+  // A window without a single consistent answer makes no claim. With the wrong noise χ² would say so first, and hide
+  // the distances.
   if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
       r.covariance_content != CovarianceContent::image_noise) {
     return {};

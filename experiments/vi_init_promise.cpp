@@ -1,4 +1,4 @@
-// What is promised of the rows of `liestat validate vi-init`: docs/validation.md says how it was measured.
+// The promises made about the rows of `liestat validate vi-init`; docs/validation.md says how they were measured.
 
 #include <experiments/vi_init_validation.hpp>
 

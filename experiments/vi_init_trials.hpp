@@ -35,7 +35,7 @@ struct ViChiSquared {
   double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// What a trial is made of. `noise` multiplies the noise that is simulated, not the one that the estimators are told.
+/// One trial. `noise` multiplies the noise that is simulated, not the one that the estimators are told.
 template <class Outcome>
 using ViInitTrial = Outcome (*)(const ViInitWindow& window, double noise, CounterRng& rng);
 

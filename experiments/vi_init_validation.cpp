@@ -18,7 +18,7 @@ using Check = ViInitCheck;
 using Estimator = ViInitEstimator;
 using Quantity = ViInitQuantity;
 
-/// What is known of a quantity, in the order of the enumerators.
+/// Name, unit and kind of each quantity, in the order of the enumerators.
 struct QuantityEntry {
   const char* name;
   const char* unit;

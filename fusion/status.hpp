@@ -12,7 +12,7 @@ namespace liestat {
 enum class FusionStatus {
   ok,
 
-  // What a window allows to say (fusion/init/closed_form.hpp), one for each case of the design note's section 4.
+  // The cases of a window (fusion/init/closed_form.hpp), those of the design note's section 4.
   ambiguous,             ///< two solutions explain the data, both with the features in front of the camera
   double_root,           ///< two solutions meet: noise is amplified without bound (acceleration across gravity)
   scale_unobservable,    ///< constant velocity: gravity and the direction of V known, lengths free
@@ -24,7 +24,7 @@ enum class FusionStatus {
   coplanar,              ///< few images, and features and positions in one plane
   too_few_images,        ///< more unknowns than equations for any motion
 
-  // What keeps an iteration from its answer.
+  // Obstacles of an iteration.
   bias_from_rotations,  ///< the motion does not tell the gyroscope's bias: it is that of rotations
   no_consensus,         ///< too few tracks agree
   no_start,             ///< no solution with features in front of the camera to start from
@@ -33,7 +33,7 @@ enum class FusionStatus {
   bad_motion,           ///< a motion without a positive definite covariance (no noise was given), or not finite
   not_converged,        ///< the iterations ended before the estimate stayed
 
-  // What keeps a window of a recording from being used (fusion/visual_inertial.hpp).
+  // Obstacles to the use of a window of a recording (fusion/visual_inertial.hpp).
   gap,           ///< two readings are too far apart
   no_readings,   ///< the readings do not serve: see the window's fault
   no_features,   ///< none was seen in two of its images
@@ -44,13 +44,13 @@ enum class FusionStatus {
 };
 
 /// Whether what ended with this status found its answer, or all of several, whatever else there is to say about it. The
-/// function of the same name for liestat::Status means the same, so that the harness of stats/validation.hpp takes both.
+/// function of the same name for liestat::Status means the same, and the harness of stats/validation.hpp takes both.
 constexpr bool converged(FusionStatus status) {
   return status == FusionStatus::ok || status == FusionStatus::ambiguous || status == FusionStatus::double_root ||
          status == FusionStatus::mirror_gravity || status == FusionStatus::inconsistent;
 }
 
-/// What is wrong with the input.
+/// Kinds of faults in the input.
 enum class FaultKind {
   none,
   // A window.
@@ -78,10 +78,10 @@ struct Fault {
 
   Fault() = default;
   Fault(FaultKind what, std::size_t where = 0) : kind(what), index(where) {}  // NOLINT: a kind is a fault
-  /// Whether there is one.
+  /// True where there is one.
   explicit operator bool() const { return kind != FaultKind::none; }
   friend bool operator==(const Fault&, const Fault&) = default;
-  /// Whether it is of a kind, wherever.
+  /// True where it is of a kind, wherever.
   friend bool operator==(const Fault& fault, FaultKind of_kind) { return fault.kind == of_kind; }
 };
 
@@ -195,7 +195,7 @@ inline const char* describe(FusionStatus status) {
   return "";
 }
 
-/// What is wrong with the input, with the index of the culprit, for people.
+/// The fault in words, with the index of the culprit, for people.
 inline std::string describe(const Fault& fault) {
   const std::string at = std::to_string(fault.index);
   switch (fault.kind) {

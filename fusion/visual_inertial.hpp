@@ -1,10 +1,10 @@
-// The front door of visual-inertial initialisation: a recording of an inertial sensor and of tracks in the images of one
-// or several cameras in, and out of it window by window velocity, gravity, scale and biases, what disjoint windows say
-// together, and what of it is to be trusted.
+// The front door of visual-inertial initialisation: a recording of an inertial sensor and of tracks in the images of
+// one or several cameras in, and out of it window by window velocity, gravity, scale and biases, what disjoint windows
+// say together, and what of it is to be trusted.
 //
 //   liestat::VisualInertialRecording recording{.readings = readings, .noise = noise, .image_times = times,
 //                                              .cameras = {body_T_camera}};
-//   recording.observations = liestat::bearingsOf(pixels, {&camera, 1}, 1.);  // 1 pixel of noise; or bearings of your own
+//   recording.observations = liestat::bearingsOf(pixels, {&camera, 1}, 1.);  // 1 pixel of noise; or your bearings
 //   const auto result = liestat::initialiseRecording(recording, {});
 //   for (const auto& window : result.windows) {
 //     if (window.ok()) … window.refined->velocity(), window.refined->gravity, window.refined->covariance
@@ -12,8 +12,8 @@
 //   … result.stretches: the state at the end of each, with its covariance
 //
 // Windows slide over the recording. Each is initialised by itself (robust_initialisation.hpp), refined (refinement.hpp)
-// and, where windows are disjoint, fused with its neighbours (window_fusion.hpp). Nothing throws: what is wrong with the
-// input is a fault of the result or of a window. Source: the design note on visual-inertial initialisation.
+// and, where windows are disjoint, fused with its neighbours (window_fusion.hpp). Nothing throws: what is wrong with
+// the input is a fault of the result or of a window. Source: the design note on visual-inertial initialisation.
 #pragma once
 
 #include <fusion/detail/visual_inertial_run.hpp>

@@ -1,4 +1,4 @@
-// What goes into the initialisation of a visual-inertial recording and what comes out (fusion/visual_inertial.hpp), for
+// The input and the result of the initialisation of a visual-inertial recording (fusion/visual_inertial.hpp), for
 // units that only look at it: the estimators cost a compiler more than the rest of the library.
 #pragma once
 
@@ -53,7 +53,7 @@ inline std::vector<BearingMeasurement> bearingsOf(std::span<const PixelMeasureme
   return bearings;
 }
 
-/// What the sensors recorded. Times are on one clock (s).
+/// The measurements of a recording. Times are on one clock (s).
 struct VisualInertialRecording {
   std::span<const ImuSample<double>> readings = {};  ///< in the order of time; a view: they must outlive the call
   ImuNoise<double> noise = {};                       ///< of the inertial sensor; both white densities must be positive
@@ -124,7 +124,7 @@ struct InitialisedWindow {
   bool ok() const { return verdict() == FusionStatus::ok; }
 };
 
-/// What disjoint windows say together (fusion/init/window_fusion.hpp), at the last image of the last.
+/// The state that disjoint windows give together (fusion/init/window_fusion.hpp), at the last image of the last.
 struct FusedStretch {
   double begin = 0, end = 0;         ///< s
   std::vector<std::size_t> windows;  ///< of the result's

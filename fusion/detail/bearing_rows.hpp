@@ -1,5 +1,5 @@
-// What the least squares over bearings have in common (the gyroscope's bias, the refinement): observations of features,
-// their residuals, priors, gravity of known length, and the step of what they share.
+// The common parts of the least squares over bearings (the gyroscope's bias, the refinement): observations of features,
+// their residuals, priors, gravity of known length, and the step of the unknowns that both have.
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>

@@ -122,8 +122,8 @@ struct EliminatedFeature {
   int rank = 3;
 };
 
-/// The covariance of a feature's position, the inverse of its normal matrix: by cofactors where these are accurate, else
-/// the pseudo-inverse.
+/// The covariance of a feature's position, the inverse of its normal matrix: by cofactors where these are accurate,
+/// else the pseudo-inverse.
 inline Eigen::Matrix3d featureCovariance(const Eigen::Matrix3d& H, int& rank) {
   const Eigen::Matrix3d adjugate = cofactors(H);
   const double determinant = H.col(0).dot(adjugate.col(0)), trace = H.trace();

@@ -14,7 +14,7 @@ namespace liestat::detail {
 /// A singular value that is zero to rounding, relative to the largest.
 constexpr double rankTolerance(bool bias) { return bias ? 1e-12 : 1e-10; }
 
-/// What the unweighted system says by itself.
+/// The ranks of the system without weights, and its weakest motions.
 struct RankDiagnosis {
   Triangle root;
   std::vector<SmallMatrix> by_motion;

@@ -88,7 +88,7 @@ class ClosedFormRun {
   }
 
   void solveNoisy() {
-    // What has no parallax says nothing on the motion but that it is small, which is wrong.
+    // A feature without parallax says nothing on the motion but that it is small, which is wrong.
     RayTable near = withParallax(table_, result_, options_.closed_form.min_parallax * solver_.sigma());
     if (near.features() == 0) {
       result_.status = solveAtRest() ? Status::stationary : Status::no_parallax;
@@ -200,7 +200,7 @@ class ClosedFormRun {
     const bool lost = share.shares[0] > lost_share;
     // Plain least squares never quite fit, and that says nothing on the case.
     const bool misfit = options_.closed_form.remove_noise_bias && !isConsistent();
-    // What gravity gains a bias may make up for.
+    // A bias may make up for what gravity gains.
     const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > 0.1 * weak.velocity().norm();
     const Eigen::Vector3d G = candidates_[0].y.gravity(), along = weak.gravity().normalized();
     // Where the lost direction leaves the sphere of gravity again: the other solution.

@@ -44,7 +44,7 @@ inline bool coplanarityMatters(std::size_t images, std::size_t features) {
   return (features == 1 && images < 6) || (features == 2 && images == 3);
 }
 
-/// What the null vectors of the motion say about its parts.
+/// The parts of the motion that its null vectors move.
 struct NullShape {
   int gravity_rank = 0;         ///< how many directions of G they move
   bool bias_is_gravity = true;  ///< all are changes of the bias that gravity makes up for, V at rest

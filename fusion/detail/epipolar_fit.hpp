@@ -101,8 +101,8 @@ class EpipolarFit {
     return converged(summary.status);
   }
 
-  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay (or six times: one
-  /// at the limit may come and go); whether there is a minimum.
+  /// Accepts and rejects tracks, and goes to the minimum for those that are accepted, until these stay (or six times:
+  /// one at the limit may come and go); whether there is a minimum.
   bool settle() {
     for (int round = 0; round < 6; ++round) {
       const std::vector<double> before = problem.weight;

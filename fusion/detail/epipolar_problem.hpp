@@ -23,7 +23,7 @@
 
 namespace liestat::detail {
 
-/// What the bias is a function of, at a bias, with translations and weights of tracks that the caller sets.
+/// The residuals at a bias, with translations and weights of the tracks that the caller sets.
 class EpipolarProblem {
  public:
   using Pair = EpipolarPair;
@@ -236,7 +236,7 @@ class EpipolarProblem {
   }
 
  private:
-  /// What is left of a pair when its translation is taken out: t = t - acrossᵀ (offset + gainᵀ δb).
+  /// A pair whose translation is eliminated: after a step δb of the bias it is best at t - acrossᵀ (offset + gainᵀ δb).
   struct Part {
     Eigen::Matrix<double, 2, 3> across;
     Eigen::Matrix<double, 3, 2> gain;

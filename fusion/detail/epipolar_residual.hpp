@@ -1,5 +1,5 @@
-// The residual of a match of two images. In the axes of t0, with a translation along t, directions u of the first and u'
-// of the second,
+// The residual of a match of two images. In the axes of t0, with a translation along t, directions u of the first and
+// u' of the second,
 //   r = t·(u × u') / s,    s² = σ² |u' × t|² + σ'² |u × t|²,
 // is a residual of variance one to first order (Kneip's and Lynen's normal epipolar constraint, with the noise of the
 // normal).

@@ -76,8 +76,8 @@ struct IncrementCovariance {
     vv.addProduct(vr, W);
   }
 
-  /// What the drift of the biases does through a response J to them: with C their covariance with the errors, `walk`
-  /// before and `now` = C + q t J after, P += C Jᵀ + J Cᵀ + q t J Jᵀ.
+  /// Adds what the drift of the biases does through a response J to them: with C their covariance with the errors,
+  /// `walk` before and `now` = C + q t J after, P += C Jᵀ + J Cᵀ + q t J Jᵀ.
   void drift(const BiasBlocks<S>& walk, const BiasBlocks<S>& now, const BiasBlocks<S>& J) {
     pp += now.pg.timesTransposed(J.pg) + J.pg.timesTransposed(walk.pg) + now.pa.timesTransposed(J.pa) +
           J.pa.timesTransposed(walk.pa);

@@ -106,7 +106,7 @@ class RefinementProblem {
   std::size_t observations() const { return observations_.size(); }
   int blocks() const { return gravityBlock() + 3; }
   int gravityBlock() const { return 3 * static_cast<int>(state_.X.size()) - 2; }
-  /// Of the part of a state: 0 position, 1 rotation, 2 velocity. The first state has the velocity alone.
+  /// The block of a part of a state: 0 position, 1 rotation, 2 velocity. The first state has the velocity alone.
   int stateBlock(std::size_t j, int part) const {
     const int images = static_cast<int>(state_.X.size()), image = static_cast<int>(j);
     return part == 2 ? image : images + 2 * (image - 1) + part;

@@ -1,4 +1,4 @@
-// What one preintegration step of constant rate and force is made of: coefficients by its angle, and matrices.
+// The coefficients, by its angle, and the matrices of one preintegration step of constant rate and force.
 #pragma once
 
 #include <lie/detail/small_columns.hpp>

@@ -19,7 +19,7 @@
 
 namespace liestat::detail {
 
-/// What does not change from window to window.
+/// The run over one recording: all that stays the same from window to window.
 class RecordingRun {
  public:
   RecordingRun(const VisualInertialRecording& recording, const VisualInertialOptions& options,

@@ -12,7 +12,7 @@
 
 namespace liestat {
 
-/// What a reading stands for, and how motion goes on between readings.
+/// How motion goes on between readings, and thereby what a reading stands for.
 enum class ImuScheme {
   averaged,  ///< instantaneous readings; the mean of two neighbours holds between them, integrated exactly. Order 2
   held,      ///< a reading is the mean rate and force from its time to the next (delta-angle sensors)
@@ -28,7 +28,7 @@ struct RecordingOptions {
   S max_gap = S(0.1);  ///< s; readings further apart than this make the result not usable
 };
 
-/// What preintegrate() returns. Only a result without fault is to be used.
+/// The result of preintegrate(). Only one without fault is to be used.
 template <class S>
 struct RecordingResult {
   Preintegration<S> motion;

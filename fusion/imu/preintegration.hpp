@@ -30,7 +30,7 @@
 
 namespace liestat {
 
-/// What a preintegration assumes.
+/// The noise and the biases that a preintegration assumes.
 template <class S>
 struct PreintegrationOptions {
   ImuNoise<S> noise = {};
@@ -161,7 +161,7 @@ class Preintegration {
     Covariance& c = all.covariance_;
     c.pp += turned(n.pp), c.pr += turned(n.pr), c.pv += turned(n.pv);
     c.rr += turned(n.rr), c.vr += turned(n.vr), c.vv += turned(n.vv);
-    // What the biases have drifted since the start acts on the second interval as a whole.
+    // The drift of the biases since the start acts on the second interval as a whole.
     const BiasBlocks response{R * next.bias_.pg, R * next.bias_.pa, R * next.bias_.rg, R * next.bias_.vg,
                               R * next.bias_.va};
     if (has_walk_) {
@@ -191,7 +191,7 @@ class Preintegration {
     if (has_walk_) walk_.carry(h, U, W);
   }
 
-  /// What biases that have walked for t seconds do through a response J to them.
+  /// Adds what biases that have walked for t seconds do through a response J to them.
   void drift(const BiasBlocks& J, const S& t) {
     BiasBlocks now = walk_;
     now += J.scaled(gyroscopeWalk(t), accelerometerWalk(t));

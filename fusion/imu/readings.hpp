@@ -1,4 +1,4 @@
-// What an inertial measurement unit says, and how wrong it is.
+// The readings of an inertial measurement unit, its biases and its noise.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ struct ImuSample {
   Eigen::Matrix<S, 3, 1> specific_force = Eigen::Matrix<S, 3, 1>::Zero();
 };
 
-/// What is added to the truth: measured = true + bias + noise. Coordinates (gyroscope rad/s, accelerometer m/s²).
+/// The bias that a sensor adds: measured = true + bias + noise. Coordinates (gyroscope rad/s, accelerometer m/s²).
 template <class S>
 struct ImuBias {
   Eigen::Matrix<S, 3, 1> gyroscope = Eigen::Matrix<S, 3, 1>::Zero();

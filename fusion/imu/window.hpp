@@ -1,6 +1,6 @@
 // A window of a recording: the images of one or several cameras with the readings of the inertial sensor between them.
 //
-//   liestat::InertialWindow window(readings, image_times, {.preintegration = {.noise = noise}}, tracks, {body_T_camera});
+//   liestat::InertialWindow window(readings, times, {.preintegration = {.noise = noise}}, tracks, {body_T_camera});
 //   const auto images = liestat::biasedImages(window.motions(), bias);
 //
 // A window knows its readings, so that every estimator integrates them anew where its biases have gone too far for a
@@ -27,7 +27,7 @@
 
 namespace liestat {
 
-/// What was measured between the first and the last of n images. The working frame is the body's at the first image.
+/// All that was measured from the first of n images to the last. The working frame is the body's at the first image.
 class InertialWindow {
  public:
   std::vector<FeatureTrack> features;    ///< what was seen of each feature, in the axes of its camera
@@ -109,7 +109,7 @@ class InertialWindow {
   Fault fault_;
 };
 
-/// What the inertial sensor says about one image, with derivatives by the biases: C_j(b + δ) =
+/// One image as the inertial sensor predicts it, with derivatives by the biases: C_j(b + δ) =
 /// Exp(rotation_by_gyroscope δ) C_j, and of S_j by both.
 struct BiasedImage {
   WindowImage image;

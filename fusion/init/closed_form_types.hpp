@@ -1,4 +1,4 @@
-// What goes into the closed form of visual-inertial initialisation and what comes out (fusion/init/closed_form.hpp).
+// The input and the result of the closed form of visual-inertial initialisation (fusion/init/closed_form.hpp).
 //
 // The working frame is the body's at the first image, t0. All vectors are in it but bearings, which are in the axes of
 // their camera at their image.
@@ -21,7 +21,7 @@ namespace liestat {
 template <class S>
 class Preintegration;
 
-/// What the inertial sensor says about one image: C_j and S_j of the paper (Martinelli 2012, section II).
+/// One image as the inertial sensor sees it: C_j and S_j of the paper (Martinelli 2012, section II).
 struct WindowImage {
   double time = 0;                                                 ///< s since the first image
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< C_j: the body's axes in t0
@@ -59,7 +59,7 @@ struct ClosedFormWindow {
   std::vector<SE3d> cameras = {SE3d()};  ///< body_T_camera of each camera (m): its translation is p_c of the paper
 };
 
-/// What happened to a feature.
+/// How a feature was used and how well it is known.
 struct ClosedFormFeature {
   std::size_t observations = 0;
   bool used = false;              ///< false: seen in fewer than two images
@@ -84,7 +84,7 @@ struct ClosedFormSolution {
   double pitch() const { return std::atan2(gravity.x(), std::hypot(gravity.y(), gravity.z())); }
 };
 
-/// What a covariance accounts for.
+/// The sources of error that a covariance accounts for.
 enum class CovarianceContent {
   none,                   ///< there is none: exact data, or not all unknowns are determined
   image_noise,            ///< image noise only: not the inertial sensor's noise, nor unmodelled biases
@@ -101,14 +101,14 @@ struct ClosedFormResult {
   std::vector<ClosedFormSolution> solutions;
   std::vector<ClosedFormFeature> features;
 
-  /// Of the whole scaled linear system (columns P_i, V T, G T²/2 and b T²/2; rows N'), before priors and weights: the
+  /// For the whole scaled linear system (columns P_i, V T, G T²/2 and b T²/2; rows N'), before priors and weights: the
   /// dimension of its null space, its largest singular value, and those of its restriction to the motions with the
   /// features that fit each best, descending (6, or 9 with bias). −1 and empty without diagnosis.
   int null_dimension = -1;
   double largest_singular_value = 0;
   std::vector<double> singular_values;
 
-  /// Of (V, G) or (V, G, b) of the first solution, 6 or 9 square; singular along G where |G| is known. Empty: none.
+  /// That of (V, G) or (V, G, b) of the first solution, 6 or 9 square; singular along a known |G|. Empty: none.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9> covariance;
   CovarianceContent covariance_content = CovarianceContent::none;
   double scale_sigma = std::numeric_limits<double>::infinity();  ///< relative, predicted; with noise

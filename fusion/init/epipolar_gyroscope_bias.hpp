@@ -37,7 +37,7 @@
 
 namespace liestat {
 
-/// The bias that the rotations between images say. The window is integrated anew where a first-order update will not do.
+/// The bias that the rotations between images say. The window is integrated anew where first order will not do.
 inline EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window,
                                                         const InitialisationOptions& options) {
   EpipolarBiasResult found;

@@ -10,7 +10,7 @@
 
 namespace liestat {
 
-/// What a camera and an inertial sensor tell of a body at one time, without a map; position and heading, which they do
+/// The state of a body that a camera and an inertial sensor tell without a map; position and heading, which they do
 /// not tell, are not in it. All in the body's axes: the direction of gravity (downwards), the velocity (m/s), the
 /// gyroscope's bias (rad/s), and the resting force: what the accelerometer would read at rest, its bias less gravity
 /// (m/s²). That is known much better than either of the two, which only the rotation of a window tells apart: bias and

@@ -15,7 +15,7 @@
 
 namespace liestat {
 
-/// What is known of the biases beforehand: normal about `mean`, with these standard deviations in each axis.
+/// The prior of the biases: normal about `mean`, with these standard deviations in each axis.
 struct BiasPrior {
   ImuBias<double> mean = {};
   double gyroscope_sigma = 0.1;      ///< rad/s
@@ -30,7 +30,7 @@ struct ClosedFormOptions {
   bool singular_values = true;    ///< the diagnosis of ranks; exact data always have it
   double min_parallax = 4;        ///< with noise: RMS parallax of a feature that is used, in sigmas of a bearing
   bool remove_noise_bias = true;  ///< with noise: take off what noise adds to the system. Without, scale is too small
-  /// What counts as determined, with noise: the scale to 30 %, the vertical to 0.2 rad.
+  /// Limits to what counts as determined, with noise: the scale to 30 %, the vertical to 0.2 rad.
   double max_scale_sigma = 0.3;
   double max_tilt_sigma = 0.2;
 };
@@ -48,7 +48,7 @@ struct ConsensusOptions {
 
 /// fusion/init/epipolar_gyroscope_bias.hpp
 struct EpipolarBiasOptions {
-  /// Of a pair of images that is used: RMS by which its directions move, beyond what a rotation explains, in sigmas.
+  /// RMS by which the directions of a pair of images must move, beyond what a rotation explains, in sigmas.
   double min_parallax = 4;
   double misfit_sigmas = 5;    ///< of a track's χ², beyond which it is rejected
   double min_consensus = 0.4;  ///< fraction of the tracks that must agree
@@ -77,7 +77,7 @@ struct RefinementOptions {
 /// All of them.
 struct InitialisationOptions {
   /// Standard deviation of a bearing in each direction across it, in rad (pixel noise over focal length), times the
-  /// bearing's own relative_sigma. 0: exact data, which only the closed form takes; its status is then decided by ranks.
+  /// bearing's own relative_sigma. 0: exact data, which only the closed form takes; its status is decided by ranks.
   double bearing_noise = 0;
   std::optional<double> gravity = 9.81;  ///< |G| in m/s²; none: its length is an unknown too
   BiasPrior prior = {};
@@ -93,8 +93,8 @@ struct InitialisationOptions {
   RefinementOptions refinement = {};
 };
 
-/// What each of n windows that are to be fused (fusion/init/window_fusion.hpp) is refined with, so that all together
-/// count the prior of the biases once: standard deviations √n times as large.
+/// The options for the refinement of each of n windows to be fused (fusion/init/window_fusion.hpp), so that all
+/// together count the prior of the biases once: standard deviations √n times as large.
 inline InitialisationOptions withSharedPrior(InitialisationOptions options, std::size_t n) {
   const double root = std::sqrt(static_cast<double>(n));
   options.prior.gyroscope_sigma *= root;

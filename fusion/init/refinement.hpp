@@ -75,8 +75,8 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
 }  // namespace detail
 
 /// The most probable motion next to a start: a solution of the closed form, and the biases with which it was found (its
-/// own correction of the accelerometer's is added). The motions must have been integrated with the sensor's noise; where
-/// the biases go too far for their first-order update, the window is integrated anew and refined on from there.
+/// own correction of the accelerometer's is added). The motions must have been integrated with the sensor's noise;
+/// where the biases go too far for their first-order update, the window is integrated anew and refined on from there.
 inline RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
                                const ImuBias<double>& start_bias, const InitialisationOptions& options) {
   RefinementResult result;

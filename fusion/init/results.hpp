@@ -1,4 +1,4 @@
-// What the steps of a visual-inertial initialisation return, for units that only look at it: the estimators cost a
+// The results of the steps of a visual-inertial initialisation, for units that only look at them: estimators cost a
 // compiler more than the rest of the library. The closed form's results are in closed_form_types.hpp.
 #pragma once
 
@@ -92,7 +92,7 @@ struct InitialCovariance {
   Eigen::Matrix<double, 21, 21> joint = Eigen::Matrix<double, 21, 21>::Zero();
 
   Eigen::Matrix3d block(Block row, Block column) const { return joint.block<3, 3>(row, column); }
-  /// Of some blocks, in their order.
+  /// The covariance of some blocks, in their order.
   template <Block... blocks>
   Eigen::Matrix<double, 3 * sizeof...(blocks), 3 * sizeof...(blocks)> of() const {
     constexpr int n = sizeof...(blocks);
@@ -103,11 +103,11 @@ struct InitialCovariance {
     }
     return part;
   }
-  /// Of (V, G, gyroscope's bias, accelerometer's bias) at t0.
+  /// The covariance of (V, G, gyroscope's bias, accelerometer's bias) at t0.
   Eigen::Matrix<double, 12, 12> atFirst() const {
     return of<first_velocity, gravity, gyroscope_bias, accelerometer_bias>();
   }
-  /// Of the last state (position, rotation, velocity), then G and both biases: what a filter starts from.
+  /// That of the last state (position, rotation, velocity), then G and both biases: a filter starts from it.
   Eigen::Matrix<double, 18, 18> atLast() const { return joint.bottomRightCorner<18, 18>(); }
 };
 
@@ -123,7 +123,7 @@ struct RefinementResult {
   ImuBias<double> bias;                   ///< whole: not the change of the one that was integrated
   std::vector<Eigen::Vector3d> features;  ///< NaN for a feature that was not used
 
-  /// Of the state from which a filter starts, and of what came before it.
+  /// Covers the state from which a filter starts, and the velocity at t0.
   InitialCovariance covariance;
 
   double cost = 0;  ///< χ² of bearings, motions and priors

@@ -35,7 +35,7 @@ inline RobustInitialisation initialiseRobustly(InertialWindow window, const Init
   found.bias_covariance = found.epipolar.covariance;
 
   InitialisationOptions outer = options;
-  // What keeps a short window from the wrong minimum of a large bias.
+  // This keeps a short window from the wrong minimum of a large bias.
   if (found.epipolar.ok()) outer.gyroscope_bias.min_window = 0;
   const Eigen::Vector3d accelerometer = window.bias().accelerometer;
   const auto restoreCounts = [&] {

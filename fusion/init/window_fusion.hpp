@@ -154,7 +154,7 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
 /// Collects windows in the order of time; see the header comment.
 class WindowFusion {
  public:
-  /// What came of a window that was added.
+  /// The outcome for a window that was added.
   struct Meeting {
     Status status = Status::too_few;
     /// Squared distance of the window from all before it, under both covariances: χ² of 11 degrees of freedom where
@@ -210,7 +210,7 @@ class WindowFusion {
   /// or are noisier than their covariances say (chiSquaredSurvival of stats/inference.hpp is the probability).
   double chi2() const { return chi2_; }
   std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
-  /// What covariances would have to be multiplied by for the windows to be as far apart as they are; at least 1.
+  /// The factor of the covariances at which windows would be as far apart as these are; at least 1.
   double inflation() const {
     return degrees_of_freedom_ == 0 ? 1 : std::max(1., chi2_ / static_cast<double>(degrees_of_freedom_));
   }
