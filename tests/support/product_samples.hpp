@@ -11,7 +11,7 @@
 
 namespace liestat_test {
 
-using liestat::CounterRng, liestat::Gaussian, liestat::sample, liestat::sampleUniform;
+using liestat::CounterRng, liestat::Gaussian, liestat::sample, liestat::sampleInCube;
 
 /// The I-th parts.
 template <std::size_t I, class M>
