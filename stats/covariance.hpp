@@ -26,7 +26,7 @@ template <Metric M>
 SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
   const Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> factor(result.hessian);
   const SquareOf<M> G = factor.solve(SquareOf<M>(ManifoldTraits<M>::metricWeights().asDiagonal()));
-  return G * S * G.transpose();
+  return congruence(G, S);
 }
 
 /// States in one sentence what is wrong with a range of covariances; `ok` where nothing is.

@@ -27,7 +27,7 @@ struct GroupMeanResult {
     using S = ScalarOf<G>;
     if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
     const SquareOf<G> inverse = detail::inverse<S, G::DoF>(jacobian);
-    return inverse * scatter * inverse.transpose() * (S(sum_of_weights) / (S(n) - S(1)));
+    return detail::congruence(inverse, scatter) * (S(sum_of_weights) / (S(n) - S(1)));
   }
 };
 
