@@ -80,14 +80,13 @@ MahaResult<M> maha(R&& range, const MahaOptions<std::type_identity_t<M>>& option
     ++result.iterations;
     y = exp(y, step);
     if (result.residual <= result.tolerance) {
-      result.converged = true;
       result.status = Status::ok;
       break;
     }
   }
   result.mean = y;
   result.hessian = result.gauss_newton = H;
-  if (result.converged) result.covariance = detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).inverse();
+  if (converged(result.status)) result.covariance = detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).inverse();
   return result;
 }
 

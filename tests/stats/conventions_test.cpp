@@ -21,7 +21,7 @@ M randomFeature(CounterRng& rng) {
   if constexpr (requires { M::sampleUniform(rng); }) {
     return M::sampleUniform(rng);
   } else {
-    return sampleUniform<M>(rng);
+    return sampleInCube<M>(rng);
   }
 }
 

@@ -28,7 +28,7 @@ Gaussian<M> draw(CounterRng& rng, double sd) {
   SquareOf<M> A;
   for (int i = 0; i < k; ++i) A.col(i) = rng.normalVector<k>();
   const Eigen::MatrixXd square = outer(dynamic(A)) / k + 0.2 * Eigen::MatrixXd::Identity(k, k);
-  return {sampleUniform<M>(rng, 3), fixed<SquareOf<M>>(sd * sd * square)};
+  return {sampleInCube<M>(rng, 3), fixed<SquareOf<M>>(sd * sd * square)};
 }
 
 TYPED_TEST(GaussianTest, distanceIsInvariant) {
@@ -102,7 +102,7 @@ TEST(Gaussian, comparisonOfTwoEstimatesFollowsChiSquared) {
   double sum = 0;
   for (int i = 0; i < n; ++i) {
     CounterRng rng(6, static_cast<std::uint64_t>(i));
-    const SO3d exact = sampleUniform<SO3d>(rng);
+    const SO3d exact = sampleInCube<SO3d>(rng);
     const SO3d a = sample(Gaussian<SO3d>{exact, first}, rng), b = sample(Gaussian<SO3d>{exact, second}, rng);
     sum += mahalanobisSquared(Gaussian<SO3d>{a, first}, Gaussian<SO3d>{b, second});
   }
