@@ -43,5 +43,5 @@ int main() {
   for (const S2d& x : normals) sum += x.unit_vector();
   std::cout << "the normalised sum of the vectors is " << distance(S2d(sum), plain.mean) / degree
             << " deg from the mean\n";
-  return plain.converged && weighted.converged ? 0 : 1;
+  return converged(plain.status) && converged(weighted.status) ? 0 : 1;
 }

@@ -62,5 +62,5 @@ int main() {
             << " deg\n"
             << "deviations  " << covarianceFromResiduals(result).diagonal().cwiseSqrt().transpose()
             << " (forward m, left m, rad)\n";
-  return contract.ok() && result.converged ? 0 : 1;
+  return contract.ok() && converged(result.status) ? 0 : 1;
 }

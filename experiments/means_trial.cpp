@@ -47,7 +47,7 @@ template <class M>
 Scene<M> drawScene(const MeansExperiment& experiment, CounterRng& rng) {
   using T = ManifoldTraits<M>;
   Scene<M> scene;
-  scene.exact = sampleUniform<M>(rng, 100);
+  scene.exact = sampleInCube<M>(rng, 100);
   const SquareOf<M> sigma = reportCovariance<M>(experiment.spread);
   for (std::size_t i = 0; i < experiment.n; ++i) {
     SquareOf<M> V = sigma;
@@ -113,10 +113,10 @@ MeanResult<M> globalMean(const Scene<M>& scene, const W& weights, bool certify, 
   iterations_from_first = best.iterations;
   options.start = scene.exact;
   const MeanResult<M> other = mean(scene.measurements, weights, options);
-  if (!best.converged || (other.converged && other.cost < best.cost)) best = other;
+  if (!converged(best.status) || (converged(other.status) && other.cost < best.cost)) best = other;
   if (certify) {
     const auto certified = certifiedMean(scene.measurements, weights);
-    if (certified.mean.converged && certified.mean.cost < best.cost) best = certified.mean;
+    if (converged(certified.mean.status) && certified.mean.cost < best.cost) best = certified.mean;
   }
   return best;
 }
@@ -141,7 +141,7 @@ void leastSquares(const MeansExperiment& experiment, const Scene<M>& scene, cons
     MethodOutcome& o = outcome(corrected, known);
     o.iterations = iterations;
     setErrors(result.mean, scene.exact, o);
-    if (result.converged) o.mahalanobis_squared = mahalanobisSquared(Gaussian<M>{result.mean, covariance}, scene.exact);
+    if (converged(result.status)) o.mahalanobis_squared = mahalanobisSquared(Gaussian<M>{result.mean, covariance}, scene.exact);
   };
   set(true, true, covarianceFromNoise(result, weights, noise));
   set(false, true, printed::covarianceFromNoise(scene.measurements, weights, attached, result.mean));

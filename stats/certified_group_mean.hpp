@@ -96,23 +96,30 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
 
 /// The exponential barycentre of a range of group elements, weighted or not, certified by the mean of its metric twin,
 /// with its covariance from the residuals where that can be trusted: status ok. The same bits on any executor.
-template <Executor E, SampleRange R, LieGroup G = SampleOf<R>>
-CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples,
+template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples,
                                          const CertifiedGroupMeanOptions& options = {}) {
-  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+  if constexpr (detail::RequireGroupMean<R>::ok) {
+    return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, LieGroup G = SampleOf<R>>
-CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const CertifiedGroupMeanOptions& options = {}) {
+template <detail::AnyRange R, class G = detail::GroupInSignature<R>>
+CertifiedGroupMean<G> certifiedGroupMean(R&& samples, const CertifiedGroupMeanOptions& options = {}) {
   return certifiedGroupMean(SerialExecutor{}, samples, options);
 }
-template <Executor E, SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
-CertifiedGroupMean<G> certifiedGroupMean(const E& executor, const R& samples, const W& weights,
+template <Executor E, detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples, W&& weights,
                                          const CertifiedGroupMeanOptions& options = {}) {
-  return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+  if constexpr (detail::RequireGroupMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, WeightRange W, LieGroup G = SampleOf<R>>
-CertifiedGroupMean<G> certifiedGroupMean(const R& samples, const W& weights,
-                                         const CertifiedGroupMeanOptions& options = {}) {
+template <detail::AnyRange R, detail::AnyRange W, class G = detail::GroupInSignature<R>>
+CertifiedGroupMean<G> certifiedGroupMean(R&& samples, W&& weights, const CertifiedGroupMeanOptions& options = {}) {
   return certifiedGroupMean(SerialExecutor{}, samples, weights, options);
 }
 

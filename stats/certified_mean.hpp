@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <optional>
 #include <ranges>
+#include <type_traits>
 #include <vector>
 
 namespace liestat {
@@ -119,21 +120,31 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 /// (ambiguous), when the mass near the cut locus makes the mean of quotient frames or of very scattered rotations
 /// ill-defined (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
 /// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
-template <Executor E, SampleRange R, Metric M = SampleOf<R>>
-CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const CertifiedMeanOptions<M>& options = {}) {
-  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
+CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
+                               const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, Metric M = SampleOf<R>>
-CertifiedMean<M> certifiedMean(const R& samples, const CertifiedMeanOptions<M>& options = {}) {
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+CertifiedMean<M> certifiedMean(R&& samples, const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   return certifiedMean(SerialExecutor{}, samples, options);
 }
-template <Executor E, SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-CertifiedMean<M> certifiedMean(const E& executor, const R& samples, const W& weights,
-                               const CertifiedMeanOptions<M>& options = {}) {
-  return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+template <Executor E, detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+CertifiedMean<M> certifiedMean(const E& executor, R&& samples, W&& weights,
+                               const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-CertifiedMean<M> certifiedMean(const R& samples, const W& weights, const CertifiedMeanOptions<M>& options = {}) {
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+CertifiedMean<M> certifiedMean(R&& samples, W&& weights,
+                               const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   return certifiedMean(SerialExecutor{}, samples, weights, options);
 }
 

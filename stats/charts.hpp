@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <optional>
 #include <ranges>
+#include <type_traits>
 
 namespace liestat {
 
@@ -24,17 +25,14 @@ struct ChartScatter {
   Eigen::MatrixXd barycentre_covariance, barycentre_covariance_centred;
 };
 
-/// A range of features with their weights in both charts, y their mean, with the dispersion and the covariance of the
-/// mean in the local frame at y. Covariances move with the charts' derivatives.
-template <SampleRange R, WeightRange W, Homogeneous M = SampleOf<R>>
-ChartScatter chartScatter(const R& samples, const W& weights, const M& y,
-                          const std::optional<SquareOf<M>>& dispersion = {},
-                          const std::optional<SquareOf<M>>& covariance = {}) {
+namespace detail {
+
+template <Homogeneous M, class R, class W>
+ChartScatter findChartScatter(const R& features, const W& p, const M& y, const std::optional<SquareOf<M>>& dispersion,
+                              const std::optional<SquareOf<M>>& covariance) {
   using T = ManifoldTraits<M>;
   constexpr int k = T::DoF;
-  const auto& features = detail::asSamples(samples);
-  const auto& p = detail::asWeights(weights);
-  eigen_assert(detail::haveOneSize(features, p));
+  eigen_assert(haveOneSize(features, p));
   const auto n = static_cast<Eigen::Index>(std::ranges::size(features));
   ChartScatter s;
   s.principal.resize(k, n);
@@ -74,6 +72,22 @@ ChartScatter chartScatter(const R& samples, const W& weights, const M& y,
     s.barycentre_covariance_centred = carried(C, scatter.template cast<ScalarOf<M>>());
   }
   return s;
+}
+
+}  // namespace detail
+
+/// A range of features with their weights in both charts, y their mean, with the dispersion and the covariance of the
+/// mean in the local frame at y. Covariances move with the charts' derivatives.
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::SampleInSignature<R>>
+ChartScatter chartScatter(R&& samples, W&& weights, const std::type_identity_t<M>& y,
+                          const std::optional<SquareOf<M>>& dispersion = {},
+                          const std::optional<SquareOf<M>>& covariance = {}) {
+  if constexpr (detail::RequireSamples<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findChartScatter<M>(detail::asSamples(samples), detail::asWeights(weights), y, dispersion,
+                                       covariance);
+  } else {
+    return {};
+  }
 }
 
 }  // namespace liestat

@@ -19,13 +19,13 @@ namespace liestat {
 template <LieGroup G>
 SquareOf<G> leftCovariance(const Gaussian<G>& g) {
   const SquareOf<G> J = g.mean.Adj();
-  return J * g.covariance * J.transpose();
+  return detail::congruence(J, g.covariance);
 }
 /// The Gaussian of a mean and the covariance of its left perturbation; inverse of leftCovariance.
 template <LieGroup G>
 Gaussian<G> fromLeftCovariance(const G& mean, const SquareOf<G>& left_covariance) {
   const SquareOf<G> J = mean.inverse().Adj();
-  return {mean, J * left_covariance * J.transpose()};
+  return {mean, detail::congruence(J, left_covariance)};
 }
 
 /// The order of rotation, translation, then the rest. Parts that a type does not have are passed over, so it serves SE2
@@ -91,13 +91,13 @@ SquareOf<M> covarianceFromOrder(const SquareOf<M>& covariance, std::initializer_
 template <HasTangentParts M>
 SquareOf<M> worldAxesCovariance(const Gaussian<M>& g) {
   const SquareOf<M> J = detail::worldAxes(g.mean);
-  return J * g.covariance * J.transpose();
+  return detail::congruence(J, g.covariance);
 }
 /// The Gaussian of a mean and its covariance along the axes of the world; inverse of worldAxesCovariance.
 template <HasTangentParts M>
 Gaussian<M> fromWorldAxesCovariance(const M& mean, const SquareOf<M>& world_covariance) {
   const SquareOf<M> J = detail::inverse<ScalarOf<M>, ManifoldTraits<M>::DoF>(detail::worldAxes(mean));
-  return {mean, J * world_covariance * J.transpose()};
+  return {mean, detail::congruence(J, world_covariance)};
 }
 
 }  // namespace liestat

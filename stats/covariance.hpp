@@ -6,7 +6,10 @@
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 #include <stats/mean.hpp>
+
+#include <cmath>
 
 namespace liestat {
 
@@ -23,7 +26,7 @@ template <Metric M>
 SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
   const Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> factor(result.hessian);
   const SquareOf<M> G = factor.solve(SquareOf<M>(ManifoldTraits<M>::metricWeights().asDiagonal()));
-  return G * S * G.transpose();
+  return congruence(G, S);
 }
 
 /// States in one sentence what is wrong with a range of covariances; `ok` where nothing is.
@@ -99,6 +102,24 @@ SquareOf<M> empiricalCovariance(R&& samples, const std::type_identity_t<M>& y) {
     }
   }
   return sum / ScalarOf<M>(n);
+}
+
+/// Whether a covariance (symmetric, at most 13×13) leaves some direction without any error, whatever the units: a
+/// variance that is not positive, or an eigenvalue of the correlation matrix that is not above 1e-10. True for NaN.
+template <class Derived>
+bool isSingular(const Eigen::MatrixBase<Derived>& covariance) {
+  const int k = static_cast<int>(covariance.rows());
+  eigen_assert(covariance.cols() == k && k <= detail::SmallMatrix::most);
+  detail::SmallMatrix correlation(k, k);
+  for (int i = 0; i < k; ++i) {
+    for (int j = 0; j < k; ++j) {
+      const double scale = std::sqrt(static_cast<double>(covariance(i, i)) * static_cast<double>(covariance(j, j)));
+      correlation(i, j) = static_cast<double>(covariance(i, j)) / scale;
+      if (!std::isfinite(correlation(i, j))) return true;
+    }
+  }
+  // Singular values are the eigenvalues' absolute values, and a covariance has none below zero but by rounding.
+  return k > 0 && !(detail::SmallSvd(correlation).value(k - 1) > 1e-10);
 }
 
 }  // namespace liestat

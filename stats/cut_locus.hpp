@@ -16,6 +16,8 @@
 #include <limits>
 #include <ranges>
 #include <tuple>
+#include <type_traits>
+#include <utility>
 
 namespace liestat {
 
@@ -169,25 +171,42 @@ CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanRe
 ///     - Σ_{gap < w} p (z - z₂)(z - z₂)ᵀ/((θ + θ₂) w).
 /// hessian_change is its largest eigenvalue relative to the sample's Hessian: about π m/w for quotient frames folded
 /// about one axis, 2π m/w for rotations.
-template <SampleRange R, Metric M = SampleOf<R>>
-CutLocusMass cutLocusMass(const R& samples, const MeanResult<M>& mean, double window) {
-  return detail::findCutLocusMass(detail::asSamples(samples), detail::UnitWeights{}, mean, window);
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+CutLocusMass cutLocusMass(R&& samples, const MeanResult<std::type_identity_t<M>>& mean, double window) {
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findCutLocusMass(detail::asSamples(samples), detail::UnitWeights{}, mean, window);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-CutLocusMass cutLocusMass(const R& samples, const W& weights, const MeanResult<M>& mean, double window) {
-  return detail::findCutLocusMass(detail::asSamples(samples), detail::asWeights(weights), mean, window);
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+CutLocusMass cutLocusMass(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean, double window) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findCutLocusMass(detail::asSamples(samples), detail::asWeights(weights), mean, window);
+  } else {
+    return {};
+  }
 }
 
 /// The same within the confidence region of a mean of the given covariance (rad², local frame): the window is six times
 /// the largest standard deviation of the rotation, whatever its axis, and at least 0.2 rad.
-template <SampleRange R, Metric M = SampleOf<R>>
-CutLocusMass cutLocusNearby(const R& samples, const MeanResult<M>& mean, const SquareOf<M>& covariance) {
-  return detail::findCutLocusNearby(detail::asSamples(samples), detail::UnitWeights{}, mean, covariance);
-}
-template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-CutLocusMass cutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+CutLocusMass cutLocusNearby(R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
                             const SquareOf<M>& covariance) {
-  return detail::findCutLocusNearby(detail::asSamples(samples), detail::asWeights(weights), mean, covariance);
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findCutLocusNearby(detail::asSamples(samples), detail::UnitWeights{}, mean, covariance);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+CutLocusMass cutLocusNearby(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
+                            const SquareOf<M>& covariance) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findCutLocusNearby(detail::asSamples(samples), detail::asWeights(weights), mean, covariance);
+  } else {
+    return {};
+  }
 }
 
 }  // namespace liestat

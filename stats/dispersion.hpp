@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <limits>
 #include <ranges>
+#include <type_traits>
 #include <vector>
 
 namespace liestat {
@@ -64,13 +65,21 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
 }  // namespace detail
 
 /// Dispersion of a range of features about y, weighted or not, in the local frame at y. NaN for an empty range.
-template <SampleRange R, Homogeneous M = SampleOf<R>>
-Dispersion<M> dispersionAbout(const R& samples, const M& y) {
-  return detail::findDispersion(detail::asSamples(samples), detail::UnitWeights{}, y);
+template <detail::AnyRange R, class M = detail::SampleInSignature<R>>
+Dispersion<M> dispersionAbout(R&& samples, const std::type_identity_t<M>& y) {
+  if constexpr (detail::RequireSamples<R>::ok) {
+    return detail::findDispersion(detail::asSamples(samples), detail::UnitWeights{}, y);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, WeightRange W, Homogeneous M = SampleOf<R>>
-Dispersion<M> dispersionAbout(const R& samples, const W& weights, const M& y) {
-  return detail::findDispersion(detail::asSamples(samples), detail::asWeights(weights), y);
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::SampleInSignature<R>>
+Dispersion<M> dispersionAbout(R&& samples, W&& weights, const std::type_identity_t<M>& y) {
+  if constexpr (detail::RequireSamples<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findDispersion(detail::asSamples(samples), detail::asWeights(weights), y);
+  } else {
+    return {};
+  }
 }
 
 }  // namespace liestat

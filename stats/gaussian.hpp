@@ -3,6 +3,7 @@
 
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_products.hpp>
 
 #include <cmath>
 #include <limits>
@@ -41,8 +42,7 @@ ScalarOf<M> mahalanobis(const Gaussian<M>& g, const M& y) {
 template <Homogeneous M>
 ScalarOf<M> mahalanobisSquared(const Gaussian<M>& a, const Gaussian<M>& b) {
   const ErrorVector<M> e = errorVector(a.mean, b.mean);
-  const SquareOf<M> sum =
-      e.by_base * a.covariance * e.by_base.transpose() + e.by_feature * b.covariance * e.by_feature.transpose();
+  const SquareOf<M> sum = detail::congruence(e.by_base, a.covariance) + detail::congruence(e.by_feature, b.covariance);
   return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(e.z, sum);
 }
 
@@ -50,7 +50,7 @@ ScalarOf<M> mahalanobisSquared(const Gaussian<M>& a, const Gaussian<M>& b) {
 template <Homogeneous M>
 Gaussian<M> act(const typename ManifoldTraits<M>::Group& f, const Gaussian<M>& g) {
   const SquareOf<M> J = actionFeatureJacobian(f, g.mean);
-  return {act(f, g.mean), J * g.covariance * J.transpose()};
+  return {act(f, g.mean), detail::congruence(J, g.covariance)};
 }
 
 /// The covariance of g carried to the frame at y by the transformation that leads from g.mean to y along exp (parallel
@@ -58,19 +58,19 @@ Gaussian<M> act(const typename ManifoldTraits<M>::Group& f, const Gaussian<M>& g
 template <Homogeneous M>
 Gaussian<M> transport(const Gaussian<M>& g, const M& y) {
   const SquareOf<M> T = frameTransport(g.mean, y);
-  return {y, T * g.covariance * T.transpose()};
+  return {y, detail::congruence(T, g.covariance)};
 }
 
 /// Covariance in the principal chart of the report, Σ_chart = J(f_x) Σ J(f_x)ᵀ (first order), and back.
 template <Homogeneous M>
 SquareOf<M> principalChartCovariance(const Gaussian<M>& g) {
   const SquareOf<M> J = principalChartJacobian(g.mean);
-  return J * g.covariance * J.transpose();
+  return detail::congruence(J, g.covariance);
 }
 template <Homogeneous M>
 SquareOf<M> covarianceFromPrincipalChart(const M& x, const SquareOf<M>& chart_covariance) {
   const SquareOf<M> J = detail::inverse<ScalarOf<M>, ManifoldTraits<M>::DoF>(principalChartJacobian(x));
-  return J * chart_covariance * J.transpose();
+  return detail::congruence(J, chart_covariance);
 }
 
 }  // namespace liestat

@@ -12,7 +12,6 @@ template <LieGroup G>
 struct GroupMeanResult {
   G mean;
   Status status = Status::too_few;
-  bool converged = false;
   int iterations = 0;
   double residual = 0, tolerance = 0;
   std::size_t n = 0;
@@ -28,7 +27,7 @@ struct GroupMeanResult {
     using S = ScalarOf<G>;
     if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
     const SquareOf<G> inverse = detail::inverse<S, G::DoF>(jacobian);
-    return inverse * scatter * inverse.transpose() * (S(sum_of_weights) / (S(n) - S(1)));
+    return detail::congruence(inverse, scatter) * (S(sum_of_weights) / (S(n) - S(1)));
   }
 };
 
@@ -64,7 +63,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
   result.status = Status::not_converged;
   G y = start ? *start : startOfMean<G>(samples, weights);
   result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
-  for (int i = 0; i < 100 && !result.converged; ++i) {
+  for (int i = 0; i < 100 && result.status != Status::ok; ++i) {
     const G to_mean = y.inverse();
     const auto sums = sumOverData<GroupMeanSums<G>>(executor, result.n, [&](std::size_t k, GroupMeanSums<G>& s) {
       const S p = S(weights[k]);
@@ -82,10 +81,9 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     if (!std::isfinite(result.residual)) break;
     ++result.iterations;
     y = y * G::exp(step);
-    result.converged = result.residual <= result.tolerance;
+    if (result.residual <= result.tolerance) result.status = Status::ok;
   }
   result.mean = y;
-  if (result.converged) result.status = Status::ok;
   return result;
 }
 

@@ -53,7 +53,6 @@ template <Homogeneous M>
 struct MahaResult {
   M mean = ManifoldTraits<M>::origin();
   Status status = Status::too_few;
-  bool converged = false;
   int iterations = 0;    ///< steps taken, the last one below the tolerance
   double residual = 0;   ///< norm of the last step
   double tolerance = 0;  ///< the one that was used
@@ -125,8 +124,8 @@ struct MahaProblem {
     SquareOf<M> B = information[i];
     TangentOf<M> a = B * e.z;
     sums.cost += S(0.5) * e.z.dot(a);
-    const SquareOf<M> BJ = B * J;
-    sums.gauss_newton += J.transpose() * BJ;
+    const SquareOf<M> transposed = J.transpose();
+    sums.gauss_newton += product(transposed, product(B, J));
     if constexpr (requires { T::logVolume(e.z); }) {
       if (likelihood) {
         const auto volume = T::logVolume(e.z);
@@ -139,10 +138,11 @@ struct MahaProblem {
     if constexpr (second_order) {
       // J = D(z) Q with Q = D⁻¹ J constant in z to the order that counts: isotropy and the representative's half-turn.
       if (measured) {
-        const SquareOf<M> Q = T::dexpOrigin(e.z) * J;
-        sums.hessian += J.transpose() * B * J + Q.transpose() * T::dlogFeatureTransposed(e.z, a) * J;
+        const SquareOf<M> Q = product(T::dexpOrigin(e.z), J);
+        sums.hessian +=
+            product(product(transposed, B), J) + product(product(Q.transpose(), T::dlogFeatureTransposed(e.z, a)), J);
       } else {
-        sums.hessian += J.transpose() * B * J + T::dlogBaseTransposed(e.z, a) * J;
+        sums.hessian += product(product(transposed, B), J) + product(T::dlogBaseTransposed(e.z, a), J);
       }
     }
   }
@@ -221,6 +221,7 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     result.tolerance = options.tolerance.value_or(automaticTolerance<S>(scale));
   }
   result.status = Status::not_converged;
+  bool reached = false;
   while (result.iterations < options.max_iterations) {
     TangentOf<M> step;
     bool newton = false;
@@ -253,12 +254,12 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     if (!accepted) {
       // A kink of the criterion: no descent along an exact descent direction. Or the rounding of the cost, which is
       // large where coordinates are large in deviations: not of steps that are nothing.
-      result.converged = result.residual <= result.tolerance;
+      reached = result.residual <= result.tolerance;
       break;
     }
     y = next, sums = next_sums;
     if (result.residual <= result.tolerance || stalled) {
-      result.converged = true;
+      reached = true;
       break;
     }
   }
@@ -266,7 +267,7 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
   result.mean = y;
   result.cost = sums.cost;
   result.gauss_newton = sums.gauss_newton;
-  if (!result.converged) return result;
+  if (!reached) return result;
   result.hessian = problem.hessian(executor, y, sums);
   const Cholesky<S, T::DoF> factor(result.hessian);
   result.status = factor.ok() ? Status::ok : Status::ill_defined;

@@ -49,7 +49,6 @@ template <Homogeneous M>
 struct MeanResult {
   M mean = ManifoldTraits<M>::origin();
   Status status = Status::too_few;
-  bool converged = false;
   int iterations = 0;    ///< steps taken, the last one below the tolerance
   double residual = 0;   ///< intrinsic norm of the last step
   double tolerance = 0;  ///< the one that was used
@@ -276,7 +275,7 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
     if (result.residual <= result.tolerance) {
       // The sums remain those of the point before, which is the mean to the tolerance: no pass over the data for that.
       y = next;
-      result.converged = true;
+      result.status = Status::ok;
       break;
     }
     // The next step's length: the square of this one by Newton's method (a small multiple of it: clouds are nearly
@@ -300,7 +299,6 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
 
   if (!pass.has_scatter) pass = meanPass<true>(executor, samples, weights, y);
   result.mean = y;
-  if (result.converged) result.status = Status::ok;
   result.cost = pass.sums.cost;
   result.hessian = pass.sums.hessian;
   result.sum_of_weights = pass.sums.weight;
@@ -320,6 +318,8 @@ struct RequireMean : RequireSamples<R> {
       "the Frechet mean needs an invariant Riemannian metric; this type has none. Use Frame3 or Frame2 for poses, or "
       "groupMean (the exponential barycentre) or maha.");
 };
+template <class R>
+using MetricInSignature = std::conditional_t<Metric<SampleInSignature<R>>, SampleInSignature<R>, SO3<double>>;
 
 }  // namespace detail
 

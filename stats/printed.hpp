@@ -22,7 +22,7 @@ SquareOf<M> covarianceFromNoise(R&& samples, W&& weights, V&& noise, const std::
   for (std::size_t i = 0; i < x.size(); ++i) {
     const ScalarOf<M> p = ScalarOf<M>(numbers[i]);
     const SquareOf<M> D = errorVector(mean, x[i]).by_feature;
-    sum += p * p * D * covariances[i] * D.transpose();
+    sum += p * p * detail::congruence(D, covariances[i]);
     weight += p;
   }
   return sum / (weight * weight);
@@ -67,7 +67,7 @@ MahaResult<M> maha(R&& range, const MahaOptions<std::type_identity_t<M>>& option
     for (const Gaussian<M>& g : samples) {
       const ErrorVector<M> e = errorVector(y, g.mean);
       const SquareOf<M> information =
-          detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(e.by_feature * g.covariance * e.by_feature.transpose())
+          detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(detail::congruence(e.by_feature, g.covariance))
               .inverse();
       const SquareOf<M> weighted = e.by_base.transpose() * information;
       result.cost += ScalarOf<M>(0.5) * e.z.dot(information * e.z);
@@ -80,14 +80,13 @@ MahaResult<M> maha(R&& range, const MahaOptions<std::type_identity_t<M>>& option
     ++result.iterations;
     y = exp(y, step);
     if (result.residual <= result.tolerance) {
-      result.converged = true;
       result.status = Status::ok;
       break;
     }
   }
   result.mean = y;
   result.hessian = result.gauss_newton = H;
-  if (result.converged) result.covariance = detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).inverse();
+  if (converged(result.status)) result.covariance = detail::Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(H).inverse();
   return result;
 }
 

@@ -10,6 +10,7 @@
 // problems", IEEE Transactions on Robotics 30(3), 2014; their perturbations are on the left.
 #pragma once
 
+#include <lie/detail/small_products.hpp>
 #include <stats/conventions.hpp>
 #include <stats/gaussian.hpp>
 
@@ -31,17 +32,11 @@ using JacobianOf = Eigen::Matrix<ScalarOf<N>, ManifoldTraits<N>::DoF, ManifoldTr
 
 namespace detail {
 
-/// J Σ Jᵀ
-template <class S, int N, int M>
-Eigen::Matrix<S, N, N> transformed(const Eigen::Matrix<S, N, M>& J, const Eigen::Matrix<S, M, M>& covariance) {
-  return J * covariance * J.transpose();
-}
-
 /// J_a C J_bᵀ and its transpose, what correlation adds to the covariance of a sum.
 template <class S, int N, int A, int B>
 Eigen::Matrix<S, N, N> correlated(const Eigen::Matrix<S, N, A>& J_a, const Eigen::Matrix<S, A, B>& cross,
                                   const Eigen::Matrix<S, N, B>& J_b) {
-  const Eigen::Matrix<S, N, N> half = J_a * cross * J_b.transpose();
+  const Eigen::Matrix<S, N, N> half = productTransposed(product(J_a, cross), J_b);
   return half + half.transpose();
 }
 
@@ -53,10 +48,10 @@ struct Linearized {
   JacobianOf<N, B> by_b;
 
   Gaussian<N> of(const SquareOf<A>& a, const SquareOf<B>& b) const {
-    return {value, transformed(by_a, a) + transformed(by_b, b)};
+    return {value, congruence(by_a, a) + congruence(by_b, b)};
   }
   Gaussian<N> of(const SquareOf<A>& a, const SquareOf<B>& b, const CrossCovariance<A, B>& cross) const {
-    return {value, transformed(by_a, a) + transformed(by_b, b) + correlated(by_a, cross, by_b)};
+    return {value, congruence(by_a, a) + congruence(by_b, b) + correlated(by_a, cross, by_b)};
   }
 };
 
@@ -70,7 +65,7 @@ Linearized<M, M, M> linearizedBetween(const M& x, const M& y) {
   using T = ManifoldTraits<M>;
   const typename T::Group to_x = T::placement(x), f = to_x.inverse();
   // placement(exp(x, e))⁻¹ = f·Exp(-Adj(placement(x)) P e), P the derivative of the placement.
-  return {act(f, y), -(actionTransformationJacobian(f, y) * to_x.Adj() * T::placementJacobian(x)),
+  return {act(f, y), -product(product(actionTransformationJacobian(f, y), to_x.Adj()), T::placementJacobian(x)),
           actionFeatureJacobian(f, y)};
 }
 
@@ -146,7 +141,7 @@ Gaussian<G> compose(const Gaussian<G>& a, const Gaussian<G>& b, const CrossCovar
 /// a·b with an exact factor; exact.
 template <LieGroup G>
 Gaussian<G> compose(const Gaussian<G>& a, const G& b) {
-  return {a.mean * b, detail::transformed(SquareOf<G>(b.inverse().Adj()), a.covariance)};
+  return {a.mean * b, detail::congruence(SquareOf<G>(b.inverse().Adj()), a.covariance)};
 }
 template <LieGroup G>
 Gaussian<G> compose(const G& a, const Gaussian<G>& b) {
@@ -156,7 +151,7 @@ Gaussian<G> compose(const G& a, const Gaussian<G>& b) {
 /// x⁻¹: covariance Adj(x) Σ Adj(x)ᵀ; exact.
 template <LieGroup G>
 Gaussian<G> inverse(const Gaussian<G>& x) {
-  return {x.mean.inverse(), detail::transformed(SquareOf<G>(x.mean.Adj()), x.covariance)};
+  return {x.mean.inverse(), detail::congruence(SquareOf<G>(x.mean.Adj()), x.covariance)};
 }
 
 /// a·b of independent factors, the covariance to fourth order in the noise: of the logarithm's exact second moment by
@@ -168,7 +163,7 @@ Gaussian<G> composeFourthOrder(const Gaussian<G>& a, const Gaussian<G>& b) {
   using S = ScalarOf<G>;
   constexpr int n = G::DoF;
   // (a·b)⁻¹·a Exp(e_a)·b Exp(e_b) = Exp(Adj(b)⁻¹ e_a)·Exp(e_b): two factors at the identity, P and Q.
-  const Square P = detail::transformed(Square(b.mean.inverse().Adj()), a.covariance);
+  const Square P = detail::congruence(Square(b.mean.inverse().Adj()), a.covariance);
   const Square& Q = b.covariance;
   // Σ_j P_ij ad(e_j), and then E[ad(p) ad(p)] = A_P, likewise A_Q, and E[ad(p) q qᵀ ad(p)ᵀ] = B.
   Square A_P = Square::Zero(), A_Q = Square::Zero(), B = Square::Zero();
@@ -183,11 +178,11 @@ Gaussian<G> composeFourthOrder(const Gaussian<G>& a, const Gaussian<G>& b) {
       by_q += Q(i, j) * basis[static_cast<std::size_t>(j)];
     }
     const Square& ad = basis[static_cast<std::size_t>(i)];
-    A_P += ad * by_p;
-    A_Q += ad * by_q;
-    B += ad * Q * by_p.transpose();
+    A_P += detail::product(ad, by_p);
+    A_Q += detail::product(ad, by_q);
+    B += detail::productTransposed(detail::product(ad, Q), by_p);
   }
-  const Square twelfths = A_P * Q + A_Q * P;
+  const Square twelfths = detail::product(A_P, Q) + detail::product(A_Q, P);
   return {a.mean * b.mean, P + Q + S(0.25) * B + (twelfths + twelfths.transpose()) / S(12)};
 }
 
@@ -264,7 +259,7 @@ auto propagate(const Gaussian<M>& x, F&& f, const J& jacobian) {
   const auto value = detail::evaluated<ScalarOf<M>>(f, x.mean);
   using N = std::remove_const_t<decltype(value)>;
   const JacobianOf<N, M> derivative = detail::jacobianAt(jacobian, x.mean);
-  return Gaussian<N>{value, detail::transformed(derivative, x.covariance)};
+  return Gaussian<N>{value, detail::congruence(derivative, x.covariance)};
 }
 
 /// f(a, b) of independent features: Jacobians with respect to each, as matrices or as functions of (a, b).

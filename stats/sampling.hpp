@@ -1,4 +1,4 @@
-// Random features: Gaussian and uniform, from counter-based random numbers.
+// Random features from counter-based random numbers: Gaussian, and with any orientation at places in a cube.
 #pragma once
 
 #include <lie/lie.hpp>
@@ -62,9 +62,10 @@ G uniformTransformation(CounterRng& rng, double half_width) {
 }  // namespace detail
 
 /// A feature whose orientation is uniform and whose position is uniform in the cube [-half_width, half_width]^d (m);
-/// where there is a scale, its logarithm to base 2 is uniform in [-1, 1].
+/// where there is a scale, its logarithm to base 2 is uniform in [-1, 1]. (A group's static
+/// sampleUniform(generator), which is Sophus', takes any generator, has no width and draws other numbers.)
 template <Homogeneous M>
-M sampleUniform(CounterRng& rng, double half_width = 1) {
+M sampleInCube(CounterRng& rng, double half_width = 1) {
   using T = ManifoldTraits<M>;
   return T::act(detail::uniformTransformation<typename T::Group>(rng, half_width), T::origin());
 }

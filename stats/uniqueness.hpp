@@ -21,40 +21,57 @@
 #include <stats/mean.hpp>
 #include <stats/uniqueness_types.hpp>
 
-#include <ranges>
+#include <type_traits>
 
 namespace liestat {
 
 /// r*: the largest radius (rad) about a mean in which the criterion is strictly convex along every geodesic from it, so
 /// that the mean is the only minimum there: θ_i + r < π (quotients: 2r < gap_i) for all data and Σ p_i g(θ_i + r) > 0,
 /// g the transverse eigenvalue of Hess ½d². 0 if there is none.
-template <SampleRange R, Metric M = SampleOf<R>>
-double localRadius(const R& samples, const M& mean) {
-  return detail::findLocalRadius(detail::asSamples(samples), detail::UnitWeights{}, mean);
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+double localRadius(R&& samples, const std::type_identity_t<M>& mean) {
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findLocalRadius(detail::asSamples(samples), detail::UnitWeights{}, mean);
+  } else {
+    return 0;
+  }
 }
-template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-double localRadius(const R& samples, const W& weights, const M& mean) {
-  return detail::findLocalRadius(detail::asSamples(samples), detail::asWeights(weights), mean);
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+double localRadius(R&& samples, W&& weights, const std::type_identity_t<M>& mean) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findLocalRadius(detail::asSamples(samples), detail::asWeights(weights), mean);
+  } else {
+    return 0;
+  }
 }
 
 /// Is the mean of these features the only one? `mean` is what mean() returned for the same features and weights.
 /// If a lower minimum turns up it is returned: this is a certified global search. The same bits on any executor.
-template <Executor E, SampleRange R, Metric M = SampleOf<R>>
-UniquenessResult<M> uniqueness(const E& executor, const R& samples, const MeanResult<M>& mean,
+template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
+UniquenessResult<M> uniqueness(const E& executor, R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
                                const UniquenessOptions& options = {}) {
-  return detail::findUniqueness(executor, detail::asSamples(samples), detail::UnitWeights{}, mean, options);
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findUniqueness(executor, detail::asSamples(samples), detail::UnitWeights{}, mean, options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, Metric M = SampleOf<R>>
-UniquenessResult<M> uniqueness(const R& samples, const MeanResult<M>& mean, const UniquenessOptions& options = {}) {
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+UniquenessResult<M> uniqueness(R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
+                               const UniquenessOptions& options = {}) {
   return uniqueness(SerialExecutor{}, samples, mean, options);
 }
-template <Executor E, SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-UniquenessResult<M> uniqueness(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean,
-                               const UniquenessOptions& options = {}) {
-  return detail::findUniqueness(executor, detail::asSamples(samples), detail::asWeights(weights), mean, options);
+template <Executor E, detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+UniquenessResult<M> uniqueness(const E& executor, R&& samples, W&& weights,
+                               const MeanResult<std::type_identity_t<M>>& mean, const UniquenessOptions& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findUniqueness(executor, detail::asSamples(samples), detail::asWeights(weights), mean, options);
+  } else {
+    return {};
+  }
 }
-template <SampleRange R, WeightRange W, Metric M = SampleOf<R>>
-UniquenessResult<M> uniqueness(const R& samples, const W& weights, const MeanResult<M>& mean,
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+UniquenessResult<M> uniqueness(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
                                const UniquenessOptions& options = {}) {
   return uniqueness(SerialExecutor{}, samples, weights, mean, options);
 }

@@ -6,10 +6,6 @@
 #include <stats/certified_maha.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/dispersion.hpp>
-#include <stats/inference.hpp>
-
-#include <Eigen/Eigenvalues>
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -134,15 +130,6 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   return analysis;
 }
 
-/// True if the measurements leave some direction without any error, whatever the units.
-bool isSingular(const Eigen::MatrixXd& covariance) {
-  const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
-  if (!(sd.minCoeff() > 0)) return true;
-  const Eigen::MatrixXd correlation = sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
-  return !(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation, Eigen::EigenvaluesOnly).eigenvalues()[0] >
-           1e-10);
-}
-
 }  // namespace
 
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options) {
@@ -150,26 +137,7 @@ MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions
   if (how.budget == 0) how.budget = measurements.size() > 100000 ? 2000 : 1000000;
   MeanAnalysis analysis =
       experiments::withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, how); });
-  if (measurements.size() == 1) {
-    analysis.notes.emplace_back("one measurement is its own mean");
-  } else if (analysis.dispersion.isZero(0) || !(analysis.dispersion.diagonal().maxCoeff() > 1e-28)) {
-    analysis.notes.emplace_back(analysis.covariance_from == "residuals"
-                                    ? "all measurements are equal: a covariance from the residuals is zero, which says "
-                                      "nothing about an error that they share"
-                                    : "all measurements are equal");
-  } else if (analysis.covariance_from == "residuals" && isSingular(analysis.covariance)) {
-    analysis.notes.emplace_back(
-        "the measurements do not vary in every direction: the covariance from the residuals is singular");
-  }
-  if (analysis.fit_dof > 0) {
-    analysis.fit_p = chiSquaredSurvival(analysis.fit, analysis.fit_dof);
-    if (analysis.fit_p < 1e-3) {
-      analysis.notes.push_back(
-          fmt::format("the measurements scatter more than their covariances say: {:.4g} times the expected squared "
-                      "distance (p = {:.2g})",
-                      analysis.fit / analysis.fit_dof, analysis.fit_p));
-    }
-  }
+  explain(analysis, measurements.size());
   return analysis;
 }
 

@@ -65,4 +65,7 @@ struct AnalysisOptions {
 /// Mean, covariance, dispersion and uniqueness of the measurements. The same bits for any number of threads.
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options);
 
+/// Adds the p-value of the fit, and notes on what is remarkable about the result, to an analysis of n measurements.
+void explain(MeanAnalysis& analysis, std::size_t n);
+
 }  // namespace liestat::cli

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <fusion/imu/preintegration.hpp>
+#include <lie/detail/small_products.hpp>
 
 namespace liestat {
 
@@ -55,12 +56,12 @@ PreintegrationResidual<S> preintegrationResidual(const Preintegration<S>& motion
   // Φ_t(X Exp d) = Φ_t(X) Exp(F d): a velocity carries the position along.
   Matrix9 F = Matrix9::Identity();
   F.template block<3, 3>(0, 6) = t * Matrix3::Identity();
-  r.by_first = -r.by_second * implied.inverse().Adj() * F;
-  r.by_bias = -SE23<S>::leftJacobianInverse(r.value) * motion.biasJacobian(bias);
+  r.by_first = -detail::product(detail::product(r.by_second, implied.inverse().Adj()), F);
+  r.by_bias = -detail::product(SE23<S>::leftJacobianInverse(r.value), motion.biasJacobian(bias));
   const Matrix3 back = second.so3().matrix().transpose();
   Eigen::Matrix<S, 9, 3> by_gravity;
   by_gravity << -(S(0.5) * t * t) * back, Matrix3::Zero(), -t * back;
-  r.by_gravity = r.by_second * by_gravity;
+  r.by_gravity = detail::product(r.by_second, by_gravity);
   return r;
 }
 

@@ -23,6 +23,7 @@
 #include <fusion/detail/increment_covariance.hpp>
 #include <fusion/detail/step_matrices.hpp>
 #include <fusion/imu/readings.hpp>
+#include <lie/detail/small_products.hpp>
 #include <lie/se23.hpp>
 #include <stats/gaussian.hpp>
 
@@ -126,7 +127,7 @@ class Preintegration {
     Matrix9 T = Matrix9::Zero();
     T.template block<3, 3>(0, 3) = increment_.so3().matrix().transpose();
     T.template block<3, 3>(3, 6) = T.template block<3, 3>(6, 0) = Matrix3::Identity();
-    return T * sigma * T.transpose();
+    return detail::congruence(T, sigma);
   }
 
   /// The increment's covariance with that of the biases at the end, 15×15, order (position, rotation, velocity,

@@ -1,6 +1,7 @@
 // The state of a body that a camera and an inertial sensor tell without a map, as a manifold.
 #pragma once
 
+#include <lie/detail/small_products.hpp>
 #include <lie/product.hpp>
 #include <lie/rn.hpp>
 #include <lie/s2.hpp>
@@ -49,7 +50,7 @@ inline Eigen::Vector3d accelerometerBias(const InertialState& state, double grav
 }
 inline Gaussian<Eigen::Vector3d> accelerometerBias(const Gaussian<InertialState>& state, double gravity) {
   const Eigen::Matrix<double, 3, 11> J = detail::fromInertialTangent(state.mean.get<0>(), gravity).bottomRows<3>();
-  return {accelerometerBias(state.mean, gravity), J * state.covariance * J.transpose()};
+  return {accelerometerBias(state.mean, gravity), detail::congruence(J, state.covariance)};
 }
 
 }  // namespace liestat

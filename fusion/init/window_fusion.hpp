@@ -20,6 +20,7 @@
 #include <fusion/init/inertial_state.hpp>
 #include <fusion/init/results.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_products.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/maha.hpp>
 
@@ -63,16 +64,17 @@ inline Gaussian<InertialState> carried(const Gaussian<InertialState>& state, con
   Eigen::Matrix<double, 12, 12> F = Eigen::Matrix<double, 12, 12>::Identity();
   F.block<3, 3>(0, 0) = F.block<3, 3>(3, 3) = back;
   F.block<3, 3>(3, 0) = (gravity * t) * back;
-  F.block<6, 6>(0, 6) = by_noise.topLeftCorner<6, 9>() * motion.biasJacobian(bias);
+  F.block<6, 6>(0, 6) = detail::product(by_noise.topLeftCorner<6, 9>(), motion.biasJacobian(bias));
 
   Gaussian<InertialState> after;
   after.mean = InertialState(direction_after, velocity_after, gyroscope,
                              Eigen::Vector3d(bias.accelerometer - gravity * down_after));
   const Eigen::Matrix<double, 11, 12> to_tangent = detail::toInertialTangent(direction_after, gravity);
-  const detail::Matrix11 by_state = to_tangent * F * detail::fromInertialTangent(direction, gravity);
-  const Eigen::Matrix<double, 11, 15> noise = to_tangent * by_noise;
-  after.covariance = by_state * state.covariance * by_state.transpose();
-  after.covariance += noise * motion.covarianceWithBias() * noise.transpose();
+  const detail::Matrix11 by_state =
+      detail::product(to_tangent, detail::product(F, detail::fromInertialTangent(direction, gravity)));
+  const Eigen::Matrix<double, 11, 15> noise = detail::product(to_tangent, by_noise);
+  after.covariance =
+      detail::congruence(by_state, state.covariance) + detail::congruence(noise, motion.covarianceWithBias());
   return after;
 }
 
@@ -122,7 +124,7 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
   const auto tangent = [&](const InertialState& x, const Eigen::Matrix<double, 12, 21>& by_unknowns) {
     Eigen::Matrix<double, 11, 12> J = detail::toInertialTangent(x.get<0>(), 1);
     J.topLeftCorner<2, 3>() /= length;
-    return Eigen::Matrix<double, 11, 21>(J * by_unknowns);
+    return detail::product(J, by_unknowns);
   };
   states.first.mean = state(refined.gravity, refined.velocity());
   states.last.mean = state(G, V);
@@ -133,13 +135,13 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
     walked.segment<3>(5).array() += noise.gyroscope_walk * noise.gyroscope_walk * motion.duration();
     walked.tail<3>().array() += noise.accelerometer_walk * noise.accelerometer_walk * motion.duration();
   }
-  states.first.covariance = A * covariance * A.transpose();
-  states.last.covariance = B * covariance * B.transpose();
+  states.first.covariance = detail::congruence(A, covariance);
+  states.last.covariance = detail::congruence(B, covariance);
   states.first.covariance.diagonal() += walked / 3;
   states.last.covariance.diagonal() += walked / 3;
   // In sigmas, because those differ by factors of thousands.
   const Eigen::Matrix<double, 11, 1> unit = states.first.covariance.diagonal().cwiseSqrt();
-  detail::Matrix11 both = A * covariance * B.transpose();
+  detail::Matrix11 both = detail::productTransposed(detail::product(A, covariance), B);
   both.diagonal() -= walked / 6;
   const detail::Matrix11 cross = unit.cwiseInverse().asDiagonal() * both;
   const detail::Cholesky<double, 11> factor(
@@ -147,7 +149,7 @@ inline WindowStates windowStates(const RefinementResult& refined, const Inertial
   if (!factor.ok()) return none();
   states.by_first = factor.solve<11>(cross).transpose() * unit.cwiseInverse().asDiagonal();
   const detail::Matrix11 half = factor.halfSolve<11>(cross);
-  states.independent = states.last.covariance - half.transpose() * half;
+  states.independent = states.last.covariance - detail::product(half.transpose(), half);
   return states;
 }
 
@@ -222,7 +224,7 @@ class WindowFusion {
     const detail::Matrix11 before = transport(at_first, window.first.mean).covariance;
     const Vector11 moved = window.by_first * Vector11(log(window.first.mean, at_first.mean));
     const Gaussian<InertialState> at_last{window.last.mean,
-                                          window.by_first * before * window.by_first.transpose() + window.independent};
+                                          detail::congruence(window.by_first, before) + window.independent};
     return transport(at_last, exp(window.last.mean, moved));
   }
 

@@ -7,12 +7,12 @@
 // perturbations x·Exp(d), in the frame that the placement carries, translation first.
 #pragma once
 
+#include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_products.hpp>
 #include <lie/manifold.hpp>
 
 #include <ceres/jet.h>
 #include <ceres/manifold.h>
-
-#include <Eigen/LU>
 
 #include <type_traits>
 #include <utility>
@@ -118,8 +118,9 @@ double > class CeresManifold final : public ceres::Manifold {
       result = at.Dx_log_this_inv_by_x_at_this();
     } else {
       const auto J = detail::parameterJacobian(at);
-      const Eigen::Matrix<double, T::DoF, T::DoF> normal = J.transpose() * J;
-      result = normal.inverse() * J.transpose();
+      const Eigen::Matrix<double, T::DoF, ambient> transposed = J.transpose();
+      const detail::Cholesky<double, T::DoF> normal(detail::product(transposed, J));
+      result = normal.template solve<ambient>(transposed);
     }
     return result.allFinite();
   }

@@ -3,6 +3,10 @@
 
 #include <lie/detail/contract_inputs.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 namespace liestat {
 
 /// Invariant 8: an invariant distance, which geodesics measure.
@@ -77,6 +81,18 @@ inline void checkQuotient(const ManifoldOperations& m, ContractReport& report, c
     const Vector b = bench.generic(), c = bench.generic();
     const Point y = m.expOrigin(b), x = m.exp(y, v);
     const double room = bench.room(bench.between(y, x));
+    const auto& compact = m.statistics;
+    if (m.representativeGap && compact.compactCoordinates && compact.compact_factor == CompactFactor::rotation) {
+      std::vector<double> angles;
+      for (const int i : m.representatives) {
+        const Vector q = compact.compactCoordinates(m.representative(x, i));
+        angles.push_back(2 * std::atan2(q.head(3).norm(), std::abs(q[3])));
+      }
+      std::sort(angles.begin(), angles.end());
+      bench.exact("the gap of nearestRepresentative is that of the two least angles",
+                  std::abs(m.representativeGap(x) - (angles[1] - angles[0])), {{"log(y, x)", v}, {"y = expOrigin", b}},
+                  8);
+    }
     for (const int i : m.representatives) {
       const Point x_i = m.representative(x, i), y_i = m.representative(y, i);
       const Matrix K = m.representativeJacobian(i);

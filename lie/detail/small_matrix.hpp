@@ -5,6 +5,7 @@
 //
 //   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to 13
 //   small_columns.hpp      3×3 blocks in vector registers
+//   small_products.hpp     products of more rows than that, and A C Aᵀ
 //   nearest_rotation.hpp   the rotation nearest to a 3×3 matrix
 //   trig.hpp               cross-product matrices, beside the coefficients that they are multiplied with
 #pragma once
@@ -96,8 +97,11 @@ class Cholesky {
 
  private:
   void fail() {
-    L_.setConstant(std::numeric_limits<S>::quiet_NaN());
-    inverse_pivots_.setConstant(std::numeric_limits<S>::quiet_NaN());
+    const S nan = std::numeric_limits<S>::quiet_NaN();
+    for (int j = 0; j < N; ++j) {
+      inverse_pivots_[j] = nan;
+      for (int i = 0; i < N; ++i) L_(i, j) = nan;
+    }
   }
 
   Matrix L_;

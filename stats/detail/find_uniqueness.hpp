@@ -2,8 +2,8 @@
 // that its traits say, else by distances alone.
 #pragma once
 
+#include <stats/detail/searched_manifold.hpp>
 #include <stats/detail/uniqueness_circle.hpp>
-#include <stats/detail/uniqueness_search.hpp>
 #include <stats/mean.hpp>
 
 #include <algorithm>
@@ -118,7 +118,7 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
     return result;
   } else {
     using Space = decltype(searchSpace<M>());
-    return UniquenessSearch<M, Space, E, R, W>(executor, samples, weights, mean, options).run();
+    return SearchedManifold<M, Space, E, R, W>(executor, samples, weights, mean).certify(options);
   }
 }
 

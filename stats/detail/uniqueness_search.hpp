@@ -1,17 +1,16 @@
 // The certificates of stats/uniqueness.hpp on rotations, their quotients and the sphere: cheap ones first, then branch
-// and bound.
+// and bound. The search knows points of its space and no manifold, so that it is compiled once for all manifolds with
+// that space; the manifold's side of it is stats/detail/searched_manifold.hpp.
 #pragma once
 
 #include <stats/detail/branch_and_bound.hpp>
 #include <stats/executor.hpp>
-#include <stats/mean.hpp>
 #include <stats/uniqueness_types.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -36,103 +35,126 @@ std::pair<typename Space::Point, double> enclosingBall(const PackedData<Space>& 
   return best;
 }
 
-/// All that one call of uniqueness() needs on a manifold with a search space.
-template <Metric M, class Space, Executor E, class R, class W>
+/// What a search asks of the features whose mean it certifies, a few times each search. Points are seen from the base,
+/// which is the mean at first.
+template <class Space>
+class SearchedMean {
+ public:
+  using Point = typename Space::Point;
+
+  /// Where the iteration for a mean of the features ended.
+  struct Found {
+    bool converged;
+    bool lower;   ///< its cost is below the base's
+    Point point;  ///< its compact part
+  };
+
+  /// The compact parts of the features.
+  virtual PackedData<Space> data() const = 0;
+  /// Iterates from a point of the search.
+  virtual Found iterate(const Point& start) = 0;
+  /// What was found last becomes the base, a better minimum; there are no rivals yet.
+  virtual void takeAsBase() = 0;
+  /// What was found last is a rival of the base.
+  virtual void keepAsRival() = 0;
+  /// The feature at a point is a rival of the base.
+  virtual void addRival(const Point& point) = 0;
+
+ protected:
+  ~SearchedMean() = default;
+};
+
+/// What a search needs to know of the manifold and of the mean from which it starts.
+struct SearchOptions {
+  double tie;              ///< costs that differ by less, relative, are equal
+  double a_priori_radius;  ///< data in a smaller ball have one mean
+  bool base_converged;     ///< the base is a minimum
+  bool branch_and_bound;
+  std::size_t budget;
+  std::size_t max_rivals;
+};
+
+/// What a search says about the base.
+struct SearchVerdict {
+  Uniqueness unique = Uniqueness::not_certified;
+  double r_star = 0;
+  std::size_t cells = 0;
+  const char* proof = "";
+};
+
+/// All that one call of uniqueness() needs in a space.
+template <class Space, Executor E>
 class UniquenessSearch {
  public:
   using Point = typename Space::Point;
 
-  UniquenessSearch(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean,
-                   const UniquenessOptions& options)
-      : executor_(executor),
-        samples_(samples),
-        weights_(weights),
-        options_(options),
-        tie_(std::max(options.tie_tolerance, 64 * static_cast<double>(std::numeric_limits<ScalarOf<M>>::epsilon()))),
-        space_(searchSpace<M>()),
-        base_(mean) {
-    result_.minimiser = mean.mean;
-    result_.cost = mean.cost;
-  }
+  UniquenessSearch(const E& executor, SearchedMean<Space>& mean, const SearchOptions& options)
+      : executor_(executor), mean_(mean), options_(options) {}
 
-  UniquenessResult<M> run() {
+  SearchVerdict run() {
     setBase();
-    if (!std::isfinite(profile_.cost) || !(profile_.weight > 0)) return result_;
-    if (!converged(base_.status)) {
-      // An iteration that ran out of steps: go on from where it stands.
-      const MeanResult<M> further = polished(base_.mean);
-      if (converged(further.status) && further.cost <= base_.cost) adopt(further);
-    }
-    if (converged(base_.status) && cheap()) return result_;
+    if (!std::isfinite(profile_.cost) || !(profile_.weight > 0)) return verdict_;
+    if (options_.base_converged && cheap()) return verdict_;
     if (options_.branch_and_bound) global();
-    return result_;
+    return verdict_;
   }
 
  private:
   struct Minimum {
-    MeanResult<M> mean;
     Point point;
     double cost;  ///< of the compact part
     ExcludedBall<Space> ball;
   };
 
-  MeanResult<M> polished(const M& start) const {
-    MeanOptions<M> options;
-    options.start = start;
-    return detail::frechetMean<M>(executor_, samples_, weights_, options);
-  }
-
   void setBase() {
-    data_ = pack(space_, samples_, weights_, base_.mean);
+    data_ = mean_.data();
     profile_ = profile(data_, Space::fromChart(Space::Chart::Zero()));
-    result_.r_star = convexityRadius<Space>(profile_);
+    verdict_.r_star = convexityRadius<Space>(profile_);
   }
 
-  void adopt(const MeanResult<M>& better) {
-    base_ = better;
-    result_.minimiser = better.mean;
-    result_.cost = better.cost;
-    result_.improved = true;
+  /// Goes on from the better minimum that was found last.
+  void adopt() {
+    mean_.takeAsBase();
+    options_.base_converged = true;
     setBase();
   }
 
   bool prove(const char* proof) {
-    result_.unique = Uniqueness::unique;
-    result_.proof = proof;
+    verdict_.unique = Uniqueness::unique;
+    verdict_.proof = proof;
     return true;
   }
 
   /// The radius about the mean that holds everything as good as the mean.
   double reach() const {
     const double m = profile_.mean_angle;
-    return (m + std::sqrt(m * m + 2 * tie_ * profile_.cost / profile_.weight)) * (1 + 1e-9) + 1e-12;
+    return (m + std::sqrt(m * m + 2 * options_.tie * profile_.cost / profile_.weight)) * (1 + 1e-9) + 1e-12;
   }
 
   bool cheap() {
-    const double radius = aPrioriRadius<M>() * (1 - 1e-9);
+    const double radius = options_.a_priori_radius * (1 - 1e-9);
     if (profile_.largest < radius) return prove("the data lie in a ball about the mean that is small enough");
-    if (result_.r_star > reach()) return prove("no rival can lie outside the ball in which the criterion is convex");
+    if (verdict_.r_star > reach()) return prove("no rival can lie outside the ball in which the criterion is convex");
     if (data_.items.size() <= 100000 && profile_.largest < 2 * radius) {
       const auto [centre, r] = enclosingBall(data_, radius);
       if (r < radius) {
         // The mean is the only critical point inside that ball: if the given one is outside, it is another.
         if (data_.space.see(centre, Space::fromChart(Space::Chart::Zero())).angle >= radius) {
-          const MeanResult<M> better = polished(featureAt(space_, base_.mean, centre));
-          if (!converged(better.status) || !(better.cost < base_.cost)) return false;
-          adopt(better);
+          const auto found = mean_.iterate(centre);
+          if (!found.converged || !found.lower) return false;
+          adopt();
         }
         return prove("the data lie in a ball that is small enough");
       }
     }
     if (data_.items.size() == 2 && profile_.items.size() == 2) {
       const Sighting s = data_.space.see(data_.items[0].point, data_.items[1].point);
-      if (!space_.isQuotient() && s.angle > pi - 1e-7) {
+      if (!data_.space.isQuotient() && s.angle > pi - 1e-7) {
         // Both ways round are equally long; the point opposite on the great circle mirrors the mean.
         const Sighting to_first = data_.space.see(Space::fromChart(Space::Chart::Zero()), data_.items[0].point);
-        result_.rivals.push_back(
-            featureAt(space_, base_.mean, Space::exp(Space::fromChart(Space::Chart::Zero()), 2 * to_first.z)));
-        result_.unique = Uniqueness::ambiguous;
-        result_.proof = "two features as far apart as can be have several midpoints";
+        mean_.addRival(Space::exp(Space::fromChart(Space::Chart::Zero()), 2 * to_first.z));
+        verdict_.unique = Uniqueness::ambiguous;
+        verdict_.proof = "two features as far apart as can be have several midpoints";
         return true;
       }
     }
@@ -156,14 +178,14 @@ class UniquenessSearch {
     const std::size_t budget = options_.budget;
     const Point origin = Space::fromChart(Space::Chart::Zero());
     const double best = profile_.cost;
-    const double threshold = best * (1 + tie_);
+    const double threshold = best * (1 + options_.tie);
     std::vector<Minimum> rivals, others;
-    std::optional<MeanResult<M>> better;
-    CellSearch<Space, E> search(executor_, data, g, reach(), budget > result_.cells ? budget - result_.cells : 0);
+    bool found_better = false;
+    CellSearch<Space, E> search(executor_, data, g, reach(), budget > verdict_.cells ? budget - verdict_.cells : 0);
     constexpr double distinct = 1e-3;  // rad; nearer minima are one
-    const double same = best * (1 - tie_);
+    const double same = best * (1 - options_.tie);
     search.setThreshold(threshold, same, distinct);
-    const double excluded = converged(base_.status) ? exclusionRadius<Space>(profile_, g, result_.r_star, best) : 0;
+    const double excluded = options_.base_converged ? exclusionRadius<Space>(profile_, g, verdict_.r_star, best) : 0;
     search.exclude({origin, excluded});
 
     // From a promising cell down to the minimum below it.
@@ -171,7 +193,7 @@ class UniquenessSearch {
       const Point rest = descend(data, Space::fromChart(cell.centre));
       const auto known = [&](const Point& p, double within) {
         const auto near = [&](const Point& q) { return data_.space.see(q, p).angle < within; };
-        return (converged(base_.status) && near(origin)) ||
+        return (options_.base_converged && near(origin)) ||
                std::any_of(rivals.begin(), rivals.end(), [&](const Minimum& m) { return near(m.point); }) ||
                std::any_of(others.begin(), others.end(), [&](const Minimum& m) { return near(m.point); });
       };
@@ -179,24 +201,25 @@ class UniquenessSearch {
       if (known(rest, distinct) && !(cost_at_rest < same)) return;
       // The costs of bins are upper bounds, and a step through many data is dear.
       if (data.roots < data_.items.size() && cost_at_rest > 1.05 * best) return;
-      Minimum m{polished(featureAt(space_, base_.mean, rest)), rest, 0, {}};
-      if (!converged(m.mean.status)) return;
-      m.point = relativePoint<Space>(ManifoldTraits<M>::placement(base_.mean).inverse(), m.mean.mean);
-      const Profile seen = profile(data_, m.point);
-      m.cost = seen.cost;
-      if (m.cost < same || (!converged(base_.status) && m.cost <= best)) {
-        better = m.mean;
+      const auto found = mean_.iterate(rest);
+      if (!found.converged) return;
+      const Profile seen = profile(data_, found.point);
+      Minimum m{found.point, seen.cost, {}};
+      if (m.cost < same || (!options_.base_converged && m.cost <= best)) {
+        found_better = true;
         return;
       }
       if (known(m.point, distinct)) return;
       m.ball = {m.point, exclusionRadius<Space>(seen, g, convexityRadius<Space>(seen), std::min(m.cost, threshold))};
       search.exclude(m.ball);
-      (m.cost <= threshold ? rivals : others).push_back(m);
+      const bool is_rival = m.cost <= threshold;
+      (is_rival ? rivals : others).push_back(m);
+      if (is_rival) mean_.keepAsRival();
     };
 
     std::size_t visits = 0, next_exploration = 8;
     auto step = CellSearch<Space, E>::Step::split;
-    while (step == CellSearch<Space, E>::Step::split && !better && rivals.size() < options_.max_rivals) {
+    while (step == CellSearch<Space, E>::Step::split && !found_better && rivals.size() < options_.max_rivals) {
       step = search.step([&](const typename CellSearch<Space, E>::Cell& cell) {
         const bool promising = cell.centre_cost < best;
         if (!promising && ++visits < next_exploration) return;
@@ -204,31 +227,26 @@ class UniquenessSearch {
         explore(cell);
       });
     }
-    result_.cells += search.cells();
-    if (better) {
-      adopt(*better);
+    verdict_.cells += search.cells();
+    if (found_better) {
+      adopt();
       return true;
     }
     if (!rivals.empty()) {
-      result_.unique = Uniqueness::ambiguous;
-      result_.proof = "several minima of equal cost";
-      for (const Minimum& m : rivals) result_.rivals.push_back(m.mean.mean);
+      verdict_.unique = Uniqueness::ambiguous;
+      verdict_.proof = "several minima of equal cost";
       return false;
     }
-    if (step == CellSearch<Space, E>::Step::done && converged(base_.status)) prove("branch and bound");
+    if (step == CellSearch<Space, E>::Step::done && options_.base_converged) prove("branch and bound");
     return false;
   }
 
   const E& executor_;
-  const R& samples_;
-  const W& weights_;
-  const UniquenessOptions& options_;
-  double tie_;
-  Space space_;
-  MeanResult<M> base_;
+  SearchedMean<Space>& mean_;
+  SearchOptions options_;
   PackedData<Space> data_;
   Profile profile_;
-  UniquenessResult<M> result_;
+  SearchVerdict verdict_;
 };
 
 }  // namespace liestat::detail

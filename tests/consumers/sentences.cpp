@@ -1,8 +1,15 @@
 // Mistakes of a user, one for each value of MISTAKE: run.sh shows that each is answered by one sentence.
 #include <lie/lie.hpp>
+#include <stats/certified_group_mean.hpp>
+#include <stats/certified_maha.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/charts.hpp>
+#include <stats/cut_locus.hpp>
+#include <stats/dispersion.hpp>
 #include <stats/group_mean.hpp>
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
+#include <stats/uniqueness.hpp>
 
 #include <ranges>
 #include <sstream>
@@ -17,7 +24,8 @@ int main() {
   const std::vector<Gaussian<Frame3d>> frames(3);
   std::istringstream text("1 2 3");
 #if MISTAKE == 0
-  return static_cast<int>(mean(rotations).n + groupMean(poses).n + maha(frames, CovarianceAt::measured).n);
+  return static_cast<int>(mean(rotations).n + groupMean(poses).n + maha(frames, CovarianceAt::measured).n +
+                          certifiedMean(rotations).mean.n + uniqueness(rotations, mean(rotations)).cells);
 #elif MISTAKE == 1
   return mean(std::vector<int>(3)).iterations;
 #elif MISTAKE == 2
@@ -32,5 +40,25 @@ int main() {
   return maha(rotations).iterations;
 #elif MISTAKE == 7
   return groupMean(std::vector<Frame3d>(3)).iterations;
+#elif MISTAKE == 8
+  return certifiedMean(poses).mean.iterations;
+#elif MISTAKE == 9
+  return certifiedMean(rotations, std::vector<std::string>(3)).mean.iterations;
+#elif MISTAKE == 10
+  return certifiedMaha(rotations, CovarianceAt::measured).maha.iterations;
+#elif MISTAKE == 11
+  return certifiedGroupMean(std::vector<Frame3d>(3)).mean.iterations;
+#elif MISTAKE == 12
+  return uniqueness(std::vector<int>(3), mean(rotations)).improved;
+#elif MISTAKE == 13
+  return localRadius(poses, SO3d()) > 0;
+#elif MISTAKE == 14
+  return cutLocusMass(std::vector<int>(3), mean(rotations), 0.2).mass > 0;
+#elif MISTAKE == 15
+  return cutLocusNearby(rotations, std::vector<std::string>(3), mean(rotations), SO3d::Adjoint::Identity()).mass > 0;
+#elif MISTAKE == 16
+  return static_cast<int>(dispersionAbout(std::vector<int>(3), SO3d()).farthest.size());
+#elif MISTAKE == 17
+  return static_cast<int>(chartScatter(rotations, std::vector<std::string>(3), SO3d()).mean.size());
 #endif
 }

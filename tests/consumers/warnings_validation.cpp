@@ -24,7 +24,7 @@ struct Outcome : TrialOutcome {
 int main() {
   const auto report =
       validate(SerialExecutor{}, {.trials = 10}, ReferenceLaw::hotelling(3, 9), [](CounterRng& rng, std::uint64_t) {
-        const Gaussian<SE3d> g{sampleUniform<SE3d>(rng), SquareOf<SE3d>::Identity()};
+        const Gaussian<SE3d> g{sampleInCube<SE3d>(rng), SquareOf<SE3d>::Identity()};
         Outcome outcome;
         outcome.mu2 = mahalanobisSquared(g, sample(g, rng));
         return outcome;

@@ -14,7 +14,6 @@ TEST(Jet, SE3) { checkGroup<liestat::SE3>(3); }
 TEST(Jet, SE23) { checkGroup<liestat::SE23>(3, {}, 3); }
 
 TEST(Jet, RotationMatrices) {
-  using Jet = ceres::Jet<double, 3>;
   for (const double angle : swept_angles) {
     const liestat::SO3d x = liestat::SO3d::exp(tangent<3>(angle, 0));
     const liestat::SO3<Jet> moved = x.cast<Jet>() * liestat::SO3<Jet>::exp(variable<3>(Eigen::Vector3d::Zero()));
@@ -26,12 +25,11 @@ TEST(Jet, RotationMatrices) {
 
 // The distance has a kink at zero, like |x|: its square does not.
 TEST(Jet, SquaredDistance) {
-  using Jet = ceres::Jet<double, 3>;
   for (const double angle : swept_angles) {
     const Eigen::Vector3d v = tangent<3>(angle, 0);
     const auto z = liestat::log(liestat::SO3<Jet>(), liestat::SO3<Jet>::exp(variable<3>(v)));
     const Jet half = z.dot(z) * 0.5;
-    EXPECT_LE((half.v - v).norm(), some_eps) << "gradient at angle " << angle;
+    EXPECT_LE((half.v.head<3>() - v).norm(), some_eps) << "gradient at angle " << angle;
   }
 }
 

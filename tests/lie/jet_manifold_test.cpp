@@ -19,7 +19,6 @@ void checkManifold(int translation, double limit) {
   using M = Type<double, 0>;
   using T = liestat::ManifoldTraits<M>;
   constexpr int n = T::DoF;
-  using Jet = ceres::Jet<double, n>;
   using J = Type<Jet, 0>;
   using TJ = liestat::ManifoldTraits<J>;
   for (const double angle : swept_angles) {

@@ -65,7 +65,7 @@ TEST(OrientedPoint, MeanIsThatOfPositionsAndOfDirections) {
   for (const auto& x : data) positions.push_back(x.position()), directions.push_back(x.direction());
   const auto result = mean(data);
   const auto direction = mean(directions);
-  ASSERT_TRUE(result.converged);
+  ASSERT_TRUE(converged(result.status));
   EXPECT_LE((result.mean.position() - mean(positions).mean).norm(), some_eps);
   EXPECT_LE(distance(S2d(result.mean.direction()), direction.mean), 1e-11);
   const auto unique = uniqueness(data, result);

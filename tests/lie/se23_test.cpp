@@ -88,7 +88,7 @@ TEST(SE23, GroupMeanIsTheBarycentre) {
     from_right.push_back(samples.back() * moved);
   }
   const auto result = groupMean(samples);
-  ASSERT_TRUE(result.converged);
+  ASSERT_TRUE(converged(result.status));
   Vector9 sum = Vector9::Zero();
   for (const SE23d& x : samples) sum += (result.mean.inverse() * x).log();
   EXPECT_LE(sum.norm(), 12 * 1e-11);

@@ -45,7 +45,7 @@ TEST(SimpleManifold, OfAnInverseIsPerturbedFromTheLeft) {
 }
 
 TEST(SimpleManifold, DifferentiatesThroughJets) {
-  using Jet = ceres::Jet<double, 6>;
+  using liestat_test::Jet;
   using T = liestat::ManifoldTraits<DriverPose<Jet>>;
   for (const double scale : {0.0, 1e-9, 1.0}) {
     const Vector6 v = scale * a;

@@ -1,9 +1,13 @@
 // The checkers themselves: a sphere with one defect at a time, each of which must be found, by name; and records of
 // operations of which each in turn is a little wrong.
 
+#include <lie/product.hpp>
+#include <lie/rn.hpp>
 #include <lie/s2.hpp>
 #include <lie/se2.hpp>
+#include <lie/se3.hpp>
 #include <lie/semi_oriented_frame3.hpp>
+#include <lie/so3.hpp>
 #include <lie/testing.hpp>
 
 #include <support/turned_s2.hpp>
@@ -15,6 +19,8 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace {
 
@@ -154,6 +160,11 @@ Operations::Element spoilt(const Operations& good, const Operations::Element& f)
   return good.group.product(f, good.group.exp(Eigen::VectorXd::Constant(good.group.dimension, 1e-4)));
 }
 
+std::vector<Operations::Point> spoilt(const Operations& good, std::vector<Operations::Point> points) {
+  for (Operations::Point& x : points) x = spoilt(good, x);
+  return points;
+}
+
 /// The record with one operation spoilt must fail, and did not before.
 template <class Owner, class Result, class... Arguments>
 void expectFound(const Operations& good, Owner& (*owner)(Operations&),
@@ -174,6 +185,10 @@ void expectFound(const Operations& good, Owner& (*owner)(Operations&),
 #define EXPECT_FOUND_IN_GROUP(record, name) \
   expectFound(                              \
       record, +[](Operations& m) -> Operations::Group& { return m.group; }, &Operations::Group::name, "group." #name)
+#define EXPECT_FOUND_IN_STATISTICS(record, name)                                                                     \
+  expectFound(                                                                                                       \
+      record, +[](Operations& m) -> Operations::Statistics& { return m.statistics; }, &Operations::Statistics::name, \
+      "statistics." #name)
 
 TEST(ContractCheckers, FindEachOperationOfAGroup) {
   const Operations se2 = liestat::operationsOf<liestat::SE2d>();
@@ -196,6 +211,7 @@ TEST(ContractCheckers, FindEachOperationOfAGroup) {
 TEST(ContractCheckers, FindEachOperationOfAManifold) {
   // A placement that does not carry frames in parallel, so that transvection matters.
   const Operations sphere = liestat::operationsOf<liestat_test::TurnedS2<double>>();
+  EXPECT_FOUND(sphere, origin);
   EXPECT_FOUND(sphere, act);
   EXPECT_FOUND(sphere, placement);
   EXPECT_FOUND(sphere, expOrigin);
@@ -223,9 +239,37 @@ TEST(ContractCheckers, FindEachOperationOfAManifold) {
 TEST(ContractCheckers, FindEachOperationOfAQuotient) {
   const Operations frame = liestat::operationsOf<liestat::SemiOrientedFrame3d>();
   EXPECT_FOUND(frame, representative);
+  EXPECT_FOUND(frame, representativeGap);
   EXPECT_FOUND(frame, representativeJacobian);
   EXPECT_FOUND(frame, dlogFeatureTransposed);
   EXPECT_FOUND(frame, dlogBaseTransposed);
+}
+
+TEST(ContractCheckers, FindEachTraitOfStatistics) {
+  const Operations rotation = liestat::operationsOf<liestat::SO3d>(), motion = liestat::operationsOf<liestat::SE3d>();
+  EXPECT_FOUND_IN_STATISTICS(rotation, compactCoordinates);
+  EXPECT_FOUND_IN_STATISTICS(rotation, chordalMean);
+  EXPECT_FOUND_IN_STATISTICS(rotation, parameters);
+  EXPECT_FOUND_IN_STATISTICS(motion, throughMetricTwin);
+  const Operations product = liestat::operationsOf<liestat::Product<liestat::SO3d, Eigen::Vector3d>>();
+  EXPECT_FOUND_IN_STATISTICS(product, throughFactors);
+  EXPECT_FOUND_IN_STATISTICS(product, factorDistances);
+}
+
+TEST(ContractCheckers, FindWrongNumbersOfStatistics) {
+  const Operations frame = liestat::operationsOf<liestat::SemiOrientedFrame3d>();
+  liestat::ContractOptions few;
+  few.samples = 1;
+  ASSERT_TRUE(liestat::checkContract(frame, few).ok());
+  const auto expectFound = [&](const char* what, const auto& spoil) {
+    Operations bad = frame;
+    spoil(bad.statistics);
+    EXPECT_FALSE(liestat::checkContract(bad, few).ok()) << what;
+  };
+  expectFound("compact_begin", [](auto& s) { s.compact_begin = 0; });
+  expectFound("a part is missing", [](auto& s) { s.tangent_parts.pop_back(); });
+  expectFound("parts overlap", [](auto& s) { s.tangent_parts[1].begin = 2; });
+  expectFound("lengths for angles", [](auto& s) { std::swap(s.tangent_parts[0].part, s.tangent_parts[1].part); });
 }
 
 /// The sphere with a transvection that does not carry frames in parallel.

@@ -33,7 +33,7 @@ TEST_P(Iterations, agreeWithTheTable) {
   const std::size_t trials = trialsOf(2000, 8);
   for (std::size_t t = 0; t < trials; ++t) {
     CounterRng rng(2718, t);
-    const SO3d exact = sampleUniform<SO3d>(rng);
+    const SO3d exact = sampleInCube<SO3d>(rng);
     std::vector<SO3d> x;
     std::vector<Gaussian<SO3d>> g;
     for (std::size_t i = 0; i < row.n; ++i) {

@@ -42,15 +42,15 @@ TEST(Act, movesDirectionsAndFrames) {
   CounterRng rng(10, 0);
   const auto moved = [](const auto& f, const auto& x) { return act(f, x); };
   expectAction(SO3d::sampleUniform(rng), S2d(0.3, -0.5, 0.7), moved, "SO3 on S2");
-  expectAction(SE3d::sampleUniform(rng), sampleUniform<Frame3d>(rng), moved, "SE3 on Frame3");
-  expectAction(SE2d::sampleUniform(rng), sampleUniform<Frame2d>(rng), moved, "SE2 on Frame2");
-  expectAction(SE3d::sampleUniform(rng), sampleUniform<OrientedPointd>(rng), moved, "SE3 on oriented points");
+  expectAction(SE3d::sampleUniform(rng), sampleInCube<Frame3d>(rng), moved, "SE3 on Frame3");
+  expectAction(SE2d::sampleUniform(rng), sampleInCube<Frame2d>(rng), moved, "SE2 on Frame2");
+  expectAction(SE3d::sampleUniform(rng), sampleInCube<OrientedPointd>(rng), moved, "SE3 on oriented points");
 }
 
 TEST(Between, ofFeaturesThatAreNoGroup) {
   CounterRng rng(11, 0);
   const auto relative = [](const auto& x, const auto& y) { return between(x, y); };
-  const Pair<Frame3d, Frame3d> p(sampleUniform<Frame3d>(rng), sampleUniform<Frame3d>(rng), rng, 1e-3);
+  const Pair<Frame3d, Frame3d> p(sampleInCube<Frame3d>(rng), sampleInCube<Frame3d>(rng), rng, 1e-3);
   expectDerivative(inCoordinates(p, between(p.a, p.b).mean, relative), p.joint, between(p.a, p.b, p.cross()).covariance,
                    "frames");
   expectSame(between(p.a.mean, p.b), between(Gaussian<Frame3d>{p.a.mean, SquareOf<Frame3d>::Zero()}, p.b), "exact x");

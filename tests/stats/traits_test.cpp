@@ -157,7 +157,7 @@ TYPED_TEST(StatisticsOf, aUsersTypeAreThoseOfTheLibrarys) {
   EXPECT_LE(gap(attitudeOf(maha(measured).mean), maha(measured_rotations).mean), 1e-11);
 
   CounterRng rng(2, 0);
-  EXPECT_TRUE(std::isfinite(attitudeOf(sampleUniform<M>(rng)).log().norm()));
+  EXPECT_TRUE(std::isfinite(attitudeOf(sampleInCube<M>(rng)).log().norm()));
 }
 
 TEST(StatisticsOfUnknownTypes, certifyWhatDistancesAlone) {

@@ -34,7 +34,7 @@ std::vector<M> scattered(std::uint64_t trial, int n, double spread, M* centre = 
   constexpr int K = rotation_dof<M>;
   CounterRng rng(20260, trial);
   Gaussian<M> g;
-  g.mean = sampleUniform<M>(rng);
+  g.mean = sampleInCube<M>(rng);
   const Vector3d sd = spread * Vector3d(0.3, 0.6, 0.9);
   g.covariance.diagonal().template tail<K>() = sd.tail<K>().cwiseAbs2().template cast<ScalarOf<M>>();
   std::vector<M> samples;
@@ -52,10 +52,10 @@ double bruteForce(const std::vector<M>& samples, std::uint64_t trial, int random
     MeanOptions<M> options;
     options.start = start;
     const auto result = mean(samples, options);
-    if (result.converged) best = std::min(best, static_cast<double>(result.cost));
+    if (converged(result.status)) best = std::min(best, static_cast<double>(result.cost));
   };
   for (const M& x : samples) from(x);
-  for (int i = 0; i < random_starts; ++i) from(sampleUniform<M>(rng));
+  for (int i = 0; i < random_starts; ++i) from(sampleInCube<M>(rng));
   return best;
 }
 
@@ -161,7 +161,7 @@ void sightingsAgree() {
   const auto space = detail::searchSpace<M>();
   CounterRng rng(11);
   for (int k = 0; k < 1000; ++k) {
-    const M x = sampleUniform<M>(rng), y = sampleUniform<M>(rng);
+    const M x = sampleInCube<M>(rng), y = sampleInCube<M>(rng);
     const auto s = space.see(y.params().template head<4>(), x.params().template head<4>());
     const auto z = log(y, x);
     EXPECT_LT((s.z - z.template tail<3>()).norm(), 1e-12);
@@ -184,7 +184,7 @@ TEST(BranchAndBound, seesWhatTheManifoldsSee) {
 TEST(Uniqueness, aPrioriTheoremOneLimitFromEveryStart) {
   for (std::uint64_t trial = 0; trial < 300; ++trial) {
     CounterRng rng(3, trial);
-    const SO3d centre = sampleUniform<SO3d>(rng);
+    const SO3d centre = sampleInCube<SO3d>(rng);
     std::vector<SO3d> samples;
     for (int i = 0; i < 6; ++i) {
       const Vector3d v = rng.normalVector<3>().normalized() * 1.55 * std::cbrt(rng.uniform());
@@ -364,7 +364,7 @@ TEST(BranchAndBound, uniformRotationsWithoutStructure) {
   for (std::uint64_t trial = 0; trial < 15; ++trial) {
     CounterRng rng(99, trial);
     std::vector<SO3d> samples;
-    for (int i = 0; i < 12; ++i) samples.push_back(sampleUniform<SO3d>(rng));
+    for (int i = 0; i < 12; ++i) samples.push_back(sampleInCube<SO3d>(rng));
     const auto result = checked(samples, "uniform " + std::to_string(trial));
     EXPECT_NE(result.unique, Uniqueness::ambiguous);
     EXPECT_EQ(result.unique, Uniqueness::unique);

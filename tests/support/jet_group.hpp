@@ -18,7 +18,6 @@ template <template <class, int> class Type>
 void checkGroup(int translation, std::initializer_list<double> scales = {}, int rotation = 0) {
   using G = Type<double, 0>;
   constexpr int n = G::DoF;
-  using Jet = ceres::Jet<double, n>;
   using J = Type<Jet, 0>;
   std::vector<std::pair<double, typename G::Tangent>> inputs;
   for (const double angle : swept_angles) {

@@ -11,7 +11,7 @@
 
 namespace liestat_test {
 
-using liestat::CounterRng, liestat::Gaussian, liestat::sample, liestat::sampleUniform;
+using liestat::CounterRng, liestat::Gaussian, liestat::sample, liestat::sampleInCube;
 
 /// The I-th parts.
 template <std::size_t I, class M>
@@ -26,7 +26,7 @@ template <class M>
 std::vector<M> scattered(int n, double sd, std::uint64_t seed = 1) {
   CounterRng rng(seed, 0);
   Gaussian<M> g;
-  g.mean = sampleUniform<M>(rng);
+  g.mean = sampleInCube<M>(rng);
   g.covariance *= sd * sd;
   std::vector<M> samples;
   for (int i = 0; i < n; ++i) samples.push_back(sample(g, rng));

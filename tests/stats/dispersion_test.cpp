@@ -1,0 +1,85 @@
+#include <lie/frame3.hpp>
+#include <lie/rn.hpp>
+#include <lie/s2.hpp>
+#include <stats/dispersion.hpp>
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <list>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+
+TEST(Dispersion, OfPointsIsTheirSecondMoment) {
+  const std::vector<Eigen::Vector3d> points{{1, 0, 0}, {-1, 0, 0}, {0, 2, 0}, {0, -2, 0}};
+  const auto plain = dispersionAbout(points, Eigen::Vector3d(0, 0, 0));
+  EXPECT_TRUE(plain.covariance.isApprox(Eigen::Vector3d(0.5, 2, 0).asDiagonal().toDenseMatrix(), 1e-15));
+  ASSERT_EQ(plain.farthest.size(), 1u);
+  EXPECT_DOUBLE_EQ(plain.farthest[0].distance, 2);
+  EXPECT_EQ(plain.farthest[0].index, 2u) << "the first of two that are equally far";
+
+  const auto weighted = dispersionAbout(points, std::vector<double>{3, 3, 1, 1}, Eigen::Vector3d(0, 0, 0));
+  EXPECT_TRUE(weighted.covariance.isApprox(Eigen::Vector3d(0.75, 1, 0).asDiagonal().toDenseMatrix(), 1e-15));
+}
+
+TEST(Dispersion, OfNothingIsNotANumber) {
+  const auto none = dispersionAbout(std::vector<Eigen::Vector3d>(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_TRUE(none.covariance.hasNaN());
+}
+
+TEST(Dispersion, NamesTheFarthestInEachPartOfATangentVector) {
+  const Frame3d y(SO3d::exp({0.3, -0.2, 1}), {1, 2, 3});
+  std::list<Frame3d> frames;  // whose elements are copied
+  Eigen::Matrix<double, 6, 1> turned, moved;
+  turned << 0.1, 0, 0, 0, 0, 0.7;
+  moved << 0, 0.9, 0, 0.2, 0, 0;
+  for (const auto& v : {turned, moved}) frames.push_back(exp(y, v));
+  const auto d = dispersionAbout(frames, y);
+  ASSERT_EQ(d.farthest.size(), 2u);
+  EXPECT_EQ(d.farthest[0].block.part, TangentPart::translation);
+  EXPECT_NEAR(d.farthest[0].distance, 0.9, 1e-14);
+  EXPECT_EQ(d.farthest[0].index, 1u);
+  EXPECT_EQ(d.farthest[1].block.part, TangentPart::rotation);
+  EXPECT_NEAR(d.farthest[1].distance, 0.7, 1e-14);
+  EXPECT_EQ(d.farthest[1].index, 0u);
+}
+
+/// Moving everything leaves the dispersion of frames in the local frame as it is.
+template <class S>
+void expectInvariance() {
+  using M = Frame3<S>;
+  const M y(SO3<S>::exp({S(0.3), S(-0.2), S(1)}), {S(1), S(2), S(3)});
+  const SE3<S> f(SO3<S>::exp({S(-1), S(0.4), S(0.6)}), {S(-2), S(0.5), S(1)});
+  std::vector<M> frames, moved;
+  for (int i = 0; i < 20; ++i) {
+    TangentOf<M> v;
+    for (int k = 0; k < 6; ++k) v[k] = S(0.3) * std::sin(S(1 + i * (k + 2)));
+    frames.push_back(exp(y, v));
+    moved.push_back(ManifoldTraits<M>::act(f, frames.back()));
+  }
+  const auto here = dispersionAbout(frames, y), there = dispersionAbout(moved, M(ManifoldTraits<M>::act(f, y)));
+  // Coordinates of a few metres are rounded once each.
+  const S bound = 64 * std::numeric_limits<S>::epsilon();
+  EXPECT_LT((here.covariance - there.covariance).norm(), bound);
+  EXPECT_EQ(here.farthest[0].index, there.farthest[0].index);
+  EXPECT_EQ(here.farthest[1].index, there.farthest[1].index);
+}
+
+TEST(Dispersion, IsInvariantDouble) { expectInvariance<double>(); }
+TEST(Dispersion, IsInvariantFloat) { expectInvariance<float>(); }
+
+TEST(Dispersion, OfDirectionsIsTheirSquaredAngle) {
+  const S2d y(Eigen::Vector3d(1, 2, -2) / 3);
+  std::vector<S2d> ring;
+  for (int i = 0; i < 8; ++i) {
+    const double a = 2 * EIGEN_PI * i / 8;
+    ring.push_back(exp(y, Eigen::Vector2d(0.5 * std::cos(a), 0.5 * std::sin(a))));
+  }
+  const auto d = dispersionAbout(ring, y);
+  EXPECT_TRUE(d.covariance.isApprox(0.125 * Eigen::Matrix2d::Identity(), 1e-13));
+}
+
+}  // namespace
