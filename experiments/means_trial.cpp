@@ -141,7 +141,8 @@ void leastSquares(const MeansExperiment& experiment, const Scene<M>& scene, cons
     MethodOutcome& o = outcome(corrected, known);
     o.iterations = iterations;
     setErrors(result.mean, scene.exact, o);
-    if (converged(result.status)) o.mahalanobis_squared = mahalanobisSquared(Gaussian<M>{result.mean, covariance}, scene.exact);
+    if (converged(result.status))
+      o.mahalanobis_squared = mahalanobisSquared(Gaussian<M>{result.mean, covariance}, scene.exact);
   };
   set(true, true, covarianceFromNoise(result, weights, noise));
   set(false, true, printed::covarianceFromNoise(scene.measurements, weights, attached, result.mean));

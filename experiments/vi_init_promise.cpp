@@ -28,7 +28,7 @@ struct Errors {
 };
 
 /// Sections 3.7 and 5. The other is the scale of the features.
-constexpr std::array<Errors, 5> refined = {{
+constexpr std::array<Errors, 5> refined_errors = {{
     {{1, 11, 20}, {0.043, 0.14}, {0.5, 1.2}, {2.5, 10}, {2.1, 8.5}, {0.041, 0.13}, {0.52, 1.0}, {1.9, 6}},
     {{2, 11, 20}, {0.02, 0.054}, {0.35, 0.78}, {0.92, 3.9}, {0.69, 2.6}},
     {{2, 21, 20}, {0.016, 0.043}, {0.33, 0.73}, {0.73, 3.1}, {0.56, 2}, {0.016, 0.05}, {0.27, 0.6}, {0.7, 2}},
@@ -108,7 +108,7 @@ std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
   }
   switch (row.estimator) {
     case Estimator::refinement:
-      return errorsOf(refined, row, false, 50);
+      return errorsOf(refined_errors, row, false, 50);
     case Estimator::closed_form:
       return errorsOf(known, row, false, 60);
     case Estimator::least_squares:

@@ -10,9 +10,7 @@
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
-namespace {
-
-}  // namespace
+namespace {}  // namespace
 
 std::string shown(const YAML::Node& node) {
   if (node.IsScalar()) return "'" + printable(node.Scalar()) + "'";

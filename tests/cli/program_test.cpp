@@ -148,7 +148,8 @@ TEST_F(Program, BoundsOfAnOptionAreSaid) {
 }
 
 TEST_F(Program, AValidationThatJudgesNothingHasNotPassed) {
-  const std::string run = "cd '" + directory_.path().string() + "' && '" LIESTAT_PROGRAM
+  const std::string run = "cd '" + directory_.path().string() +
+                          "' && '" LIESTAT_PROGRAM
                           "' validate means --feature frame --n 2 --criterion lsq --trials 50 > out.txt 2>&1";
   EXPECT_EQ(WEXITSTATUS(std::system(run.c_str())), 1);
   const std::string text = contentOf(directory_ / "out.txt");
