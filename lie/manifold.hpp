@@ -6,7 +6,6 @@
 #pragma once
 
 #include <lie/concepts.hpp>
-#include <lie/detail/small_products.hpp>
 
 #include <cmath>
 #include <concepts>
@@ -145,8 +144,8 @@ auto actionTransformationJacobian(const typename ManifoldTraits<M>::Group& f, co
   if constexpr (detail::HasTrivialIsotropy<M>) {
     return SquareOf<M>(T::placement(x).inverse().Adj());
   } else {
-    const auto projected = detail::product(T::isotropy(f, x), T::originProjection());
-    return detail::product(projected, T::placement(x).inverse().Adj());
+    const auto projected = (T::isotropy(f, x) * T::originProjection()).eval();
+    return (projected * T::placement(x).inverse().Adj()).eval();
   }
 }
 
@@ -176,14 +175,14 @@ template <Homogeneous M>
 SquareOf<M> logBaseJacobian(const M& p, const SquareOf<M>& dlog) {
   using T = ManifoldTraits<M>;
   if constexpr (detail::HasTrivialIsotropy<M>) {
-    return -detail::product(dlog, T::placement(p).inverse().Adj());
+    return -(dlog * T::placement(p).inverse().Adj());
   } else {
-    const auto projected = detail::product(dlog, T::originProjection());
-    const auto by_group = detail::product(projected, T::placement(p).inverse().Adj());
+    const auto projected = (dlog * T::originProjection()).eval();
+    const auto by_group = (projected * T::placement(p).inverse().Adj()).eval();
     if constexpr (requires { T::transvectionJacobian(); }) {
-      return -detail::product(by_group, T::transvectionJacobian());
+      return -(by_group * T::transvectionJacobian());
     } else {
-      return -detail::product(by_group, T::placementJacobian(T::origin()));
+      return -(by_group * T::placementJacobian(T::origin()));
     }
   }
 }
@@ -198,7 +197,7 @@ ErrorVector<M> errorVector(const M& y, const M& x) {
   if constexpr (detail::HasTrivialIsotropy<M>) {
     return {T::logOrigin(p), dlog, logBaseJacobian(p, dlog)};
   } else {
-    return {T::logOrigin(p), detail::product(dlog, T::isotropy(f, x)), logBaseJacobian(p, dlog)};
+    return {T::logOrigin(p), dlog * T::isotropy(f, x), logBaseJacobian(p, dlog)};
   }
 }
 

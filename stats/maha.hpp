@@ -124,8 +124,8 @@ struct MahaProblem {
     SquareOf<M> B = information[i];
     TangentOf<M> a = B * e.z;
     sums.cost += S(0.5) * e.z.dot(a);
-    const SquareOf<M> transposed = J.transpose();
-    sums.gauss_newton += product(transposed, product(B, J));
+    const SquareOf<M> BJ = B * J;
+    sums.gauss_newton += J.transpose() * BJ;
     if constexpr (requires { T::logVolume(e.z); }) {
       if (likelihood) {
         const auto volume = T::logVolume(e.z);
@@ -138,11 +138,10 @@ struct MahaProblem {
     if constexpr (second_order) {
       // J = D(z) Q with Q = D⁻¹ J constant in z to the order that counts: isotropy and the representative's half-turn.
       if (measured) {
-        const SquareOf<M> Q = product(T::dexpOrigin(e.z), J);
-        sums.hessian +=
-            product(product(transposed, B), J) + product(product(Q.transpose(), T::dlogFeatureTransposed(e.z, a)), J);
+        const SquareOf<M> Q = T::dexpOrigin(e.z) * J;
+        sums.hessian += J.transpose() * B * J + Q.transpose() * T::dlogFeatureTransposed(e.z, a) * J;
       } else {
-        sums.hessian += product(product(transposed, B), J) + product(T::dlogBaseTransposed(e.z, a), J);
+        sums.hessian += J.transpose() * B * J + T::dlogBaseTransposed(e.z, a) * J;
       }
     }
   }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <lie/detail/shell.hpp>
-#include <lie/detail/small_products.hpp>
 #include <lie/detail/uniform.hpp>
 
 #include <ostream>
@@ -140,9 +139,7 @@ class GroupBase : public Shell<Derived> {
     return Math::quotientJacobian(params());
   }
   /// Exp(v + d).params() = Exp(v).params() + Dx_exp_x(v) d + O(d²)
-  static ParameterJacobian Dx_exp_x(const Tangent& v) {
-    return product(Math::productJacobian(Math::exp(v)), rightJacobian(v));
-  }
+  static ParameterJacobian Dx_exp_x(const Tangent& v) { return Math::productJacobian(Math::exp(v)) * rightJacobian(v); }
   static ParameterJacobian Dx_exp_x_at_0() { return Math::productJacobian(Math::identity()); }
   /// Exp(d)·p = p + Dx_exp_x_times_point_at_0(p) d + O(d²)
   static Eigen::Matrix<Scalar, Dim, DoF> Dx_exp_x_times_point_at_0(const Point& p) {
