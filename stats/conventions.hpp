@@ -9,6 +9,7 @@
 // A type's tangent order is that of its traits' tangent_parts (lie/concepts.hpp).
 #pragma once
 
+#include <lie/detail/small_products.hpp>
 #include <stats/gaussian.hpp>
 
 #include <initializer_list>

@@ -7,6 +7,7 @@
 
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
+#include <lie/detail/small_products.hpp>
 #include <stats/mean.hpp>
 
 #include <cmath>

@@ -3,6 +3,7 @@
 // mean.
 #pragma once
 
+#include <lie/detail/small_products.hpp>
 #include <stats/mean.hpp>
 
 namespace liestat {

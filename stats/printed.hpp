@@ -5,6 +5,7 @@
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_products.hpp>
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
 
