@@ -312,6 +312,8 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
             "liestat simulate vi: there is no --truth, expected where the body was that --imu recorded\n");
   EXPECT_EQ(complaint({"--truth", "none"}), "none: no such file\n");
   EXPECT_EQ(complaint({"--drift", "nan"}),
+            "liestat: --drift: nan is not a number (liestat --help explains the usage)\n");
+  EXPECT_EQ(complaint({"--begin", "inf"}),
             "liestat simulate vi: an option is not a finite number, expected finite ones\n");
   EXPECT_EQ(complaint({"--begin", "4"}),
             "liestat simulate vi: the interval is from 4 to 3 s, expected an end after the beginning\n");

@@ -163,7 +163,8 @@ TEST(ViInit, WhatCannotBeUsedIsSaid) {
   EXPECT_NE(message({"--camera", "cam7"}).find("one of cam0"), std::string::npos);
   EXPECT_NE(message({"--true-biases"}).find("--truth"), std::string::npos);
   EXPECT_NE(message({"--window", "30"}).find("no window of 30 s fits"), std::string::npos);
-  EXPECT_NE(message({"--begin", "nan"}).find("windows from"), std::string::npos);
+  EXPECT_NE(message({"--begin", "nan"}).find("--begin: nan is not a number"), std::string::npos);
+  EXPECT_NE(message({"--begin", "-1e9"}).find("windows from"), std::string::npos);
   // A camera's clock that is another one.
   directory.write("later.csv", "frame,t_s\n0,1000\n1,1000.1\n2,1000.2\n");
   directory.write("few.csv", "frame,track,u,v\n0,1,300,200\n1,1,301,200\n2,1,302,200\n2,2,302,210\n");
