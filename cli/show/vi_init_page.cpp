@@ -129,7 +129,7 @@ Panel anglePanel(const ViRecording& recording, const ViInitResult& result, bool 
 /// The length of V at the first image of each window: the scale.
 Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
   Panel panel{.title = "speed", .x = {.label = "s"}, .y = {.label = "m/s", .low = 0}};
-  Series found = bars("windows, two deviations", estimate_colour);
+  Series found = bars("windows, two standard deviations", estimate_colour);
   const Series truth = truthLine(recording, result, [](const GroundTruth& g) { return g.state.velocity().norm(); });
   for (const ViWindow& w : result.windows) {
     if (!isRefined(w)) continue;
