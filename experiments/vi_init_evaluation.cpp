@@ -22,7 +22,7 @@ ValidationReport reportOf(const std::vector<double>& distances, int dof) {
                   });
 }
 
-/// Whether more windows are beyond a bound than a probability of that explains.
+/// True if more windows are beyond a bound than a probability of that explains.
 bool exceeds(const std::vector<double>& sorted, double bound, double probability, double false_alarm) {
   const auto beyond = static_cast<std::size_t>(sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), bound));
   return !(binomialSurvival(beyond, sorted.size(), std::min(1., probability)) >= false_alarm);

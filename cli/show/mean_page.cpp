@@ -133,7 +133,7 @@ double largestAngle(Feature feature) {
   return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
 }
 
-/// Whether a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
+/// True if a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
 bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& principal) {
   const Eigen::VectorXd first = principal.col(0);
   // In the principal chart even a small cloud may lie on both sides of the frontier.

@@ -306,7 +306,8 @@ void writeViInitReport(const std::string& directory, const std::string& command_
   for (const bool gyroscope : {true, false}) {
     for (int axis = 0; axis < 3; ++axis) panels.push_back(biasPanel(recording, result, gyroscope, axis));
   }
-  report.plot({.name = "biases", .caption = "With two standard deviations on either side.", .panels = panels, .columns = 3});
+  report.plot(
+      {.name = "biases", .caption = "With two standard deviations on either side.", .panels = panels, .columns = 3});
   addSolutions(report, result);
   report.write();
 }

@@ -46,7 +46,7 @@ class ViErrorSummary {
   std::vector<double> speed_, gravity_, scale_;
 };
 
-/// What all windows of a result say together.
+/// Errors and test values over all windows of a result.
 struct ViInitSummary {
   std::map<std::string, std::size_t> statuses;
   ViErrorSummary closed_form, refined;

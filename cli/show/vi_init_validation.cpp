@@ -68,7 +68,7 @@ Table errorsTable(const std::vector<Group>& list) {
     if (check == Check::consistency) cells.push_back(errors(g.of(Quantity::scale_of_features)));
     if (check == Check::drift) cells.push_back(ratio(g.of(Quantity::selection)));
     table.row(cells);
-    // What the note has, beside the first estimator of a window.
+    // The reference figures, beside the first estimator of a window.
     const auto noted = [&](Quantity quantity) {
       const ViInitRow* row = g.of(quantity);
       if (row == nullptr || !row->promise || !std::isfinite(row->promise->note_median)) return std::string();

@@ -52,7 +52,7 @@ inline std::vector<ViInitGroup> groups(const std::vector<experiments::ViInitRow>
   return list;
 }
 
-/// What a check is about, in a line.
+/// The subject of a check, in a line.
 inline const char* describe(experiments::ViInitCheck check) {
   using Check = experiments::ViInitCheck;
   switch (check) {

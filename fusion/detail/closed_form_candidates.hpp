@@ -13,7 +13,7 @@
 
 namespace liestat::detail {
 
-/// Whether most of its features are in front of the camera.
+/// True if most of its features are in front of the camera.
 inline bool isInFront(const MotionCandidate& c, const RayTable& table) { return 2 * c.negative < table.features(); }
 
 /// Puts first the one whose features are in front of the camera, then the cheaper.
@@ -25,12 +25,12 @@ inline void order(std::vector<MotionCandidate>& candidates, const RayTable& tabl
   }
 }
 
-/// Whether the second minimiser explains the data as well as the first.
+/// True if the second minimiser explains the data as well as the first.
 inline bool hasRival(const std::vector<MotionCandidate>& candidates) {
   return candidates.size() == 2 && candidates[1].cost - candidates[0].cost <= chi_squared_1_95;
 }
 
-/// Whether the two gravities differ by what the biases differ.
+/// True if the two gravities differ by what the biases differ.
 inline bool isMirror(const std::vector<MotionCandidate>& candidates) {
   const Eigen::Vector3d G = candidates[1].y.gravity() - candidates[0].y.gravity();
   return (candidates[1].y.bias() - candidates[0].y.bias() - G).norm() < 0.2 * G.norm();

@@ -58,7 +58,7 @@ inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, 
   if (!relative.empty()) result.scale_sigma = median(relative);
 }
 
-/// Whether it is the prior that says what the accelerometer's bias is: the data improve one of its three directions at
+/// True if it is the prior that says what the accelerometer's bias is: the data improve one of its three directions at
 /// most (with |G| known one comes from its length).
 inline bool biasRestsOnPrior(const ClosedFormResult& result, const InitialisationOptions& options) {
   if (!std::isfinite(options.prior.accelerometer_sigma) || result.covariance.rows() != 9) return false;

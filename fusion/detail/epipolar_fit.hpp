@@ -118,7 +118,7 @@ class EpipolarFit {
     return true;
   }
 
-  /// Whether what is accepted differs by noise only (three sigmas of χ²), is a good part of all tracks, and is in
+  /// True if what is accepted differs by noise only (three sigmas of χ²), is a good part of all tracks, and is in
   /// front of the camera.
   bool isConsistent() const {
     double sum = 0, freedom = 0, in = 0;
@@ -132,7 +132,7 @@ class EpipolarFit {
            sum <= freedom + 3 * std::sqrt(2 * freedom) && (rotation || problem.wrongWay() <= max_wrong_way);
   }
 
-  /// Whether a good part of the tracks agree after a start, to noise.
+  /// True if a good part of the tracks agree after a start, to noise.
   bool isPromising() {
     const std::vector<double> soft = problem.weight;
     decide();

@@ -14,22 +14,18 @@ namespace liestat::detail {
 template <class Left, class Right>
 concept FixedSizes = (Left::SizeAtCompileTime != Eigen::Dynamic) && (Right::SizeAtCompileTime != Eigen::Dynamic);
 
-/// A B. Factors may be expressions, which are evaluated first.
-template <class Left, class Right>
-  requires FixedSizes<Left, Right>
-auto product(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixBase<Right>& right) {
-  using S = typename Left::Scalar;
-  constexpr int M = Left::RowsAtCompileTime, K = Left::ColsAtCompileTime, N = Right::ColsAtCompileTime;
-  static_assert(K == Right::RowsAtCompileTime, "columns of the left factor, rows of the right");
-  const typename Left::PlainObject& A = left.derived();
-  const typename Right::PlainObject& B = right.derived();
+/// The M×N product of A, with K columns, and the matrix of which entry(k, j) is an element.
+template <int M, int K, int N, class Factor, class Entry>
+Eigen::Matrix<typename Factor::Scalar, M, N> productWith(const Factor& A, const Entry& entry) {
+  using S = typename Factor::Scalar;
   Eigen::Matrix<S, M, N> C;
   for (int j = 0; j < N; ++j) {
     S column[static_cast<std::size_t>(M)];
+    const S first = entry(0, j);
 #pragma GCC unroll 12
-    for (int i = 0; i < M; ++i) column[i] = A(i, 0) * B(0, j);
+    for (int i = 0; i < M; ++i) column[i] = A(i, 0) * first;
     for (int k = 1; k < K; ++k) {
-      const S b = B(k, j);
+      const S b = entry(k, j);
 #pragma GCC unroll 12
       for (int i = 0; i < M; ++i) column[i] += A(i, k) * b;
     }
@@ -39,29 +35,26 @@ auto product(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixBase<Right>
   return C;
 }
 
+/// A B. Factors may be expressions, which are evaluated first.
+template <class Left, class Right>
+  requires FixedSizes<Left, Right>
+auto product(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixBase<Right>& right) {
+  constexpr int M = Left::RowsAtCompileTime, K = Left::ColsAtCompileTime, N = Right::ColsAtCompileTime;
+  static_assert(K == Right::RowsAtCompileTime, "columns of the left factor, rows of the right");
+  const typename Left::PlainObject& A = left.derived();
+  const typename Right::PlainObject& B = right.derived();
+  return productWith<M, K, N>(A, [&B](int k, int j) { return B(k, j); });
+}
+
 /// A Bᵀ.
 template <class Left, class Right>
   requires FixedSizes<Left, Right>
 auto productTransposed(const Eigen::MatrixBase<Left>& left, const Eigen::MatrixBase<Right>& right) {
-  using S = typename Left::Scalar;
   constexpr int M = Left::RowsAtCompileTime, K = Left::ColsAtCompileTime, N = Right::RowsAtCompileTime;
   static_assert(K == Right::ColsAtCompileTime, "columns of both factors");
   const typename Left::PlainObject& A = left.derived();
   const typename Right::PlainObject& B = right.derived();
-  Eigen::Matrix<S, M, N> C;
-  for (int j = 0; j < N; ++j) {
-    S column[static_cast<std::size_t>(M)];
-#pragma GCC unroll 12
-    for (int i = 0; i < M; ++i) column[i] = A(i, 0) * B(j, 0);
-    for (int k = 1; k < K; ++k) {
-      const S b = B(j, k);
-#pragma GCC unroll 12
-      for (int i = 0; i < M; ++i) column[i] += A(i, k) * b;
-    }
-#pragma GCC unroll 12
-    for (int i = 0; i < M; ++i) C(i, j) = column[i];
-  }
-  return C;
+  return productWith<M, K, N>(A, [&B](int k, int j) { return B(j, k); });
 }
 
 /// A C Aᵀ: a covariance C through a Jacobian A.
