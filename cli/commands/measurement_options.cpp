@@ -6,6 +6,8 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
   const Option path = app.option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path.required();
   app.option("--format", format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
+  app.option("--columns", columns, "Names of CSV columns that are not ours: r00=R00,tx=cx (ours=the file's)").list();
+  app.flag("--ignore-unknown", ignore_unknown, "Pass over CSV columns without a meaning");
   app.option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
       .oneOf(experiments::featureNames());
   app.option("--criterion", options.criterion,
@@ -15,6 +17,8 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
              "Where covariances of frames belong: measured (the frame of each measurement) or estimated (of the mean)")
       .oneOf({"measured", "estimated"});
   app.flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
+  const Option in_degrees = app.flag("--degrees", degrees, "Rotation vectors are in degrees");
+  app.flag("--radians", radians, "Rotation vectors are in radians, those beyond a turn too").excludes(in_degrees);
   app.option("--norm-tolerance", norm_tolerance,
              "Quaternions, directions and matrices that are off by less are normalised (default 0.001)")
       .range(0.0, 0.5);
@@ -24,6 +28,9 @@ Measurements MeasurementInput::read(const std::string& command) const {
   ReadingOptions how;
   if (!format.empty()) how.format = format;
   how.norm_tolerance = norm_tolerance;
+  how.angles = degrees ? AngleUnit::degrees : radians ? AngleUnit::radians : AngleUnit::unsaid;
+  how.ignore_unknown = ignore_unknown;
+  how.columns = columns;
   return chooseMeasurements(readFeatureFile(file, how), options, command);
 }
 

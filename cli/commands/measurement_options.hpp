@@ -4,6 +4,7 @@
 #include <cli/io/measurements.hpp>
 
 #include <string>
+#include <vector>
 
 namespace liestat::cli {
 
@@ -12,9 +13,12 @@ struct MeasurementInput {
   std::string file;
   std::string format = "auto";
   double norm_tolerance = ReadingOptions{}.norm_tolerance;
+  bool degrees = false, radians = false, ignore_unknown = false;
+  std::vector<std::string> columns;
   MeasurementOptions options;
 
-  /// Declares FILE, --format, --feature, --criterion, --covariance-at, --likelihood and --norm-tolerance.
+  /// Declares FILE, --format, --columns, --ignore-unknown, --feature, --criterion, --covariance-at, --likelihood,
+  /// --degrees, --radians and --norm-tolerance.
   void declare(const Command& app, bool file_required);
   /// Reads the file; throws InputError. `command` begins the messages about options.
   Measurements read(const std::string& command) const;

@@ -9,7 +9,6 @@
 #include <cli/io/feature_columns.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/io/numeric_table.hpp>
-#include <cli/io/reading.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -22,15 +21,47 @@ bool isKnown(std::string_view column) {
   return std::find(known.begin(), known.end(), column) != known.end();
 }
 
-// TUM: t tx ty tz qx qy qz qw, separated by blanks.
-bool isTum(const FirstLine& first) { return first.numbers.size() == 8; }
-RowLayout readTum(const LineReader&, const std::string&) {
-  return {{"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"}, Separator::comma_or_blanks, "(t tx ty tz qx qy qz qw)"};
+/// Whether a column is the time under a name that other programs give it.
+bool isTime(std::string_view column) { return column == "t" || column == "time" || column == "timestamp"; }
+
+// TUM: t tx ty tz qx qy qz qw, separated by blanks. Some programs put these names into a first line, or a comment.
+constexpr std::array<std::string_view, 8> tum_columns{"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
+
+bool isTumHeader(const std::vector<std::string_view>& words) {
+  return words.size() == tum_columns.size() && isTime(words[0]) &&
+         std::equal(words.begin() + 1, words.end(), tum_columns.begin() + 1);
+}
+bool isTum(const FirstLine& first) { return first.numbers.size() == 8 || isTumHeader(first.words); }
+
+/// Programs disagree about the order of a quaternion: where a comment names TUM's columns, the order must be TUM's.
+void checkTumComment(const LineReader& reader, const std::string& file) {
+  std::vector<std::string_view> words;
+  splitFields(reader.comment(), Separator::comma_or_blanks, words);
+  if (words.size() != tum_columns.size() || isTumHeader(words)) return;
+  std::vector<std::string_view> sorted = words;
+  std::array<std::string_view, 8> expected = tum_columns;
+  sorted[0] = isTime(sorted[0]) ? "t" : sorted[0];
+  std::sort(sorted.begin(), sorted.end());
+  std::sort(expected.begin(), expected.end());
+  if (!std::equal(sorted.begin(), sorted.end(), expected.begin())) return;
+  throw InputError(file, reader.comment_number(),
+                   fmt::format("the comment names the columns {}", printable(reader.comment(), 60)),
+                   "TUM's order t tx ty tz qx qy qz qw, or the header without a '#' before it");
+}
+
+RowLayout readTum(const LineReader& reader, const std::string& file, const ReadingOptions&) {
+  checkTumComment(reader, file);
+  std::vector<std::string_view> fields;
+  splitFields(reader.line(), Separator::comma_or_blanks, fields);
+  return {.columns = {tum_columns.begin(), tum_columns.end()},
+          .separator = Separator::comma_or_blanks,
+          .description = "(t tx ty tz qx qy qz qw)",
+          .has_header = isTumHeader(fields)};
 }
 
 // KITTI: the upper 3x4 of a pose matrix, row by row.
 bool isKitti(const FirstLine& first) { return first.numbers.size() == 12; }
-RowLayout readKitti(const LineReader&, const std::string&) {
+RowLayout readKitti(const LineReader&, const std::string&, const ReadingOptions&) {
   return {{"r00", "r01", "r02", "tx", "r10", "r11", "r12", "ty", "r20", "r21", "r22", "tz"},
           Separator::comma_or_blanks,
           "(a 3x4 matrix row by row)"};
@@ -58,7 +89,7 @@ void checkEurocHeader(const LineReader& reader, const std::string& file) {
   }
 }
 
-RowLayout readEuroc(const LineReader& reader, const std::string& file) {
+RowLayout readEuroc(const LineReader& reader, const std::string& file, const ReadingOptions&) {
   checkEurocHeader(reader, file);
   std::vector<std::string> columns = {"t", "tx", "ty", "tz", "qw", "qx", "qy", "qz"};
   std::vector<std::string_view> fields;
@@ -83,12 +114,64 @@ bool isCsv(const FirstLine& first) { return first.numbers.empty(); }
   const std::string suggestion =
       column.substr(0, 4) == "time" || column.substr(0, 4) == "Time" ? "t" : nearestName(column, knownColumns());
   if (!suggestion.empty()) found += " (is it '" + suggestion + "'?)";
-  throw InputError(file, line, found, std::string(known_columns_text));
+  throw InputError(file, line, found,
+                   fmt::format("{} (--ignore-unknown passes over others, --columns maps names)", known_columns_text));
 }
 
-RowLayout readCsv(const LineReader& reader, const std::string& file) {
+/// Gives columns our names where the user says which they are, as "ours=theirs".
+void rename(RowLayout& layout, const std::vector<std::string>& wishes, const std::string& file, std::size_t line) {
+  const std::vector<std::string> theirs = layout.columns;
+  std::vector<bool> renamed(theirs.size(), false);
+  for (const std::string& wish : wishes) {
+    const std::size_t sign = wish.find('=');
+    const std::string to = wish.substr(0, sign), from = sign == std::string::npos ? "" : wish.substr(sign + 1);
+    const auto complain = [&](const std::string& what, const std::string& expected) {
+      throw InputError(file, line, "--columns " + printable(wish) + ": " + what, expected);
+    };
+    if (from.empty() || !isKnown(to)) {
+      complain(from.empty() ? "no '='" : "there is no column '" + printable(to) + "' of features",
+               fmt::format("our name = the file's; ours are {}", known_columns_text));
+    }
+    const auto found = std::find(theirs.begin(), theirs.end(), from);
+    if (found == theirs.end()) {
+      const std::string near = nearestName(from, theirs);
+      complain("the file has no column '" + printable(from) + "'" +
+                   (near.empty() ? "" : " (is it '" + printable(near) + "'?)"),
+               "one of its header");
+    }
+    const auto place = static_cast<std::size_t>(found - theirs.begin());
+    if (renamed[place]) complain("the column '" + printable(from) + "' has another name already", "one name for each");
+    renamed[place] = true;
+    layout.columns[place] = to;
+  }
+  // The file may have a column of that name already.
+  for (std::size_t i = 0; i < theirs.size(); ++i) {
+    const auto others = std::count(layout.columns.begin(), layout.columns.end(), layout.columns[i]);
+    if (renamed[i] && others > 1) {
+      throw InputError(file, line, "two columns are '" + layout.columns[i] + "' after --columns", "one");
+    }
+  }
+}
+
+/// The names of a header that is parted by blanks, if it is one: each of them known. Otherwise empty.
+std::vector<std::string> namesBetweenBlanks(const std::vector<std::string_view>& words) {
+  if (words.size() < 2) return {};
+  std::vector<std::string> names(words.begin(), words.end());
+  if (isTime(names[0])) names[0] = "t";
+  return std::all_of(names.begin(), names.end(), isKnown) ? names : std::vector<std::string>();
+}
+
+RowLayout readCsv(const LineReader& reader, const std::string& file, const ReadingOptions& options) {
   const std::size_t line = reader.number();
   std::vector<std::string_view> fields;
+  splitFields(reader.line(), Separator::blanks, fields);
+  if (std::vector<std::string> names = namesBetweenBlanks(fields); !names.empty()) {
+    const std::vector<std::string_view> views(names.begin(), names.end());
+    return {.columns = readHeader(views, file, line),
+            .separator = Separator::blanks,
+            .description = "as in the header",
+            .has_header = true};
+  }
   splitFields(reader.line(), Separator::comma, fields);
   if (looksNumeric(fields)) {
     std::vector<std::string_view> hidden;
@@ -99,8 +182,11 @@ RowLayout readCsv(const LineReader& reader, const std::string& file) {
                          : fmt::format("a line that names the columns: {}", feature_columns_text));
   }
   RowLayout layout{.columns = readHeader(fields, file, line), .description = "as in the header", .has_header = true};
-  for (const std::string& column : layout.columns) {
-    if (!isKnown(column)) throwUnknown(column, layout.columns.size(), file, line);
+  rename(layout, options.columns, file, line);
+  for (std::string& column : layout.columns) {
+    if (isKnown(column)) continue;
+    if (!options.ignore_unknown) throwUnknown(column, layout.columns.size(), file, line);
+    column.clear();
   }
   return layout;
 }
@@ -117,10 +203,10 @@ constexpr std::array formats{
 std::span<const FeatureFormat> featureFormats() { return formats; }
 
 const FeatureFormat& featureFormat(std::string_view name, const LineReader& reader, const std::string& file) {
-  FirstLine first{.comment = reader.comment(), .commas = {}, .numbers = {}};
+  FirstLine first{.comment = reader.comment(), .words = {}, .commas = {}, .numbers = {}};
   splitFields(reader.line(), Separator::comma, first.commas);
-  splitFields(reader.line(), Separator::blanks, first.numbers);
-  if (first.commas.size() > 1 || first.numbers.size() < 2 || !looksNumeric(first.numbers)) first.numbers.clear();
+  if (first.commas.size() == 1) splitFields(reader.line(), Separator::blanks, first.words);
+  if (first.words.size() > 1 && looksNumeric(first.words)) first.numbers = first.words;
   std::vector<std::string> without_header;
   for (const FeatureFormat& format : formats) {
     if (name == "auto" ? format.recognises(first) : name == format.name) return format;

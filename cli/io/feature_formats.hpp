@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <cli/io/reading.hpp>
 #include <cli/io/text.hpp>
 
 namespace liestat::cli {
@@ -22,6 +23,7 @@ struct RowLayout {
 /// The first line with content, as a format is recognised by it.
 struct FirstLine {
   std::string_view comment;               ///< the comment before it
+  std::vector<std::string_view> words;    ///< its fields, parted by blanks, if there is no comma
   std::vector<std::string_view> commas;   ///< its fields, parted by commas
   std::vector<std::string_view> numbers;  ///< its fields, parted by blanks, if there are several and all are numbers
 };
@@ -32,7 +34,7 @@ struct FeatureFormat {
   std::string_view without_header;  ///< the meaning of a line of numbers, if the format has no header; for messages
   bool (*recognises)(const FirstLine& first);
   /// Reads how the rows are laid out; the reader stands at the first line with content. Throws InputError.
-  RowLayout (*reads)(const LineReader& reader, const std::string& file);
+  RowLayout (*reads)(const LineReader& reader, const std::string& file, const ReadingOptions& options);
 };
 
 /// All formats, in the order in which they are tried.

@@ -8,21 +8,12 @@
 
 namespace liestat::cli {
 
-/// Text from outside made fit for a message: one line, no control characters, at most `limit` bytes.
-inline std::string printable(std::string_view text, std::size_t limit = 40) {
-  const bool cut = text.size() > limit;
-  std::size_t end = cut ? limit : text.size();
-  // Never end in the middle of a UTF-8 sequence: the terminal would show garbage.
-  while (cut && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-  std::string result;
-  result.reserve(end + 3);
-  for (const char c : text.substr(0, end)) {
-    const auto code = static_cast<unsigned char>(c);
-    result += (code < 0x20U || code == 0x7FU) ? '?' : c;
-  }
-  if (cut) result += "...";
-  return result;
-}
+/// Text from outside made fit for a terminal: one line, at most `limit` bytes. Control characters, those beyond ASCII too
+/// (U+0080 to U+009F and the marks that reverse the direction of writing), and bytes that are no UTF-8 become '?'.
+std::string printable(std::string_view text, std::size_t limit = 40);
+
+/// The same of a text of several lines, uncut: newlines stay.
+std::string printableLines(std::string_view text);
 
 /// An error in an input (or an output path) that the user named. `what()` is one line that begins
 /// with `file:line: `, or `file: ` where no line is to blame.

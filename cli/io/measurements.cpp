@@ -36,6 +36,13 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
     m.notes.push_back(fmt::format("the file's covariances are those of whole {} and are not used", rows.plural));
     file.covariances.clear();
   }
+  if (file.n_beyond_half_turn > 0 && feature.parts.contains(experiments::Part::rotation)) {
+    m.notes.push_back(
+        fmt::format("{} rotation {} longer than a half-turn, {:.4g} rad at most, and taken modulo a turn (--degrees "
+                    "reads degrees)",
+                    file.n_beyond_half_turn, file.n_beyond_half_turn == 1 ? "vector is" : "vectors are",
+                    file.largest_rotation_vector));
+  }
   const bool has_covariances = !file.covariances.empty();
   const bool must_choose = has_covariances && feature.frameMatters() && options.covariance_at.empty();
   const std::string choice =

@@ -87,6 +87,11 @@ void writeOutput(const std::string& path, std::string_view content) {
   throwUnwritable(path, error);
 }
 
+void printLines(std::string_view text) {
+  const std::string lines = printableLines(text);
+  std::fwrite(lines.data(), 1, lines.size(), stdout);
+}
+
 void createDirectory(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);

@@ -10,6 +10,10 @@ namespace liestat::cli {
 /// written.
 void writeOutput(const std::string& path, std::string_view content);
 
+/// Shows lines on standard output, without the control characters that a name out of a file or a command line may have.
+/// Whether they arrived is seen when the program ends.
+void printLines(std::string_view text);
+
 /// Creates a directory and its parents; throws InputError where that is not possible.
 void createDirectory(const std::string& path);
 

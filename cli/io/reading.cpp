@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <cli/io/feature_columns.hpp>
@@ -40,11 +41,18 @@ class FeatureReader {
     if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
     const FeatureFormat& format = featureFormat(options_.format, reader_, name_);
     file_.format = std::string(format.name);
-    layout_ = format.reads(reader_, name_);
+    if (!options_.columns.empty() && format.name != "csv") {
+      throw InputError(name_, reader_.number(), fmt::format("--columns for a file of the format {}", format.name),
+                       "a CSV file, whose header names the columns");
+    }
+    layout_ = format.reads(reader_, name_, options_);
     const std::size_t first_line = reader_.number();
     places_ = findFeature(layout_.columns, name_, first_line);
     if (layout_.has_header && !reader_.next()) {
       throw InputError(name_, first_line, "there is a header but no data", "at least one row after it");
+    }
+    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == absent) {
+      throw InputError(name_, first_line, "--degrees, but there are no rotation vectors", "the columns rx,ry,rz");
     }
     readRows();
     return std::move(file_);
@@ -139,13 +147,19 @@ class FeatureReader {
       return Eigen::Quaterniond(Eigen::Vector4d(q / norm));
     }
     if (places_.rotation_vector[0] != absent) {
-      const Eigen::Vector3d r(value(places_.rotation_vector[0]), value(places_.rotation_vector[1]),
-                              value(places_.rotation_vector[2]));
+      const Eigen::Vector3d r = (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * readVector(places_.rotation_vector);
       const double angle = r.stableNorm();
       // Beyond this the angle modulo a turn is rounding, not data.
       if (!(angle < 1e6))
         throw InputError(name_, line_, fmt::format("the rotation vector has length {:.6g}", angle),
                          "an angle in radians");
+      if (angle > std::numbers::pi * (1 + 1e-6)) ++file_.n_beyond_half_turn;
+      if (options_.angles == AngleUnit::unsaid && angle > 2 * std::numbers::pi * (1 + 1e-6)) {
+        throw InputError(name_, line_,
+                         fmt::format("the rotation vector has length {:.6g}, more than a turn: in degrees?", angle),
+                         "radians, or --degrees; --radians takes them as they are");
+      }
+      file_.largest_rotation_vector = std::max(file_.largest_rotation_vector, angle);
       const double scale = angle > 1e-150 ? std::sin(angle / 2) / angle : 0.5;
       Eigen::Quaterniond q;
       q.w() = std::cos(angle / 2);

@@ -30,10 +30,15 @@ struct FeatureFile {
   std::vector<std::size_t> lines;       ///< the line that each row stands in
   std::size_t n_normalised = 0;         ///< rows whose rotation or direction was off its norm by more than rounding
   double largest_norm_error = 0;        ///< the largest such error
+  std::size_t n_beyond_half_turn = 0;   ///< rotation vectors longer than a half-turn, which no logarithm is
+  double largest_rotation_vector = 0;   ///< rad
   std::string format;                   ///< the name of the format that was read
 
   std::size_t size() const { return lines.size(); }
 };
+
+/// The unit of rotation vectors. Unsaid: radians, and one longer than a turn is an error, for degrees look like that.
+enum class AngleUnit { unsaid, radians, degrees };
 
 /// Options of readFeatureFile().
 struct ReadingOptions {
@@ -41,6 +46,9 @@ struct ReadingOptions {
   /// A quaternion or direction whose norm is off by less is normalised, one off by more is an error. For rotation
   /// matrices the error is half the Frobenius norm of RᵀR − I.
   double norm_tolerance = 1e-3;
+  AngleUnit angles = AngleUnit::unsaid;
+  bool ignore_unknown = false;   ///< CSV columns without a meaning are passed over
+  std::vector<std::string> columns = {};  ///< names of CSV columns that are not ours, each as "ours=theirs"
 };
 
 /// The names of the formats that are known (cli/io/feature_formats.cpp), `auto` first.

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
@@ -82,6 +83,63 @@ std::string folded(std::string_view name) {
 }
 
 }  // namespace
+
+namespace {
+
+/// The length of the UTF-8 sequence at the beginning of a text, 0 if there is none; `code` is its character.
+std::size_t sequenceLength(std::string_view text, std::uint32_t& code) {
+  const auto first = static_cast<unsigned char>(text.front());
+  const std::size_t length = first < 0x80 ? 1 : first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  if (length == 0 || length > text.size()) return 0;
+  code = length == 1 ? first : first & (0x7FU >> length);
+  for (std::size_t i = 1; i < length; ++i) {
+    const auto next = static_cast<unsigned char>(text[i]);
+    if ((next & 0xC0U) != 0x80U) return 0;
+    code = code << 6U | (next & 0x3FU);
+  }
+  // Longer than it need be, half of a pair of UTF-16, or beyond the last character.
+  const bool wrong = (length == 3 && code < 0x800) || (length == 4 && code < 0x10000) ||
+                     (code >= 0xD800 && code < 0xE000) || code > 0x10FFFF;
+  return wrong ? 0 : length;
+}
+
+bool controls(std::uint32_t code) {
+  return code < 0x20 || (code >= 0x7F && code < 0xA0) || code == 0x200E || code == 0x200F ||
+         (code >= 0x2028 && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
+}
+
+std::string withoutControls(std::string_view text, bool keep_newlines) {
+  std::string result;
+  result.reserve(text.size());
+  while (!text.empty()) {
+    std::uint32_t code = 0;
+    const std::size_t length = sequenceLength(text, code);
+    const bool kept = length > 0 && (!controls(code) || (keep_newlines && code == '\n'));
+    if (kept) {
+      result += text.substr(0, length);
+    } else {
+      result += '?';
+    }
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text, std::size_t limit) {
+  const bool cut = text.size() > limit;
+  std::size_t end = cut ? limit : text.size();
+  // Never end in the middle of a UTF-8 sequence.
+  while (cut && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  return withoutControls(text.substr(0, end), false) + (cut ? "..." : "");
+}
+
+std::string printableLines(std::string_view text) { return withoutControls(text, true); }
+
+std::string sourceName(const std::string& path) {
+  return path == "-" ? "standard input" : printable(path, path.size());
+}
 
 TextFile loadText(const std::string& path) {
   const bool standard_input = path == "-";

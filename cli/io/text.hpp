@@ -13,6 +13,9 @@ struct TextFile {
   std::string text;
 };
 
+/// The name of an input in messages: `-` is standard input, and control characters never reach a terminal.
+std::string sourceName(const std::string& path);
+
 /// Reads a file in one go; `-` is standard input. Throws InputError where that is not possible.
 TextFile loadText(const std::string& path);
 
