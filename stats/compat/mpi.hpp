@@ -22,7 +22,6 @@
 #include <vector>
 
 namespace liestat {
-
 namespace detail {
 
 inline int mpiCount(std::size_t size) {
