@@ -137,7 +137,7 @@ Command CommandList::add(const std::string& name, const std::string& description
 namespace {
 
 int complain(const std::string& message) {
-  std::fputs((message + "\n").c_str(), stderr);
+  std::fputs((printableLines(message) + "\n").c_str(), stderr);
   return exit_bad_input;
 }
 

@@ -1,7 +1,8 @@
+#include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
 
-#include <cstdio>
 #include <memory>
 
 #include <cli/commands/measurement_options.hpp>
@@ -21,9 +22,14 @@ int runCommand(const Options& options, const Invocation& invocation) {
   AnalysisOptions how = options.analysis;
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
-  const MeanAnalysis analysis = analyseMean(measurements, how);
+  MeanAnalysis analysis = analyseMean(measurements, how);
+  compareBlocks(analysis, measurements, how);
+  if (how.inflate && !analysis.time_blocks) {
+    throw InputError("liestat mean", 0, "--inflate, but blocks of time cannot be compared",
+                     "rows with times (a column t), at least ten, and a mean with a covariance");
+  }
   // Whoever asks for JSON on standard output wants nothing else there.
-  if (options.json != "-") std::fputs(formatMean(options.input.file, measurements, analysis).c_str(), stdout);
+  if (options.json != "-") printLines(formatMean(options.input.file, measurements, analysis));
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
     setMeanFields(object, options.input.file, measurements, analysis);
@@ -47,6 +53,8 @@ void addMeanCommand(const CommandList& app) {
       .option("--budget", options->analysis.budget,
               "Cells of branch and bound (default 1000000, with more than 100000 measurements 2000)")
       .range(std::size_t{1}, std::size_t{1000000000});
+  command.flag("--inflate", options->analysis.inflate,
+               "Multiply the covariance by the factor by which blocks of time disagree");
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");

@@ -43,6 +43,7 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
   analysis.r_star = result.uniqueness.r_star;
   analysis.cells = result.uniqueness.cells;
   for (const M& rival : result.uniqueness.rivals) analysis.rivals.push_back(describe(rival));
+  analysis.more_rivals = analysis.rivals.size() >= UniquenessOptions{}.max_rivals;
   analysis.cut_locus_mass = result.cut_locus.mass;
   analysis.status = analysis.covariance_status = result.status;
   analysis.reason = result.reason;

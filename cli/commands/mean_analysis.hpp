@@ -20,6 +20,17 @@ struct LargestResidual {
   std::size_t line = 0;
 };
 
+/// Rows with times: do halves made of blocks of time agree as well as the covariance says (stats/split_validation.hpp)?
+struct TimeBlocks {
+  std::size_t blocks = 0, splits = 0;
+  double factor = 1, low = 1, high = 1;  ///< of the squared distances to what is expected, with its 95 % interval
+  double p = 1;                          ///< probability of so large a factor, if rows are independent
+  bool applied = false;                  ///< the covariance was multiplied by the factor, where it is above one
+};
+
+/// Below this p the errors of successive rows are called dependent.
+inline constexpr double dependent_rows = 1e-3;
+
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
@@ -41,6 +52,7 @@ struct MeanAnalysis {
   Uniqueness unique = Uniqueness::not_certified;
   std::string proof = {};  ///< in words
   std::vector<FeatureValue> rivals = {};
+  bool more_rivals = false;  ///< the search ended because the list was full
   double r_star = 0;
   std::size_t cells = 0;
   double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
@@ -50,6 +62,7 @@ struct MeanAnalysis {
   double fit_dof = 0;  ///< 0: there is none
   double fit_p = 1;    ///< probability of so large a sum
 
+  std::optional<TimeBlocks> time_blocks = {};  ///< rows with times that can be split
   std::optional<ChartScatter> charts = {};
   std::vector<std::string> notes = {};
 };
@@ -60,10 +73,16 @@ struct AnalysisOptions {
   std::size_t budget = 0;  ///< its cells; 0: a million, of very many measurements as many as take some seconds
   int threads = 0;         ///< 0: all
   bool charts = false;     ///< for a report
+  bool inflate = false;    ///< multiply the covariance by the factor of compareBlocks()
 };
 
 /// Mean, covariance, dispersion and uniqueness of the measurements. The same bits for any number of threads.
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options);
+
+/// Compares blocks of time where the measurements have times and there is a covariance, adds a note where they disagree,
+/// and multiplies the covariance by the factor where the options ask for it. Files of more than 200 000 rows are left to
+/// `validate split`.
+void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, const AnalysisOptions& options);
 
 /// Adds the p-value of the fit, and notes on what is remarkable about the result, to an analysis of n measurements.
 void explain(MeanAnalysis& analysis, std::size_t n);

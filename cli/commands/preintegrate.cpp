@@ -3,6 +3,7 @@
 #include <cli/io/imu_file.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/preintegration.hpp>
 #include <fusion/imu/preintegrate.hpp>
@@ -11,7 +12,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -78,7 +78,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     windows.push_back(w);
   }
   if (options.json != "-") {
-    std::fputs(formatPreintegration(result).c_str(), stdout);
+    printLines(formatPreintegration(result));
   }
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);

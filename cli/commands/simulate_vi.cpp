@@ -2,6 +2,7 @@
 #include <cli/io/calibration.hpp>
 #include <cli/io/imu_file.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/io/recording_files.hpp>
 #include <cli/io/text.hpp>
 #include <cli/show/simulated_recording.hpp>
@@ -11,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
 
@@ -29,6 +29,7 @@ struct Options {
   std::vector<std::string> calibration;
   std::vector<double> box, gyroscope_bias, accelerometer_bias;
   std::optional<double> begin, end;
+  bool overwrite = false;
   ViSceneOptions scene;
   double imu_rate = 200, imu_noise = 1, spacing = 0.1, gravity = 9.81;
 };
@@ -139,12 +140,12 @@ int runCommand(Options options) {
                      fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),
                      "an end after the beginning");
   }
+  if (!options.overwrite) requireOwnFiles(options.output);
   const Sensors sensors = sensorsOf(options);
   try {
     const SimulatedRecording recording = simulate(options, sensors);
     writeRecording(recording, options.output);
-    std::fputs(formatSimulatedRecording(recording, options.scene, !options.imu.empty(), options.output).c_str(),
-               stdout);
+    printLines(formatSimulatedRecording(recording, options.scene, !options.imu.empty(), options.output));
   } catch (const ImpossibleMotion& complaint) {
     throw InputError(command_name, 0, complaint.found(), complaint.expected());
   }
@@ -159,6 +160,7 @@ void addSimulateViCommand(const CommandList& simulate) {
   const Command command =
       simulate.add("vi", "A recording of an inertial sensor and of what a camera tracks, with its truth, for vi-init");
   command.option("--output", options->output, "Directory for the files").required();
+  command.flag("--overwrite", options->overwrite, "Replace files of the same names, whoever has written them");
   command.option("--truth", options->truth, "EuRoC's ground truth to move along (default: a motion of our own)");
   command.option("--imu", options->imu,
                  "EuRoC's imu0/data.csv that belongs to it: kept as it is (default: simulated along a spline)");

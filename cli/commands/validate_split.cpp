@@ -1,7 +1,9 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/measurement_options.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/io/stereo.hpp>
+#include <cli/io/text.hpp>
 #include <cli/io/tracks.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/mean.hpp>
@@ -30,7 +32,8 @@ FileSplit splitFile(const Options& options) {
   const Measurements measurements = options.input.read(command_name);
   const std::size_t fewest = fewestMeasurements(measurements, options.settings.split);
   if (measurements.size() < fewest) {
-    throw InputError(options.input.file, 0, fmt::format("{} measurements, too few to be split", measurements.size()),
+    throw InputError(sourceName(options.input.file), 0,
+                     fmt::format("{} measurements, too few to be split", measurements.size()),
                      fmt::format("{} at least (--blocks is {})", fewest, options.settings.split.blocks));
   }
   FileSplit split;
@@ -112,7 +115,7 @@ LandmarkSplits splitStereo(const Options& options) {
 
 template <class Split>
 int show(const Split& split, const Options& options, const Invocation& invocation) {
-  if (options.json != "-") std::fputs(formatSplit(split).c_str(), stdout);
+  if (options.json != "-") printLines(formatSplit(split));
   if (!options.json.empty()) writeJson(options.json, toJson(split, invocation.command_line));
   if (!options.report.empty()) writeSplitReport(options.report, invocation.command_line, split);
   return split.passed() ? exit_fine : exit_validation_failed;

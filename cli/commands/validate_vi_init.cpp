@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/show/table1.hpp>
 #include <cli/show/two_solutions.hpp>
 #include <cli/show/vi_init_validation.hpp>
@@ -39,10 +40,10 @@ int runScene(const Options& options, const Invocation& invocation) {
   }
   const auto found = twoSolutions(options.scene == "fig1" ? 1 : 2, options.seed);
   if (!found) {
-    std::fputs("no scene with two solutions that can be drawn among a thousand seeds\nFAILED\n", stdout);
+    printLines("no scene with two solutions that can be drawn among a thousand seeds\nFAILED\n");
     return exit_validation_failed;
   }
-  if (options.output.json != "-") std::fputs(formatTwoSolutions(*found).c_str(), stdout);
+  if (options.output.json != "-") printLines(formatTwoSolutions(*found));
   if (!options.output.json.empty()) {
     writeJson(options.output.json, toJson(*found, invocation.command_line, options.seed));
   }

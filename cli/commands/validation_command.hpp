@@ -3,6 +3,7 @@
 // The common part of the commands `validate means`, `validate propagation` and the like: lists of names on the command
 // line, options of a run, a progress bar, rows in JSON, the exit code.
 
+#include <cli/io/output_file.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/progress.hpp>
@@ -71,7 +72,7 @@ template <class Row, class Format, class ToJson, class WriteReport>
 int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
             const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport) {
   // Whoever asks for JSON on standard output wants nothing else there.
-  if (output.json != "-") std::fputs(format(rows).c_str(), stdout);
+  if (output.json != "-") printLines(format(rows));
   if (!output.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line, seed);
     std::vector<JsonObject> list;

@@ -3,6 +3,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
@@ -145,7 +146,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
-  if (options.json != "-") std::fputs(viInitTable(recording, result).c_str(), stdout);
+  if (options.json != "-") printLines(viInitTable(recording, result));
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line, how.initialisation.consensus.seed);
     setViInit(object, recording, result);

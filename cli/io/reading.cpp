@@ -147,7 +147,8 @@ class FeatureReader {
       return Eigen::Quaterniond(Eigen::Vector4d(q / norm));
     }
     if (places_.rotation_vector[0] != absent) {
-      const Eigen::Vector3d r = (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * readVector(places_.rotation_vector);
+      const Eigen::Vector3d r =
+          (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * readVector(places_.rotation_vector);
       const double angle = r.stableNorm();
       // Beyond this the angle modulo a turn is rounding, not data.
       if (!(angle < 1e6))

@@ -47,7 +47,7 @@ struct ReadingOptions {
   /// matrices the error is half the Frobenius norm of RᵀR − I.
   double norm_tolerance = 1e-3;
   AngleUnit angles = AngleUnit::unsaid;
-  bool ignore_unknown = false;   ///< CSV columns without a meaning are passed over
+  bool ignore_unknown = false;            ///< CSV columns without a meaning are passed over
   std::vector<std::string> columns = {};  ///< names of CSV columns that are not ours, each as "ours=theirs"
 };
 

@@ -1,19 +1,40 @@
 #include <cli/io/recording_files.hpp>
 
+#include <cli/io/input_error.hpp>
 #include <cli/io/output_file.hpp>
+#include <cli/io/text.hpp>
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <iterator>
+#include <string_view>
 
 namespace liestat::cli {
 
 using namespace experiments;
 
 namespace {
+
+constexpr std::array file_names = {"imu.csv",   "images.csv",    "tracks.csv",
+                                   "truth.csv", "landmarks.csv", "calibration.yaml"};
+constexpr const char* list_name = "liestat.txt";
+constexpr std::string_view list_header = "# written by liestat simulate vi: FNV-1a of the contents, file";
+
+/// FNV-1a: no protection against malice, but against replacing what somebody else has written.
+std::uint64_t checksum(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
+
+std::string listLine(std::string_view name, std::string_view text) {
+  return fmt::format("{:016x} {}\n", checksum(text), name);
+}
 
 /// Kalibr's chain of one camera, and its sensor.
 std::string calibrationText(const SimulatedRecording& recording) {
@@ -42,7 +63,11 @@ std::string calibrationText(const SimulatedRecording& recording) {
 
 void writeRecording(const SimulatedRecording& recording, const std::string& directory) {
   createDirectory(directory);
-  const auto write = [&](const char* name, const std::string& text) { writeOutput(directory + "/" + name, text); };
+  std::string list = std::string(list_header) + "\n";
+  const auto write = [&](const char* name, const std::string& text) {
+    writeOutput(directory + "/" + name, text);
+    list += listLine(name, text);
+  };
   const auto stamp = [&](double time) { return recording.start_ns + std::llround(1e9 * time); };
   std::string text;
   const auto append = [&](const Eigen::Vector3d& v) {
@@ -93,6 +118,24 @@ void writeRecording(const SimulatedRecording& recording, const std::string& dire
   }
   write("landmarks.csv", text);
   write("calibration.yaml", calibrationText(recording));
+  writeOutput(directory + "/" + list_name, list);
+}
+
+void requireOwnFiles(const std::string& directory) {
+  const auto pathOf = [&](const char* name) { return directory + "/" + name; };
+  const std::string list = std::filesystem::is_regular_file(pathOf(list_name)) ? loadText(pathOf(list_name)).text : "";
+  const bool is_list = list.rfind(list_header, 0) == 0;
+  const auto refuse = [&](const char* name) {
+    throw InputError(pathOf(name), 0, "the file is there, and not as liestat simulate vi has written it",
+                     "another directory, or --overwrite");
+  };
+  if (!list.empty() && !is_list) refuse(list_name);
+  for (const char* name : file_names) {
+    if (!std::filesystem::exists(pathOf(name))) continue;
+    if (!is_list || !std::filesystem::is_regular_file(pathOf(name)) ||
+        list.find("\n" + listLine(name, loadText(pathOf(name)).text)) == std::string::npos)
+      refuse(name);
+  }
 }
 
 }  // namespace liestat::cli

@@ -8,7 +8,12 @@ namespace liestat::cli {
 
 /// Writes imu.csv, images.csv and truth.csv as EuRoC does, tracks.csv (frame,track,u,v; the frame is the row of
 /// images.csv), calibration.yaml in Kalibr's form and landmarks.csv (track,x,y,z,outlier). Image times are on the
-/// camera's clock. Throws InputError where the directory cannot be written.
+/// camera's clock. liestat.txt tells these files, as they were written, from others of the same names. Throws InputError
+/// where the directory cannot be written.
 void writeRecording(const experiments::SimulatedRecording& recording, const std::string& directory);
+
+/// Throws InputError where writeRecording() would replace a file that it has not written itself, or that was changed
+/// since.
+void requireOwnFiles(const std::string& directory);
 
 }  // namespace liestat::cli

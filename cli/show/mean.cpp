@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
+#include <cli/io/text.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
 
@@ -29,6 +31,34 @@ std::string criterionInWords(const Measurements& measurements) {
   return measurements.weighted ? "weighted exponential barycentre of the group" : "exponential barycentre of the group";
 }
 
+/// The digits of a value that its standard deviation leaves: two beyond the deviation's first, nine in all at least.
+std::string withDigitsOf(double value, double sd) {
+  if (!(sd > 0) || !std::isfinite(sd)) return number(value, 12);
+  const int decimals = 2 - static_cast<int>(std::floor(std::log10(sd)));
+  const int before = value == 0 ? 1 : 1 + static_cast<int>(std::floor(std::log10(std::abs(value))));
+  if (before + decimals <= 9) return number(value, 9);
+  // A double has no more digits than seventeen.
+  return fmt::format("{:.{}f}", value, std::clamp(decimals, 0, std::clamp(17 - before, 0, 20)));
+}
+
+/// The value that belongs to a part of the tangent vector, as it is shown.
+struct ShownPart {
+  const char* name = "";
+  Eigen::Vector3d value;
+  std::string unit;
+  double per_sd = 1;  ///< units of the value in one of the part's standard deviation
+};
+
+ShownPart shownPart(const TangentBlock& part, const FeatureValue& value) {
+  if (isAngular(part.part)) {
+    if (value.direction) return {"direction", *value.direction, "", 1 / degrees};
+    return {"rotation vector", degrees * *value.rotation_vector, "deg"};
+  }
+  return value.translation ? ShownPart{"translation", *value.translation, "m"} : ShownPart{"point", *value.point, "m"};
+}
+
+}  // namespace
+
 std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance) {
   std::vector<double> list;
   for (int i = part.begin; i < part.begin + part.size; ++i) {
@@ -37,26 +67,46 @@ std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& 
   return list;
 }
 
-std::vector<std::string> triple(const std::string& what, const Eigen::Vector3d& v, const std::string& unit) {
-  return {what, number(v[0], 9), number(v[1], 9), number(v[2], 9), unit};
+std::optional<std::vector<double>> worldDeviations(const TangentBlock& part, const FeatureValue& mean,
+                                                   const Eigen::MatrixXd& covariance) {
+  if (isAngular(part.part) || !mean.quaternion_xyzw) return std::nullopt;
+  const Eigen::Matrix3d R = SO3d::fromParams(*mean.quaternion_xyzw).matrix();
+  const Eigen::Matrix3d world = R * covariance.block<3, 3>(part.begin, part.begin) * R.transpose();
+  return deviations(TangentBlock{part.part, 0, 3}, world);
 }
 
-}  // namespace
-
-std::vector<std::vector<std::string>> deviationRows(const Measurements& measurements, const MeanAnalysis& analysis) {
+std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis) {
   std::vector<std::vector<std::string>> rows;
-  const auto add = [&](const std::string& what, const TangentBlock& part, const Eigen::MatrixXd& covariance) {
-    std::vector<std::string> row{fmt::format("{}, {}", what, name(part.part))};
-    for (const double sd : deviations(part, covariance)) row.push_back(number(sd));
+  const auto add = [&](const std::string& what, const std::vector<double>& list, const TangentBlock& part) {
+    std::vector<std::string> row{what};
+    for (const double sd : list) row.push_back(number(sd));
     row.resize(4);
     row.push_back(unitOf(part).name);
     rows.push_back(row);
   };
-  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
-  if (analysis.covariance.size() > 0) {
-    for (const TangentBlock& part : parts) add("sd of the mean", part, analysis.covariance);
+  for (const TangentBlock& part : experiments::info(measurements.feature).tangent) {
+    const ShownPart shown = shownPart(part, analysis.mean);
+    const bool has_covariance = analysis.covariance.size() > 0;
+    double least = 0;
+    if (has_covariance) {
+      const auto world = worldDeviations(part, analysis.mean, analysis.covariance);
+      const std::vector<double> list = world ? *world : deviations(part, analysis.covariance);
+      least = shown.per_sd * *std::min_element(list.begin(), list.end());
+    }
+    std::vector<std::string> row{shown.name};
+    for (int i = 0; i < 3; ++i) row.push_back(withDigitsOf(shown.value[i], least));
+    row.push_back(shown.unit);
+    rows.push_back(row);
+    const std::string own_axes = analysis.mean.direction         ? ", tangent axes"
+                                 : analysis.mean.quaternion_xyzw ? ", body axes"
+                                                                 : "";
+    const auto addBoth = [&](const std::string& what, const Eigen::MatrixXd& covariance) {
+      if (const auto world = worldDeviations(part, analysis.mean, covariance)) add(what + ", world axes", *world, part);
+      add(what + own_axes, deviations(part, covariance), part);
+    };
+    if (has_covariance) addBoth("  sd", analysis.covariance);
+    addBoth("  dispersion", analysis.dispersion);
   }
-  for (const TangentBlock& part : parts) add("dispersion", part, analysis.dispersion);
   return rows;
 }
 
@@ -65,22 +115,13 @@ std::string oneLine(const FeatureValue& value) {
   const auto add = [&](const char* what, const auto& v, double scale, const char* unit) {
     if (!v) return;
     if (!text.empty()) text += ", ";
-    text += fmt::format("{} ({:.6g}, {:.6g}, {:.6g}){}", what, scale * (*v)[0], scale * (*v)[1], scale * (*v)[2], unit);
+    text += fmt::format("{} ({:.9g}, {:.9g}, {:.9g}){}", what, scale * (*v)[0], scale * (*v)[1], scale * (*v)[2], unit);
   };
   add("rotation vector", value.rotation_vector, degrees, " deg");
   add("translation", value.translation, 1, " m");
   add("point", value.point, 1, " m");
   add("direction", value.direction, 1, "");
   return text;
-}
-
-std::vector<std::vector<std::string>> valueRows(const FeatureValue& value) {
-  std::vector<std::vector<std::string>> rows;
-  if (value.rotation_vector) rows.push_back(triple("rotation vector", degrees * *value.rotation_vector, "deg"));
-  if (value.translation) rows.push_back(triple("translation", *value.translation, "m"));
-  if (value.point) rows.push_back(triple("point", *value.point, "m"));
-  if (value.direction) rows.push_back(triple("direction", *value.direction, ""));
-  return rows;
 }
 
 std::string uniquenessInWords(const MeanAnalysis& analysis) {
@@ -111,7 +152,7 @@ std::string covarianceInWords(const Measurements& measurements, const MeanAnalys
 
 std::string measurementsInWords(const std::string& source, const Measurements& measurements) {
   const experiments::FeatureInfo& feature = experiments::info(measurements.feature);
-  std::string text = fmt::format("{}: {} {} ({})", source, measurements.size(),
+  std::string text = fmt::format("{}: {} {} ({})", sourceName(source), measurements.size(),
                                  measurements.size() == 1 ? feature.name : feature.plural, measurements.file.format);
   if (measurements.file.n_normalised > 0) {
     text += fmt::format(", {} normalised (largest error {:.2g})", measurements.file.n_normalised,
@@ -120,22 +161,50 @@ std::string measurementsInWords(const std::string& source, const Measurements& m
   return text;
 }
 
+namespace {
+
+/// As many decimals as the standard deviation of the rotation leaves, nine at least.
+int quaternionDecimals(Feature feature, const MeanAnalysis& analysis) {
+  if (analysis.covariance.size() == 0) return 9;
+  for (const TangentBlock& part : experiments::info(feature).tangent) {
+    if (!isAngular(part.part)) continue;
+    const double least = analysis.covariance.diagonal().segment(part.begin, part.size).minCoeff();
+    if (least > 0) return std::clamp(2 - static_cast<int>(std::floor(0.5 * std::log10(least))), 9, 16);
+  }
+  return 9;
+}
+
+std::string blocksInWords(const TimeBlocks& found) {
+  return fmt::format("of time, {}: halves differ by {} times the expected squared distance (95 %: {} to {}){}",
+                     found.blocks, number(found.factor, 3), number(found.low, 3), number(found.high, 3),
+                     !found.applied        ? ""
+                     : !(found.factor > 1) ? ", so the covariance is left as it is"
+                                           : ", by which the covariance was multiplied");
+}
+
+}  // namespace
+
 std::string formatMean(const std::string& source, const Measurements& measurements, const MeanAnalysis& analysis) {
   std::string text = measurementsInWords(source, measurements) + "\n";
   text += fmt::format("mean by {}: {} after {} {}\n\n", criterionInWords(measurements),
                       analysis.converged ? "converged" : "not converged", analysis.iterations,
                       analysis.iterations == 1 ? "step" : "steps");
   Table table({"", "x", "y", "z", "unit"});
-  for (auto& row : valueRows(analysis.mean)) table.row(row);
-  for (auto& row : deviationRows(measurements, analysis)) table.row(row);
+  for (auto& row : meanRows(measurements, analysis)) table.row(row);
   text += table.str() + "\n";
   if (analysis.mean.quaternion_xyzw) {
     const Eigen::Vector4d& q = *analysis.mean.quaternion_xyzw;
-    text += fmt::format("quaternion x y z w  {:.9f} {:.9f} {:.9f} {:.9f}\n", q[0], q[1], q[2], q[3]);
+    const int decimals = quaternionDecimals(measurements.feature, analysis);
+    text +=
+        fmt::format("quaternion x y z w  {0:.{4}f} {1:.{4}f} {2:.{4}f} {3:.{4}f}\n", q[0], q[1], q[2], q[3], decimals);
   }
   text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
+  if (analysis.more_rivals) {
+    text += fmt::format("  rival      perhaps more: the search ended with these {}\n", analysis.rivals.size());
+  }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
+  if (analysis.time_blocks) text += "blocks       " + blocksInWords(*analysis.time_blocks) + "\n";
   const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
   for (std::size_t p = 0; measurements.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
     text +=
@@ -148,116 +217,6 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
     text += fmt::format("\nNot to be trusted ({}): {}.\n", name(analysis.status), analysis.reason);
   }
   return text;
-}
-
-JsonObject toJson(const FeatureValue& value) {
-  JsonObject object;
-  if (value.quaternion_xyzw) object.set("quaternion_xyzw", *value.quaternion_xyzw);
-  if (value.rotation_vector) object.set("rotation_vector", *value.rotation_vector);
-  if (value.translation) object.set("translation", *value.translation);
-  if (value.point) object.set("point", *value.point);
-  if (value.direction) object.set("direction", *value.direction);
-  return object;
-}
-
-void setCovarianceWords(JsonObject& object, Feature feature) {
-  switch (feature) {
-    case Feature::point:
-      object.set("covariance_order", "x y z (m)");
-      object.set("covariance_side", "none: the error is added to the point");
-      object.set("covariance_frame", "the coordinates of the file");
-      return;
-    case Feature::direction:
-      object.set("covariance_order", "two tangent coordinates (rad)");
-      object.set("covariance_side", "right: the error is a tangent vector at the mean, followed along a great circle");
-      object.set("covariance_frame",
-                 "the tangent plane at the mean, its axes the columns of tangent_basis (the x and y axes turned by the "
-                 "smallest rotation that takes z to the mean)");
-      return;
-    case Feature::rotation:
-      object.set("covariance_order", "rotation x y z (rad)");
-      break;
-    default:
-      object.set("covariance_order", "translation x y z (m), rotation x y z (rad)");
-  }
-  object.set("covariance_side", feature == Feature::rotation ? "right: mean * Exp(error)"
-                                : feature == Feature::se3    ? "right: mean * Exp(error), Exp of SE(3)"
-                                                             : "right: translation + R * error_t, R * Exp(error_r)");
-  object.set("covariance_frame", "the axes of the mean (body frame)");
-}
-
-JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance) {
-  JsonObject object;
-  for (const TangentBlock& part : experiments::info(feature).tangent) {
-    object.set(std::string(name(part.part)) + "_" + unitOf(part).name, deviations(part, covariance));
-  }
-  return object;
-}
-
-void setMeanFields(JsonObject& object, const std::string& source, const Measurements& measurements,
-                   const MeanAnalysis& analysis) {
-  object.set("file", source).set("format", measurements.file.format).set("feature", name(measurements.feature));
-  object.set("criterion", name(measurements.criterion));
-  if (measurements.covariance_at_matters) {
-    object.set("covariance_at", measurements.covariance_at == CovarianceAt::measured ? "measured" : "estimated");
-  } else {
-    object.set("covariance_at", nullptr);
-  }
-  object.set("likelihood", measurements.likelihood).set("weighted", measurements.weighted);
-  object.set("n", measurements.size()).set("n_normalised", measurements.file.n_normalised);
-  object.set("largest_norm_error", measurements.file.largest_norm_error);
-  object.set("status", name(analysis.status));
-  if (analysis.status == Status::ok) {
-    object.set("reason", nullptr);
-  } else {
-    object.set("reason", analysis.reason);
-  }
-  object.set("converged", analysis.converged).set("iterations", analysis.iterations);
-  object.set("residual", analysis.residual).set("tolerance", analysis.tolerance);
-  object.set("mean", toJson(analysis.mean));
-
-  const bool has_covariance = analysis.covariance.size() > 0;
-  if (has_covariance) {
-    object.set("covariance", analysis.covariance);
-  } else {
-    object.set("covariance", nullptr);
-  }
-  object.set("covariance_status", name(analysis.covariance_status));
-  setCovarianceWords(object, measurements.feature);
-  if (analysis.tangent_basis) object.set("tangent_basis", *analysis.tangent_basis);
-  if (has_covariance) {
-    object.set("covariance_from", analysis.covariance_from)
-        .set("covariance_law", analysis.covariance_from == "residuals" ? "hotelling" : "chi2");
-    object.set("standard_deviations", standardDeviations(measurements.feature, analysis.covariance));
-  } else {
-    object.set("covariance_from", nullptr).set("covariance_law", nullptr).set("standard_deviations", nullptr);
-  }
-  object.set("dispersion", analysis.dispersion);
-  object.set("dispersion_standard_deviations", standardDeviations(measurements.feature, analysis.dispersion));
-  std::vector<JsonObject> farthest;
-  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    JsonObject entry;
-    entry.set("part", name(parts[p].part)).set("distance", unitOf(parts[p]).scale * analysis.largest[p].value);
-    entry.set("unit", unitOf(parts[p]).name).set("line", analysis.largest[p].line);
-    farthest.push_back(entry);
-  }
-  object.set("farthest", farthest);
-
-  object.set("unique", name(analysis.unique)).set("proof", uniquenessInWords(analysis));
-  std::vector<JsonObject> rivals;
-  for (const FeatureValue& rival : analysis.rivals) rivals.push_back(toJson(rival));
-  object.set("rivals", rivals).set("r_star", analysis.r_star).set("cells", analysis.cells);
-  object.set("cut_locus_mass", analysis.cut_locus_mass);
-  if (analysis.fit_dof > 0) {
-    object.set("fit", analysis.fit).set("fit_dof", analysis.fit_dof);
-    object.set("fit_p", analysis.fit_p);
-  } else {
-    object.set("fit", nullptr).set("fit_dof", nullptr).set("fit_p", nullptr);
-  }
-  std::vector<std::string> notes = measurements.notes;
-  notes.insert(notes.end(), analysis.notes.begin(), analysis.notes.end());
-  object.set("notes", notes);
 }
 
 }  // namespace liestat::cli

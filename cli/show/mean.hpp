@@ -3,7 +3,9 @@
 #include <cli/show/json.hpp>
 #include <cli/commands/mean_analysis.hpp>
 
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace liestat::cli {
 
@@ -27,9 +29,16 @@ JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance
 /// A feature on one line, for lists of rivals and of halves.
 std::string oneLine(const FeatureValue& value);
 
-/// Rows of a table with the columns name, x, y, z, unit: the feature itself; standard deviations and dispersion.
-std::vector<std::vector<std::string>> valueRows(const FeatureValue& value);
-std::vector<std::vector<std::string>> deviationRows(const Measurements& measurements, const MeanAnalysis& analysis);
+/// Square roots of the diagonal of one part of a covariance, in the part's unit, along the axes of the mean.
+std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance);
+/// The same along the axes of the world, in which a translation is given; nothing for parts that are not translations of
+/// a feature with a rotation.
+std::optional<std::vector<double>> worldDeviations(const TangentBlock& part, const FeatureValue& mean,
+                                                   const Eigen::MatrixXd& covariance);
+
+/// Rows of a table with the columns name, x, y, z, unit: each part of the feature with the digits that its standard
+/// deviation leaves, and below it standard deviations and dispersion, for translations along both kinds of axes.
+std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis);
 
 /// "is unique: the data …" and so on.
 std::string uniquenessInWords(const MeanAnalysis& analysis);

@@ -220,9 +220,7 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
     }
   }
   report.section("Numbers");
-  std::vector<std::vector<std::string>> rows = valueRows(analysis.mean);
-  for (auto& row : deviationRows(measurements, analysis)) rows.push_back(std::move(row));
-  report.table({"", "x", "y", "z", "unit"}, rows);
+  report.table({"", "x", "y", "z", "unit"}, meanRows(measurements, analysis));
   report.section("All that the program said");
   report.code(formatMean(source, measurements, analysis));
   if (analysis.covariance.size() > 0) {
