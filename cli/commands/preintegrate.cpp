@@ -69,6 +69,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
     const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
     if (!options.imu.hasBias()) how.preintegration.bias = first ? first->bias : ImuBias<double>{};
     w.result = preintegrate<double>(imu.samples, w.begin, until, how);
+    if (const Fault& fault = w.result.fault; fault && fault.index < imu.samples.size()) {
+      w.fault_end = imu.samples[fault.index].time;
+      if (fault.index > 0) w.fault_begin = imu.samples[fault.index - 1].time;
+    }
     if (w.result.ok() && first && last) {
       w.error =
           preintegrationError<double>(w.result.motion, first->state, last->state, how.preintegration.bias, gravity);

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -61,6 +61,7 @@ ViRecording recordingOf(const Options& options) {
   recording.tracks = readImageTracks(options.tracks, options.image_times, recording.imu.start_ns);
   const Calibration calibration = options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
   recording.camera = cameraOf(options, calibration);
+  recording.pose_assumed = calibration.cameras.empty();
   recording.noise = options.imu.noiseOver(calibration.imu.value_or(ImuNoise<double>{}));
   if (!(recording.noise.gyroscope > 0 && recording.noise.accelerometer > 0)) {
     throw InputError(command_name, 0, "the inertial sensor's densities of noise are not known",
@@ -116,18 +117,28 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
+/// The times of images and readings, with as many decimals as tell them apart.
+std::string noWindow(double window, const VisualInertialRecording& measured, std::size_t outside) {
+  const double first = measured.image_times.front(), last = measured.image_times.back();
+  const double begin = measured.readings.front().time, end = measured.readings.back().time;
+  const double apart = std::max(std::min({last - first, end - begin}), 1e-9);
+  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(apart))), 1, 9);
+  return fmt::format(
+      "no window of {} s fits: {} images from {:.{}f} to {:.{}f} s, {} of them outside of the readings' {:.{}f} to "
+      "{:.{}f} s",
+      window, measured.image_times.size(), first, decimals, last, decimals, outside, begin, decimals, end, decimals);
+}
+
 /// The fault of a recording as a whole.
 void throwFault(const VisualInertialResult& result, const VisualInertialRecording& measured,
-                const VisualInertialOptions& how) {
+                const ViRecording& recording, const VisualInertialOptions& how) {
   if (!result.fault) return;
   const std::vector<double>& times = measured.image_times;
   if (result.fault == FaultKind::too_few_images) {
-    throw InputError(command_name, 0,
-                     fmt::format("no window of {} s fits: {} images from {:.6g} to {:.6g} s, {} of them outside of the "
-                                 "readings' {:.6g} to {:.6g} s",
-                                 how.window, times.size(), times.front(), times.back(), result.images_outside,
-                                 measured.readings.front().time, measured.readings.back().time),
-                     "images that the readings cover, on the same clock");
+    throw InputError(
+        command_name, 0,
+        noWindow(how.window, measured, result.images_outside) + suspectedUnit(recording.imu.start_ns, times.front()),
+        "images that the readings cover, on the same clock");
   }
   const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
   const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
@@ -142,7 +153,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
-  throwFault(found, measured, how);
+  throwFault(found, measured, recording, how);
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();

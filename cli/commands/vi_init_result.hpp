@@ -16,6 +16,7 @@ struct ViRecording {
   ImuFile imu;
   ImageTracks tracks;
   CameraCalibration camera;
+  bool pose_assumed = false;  ///< no calibration has the camera's pose on the sensor: it is taken as the identity
   ImuNoise<double> noise;
   std::vector<GroundTruth> truth;  ///< empty: not known
 };

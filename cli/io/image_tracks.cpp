@@ -159,6 +159,23 @@ ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tr
   return result;
 }
 
+std::string suspectedUnit(std::int64_t start_ns, double image_time) {
+  const double start = static_cast<double>(start_ns), image = start + 1e9 * image_time;
+  struct Unit {
+    double per_ns;
+    const char* name;
+  };
+  for (const Unit unit : {Unit{1e3, "microseconds"}, Unit{1e6, "milliseconds"}, Unit{1e9, "seconds"}}) {
+    // Years apart, two recordings of today agree within a few parts in a hundred since 1970.
+    const auto near = [&](double small, double large) {
+      return small > 0 && large > 0 && std::abs(small * unit.per_ns / large - 1) < 0.1;
+    };
+    if (near(image, start)) return fmt::format(" (are the images' times in {}?)", unit.name);
+    if (near(start, image)) return fmt::format(" (are the readings' times in {}?)", unit.name);
+  }
+  return {};
+}
+
 ImageTracks readImageTracks(const std::string& tracks, const std::string& image_times, std::int64_t start_ns) {
   const TextFile file = loadText(tracks);
   const TextFile times = image_times.empty() ? TextFile{} : loadText(image_times);

@@ -34,4 +34,8 @@ ImageTracks readImageTracks(const std::string& tracks, const std::string& image_
 ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
                              const std::string& times_name, std::int64_t start_ns);
 
+/// Where no image is among the readings: which unit the stamps of one of the two files may have, if not nanoseconds, in
+/// words. `image_time` is that of an image on the clock that shows start_ns at zero. Empty: no suspicion.
+std::string suspectedUnit(std::int64_t start_ns, double image_time);
+
 }  // namespace liestat::cli

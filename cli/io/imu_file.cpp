@@ -30,6 +30,11 @@ void checkUnits(const ImuFile& file, const std::string& name) {
     throw InputError(name, 0, fmt::format("specific forces are {:.3g} in the mean: in g?", force),
                      "m/s^2, some 9.8 at rest");
   }
+  // Rockets have a tenth of this.
+  if (force > 500) {
+    throw InputError(name, 0, fmt::format("specific forces are {:.4g} in the mean: in mm/s^2?", force),
+                     "m/s^2, some 9.8 at rest");
+  }
   // The fastest gyroscopes of vehicles end at 35 rad/s.
   if (rate > 35) {
     throw InputError(name, 0, fmt::format("angular rates are {:.3g} in the mean: in degrees a second?", rate), "rad/s");

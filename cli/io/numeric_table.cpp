@@ -5,11 +5,25 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <cli/io/input_error.hpp>
 
 namespace liestat::cli {
+namespace {
+
+/// The whole number that a field writes without point or exponent, if it is so large that a double may be another.
+std::optional<std::uint64_t> beyondDoubles(double value, std::string_view field) {
+  if (!(value >= 9007199254740992.0)) return std::nullopt;
+  if (field.front() == '+') field.remove_prefix(1);
+  std::uint64_t whole = 0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), whole);
+  if (error != std::errc() || end != field.data() + field.size()) return std::nullopt;
+  return whole;
+}
+
+}  // namespace
 
 NumericTable::NumericTable(std::string file, std::vector<std::string> columns)
     : file_(std::move(file)), columns_(std::move(columns)) {}
@@ -24,6 +38,11 @@ std::size_t NumericTable::column(std::string_view column) const {
 
 std::size_t NumericTable::index(std::size_t row, std::size_t column) const {
   const double value = (*this)(row, column);
+  if (const auto exact = exact_.find(row * columns_.size() + column); exact != exact_.end()) {
+    if (exact->second <= std::uint64_t{1} << 63U) return exact->second;
+    throw InputError(file_, lines_[row], fmt::format("{} is {}", columns_[column], exact->second),
+                     "a whole number of 0 or more, up to 2^63");
+  }
   // 2^53: up to there every whole number is a double.
   if (value >= 0 && value <= 9007199254740992.0 && value == std::floor(value)) return static_cast<std::size_t>(value);
   throw InputError(file_, lines_[row], fmt::format("{} is {}", columns_[column], value), "a whole number of 0 or more");
@@ -32,6 +51,10 @@ std::size_t NumericTable::index(std::size_t row, std::size_t column) const {
 void NumericTable::append(const double* values, std::size_t line) {
   values_.insert(values_.end(), values, values + columns_.size());
   lines_.push_back(line);
+}
+
+void NumericTable::keepExactly(std::size_t column, std::uint64_t value) {
+  exact_[values_.size() - columns_.size() + column] = value;
 }
 
 NumericTable readTable(const std::string& path, const std::vector<std::string>& required,
@@ -82,6 +105,9 @@ NumericTable parseTable(std::string_view text, std::string name, const std::vect
       values[i] = numberField(fields[places[i]], columns[i], table.file(), reader.number());
     }
     table.append(values.data(), reader.number());
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (const auto whole = beyondDoubles(values[i], fields[places[i]])) table.keepExactly(i, *whole);
+    }
   }
   if (table.rows() == 0)
     throw InputError(table.file(), header_line, "there is a header but no data", "at least one row after it");

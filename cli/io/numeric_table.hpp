@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include <cli/io/text.hpp>
@@ -28,17 +29,20 @@ class NumericTable {
   std::size_t rows() const { return lines_.size(); }
   double operator()(std::size_t row, std::size_t column) const { return values_[row * columns_.size() + column]; }
   std::size_t line(std::size_t row) const { return lines_[row]; }
-  /// A value that has to be a whole number of zero or more; throws InputError otherwise.
+  /// A value that has to be a whole number from 0 to 2^63, exactly as the file has it; throws InputError otherwise.
   std::size_t index(std::size_t row, std::size_t column) const;
 
   /// Adds a row of as many values as there are columns.
   void append(const double* values, std::size_t line);
+  /// Keeps a whole number of the last row that a double does not hold.
+  void keepExactly(std::size_t column, std::uint64_t value);
 
  private:
   std::string file_;
   std::vector<std::string> columns_;
   std::vector<double> values_;
   std::vector<std::size_t> lines_;
+  std::unordered_map<std::size_t, std::uint64_t> exact_;  ///< by the place in values_
 };
 
 /// Reads the required columns, and those of the optional ones that are there, in whatever order the file has them; it

@@ -56,9 +56,16 @@ std::vector<double> numbers(const NamedNode& list, const std::string& expected);
 /// A rigid motion as rows (4x4, or 3x4), as 16 or 12 numbers in a row, or as OpenCV's map of rows, cols and data.
 SE3d rigidMotion(const NamedNode& matrix);
 
+/// The size of a calibration, bytes; yaml-cpp would take minutes for what is larger.
+inline constexpr std::size_t most_yaml = 1000000;
+
 /// Calls a function with the file's root; what yaml-cpp throws becomes an InputError.
 template <class Function>
 auto withRoot(std::string_view text, const std::string& name, Function&& function) {
+  if (text.size() > most_yaml) {
+    throw InputError(name, 0, "this YAML file has " + std::to_string(text.size()) + " bytes",
+                     "a calibration, of at most " + std::to_string(most_yaml));
+  }
   // OpenCV's directive is none of YAML's; as a comment it keeps the numbers of the lines.
   std::string yaml(text);
   if (yaml.rfind("%YAML:", 0) == 0) yaml[0] = '#';

@@ -40,7 +40,10 @@ JsonObject toJson(const PreintegratedWindow& w, bool with_noise) {
   JsonObject o;
   o.set("begin", w.begin).set("status", statusOf(w.result.fault)).set("duration", w.result.motion.duration());
   o.set("largest_gap", w.result.max_gap);
-  if (!w.result.ok()) return o;
+  if (!w.result.ok()) {
+    if (w.fault_end) o.set("fault_time", *w.fault_end);
+    return o;
+  }
   const SE23d& x = w.result.motion.increment();
   o.set("quaternion_xyzw", Eigen::Vector4d(x.so3().params())).set("rotation_vector", Eigen::Vector3d(x.so3().log()));
   o.set("position", Eigen::Vector3d(x.translation())).set("velocity", Eigen::Vector3d(x.velocity()));
@@ -65,10 +68,10 @@ std::string windowTable(const std::vector<PreintegratedWindow>& windows, bool wi
   for (const PreintegratedWindow& w : windows) {
     const SE23d& x = w.result.motion.increment();
     if (!w.result.ok()) {
-      table.row({number(w.begin), statusOf(w.result.fault)});
+      table.row({number(w.begin, 9), statusOf(w.result.fault)});
       continue;
     }
-    std::vector<std::string> cells = {number(w.begin), number(w.result.motion.duration()),
+    std::vector<std::string> cells = {number(w.begin, 9), number(w.result.motion.duration()),
                                       number(degrees * x.so3().log().norm()), number(x.velocity().norm()),
                                       number(x.translation().norm())};
     if (with_noise) {
@@ -85,6 +88,19 @@ std::string windowTable(const std::vector<PreintegratedWindow>& windows, bool wi
     table.row(cells);
   }
   return table.str();
+}
+
+/// Where the readings of windows without a result fail.
+std::string faultLines(const std::vector<PreintegratedWindow>& windows) {
+  std::string text;
+  for (const PreintegratedWindow& w : windows) {
+    if (w.result.ok() || !w.fault_end) continue;
+    text += fmt::format("window from {:.3f} s: {} ", w.begin, statusOf(w.result.fault));
+    text += w.result.fault == FaultKind::gap && w.fault_begin
+                ? fmt::format("in the readings from {:.6f} to {:.6f} s\n", *w.fault_begin, *w.fault_end)
+                : fmt::format("at the reading of {:.6f} s\n", *w.fault_end);
+  }
+  return text.empty() ? text : "\n" + text;
 }
 
 std::string errorSummary(const std::vector<PreintegratedWindow>& windows, bool with_noise) {
@@ -109,7 +125,7 @@ std::string errorSummary(const std::vector<PreintegratedWindow>& windows, bool w
 }  // namespace
 
 std::string formatPreintegration(const PreintegrationResult& result) {
-  return windowTable(result.windows, result.with_noise, result.with_truth) +
+  return windowTable(result.windows, result.with_noise, result.with_truth) + faultLines(result.windows) +
          errorSummary(result.windows, result.with_noise);
 }
 

@@ -16,6 +16,8 @@ namespace liestat::cli {
 struct PreintegratedWindow {
   double begin = 0;  ///< s
   RecordingResult<double> result;
+  /// Where the readings fail, s: the reading that is at fault, and the one before it.
+  std::optional<double> fault_end = {}, fault_begin = {};
   std::optional<Eigen::Matrix<double, 9, 1>> error;  ///< position, rotation, velocity
   double squared_distance = 0;                       ///< the error's, under the covariance
 };

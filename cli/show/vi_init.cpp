@@ -155,6 +155,16 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     notes.push_back(fmt::format("{} pixels have no direction by the lens' model", result.observations_outside));
   }
   for (const std::string& note : notes) text += "note: " + note + ", and not used\n";
+  for (const ViWindow& w : result.windows) {
+    if (!w.fault) continue;
+    text += fmt::format("note: the window from {:.3f} s has no result ({}): the readings fail at {:.6f} s\n", w.begin,
+                        name(w.verdict()), w.fault_time);
+  }
+  if (recording.pose_assumed) {
+    text +=
+        "note: no calibration has the camera's pose on the inertial sensor, and --intrinsics has none: both are taken "
+        "to have the same axes and origin\n";
+  }
   return text;
 }
 

@@ -121,6 +121,7 @@ JsonObject toJson(const ViFusion& f) {
 void setViInit(JsonObject& object, const ViRecording& recording, const ViInitResult& result) {
   object.set("readings", recording.imu.samples.size()).set("start_ns", recording.imu.start_ns);
   object.set("images", recording.tracks.times.size()).set("tracks", recording.tracks.track_ids.size());
+  object.set("camera_pose_assumed", recording.pose_assumed);
   object.set("tracks_seen_once", recording.tracks.seen_once).set("images_outside", result.images_outside);
   object.set("observations_outside", result.observations_outside).set("bearing_noise", result.bearing_noise);
   object.set("gravity", result.gravity);
