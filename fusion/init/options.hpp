@@ -19,7 +19,7 @@ namespace liestat {
 struct BiasPrior {
   ImuBias<double> mean = {};
   double gyroscope_sigma = 0.1;      ///< rad/s
-  double accelerometer_sigma = 0.1;  ///< m/s²; for the closed form infinite means none
+  double accelerometer_sigma = 0.15;  ///< m/s²; for the closed form infinite means none
 };
 
 /// fusion/init/closed_form.hpp
