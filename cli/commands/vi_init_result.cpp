@@ -134,7 +134,7 @@ void refuseFault(const VisualInertialResult& found, const VisualInertialRecordin
           "no window of {} s fits: {} images from {:.3f} to {:.3f} s, {} of them outside of the readings' {:.3f} "
           "to {:.3f} s{}",
           how.window, times.size(), times.front(), times.back(), found.images_outside, readings.front().time,
-          readings.back().time, unit ? "; one clock seems to count in µs where the other counts in ns" : ""),
+          readings.back().time, unit ? "; does one clock count in µs where the other counts in ns?" : ""),
       "images that the readings cover, on the same clock");
 }
 
