@@ -20,6 +20,7 @@
 #include <lie/detail/contract_group.hpp>
 #include <lie/detail/contract_homogeneous.hpp>
 #include <lie/detail/contract_metric.hpp>
+#include <lie/detail/contract_operations.hpp>
 #include <lie/detail/contract_statistics.hpp>
 
 namespace liestat {
