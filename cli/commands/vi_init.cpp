@@ -117,35 +117,6 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
-/// The times of images and readings, with as many decimals as tell them apart.
-std::string noWindow(double window, const VisualInertialRecording& measured, std::size_t outside) {
-  const double first = measured.image_times.front(), last = measured.image_times.back();
-  const double begin = measured.readings.front().time, end = measured.readings.back().time;
-  const double apart = std::max(std::min({last - first, end - begin}), 1e-9);
-  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(apart))), 1, 9);
-  return fmt::format(
-      "no window of {} s fits: {} images from {:.{}f} to {:.{}f} s, {} of them outside of the readings' {:.{}f} to "
-      "{:.{}f} s",
-      window, measured.image_times.size(), first, decimals, last, decimals, outside, begin, decimals, end, decimals);
-}
-
-/// The fault of a recording as a whole.
-void throwFault(const VisualInertialResult& result, const VisualInertialRecording& measured,
-                const ViRecording& recording, const VisualInertialOptions& how) {
-  if (!result.fault) return;
-  const std::vector<double>& times = measured.image_times;
-  if (result.fault == FaultKind::too_few_images) {
-    throw InputError(
-        command_name, 0,
-        noWindow(how.window, measured, result.images_outside) + suspectedUnit(recording.imu.start_ns, times.front()),
-        "images that the readings cover, on the same clock");
-  }
-  const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
-  const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
-  throw InputError(command_name, 0, fmt::format("{:.3g} windows from {} to {} s", windows, begin, end),
-                   fmt::format("at most {}", how.max_windows));
-}
-
 int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
   const VisualInertialRecording measured = measurementsOf(recording, options);
@@ -153,7 +124,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
-  throwFault(found, measured, recording, how);
+  refuseFault(found, measured, recording.imu.start_ns, how, command_name);
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();

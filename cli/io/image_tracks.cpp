@@ -170,8 +170,8 @@ std::string suspectedUnit(std::int64_t start_ns, double image_time) {
     const auto near = [&](double small, double large) {
       return small > 0 && large > 0 && std::abs(small * unit.per_ns / large - 1) < 0.1;
     };
-    if (near(image, start)) return fmt::format(" (are the images' times in {}?)", unit.name);
-    if (near(start, image)) return fmt::format(" (are the readings' times in {}?)", unit.name);
+    if (near(image, start)) return fmt::format("; are the images' times in {}?", unit.name);
+    if (near(start, image)) return fmt::format("; are the readings' times in {}?", unit.name);
   }
   return {};
 }
