@@ -61,6 +61,6 @@ ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& rec
 
 /// Throws an InputError in the command's name for the fault of a recording as a whole.
 void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured, std::int64_t start_ns,
-                 const VisualInertialOptions& how, const char* command_name);
+                 const VisualInertialOptions& how, const char* command);
 
 }  // namespace liestat::cli
