@@ -10,6 +10,7 @@
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
+#include <stats/near_ties.hpp>
 #include <stats/status.hpp>
 #include <stats/uniqueness.hpp>
 
@@ -33,6 +34,7 @@ struct CertifiedMeanOptions {
   std::vector<SquareOf<M>> known_noise = {};
   /// The covariance is withdrawn when the Hessian averaged over its region is lower than that by more, relative.
   double largest_hessian_change = liestat::largest_hessian_change;
+  NearTieOptions near_ties = {};  ///< which other minima are rivals although they are higher
 };
 
 /// A mean with all that is known about it.
@@ -41,6 +43,7 @@ struct CertifiedMean {
   MeanResult<M> mean;  ///< the improved one if the search found a lower minimum
   UniquenessResult<M> uniqueness;
   Concentration concentration;
+  std::vector<NearTie<M>> near_ties;  ///< other minima that the data do not exclude, the nearest tie first
   CutLocusMass cut_locus;
   /// By how much the Hessian averaged over the confidence region (averagedHessian) is lower than at the mean, relative;
   /// the covariance is that of the averaged one.
@@ -57,6 +60,7 @@ inline constexpr const char* not_converged_reason = "the iteration for the mean 
 inline constexpr const char* rival_reason = "another feature explains the data as well";
 inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
 inline constexpr const char* hessian_reason = "the Hessian of the criterion is not positive definite at the mean";
+inline constexpr const char* near_tie_reason = "another feature explains the data as well but for their noise";
 inline constexpr const char* scattered_reason =
     "the features are as scattered as uniform ones: they have no mean, or too few of them show it";
 inline constexpr const char* cut_locus_reason =
@@ -121,8 +125,20 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   if (!result.concentration.concentrated && !modest) {
     return without(Status::ill_defined, scattered_reason);
   }
-  if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   SquareOf<M> covariance = settled.covariance;
+  const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
+  if (known) {
+    const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
+      return options.known_noise[options.known_noise.size() == 1 ? 0 : i];
+    };
+    result.near_ties =
+        findNearTies<M>(executor, samples, weights, result.mean, region, have_residuals, noise, options.near_ties);
+  } else {
+    result.near_ties =
+        findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
+  }
+  if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
+  if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   if (known && have_residuals) {
     MeanResult<M> averaged = result.mean;
     averaged.hessian = settled.hessian;
@@ -137,8 +153,8 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 }  // namespace detail
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, where that
-/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well
-/// (ambiguous), when the features are as scattered as uniform ones or the criterion is flat within the confidence region
+/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well,
+/// exactly or up to the noise of the data (ambiguous), when the features are as scattered as uniform ones or the criterion is flat within the confidence region
 /// (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
 /// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>

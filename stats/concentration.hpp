@@ -59,25 +59,48 @@ struct UniformLaw {
   }
 };
 
-/// The uniform law on the compact factor of M, which is not none or unknown.
+inline UniformLaw circleLaw() { return {pi * pi / 3, {2.881, -2.912, 10.537, -25.902, 17.927}}; }
+inline UniformLaw sphereLaw() { return {0.5 * (pi * pi - 4), {2.670, -2.284, 4.387, -9.260, 5.742}}; }
+/// SO(3) modulo half-turns about none, one or all of three axes.
+inline UniformLaw rotationLaw(std::ptrdiff_t half_turns) {
+  if (half_turns == 0) return {pi * pi / 3 + 2, {1.992, -0.311, -0.440, -0.464, 0}};
+  if (half_turns == 1) return {3.534856, {2.246, -0.795, -0.549, -0.049, 0}};
+  return {1.853103, {1.971, -0.647, 0.615, -1.221, 0}};
+}
+
+/// The uniform law on the compact factor of M, which is known.
 template <Metric M>
 UniformLaw uniformLaw() {
   if constexpr (compactFactor<M>() == CompactFactor::circle) {
-    return {pi * pi / 3, {2.881, -2.912, 10.537, -25.902, 17.927}};
+    return circleLaw();
   } else if constexpr (compactFactor<M>() == CompactFactor::sphere) {
-    return {0.5 * (pi * pi - 4), {2.670, -2.284, 4.387, -9.260, 5.742}};
+    return sphereLaw();
   } else {
     const auto half_turns = searchSpace<M>().half_turns;
-    switch (std::count(half_turns.begin(), half_turns.end(), true)) {
-      case 0:
-        return {pi * pi / 3 + 2, {1.992, -0.311, -0.440, -0.464, 0}};
-      case 1:
-        return {3.534856, {2.246, -0.795, -0.549, -0.049, 0}};
-      default:
-        return {1.853103, {1.971, -0.647, 0.615, -1.221, 0}};
-    }
+    return rotationLaw(std::count(half_turns.begin(), half_turns.end(), true));
   }
 }
+
+/// Sums over angles from a mean.
+struct ScatterOfAngles {
+  double weight = 0, squared_weight = 0, sum = 0, plain = 0, n = 0;
+
+  void add(double p, double squared_angle) {
+    if (p == 0) return;
+    weight += p, squared_weight += p * p, sum += p * squared_angle;
+    plain += squared_angle, ++n;
+  }
+  Concentration judge(const UniformLaw& law) const {
+    Concentration result;
+    result.mean_square = sum / weight;
+    result.uniform = law.expectation;
+    result.limit = law.limit(weight * weight / squared_weight);
+    // Without their weights uniform data scatter no less, wherever the weights put the mean. A few precise data do not
+    // hide that the others are concentrated too.
+    result.concentrated = result.mean_square < result.limit || plain / n < law.limit(n);
+    return result;
+  }
+};
 
 template <Metric M, class R, class W>
 Concentration findConcentration(const R& samples, const W& weights, const M& mean) {
@@ -91,23 +114,13 @@ Concentration findConcentration(const R& samples, const W& weights, const M& mea
   } else if constexpr (has_compact_factor<M>) {
     using T = ManifoldTraits<M>;
     const auto to_mean = T::placement(mean).inverse();
-    double weight = 0, squared_weight = 0, sum = 0, plain = 0, n = 0;
+    ScatterOfAngles angles;
     for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-      const double p = static_cast<double>(weights[i]);
-      if (p == 0) continue;
       const TangentOf<M> z = T::logOrigin(T::act(to_mean, M(samples[i])));
-      const double angle2 =
-          static_cast<double>(z.template segment<compact_dimension<M>>(T::compact_begin).squaredNorm());
-      weight += p, squared_weight += p * p, sum += p * angle2;
-      plain += angle2, ++n;
+      angles.add(static_cast<double>(weights[i]),
+                 static_cast<double>(z.template segment<compact_dimension<M>>(T::compact_begin).squaredNorm()));
     }
-    const UniformLaw law = uniformLaw<M>();
-    result.mean_square = sum / weight;
-    result.uniform = law.expectation;
-    result.limit = law.limit(weight * weight / squared_weight);
-    // Uniform data have no less without their weights, wherever the weights put the mean: precise data do not hide that
-    // the others are concentrated too.
-    result.concentrated = result.mean_square < result.limit || plain / n < law.limit(n);
+    result = angles.judge(uniformLaw<M>());
   }
   return result;
 }

@@ -43,7 +43,9 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
   analysis.r_star = result.uniqueness.r_star;
   analysis.cells = result.uniqueness.cells;
   for (const M& rival : result.uniqueness.rivals) analysis.rivals.push_back(describe(rival));
+  for (const auto& tie : result.near_ties) analysis.near_ties.push_back({describe(tie.feature), tie.z});
   analysis.cut_locus_mass = result.cut_locus.mass;
+  analysis.hessian_change = result.hessian_change;
   analysis.status = analysis.covariance_status = result.status;
   analysis.reason = result.reason;
   if (result.status == Status::too_few) {

@@ -20,6 +20,12 @@ struct LargestResidual {
   std::size_t line = 0;
 };
 
+/// Another feature that the measurements do not exclude, and by how many standard deviations it is the worse.
+struct NearRival {
+  FeatureValue feature;
+  double z = 0;
+};
+
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
@@ -43,7 +49,10 @@ struct MeanAnalysis {
   std::vector<FeatureValue> rivals = {};
   double r_star = 0;
   std::size_t cells = 0;
+  std::vector<NearRival> near_ties = {};
   double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
+  /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
+  double hessian_change = 0;
 
   /// Sum of the measurements' squared Mahalanobis distances, where their noise is known, and what is expected.
   double fit = 0;

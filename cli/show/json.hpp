@@ -71,7 +71,7 @@ class JsonObject {
 };
 
 /// The version of the fields' names and meanings; grows when one of them changes.
-inline constexpr int schema_version = 1;
+inline constexpr int schema_version = 2;
 
 /// The first fields of every JSON file of the program: schema_version, program, version, command_line, and the seed if
 /// there is one.

@@ -135,6 +135,9 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   }
   text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
+  for (const NearRival& rival : analysis.near_ties) {
+    text += fmt::format("  near tie   {}: worse by {:.2g} standard deviations\n", oneLine(rival.feature), rival.z);
+  }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
   const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
   for (std::size_t p = 0; measurements.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
@@ -248,7 +251,13 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measurem
   std::vector<JsonObject> rivals;
   for (const FeatureValue& rival : analysis.rivals) rivals.push_back(toJson(rival));
   object.set("rivals", rivals).set("r_star", analysis.r_star).set("cells", analysis.cells);
-  object.set("cut_locus_mass", analysis.cut_locus_mass);
+  std::vector<JsonObject> near_ties;
+  for (const NearRival& rival : analysis.near_ties) {
+    near_ties.push_back(toJson(rival.feature));
+    near_ties.back().set("z", rival.z);
+  }
+  object.set("near_ties", near_ties);
+  object.set("cut_locus_mass", analysis.cut_locus_mass).set("hessian_change", analysis.hessian_change);
   if (analysis.fit_dof > 0) {
     object.set("fit", analysis.fit).set("fit_dof", analysis.fit_dof);
     object.set("fit_p", analysis.fit_p);

@@ -36,7 +36,8 @@ struct SettledCovariance {
 /// found where the criterion is steep by chance, which a narrow average sees in part only: at two the coverage of
 /// scattered rotations and directions holds. Fewer than twenty data say less about places that far off, and Hotelling's
 /// law widens their region already.
-inline double averagingWidth(std::size_t n) { return std::min(2.0, 0.1 * static_cast<double>(n)); }
+inline constexpr double averaging_width = 2;
+inline double averagingWidth(std::size_t n) { return std::min(averaging_width, 0.1 * static_cast<double>(n)); }
 
 /// Iterates: covariance of a mean by covariance_of(mean with its Hessian), region, averaged Hessian.
 template <Metric M, class R, class W, class Covariance>

@@ -71,7 +71,7 @@ TEST(JsonOutput, EnvelopeAndFields) {
   object.set("row", Eigen::RowVector2d(1, 2)).set("nothing", nullptr).set("maybe", std::optional<double>());
   object.set("list", std::vector<double>{1, nan}).set("names", std::vector<std::string>{"a"});
   const auto json = nlohmann::ordered_json::parse(object.str());
-  EXPECT_EQ(json["schema_version"], 1);
+  EXPECT_EQ(json["schema_version"], 2);
   EXPECT_EQ(json["program"], "liestat");
   EXPECT_EQ(json["version"], std::string(programVersion()));
   EXPECT_EQ(json["command_line"], "liestat mean f.csv");
