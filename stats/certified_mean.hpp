@@ -120,12 +120,6 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.hessian_change = settled.change;
   if (!settled.first.allFinite()) return without(Status::ill_defined, hessian_reason);
   result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
-  // Of few data whose noise is known it is not asked to show that there is a mean.
-  const bool modest = result.concentration.isModest() && isModestNoise<M>(options.known_noise);
-  if (!result.concentration.concentrated && !modest) {
-    return without(Status::ill_defined, scattered_reason);
-  }
-  SquareOf<M> covariance = settled.covariance;
   const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
   if (known) {
     const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
@@ -137,8 +131,15 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     result.near_ties =
         findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
   }
+  // Of few data whose noise is known it is not asked to show that there is a mean.
+  const bool modest =
+      known && (result.mean.n == 1 || (result.concentration.isModest() && isModestNoise<M>(options.known_noise)));
+  if (!result.concentration.concentrated && !modest) {
+    return without(Status::ill_defined, scattered_reason);
+  }
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
+  SquareOf<M> covariance = settled.covariance;
   if (known && have_residuals) {
     MeanResult<M> averaged = result.mean;
     averaged.hessian = settled.hessian;

@@ -20,6 +20,7 @@
 #include <limits>
 #include <ranges>
 #include <tuple>
+#include <vector>
 
 namespace liestat {
 
@@ -59,7 +60,7 @@ struct UniformLaw {
   }
 };
 
-inline UniformLaw circleLaw() { return {pi * pi / 3, {2.881, -2.912, 10.537, -25.902, 17.927}}; }
+inline UniformLaw circleLaw() { return {pi * pi / 3, {2.881, -2.912, 10.537, -25.902, 17.926}}; }
 inline UniformLaw sphereLaw() { return {0.5 * (pi * pi - 4), {2.670, -2.284, 4.387, -9.260, 5.742}}; }
 /// SO(3) modulo half-turns about none, one or all of three axes.
 inline UniformLaw rotationLaw(std::ptrdiff_t half_turns) {
@@ -125,6 +126,34 @@ Concentration findConcentration(const R& samples, const W& weights, const M& mea
   return result;
 }
 
+/// Whether noise of this covariance scatters less than a quarter as much as uniform features; of products each factor.
+template <Metric M>
+bool isModestNoise(const SquareOf<M>& noise) {
+  if constexpr (Factored<M>) {
+    bool modest = true;
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      using F = std::tuple_element_t<i, FactorsOf<M>>;
+      constexpr int k = ManifoldTraits<F>::DoF, begin = factorOffset<i, M>();
+      modest = modest && isModestNoise<F>(SquareOf<F>(noise.template block<k, k>(begin, begin)));
+    });
+    return modest;
+  } else if constexpr (has_compact_factor<M>) {
+    constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
+    return static_cast<double>(noise.template block<K, K>(begin, begin).trace()) <= 0.25 * uniformLaw<M>().expectation;
+  } else {
+    return true;
+  }
+}
+
+/// The same of the mean of several covariances, in whatever frames.
+template <Metric M>
+bool isModestNoise(const std::vector<SquareOf<M>>& noise) {
+  if (noise.empty()) return false;
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (const SquareOf<M>& v : noise) sum += v;
+  sum /= ScalarOf<M>(noise.size());
+  return isModestNoise<M>(sum);
+}
 }  // namespace detail
 
 /// The scatter of features about their mean, weighted or not, and whether uniform features would scatter as little by

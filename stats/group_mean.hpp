@@ -88,7 +88,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     if (result.residual <= result.tolerance) result.status = Status::ok;
   }
   result.mean = y;
-  result.concentration = groupConcentration(samples, weights, y);
+  result.concentration = angularConcentration<G>(samples, weights, y);
   return result;
 }
 

@@ -53,6 +53,11 @@ double squaredLength(const Tangent& z, const TangentBlock& part) {
   return sum;
 }
 
+/// The uniform law of an angular part.
+inline UniformLaw lawOf(const TangentBlock& part) {
+  return part.size == 1 ? circleLaw() : part.size == 2 ? sphereLaw() : rotationLaw(0);
+}
+
 /// How far an estimate may turn before it meets the cut locus of a feature, rad.
 template <Homogeneous M, class R>
 double angleToCutLocus(const R& features, const M& y) {
@@ -89,26 +94,40 @@ Eigen::Matrix<double, K, K> angularRegion(const Matrix& covariance, const List& 
   return lowerFactor<K>(region);
 }
 
-/// The concentration of the rotations in the elements of a group about one of them, from their logarithms: the most
-/// scattered block counts.
-template <LieGroup G, class R, class W>
-Concentration groupConcentration(const R& samples, const W& weights, const G& y) {
+/// The concentration of the angles in features about one of them: by the metric where there is one, else by the parts of
+/// their logarithms, of which the most scattered counts.
+template <Homogeneous M, class R, class W>
+Concentration angularConcentration(const R& samples, const W& weights, const M& y) {
   Concentration result;
-  if constexpr (Metric<G>) {
+  if constexpr (Metric<M>) {
     result = findConcentration(samples, weights, y);
-  } else if constexpr (HasTangentParts<G>) {
-    const G to_mean = y.inverse();
-    for (const TangentBlock& part : ManifoldTraits<G>::tangent_parts) {
+  } else if constexpr (HasTangentParts<M>) {
+    for (const TangentBlock& part : ManifoldTraits<M>::tangent_parts) {
       if (!isAngular(part.part)) continue;
       ScatterOfAngles angles;
       for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-        const TangentOf<G> z = (to_mean * G(samples[i])).log();
-        angles.add(static_cast<double>(weights[i]), squaredLength(z, part));
+        angles.add(static_cast<double>(weights[i]), squaredLength(log(y, M(samples[i])), part));
       }
-      result.worsen(angles.judge(part.size == 1 ? circleLaw() : rotationLaw(0)));
+      result.worsen(angles.judge(lawOf(part)));
     }
   }
   return result;
+}
+
+/// Whether noise of this covariance turns features by less than a quarter of what uniform ones scatter.
+template <Homogeneous M>
+bool isModestAngularNoise(const SquareOf<M>& noise) {
+  if constexpr (Metric<M>) {
+    return isModestNoise<M>(noise);
+  } else if constexpr (HasTangentParts<M>) {
+    for (const TangentBlock& part : ManifoldTraits<M>::tangent_parts) {
+      if (!isAngular(part.part)) continue;
+      double trace = 0;
+      for (int i = part.begin; i < part.begin + part.size; ++i) trace += static_cast<double>(noise(i, i));
+      if (!(trace <= 0.25 * lawOf(part).expectation)) return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace liestat::detail

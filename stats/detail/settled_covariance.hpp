@@ -2,15 +2,11 @@
 #pragma once
 
 #include <stats/averaged_hessian.hpp>
-#include <stats/concentration.hpp>
-#include <stats/detail/compact_part.hpp>
 #include <stats/mean.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <tuple>
-#include <vector>
 
 namespace liestat {
 
@@ -73,32 +69,4 @@ SettledCovariance<M> settleCovariance(const R& samples, const W& weights, const 
   return result;
 }
 
-/// Whether noise of this covariance scatters less than a quarter as much as uniform features; of products each factor.
-template <Metric M>
-bool isModestNoise(const SquareOf<M>& noise) {
-  if constexpr (Factored<M>) {
-    bool modest = true;
-    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
-      using F = std::tuple_element_t<i, FactorsOf<M>>;
-      constexpr int k = ManifoldTraits<F>::DoF, begin = factorOffset<i, M>();
-      modest = modest && isModestNoise<F>(SquareOf<F>(noise.template block<k, k>(begin, begin)));
-    });
-    return modest;
-  } else if constexpr (has_compact_factor<M>) {
-    constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
-    return static_cast<double>(noise.template block<K, K>(begin, begin).trace()) <= 0.25 * uniformLaw<M>().expectation;
-  } else {
-    return true;
-  }
-}
-
-/// The same of the mean of several covariances, in whatever frames.
-template <Metric M>
-bool isModestNoise(const std::vector<SquareOf<M>>& noise) {
-  if (noise.empty()) return false;
-  SquareOf<M> sum = SquareOf<M>::Zero();
-  for (const SquareOf<M>& v : noise) sum += v;
-  sum /= ScalarOf<M>(noise.size());
-  return isModestNoise<M>(sum);
-}
 }  // namespace liestat::detail

@@ -4,7 +4,7 @@
 
 #include <stats/detail/angular_part.hpp>
 #include <stats/detail/settled_covariance.hpp>
-#include <stats/maha.hpp>
+#include <stats/detail/mahalanobis_mean.hpp>
 
 #include <Eigen/Eigenvalues>
 
@@ -98,6 +98,24 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
     settled.settled = false;
   }
   return settled;
+}
+
+/// Whether measurements with their noise show that there is a mean. Neither few of them whose noise and scatter are
+/// below a quarter of the uniform law's nor a single one need to.
+template <Homogeneous M, class R>
+bool showAMean(const R& samples, const M& y) {
+  const std::size_t n = std::ranges::size(samples);
+  if (n == 1) return true;
+  std::vector<M> features;
+  std::vector<double> weights;
+  SquareOf<M> noise = SquareOf<M>::Zero();
+  for (const Gaussian<M>& g : samples) {
+    features.push_back(g.mean);
+    weights.push_back(static_cast<double>(scalarWeight(g.covariance)));
+    noise += g.covariance / ScalarOf<M>(n);
+  }
+  const Concentration found = angularConcentration<M>(features, weights, y);
+  return found.concentrated || (found.isModest() && isModestAngularNoise<M>(noise));
 }
 
 }  // namespace liestat::detail

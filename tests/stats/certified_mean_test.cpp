@@ -132,7 +132,7 @@ TEST(NearTies, knownNoiseTurnsCostsIntoLikelihoods) {
     const double ratio = difference / (sd * sd);
     EXPECT_EQ(result.near_ties.size(), ratio < 4.5 ? 1u : 0u) << sd << ": " << ratio;
   }
-  // At 179.9° with an sd of 0.1 rad the difference is 0.55 rad² · … of a likelihood: ambiguous.
+  // 179.5° apart, with an sd of 0.1 rad: the costs differ by 2.7 as likelihoods.
   const std::vector<Gaussian<SO3d>> close{
       {SO3d(), 0.01 * SO3d::Adjoint::Identity()},
       {SO3d::exp(Vector3d(0, 0, 179.5 * pi / 180)), 0.01 * SO3d::Adjoint::Identity()}};
