@@ -124,12 +124,12 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       }
     });
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
-    // Data within half the injectivity radius of their mean are far from any other minimum.
+    // Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
     using Vector = Eigen::Matrix<double, K, 1>;
     const Eigen::Matrix<double, K, K> region = covariance.template block<K, K>(begin, begin).template cast<double>();
     const double radius = static_cast<double>(T::injectivityRadius());
-    if (!(distanceToCutLocus(samples, mean.mean) < 0.5 * radius)) return ties;
+    if (!(distanceToCutLocus(samples, mean.mean) < 2.0 / 3 * radius)) return ties;
     const auto squaredAngle = [](const typename T::Group& to_y, const M& x) {
       const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
       return static_cast<double>(z.dot(T::metricWeights().cwiseProduct(z)));
