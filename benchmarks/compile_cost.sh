@@ -49,7 +49,10 @@ printf '\n'
 # What the library stands on comes first, to compare with.
 {
   printf 'Eigen/Core\nEigen/Geometry\nEigen/Dense\n'
-  sed -e 's/#.*//' -e '/^ *$/d' "$root/tests/headers.txt" | awk '{ print $1 }'
+  {
+    sed -e 's/#.*//' -e '/^ *$/d' "$root/tests/headers.txt" | awk '{ print $1 }'
+    sed -n 's/^[a-z0-9_]*;\(lie[^;]*\);.*/\1/p' "$root/tests/manifolds.txt"
+  } | sort -u
 } | while read -r header; do
   printf '| %-30s | %7s |' "$header" "$(lines "$header" </dev/null)"
   for compiler in "${compilers[@]}"; do printf ' %10s |' "$(milliseconds "$compiler" "$header" </dev/null)"; done

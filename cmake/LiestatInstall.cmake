@@ -4,7 +4,8 @@ include(CMakePackageConfigHelpers)
 
 foreach(room lie stats fusion)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${room})
-    install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp")
+    install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp"
+            PATTERN "compiled/*.cpp")
   endif()
 endforeach()
 

@@ -1,3 +1,4 @@
+#include <fusion/init/closed_form.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/consensus.hpp>

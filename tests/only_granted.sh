@@ -15,6 +15,6 @@ done
 # shellcheck disable=SC1003 # a backslash ends the list's lines
 found=$(tr -s '[:space:]\\' '\n' <"$depfile" | grep -v "^$root/" | grep -E -m 1 -e "$pattern" || true)
 if [ -n "$found" ]; then
-  echo "$header includes $found, a package which tests/headers.txt does not grant it" >&2
+  echo "$header includes $found, a package which tests/headers.txt (manifolds.txt) does not grant it" >&2
   exit 1
 fi

@@ -3,6 +3,8 @@
 // with wrong tracks; the refinement; and the dense normal equations that a straightforward program sets up.
 #include "../inputs.hpp"
 
+#include <fusion/imu/window.hpp>
+#include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/gyroscope_bias.hpp>

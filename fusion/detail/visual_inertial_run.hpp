@@ -1,6 +1,9 @@
 // How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
 #pragma once
 
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/consensus.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
 #include <fusion/init/refinement.hpp>
 #include <fusion/init/robust_initialisation.hpp>
 #include <fusion/init/window_fusion.hpp>

@@ -16,25 +16,14 @@
 #pragma once
 
 #include <fusion/init/closed_form_types.hpp>
-#include <fusion/detail/closed_form_input.hpp>
-#include <fusion/detail/closed_form_run.hpp>
-
-#include <Eigen/Core>
 
 namespace liestat {
 
 /// Velocity, gravity and features of a window. Input that can't be used gives bad_input with a fault, never a crash.
-inline ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const InitialisationOptions& options = {}) {
-  ClosedFormResult result;
-  result.fault = detail::faultOf(window, options);
-  if (result.fault) return result;
-  detail::RayTable table = detail::rayTable(window, result);
-  if (table.features() == 0) {
-    result.fault = FaultKind::no_feature;
-    return result;
-  }
-  detail::ClosedFormRun(table, options, result).run();
-  return result;
-}
+ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const InitialisationOptions& options = {});
 
 }  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/solve_closed_form.hpp>
+#endif

@@ -11,102 +11,19 @@
 // Gauss–Newton fails from short windows.
 #pragma once
 
-#include <fusion/detail/closed_form_input.hpp>
-#include <fusion/detail/refinement_problem.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/results.hpp>
 
-#include <Eigen/Core>
-
-#include <cmath>
-#include <cstddef>
-#include <limits>
-#include <vector>
-
 namespace liestat {
-
-namespace detail {
-
-/// One refinement with the motions as they are.
-inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFormSolution& start,
-                                   const ImuBias<double>& bias, const InitialisationOptions& options) {
-  RefinementResult result;
-  RefinementProblem problem(window, options);
-  if (!problem.setWeights()) {
-    result.status = FusionStatus::bad_motion;
-    return result;
-  }
-  problem.start(start, bias);
-  if (problem.features().empty()) {
-    result.status = FusionStatus::no_start;
-    return result;
-  }
-  ReducedSystem system(problem.blocks(), problem.features().size());
-  const DampedSummary summary = minimiseDamped(
-      problem, system,
-      {.max_iterations = options.refinement.max_iterations, .min_decrease = options.refinement.min_decrease});
-  const RefinementProblem::State& best = problem.state();
-  result.states = best.X;
-  result.gravity = best.gravity;
-  result.bias = best.bias;
-  result.features.assign(window.features.size(), Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  for (std::size_t i = 0; i < best.P.size(); ++i) result.features[problem.features()[i]] = best.P[i];
-  result.cost = summary.cost;
-  result.iterations = summary.iterations;
-  result.features_used = best.P.size();
-  result.observations_used = problem.observations();
-  // Motions and the priors have as many rows as states and biases: what is left are V, G and the features.
-  const std::size_t rows = 2 * problem.observations(), unknowns = 3 * best.P.size() + (options.gravity ? 5 : 6);
-  result.degrees_of_freedom = rows > unknowns ? rows - unknowns : 0;
-  result.must_reintegrate = window.isFar(best.bias);
-  if (!system.factor(0)) {
-    result.status = FusionStatus::undetermined;
-    return result;
-  }
-  result.status = summary.status;
-  const int g = problem.gravityBlock();
-  const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
-  const std::vector<double> inverse =
-      system.inverse({problem.stateBlock(0, 2), last(0), last(1), last(2), g, g + 1, g + 2});
-  result.covariance.joint = Eigen::Map<const Eigen::Matrix<double, 21, 21>>(inverse.data());
-  return result;
-}
-
-}  // namespace detail
 
 /// The most probable motion next to a start: a solution of the closed form, and the biases with which it was found (its
 /// own correction of the accelerometer's is added). The motions must have been integrated with the sensor's noise;
 /// where the biases go too far for their first-order update, the window is integrated anew and refined on from there.
-inline RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
-                               const ImuBias<double>& start_bias, const InitialisationOptions& options) {
-  RefinementResult result;
-  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
-  const BiasPrior& prior = options.prior;
-  const bool finite = start.velocity.allFinite() && positive(start.gravity.norm()) &&
-                      start.accelerometer_bias.allFinite() && start_bias.gyroscope.allFinite() &&
-                      start_bias.accelerometer.allFinite() && prior.mean.gyroscope.allFinite() &&
-                      prior.mean.accelerometer.allFinite();
-  result.fault = window.fault();
-  if (!result.fault && (!finite || !positive(options.bearing_noise) || !positive(prior.gyroscope_sigma) ||
-                        !positive(prior.accelerometer_sigma) || !positive(options.inertial_noise_factor))) {
-    result.fault = FaultKind::bad_option;
-  }
-  if (result.fault) return result;
-  ImuBias<double> bias{start_bias.gyroscope, start_bias.accelerometer + start.accelerometer_bias};
-  result.fault = detail::faultOf(closedFormWindow(window, bias), options);
-  if (result.fault) return result;
-  ClosedFormSolution from = start;
-  int integrations = window.integrateIfFar(bias);
-  for (;;) {
-    result = detail::refineOnce(window, from, bias, options);
-    result.integrations = integrations;
-    if (!result.must_reintegrate || integrations >= options.refinement.max_integrations) return result;
-    // Too far for a first-order update: the readings again with these biases, and on from there.
-    if (!window.integrateIfFar(result.bias)) return result;
-    ++integrations;
-    bias = result.bias;
-    from = {.velocity = result.velocity(), .gravity = result.gravity, .features = result.features};
-  }
-}
+RefinementResult refine(InertialWindow window, const ClosedFormSolution& start, const ImuBias<double>& start_bias,
+                        const InitialisationOptions& options);
 
 }  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/refine.hpp>
+#endif

@@ -9,102 +9,16 @@
 // on the tracks that agree the bias and the motion together (gyroscope_bias.hpp), and again while tracks come or go.
 #pragma once
 
-#include <fusion/init/consensus.hpp>
-#include <fusion/init/epipolar_gyroscope_bias.hpp>
-#include <fusion/init/gyroscope_bias.hpp>
+#include <fusion/imu/window.hpp>
 #include <fusion/init/results.hpp>
-
-#include <Eigen/Core>
-
-#include <cstddef>
-#include <cstdint>
-#include <utility>
-#include <vector>
 
 namespace liestat {
 
 /// Velocity, gravity, features and the gyroscope's bias of a window. Bad input: see result.fault.
-inline RobustInitialisation initialiseRobustly(InertialWindow window, const InitialisationOptions& options) {
-  RobustInitialisation found;
-  const BiasPrior& prior = options.prior;
-  found.epipolar = estimateEpipolarGyroscopeBias(window, options);
-  found.integrations = found.epipolar.integrations;
-  found.result.fault = found.epipolar.fault;
-  if (found.result.fault) return found;
-  found.gyroscope_bias = found.epipolar.bias;
-  found.bias_covariance = found.epipolar.covariance;
-
-  InitialisationOptions outer = options;
-  // This keeps a short window from the wrong minimum of a large bias.
-  if (found.epipolar.ok()) outer.gyroscope_bias.min_window = 0;
-  const Eigen::Vector3d accelerometer = window.bias().accelerometer;
-  const auto restoreCounts = [&] {
-    for (const std::size_t i : found.outliers) found.result.features[i].observations = window.features[i].size();
-  };
-  found.status = FusionStatus::bias_from_rotations;
-  std::uint64_t searches = 0;
-  const auto consensusFor = [&](const Eigen::Vector3d& gyroscope) {
-    const ImuBias<double> bias{gyroscope, accelerometer};
-    found.integrations += window.integrateIfFar(bias);
-    // Rounds draw anew.
-    InitialisationOptions drawn = options;
-    drawn.consensus.seed = CounterRng(options.consensus.seed, searches++)();
-    ConsensusResult consensus = solveClosedFormRobustly(closedFormWindow(window, bias), drawn);
-    found.hypotheses += consensus.hypotheses;
-    return consensus;
-  };
-  for (; found.rounds < options.max_rounds; ++found.rounds) {
-    ConsensusResult consensus = consensusFor(found.gyroscope_bias);
-    const std::size_t tracks = consensus.inliers.size() + consensus.outliers.size();
-    if (found.rounds == 0 && !found.epipolar.without_parallax) {
-      // Rotations may have more than one explanation: the motion decides, if a good part of the tracks agree on it.
-      std::vector<Eigen::Vector3d> others = found.epipolar.others;
-      others.push_back(prior.mean.gyroscope);
-      for (const Eigen::Vector3d& other : others) {
-        if (2 * consensus.inliers.size() >= tracks) break;
-        ConsensusResult next = consensusFor(other);
-        if (5 * next.inliers.size() < 2 * tracks || next.inliers.size() <= consensus.inliers.size()) continue;
-        consensus = std::move(next);
-        found.gyroscope_bias = other;
-        found.bias_covariance = prior.gyroscope_sigma * prior.gyroscope_sigma * Eigen::Matrix3d::Identity();
-      }
-    }
-    const bool same = found.rounds > 0 && consensus.inliers == found.inliers;
-    if (same && found.status == FusionStatus::ok) break;
-    found.inliers = std::move(consensus.inliers);
-    found.outliers = std::move(consensus.outliers);
-    found.result = std::move(consensus.result);
-    if (found.result.fault) {
-      found.status = FusionStatus::bad_input;
-      return found;
-    }
-    if (found.inliers.empty()) {
-      found.status = FusionStatus::no_consensus;
-      if (!found.epipolar.ok()) return found;
-      // At rest and at constant velocity there is no motion to agree on, but still a rotation.
-      found.status = FusionStatus::bias_from_rotations;
-      found.inliers = found.epipolar.inliers;
-      found.outliers = found.epipolar.outliers;
-      found.result = solveClosedForm(
-          closedFormWindow(window.without(found.outliers), {found.gyroscope_bias, accelerometer}), options);
-      restoreCounts();
-      return found;
-    }
-    outer.gyroscope_bias.start = found.gyroscope_bias;
-    GyroscopeBiasResult estimate = estimateGyroscopeBias(window.without(found.outliers), outer);
-    found.integrations += estimate.integrations;
-    found.bias_status = estimate.status;
-    if (estimate.status != FusionStatus::ok) {
-      found.status = FusionStatus::bias_from_rotations;
-      return found;
-    }
-    found.status = FusionStatus::ok;
-    found.gyroscope_bias = estimate.bias;
-    found.bias_covariance = estimate.covariance;
-    found.result = std::move(estimate.result);
-    restoreCounts();
-  }
-  return found;
-}
+RobustInitialisation initialiseRobustly(InertialWindow window, const InitialisationOptions& options);
 
 }  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/initialise_robustly.hpp>
+#endif

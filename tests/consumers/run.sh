@@ -1,13 +1,12 @@
 #!/usr/bin/env bash
 # Builds and runs one tiny program in each way that a user can take liestat: in place, by add_subdirectory, by
 # find_package and by pkg-config from an installed tree. Usage: run.sh [WORK_DIRECTORY]; CXX and CMAKE are obeyed.
-# Without pkg-config its part is left out, and said to be: nothing else of liestat needs it. Before that, what its own unit
-# gets to see: no warning, and one sentence for a mistake.
+# Without pkg-config its part is left out, and said to be: nothing else of liestat needs it. Before that, what a user's
+# own unit gets to see of a mistake: one sentence. (warnings.sh: no warning.)
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../.." && pwd)
-chosen=${CXX:-}
 CXX=${CXX:-c++}
 CMAKE=${CMAKE:-cmake}
 export CXX
@@ -48,38 +47,17 @@ eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/
 quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
 built_and_ran ./in_place "in place"
 
-# No warning from the headers in a user's unit, with the compiler that CXX names, else with each that there is; Boost's
-# and Random123's own headers are the system's.
-for compiler in ${chosen:-g++ clang++}; do
-  command -v "$compiler" >/dev/null || {
-    echo "consumers: warnings: $compiler SKIPPED, it is not installed"
-    continue
-  }
-  for unit in "$here"/warnings_*.cpp; do
-    case $(basename "$unit") in
-    warnings_validation.cpp) needed='#include <boost/math/special_functions/beta.hpp>\n#include <Random123/philox.h>\n' ;;
-    warnings_visual_inertial.cpp) needed='#include <Random123/philox.h>\n' ;;
-    *) needed= ;;
-    esac
-    # shellcheck disable=SC2059
-    if ! printf "$needed" | $compiler -std=c++20 -E -x c++ - >/dev/null 2>&1; then
-      echo "consumers: warnings: $(basename "$unit") SKIPPED, Boost.Math or Random123 is not installed"
-      continue
-    fi
-    # shellcheck disable=SC2086
-    quietly $compiler -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror \
-      -I"$root" ${eigen//-I/-isystem } "$unit"
-    echo "consumers: $compiler: $(basename "$unit"): no warning"
-  done
-done
-
 # A mistake is answered by one error, and that is a sentence of ours. Program 0 has none and compiles. With g++ where it
 # is there: clang 14 cannot use the views of its standard library.
 first=$(command -v g++ || echo "$CXX")
+# The headers are read once for all of them.
+grep '^#include' "$here/sentences.cpp" >"$work/sentences.hpp"
+# shellcheck disable=SC2086
+quietly $first -std=c++20 -x c++-header -I"$root" $eigen "$work/sentences.hpp" -o "$work/sentences.hpp.gch"
 for mistake in $(seq 0 17); do
   # shellcheck disable=SC2086
-  errors=$($first -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen "$here/sentences.cpp" 2>&1 |
-    grep -E '(^|[ :])error:' || true)
+  errors=$($first -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen -include "$work/sentences.hpp" \
+    "$here/sentences.cpp" 2>&1 | grep -E '(^|[ :])error:' || true)
   expected=1
   [ "$mistake" != 0 ] || expected=0
   [ "$(printf '%s' "$errors" | grep -c .)" = $expected ] &&
@@ -100,6 +78,10 @@ quietly "$CMAKE" -S "$root" -B liestat -DCMAKE_INSTALL_PREFIX="$work/prefix" -DL
 quietly "$CMAKE" --install liestat
 # An installed tree that is moved must keep working: nothing in it may name the place it was installed to.
 mv "$work/prefix" "$work/moved"
+# The estimators for programs that compile them once (fusion/detail/compiled.hpp).
+for source in "$root"/fusion/compiled/*.cpp; do
+  quietly test -s "$work/moved/include/liestat/fusion/compiled/$(basename "$source")"
+done
 
 quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved"
 quietly "$CMAKE" --build find_package

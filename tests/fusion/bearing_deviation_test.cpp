@@ -1,8 +1,14 @@
 // Bearings with deviations of their own: whatever is estimated is consistent, and a common factor is the same as
 // another bearing_noise.
 
+#include <fusion/imu/window.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/consensus.hpp>
+#include <fusion/init/epipolar_gyroscope_bias.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
 #include <fusion/init/refinement.hpp>
 #include <fusion/init/robust_initialisation.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 #include <support/small_mahalanobis.hpp>
 #include <support/vi_recorded.hpp>
 

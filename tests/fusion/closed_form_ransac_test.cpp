@@ -1,5 +1,6 @@
 // Consensus over features: drifting tracks are found and left out, and what remains is as good as without them.
 
+#include <fusion/init/closed_form.hpp>
 #include <fusion/init/consensus.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

@@ -1,5 +1,7 @@
 // The outer problem over the gyroscope's bias, against the design note's target, and what it refuses.
 
+#include <fusion/imu/window.hpp>
+#include <fusion/init/closed_form.hpp>
 #include <fusion/init/gyroscope_bias.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

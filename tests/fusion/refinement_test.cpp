@@ -1,7 +1,9 @@
 // The refinement against the design note's tables of accuracy and consistency.
 
+#include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/refinement.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 #include <support/small_mahalanobis.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

@@ -1,6 +1,8 @@
 // The whole initialisation with wrong tracks and an unknown bias of the gyroscope: as good as with the right tracks
 // given, at any bias.
 
+#include <fusion/imu/window.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
 #include <fusion/init/robust_initialisation.hpp>
 #include <support/vi_recorded.hpp>
 

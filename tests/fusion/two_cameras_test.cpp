@@ -1,6 +1,7 @@
 // Two cameras in the refinement and in the gyroscope's bias from rotations: each bearing in the axes of its own camera
 // and from its own place.
 
+#include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <fusion/init/refinement.hpp>

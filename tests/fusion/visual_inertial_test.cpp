@@ -1,5 +1,6 @@
 // The front door: a recording in, windows and what they say together out; several cameras; what can't be used.
 
+#include <fusion/init/closed_form.hpp>
 #include <fusion/visual_inertial.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>

@@ -1,5 +1,6 @@
 // What windows say together: consistent where their covariances are, and the prior of the biases counted once.
 
+#include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/refinement.hpp>
 #include <fusion/init/window_fusion.hpp>

@@ -1,0 +1,12 @@
+// The estimators of a window's motion and biases, compiled once. Add the files of fusion/compiled/ to your own target and
+// define LIESTAT_COMPILED_FUSION for all of its units: their headers then declare the estimators only.
+#ifndef LIESTAT_COMPILED_FUSION
+#define LIESTAT_COMPILED_FUSION
+#endif
+
+#include <fusion/detail/estimate_epipolar_gyroscope_bias.hpp>
+#include <fusion/detail/estimate_gyroscope_bias.hpp>
+#include <fusion/detail/inertial_window.hpp>
+#include <fusion/detail/initialise_robustly.hpp>
+#include <fusion/detail/solve_closed_form.hpp>
+#include <fusion/detail/solve_closed_form_robustly.hpp>
