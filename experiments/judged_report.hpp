@@ -54,6 +54,7 @@ struct Tally {
   std::size_t judged = 0, failed = 0;
   /// A run in which nothing was judged has not passed.
   bool passed() const { return judged > 0 && failed == 0; }
+  Tally operator+(const Tally& other) const { return {judged + other.judged, failed + other.failed}; }
 };
 template <class Row>
 Tally tally(const std::vector<Row>& rows) {

@@ -12,17 +12,20 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
+#include <stats/detail/settled_group_mean.hpp>
 #include <stats/group_mean.hpp>
 
 #include <optional>
 #include <ranges>
+#include <vector>
 
 namespace liestat {
 
 /// Options of certifiedGroupMean().
 struct CertifiedGroupMeanOptions {
   UniquenessOptions uniqueness = {};
-  /// The covariance is withdrawn when kinks may change the Hessian of the twin's mean by more than this, relative.
+  /// The covariance is withdrawn when the Hessian of the twin's mean, or without a twin the barycentre's equations,
+  /// averaged over the covariance's region are flatter than those at the mean by more than this, relative.
   double largest_hessian_change = liestat::largest_hessian_change;
 };
 
@@ -30,8 +33,10 @@ struct CertifiedGroupMeanOptions {
 template <LieGroup G>
 struct CertifiedGroupMean {
   GroupMeanResult<G> mean;
-  UniquenessResult<G> uniqueness;  ///< of the twin's mean, its rivals as barycentres; cost is the twin's
-  CutLocusMass cut_locus;          ///< of the twin's mean
+  UniquenessResult<G> uniqueness;     ///< of the twin's mean, its rivals as barycentres; cost is the twin's
+  std::vector<NearTie<G>> near_ties;  ///< those of the twin's mean, as barycentres
+  CutLocusMass cut_locus;             ///< of the twin's mean
+  double hessian_change = 0;          ///< how much flatter the barycentre's equations are across the confidence region
   /// The barycentre with its covariance from residuals; none unless status is ok.
   std::optional<Gaussian<G>> estimate;
   Status status = Status::too_few;
@@ -74,6 +79,9 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
     for (const Twin& rival : twin.uniqueness.rivals) {
       result.uniqueness.rivals.push_back(from(fromTwin<G>(rival)).mean);
     }
+    for (const NearTie<Twin>& tie : twin.near_ties) {
+      result.near_ties.push_back({from(fromTwin<G>(tie.feature)).mean, tie.z, tie.log_likelihood_ratio});
+    }
     result.cut_locus = twin.cut_locus;
     twin_status = twin.status;
     twin_reason = twin.reason;
@@ -85,9 +93,13 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
   if (result.mean.n == 0) return without(Status::too_few, "there are no features");
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
   if (twin_status != Status::ok) return without(twin_status, twin_reason);
+  if (!result.mean.concentration.concentrated) return without(Status::ill_defined, scattered_reason);
   const SquareOf<G> covariance = result.mean.covarianceFromResiduals();
   if (!covariance.allFinite()) return without(Status::ill_defined, "the equations of the barycentre are singular");
-  result.estimate = Gaussian<G>{result.mean.mean, covariance};
+  const SettledGroupMean<G> settled = settleGroupMean(samples, weights, result.mean, options.largest_hessian_change);
+  result.hessian_change = settled.change;
+  if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
+  result.estimate = Gaussian<G>{result.mean.mean, settled.covariance};
   result.status = Status::ok;
   return result;
 }

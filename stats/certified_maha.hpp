@@ -11,6 +11,7 @@
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/settled_maha.hpp>
 #include <stats/maha.hpp>
 
 #include <algorithm>
@@ -33,17 +34,22 @@ struct CertifiedMahaOptions {
   std::size_t starts_from_data = 6;  ///< features, spread over the data, that are starts too
   double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
   double distinct = 1e-4;            ///< and they are this far apart, rad and m
-  /// The covariance is withdrawn when kinks may change the Hessian of the least-squares mean by more than this, relative.
+  NearTieOptions near_ties = {};     ///< which minima are rivals although they are higher; costs are log-likelihoods
+  /// The covariance is withdrawn when a Hessian averaged over its region is lower than that at the mean by more than
+  /// this, relative: that of MAHA, or of the least-squares mean.
   double largest_hessian_change = liestat::largest_hessian_change;
 };
 
 /// A Mahalanobis mean with all that is known about it.
 template <Homogeneous M>
 struct CertifiedMaha {
-  MahaResult<M> maha;              ///< the best of all starts; of equals the first
-  UniquenessResult<M> uniqueness;  ///< unique on flat manifolds only; ambiguous if there are rivals
-  std::size_t starts = 0;          ///< iterations that were made
-  CutLocusMass cut_locus;          ///< of the weighted least-squares mean
+  MahaResult<M> maha;                 ///< the best of all starts; of equals the first
+  UniquenessResult<M> uniqueness;     ///< unique on flat manifolds only; ambiguous if there are rivals
+  std::vector<NearTie<M>> near_ties;  ///< other minima that the data do not exclude, the nearest tie first
+  std::size_t starts = 0;             ///< iterations that were made
+  Concentration concentration;        ///< of the weighted least-squares mean
+  CutLocusMass cut_locus;             ///< of the weighted least-squares mean
+  double hessian_change = 0;          ///< as of CertifiedMean, of MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
   double fit = 0;  ///< Σ μ_i² at the mean, which follows χ² of `fit_dof` degrees of freedom if the covariances are true
@@ -78,6 +84,29 @@ ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, Co
 
 namespace detail {
 
+/// The minima of other starts that are higher by less than the noise explains, outside of the mean's region.
+template <Homogeneous M>
+void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& others, const SquareOf<M>& region,
+                 const CertifiedMahaOptions<M>& options) {
+  const MahaResult<M>& best = result.maha;
+  for (const MahaResult<M>& other : others) {
+    const double ratio = static_cast<double>(other.cost - best.cost);
+    if (other.status != Status::ok || !(ratio < options.near_ties.log_likelihood_ratio)) continue;
+    const TangentOf<M> error = log(best.mean, other.mean);
+    const double squared = static_cast<double>(mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(error, region));
+    if (chiSquaredTail(squared, ManifoldTraits<M>::DoF) > options.near_ties.region) continue;
+    const bool known = std::any_of(result.near_ties.begin(), result.near_ties.end(), [&](const NearTie<M>& tie) {
+      return static_cast<double>(log(tie.feature, other.mean).norm()) < options.distinct;
+    });
+    // Half the square of as many standard deviations.
+    if (!known && static_cast<double>(error.norm()) >= options.distinct) {
+      result.near_ties.push_back({other.mean, std::sqrt(2 * std::max(0.0, ratio)), ratio});
+    }
+  }
+  std::sort(result.near_ties.begin(), result.near_ties.end(),
+            [](const NearTie<M>& a, const NearTie<M>& b) { return a.log_likelihood_ratio < b.log_likelihood_ratio; });
+}
+
 template <Homogeneous M, Executor E, class R>
 CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, CovarianceAt at,
                                    const CertifiedMahaOptions<M>& options) {
@@ -91,31 +120,38 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (n == 0) return without(Status::too_few, "there are no features");
   std::vector<M> features;
   std::vector<double> weights;
+  std::vector<SquareOf<M>> noise;
   features.reserve(n), weights.reserve(n);
   for (const Gaussian<M>& g : samples) {
     features.push_back(g.mean);
     weights.push_back(static_cast<double>(scalarWeight(g.covariance)));
+    noise.push_back(g.covariance);
   }
 
   std::vector<std::optional<M>> starts;
   if (options.maha.start) starts.push_back(options.maha.start);
   Status twin_status = Status::ok;
+  const char* twin_reason = "";
   if constexpr (has_metric_twin<M>) {
     using Twin = MetricTwinOf<M>;
     CertifiedMeanOptions<Twin> how;
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
+    how.known_noise = std::move(noise);  // the twin keeps the rotation, and with it the noise that is looked at
     // Of the types that the front door of certifiedMean has, so that both share what they compile.
     const Samples<Twin> twins(metricTwins<M>(features));
     const Samples<double> numbers(std::move(weights));
     const auto twin = findCertifiedMean<Twin>(executor, twins, numbers, how);
     result.cut_locus = twin.cut_locus;
+    result.concentration = twin.concentration;
     twin_status = twin.status;
+    twin_reason = twin.reason;
     // Exact to rounding and not only to its tolerance, or the number of steps from there would hang on the last digits.
     MeanOptions<Twin> once_more;
     once_more.start = twin.mean.mean;
     starts.push_back(fromTwin<M>(frechetMean<Twin>(executor, twins, numbers, once_more).mean));
     for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
+    for (const NearTie<Twin>& tie : twin.near_ties) starts.push_back(fromTwin<M>(tie.feature));
   } else {
     starts.push_back(std::nullopt);  // the one that maha() chooses
   }
@@ -169,8 +205,14 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (best.status == Status::ill_defined) return without(best.status, hessian_reason);
   if (best.status != Status::ok) return without(best.status, "this criterion has no answer for these measurements");
   if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
-  if (twin_status == Status::ill_defined) return without(Status::ill_defined, cut_locus_reason);
-  result.estimate = best.estimate();
+  const SettledMaha<M> settled =
+      settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change);
+  result.hessian_change = settled.change;
+  setNearTies(result, results, settled.covariance, options);
+  if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
+  if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
+  if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
+  result.estimate = Gaussian<M>{best.mean, settled.covariance};
   result.status = Status::ok;
   return result;
 }
@@ -179,7 +221,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
 
 /// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance where that can be trusted:
 /// status ok. It is withheld, with the reason in words, when the iteration did not converge, when several minima are
-/// equally low (ambiguous), and when the Hessian is singular or the mass near the cut locus makes the mean ill-defined.
+/// equally low or higher by less than their noise explains (ambiguous), and when the Hessian is singular or, averaged
+/// over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined).
 /// Statuses of maha() besides. The same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <stats/detail/ranges.hpp>
+#include <stats/concentration.hpp>
 #include <stats/covariance.hpp>
 #include <stats/cut_locus.hpp>
+#include <stats/detail/settled_covariance.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
+#include <stats/near_ties.hpp>
 #include <stats/status.hpp>
 #include <stats/uniqueness.hpp>
 
@@ -29,8 +32,9 @@ struct CertifiedMeanOptions {
   /// mean along the geodesic, which changes nothing but on directions and the like), or a single one, in the frame of
   /// the mean, that all of them have. Empty: the covariance comes from the residuals.
   std::vector<SquareOf<M>> known_noise = {};
-  /// The covariance is withdrawn when kinks may change the Hessian by more than this, relative.
+  /// The covariance is withdrawn when the Hessian averaged over its region is lower than that by more, relative.
   double largest_hessian_change = liestat::largest_hessian_change;
+  NearTieOptions near_ties = {};  ///< which other minima are rivals although they are higher
 };
 
 /// A mean with all that is known about it.
@@ -38,7 +42,12 @@ template <Metric M>
 struct CertifiedMean {
   MeanResult<M> mean;  ///< the improved one if the search found a lower minimum
   UniquenessResult<M> uniqueness;
+  Concentration concentration;
+  std::vector<NearTie<M>> near_ties;  ///< other minima that the data do not exclude, the nearest tie first
   CutLocusMass cut_locus;
+  /// By how much the Hessian averaged over the confidence region (averagedHessian) is lower than at the mean, relative;
+  /// the covariance is that of the averaged one.
+  double hessian_change = 0;
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
   std::optional<Gaussian<M>> estimate;
   Status status = Status::too_few;
@@ -51,9 +60,12 @@ inline constexpr const char* not_converged_reason = "the iteration for the mean 
 inline constexpr const char* rival_reason = "another feature explains the data as well";
 inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
 inline constexpr const char* hessian_reason = "the Hessian of the criterion is not positive definite at the mean";
+inline constexpr const char* near_tie_reason = "another feature explains the data as well but for their noise";
+inline constexpr const char* scattered_reason =
+    "the features are as scattered as uniform ones: they have no mean, or too few of them show it";
 inline constexpr const char* cut_locus_reason =
-    "too many features lie near the cut locus of the mean, where the squared distance has a kink: no first-order "
-    "covariance is right";
+    "the criterion is flat within the confidence region of the mean, because features lie near the cut locus: no "
+    "first-order covariance is right";
 
 /// The covariance of a mean from the noise that the options know.
 template <Metric M, class R, class W>
@@ -91,21 +103,47 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
   if (result.uniqueness.unique == Uniqueness::ambiguous) return without(Status::ambiguous, rival_reason);
 
-  // The cut locus is looked at within the confidence region that the residuals show, whatever the noise is said to be;
-  // within that of the known noise where there are too few residuals.
+  // The region is the one that the residuals show, whatever the noise is said to be; that of the known noise where
+  // there are too few residuals.
   const bool known = !options.known_noise.empty();
   const bool have_residuals = result.mean.n > static_cast<std::size_t>(ManifoldTraits<M>::DoF);
   if (!have_residuals && !known) return without(Status::too_few, too_few_reason);
-  SquareOf<M> covariance = have_residuals
-                               ? covarianceFromResiduals(result.mean, options.noise)
-                               : covarianceFromKnownNoise(samples, weights, result.mean, options.known_noise);
-  if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
-  result.cut_locus = findCutLocusNearby(samples, weights, result.mean, covariance);
-  if (isIllDefined(result.cut_locus, options.largest_hessian_change)) {
-    return without(Status::ill_defined, cut_locus_reason);
+  result.concentration = findConcentration(samples, weights, result.mean.mean);
+  const auto known_covariance = [&](const MeanResult<M>& mean) {
+    return covarianceFromKnownNoise(samples, weights, mean, options.known_noise);
+  };
+  const auto from_residuals = [&](const MeanResult<M>& mean) { return covarianceFromResiduals(mean, options.noise); };
+  const SettledCovariance<M> settled =
+      have_residuals
+          ? settleCovariance(samples, weights, result.mean, options.largest_hessian_change, from_residuals)
+          : settleCovariance(samples, weights, result.mean, options.largest_hessian_change, known_covariance);
+  result.hessian_change = settled.change;
+  if (!settled.first.allFinite()) return without(Status::ill_defined, hessian_reason);
+  result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
+  const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
+  if (known) {
+    const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
+      return options.known_noise[options.known_noise.size() == 1 ? 0 : i];
+    };
+    result.near_ties =
+        findNearTies<M>(executor, samples, weights, result.mean, region, have_residuals, noise, options.near_ties);
+  } else {
+    result.near_ties =
+        findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
   }
+  // Of few data whose noise is known it is not asked to show that there is a mean.
+  const bool modest =
+      known && (result.mean.n == 1 || (result.concentration.isModest() && isModestNoise<M>(options.known_noise)));
+  if (!result.concentration.concentrated && !modest) {
+    return without(Status::ill_defined, scattered_reason);
+  }
+  if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
+  if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
+  SquareOf<M> covariance = settled.covariance;
   if (known && have_residuals) {
-    covariance = covarianceFromKnownNoise(samples, weights, result.mean, options.known_noise);
+    MeanResult<M> averaged = result.mean;
+    averaged.hessian = settled.hessian;
+    covariance = known_covariance(averaged);
     if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
   }
   result.estimate = Gaussian<M>{result.mean.mean, covariance};
@@ -116,9 +154,9 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 }  // namespace detail
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, where that
-/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well
-/// (ambiguous), when the mass near the cut locus makes the mean of quotient frames or of very scattered rotations
-/// ill-defined (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
+/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well,
+/// exactly or up to the noise of the data (ambiguous), when the features are as scattered as uniform ones or the criterion is flat within the confidence region
+/// (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
 /// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/compact_part.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/search_space.hpp>
 #include <stats/detail/ranges.hpp>
@@ -34,16 +35,6 @@ struct CutLocusMass {
   }
 };
 
-/// The largest relative change of a Hessian by kinks for which a first-order covariance is given. A change by 0.1 in one
-/// direction of three makes the squared Mahalanobis distances 8 % larger on average, (1/0.9² - 1)/3; much less could
-/// not be told from the chance that a datum or two lie there.
-inline constexpr double largest_hessian_change = 0.1;
-
-/// Whether kinks of the squared distance make a mean ill-defined: the Hessian may change by more than the limit.
-inline bool isIllDefined(const CutLocusMass& cut_locus, double limit = largest_hessian_change) {
-  return !(cut_locus.hessian_change <= limit);
-}
-
 namespace detail {
 
 /// Manifolds on whose compact part the squared distance has kinks that a mean can feel. On the sphere the cut locus is
@@ -51,19 +42,6 @@ namespace detail {
 template <Metric M>
 inline constexpr bool has_kinks = compactFactor<M>() == CompactFactor::rotation
                                   || compactFactor<M>() == CompactFactor::circle;
-
-/// The dimension of the compact factor of such a manifold.
-template <Metric M>
-inline constexpr int compact_dimension = compactFactor<M>() == CompactFactor::rotation ? 3 : 1;
-
-/// Where the I-th factor's coordinates begin in a tangent vector.
-template <std::size_t I, Metric M>
-constexpr int factorOffset() {
-  return []<std::size_t... K>(std::index_sequence<K...>) {
-    return (0 + ... + ManifoldTraits<std::tuple_element_t<K, FactorsOf<M>>>::DoF);
-  }
-  (std::make_index_sequence<I>{});
-}
 
 /// z - z₂ of a feature in the frame of the mean, z its error vector and z₂ that of the second shortest geodesic, which
 /// is `second` long.

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <lie/detail/small_products.hpp>
+#include <stats/concentration.hpp>
+#include <stats/detail/angular_part.hpp>
 #include <stats/mean.hpp>
 
 namespace liestat {
@@ -19,14 +21,15 @@ struct GroupMeanResult {
   double sum_of_weights = 0;
   SquareOf<G> scatter = SquareOf<G>::Zero();   ///< Σ p_i z_i z_iᵀ
   SquareOf<G> jacobian = SquareOf<G>::Zero();  ///< Σ p_i J_l⁻¹(z_i): minus the derivative of Σ p_i z_i
+  Concentration concentration;                 ///< of the rotations, the most scattered where there are several
 
   /// Σ p_i z_i z_iᵀ / Σ p_i
   SquareOf<G> dispersion() const { return scatter / ScalarOf<G>(sum_of_weights); }
   /// Covariance of the barycentre from the residuals, A⁻¹ (Σ p_i z_i z_iᵀ) A⁻ᵀ Σp_i/(n-1), A the jacobian; NaN for one
-  /// measurement.
+  /// measurement, and where the rotations are as scattered as uniform ones, which have no mean.
   SquareOf<G> covarianceFromResiduals() const {
     using S = ScalarOf<G>;
-    if (n < 2) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
+    if (n < 2 || !concentration.concentrated) return SquareOf<G>::Constant(std::numeric_limits<S>::quiet_NaN());
     const SquareOf<G> inverse = detail::inverse<S, G::DoF>(jacobian);
     return detail::congruence(inverse, scatter) * (S(sum_of_weights) / (S(n) - S(1)));
   }
@@ -85,6 +88,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     if (result.residual <= result.tolerance) result.status = Status::ok;
   }
   result.mean = y;
+  result.concentration = angularConcentration<G>(samples, weights, y);
   return result;
 }
 

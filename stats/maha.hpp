@@ -12,14 +12,19 @@
 #include <lie/manifold.hpp>
 #include <stats/detail/mahalanobis_mean.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/settled_maha.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/mean.hpp>
+#include <stats/start.hpp>
+#include <stats/status.hpp>
 
 #include <concepts>
+#include <limits>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace liestat {
 
@@ -83,15 +88,42 @@ MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& opti
   }
 }
 
-/// A range of Gaussians to one: mean and covariance of maha(). The covariance is NaN if there is no trustworthy
-/// estimate.
+namespace detail {
+
+template <Homogeneous M, class R>
+Gaussian<M> fused(const R& samples, CovarianceAt at) {
+  const SerialExecutor executor;
+  const MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, {});
+  Gaussian<M> estimate = result.estimate();
+  if (result.status != Status::ok) return estimate;
+  const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, result, largest_hessian_change);
+  const bool trusted = settled.settled && showAMean<M>(samples, result.mean);
+  estimate.covariance =
+      trusted ? settled.covariance : SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  return estimate;
+}
+
+}  // namespace detail
+
+/// A range of Gaussians to one: the mean of maha() with its covariance, the Hessian averaged over the confidence region
+/// as certifiedMaha (stats/certified_maha.hpp) does. The covariance is NaN if there is no trustworthy estimate:
+/// directions or rotations as scattered as uniform ones, a criterion that is flat where the truth may be. Other minima
+/// are not looked for.
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 Gaussian<M> fuse(R&& samples, CovarianceAt at) {
-  return maha(samples, at).estimate();
+  if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::fused<M>(detail::asValues<Gaussian<M>>(samples), at);
+  } else {
+    return {};
+  }
 }
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 Gaussian<M> fuse(R&& samples) {
-  return maha(samples).estimate();
+  if constexpr (detail::RequireGaussians<R, false>::ok) {
+    return fuse(samples, CovarianceAt::measured);
+  } else {
+    return {};
+  }
 }
 
 }  // namespace liestat

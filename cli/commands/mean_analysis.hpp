@@ -31,6 +31,12 @@ struct TimeBlocks {
 /// Below this p the errors of successive rows are called dependent.
 inline constexpr double dependent_rows = 1e-3;
 
+/// Another feature that the measurements do not exclude, and by how many standard deviations it is the worse.
+struct NearRival {
+  FeatureValue feature;
+  double z = 0;
+};
+
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
@@ -55,7 +61,10 @@ struct MeanAnalysis {
   bool more_rivals = false;  ///< the search ended because the list was full
   double r_star = 0;
   std::size_t cells = 0;
+  std::vector<NearRival> near_ties = {};
   double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
+  /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
+  double hessian_change = 0;
 
   /// Sum of the measurements' squared Mahalanobis distances, where their noise is known, and what is expected.
   double fit = 0;

@@ -2,7 +2,10 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/show/means_validation.hpp>
 
+#include <algorithm>
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace liestat::cli {
 using namespace experiments;
@@ -19,6 +22,20 @@ struct Options {
   int threads = 0;
   bool certify = false, full = false;
 };
+
+/// The front door's cells of the chosen features; none where the run is about certain rows of the experiments.
+std::vector<VerdictCell> chosenCells(const Options& options, const std::vector<Feature>& features) {
+  const bool narrowed = !options.noises.empty() || !options.criteria.empty() || !options.n.empty() ||
+                        !options.spreads.empty() || options.covariance_at != "estimated";
+  std::vector<VerdictCell> cells;
+  if (narrowed) return cells;
+  for (VerdictCell cell : verdictCells(options.full)) {
+    if (std::find(features.begin(), features.end(), cell.feature) == features.end()) continue;
+    if (options.trials != 0) cell.trials = std::min(cell.trials, options.trials);
+    cells.push_back(cell);
+  }
+  return cells;
+}
 
 int runCommand(const Options& options, const Invocation& invocation) {
   MeansValidation validation;
@@ -37,8 +54,15 @@ int runCommand(const Options& options, const Invocation& invocation) {
 
   const std::vector<MeansRow> rows =
       withProgressBar("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
-  return publish(options.output, invocation, options.seed, run_false_alarm, rows, formatMeansTables, toJson,
-                 writeMeansReport);
+  const std::vector<VerdictRow> verdicts = withProgressBar("verdicts", [&](const auto& progress) {
+    return judgeVerdicts(chosenCells(options, validation.features), options.seed, options.threads, progress);
+  });
+  FurtherRows further{"verdicts", {}, tally(verdicts)};
+  for (const VerdictRow& row : verdicts) further.rows.push_back(toJson(row));
+  return publish(
+      options.output, invocation, options.seed, run_false_alarm, rows,
+      [&](const std::vector<MeansRow>& list) { return formatMeansTables(list, verdicts); },
+      [](const MeansRow& row) { return toJson(row); }, writeMeansReport, further);
 }
 
 }  // namespace

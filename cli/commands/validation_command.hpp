@@ -66,11 +66,19 @@ inline void addRunOptions(const Command& command, const std::string& size, std::
   command.option("--report", output.report, "Write a page with plots into this directory");
 }
 
+/// Further rows that a run judges, which format() shows: their fields in JSON and their tally.
+struct FurtherRows {
+  std::string key;
+  std::vector<JsonObject> rows;
+  experiments::Tally tally;
+};
+
 /// Shows rows as format(rows) on the terminal, each as toJson(row) in a JSON file and as a page by writeReport; returns
-/// the exit code of those that were judged.
+/// the exit code of those that were judged, further ones counted.
 template <class Row, class Format, class ToJson, class WriteReport>
 int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
-            const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport) {
+            const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport,
+            const FurtherRows& further = {}) {
   // Whoever asks for JSON on standard output wants nothing else there.
   if (output.json != "-") printLines(format(rows));
   if (!output.json.empty()) {
@@ -78,10 +86,11 @@ int publish(const ValidationOutput& output, const Invocation& invocation, std::u
     std::vector<JsonObject> list;
     for (const Row& row : rows) list.push_back(toJson(row));
     object.set("false_alarm", false_alarm).set("rows", list);
+    if (!further.key.empty()) object.set(further.key, further.rows);
     writeJson(output.json, object);
   }
   if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
-  return experiments::tally(rows).passed() ? exit_fine : exit_validation_failed;
+  return (experiments::tally(rows) + further.tally).passed() ? exit_fine : exit_validation_failed;
 }
 
 }  // namespace liestat::cli

@@ -203,6 +203,9 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   if (analysis.more_rivals) {
     text += fmt::format("  rival      perhaps more: the search ended with these {}\n", analysis.rivals.size());
   }
+  for (const NearRival& rival : analysis.near_ties) {
+    text += fmt::format("  near tie   {}: worse by {:.2g} standard deviations\n", oneLine(rival.feature), rival.z);
+  }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
   if (analysis.time_blocks) text += "blocks       " + blocksInWords(*analysis.time_blocks) + "\n";
   const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;

@@ -138,7 +138,13 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measurem
       .set("rivals_complete", !analysis.more_rivals)
       .set("r_star", analysis.r_star)
       .set("cells", analysis.cells);
-  object.set("cut_locus_mass", analysis.cut_locus_mass);
+  std::vector<JsonObject> near_ties;
+  for (const NearRival& rival : analysis.near_ties) {
+    near_ties.push_back(toJson(rival.feature));
+    near_ties.back().set("z", rival.z);
+  }
+  object.set("near_ties", near_ties);
+  object.set("cut_locus_mass", analysis.cut_locus_mass).set("hessian_change", analysis.hessian_change);
   if (analysis.fit_dof > 0) {
     object.set("fit", analysis.fit).set("fit_dof", analysis.fit_dof);
     object.set("fit_p", analysis.fit_p);

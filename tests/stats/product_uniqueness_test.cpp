@@ -82,7 +82,7 @@ TEST(ProductUniqueness, AWrongMinimumIsImproved) {
 // A covariance is withheld for the product where it is for the part.
 TEST(ProductUniqueness, AnIllDefinedPartWithholdsTheCovariance) {
   using M = Product<Vector3d, NonOrientedFrame3d>;
-  const auto samples = scattered<M>(200, 0.6, 7);
+  const auto samples = scattered<M>(200, 0.9, 7);
   const auto whole = certifiedMean(samples);
   const auto part = certifiedMean(parts<1>(samples));
   EXPECT_EQ(whole.status, part.status);

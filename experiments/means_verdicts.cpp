@@ -1,0 +1,243 @@
+#include <experiments/means_verdicts.hpp>
+
+#include <experiments/means_experiment.hpp>
+#include <experiments/parallel.hpp>
+#include <experiments/scattered_features.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/laws.hpp>
+#include <stats/random.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+namespace liestat::experiments {
+namespace {
+
+constexpr double pi = static_cast<double>(EIGEN_PI);
+
+/// A quotient's rotations meet their rivals half as far away.
+template <class M>
+constexpr double fold = Quotient<M> ? 0.5 : 1.0;
+
+/// Draws the features of a cell, whose truth is the origin.
+template <class M>
+class Sampler {
+ public:
+  explicit Sampler(const VerdictCell& cell)
+      : cell_(cell), fisher_(cell.law == VerdictLaw::fisher ? cell.parameter : 1) {}
+
+  M draw(std::size_t i, CounterRng& rng) const {
+    constexpr int k = ManifoldTraits<M>::DoF, angles = std::min(k, 3);
+    if (cell_.law == VerdictLaw::fisher) return fisher_.draw(rng);
+    TangentOf<M> e = rng.template normalVector<k>();
+    if (cell_.law == VerdictLaw::clouds) {
+      TangentOf<M> side = TangentOf<M>::Zero();
+      side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * pi / 180;
+      return exp(exp(ManifoldTraits<M>::origin(), side), TangentOf<M>(0.05 * e));
+    }
+    for (int j = 0; j < angles; ++j) {
+      e[k - angles + j] *= cell_.parameter * (cell_.law == VerdictLaw::report ? 0.3 * (j + 1) : 1.0);
+    }
+    return exp(ManifoldTraits<M>::origin(), e);
+  }
+
+ private:
+  VerdictCell cell_;
+  FisherLaw<M> fisher_;
+};
+
+void add(VerdictRow& a, const VerdictRow& b) {
+  a.ok += b.ok, a.ambiguous += b.ambiguous, a.ill_defined += b.ill_defined;
+  a.outside += b.outside, a.wrong += b.wrong, a.plain_outside += b.plain_outside;
+}
+
+template <class M>
+void judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, CounterRng& rng, VerdictRow& row) {
+  std::vector<M> samples;
+  samples.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) samples.push_back(sampler.draw(i, rng));
+  CertifiedMeanOptions<M> options;
+  // A certificate that is not found changes no verdict; a rival that is, is found early.
+  options.uniqueness.budget = 2000;
+  const CertifiedMean<M> result = certifiedMean(samples, options);
+  const M truth = ManifoldTraits<M>::origin();
+  const auto misses = [&](const SquareOf<M>& covariance) {
+    return !(mahalanobisSquared(Gaussian<M>{result.mean.mean, covariance}, truth) <= quantile);
+  };
+  row.plain_outside += misses(covarianceFromResiduals(result.mean));
+  row.ambiguous += result.status == Status::ambiguous;
+  row.ill_defined += result.status == Status::ill_defined;
+  if (result.status != Status::ok) return;
+  ++row.ok;
+  row.outside += misses(result.estimate->covariance);
+  const TangentOf<M> error = log(result.mean.mean, truth);
+  row.wrong += std::abs(error[ManifoldTraits<M>::DoF - 1]) > 0.25 * fold<M> * pi;
+}
+
+template <Metric M>
+VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, int threads, const std::function<void()>& done) {
+  const Sampler<M> sampler(cell);
+  const double quantile = ReferenceLaw::hotelling(ManifoldTraits<M>::DoF, static_cast<int>(cell.n)).quantile(0.95);
+  constexpr std::size_t trials_a_chunk = 16;
+  const std::size_t chunks = (cell.trials + trials_a_chunk - 1) / trials_a_chunk;
+  VerdictRow row = ProgramExecutor{threads}.reduce(
+      chunks,
+      [&](std::size_t chunk) {
+        VerdictRow part;
+        const std::size_t end = std::min(cell.trials, (chunk + 1) * trials_a_chunk);
+        for (std::size_t t = chunk * trials_a_chunk; t < end; ++t) {
+          CounterRng rng(seed, t, 7);
+          judgeTrial(sampler, quantile, cell.n, rng, part);
+        }
+        return part;
+      },
+      [&](VerdictRow& a, const VerdictRow& b) { add(a, b); });
+  row.cell = cell;
+  done();
+  return row;
+}
+
+/// Compares a rate with its bound, give or take four standard errors of that many trials.
+void compare(VerdictRow& row, const char* what, const std::optional<double>& bound, double rate, double trials,
+             bool at_most) {
+  if (!bound) return;
+  const double margin = 4 * std::sqrt(*bound * (1 - *bound) / trials);
+  const bool kept = at_most ? rate <= *bound + margin : rate >= *bound - margin;
+  row.passed = row.passed.value_or(true) && kept;
+  if (!kept) row.failure += fmt::format("{}{} {:.4f}", row.failure.empty() ? "" : ", ", what, rate);
+}
+
+void giveVerdict(VerdictRow& row) {
+  const VerdictPromise& p = row.promise;
+  const double trials = static_cast<double>(row.cell.trials);
+  compare(row, "ok but outside", p.most_outside, row.rate(row.outside), trials, true);
+  if (2 * row.ok >= row.cell.trials) {
+    compare(row, "coverage", p.least_coverage, row.coverage(), static_cast<double>(row.ok), false);
+  }
+  compare(row, "kept", p.least_kept, row.rate(row.ok), trials, false);
+  compare(row, "kept", p.most_kept, row.rate(row.ok), trials, true);
+  compare(row, "ambiguous", p.most_ambiguous, row.rate(row.ambiguous), trials, true);
+  compare(row, "ill-defined", p.most_ill_defined, row.rate(row.ill_defined), trials, true);
+  compare(row, "wrong side", p.most_wrong, row.rate(row.wrong), trials, true);
+}
+
+}  // namespace
+
+std::string name(VerdictLaw law) {
+  switch (law) {
+    case VerdictLaw::fisher:
+      return "fisher";
+    case VerdictLaw::report:
+      return "report";
+    case VerdictLaw::isotropic:
+      return "isotropic";
+    case VerdictLaw::clouds:
+      return "clouds";
+  }
+  return "unknown";
+}
+
+VerdictPromise promiseOf(const VerdictCell& cell) {
+  const bool quotient = cell.feature == Feature::semi_oriented_frame || cell.feature == Feature::non_oriented_frame;
+  const double x = cell.parameter;
+  VerdictPromise promise;
+  if (cell.law == VerdictLaw::clouds) {
+    if (x >= 174) promise.most_wrong = 0.01;
+    // Directions that lie on opposite sides of a mean are as scattered as uniform ones while they are few.
+    if (x <= 160 && cell.feature == Feature::rotation) promise.most_ambiguous = promise.most_ill_defined = 0;
+    return promise;
+  }
+  promise.most_outside = 0.07;
+  promise.least_coverage = 0.93;
+  if (cell.law == VerdictLaw::fisher) {
+    if (x == 0) promise.most_kept = 0.02;
+    const bool direction = cell.feature == Feature::direction;
+    if (cell.n >= 10 && (x >= 20 || (x >= 4 && !quotient))) promise.least_kept = 0.95;
+    if (direction && cell.n >= 30 && x >= 2) promise.least_kept = 0.95;
+    return promise;
+  }
+  if (cell.law == VerdictLaw::report && cell.feature == Feature::rotation && x == 1) {
+    if (cell.n >= 30) {
+      promise.least_kept = 0.98;
+    } else {
+      promise.most_ambiguous = 0.05, promise.most_ill_defined = 0.08;
+    }
+  }
+  if (cell.law == VerdictLaw::report && quotient && x == 1) {
+    // Beyond any expansion: few are kept, and their coverage is not promised.
+    promise.least_coverage = std::nullopt;
+  }
+  if (cell.law == VerdictLaw::isotropic && quotient && x <= 0.5 && cell.n >= 30) promise.least_kept = 0.90;
+  return promise;
+}
+
+std::vector<VerdictCell> verdictCells(bool full) {
+  std::vector<VerdictCell> cells;
+  const auto add_cell = [&](Feature feature, VerdictLaw law, double parameter, std::size_t n, std::size_t trials) {
+    if (n > static_cast<std::size_t>(degreesOfFreedom(feature))) cells.push_back({feature, law, parameter, n, trials});
+  };
+  if (!full) {
+    for (const Feature feature : {Feature::direction, Feature::rotation}) {
+      add_cell(feature, VerdictLaw::fisher, 0, 10, 400);
+      add_cell(feature, VerdictLaw::fisher, 0.5, 30, 200);
+      add_cell(feature, VerdictLaw::fisher, 1, 30, 200);
+      add_cell(feature, VerdictLaw::fisher, 2, 30, 200);
+      add_cell(feature, VerdictLaw::fisher, 4, 10, 400);
+    }
+    add_cell(Feature::semi_oriented_frame, VerdictLaw::fisher, 2, 10, 200);
+    add_cell(Feature::semi_oriented_frame, VerdictLaw::isotropic, 0.5, 30, 200);
+    add_cell(Feature::non_oriented_frame, VerdictLaw::fisher, 20, 10, 200);
+    add_cell(Feature::non_oriented_frame, VerdictLaw::isotropic, 0.5, 30, 200);
+    add_cell(Feature::rotation, VerdictLaw::report, 1, 10, 400);
+    add_cell(Feature::rotation, VerdictLaw::report, 1, 30, 200);
+    for (const double degrees : {160.0, 178.0, 180.0})
+      add_cell(Feature::rotation, VerdictLaw::clouds, degrees, 40, 200);
+    return cells;
+  }
+  for (const Feature feature : all_features) {
+    if (feature == Feature::point) continue;
+    for (const double kappa : {0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 20.0}) {
+      for (const std::size_t n : {5, 10, 30, 100}) add_cell(feature, VerdictLaw::fisher, kappa, n, 4000);
+    }
+    for (const double spread : {1.0 / 3, 1.0}) {
+      for (const std::size_t n : {10, 30, 100}) {
+        if (feature != Feature::direction) add_cell(feature, VerdictLaw::report, spread, n, 4000);
+      }
+    }
+    for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::isotropic, 0.5, n, 4000);
+    for (const double degrees : {150.0, 160.0, 170.0, 174.0, 176.0, 178.0, 179.0, 180.0}) {
+      for (const std::size_t n : {10, 40, 1000}) {
+        add_cell(feature, VerdictLaw::clouds, degrees, n, n < 1000 ? 4000 : 400);
+      }
+    }
+  }
+  return cells;
+}
+
+std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std::uint64_t seed, int threads,
+                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  std::uint64_t all = 0, finished = 0;
+  for (const VerdictCell& cell : cells) all += cell.n * cell.trials;
+  std::vector<VerdictRow> rows;
+  for (const VerdictCell& cell : cells) {
+    const auto done = [&] {
+      finished += cell.n * cell.trials;
+      if (progress) progress(finished, all);
+    };
+    rows.push_back(withFeature(cell.feature, [&]<class M>() -> VerdictRow {
+      if constexpr (Metric<M>) {
+        return judge<M>(cell, seed, threads, done);
+      } else {
+        return {};
+      }
+    }));
+    rows.back().promise = promiseOf(cell);
+    giveVerdict(rows.back());
+  }
+  return rows;
+}
+
+}  // namespace liestat::experiments

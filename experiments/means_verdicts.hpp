@@ -1,0 +1,69 @@
+#pragma once
+
+#include <experiments/feature.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// The verdicts of certifiedMean: what it hands out a covariance for, what it withholds one from, and whether the
+/// regions of those that it hands out hold the truth. Where `validate means` judges the formulas on means that were
+/// started at the truth, this judges the front door, with its own starts and its own refusals.
+
+/// What the features of a cell are drawn from.
+enum class VerdictLaw {
+  fisher,     ///< the matrix Fisher law with F = κ/2 · I, von Mises and Fisher's on directions; of frames N(0, 1) m
+  report,     ///< normal in the chart, the report's standard deviations (0.3, 0.6, 0.9) rad times the parameter
+  isotropic,  ///< normal in the chart, the parameter in rad along each axis
+  clouds      ///< two clouds 0.05 rad wide, the parameter in degrees apart (of quotient frames half of it)
+};
+/// The name in tables and JSON fields.
+std::string name(VerdictLaw law);
+
+/// One cell of the table.
+struct VerdictCell {
+  Feature feature = Feature::rotation;
+  VerdictLaw law = VerdictLaw::fisher;
+  double parameter = 0;
+  std::size_t n = 10, trials = 400;
+};
+
+/// What is promised of a cell's rates; absent bounds are not.
+struct VerdictPromise {
+  std::optional<double> most_outside;    ///< ok, and the truth outside of the 95 % region
+  std::optional<double> least_coverage;  ///< of those that are ok, where they are half of all
+  std::optional<double> least_kept, most_kept;
+  std::optional<double> most_ambiguous, most_ill_defined;
+  std::optional<double> most_wrong;  ///< ok, and the mean on the wrong side
+};
+/// The promise of docs/uniqueness.md for a cell.
+VerdictPromise promiseOf(const VerdictCell& cell);
+
+/// What became of the trials of a cell.
+struct VerdictRow {
+  VerdictCell cell;
+  VerdictPromise promise;
+  std::size_t ok = 0, ambiguous = 0, ill_defined = 0;
+  std::size_t outside = 0;        ///< of those that are ok
+  std::size_t wrong = 0;          ///< of those that are ok: the mean of two clouds on the other side
+  std::size_t plain_outside = 0;  ///< of all: the region of the first-order covariance, which nothing withholds
+  std::optional<bool> passed;     ///< within four standard errors of every bound
+  std::string failure = {};       ///< which bound was not kept
+
+  double rate(std::size_t count) const { return static_cast<double>(count) / static_cast<double>(cell.trials); }
+  double coverage() const { return ok > 0 ? 1 - static_cast<double>(outside) / static_cast<double>(ok) : 1; }
+};
+
+/// The cells of a default run, or all of them with 4000 trials each (400 of two clouds of 1000).
+std::vector<VerdictCell> verdictCells(bool full);
+
+/// Runs the cells; the same counts on any number of threads.
+std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std::uint64_t seed, int threads,
+                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress = {});
+
+}  // namespace liestat::experiments

@@ -1,0 +1,121 @@
+// The covariance of a Mahalanobis mean from the Hessian averaged over the region that this covariance says: what
+// stats/detail/settled_covariance.hpp does for a Fréchet mean.
+#pragma once
+
+#include <stats/detail/angular_part.hpp>
+#include <stats/detail/settled_covariance.hpp>
+#include <stats/detail/mahalanobis_mean.hpp>
+
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <cstddef>
+#include <ranges>
+#include <vector>
+
+namespace liestat::detail {
+
+template <Homogeneous M>
+struct SettledMaha {
+  SquareOf<M> covariance;
+  double change = 0;  ///< of the Hessian
+  bool settled = false;
+};
+
+template <Homogeneous M, Executor E, class R>
+SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, bool likelihood,
+                          const MahaResult<M>& result, double largest_change) {
+  using S = ScalarOf<M>;
+  constexpr int D = ManifoldTraits<M>::DoF;
+  constexpr auto angular = angularCoordinates<M>();
+  constexpr int K = angular.count;
+  SettledMaha<M> settled{result.covariance, 0, true};
+  if constexpr (K > 0) {
+    using Derivative = Eigen::Matrix<double, D, K>;
+    using Matrix = Eigen::Matrix<double, D, D>;
+    const std::size_t n = std::ranges::size(samples), stride = (n + most_averaged - 1) / most_averaged;
+    std::vector<Gaussian<M>> some;
+    std::vector<M> features;
+    features.reserve(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i % stride == 0) some.push_back(samples[i]);
+      features.push_back(Gaussian<M>(samples[i]).mean);
+    }
+    MahaProblem<M, std::vector<Gaussian<M>>> problem{some, {}, at, likelihood};
+    for (const Gaussian<M>& g : some) problem.information.push_back(Cholesky<S, D>(g.covariance).inverse());
+    const double scale = static_cast<double>(n) / static_cast<double>(some.size());
+    const double clearance = angleToCutLocus(features, result.mean);
+    Matrix at_mean = result.hessian.template cast<double>();
+    if (stride > 1) {
+      at_mean = problem.hessian(executor, result.mean, problem.evaluate(executor, result.mean)).template cast<double>();
+    }
+    for (int i = 0; i < 20; ++i) {
+      settled.settled = false;
+      const auto L = angularRegion<K>(settled.covariance, angular, averaging_width);
+      if (!L.allFinite()) return settled;
+      if (clearance > 1.5 * reachOf<K>(L)) {
+        settled.settled = true;
+        return settled;
+      }
+      const Derivative derivative = averagedDerivative<D, K>(L, [&](const Eigen::Matrix<double, K, 1>& v) {
+        TangentOf<M> step = TangentOf<M>::Zero();
+        for (int k = 0; k < K; ++k) step[angular.index[static_cast<std::size_t>(k)]] = static_cast<S>(v[k]);
+        const M y = exp(result.mean, step);
+        const TangentOf<M> gradient = problem.evaluate(executor, y).gradient;
+        return Eigen::Matrix<double, D, 1>(
+            (frameTransport(result.mean, y).transpose() * gradient).template cast<double>());
+      });
+      Matrix averaged = result.hessian.template cast<double>();
+      for (int k = 0; k < K; ++k) {
+        const int c = angular.index[static_cast<std::size_t>(k)];
+        for (int r = 0; r < D; ++r) averaged(r, c) += scale * (derivative(r, k) - at_mean(r, c));
+      }
+      for (int a = 0; a < K; ++a) {
+        const int c = angular.index[static_cast<std::size_t>(a)];
+        for (int r = 0; r < D; ++r) {
+          bool both = false;
+          for (int b = 0; b < K; ++b) both = both || angular.index[static_cast<std::size_t>(b)] == r;
+          if (!both) averaged(c, r) = averaged(r, c);
+        }
+      }
+      averaged = 0.5 * (averaged + averaged.transpose()).eval();
+      const Cholesky<double, D> factor(result.hessian.template cast<double>());
+      const Matrix relative = factor.halfSolve(Matrix(factor.halfSolve(averaged).transpose()));
+      if (!relative.allFinite()) return settled;
+      settled.change = 1 - Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[0];
+      if (!(settled.change <= largest_change)) return settled;
+      const SquareOf<M> inverse = Cholesky<double, D>(averaged).inverse().template cast<S>();
+      const SquareOf<M> next = likelihood ? inverse : SquareOf<M>(inverse * result.gauss_newton * inverse);
+      if (!next.allFinite()) return settled;
+      const double step = static_cast<double>((next - settled.covariance).norm());
+      const double size = static_cast<double>(settled.covariance.norm());
+      settled.covariance = next;
+      if (step <= 0.02 * size) {
+        settled.settled = true;
+        return settled;
+      }
+    }
+    settled.settled = false;
+  }
+  return settled;
+}
+
+/// Whether measurements with their noise show that there is a mean. Neither few of them whose noise and scatter are
+/// below a quarter of the uniform law's nor a single one need to.
+template <Homogeneous M, class R>
+bool showAMean(const R& samples, const M& y) {
+  const std::size_t n = std::ranges::size(samples);
+  if (n == 1) return true;
+  std::vector<M> features;
+  std::vector<double> weights;
+  SquareOf<M> noise = SquareOf<M>::Zero();
+  for (const Gaussian<M>& g : samples) {
+    features.push_back(g.mean);
+    weights.push_back(static_cast<double>(scalarWeight(g.covariance)));
+    noise += g.covariance / ScalarOf<M>(n);
+  }
+  const Concentration found = angularConcentration<M>(features, weights, y);
+  return found.concentrated || (found.isModest() && isModestAngularNoise<M>(noise));
+}
+
+}  // namespace liestat::detail

@@ -1,0 +1,57 @@
+// Tail probabilities of Student's and Fisher's laws, for estimators that need Eigen alone (stats/laws.hpp has the laws,
+// by Boost).
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+namespace liestat::detail {
+
+/// The regularised incomplete beta function I_x(a, b), by Lentz's continued fraction; about 1e-14.
+inline double incompleteBeta(double a, double b, double x) {
+  if (!(x >= 0 && x <= 1)) return std::numeric_limits<double>::quiet_NaN();
+  if (x == 0 || x == 1) return x;
+  if (x > (a + 1) / (a + b + 2)) return 1 - incompleteBeta(b, a, 1 - x);
+  constexpr double tiny = 1e-300;
+  const auto away = [](double v) { return std::abs(v) < tiny ? tiny : v; };
+  double c = 1, d = 1 / away(1 - (a + b) * x / (a + 1)), fraction = d;
+  for (int m = 1; m < 10000; ++m) {
+    const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
+    d = 1 / away(1 + even * d), c = away(1 + even / c), fraction *= c * d;
+    const double odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
+    d = 1 / away(1 + odd * d), c = away(1 + odd / c);
+    fraction *= c * d;
+    if (std::abs(c * d - 1) < 1e-15) break;
+  }
+  const double log_front = std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x);
+  return std::exp(log_front) * fraction / a;
+}
+
+/// P(T > t) of Student's law with the given degrees of freedom.
+inline double studentTail(double t, double dof) {
+  const double two_sided = incompleteBeta(0.5 * dof, 0.5, dof / (dof + t * t));
+  return t > 0 ? 0.5 * two_sided : 1 - 0.5 * two_sided;
+}
+
+/// P(T² > t2) of Hotelling's law: k dimensions, covariance from n residuals. NaN for n <= k.
+inline double hotellingTail(double t2, int k, double n) {
+  if (!(n > k)) return std::numeric_limits<double>::quiet_NaN();
+  return incompleteBeta(0.5 * (n - k), 0.5 * k, 1 / (1 + t2 / (n - 1)));
+}
+
+/// P(χ² > x) with k degrees of freedom: the upper incomplete gamma function, exact for whole k.
+inline double chiSquaredTail(double x, int k) {
+  if (!(x >= 0)) return std::numeric_limits<double>::quiet_NaN();
+  double term, sum;
+  if (k % 2 == 0) {
+    term = sum = std::exp(-0.5 * x);
+    for (int i = 1; i < k / 2; ++i) sum += term *= 0.5 * x / i;
+  } else {
+    sum = std::erfc(std::sqrt(0.5 * x));
+    term = std::sqrt(2 * x / 3.14159265358979323846) * std::exp(-0.5 * x);
+    for (int i = 1; 2 * i < k; ++i) sum += term, term *= x / (2 * i + 1);
+  }
+  return sum;
+}
+
+}  // namespace liestat::detail

@@ -1,0 +1,203 @@
+// Features that a sample does not tell from its mean: other minima of the criterion, higher by no more than the noise of
+// the data explains. Needs Eigen alone.
+//
+// A certificate (stats/uniqueness.hpp) speaks of the sample's criterion. Of two clouds of rotations half a turn apart
+// the mean lies on one side or the other by chance, and the next sample says the opposite. A rival at y is judged by the
+// differences e_i = ½ p_i (d²(y, x_i) - d²(mean, x_i)), whose sum is how much higher it is: paired data, so
+//     z = Σ e_i/(√n sd(e_i))
+// is Student's t with n - 1 degrees of freedom where the truth has no preference. Where the noise is known the sum of
+// e_i/variance is a log-likelihood ratio, and speaks for itself. A minimum within the 99 % region of the mean is no
+// rival: the covariance covers it. Rivals are found by descents from data and along the principal axes of the scatter,
+// without a proof that there are no others.
+#pragma once
+
+#include <stats/covariance.hpp>
+#include <stats/detail/averaged_slope.hpp>
+#include <stats/detail/compact_part.hpp>
+#include <stats/detail/find_uniqueness.hpp>
+#include <stats/detail/ranges.hpp>
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/executor.hpp>
+#include <stats/gaussian.hpp>
+#include <stats/mean.hpp>
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <ranges>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+
+/// A rival of a mean that the data do not exclude.
+template <Homogeneous M>
+struct NearTie {
+  M feature = ManifoldTraits<M>::origin();
+  double z = 0;  ///< how much higher its cost is, in standard deviations of that difference
+  /// The same as a log-likelihood ratio, where the noise is known; NaN elsewhere.
+  double log_likelihood_ratio = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// What nearTies() takes for a rival.
+struct NearTieOptions {
+  double significance = 0.00135;  ///< one-sided, of Student's law; that of three standard deviations of a normal one
+  double log_likelihood_ratio = 4.5;  ///< where the noise is known: less is a rival; half of three squared
+  double region = 0.01;               ///< minima that the mean's law reaches with this probability are no rivals
+};
+
+namespace detail {
+
+/// Where descents to rivals start: some of the data, and both ways along the principal axes of the compact scatter,
+/// twice its root mean square away, which is where the rival of two opposite clouds lies.
+template <Metric M, class R>
+std::vector<M> startsOfRivals(const R& samples, const MeanResult<M>& mean) {
+  constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
+  const std::size_t n = std::ranges::size(samples);
+  const std::size_t several = std::min<std::size_t>(n, n > 20000                                     ? 3
+                                                       : compactFactor<M>() == CompactFactor::circle ? 64
+                                                                                                     : 8);
+  std::vector<M> starts;
+  for (std::size_t i = 0; i < several; ++i) starts.push_back(M(samples[i * n / several]));
+  const Eigen::Matrix<double, K, K> scatter =
+      mean.scatter.template block<K, K>(begin, begin).template cast<double>() / mean.sum_of_weights;
+  if (!scatter.allFinite()) return starts;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>> axes(scatter);
+  for (int k = 0; k < K; ++k) {
+    const double length = std::min(2 * std::sqrt(std::max(0.0, axes.eigenvalues()[k])), pi);
+    for (const double sign : {1.0, -1.0}) {
+      TangentOf<M> v = TangentOf<M>::Zero();
+      v.template segment<K>(begin) = (sign * length * axes.eigenvectors().col(k)).template cast<ScalarOf<M>>();
+      starts.push_back(exp(mean.mean, v));
+    }
+  }
+  return starts;
+}
+
+/// The noise of the data where it is not known.
+struct NoNoise {};
+
+/// Of a product: that of the I-th factor.
+template <std::size_t I, Metric M, class Noise>
+struct FactorNoise {
+  const Noise& noise;
+  auto operator()(std::size_t i) const {
+    using F = std::tuple_element_t<I, FactorsOf<M>>;
+    constexpr int k = ManifoldTraits<F>::DoF, begin = factorOffset<I, M>();
+    return SquareOf<F>(noise(i).template block<k, k>(begin, begin));
+  }
+};
+
+/// `noise(i)` is the covariance of datum i's noise, or NoNoise; `residual_law`: `covariance` is from residuals.
+template <Metric M, Executor E, class R, class W, class Noise>
+std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean,
+                                     const SquareOf<M>& covariance, bool residual_law, const Noise& noise,
+                                     const NearTieOptions& options) {
+  constexpr bool known_noise = !std::is_same_v<Noise, NoNoise>;
+  using T = ManifoldTraits<M>;
+  std::vector<NearTie<M>> ties;
+  const std::size_t n = std::ranges::size(samples);
+  if (n < 2 || !covariance.allFinite()) return ties;
+  if constexpr (Factored<M>) {
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      using F = std::tuple_element_t<i, FactorsOf<M>>;
+      constexpr int k = ManifoldTraits<F>::DoF, begin = factorOffset<i, M>();
+      const auto noise_of_factor = [&] {
+        if constexpr (known_noise) {
+          return FactorNoise<i, M, Noise>{noise};
+        } else {
+          return NoNoise{};
+        }
+      }();
+      const auto of_factor = findNearTies<F>(
+          executor, FactorRange<i, M, R>{samples}, weights, factorMean<i>(executor, samples, weights, mean),
+          SquareOf<F>(covariance.template block<k, k>(begin, begin)), residual_law, noise_of_factor, options);
+      for (const NearTie<F>& tie : of_factor) {
+        auto factors = FactorsOf<M>(T::factors(mean.mean));
+        std::get<i>(factors) = tie.feature;
+        ties.push_back({M(T::fromFactors(factors)), tie.z, tie.log_likelihood_ratio});
+      }
+    });
+  } else if constexpr (compactFactor<M>() != CompactFactor::none) {
+    // Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it.
+    constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
+    using Vector = Eigen::Matrix<double, K, 1>;
+    const Eigen::Matrix<double, K, K> region = covariance.template block<K, K>(begin, begin).template cast<double>();
+    const double radius = static_cast<double>(T::injectivityRadius());
+    if (!(distanceToCutLocus(samples, mean.mean) < 2.0 / 3 * radius)) return ties;
+    const auto squaredAngle = [](const typename T::Group& to_y, const M& x) {
+      const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
+      return static_cast<double>(z.dot(T::metricWeights().cwiseProduct(z)));
+    };
+    const auto to_mean = T::placement(mean.mean).inverse();
+    std::vector<M> seen{mean.mean};
+    for (const M& start : startsOfRivals(samples, mean)) {
+      MeanOptions<M> how;
+      how.start = start;
+      const MeanResult<M> found = frechetMean<M>(executor, samples, weights, how);
+      if (!converged(found.status)) continue;
+      const bool known = std::any_of(seen.begin(), seen.end(),
+                                     [&](const M& y) { return static_cast<double>(log(y, found.mean).norm()) < 1e-3; });
+      if (known) continue;
+      seen.push_back(found.mean);
+      // The other coordinates of a minimum of the criterion are those of the mean.
+      const Vector error = log(mean.mean, found.mean).template segment<K>(begin).template cast<double>();
+      const double squared = mahalanobisSquared<double, K>(error, region);
+      if ((residual_law ? hotellingTail(squared, K, static_cast<double>(n)) : chiSquaredTail(squared, K)) >
+          options.region) {
+        continue;
+      }
+      const auto to_rival = T::placement(found.mean).inverse();
+      double sum = 0, squares = 0, ratio = 0;
+      for (std::size_t i = 0; i < n; ++i) {
+        const M x = samples[i];
+        const double half = 0.5 * (squaredAngle(to_rival, x) - squaredAngle(to_mean, x));
+        const double e = static_cast<double>(weights[i]) * half;
+        sum += e, squares += e * e;
+        if constexpr (known_noise) {
+          ratio += half * K / static_cast<double>(noise(i).template block<K, K>(begin, begin).trace());
+        }
+      }
+      const double count = static_cast<double>(n), average = sum / count;
+      const double sd = std::sqrt(std::max(0.0, squares - count * average * average) / (count - 1));
+      NearTie<M> tie{found.mean, sum / (std::sqrt(count) * sd)};
+      const bool undecided = !(studentTail(tie.z, count - 1) < options.significance);
+      if (known_noise) tie.log_likelihood_ratio = ratio;
+      if (known_noise ? ratio < options.log_likelihood_ratio : undecided) ties.push_back(tie);
+    }
+    std::sort(ties.begin(), ties.end(), [](const NearTie<M>& a, const NearTie<M>& b) { return a.z < b.z; });
+  }
+  return ties;
+}
+
+}  // namespace detail
+
+/// The rivals of a mean that descents find and the data do not exclude, the nearest tie first. `covariance` is that of
+/// the mean from residuals. Of products the rivals of each factor.
+template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
+std::vector<NearTie<M>> nearTies(R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
+                                 const SquareOf<M>& covariance, const NearTieOptions& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok) {
+    return detail::findNearTies<M>(SerialExecutor{}, detail::asSamples(samples), detail::UnitWeights{}, mean,
+                                   covariance, true, detail::NoNoise{}, options);
+  } else {
+    return {};
+  }
+}
+template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
+std::vector<NearTie<M>> nearTies(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
+                                 const SquareOf<M>& covariance, const NearTieOptions& options = {}) {
+  if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
+    return detail::findNearTies<M>(SerialExecutor{}, detail::asSamples(samples), detail::asWeights(weights), mean,
+                                   covariance, true, detail::NoNoise{}, options);
+  } else {
+    return {};
+  }
+}
+
+}  // namespace liestat
