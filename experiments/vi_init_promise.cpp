@@ -75,7 +75,7 @@ std::optional<ViInitPromise> errorsOf(std::span<const Errors> list, const ViInit
 
 std::optional<ViInitPromise> distances(const ViInitRow& row) {
   ViInitPromise promise;
-  if (row.check == Check::consistency) {
+  if (row.check == Check::consistency || row.check == Check::walk) {
     promise.tolerance = {.index = 0.03, .ks = 0.02, .failure_fraction = 0.005, .tail = 0.002};
   } else if (row.quantity == Quantity::nees_all) {
     // Gravity and bias share a direction that is known far better than either: there the sphere's curvature counts.

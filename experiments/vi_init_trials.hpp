@@ -45,12 +45,15 @@ struct RefinementOutcome {
   double nees_v_g = std::numeric_limits<double>::quiet_NaN();         ///< of V and gravity, 5
   double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< of V, gravity and both biases, 11
   double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< of the state at the last image, 9
+  double nees_at_last = std::numeric_limits<double>::quiet_NaN();     ///< of it, gravity and the biases there, 17
   ViChiSquared chi2;
   ViErrors errors;
   double scale_of_features = std::numeric_limits<double>::infinity();  ///< %: median of their distances, off 1
 };
 /// The refinement, biases drawn from their priors, started at the closed form for biases of zero.
 RefinementOutcome refinementTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// The same with biases that walk as those of an ADIS16448 do.
+RefinementOutcome walkTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
 /// A window solved in closed form, under its covariance.
 struct ClosedFormOutcome {

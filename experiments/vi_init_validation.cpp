@@ -24,11 +24,12 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 11> quantities = {{
+constexpr std::array<QuantityEntry, 12> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
     {"nees_last_state", "", ViInitStatistic::distance},
+    {"nees_at_last", "", ViInitStatistic::distance},
     {"chi2_per_dof", "", ViInitStatistic::chi_squared},
     {"speed", "m/s", ViInitStatistic::error},
     {"gravity", "deg", ViInitStatistic::error},
@@ -42,7 +43,7 @@ constexpr std::array estimators = {"refinement",    "closed_form",    "closed_fo
                                    "least_squares", "bias_estimated", "bias_ignored",
                                    "robust",        "oracle",         "no_selection"};
 static_assert(static_cast<std::size_t>(Estimator::no_selection) + 1 == estimators.size());
-constexpr std::array checks = {"consistency", "closed_form", "accuracy", "gyroscope_bias", "drift"};
+constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias", "drift"};
 static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
@@ -75,7 +76,7 @@ struct Experiment {
   /// Milliseconds of a trial, about: for the progress bar.
   double work() const {
     const double observations = static_cast<double>(window.images * window.features);
-    return (check == Check::consistency ? 0.018 : 0.004) * observations;
+    return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
 
@@ -154,6 +155,16 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
   for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 11, 20}, ViInitWindow{2, 21, 20},
                                      ViInitWindow{3, 16, 20}, ViInitWindow{2, 21, 50}}) {
     list.push_back(experiment(Check::consistency, refinementTrial, window, refined));
+  }
+
+  std::vector<Column<RefinementOutcome>> walking;
+  addDistance<&R::nees_v_g>(walking, Estimator::refinement, Quantity::nees_v_g, 5);
+  addDistance<&R::nees_all>(walking, Estimator::refinement, Quantity::nees_all, 11);
+  addDistance<&R::nees_last_state>(walking, Estimator::refinement, Quantity::nees_last_state, 9);
+  addDistance<&R::nees_at_last>(walking, Estimator::refinement, Quantity::nees_at_last, 17);
+  addChiSquared(walking, Estimator::refinement);
+  for (const ViInitWindow& window : {ViInitWindow{2, 11, 20}, ViInitWindow{3, 16, 20}, ViInitWindow{4, 21, 20}}) {
+    list.push_back(experiment(Check::walk, walkTrial, window, walking));
   }
 
   std::vector<Column<ClosedFormOutcome>> plain, with_bias;

@@ -17,14 +17,15 @@ namespace liestat::experiments {
 /// The questions that are asked of visual-inertial initialisation.
 enum class ViInitCheck {
   consistency,     ///< the refinement under its covariance, and its errors
+  walk,            ///< the same covariance where biases walk
   closed_form,     ///< the closed form under its covariance, with image noise alone
   accuracy,        ///< errors of the closed form, biases known
   gyroscope_bias,  ///< errors where the gyroscope has a bias of 0.05 rad/s
   drift            ///< errors where 40 % of the tracks drift
 };
-inline constexpr std::array all_vi_init_checks = {ViInitCheck::consistency, ViInitCheck::closed_form,
-                                                  ViInitCheck::accuracy, ViInitCheck::gyroscope_bias,
-                                                  ViInitCheck::drift};
+inline constexpr std::array all_vi_init_checks = {ViInitCheck::consistency,    ViInitCheck::walk,
+                                                  ViInitCheck::closed_form,    ViInitCheck::accuracy,
+                                                  ViInitCheck::gyroscope_bias, ViInitCheck::drift};
 std::string name(ViInitCheck check);
 
 /// The estimator that a row is about, and what it leaves out.
@@ -47,6 +48,7 @@ enum class ViInitQuantity {
   nees_v_g,         ///< of V and gravity, 5
   nees_all,         ///< of V, gravity and the biases that are estimated: 11, 8 of the closed form
   nees_last_state,  ///< of the state at the last image, 9
+  nees_at_last,     ///< of that state, gravity and the biases there, 17
   chi2_per_dof,     ///< of the bearings, motions and priors
   speed,            ///< length of the error of V
   gravity,          ///< angle to the true one

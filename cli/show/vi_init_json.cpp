@@ -30,6 +30,7 @@ JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vecto
   if (r.status != FusionStatus::ok) return o;
   o.set("velocity", r.velocity()).set("gravity", r.gravity);
   o.set("gyroscope_bias", r.bias.gyroscope).set("accelerometer_bias", r.bias.accelerometer);
+  o.set("last_gyroscope_bias", r.last_bias.gyroscope).set("last_accelerometer_bias", r.last_bias.accelerometer);
   o.set("covariance", r.covariance.atFirst());
   o.set("covariance_order", "velocity gravity gyroscope_bias accelerometer_bias");
   o.set("covariance_frame", "axes of the body at the first image, m/s m/s^2 rad/s m/s^2");

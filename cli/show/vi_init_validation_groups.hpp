@@ -58,6 +58,8 @@ inline const char* describe(experiments::ViInitCheck check) {
   switch (check) {
     case Check::consistency:
       return "Refinement under its covariance, biases drawn from their priors: index (degrees of freedom)";
+    case Check::walk:
+      return "Refinement under its covariance, biases that also walk: index (degrees of freedom)";
     case Check::closed_form:
       return "Closed form under its covariance, image noise alone: index (degrees of freedom)";
     case Check::accuracy:

@@ -5,6 +5,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/refinement_problem.hpp>
 #include <fusion/init/refinement.hpp>
+#include <lie/detail/small_products.hpp>
 
 #include <Eigen/Core>
 
@@ -16,6 +17,32 @@
 namespace liestat {
 
 namespace detail {
+
+/// The covariance of the blocks of InitialCovariance, of a factored system.
+inline Eigen::Matrix<double, 27, 27> jointCovariance(const RefinementProblem& problem, const ReducedSystem& system) {
+  const std::size_t end = problem.state().X.size() - 1;
+  std::vector<int> blocks{problem.stateBlock(0, 2),    problem.stateBlock(end, 0), problem.stateBlock(end, 1),
+                          problem.stateBlock(end, 2),  problem.gravityBlock(),     problem.gyroscopeBlock(),
+                          problem.accelerometerBlock()};
+  // A bias at the last image is that at the first and what it has walked.
+  Eigen::Matrix<double, 27, 27> from = Eigen::Matrix<double, 27, 27>::Zero();
+  from.topLeftCorner<21, 21>().setIdentity();
+  from.block<6, 6>(21, 15).setIdentity();
+  int column = 21;
+  const auto addWalk = [&](int row, int block) {
+    blocks.push_back(block);
+    from.block<3, 3>(row, column).setIdentity();
+    column += 3;
+  };
+  if (problem.walks().gyroscope) addWalk(21, problem.gyroscopeWalkBlock(end));
+  if (problem.walks().accelerometer) addWalk(24, problem.accelerometerWalkBlock(end));
+  Eigen::Matrix<double, 27, 27> unknowns = Eigen::Matrix<double, 27, 27>::Zero();
+  const std::vector<double> inverse = system.inverse(blocks);
+  for (int i = 0; i < column; ++i) {
+    for (int j = 0; j < column; ++j) unknowns(i, j) = inverse[static_cast<std::size_t>(i * column + j)];
+  }
+  return congruence(from, unknowns);
+}
 
 /// One refinement with the motions as they are.
 inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFormSolution& start,
@@ -38,7 +65,8 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
   const RefinementProblem::State& best = problem.state();
   result.states = best.X;
   result.gravity = best.gravity;
-  result.bias = best.bias;
+  result.bias = best.bias.front();
+  result.last_bias = best.bias.back();
   result.features.assign(window.features.size(), Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t i = 0; i < best.P.size(); ++i) result.features[problem.features()[i]] = best.P[i];
   result.cost = summary.cost;
@@ -48,17 +76,13 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
   // Motions and the priors have as many rows as states and biases: what is left are V, G and the features.
   const std::size_t rows = 2 * problem.observations(), unknowns = 3 * best.P.size() + (options.gravity ? 5 : 6);
   result.degrees_of_freedom = rows > unknowns ? rows - unknowns : 0;
-  result.must_reintegrate = window.isFar(best.bias);
+  result.must_reintegrate = window.isFar(best.bias.front()) || window.isFar(best.bias.back());
   if (!system.factor(0)) {
     result.status = FusionStatus::undetermined;
     return result;
   }
   result.status = summary.status;
-  const int g = problem.gravityBlock();
-  const auto last = [&](int part) { return problem.stateBlock(best.X.size() - 1, part); };
-  const std::vector<double> inverse =
-      system.inverse({problem.stateBlock(0, 2), last(0), last(1), last(2), g, g + 1, g + 2});
-  result.covariance.joint = Eigen::Map<const Eigen::Matrix<double, 21, 21>>(inverse.data());
+  result.covariance.joint = jointCovariance(problem, system);
   return result;
 }
 

@@ -214,7 +214,7 @@ class RecordingRun {
       const InitialisedWindow& w = windows[i];
       const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
       if (!estimate) continue;
-      const auto meeting = fusion.add(windowStates(*estimate, w.measured), [&](const ImuBias<double>& bias) {
+      const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
         const auto between = motion(end, w.begin, bias);
         return between.ok() ? between.motion : Preintegration<double>({.noise = recording_.noise, .bias = bias});
       });

@@ -75,21 +75,24 @@ struct RobustInitialisation {
 
 // refine(), in refinement.hpp
 
-/// The joint covariance of all that a refinement tells but the states between the first and the last: 21 unknowns in
+/// The joint covariance of all that a refinement tells but what is between the first image and the last: 27 unknowns in
 /// blocks of three. The last state's are its right tangent; gravity is in the axes of t0, and singular along itself
-/// where its length is known. Position and heading of t0's frame are exact by definition.
+/// where its length is known. Position and heading of t0's frame are exact by definition. A bias that does not walk is
+/// the same at both ends, and so are its two blocks.
 struct InitialCovariance {
   /// The first row of each block.
   enum Block {
-    first_velocity = 0,      ///< V, at t0 (m/s)
-    last_position = 3,       ///< m
-    last_rotation = 6,       ///< rad
-    last_velocity = 9,       ///< m/s
-    gravity = 12,            ///< G (m/s²)
-    gyroscope_bias = 15,     ///< rad/s
-    accelerometer_bias = 18  ///< m/s²
+    first_velocity = 0,           ///< V, at t0 (m/s)
+    last_position = 3,            ///< m
+    last_rotation = 6,            ///< rad
+    last_velocity = 9,            ///< m/s
+    gravity = 12,                 ///< G (m/s²)
+    gyroscope_bias = 15,          ///< at t0 (rad/s)
+    accelerometer_bias = 18,      ///< at t0 (m/s²)
+    last_gyroscope_bias = 21,     ///< at the last image
+    last_accelerometer_bias = 24  ///< at the last image
   };
-  Eigen::Matrix<double, 21, 21> joint = Eigen::Matrix<double, 21, 21>::Zero();
+  Eigen::Matrix<double, 27, 27> joint = Eigen::Matrix<double, 27, 27>::Zero();
 
   Eigen::Matrix3d block(Block row, Block column) const { return joint.block<3, 3>(row, column); }
   /// The covariance of some blocks, in their order.
@@ -107,8 +110,10 @@ struct InitialCovariance {
   Eigen::Matrix<double, 12, 12> atFirst() const {
     return of<first_velocity, gravity, gyroscope_bias, accelerometer_bias>();
   }
-  /// That of the last state (position, rotation, velocity), then G and both biases: a filter starts from it.
-  Eigen::Matrix<double, 18, 18> atLast() const { return joint.bottomRightCorner<18, 18>(); }
+  /// That of the last state (position, rotation, velocity), then G and both biases there: a filter starts from it.
+  Eigen::Matrix<double, 18, 18> atLast() const {
+    return of<last_position, last_rotation, last_velocity, gravity, last_gyroscope_bias, last_accelerometer_bias>();
+  }
 };
 
 /// Everything is in the body's axes at the first image, t0.
@@ -120,7 +125,8 @@ struct RefinementResult {
 
   std::vector<SE23d> states;  ///< at each image: orientation, position, velocity; the first at the identity and 0
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
-  ImuBias<double> bias;                   ///< whole: not the change of the one that was integrated
+  ImuBias<double> bias;                   ///< at t0; whole: not the change of the one that was integrated
+  ImuBias<double> last_bias;              ///< at the last image; another where the sensor's noise has a walk
   std::vector<Eigen::Vector3d> features;  ///< NaN for a feature that was not used
 
   /// Covers the state from which a filter starts, and the velocity at t0.

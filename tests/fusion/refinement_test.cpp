@@ -171,6 +171,59 @@ TEST(Refinement, CovariancesBelongTogether) {
   EXPECT_EQ(refine(recorded.window, recorded.start.solutions[0], {}, hasty).status, Status::not_converged);
 }
 
+// With walks the biases at both ends are unknowns of their own: the walk between them is what the densities allow.
+TEST(Refinement, BiasesWalk) {
+  const Recorded recorded({.images = 9, .features = 15, .window = 2}, 91);
+  ASSERT_FALSE(recorded.start.solutions.empty());
+  const auto refined = [&](double gyroscope_walk, double accelerometer_walk) {
+    const ImuNoise<double> noise{imu.gyroscope, imu.accelerometer, gyroscope_walk, accelerometer_walk};
+    InitialisationOptions close = options;
+    close.refinement.min_decrease = 1e-9;
+    const auto r = refine(windowOf(recorded.scene, recorded.readings, {.preintegration = {.noise = noise}}),
+                          recorded.start.solutions[0], {}, close);
+    EXPECT_TRUE(r.ok());
+    return r;
+  };
+  // The variance of the walk of an axis from the first image to the last.
+  const auto walked = [](const RefinementResult& r, InitialCovariance::Block first, InitialCovariance::Block last) {
+    return Eigen::Vector3d((r.covariance.block(first, first) + r.covariance.block(last, last) -
+                            r.covariance.block(first, last) - r.covariance.block(last, first))
+                               .diagonal());
+  };
+  using Block = InitialCovariance::Block;
+  const auto still = refined(0, 0), both = refined(1e-3, 1e-2), gyroscope = refined(1e-3, 0),
+             accelerometer = refined(0, 1e-2);
+  for (const RefinementResult* r : {&still, &accelerometer}) {
+    EXPECT_EQ(r->bias.gyroscope, r->last_bias.gyroscope);
+    EXPECT_LE(walked(*r, Block::gyroscope_bias, Block::last_gyroscope_bias).maxCoeff(), 1e-18);
+  }
+  for (const RefinementResult* r : {&still, &gyroscope}) {
+    EXPECT_EQ(r->bias.accelerometer, r->last_bias.accelerometer);
+    EXPECT_LE(walked(*r, Block::accelerometer_bias, Block::last_accelerometer_bias).maxCoeff(), 1e-15);
+  }
+  for (const RefinementResult* r : {&both, &gyroscope}) {
+    EXPECT_GT((r->bias.gyroscope - r->last_bias.gyroscope).norm(), 1e-6);
+    const Eigen::Vector3d variance = walked(*r, Block::gyroscope_bias, Block::last_gyroscope_bias);
+    EXPECT_GT(variance.minCoeff(), 0);
+    EXPECT_LE(variance.maxCoeff(), 1e-6 * 2);
+  }
+  for (const RefinementResult* r : {&both, &accelerometer}) {
+    EXPECT_GT((r->bias.accelerometer - r->last_bias.accelerometer).norm(), 1e-6);
+    const Eigen::Vector3d variance = walked(*r, Block::accelerometer_bias, Block::last_accelerometer_bias);
+    EXPECT_GT(variance.minCoeff(), 0);
+    EXPECT_LE(variance.maxCoeff(), 1e-4 * 2);
+  }
+  // A walk makes nothing better known; one that goes to zero goes to none.
+  for (int i = 0; i < 18; ++i) {
+    EXPECT_GE(both.covariance.atLast()(i, i), still.covariance.atLast()(i, i) * (1 - 1e-9)) << i;
+  }
+  const auto hardly = refined(1e-4 * imu.gyroscope, 1e-4 * imu.accelerometer);
+  EXPECT_NE(hardly.last_bias.gyroscope, hardly.bias.gyroscope);
+  EXPECT_LE((hardly.covariance.joint - still.covariance.joint).norm(), 1e-6 * still.covariance.joint.norm());
+  EXPECT_LE((hardly.velocity() - still.velocity()).norm(), 1e-7);
+  EXPECT_NEAR(hardly.cost, still.cost, 1e-6 * still.cost);
+}
+
 TEST(Refinement, RefusesBadInput) {
   const Recorded recorded({.images = 6, .features = 10, .window = 1}, 78);
   ASSERT_FALSE(recorded.start.solutions.empty());
