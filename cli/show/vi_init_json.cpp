@@ -23,11 +23,10 @@ JsonObject toJson(const ClosedFormSolution& s) {
 
 JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vector<double>& times) {
   JsonObject o;
-  o.set("status", r.status == FusionStatus::ok ? "refined" : describe(r.status))
-      .set("consistent", r.consistent())
-      .set("cost", r.cost);
+  o.set("status", r.converged() ? "refined" : describe(r.status)).set("consistent", r.consistent()).set("cost", r.cost);
   o.set("degrees_of_freedom", r.degrees_of_freedom).set("features_used", r.features_used);
-  if (r.status != FusionStatus::ok) return o;
+  if (!r.converged()) return o;
+  o.set("scale_sigma", r.scale_sigma).set("tilt_sigma", r.tilt_sigma).set("prior_p", r.prior_p);
   o.set("velocity", r.velocity()).set("gravity", r.gravity);
   o.set("gyroscope_bias", r.bias.gyroscope).set("accelerometer_bias", r.bias.accelerometer);
   o.set("last_gyroscope_bias", r.last_bias.gyroscope).set("last_accelerometer_bias", r.last_bias.accelerometer);

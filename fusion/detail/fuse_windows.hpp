@@ -59,7 +59,7 @@ LIESTAT_FUSION_INLINE WindowStates windowStates(const RefinementResult& refined)
     states.last.covariance = states.first.covariance;
     return states;
   };
-  if (refined.status != FusionStatus::ok) return none();
+  if (!refined.converged()) return none();
   // The refinement's unknowns: V (3), the last state (9: position, rotation, velocity), G, both biases at either end.
   const Eigen::Matrix<double, 27, 27>& covariance = refined.covariance.joint;
   const SE23d& last = refined.states.back();

@@ -185,6 +185,15 @@ class ReducedSystem {
     return result;
   }
 
+  /// The variance of a linear function of the shared unknowns, by its gradient: after factor(0).
+  double variance(const std::vector<double>& gradient) const {
+    std::vector<double> x = gradient;
+    solve(x);
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += x[i] * gradient[i];
+    return sum;
+  }
+
  private:
   struct Feature {
     Eigen::Matrix3d H, inverse;

@@ -1,14 +1,18 @@
 // The definition of fusion/init/refinement.hpp.
 #pragma once
 
+#include <fusion/detail/chi_squared.hpp>
 #include <fusion/detail/closed_form_input.hpp>
+#include <fusion/detail/closed_form_uncertainty.hpp>
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/refinement_problem.hpp>
 #include <fusion/init/refinement.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -42,6 +46,48 @@ inline Eigen::Matrix<double, 27, 27> jointCovariance(const RefinementProblem& pr
     for (int j = 0; j < column; ++j) unknowns(i, j) = inverse[static_cast<std::size_t>(i * column + j)];
   }
   return congruence(from, unknowns);
+}
+
+/// The relative standard deviation of the scale of the images' positions p: of Σ p·δp / Σ p².
+inline double scaleSigma(const RefinementProblem& problem, const ReducedSystem& system) {
+  const std::vector<SE23d>& X = problem.state().X;
+  std::vector<double> gradient(static_cast<std::size_t>(3 * problem.blocks()));
+  double squares = 0;
+  for (std::size_t j = 1; j < X.size(); ++j) {
+    const Eigen::Vector3d p = X[j].translation(), in_body = X[j].so3().inverse() * p;
+    squares += p.squaredNorm();
+    for (int k = 0; k < 3; ++k) gradient[static_cast<std::size_t>(3 * problem.stateBlock(j, 0) + k)] = in_body[k];
+  }
+  return std::sqrt(system.variance(gradient)) / squares;
+}
+
+/// The probability of a bias that is off the prior's mean by so much: estimates of biases from a prior of variance σ²
+/// scatter about its mean by σ² less their own covariance.
+inline double probabilityUnderPrior(const Eigen::Vector3d& off, const Eigen::Matrix3d& covariance, double sigma) {
+  // A hundredth keeps it regular where the data say nothing.
+  const Eigen::Matrix3d scatter = 1.01 * Eigen::Matrix3d::Identity() - covariance / (sigma * sigma);
+  const Cholesky<double, 3> factor(scatter);
+  if (!factor.ok()) return 1;
+  return chiSquaredTail(factor.halfSolve<1>(Eigen::Vector3d(off / sigma)).squaredNorm(), 3);
+}
+
+/// What a covariance makes of an estimate.
+inline void judge(RefinementResult& result, const InitialisationOptions& options) {
+  const BiasPrior& prior = options.prior;
+  using Block = InitialCovariance::Block;
+  const double gyroscope = probabilityUnderPrior(result.bias.gyroscope - prior.mean.gyroscope,
+                                                 result.covariance.of<Block::gyroscope_bias>(), prior.gyroscope_sigma);
+  const double accelerometer =
+      probabilityUnderPrior(result.bias.accelerometer - prior.mean.accelerometer,
+                            result.covariance.of<Block::accelerometer_bias>(), prior.accelerometer_sigma);
+  result.prior_p = std::min(1., 2 * std::min(gyroscope, accelerometer));
+  result.tilt_sigma = tiltSigma(result.gravity, result.covariance.of<Block::gravity>());
+  if (result.status != FusionStatus::ok) return;
+  if (!(result.tilt_sigma <= options.closed_form.max_tilt_sigma)) {
+    result.status = FusionStatus::gravity_undetermined;
+  } else if (!(result.scale_sigma <= options.closed_form.max_scale_sigma)) {
+    result.status = FusionStatus::scale_unobservable;
+  }
 }
 
 /// One refinement with the motions as they are.
@@ -83,6 +129,8 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
   }
   result.status = summary.status;
   result.covariance.joint = jointCovariance(problem, system);
+  result.scale_sigma = scaleSigma(problem, system);
+  judge(result, options);
   return result;
 }
 

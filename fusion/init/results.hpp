@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace liestat {
@@ -119,7 +120,8 @@ struct InitialCovariance {
 /// Everything is in the body's axes at the first image, t0.
 struct RefinementResult {
   /// ok, not_converged, undetermined, no_start (the start has no feature in front of its cameras), bad_motion or
-  /// bad_input (then see fault).
+  /// bad_input (then see fault). gravity_undetermined or scale_unobservable: it converged, but on the vertical or on the
+  /// scale the covariance says less than the options ask for (ClosedFormOptions::max_tilt_sigma, max_scale_sigma).
   FusionStatus status = FusionStatus::bad_input;
   Fault fault;
 
@@ -132,6 +134,13 @@ struct RefinementResult {
   /// Covers the state from which a filter starts, and the velocity at t0.
   InitialCovariance covariance;
 
+  /// Relative standard deviation of the scale: of the images' positions along themselves.
+  double scale_sigma = std::numeric_limits<double>::infinity();
+  double tilt_sigma = std::numeric_limits<double>::infinity();  ///< rad, of the vertical: about its least known axis
+  /// The probability of biases as far from the prior's mean as these, if the prior is true: twice the smaller of both
+  /// sensors'. What the data do not tell of a bias does not count.
+  double prior_p = 1;
+
   double cost = 0;  ///< χ² of bearings, motions and priors
   std::size_t degrees_of_freedom = 0;
   std::size_t features_used = 0, observations_used = 0;
@@ -142,10 +151,16 @@ struct RefinementResult {
   Eigen::Vector3d velocity() const {
     return states.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(states[0].velocity());
   }
-  /// Whether the cost is one of noise: five sigmas of χ².
+  /// Whether the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
+  /// alone, with its thousands of bearings, hardly sees a bias.
   bool consistent() const {
     const double dof = static_cast<double>(degrees_of_freedom);
-    return cost <= dof + 5 * std::sqrt(2 * dof) + 12;
+    return cost <= dof + 5 * std::sqrt(2 * dof) + 12 && prior_p >= 1e-4;
+  }
+  /// Whether there are states with their covariance, be it a large one.
+  bool converged() const {
+    return status == FusionStatus::ok || status == FusionStatus::gravity_undetermined ||
+           status == FusionStatus::scale_unobservable;
   }
   /// Exactly one answer, converged, that explains the data.
   bool ok() const { return status == FusionStatus::ok && consistent() && !must_reintegrate; }
