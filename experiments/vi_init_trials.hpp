@@ -79,6 +79,19 @@ struct GyroscopeBiasOutcome {
 };
 GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
+/// At rest, without turns, biases drawn from their priors.
+struct RestOutcome {
+  bool stationary = false;                                 ///< what it was called
+  double nees = std::numeric_limits<double>::quiet_NaN();  ///< of gravity and both biases, 8 degrees of freedom
+};
+RestOutcome restTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// A uniform motion of 1 m/s among features 40 to 160 m away: to images that is 0.05 m/s at 2 to 8 m, and to an inertial
+/// sensor it is rest.
+struct SlowOutcome {
+  bool stationary = false;  ///< what it was called, and is not
+};
+SlowOutcome slowTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+
 /// 40 % of the tracks drift by a random walk of 8 pixels an image.
 struct DriftOutcome {
   bool exact_selection = false;           ///< exactly the other tracks were kept

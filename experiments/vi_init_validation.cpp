@@ -24,12 +24,13 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 12> quantities = {{
+constexpr std::array<QuantityEntry, 14> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
     {"nees_last_state", "", ViInitStatistic::distance},
     {"nees_at_last", "", ViInitStatistic::distance},
+    {"nees_at_rest", "", ViInitStatistic::distance},
     {"chi2_per_dof", "", ViInitStatistic::chi_squared},
     {"speed", "m/s", ViInitStatistic::error},
     {"gravity", "deg", ViInitStatistic::error},
@@ -37,13 +38,14 @@ constexpr std::array<QuantityEntry, 12> quantities = {{
     {"scale_of_features", "%", ViInitStatistic::error},
     {"bias", "rad/s", ViInitStatistic::error},
     {"selection", "", ViInitStatistic::fraction},
+    {"told", "", ViInitStatistic::fraction},
 }};
-static_assert(static_cast<std::size_t>(Quantity::selection) + 1 == quantities.size());
-constexpr std::array estimators = {"refinement",    "closed_form",    "closed_form_with_bias",
-                                   "least_squares", "bias_estimated", "bias_ignored",
-                                   "robust",        "oracle",         "no_selection"};
-static_assert(static_cast<std::size_t>(Estimator::no_selection) + 1 == estimators.size());
-constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias", "drift"};
+static_assert(static_cast<std::size_t>(Quantity::told) + 1 == quantities.size());
+constexpr std::array estimators = {
+    "refinement", "closed_form", "closed_form_with_bias", "least_squares", "bias_estimated", "bias_ignored",
+    "robust",     "oracle",      "no_selection",          "at_rest",       "slow_motion"};
+static_assert(static_cast<std::size_t>(Estimator::slow_motion) + 1 == estimators.size());
+constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias", "rest", "drift"};
 static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
@@ -76,6 +78,7 @@ struct Experiment {
   /// Milliseconds of a trial, about: for the progress bar.
   double work() const {
     const double observations = static_cast<double>(window.images * window.features);
+    if (check == Check::rest) return 40;
     return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
@@ -197,6 +200,18 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
                      {Estimator::bias_estimated, Quantity::scale, [](const G& o) { return o.estimated.scale; }},
                      {Estimator::bias_ignored, Quantity::gravity, [](const G& o) { return o.ignored.gravity; }},
                      {Estimator::bias_ignored, Quantity::scale, [](const G& o) { return o.ignored.scale; }}}));
+
+  using Rest = RestOutcome;
+  using Slow = SlowOutcome;
+  for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}}) {
+    std::vector<Column<Rest>> rest{
+        {Estimator::at_rest, Quantity::told, [](const Rest& o) { return o.stationary ? 1. : 0.; }}};
+    addDistance<&Rest::nees>(rest, Estimator::at_rest, Quantity::nees_at_rest, 8);
+    list.push_back(experiment(Check::rest, restTrial, window, rest));
+  }
+  list.push_back(experiment<Slow>(
+      Check::rest, slowTrial, {2, 21, 20},
+      {{Estimator::slow_motion, Quantity::told, [](const Slow& o) { return o.stationary ? 0. : 1.; }}}));
 
   using D = DriftOutcome;
   std::vector<Column<D>> drift{

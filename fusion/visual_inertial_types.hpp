@@ -115,6 +115,8 @@ struct InitialisedWindow {
     const FusionStatus closed = closedForm().status;
     if (fault) return fault == FaultKind::gap ? FusionStatus::gap : FusionStatus::no_readings;
     if (tracks.empty() || closedForm().fault == FaultKind::no_feature) return FusionStatus::no_features;
+    // Tracks at rest, and readings that are not.
+    if (closed == FusionStatus::stationary && refined && !isRefined()) return FusionStatus::no_parallax;
     if (closed != FusionStatus::ok) return closed;
     if (found.inliers.empty()) return FusionStatus::no_consensus;
     if (refined ? refined->ok() : closedForm().consistent) return FusionStatus::ok;

@@ -85,6 +85,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   o.set("covariance_content", describe(c.covariance_content));
   o.set("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
   o.set("scale_deviation", c.scale_sigma).set("tilt_deviation", c.tilt_sigma);
+  o.set("unseen_speed_per_depth", c.unseen_speed_per_depth);
   o.set("integrated_gyroscope_bias", w.measured.bias().gyroscope);
   o.set("integrated_accelerometer_bias", w.measured.bias().accelerometer);
   o.set("gyroscope_bias", w.found.gyroscope_bias)

@@ -87,6 +87,17 @@ Table errorsTable(const std::vector<Group>& list) {
   return table;
 }
 
+/// What was told right, and the covariance at rest.
+Table restTable(const std::vector<Group>& list) {
+  Table table({"", "T, n, N", "told right", "gravity, biases (8)", "95 %", "verdict"});
+  for (const Group& g : list) {
+    const ViInitRow* nees = g.of(Quantity::nees_at_rest);
+    table.row(
+        {name(g.first().estimator), g.window(), ratio(g.of(Quantity::told)), index(nees), covered(nees), g.verdict()});
+  }
+  return table;
+}
+
 }  // namespace
 
 std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
@@ -99,7 +110,11 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     }
     text += fmt::format("{}\n\n", describe(check));
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
-    if (check != Check::closed_form && check != Check::walk) text += errorsTable(list).str() + "\n";
+    if (check == Check::rest) {
+      text += restTable(list).str() + "\n";
+    } else if (check != Check::closed_form && check != Check::walk) {
+      text += errorsTable(list).str() + "\n";
+    }
   }
   for (const ViInitRow& row : rows) {
     if (row.passed.value_or(true)) continue;

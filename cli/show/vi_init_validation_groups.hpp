@@ -66,6 +66,8 @@ inline const char* describe(experiments::ViInitCheck check) {
       return "Closed form with the sensor's noise, biases known: errors, median / 95 %";
     case Check::gyroscope_bias:
       return "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %";
+    case Check::rest:
+      return "At rest, and at 0.05 m/s among features 2 to 8 m away: told right, and the covariance at rest";
     case Check::drift:
       return "40 % of the tracks drift by 8 px an image: errors, median / 95 %";
   }

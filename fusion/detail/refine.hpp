@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -72,7 +73,7 @@ inline double probabilityUnderPrior(const Eigen::Vector3d& off, const Eigen::Mat
 }
 
 /// What a covariance makes of an estimate.
-inline void judge(RefinementResult& result, const InitialisationOptions& options) {
+inline void judge(RefinementResult& result, const InitialisationOptions& options, bool at_rest) {
   const BiasPrior& prior = options.prior;
   using Block = InitialCovariance::Block;
   const double gyroscope = probabilityUnderPrior(result.bias.gyroscope - prior.mean.gyroscope,
@@ -85,16 +86,17 @@ inline void judge(RefinementResult& result, const InitialisationOptions& options
   if (result.status != FusionStatus::ok) return;
   if (!(result.tilt_sigma <= options.closed_form.max_tilt_sigma)) {
     result.status = FusionStatus::gravity_undetermined;
-  } else if (!(result.scale_sigma <= options.closed_form.max_scale_sigma)) {
+  } else if (!at_rest && !(result.scale_sigma <= options.closed_form.max_scale_sigma)) {
     result.status = FusionStatus::scale_unobservable;
   }
 }
 
-/// One refinement with the motions as they are.
+/// One refinement with the motions as they are; at rest: with velocities and displacements of zero.
 inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFormSolution& start,
-                                   const ImuBias<double>& bias, const InitialisationOptions& options) {
+                                   const ImuBias<double>& bias, const InitialisationOptions& options, bool at_rest) {
   RefinementResult result;
   RefinementProblem problem(window, options);
+  if (at_rest) problem.holdStill();
   if (!problem.setWeights()) {
     result.status = FusionStatus::bad_motion;
     return result;
@@ -120,7 +122,10 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
   result.features_used = best.P.size();
   result.observations_used = problem.observations();
   // Motions and the priors have as many rows as states and biases: what is left are V, G and the features.
-  const std::size_t rows = 2 * problem.observations(), unknowns = 3 * best.P.size() + (options.gravity ? 5 : 6);
+  // At rest motions have six more rows, and there are neither V nor depths.
+  const std::size_t gravity = options.gravity ? 2 : 3;
+  const std::size_t rows = 2 * problem.observations() + (at_rest ? 6 * window.motions().size() : 0);
+  const std::size_t unknowns = at_rest ? 2 * best.P.size() + gravity : 3 * best.P.size() + 3 + gravity;
   result.degrees_of_freedom = rows > unknowns ? rows - unknowns : 0;
   result.must_reintegrate = window.isFar(best.bias.front()) || window.isFar(best.bias.back());
   if (!system.factor(0)) {
@@ -129,15 +134,23 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
   }
   result.status = summary.status;
   result.covariance.joint = jointCovariance(problem, system);
-  result.scale_sigma = scaleSigma(problem, system);
-  judge(result, options);
+  if (!at_rest) result.scale_sigma = scaleSigma(problem, system);
+  judge(result, options, at_rest);
+  if (at_rest && result.status == FusionStatus::ok) {
+    const std::size_t readings = 6 * window.motions().size() - gravity;
+    const bool still = chiSquaredTail(problem.inertialCost(), readings) >= 1e-3;
+    result.status = still ? FusionStatus::stationary : FusionStatus::no_parallax;
+  }
   return result;
 }
 
 }  // namespace detail
 
-LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
-                                              const ImuBias<double>& start_bias, const InitialisationOptions& options) {
+namespace detail {
+
+inline RefinementResult refineFrom(InertialWindow window, const ClosedFormSolution& start,
+                                   const ImuBias<double>& start_bias, const InitialisationOptions& options,
+                                   bool at_rest) {
   RefinementResult result;
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   const BiasPrior& prior = options.prior;
@@ -157,7 +170,7 @@ LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const Close
   ClosedFormSolution from = start;
   int integrations = window.integrateIfFar(bias);
   for (;;) {
-    result = detail::refineOnce(window, from, bias, options);
+    result = detail::refineOnce(window, from, bias, options, at_rest);
     result.integrations = integrations;
     if (!result.must_reintegrate || integrations >= options.refinement.max_integrations) return result;
     // Too far for a first-order update: the readings again with these biases, and on from there.
@@ -166,6 +179,33 @@ LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const Close
     bias = result.bias;
     from = {.velocity = result.velocity(), .gravity = result.gravity, .features = result.features};
   }
+}
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
+                                              const ImuBias<double>& start_bias, const InitialisationOptions& options) {
+  return detail::refineFrom(std::move(window), start, start_bias, options, false);
+}
+
+LIESTAT_FUSION_INLINE RefinementResult refineAtRest(InertialWindow window, const Eigen::Vector3d& gravity,
+                                                    const ImuBias<double>& start_bias,
+                                                    const InitialisationOptions& options) {
+  // Depths are free: anywhere in front of the camera will do.
+  ClosedFormSolution rest;
+  rest.gravity = gravity;
+  const std::vector<BiasedImage> images = biasedImages(window.motions(), start_bias);
+  for (const FeatureTrack& track : window.features) {
+    rest.features.push_back(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    if (track.empty() || track.front().image >= images.size() || track.front().camera >= window.cameras.size())
+      continue;
+    const TrackedBearing& seen = track.front();
+    rest.features.back() = images[seen.image].image.rotation *
+                           (window.cameras[seen.camera] * Eigen::Vector3d(10 * seen.bearing.normalized()));
+  }
+  RefinementResult result = detail::refineFrom(std::move(window), rest, start_bias, options, true);
+  result.features.clear();
+  return result;
 }
 
 }  // namespace liestat

@@ -5,6 +5,7 @@
 #include <fusion/detail/reduced_system.hpp>
 #include <fusion/imu/factor.hpp>
 #include <fusion/imu/window.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 
 #include <Eigen/Core>
@@ -107,6 +108,30 @@ class RefinementProblem {
   RefinementProblem(const InertialWindow& window, const InitialisationOptions& options)
       : window_(window), options_(options), walks_(window.motions()) {}
 
+  /// The body stays where it is: so much may its velocity and its position be off.
+  void holdStill() { still_ = true; }
+  static constexpr double still_speed = 1e-5, still_position = 1e-6;  ///< m/s, m
+  /// χ² of the readings' velocities and displacements alone, of which there are six for each motion, rotations aside.
+  double inertialCost() const {
+    double cost = 0;
+    for (std::size_t k = 0; k < window_.motions().size(); ++k) {
+      const Preintegration<double>& motion = window_.motions()[k];
+      const Eigen::Matrix<double, 9, 1> all =
+          preintegrationError<double>(motion, state_.X[k], state_.X[k + 1], state_.bias[k], state_.gravity);
+      const Eigen::Matrix<double, 9, 9> covariance = motion.gaussian().covariance;
+      Eigen::Matrix<double, 6, 1> r;
+      r << all.head<3>(), all.tail<3>();
+      Eigen::Matrix<double, 6, 6> C;
+      for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) C(i, j) = covariance(i + (i > 2 ? 3 : 0), j + (j > 2 ? 3 : 0));
+      }
+      const Cholesky<double, 6> factor(C);
+      if (!factor.ok()) return std::numeric_limits<double>::infinity();
+      cost += factor.template halfSolve<1>(r).squaredNorm();
+    }
+    return cost / (options_.inertial_noise_factor * options_.inertial_noise_factor);
+  }
+
   /// False where a motion has no covariance.
   bool setWeights() {
     for (const Preintegration<double>& motion : window_.motions()) {
@@ -202,6 +227,7 @@ class RefinementProblem {
     cost += addPrior(bias.accelerometer - prior.mean.accelerometer, prior.accelerometer_sigma, accelerometerBlock(),
                      system);
     if (system && options_.gravity) holdLength(state.gravity, gravityBlock(), *system);
+    if (still_) cost += addStillness(state, system);
     Eigen::Matrix<double, 2, 3> by_d;
     std::size_t image = state.X.size();
     Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // of the image last seen
@@ -272,6 +298,17 @@ class RefinementProblem {
     return cost;
   }
 
+  double addStillness(const State& state, ReducedSystem* system) const {
+    double cost = addPrior(state.X[0].velocity(), still_speed, stateBlock(0, 2), system);
+    for (std::size_t j = 1; j < state.X.size(); ++j) {
+      // In the body's axes, in which the steps are.
+      const SO3d back = SO3d(state.X[j].so3()).inverse();
+      cost += addPrior(back * Eigen::Vector3d(state.X[j].velocity()), still_speed, stateBlock(j, 2), system);
+      cost += addPrior(back * Eigen::Vector3d(state.X[j].translation()), still_position, stateBlock(j, 0), system);
+    }
+    return cost;
+  }
+
   /// The rows of a bias that walks from image k to the next.
   double addWalk(const Eigen::Vector3d& walk, double sigma, std::size_t k,
                  int (RefinementProblem::*block)(std::size_t) const, ReducedSystem* system) const {
@@ -288,6 +325,7 @@ class RefinementProblem {
   const InertialWindow& window_;
   const InitialisationOptions& options_;
   WalkingBiases walks_;
+  bool still_ = false;
   State state_, next_;
   std::vector<MotionWeight> weights_;
   std::vector<BearingObservation> observations_;

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace liestat {
@@ -48,33 +49,7 @@ struct EpipolarBiasResult {
   bool ok() const { return status == FusionStatus::ok && consistent; }
 };
 
-// initialiseRobustly(), in robust_initialisation.hpp
-
-/// Indices are the window's.
-struct RobustInitialisation {
-  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
-  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
-  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
-  /// are the inliers.
-  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
-  /// bad_input: see result.fault.
-  FusionStatus status = FusionStatus::bad_input;
-  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
-  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
-  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;                             ///< for this bias, of the inliers
-  std::vector<std::size_t> inliers, outliers;          ///< ascending
-  EpipolarBiasResult epipolar;                         ///< where it began
-  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
-  std::size_t hypotheses = 0;
-  int rounds = 0;
-  int integrations = 0;  ///< how often the readings were integrated anew
-
-  /// Exactly one answer, which explains the data of the inliers.
-  bool ok() const { return status == FusionStatus::ok && result.ok(); }
-};
-
-// refine(), in refinement.hpp
+// refine() and refineAtRest(), in refinement.hpp
 
 /// The joint covariance of all that a refinement tells but what is between the first image and the last: 27 unknowns in
 /// blocks of three. The last state's are its right tangent; gravity is in the axes of t0, and singular along itself
@@ -121,7 +96,8 @@ struct InitialCovariance {
 struct RefinementResult {
   /// ok, not_converged, undetermined, no_start (the start has no feature in front of its cameras), bad_motion or
   /// bad_input (then see fault). gravity_undetermined or scale_unobservable: it converged, but on the vertical or on the
-  /// scale the covariance says less than the options ask for (ClosedFormOptions::max_tilt_sigma, max_scale_sigma).
+  /// scale the covariance says less than the options ask for (ClosedFormOptions::max_tilt_sigma, max_scale_sigma). Of
+  /// refineAtRest(): stationary, or no_parallax where the readings are not those of a body at rest.
   FusionStatus status = FusionStatus::bad_input;
   Fault fault;
 
@@ -160,10 +136,37 @@ struct RefinementResult {
   /// Whether there are states with their covariance, be it a large one.
   bool converged() const {
     return status == FusionStatus::ok || status == FusionStatus::gravity_undetermined ||
-           status == FusionStatus::scale_unobservable;
+           status == FusionStatus::scale_unobservable || status == FusionStatus::stationary;
   }
   /// Exactly one answer, converged, that explains the data.
   bool ok() const { return status == FusionStatus::ok && consistent() && !must_reintegrate; }
+};
+
+// initialiseRobustly(), in robust_initialisation.hpp
+
+/// Indices are the window's.
+struct RobustInitialisation {
+  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
+  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
+  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
+  /// are the inliers.
+  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
+  /// bad_input: see result.fault.
+  FusionStatus status = FusionStatus::bad_input;
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
+  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
+  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
+  ClosedFormResult result;                             ///< for this bias, of the inliers
+  std::vector<std::size_t> inliers, outliers;          ///< ascending
+  EpipolarBiasResult epipolar;                         ///< where it began
+  std::optional<RefinementResult> rest;                ///< where result.status is stationary and the noise is known
+  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
+  std::size_t hypotheses = 0;
+  int rounds = 0;
+  int integrations = 0;  ///< how often the readings were integrated anew
+
+  /// Exactly one answer, which explains the data of the inliers.
+  bool ok() const { return status == FusionStatus::ok && result.ok(); }
 };
 
 }  // namespace liestat

@@ -37,10 +37,11 @@ bool allPassed(const std::vector<ViInitRow>& rows) {
 }
 
 TEST(ValidateViInit, eachCheckRunsAndKeepsItsPromises) {
-  // Rows a kind of window: 9 of the refinement, 5 with walks; 2, and 3 with the bias; 6 of each accuracy; 5; 10.
+  // Rows a kind of window: 9 of the refinement, 5 with walks; 2, and 3 with the bias; 6 of each accuracy; 5; 2 at rest, 1 that moves; 10.
   const std::pair<ViInitCheck, std::size_t> expected[] = {
       {ViInitCheck::consistency, 5 * 9}, {ViInitCheck::walk, 3 * 5},       {ViInitCheck::closed_form, 3 * 2 + 3 * 3},
-      {ViInitCheck::accuracy, 4 * 6},    {ViInitCheck::gyroscope_bias, 5}, {ViInitCheck::drift, 10}};
+      {ViInitCheck::accuracy, 4 * 6},    {ViInitCheck::gyroscope_bias, 5}, {ViInitCheck::rest, 2 * 2 + 1},
+      {ViInitCheck::drift, 10}};
   for (const auto& [check, count] : expected) {
     const auto rows = validateViInit(small({check}, 24));
     EXPECT_EQ(rows.size(), count) << name(check);
@@ -112,6 +113,10 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
   EXPECT_EQ(gyroscope.bias, infinite);
   expectLost(gyroscope.estimated);
   expectLost(gyroscope.ignored);
+  const RestOutcome rest = restTrial(two_images, 1, rng);
+  EXPECT_FALSE(rest.stationary);
+  expectNone({rest.nees});
+  EXPECT_FALSE(slowTrial(two_images, 1, rng).stationary);
   const DriftOutcome drift = driftTrial(two_images, 1, rng);
   EXPECT_FALSE(drift.exact_selection);
   expectLost(drift.robust);
