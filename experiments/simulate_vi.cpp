@@ -26,6 +26,21 @@ SE3d poseOf(const SE23d& state) { return SE3d(state.so3(), state.translation());
 
 }  // namespace
 
+ImuNoise<double> scaled(const ImuNoise<double>& noise, double factor) {
+  return {.gyroscope = factor * noise.gyroscope,
+          .accelerometer = factor * noise.accelerometer,
+          .gyroscope_walk = factor * noise.gyroscope_walk,
+          .accelerometer_walk = factor * noise.accelerometer_walk};
+}
+
+ImuBias<double> calibratedBias(std::uint64_t seed) {
+  CounterRng rng(seed, 1);
+  ImuBias<double> bias;
+  bias.gyroscope = 0.01 * rng.normalVector<3>();
+  bias.accelerometer = 0.05 * rng.normalVector<3>();
+  return bias;
+}
+
 SplineTrajectory builtInTrajectory(double duration, std::uint64_t seed) {
   struct Wave {
     Eigen::Vector3d amplitude;

@@ -54,6 +54,12 @@ struct SyntheticImuOptions {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< in the world, m/s²
 };
 
+/// These densities, all times a factor.
+ImuNoise<double> scaled(const ImuNoise<double>& noise, double factor);
+
+/// What a calibration leaves of the biases: drawn with standard deviations of 0.01 rad/s and 0.05 m/s² in each axis.
+ImuBias<double> calibratedBias(std::uint64_t seed);
+
 /// The point that a track of the simulated images shows.
 struct SimulatedTrack {
   Eigen::Vector3d landmark;  ///< in the world, m

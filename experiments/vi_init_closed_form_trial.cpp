@@ -32,6 +32,7 @@ ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& size, double noise, Co
 
 ClosedFormOutcome closedFormBiasNeesTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
+                                      .prior = {.accelerometer_sigma = 0.1},
                                       .closed_form = {.estimate_bias = true, .singular_values = false}};
   const std::uint64_t seed = rng();
   const Eigen::Vector3d bias = noise * options.prior.accelerometer_sigma * rng.normalVector<3>();

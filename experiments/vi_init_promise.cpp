@@ -37,7 +37,7 @@ constexpr std::array<Errors, 5> refined_errors = {{
 }};
 
 /// The first table of section 5, which is that of least squares.
-constexpr std::array<Errors, 4> known = {{
+constexpr std::array<Errors, 4> least_squares_errors = {{
     {{1, 11, 20}, {0.029, 0.105}, {0.225, 0.75}, {1.6, 8}, {}, {0.17, 0.64}, {1, 3.3}, {12, 43}},
     {{2, 21, 20}, {0.0095, 0.027}, {0.044, 0.12}, {0.43, 2}, {}, {0.03, 0.14}, {0.12, 0.49}, {1.9, 10}},
     {{3, 31, 20}, {0.0064, 0.015}, {0.0245, 0.057}, {0.28, 1.2}, {}, {0.012, 0.042}, {0.04, 0.09}, {0.8, 3.1}},
@@ -45,10 +45,10 @@ constexpr std::array<Errors, 4> known = {{
 }};
 
 /// The other is the bias.
-constexpr std::array<Errors, 1> gyroscope = {
+constexpr std::array<Errors, 1> gyroscope_bias_errors = {
     {{{2, 21, 20}, {}, {0.078, 0.2}, {0.53, 2.35}, {0.00145, 0.0033}, {}, {0.2, 0.7}, {2.8, 15}, {0.0017, 0.008}}}};
 
-constexpr std::array<Errors, 1> drifting = {
+constexpr std::array<Errors, 1> drift_errors = {
     {{{2, 21, 40}, {0.0087, 0.0235}, {0.0415, 0.108}, {0.38, 1.75}, {}, {0.03, none}}}};
 
 std::optional<ViInitPromise> errorsOf(std::span<const Errors> list, const ViInitRow& row, bool only_note,
@@ -113,13 +113,13 @@ std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
     case Estimator::refinement:
       return errorsOf(refined_errors, row, false, 50);
     case Estimator::closed_form:
-      return errorsOf(known, row, false, 60);
+      return errorsOf(least_squares_errors, row, false, 60);
     case Estimator::least_squares:
-      return errorsOf(known, row, true, 60);
+      return errorsOf(least_squares_errors, row, true, 60);
     case Estimator::bias_estimated:
-      return errorsOf(gyroscope, row, false, 60);
+      return errorsOf(gyroscope_bias_errors, row, false, 60);
     case Estimator::robust:
-      return errorsOf(drifting, row, false, 60);
+      return errorsOf(drift_errors, row, false, 60);
     default:
       return {};
   }

@@ -80,7 +80,7 @@ struct VisualInertialOptions {
   /// Gravity, the priors of the biases, the seed, and all that the steps need. The noise of bearings is that of the
   /// observations; the accelerometer's bias is estimated in closed form in windows of two seconds and more, because it
   /// is not told in less (design note, 3.5).
-  InitialisationOptions initialisation = {.prior = {.accelerometer_sigma = 0.15}};
+  InitialisationOptions initialisation = {};
 };
 
 /// One window.

@@ -20,6 +20,7 @@
 #include <lie/detail/contract_group.hpp>
 #include <lie/detail/contract_homogeneous.hpp>
 #include <lie/detail/contract_metric.hpp>
+#include <lie/detail/contract_operations.hpp>
 #include <lie/detail/contract_statistics.hpp>
 
 namespace liestat {
@@ -27,14 +28,14 @@ namespace liestat {
 /// Everything that a manifold promises by the concepts which it satisfies. The single checks are functions of the same
 /// arguments: checkGroup, checkPlacement, checkAction, checkExpLog, checkIsotropy, checkActionJacobians,
 /// checkPlacementJacobian, checkExpLogJacobians, checkErrorVector, checkSecondDerivatives, checkPlacementIndependence,
-/// checkMetric, checkHessian, checkQuotient, checkStatisticsTraits. Each adds to the report, and does nothing if the
+/// checkMetric, checkInjectivityRadius, checkHessian, checkQuotient, checkStatisticsTraits. Each adds to the report, and does nothing if the
 /// manifold does not have what it checks.
 inline ContractReport checkContract(const ManifoldOperations& m, const ContractOptions& options = {}) {
   ContractReport report;
-  for (const auto check :
-       {checkGroup, checkPlacement, checkAction, checkExpLog, checkIsotropy, checkActionJacobians,
-        checkPlacementJacobian, checkExpLogJacobians, checkErrorVector, checkSecondDerivatives,
-        checkPlacementIndependence, checkMetric, checkHessian, checkQuotient, checkStatisticsTraits}) {
+  for (const auto check : {checkGroup, checkPlacement, checkAction, checkExpLog, checkIsotropy, checkActionJacobians,
+                           checkPlacementJacobian, checkExpLogJacobians, checkErrorVector, checkSecondDerivatives,
+                           checkPlacementIndependence, checkMetric, checkInjectivityRadius, checkHessian, checkQuotient,
+                           checkStatisticsTraits}) {
     check(m, report, options);
   }
   return report;

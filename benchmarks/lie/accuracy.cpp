@@ -21,6 +21,7 @@ void printAll() {
   rigid("SO3", liestat::SO3<S>(), 0);
   rigid("SE2", liestat::SE2<S>(), 2);
   rigid("SE3", liestat::SE3<S>(), 3);
+  rigid("SE23", liestat::SE23<S>(), 3);
   row("RxSO2", sweepScaledGroup<liestat::RxSO2<S>>(0));
   row("RxSO3", sweepScaledGroup<liestat::RxSO3<S>>(0));
   row("Sim2", sweepScaledGroup<liestat::Sim2<S>>(2));

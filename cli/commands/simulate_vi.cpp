@@ -6,7 +6,6 @@
 #include <cli/io/text.hpp>
 #include <cli/show/simulated_recording.hpp>
 #include <experiments/simulate_vi.hpp>
-#include <stats/random.hpp>
 
 #include <fmt/format.h>
 
@@ -49,10 +48,8 @@ Sensors sensorsOf(const Options& options) {
   return sensors;
 }
 
-/// Given on the command line, or drawn: a calibrated sensor's.
-Eigen::Vector3d biasOf(const std::vector<double>& given, double deviation, CounterRng& rng) {
-  const Eigen::Vector3d drawn = deviation * rng.normalVector<3>();
-  return given.empty() ? drawn : Eigen::Vector3d(given[0], given[1], given[2]);
+std::optional<Eigen::Vector3d> given(const std::vector<double>& list) {
+  return list.empty() ? std::nullopt : std::optional(Eigen::Vector3d(list[0], list[1], list[2]));
 }
 
 void checkSize(const Options& options, double duration) {
@@ -88,14 +85,10 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
                      "a file with imu0 too, or --imu-noise 0");
   }
   const ImuNoise<double> nominal = sensors.noise.value_or(adis16448);
-  const double s = options.imu_noise;
-  imu.noise = {.gyroscope = s * nominal.gyroscope,
-               .accelerometer = s * nominal.accelerometer,
-               .gyroscope_walk = s * nominal.gyroscope_walk,
-               .accelerometer_walk = s * nominal.accelerometer_walk};
-  CounterRng rng(options.scene.seed, 1);
-  imu.bias.gyroscope = biasOf(options.gyroscope_bias, 0.01, rng);
-  imu.bias.accelerometer = biasOf(options.accelerometer_bias, 0.05, rng);
+  imu.noise = scaled(nominal, options.imu_noise);
+  imu.bias = calibratedBias(options.scene.seed);
+  imu.bias.gyroscope = given(options.gyroscope_bias).value_or(imu.bias.gyroscope);
+  imu.bias.accelerometer = given(options.accelerometer_bias).value_or(imu.bias.accelerometer);
 
   std::int64_t start_ns = usual_start_ns;
   std::optional<SplineTrajectory> motion;
@@ -122,7 +115,7 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
   SimulatedRecording recording = simulateMotion(*motion, begin, end, sensors.camera, imu, options.scene);
   recording.start_ns = start_ns;
   // Exact readings: no program can do with a noise of zero.
-  if (s == 0) recording.noise = nominal;
+  if (options.imu_noise == 0) recording.noise = nominal;
   return recording;
 }
 
@@ -140,7 +133,7 @@ void checkFinite(const Options& options) {
 
 int runCommand(Options options) {
   checkFinite(options);
-  if (!options.box.empty()) options.scene.box = Eigen::Vector3d(options.box[0], options.box[1], options.box[2]);
+  options.scene.box = given(options.box);
   if (options.begin && options.end && !(*options.begin < *options.end)) {
     throw InputError(command_name, 0,
                      fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),

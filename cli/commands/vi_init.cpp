@@ -115,25 +115,6 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
-/// The fault of a recording as a whole.
-void throwFault(const VisualInertialResult& result, const VisualInertialRecording& measured,
-                const VisualInertialOptions& how) {
-  if (!result.fault) return;
-  const std::vector<double>& times = measured.image_times;
-  if (result.fault == FaultKind::too_few_images) {
-    throw InputError(command_name, 0,
-                     fmt::format("no window of {} s fits: {} images from {:.6g} to {:.6g} s, {} of them outside of the "
-                                 "readings' {:.6g} to {:.6g} s",
-                                 how.window, times.size(), times.front(), times.back(), result.images_outside,
-                                 measured.readings.front().time, measured.readings.back().time),
-                     "images that the readings cover, on the same clock");
-  }
-  const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
-  const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
-  throw InputError(command_name, 0, fmt::format("{:.3g} windows from {} to {} s", windows, begin, end),
-                   fmt::format("at most {}", how.max_windows));
-}
-
 int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
   const VisualInertialRecording measured = measurementsOf(recording, options);
@@ -141,7 +122,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
-  throwFault(found, measured, how);
+  refuseFault(found, measured, how, command_name);
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();

@@ -1,9 +1,13 @@
 #include <cli/commands/vi_init_result.hpp>
 
+#include <cli/io/input_error.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <stats/inference.hpp>
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <span>
 #include <utility>
 
 namespace liestat::cli {
@@ -103,6 +107,35 @@ ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& rec
     if (const auto truth = truthAt(recording.truth, f.end)) compare(f, *truth);
   }
   return result;
+}
+
+void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured,
+                 const VisualInertialOptions& how, const char* command) {
+  if (!found.fault) return;
+  const std::vector<double>& times = measured.image_times;
+  const std::span<const ImuSample<double>> readings = measured.readings;
+  if (times.empty() || readings.empty()) {
+    throw InputError(command, 0, times.empty() ? "there are no images" : "there are no readings",
+                     "a recording of both");
+  }
+  const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
+  if (found.fault != FaultKind::too_few_images) {
+    const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
+    throw InputError(command, 0, fmt::format("{:.3g} windows from {:.3f} to {:.3f} s", windows, begin, end),
+                     fmt::format("at most {}", how.max_windows));
+  }
+  const double images_last = times.back() - times.front(), readings_last = readings.back().time - readings.front().time;
+  const double ratio = images_last / readings_last;
+  // A thousand apart, as µs and ns are, or ms and µs.
+  const bool unit = (ratio > 300 && ratio < 3000) || (1 / ratio > 300 && 1 / ratio < 3000);
+  throw InputError(
+      command, 0,
+      fmt::format(
+          "no window of {} s fits: {} images from {:.3f} to {:.3f} s, {} of them outside of the readings' {:.3f} "
+          "to {:.3f} s{}",
+          how.window, times.size(), times.front(), times.back(), found.images_outside, readings.front().time,
+          readings.back().time, unit ? "; does one clock count in µs where the other counts in ns?" : ""),
+      "images that the readings cover, on the same clock");
 }
 
 }  // namespace liestat::cli

@@ -58,4 +58,8 @@ struct ViInitResult {
 /// Compares what was found with the recording's ground truth; gravity's length in m/s², none: it was not known.
 ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& recording, std::optional<double> gravity);
 
+/// Throws an InputError in the command's name for the fault of a recording as a whole.
+void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured,
+                 const VisualInertialOptions& how, const char* command);
+
 }  // namespace liestat::cli

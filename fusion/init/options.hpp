@@ -18,8 +18,8 @@ namespace liestat {
 /// The prior of the biases: normal about `mean`, with these standard deviations in each axis.
 struct BiasPrior {
   ImuBias<double> mean = {};
-  double gyroscope_sigma = 0.1;      ///< rad/s
-  double accelerometer_sigma = 0.1;  ///< m/s²; for the closed form infinite means none
+  double gyroscope_sigma = 0.1;       ///< rad/s
+  double accelerometer_sigma = 0.15;  ///< m/s²; for the closed form infinite means none
 };
 
 /// fusion/init/closed_form.hpp

@@ -2,7 +2,7 @@
 // runs a check over the decades of the angle.
 #pragma once
 
-#include <lie/detail/contract_operations.hpp>
+#include <lie/detail/contract_record.hpp>
 #include <lie/detail/contract_report.hpp>
 #include <lie/detail/contract_sequence.hpp>
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace liestat {
@@ -35,6 +36,27 @@ inline void checkMetric(const ManifoldOperations& m, ContractReport& report, con
     bench.exact("distance(y, exp(y, v)) == |v|", std::abs(d(y, m.exp(y, v)) - length),
                 {{"y = expOrigin", b}, {"v", v}});
   });
+}
+
+/// The injectivity radius: up to it logOrigin inverts expOrigin (invariant 3 is tried up to there), and beyond it some
+/// geodesic from the origin is no longer the shortest.
+inline void checkInjectivityRadius(const ManifoldOperations& m, ContractReport& report,
+                                   const ContractOptions& options = {}) {
+  using Vector = ManifoldOperations::Vector;
+  if (!m.injectivityRadius || !m.metricWeights) return;
+  detail::ContractBench bench(m, report, options);
+  const double radius = m.injectivityRadius();
+  const Vector root = m.metricWeights().cwiseSqrt();
+  // A geodesic of one and a half turns, where there is no bound, is the shortest in flat manifolds only.
+  const double length = std::isfinite(radius) ? 1.02 * radius : 3 * static_cast<double>(EIGEN_PI);
+  double shortest = 1;
+  for (int i = 0; i < m.dimension; ++i) {
+    const Vector v = (length / root[i]) * Vector::Unit(m.dimension, i);
+    shortest = std::min(shortest, root.cwiseProduct(m.logOrigin(m.expOrigin(v))).norm() / length);
+  }
+  const bool is_bound = shortest < 0.99;
+  bench.exact("injectivityRadius is where the first geodesic along a coordinate stops being the shortest",
+              is_bound == std::isfinite(radius) ? 0 : std::numeric_limits<double>::infinity(), {});
 }
 
 /// Invariant 9: the Hessian of half the squared distance, along geodesics.

@@ -38,8 +38,14 @@ inline void checkCompactFactor(const ManifoldOperations& m, ContractReport& repo
   using Point = ManifoldOperations::Point;
   const auto& s = m.statistics;
   if (!s.compactCoordinates || !m.distance) return;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   detail::ContractBench bench(m, report, options);
   const int size = s.compact_factor == CompactFactor::circle ? 1 : s.compact_factor == CompactFactor::sphere ? 2 : 3;
+  const auto coordinates = static_cast<int>(s.compactCoordinates(m.origin()).size());
+  // A circle's angle is a unit vector of two numbers, a direction's of three, a rotation's is a quaternion.
+  const bool fits = coordinates == size + 1 && s.compact_begin >= 0 && s.compact_begin + size <= m.dimension;
+  bench.exact("compact_factor says how many numbers compactCoordinates has", fits ? 0 : infinity, {});
+  if (!fits) return;
   const auto angle = [&](const Vector& a, const Vector& b) { return detail::compactAngle(s.compact_factor, a, b); };
   // Of a quotient the nearest representative counts.
   const auto nearest = [&](const Point& x, const Vector& to) {

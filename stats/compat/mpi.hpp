@@ -3,15 +3,13 @@
 // Processes on one or many machines (needs any MPI 3, Debian: libopenmpi-dev; compile with mpicxx or link
 // MPI::MPI_CXX).
 
+#include <stats/detail/chunk_codec.hpp>
 #include <stats/executor.hpp>
 
-#include <Eigen/Core>
 #include <mpi.h>
 
 #include <algorithm>
-#include <concepts>
 #include <cstddef>
-#include <cstring>
 #include <deque>
 #include <exception>
 #include <functional>
@@ -20,80 +18,11 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace liestat {
-
-/// A chunk result that travels as a list of doubles: `t.pack()` gives the list and `T::unpack(list)` the same T, bit
-/// for bit. For types that are not trivially copyable (anything that holds a vector or an Eigen matrix).
-template <class T>
-concept Packable = requires(const T& t, std::span<const double> values) {
-  { t.pack() } -> std::convertible_to<std::vector<double>>;
-  { T::unpack(values) } -> std::convertible_to<T>;
-};
-
 namespace detail {
-
-template <class T>
-concept FixedSizeEigen = std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime != Eigen::Dynamic;
-
-using Bytes = std::vector<std::byte>;
-
-/// T as bytes and back, for the types that MpiExecutor can send. Machines of one run share one byte order.
-template <class T>
-struct ChunkCodec;
-
-template <class U>
-  requires std::is_trivially_copyable_v<U>
-struct ChunkCodec<std::vector<U>> {
-  static constexpr bool supported = true;
-
-  static Bytes encode(const std::vector<U>& values) {
-    Bytes bytes(sizeof(U) * values.size());
-    if (!bytes.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
-    return bytes;
-  }
-  static std::vector<U> decode(std::span<const std::byte> bytes) {
-    std::vector<U> values(bytes.size() / sizeof(U));
-    if (!bytes.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
-    return values;
-  }
-};
-
-template <class T>
-struct ChunkCodec {
-  static constexpr bool supported = Packable<T> || FixedSizeEigen<T> || std::is_trivially_copyable_v<T>;
-
-  static Bytes encode(const T& value) {
-    if constexpr (Packable<T>) {
-      return ChunkCodec<std::vector<double>>::encode(value.pack());
-    } else if constexpr (FixedSizeEigen<T>) {
-      Bytes bytes(sizeof(typename T::Scalar) * T::SizeAtCompileTime);
-      std::memcpy(bytes.data(), value.data(), bytes.size());
-      return bytes;
-    } else {
-      Bytes bytes(sizeof(T));
-      std::memcpy(bytes.data(), &value, bytes.size());
-      return bytes;
-    }
-  }
-
-  static T decode(std::span<const std::byte> bytes) {
-    if constexpr (Packable<T>) {
-      return T::unpack(ChunkCodec<std::vector<double>>::decode(bytes));
-    } else if constexpr (FixedSizeEigen<T>) {
-      T value;
-      std::memcpy(value.data(), bytes.data(), bytes.size());
-      return value;
-    } else {
-      T value{};
-      std::memcpy(&value, bytes.data(), bytes.size());
-      return value;
-    }
-  }
-};
 
 inline int mpiCount(std::size_t size) {
   if (size > static_cast<std::size_t>(std::numeric_limits<int>::max())) {

@@ -269,7 +269,31 @@ TEST(ContractCheckers, FindWrongNumbersOfStatistics) {
   expectFound("compact_begin", [](auto& s) { s.compact_begin = 0; });
   expectFound("a part is missing", [](auto& s) { s.tangent_parts.pop_back(); });
   expectFound("parts overlap", [](auto& s) { s.tangent_parts[1].begin = 2; });
+  expectFound("compact_factor", [](auto& s) { s.compact_factor = liestat::CompactFactor::sphere; });
+  expectFound("compact_begin beyond the tangent", [](auto& s) { s.compact_begin = 4; });
   expectFound("lengths for angles", [](auto& s) { std::swap(s.tangent_parts[0].part, s.tangent_parts[1].part); });
+}
+
+// What skips a check, or bounds the inputs of all, must not be able to do so unseen.
+TEST(ContractCheckers, FindWhatWouldSkipThem) {
+  liestat::ContractOptions few;
+  few.samples = 1;
+  Operations sphere = liestat::operationsOf<liestat_test::TurnedS2<double>>();
+  ASSERT_TRUE(liestat::checkContract(sphere, few).ok());
+  const auto is_smooth = sphere.isPlacementSmooth;
+  sphere.isPlacementSmooth = [](const Operations::Point&) { return false; };
+  EXPECT_FALSE(liestat::checkContract(sphere, few).ok()) << "isPlacementSmooth: nowhere";
+  sphere.isPlacementSmooth = is_smooth;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double half_turn = static_cast<double>(EIGEN_PI);
+  for (const double radius : {0.5 * half_turn, 0.9 * half_turn, 1.1 * half_turn, infinity}) {
+    sphere.injectivityRadius = [radius] { return radius; };
+    EXPECT_FALSE(liestat::checkContract(sphere, few).ok()) << "injectivityRadius " << radius;
+  }
+  Operations plane = liestat::operationsOf<Eigen::Vector2d>();
+  ASSERT_TRUE(liestat::checkContract(plane, few).ok());
+  plane.injectivityRadius = [half_turn] { return half_turn; };
+  EXPECT_FALSE(liestat::checkContract(plane, few).ok()) << "injectivityRadius of the plane";
 }
 
 /// The sphere with a transvection that does not carry frames in parallel.

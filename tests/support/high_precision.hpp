@@ -212,6 +212,64 @@ Matrix referenceLog(const liestat::Sim3<S>& x) {
   return column({u.a[0], u.a[1], u.a[2], l.a[0], l.a[1], l.a[2], l.a[3]});
 }
 
+/// matrix() from the parameters, whose rotation part is taken at unit norm where the group has no scale.
+template <class G>
+Matrix referenceMatrix(const G& x) {
+  constexpr int d = G::Dim, lead = d == 2 ? 2 : 4;
+  const Matrix p(x.params());
+  Matrix R(d, d);
+  Real square = 0;
+  for (int i = 0; i < lead; ++i) square += p.a[static_cast<std::size_t>(i)] * p.a[static_cast<std::size_t>(i)];
+  if constexpr (d == 2) {
+    R.a = {p.a[0], -p.a[1], p.a[1], p.a[0]};
+    square = sqrt(square);
+  } else {
+    const Real &a = p.a[0], &b = p.a[1], &c = p.a[2], &w = p.a[3];
+    R.a = {w * w + a * a - b * b - c * c, 2 * (a * b - c * w),           2 * (a * c + b * w),
+           2 * (a * b + c * w),           w * w - a * a + b * b - c * c, 2 * (b * c - a * w),
+           2 * (a * c - b * w),           2 * (b * c + a * w),           w * w - a * a - b * b + c * c};
+  }
+  if constexpr (!requires { x.scale(); }) {
+    for (auto& r : R.a) r /= square;
+  }
+  Matrix m = identity(G::N);
+  for (int i = 0; i < d; ++i) {
+    for (int j = 0; j < d; ++j) m.at(i, j) = R.at(i, j);
+    for (int j = d; j < G::N; ++j) m.at(i, j) = p.a[static_cast<std::size_t>(lead + (j - d) * d + i)];
+  }
+  return m;
+}
+
+/// Adj() from the definition: the coordinates of X hat(e) X⁻¹ for each unit tangent e, by least squares in the hats.
+template <class G>
+Matrix referenceAdjoint(const Matrix& X) {
+  Matrix hats(G::N * G::N, G::DoF), images = hats;
+  const Matrix back = inverse(X);
+  for (int j = 0; j < G::DoF; ++j) {
+    const Matrix hat(G::hat(G::Tangent::Unit(j))), image = X * hat * back;
+    for (int i = 0; i < hats.rows; ++i) {
+      hats.at(i, j) = hat.a[static_cast<std::size_t>(i)];
+      images.at(i, j) = image.a[static_cast<std::size_t>(i)];
+    }
+  }
+  Matrix transposed(hats.cols, hats.rows);
+  for (int i = 0; i < hats.rows; ++i) {
+    for (int j = 0; j < hats.cols; ++j) transposed.at(j, i) = hats.at(i, j);
+  }
+  return inverse(transposed * hats) * (transposed * images);
+}
+
+/// The action on a point.
+template <class G>
+Matrix referenceAction(const Matrix& X, const Matrix& point) {
+  Matrix moved(G::Dim, 1);
+  for (int i = 0; i < G::Dim; ++i) {
+    if (G::N > G::Dim) moved.at(i, 0) = X.at(i, G::Dim);
+    for (int j = 0; j < G::Dim; ++j) moved.at(i, 0) += X.at(i, j) * point.at(j, 0);
+  }
+  return moved;
+}
+
 template <class S>
 constexpr bool is_float = std::is_same_v<S, float>;
 
@@ -278,6 +336,17 @@ void sweepGroup(Table& worst, double angle, const std::vector<typename G::Tangen
     const G x = G::exp(v);
     worst["exp"].see(error(x.matrix(), series(Matrix(G::hat(v)), 0)), angle);
     worst["log"].see(error(x.log(), referenceLog(x)), angle);
+    if constexpr (requires { x.scale(); }) {
+      // Relative to one: of a scale of 1 + σ the last 2e-16 are σ's, too.
+      if (std::abs(static_cast<double>(v[G::DoF - 1])) <= 1e-3) {
+        worst["log near scale 1"].see(error(x.log(), referenceLog(x)), angle);
+      }
+    }
+    const Matrix X = referenceMatrix(x);
+    const typename G::Point point = G::Point::LinSpaced(typename G::Scalar(0.4), typename G::Scalar(-0.7));
+    worst["matrix"].see(error(x.matrix(), X), angle);
+    worst["Adj"].see(error(x.Adj(), referenceAdjoint<G>(X)), angle);
+    worst["action"].see(error(x * point, referenceAction<G>(X, Matrix(point))), angle);
     const Matrix ad(G::ad(v));
     Matrix minus_ad = ad;
     for (auto& a : minus_ad.a) a = -a;

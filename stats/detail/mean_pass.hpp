@@ -1,0 +1,174 @@
+// One pass of the Fréchet mean over the data: the sums at a candidate mean, in chunks combined in order.
+#pragma once
+
+#include <lie/manifold.hpp>
+#include <stats/detail/packing.hpp>
+#include <stats/detail/rotation_sums.hpp>
+#include <stats/executor.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <ranges>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace liestat::detail {
+
+/// Stands for weights that are all one.
+struct UnitWeights {
+  double operator[](std::size_t) const { return 1; }
+};
+
+/// Whether there is a weight for every datum.
+template <class R, class W>
+bool haveOneSize(const R& samples, const W& weights) {
+  if constexpr (std::is_same_v<W, UnitWeights>) {
+    return true;
+  } else {
+    return std::ranges::size(samples) == std::ranges::size(weights);
+  }
+}
+
+/// What one pass over the data returns at a candidate mean.
+template <Homogeneous M>
+struct MeanSums {
+  ScalarOf<M> cost = 0;
+  TangentOf<M> gradient = TangentOf<M>::Zero();  ///< Σ p_i W z_i, minus the gradient of C
+  SquareOf<M> hessian = SquareOf<M>::Zero();
+  double weight = 0;
+
+  void operator+=(const MeanSums& other) {
+    cost += other.cost;
+    gradient += other.gradient;
+    hessian += other.hessian;
+    weight += other.weight;
+  }
+};
+
+/// Further sums that the covariances need, at the mean.
+template <Homogeneous M>
+struct ScatterSums {
+  SquareOf<M> scatter = SquareOf<M>::Zero(), squared = SquareOf<M>::Zero();
+  ScalarOf<M> largest = 0, smallest_gap = std::numeric_limits<ScalarOf<M>>::infinity();
+
+  void operator+=(const ScatterSums& other) {
+    scatter += other.scatter;
+    squared += other.squared;
+    largest = std::max(largest, other.largest);
+    smallest_gap = std::min(smallest_gap, other.smallest_gap);
+  }
+};
+
+/// Σ over the data in fixed chunks combined in order: same bits on any executor.
+template <class Sums, Executor E, class Term>
+Sums sumOverData(const E& executor, std::size_t n, const Term& term) {
+  const std::size_t chunks = chunkCount(n);
+  return executor.reduce(
+      chunks,
+      [&](std::size_t chunk) {
+        Sums sums;
+        const ChunkRange range = chunkRange(n, chunks, chunk);
+        for (std::size_t i = range.begin; i < range.end; ++i) term(i, sums);
+        return sums;
+      },
+      [](Sums& a, const Sums& b) { a += b; });
+}
+
+/// What one pass over the data collects; the scatter only where it is asked for.
+template <Homogeneous M>
+struct MeanPass {
+  MeanSums<M> sums;
+  ScatterSums<M> scatter;
+  bool has_scatter = false;
+
+  void operator+=(const MeanPass& other) {
+    sums += other.sums;
+    scatter += other.scatter;
+  }
+  std::vector<double> pack() const {
+    return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
+                  scatter.largest, scatter.smallest_gap);
+  }
+  static MeanPass unpack(std::span<const double> list) {
+    MeanPass p;
+    unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
+               p.scatter.largest, p.scatter.smallest_gap);
+    return p;
+  }
+};
+
+/// The terms of the features in a range of indices, by the manifold's own operations.
+template <bool Scatter, Metric M, class R, class W>
+void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& range, MeanPass<M>& pass) {
+  using T = ManifoldTraits<M>;
+  using S = ScalarOf<M>;
+  using std::sqrt;
+  constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
+  const typename T::Group to_mean = T::placement(y).inverse();
+  const TangentOf<M> metric = T::metricWeights();
+  for (std::size_t i = range.begin; i < range.end; ++i) {
+    const S p = S(weights[i]);
+    const M at_mean = T::act(to_mean, M(samples[i]));
+    const TangentOf<M> z = T::logOrigin(at_mean);
+    const TangentOf<M> wz = metric.cwiseProduct(z);
+    const S squared_distance = z.dot(wz);
+    pass.sums.cost += S(0.5) * p * squared_distance;
+    pass.sums.gradient += p * wz;
+    pass.sums.hessian += p * T::hessianHalfSquaredDistance(z);
+    pass.sums.weight += weights[i];
+    if constexpr (Scatter) {
+      const SquareOf<M> outer = p * z * z.transpose();
+      pass.scatter.scatter += outer;
+      if constexpr (weighted) pass.scatter.squared += p * outer;
+      pass.scatter.largest = std::max(pass.scatter.largest, S(sqrt(squared_distance)));
+      if constexpr (Quotient<M>) {
+        pass.scatter.smallest_gap = std::min(pass.scatter.smallest_gap, T::nearestRepresentative(at_mean).gap());
+      }
+    }
+  }
+  if constexpr (Scatter && !weighted) pass.scatter.squared = pass.scatter.scatter;
+}
+
+/// The same several features at a time, for the manifolds that have it; false where that does not apply to the data.
+template <bool Scatter, Metric M, class R, class W>
+bool addTermsByPacks(const R& samples, const W& weights, const M& y, const ChunkRange& range, MeanPass<M>& pass) {
+  if constexpr (HasRotationSums<M>) {
+    RotationSums<M> sums;
+    constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
+    if (!sums.template add<weighted, Scatter>(samples, weights, range.begin, range.end, y)) return false;
+    pass.sums = {sums.cost, sums.gradient, sums.hessian, sums.weight};
+    if constexpr (Scatter) pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap};
+    return true;
+  } else {
+    return false;
+  }
+}
+
+template <bool Scatter, Metric M, Executor E, class R, class W>
+MeanPass<M> meanPass(const E& executor, const R& samples, const W& weights, const M& y) {
+  const std::size_t n = std::ranges::size(samples), chunks = chunkCount(n);
+  MeanPass<M> pass = executor.reduce(
+      chunks,
+      [&](std::size_t chunk) {
+        MeanPass<M> part;
+        const ChunkRange range = chunkRange(n, chunks, chunk);
+        if (!addTermsByPacks<Scatter>(samples, weights, y, range, part)) {
+          addTerms<Scatter>(samples, weights, y, range, part);
+        }
+        return part;
+      },
+      [](MeanPass<M>& a, const MeanPass<M>& b) { a += b; });
+  pass.has_scatter = Scatter;
+  return pass;
+}
+
+/// One pass at a candidate mean. The one that is expected to be the last collects the scatter too.
+template <Metric M, Executor E, class R, class W>
+MeanPass<M> meanPass(const E& executor, const R& samples, const W& weights, const M& y, bool with_scatter) {
+  return with_scatter ? meanPass<true>(executor, samples, weights, y) : meanPass<false>(executor, samples, weights, y);
+}
+
+}  // namespace liestat::detail
