@@ -71,7 +71,7 @@ class RestParallaxTest {
     const double mean = sum / draws, variance = squares / draws - mean * mean;
     // Wilson and Hilferty's quantile of the Γ law with this mean and variance.
     const double ninth = variance / (9 * mean * mean);
-    result.limit = mean * std::pow(1 - ninth + limit_quantile * std::sqrt(ninth), 3);
+    result.limit = mean * std::pow(1 - ninth + normal_quantile * std::sqrt(ninth), 3);
     // The parameter of non-centrality λ for which no more than 0.005 stay below: mean + λ - z √(variance + 4 λ) = limit.
     const double z = normal_quantile, gap = result.limit - mean;
     const double lambda = gap + 2 * z * z + z * std::sqrt(4 * gap + 4 * z * z + variance);
@@ -82,9 +82,6 @@ class RestParallaxTest {
  private:
   static constexpr int draws = 100;
   static constexpr double normal_quantile = 2.5758293035489;  ///< of 0.995
-  /// Of 0.9987 of the law that is drawn: 0.5 % of 4500 windows at rest were beyond, because a hundred draws know that law
-  /// to a tenth of its deviation only, and the rough tracks have been dropped.
-  static constexpr double limit_quantile = 3;
 
   /// Normal numbers, always the same ones: SplitMix64 (Steele, Lea and Flood 2014) and Box and Muller's formula. The closed
   /// form's header needs Eigen alone.
