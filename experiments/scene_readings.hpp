@@ -35,6 +35,21 @@ inline std::vector<ImuSample<double>> readingsOf(const InertialScene& scene, con
   return readings;
 }
 
+/// Lets the biases of readings walk from the first on, with the densities of the noise; what they have walked to at
+/// each reading.
+inline std::vector<ImuBias<double>> addWalk(std::vector<ImuSample<double>>& readings, const ImuNoise<double>& noise,
+                                            CounterRng& random) {
+  std::vector<ImuBias<double>> walked(readings.size());
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    const double root = std::sqrt(readings[k].time - readings[k - 1].time);
+    walked[k].gyroscope = walked[k - 1].gyroscope + noise.gyroscope_walk * root * random.normalVector<3>();
+    walked[k].accelerometer = walked[k - 1].accelerometer + noise.accelerometer_walk * root * random.normalVector<3>();
+    readings[k].angular_rate += walked[k].gyroscope;
+    readings[k].specific_force += walked[k].accelerometer;
+  }
+  return walked;
+}
+
 /// A scene's window with these readings.
 inline InertialWindow windowOf(const InertialScene& scene, const std::vector<ImuSample<double>>& readings,
                                const RecordingOptions<double>& options = {}) {

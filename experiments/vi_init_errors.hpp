@@ -17,6 +17,9 @@ namespace liestat::experiments {
 
 /// Densities of an ADIS16448, as its data sheet and EuRoC's calibration have them, rounded.
 inline constexpr ImuNoise<double> vi_init_imu{.gyroscope = 1.7e-4, .accelerometer = 2e-3};
+/// The same with the walks of its biases.
+inline constexpr ImuNoise<double> vi_init_walking_imu{
+    .gyroscope = 1.7e-4, .accelerometer = 2e-3, .gyroscope_walk = 1.9393e-5, .accelerometer_walk = 3e-3};
 
 /// The errors of a velocity and a gravity in the body's axes at the first image.
 inline ViErrors viErrors(const Eigen::Vector3d& velocity, const Eigen::Vector3d& gravity, const InertialScene& truth) {

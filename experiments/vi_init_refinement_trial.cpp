@@ -23,9 +23,14 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
   return 100 * std::abs(*middle - 1);
 }
 
-}  // namespace
+/// What biases had walked to by a time.
+ImuBias<double> biasAt(const std::vector<ImuBias<double>>& walked, const std::vector<ImuSample<double>>& readings,
+                       double time) {
+  const auto next = std::find_if(readings.begin(), readings.end() - 1, [&](const auto& s) { return s.time >= time; });
+  return walked[static_cast<std::size_t>(next - readings.begin())];
+}
 
-RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+RefinementOutcome trial(const ViInitWindow& size, double noise, const ImuNoise<double>& sensor, CounterRng& rng) {
   const InitialisationOptions options{.bearing_noise = vi_init_bearing_noise,
                                       .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05}};
   const std::uint64_t seed = rng();
@@ -33,11 +38,15 @@ RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, Counte
   const Eigen::Vector3d gyroscope = noise * options.prior.gyroscope_sigma * rng.normalVector<3>();
   InertialScene scene({.images = size.images, .features = size.features, .window = size.seconds, .bias = accelerometer},
                       seed);
-  const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
-                                   .accelerometer = noise * vi_init_imu.accelerometer};
-  const auto readings = readingsOf(scene, simulated, rng, gyroscope);
+  const ImuNoise<double> simulated{.gyroscope = noise * sensor.gyroscope,
+                                   .accelerometer = noise * sensor.accelerometer,
+                                   .gyroscope_walk = noise * sensor.gyroscope_walk,
+                                   .accelerometer_walk = noise * sensor.accelerometer_walk};
+  auto readings = readingsOf(scene, simulated, rng, gyroscope);
   scene.addNoise(noise * vi_init_bearing_noise, rng);
-  const InertialWindow window = windowOf(scene, readings, {.preintegration = {.noise = vi_init_imu}});
+  ImuBias<double> walked;  // to the last image
+  if (sensor.gyroscope_walk > 0) walked = biasAt(addWalk(readings, simulated, rng), readings, scene.times.back());
+  const InertialWindow window = windowOf(scene, readings, {.preintegration = {.noise = sensor}});
 
   const auto start = solveClosedForm(closedFormWindow(window, {}), {.bearing_noise = vi_init_bearing_noise,
                                                                     .closed_form = {.singular_values = false}});
@@ -57,14 +66,33 @@ RefinementOutcome refinementTrial(const ViInitWindow& size, double noise, Counte
                    Eigen::Vector3d(body_R_world * scene.speed(end)));
   const Eigen::Matrix<double, 9, 1> last_error = (last.inverse() * r.states.back()).log();
   const Eigen::Matrix<double, 9, 9> last_covariance = r.covariance.atLast().topLeftCorner<9, 9>();
+  Eigen::Matrix<double, 18, 1> at_last;
+  at_last << last_error.tail<3>(), r.gravity - scene.gravity, last_error.head<6>(),
+      r.last_bias.gyroscope - gyroscope - walked.gyroscope,
+      r.last_bias.accelerometer - accelerometer - walked.accelerometer;
+  using Block = InitialCovariance::Block;
+  const Eigen::Matrix<double, 18, 18> covariance_at_last =
+      r.covariance.of<Block::last_velocity, Block::gravity, Block::last_position, Block::last_rotation,
+                      Block::last_gyroscope_bias, Block::last_accelerometer_bias>();
   return {.nees_v = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
                                                   r.covariance.of<InitialCovariance::first_velocity>()),
           .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
           .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
           .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
+          .nees_at_last = neesOnSphere<17>(at_last, covariance_at_last, r.gravity),
           .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
           .errors = viErrors(r.velocity(), r.gravity, scene),
           .scale_of_features = scaleOfFeatures(r.features, scene)};
+}
+
+}  // namespace
+
+RefinementOutcome refinementTrial(const ViInitWindow& window, double noise, CounterRng& rng) {
+  return trial(window, noise, vi_init_imu, rng);
+}
+
+RefinementOutcome walkTrial(const ViInitWindow& window, double noise, CounterRng& rng) {
+  return trial(window, noise, vi_init_walking_imu, rng);
 }
 
 }  // namespace liestat::experiments

@@ -45,12 +45,15 @@ struct RefinementOutcome {
   double nees_v_g = std::numeric_limits<double>::quiet_NaN();         ///< of V and gravity, 5
   double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< of V, gravity and both biases, 11
   double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< of the state at the last image, 9
+  double nees_at_last = std::numeric_limits<double>::quiet_NaN();     ///< of it, gravity and the biases there, 17
   ViChiSquared chi2;
   ViErrors errors;
   double scale_of_features = std::numeric_limits<double>::infinity();  ///< %: median of their distances, off 1
 };
 /// The refinement, biases drawn from their priors, started at the closed form for biases of zero.
 RefinementOutcome refinementTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// The same with biases that walk as those of an ADIS16448 do.
+RefinementOutcome walkTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
 /// A window solved in closed form, under its covariance.
 struct ClosedFormOutcome {
@@ -75,6 +78,19 @@ struct GyroscopeBiasOutcome {
   ViErrors estimated, ignored;
 };
 GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+
+/// At rest, without turns, biases drawn from their priors.
+struct RestOutcome {
+  bool stationary = false;                                 ///< what it was called
+  double nees = std::numeric_limits<double>::quiet_NaN();  ///< of gravity and both biases, 8 degrees of freedom
+};
+RestOutcome restTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+/// A uniform motion of 1 m/s among features 40 to 160 m away: to images that is 0.05 m/s at 2 to 8 m, and to an inertial
+/// sensor it is rest.
+struct SlowOutcome {
+  bool stationary = false;  ///< what it was called, and is not
+};
+SlowOutcome slowTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
 /// 40 % of the tracks drift by a random walk of 8 pixels an image.
 struct DriftOutcome {

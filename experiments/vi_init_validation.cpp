@@ -24,11 +24,13 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 11> quantities = {{
+constexpr std::array<QuantityEntry, 14> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
     {"nees_last_state", "", ViInitStatistic::distance},
+    {"nees_at_last", "", ViInitStatistic::distance},
+    {"nees_at_rest", "", ViInitStatistic::distance},
     {"chi2_per_dof", "", ViInitStatistic::chi_squared},
     {"speed", "m/s", ViInitStatistic::error},
     {"gravity", "deg", ViInitStatistic::error},
@@ -36,13 +38,14 @@ constexpr std::array<QuantityEntry, 11> quantities = {{
     {"scale_of_features", "%", ViInitStatistic::error},
     {"bias", "rad/s", ViInitStatistic::error},
     {"selection", "", ViInitStatistic::fraction},
+    {"told", "", ViInitStatistic::fraction},
 }};
-static_assert(static_cast<std::size_t>(Quantity::selection) + 1 == quantities.size());
-constexpr std::array estimators = {"refinement",    "closed_form",    "closed_form_with_bias",
-                                   "least_squares", "bias_estimated", "bias_ignored",
-                                   "robust",        "oracle",         "no_selection"};
-static_assert(static_cast<std::size_t>(Estimator::no_selection) + 1 == estimators.size());
-constexpr std::array checks = {"consistency", "closed_form", "accuracy", "gyroscope_bias", "drift"};
+static_assert(static_cast<std::size_t>(Quantity::told) + 1 == quantities.size());
+constexpr std::array estimators = {
+    "refinement", "closed_form", "closed_form_with_bias", "least_squares", "bias_estimated", "bias_ignored",
+    "robust",     "oracle",      "no_selection",          "at_rest",       "slow_motion"};
+static_assert(static_cast<std::size_t>(Estimator::slow_motion) + 1 == estimators.size());
+constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias", "rest", "drift"};
 static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
@@ -75,7 +78,8 @@ struct Experiment {
   /// Milliseconds of a trial, about: for the progress bar.
   double work() const {
     const double observations = static_cast<double>(window.images * window.features);
-    return (check == Check::consistency ? 0.018 : 0.004) * observations;
+    if (check == Check::rest) return 40;
+    return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
 
@@ -156,6 +160,16 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
     list.push_back(experiment(Check::consistency, refinementTrial, window, refined));
   }
 
+  std::vector<Column<RefinementOutcome>> walking;
+  addDistance<&R::nees_v_g>(walking, Estimator::refinement, Quantity::nees_v_g, 5);
+  addDistance<&R::nees_all>(walking, Estimator::refinement, Quantity::nees_all, 11);
+  addDistance<&R::nees_last_state>(walking, Estimator::refinement, Quantity::nees_last_state, 9);
+  addDistance<&R::nees_at_last>(walking, Estimator::refinement, Quantity::nees_at_last, 17);
+  addChiSquared(walking, Estimator::refinement);
+  for (const ViInitWindow& window : {ViInitWindow{2, 11, 20}, ViInitWindow{3, 16, 20}, ViInitWindow{4, 21, 20}}) {
+    list.push_back(experiment(Check::walk, walkTrial, window, walking));
+  }
+
   std::vector<Column<ClosedFormOutcome>> plain, with_bias;
   using C = ClosedFormOutcome;
   addDistance<&C::nees_v_g>(plain, Estimator::closed_form, Quantity::nees_v_g, 5);
@@ -186,6 +200,18 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
                      {Estimator::bias_estimated, Quantity::scale, [](const G& o) { return o.estimated.scale; }},
                      {Estimator::bias_ignored, Quantity::gravity, [](const G& o) { return o.ignored.gravity; }},
                      {Estimator::bias_ignored, Quantity::scale, [](const G& o) { return o.ignored.scale; }}}));
+
+  using Rest = RestOutcome;
+  using Slow = SlowOutcome;
+  for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}}) {
+    std::vector<Column<Rest>> rest{
+        {Estimator::at_rest, Quantity::told, [](const Rest& o) { return o.stationary ? 1. : 0.; }}};
+    addDistance<&Rest::nees>(rest, Estimator::at_rest, Quantity::nees_at_rest, 8);
+    list.push_back(experiment(Check::rest, restTrial, window, rest));
+  }
+  list.push_back(experiment<Slow>(
+      Check::rest, slowTrial, {2, 21, 20},
+      {{Estimator::slow_motion, Quantity::told, [](const Slow& o) { return o.stationary ? 0. : 1.; }}}));
 
   using D = DriftOutcome;
   std::vector<Column<D>> drift{

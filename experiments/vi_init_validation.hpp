@@ -17,14 +17,16 @@ namespace liestat::experiments {
 /// The questions that are asked of visual-inertial initialisation.
 enum class ViInitCheck {
   consistency,     ///< the refinement under its covariance, and its errors
+  walk,            ///< the same covariance where biases walk
   closed_form,     ///< the closed form under its covariance, with image noise alone
   accuracy,        ///< errors of the closed form, biases known
   gyroscope_bias,  ///< errors where the gyroscope has a bias of 0.05 rad/s
+  rest,            ///< what is at rest is called so, and what moves slowly is not; gravity and biases at rest
   drift            ///< errors where 40 % of the tracks drift
 };
-inline constexpr std::array all_vi_init_checks = {ViInitCheck::consistency, ViInitCheck::closed_form,
-                                                  ViInitCheck::accuracy, ViInitCheck::gyroscope_bias,
-                                                  ViInitCheck::drift};
+inline constexpr std::array all_vi_init_checks = {
+    ViInitCheck::consistency,    ViInitCheck::walk, ViInitCheck::closed_form, ViInitCheck::accuracy,
+    ViInitCheck::gyroscope_bias, ViInitCheck::rest, ViInitCheck::drift};
 std::string name(ViInitCheck check);
 
 /// The estimator that a row is about, and what it leaves out.
@@ -36,8 +38,10 @@ enum class ViInitEstimator {
   bias_estimated,         ///< of the gyroscope
   bias_ignored,           ///< of the gyroscope
   robust,
-  oracle,       ///< knows which tracks drift
-  no_selection  ///< takes all tracks
+  oracle,        ///< knows which tracks drift
+  no_selection,  ///< takes all tracks
+  at_rest,       ///< the initialisation of a body at rest
+  slow_motion    ///< and of one that moves at 0.05 m/s among features 2 to 8 m away
 };
 std::string name(ViInitEstimator estimator);
 
@@ -47,13 +51,16 @@ enum class ViInitQuantity {
   nees_v_g,         ///< of V and gravity, 5
   nees_all,         ///< of V, gravity and the biases that are estimated: 11, 8 of the closed form
   nees_last_state,  ///< of the state at the last image, 9
+  nees_at_last,     ///< of that state, gravity and the biases there, 17
+  nees_at_rest,     ///< of gravity and both biases, 8
   chi2_per_dof,     ///< of the bearings, motions and priors
   speed,            ///< length of the error of V
   gravity,          ///< angle to the true one
   scale,            ///< length of V over the true one, off 1
   scale_of_features,
-  bias,      ///< of the gyroscope, length of the error
-  selection  ///< fraction of the windows in which exactly the right tracks were kept
+  bias,       ///< of the gyroscope, length of the error
+  selection,  ///< fraction of the windows in which exactly the right tracks were kept
+  told        ///< fraction of the windows in which rest and motion were told right
 };
 std::string name(ViInitQuantity quantity);
 /// Its unit; empty for a pure number.

@@ -98,7 +98,7 @@ struct InitialisedWindow {
   std::optional<RefinementResult> refined;
 
   const ClosedFormResult& closedForm() const { return found.result; }
-  bool isRefined() const { return refined && refined->status == FusionStatus::ok; }
+  bool isRefined() const { return refined && refined->converged(); }
   /// The best known.
   ImuBias<double> bias() const {
     if (isRefined()) return refined->bias;
@@ -110,15 +110,18 @@ struct InitialisedWindow {
   std::vector<SE23d> closedFormStates() const;
   /// The refined states, or those.
   std::vector<SE23d> states() const { return isRefined() ? refined->states : closedFormStates(); }
-  /// How it ended: what the closed form says, or why there is less than it says.
+  /// How it ended: what the closed form says, or what the refinement says against it.
   FusionStatus verdict() const {
     const FusionStatus closed = closedForm().status;
     if (fault) return fault == FaultKind::gap ? FusionStatus::gap : FusionStatus::no_readings;
     if (tracks.empty() || closedForm().fault == FaultKind::no_feature) return FusionStatus::no_features;
+    // Tracks at rest, and readings that are not.
+    if (closed == FusionStatus::stationary && refined && !isRefined()) return FusionStatus::no_parallax;
     if (closed != FusionStatus::ok) return closed;
     if (found.inliers.empty()) return FusionStatus::no_consensus;
     if (refined ? refined->ok() : closedForm().consistent) return FusionStatus::ok;
-    return refined && refined->status != FusionStatus::ok ? FusionStatus::not_refined : FusionStatus::inconsistent;
+    if (!refined || refined->status == FusionStatus::ok) return FusionStatus::inconsistent;
+    return refined->converged() ? refined->status : FusionStatus::not_refined;
   }
   /// Exactly one answer, converged, that explains the data.
   bool ok() const { return verdict() == FusionStatus::ok; }

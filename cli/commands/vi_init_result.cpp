@@ -56,7 +56,7 @@ void compare(ViWindow& w, const ViRecording& recording, std::optional<double> gr
   w.gyroscope_error = (w.bias().gyroscope - truth[0].bias.gyroscope).norm();
   if (!w.isRefined()) return;
   w.refined_error = errorOf(w.refined->velocity(), w.refined->gravity, w.refined->states);
-  if (gravity) w.nees = neesOf(*w.refined, V, G);
+  if (gravity && w.closedForm().status != FusionStatus::stationary) w.nees = neesOf(*w.refined, V, G);
 }
 
 /// The fields that say what was found.

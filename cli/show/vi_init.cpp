@@ -22,7 +22,7 @@ struct Best {
   Eigen::Vector3d velocity, gravity;
 
   explicit Best(const ViWindow& w) {
-    if (w.refined && w.refined->status == FusionStatus::ok) {
+    if (w.isRefined()) {
       velocity = w.refined->velocity();
       gravity = w.refined->gravity;
     } else {
@@ -36,13 +36,8 @@ struct Best {
 
 bool hasSolution(const ViWindow& w) { return !w.closedForm().solutions.empty(); }
 
-/// Standard deviation of the length of V over that length: of the scale.
-double scaleDeviation(const ViWindow& w) {
-  if (!w.refined || w.refined->status != FusionStatus::ok) return w.closedForm().scale_sigma;
-  const Eigen::Vector3d u = w.refined->velocity().normalized();
-  return std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)) /
-         w.refined->velocity().norm();
-}
+/// Relative.
+double scaleSigma(const ViWindow& w) { return w.isRefined() ? w.refined->scale_sigma : w.closedForm().scale_sigma; }
 
 double costPerDegree(const ViWindow& w) {
   if (w.refined && w.refined->degrees_of_freedom > 0) {
@@ -69,7 +64,7 @@ std::string windowTable(const ViInitResult& result, bool with_truth) {
       cells.push_back(has_scale ? fmt::format("{:.2f}", best.velocity.norm()) : "");
       cells.push_back(fmt::format("{:.1f}", degrees * best.roll()));
       cells.push_back(fmt::format("{:.1f}", degrees * best.pitch()));
-      cells.push_back(has_scale ? fmt::format("{:.1f}", 100 * scaleDeviation(w)) : "");
+      cells.push_back(has_scale ? fmt::format("{:.1f}", 100 * scaleSigma(w)) : "");
       cells.push_back(has_scale ? fmt::format("{:.2f}", costPerDegree(w)) : "");
       cells.push_back(fmt::format("{}/{}", w.found.inliers.size(), w.tracks.size()));
       if (const auto error = errorOf(w); error && has_scale) {
@@ -120,6 +115,8 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
   if (with_truth) {
     const bool with_biases = result.biases_given;
     if (summary.closed_form.size() > 0) {
+      text += fmt::format("errors of the {} windows with a scale, of which {} are not ok:\n", summary.compared,
+                          summary.compared_not_ok);
       text += "closed form, median / 95 %: " + summary.closed_form.str() + "\n";
     }
     if (summary.refined.size() > 0) text += "refined, median / 95 %:     " + summary.refined.str() + "\n";

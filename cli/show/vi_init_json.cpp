@@ -23,13 +23,13 @@ JsonObject toJson(const ClosedFormSolution& s) {
 
 JsonObject toJson(const RefinementResult& r, const ViWindow& w, const std::vector<double>& times) {
   JsonObject o;
-  o.set("status", r.status == FusionStatus::ok ? "refined" : describe(r.status))
-      .set("consistent", r.consistent())
-      .set("cost", r.cost);
+  o.set("status", r.converged() ? "refined" : describe(r.status)).set("consistent", r.consistent()).set("cost", r.cost);
   o.set("degrees_of_freedom", r.degrees_of_freedom).set("features_used", r.features_used);
-  if (r.status != FusionStatus::ok) return o;
+  if (!r.converged()) return o;
+  o.set("scale_sigma", r.scale_sigma).set("tilt_sigma", r.tilt_sigma).set("prior_p", r.prior_p);
   o.set("velocity", r.velocity()).set("gravity", r.gravity);
   o.set("gyroscope_bias", r.bias.gyroscope).set("accelerometer_bias", r.bias.accelerometer);
+  o.set("last_gyroscope_bias", r.last_bias.gyroscope).set("last_accelerometer_bias", r.last_bias.accelerometer);
   o.set("covariance", r.covariance.atFirst());
   o.set("covariance_order", "velocity gravity gyroscope_bias accelerometer_bias");
   o.set("covariance_frame", "axes of the body at the first image, m/s m/s^2 rad/s m/s^2");
@@ -85,6 +85,7 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   o.set("covariance_content", describe(c.covariance_content));
   o.set("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
   o.set("scale_deviation", c.scale_sigma).set("tilt_deviation", c.tilt_sigma);
+  o.set("unseen_speed_per_depth", c.unseen_speed_per_depth);
   o.set("integrated_gyroscope_bias", w.measured.bias().gyroscope);
   o.set("integrated_accelerometer_bias", w.measured.bias().accelerometer);
   o.set("gyroscope_bias", w.found.gyroscope_bias)

@@ -33,7 +33,7 @@ Series line(std::string name, std::size_t colour, bool dashed = false) {
   return {.name = std::move(name), .style = Style::lines, .colour = colour, .dashed = dashed};
 }
 
-bool isRefined(const ViWindow& w) { return w.refined && w.refined->status == FusionStatus::ok; }
+bool isRefined(const ViWindow& w) { return w.isRefined(); }
 
 /// The rotation that makes gravity point along -z, heading left as it is.
 SO3d levelling(const Eigen::Vector3d& gravity) {

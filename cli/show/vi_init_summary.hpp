@@ -53,6 +53,7 @@ struct ViInitSummary {
   std::vector<double> gyroscope;
   double nees = 0, cost = 0;
   std::size_t with_nees = 0, degrees_of_freedom = 0;
+  std::size_t compared = 0, compared_not_ok = 0;  ///< windows whose errors these are
 
   explicit ViInitSummary(const ViInitResult& result) {
     for (const ViWindow& w : result.windows) {
@@ -60,14 +61,18 @@ struct ViInitSummary {
       // Errors are those of all windows that claim a scale, not only of those that came out well.
       const FusionStatus status = w.closedForm().status;
       if (status == FusionStatus::scale_unobservable || status == FusionStatus::stationary) continue;
-      if (w.closed_form_error) closed_form.add(*w.closed_form_error);
+      if (w.closed_form_error) {
+        closed_form.add(*w.closed_form_error);
+        ++compared;
+        compared_not_ok += !w.ok();
+      }
       if (w.refined_error) refined.add(*w.refined_error);
       if (w.refined_error && w.gyroscope_error) gyroscope.push_back(*w.gyroscope_error);
       if (w.nees) {
         nees += *w.nees;
         ++with_nees;
       }
-      if (w.refined && w.refined->status == FusionStatus::ok) {
+      if (w.isRefined()) {
         cost += w.refined->cost;
         degrees_of_freedom += w.refined->degrees_of_freedom;
       }

@@ -26,13 +26,17 @@ std::string covered(const ViInitRow* row) {
 std::string both(double median, double p95) { return number(median, 2) + " / " + number(p95, 2); }
 std::string errors(const ViInitRow* row) { return row == nullptr ? "" : both(row->median, row->p95); }
 
-bool hasDistances(Check check) { return check == Check::consistency || check == Check::closed_form; }
+bool isOfRefinement(Check check) { return check == Check::consistency || check == Check::walk; }
+bool hasDistances(Check check) { return isOfRefinement(check) || check == Check::closed_form; }
 
 Table distancesTable(const std::vector<Group>& list) {
-  const bool refined = list.front().first().check == Check::consistency;
+  const Check check = list.front().first().check;
+  const bool refined = isOfRefinement(check), walks = check == Check::walk;
   std::vector<std::string> headers{"T, n, N"};
   if (refined) {
-    headers.insert(headers.end(), {"V (3)", "V,G (5)", "all (11)", "last (9)"});
+    if (!walks) headers.push_back("V (3)");
+    headers.insert(headers.end(), {"V,G (5)", "all (11)", "last (9)"});
+    if (walks) headers.push_back("last, G, biases (17)");
   } else {
     headers.insert(headers.end(), {"V,G (5)", "with bias (8)"});
   }
@@ -40,10 +44,11 @@ Table distancesTable(const std::vector<Group>& list) {
   Table table(headers);
   for (const Group& g : list) {
     std::vector<std::string> cells{g.window()};
-    if (refined) cells.push_back(index(g.of(Quantity::nees_v)));
+    if (refined && !walks) cells.push_back(index(g.of(Quantity::nees_v)));
     cells.push_back(index(g.of(Quantity::nees_v_g)));
     cells.push_back(index(g.of(Quantity::nees_all)));
     if (refined) cells.push_back(index(g.of(Quantity::nees_last_state)));
+    if (walks) cells.push_back(index(g.of(Quantity::nees_at_last)));
     cells.push_back(ratio(g.of(Quantity::chi2_per_dof)));
     cells.push_back(covered(g.of(Quantity::nees_v_g)));
     cells.push_back(fmt::format("{}", g.of(Quantity::nees_v_g)->failures));
@@ -82,6 +87,17 @@ Table errorsTable(const std::vector<Group>& list) {
   return table;
 }
 
+/// What was told right, and the covariance at rest.
+Table restTable(const std::vector<Group>& list) {
+  Table table({"", "T, n, N", "told right", "gravity, biases (8)", "95 %", "verdict"});
+  for (const Group& g : list) {
+    const ViInitRow* nees = g.of(Quantity::nees_at_rest);
+    table.row(
+        {name(g.first().estimator), g.window(), ratio(g.of(Quantity::told)), index(nees), covered(nees), g.verdict()});
+  }
+  return table;
+}
+
 }  // namespace
 
 std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
@@ -94,7 +110,11 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     }
     text += fmt::format("{}\n\n", describe(check));
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
-    if (check != Check::closed_form) text += errorsTable(list).str() + "\n";
+    if (check == Check::rest) {
+      text += restTable(list).str() + "\n";
+    } else if (check != Check::closed_form && check != Check::walk) {
+      text += errorsTable(list).str() + "\n";
+    }
   }
   for (const ViInitRow& row : rows) {
     if (row.passed.value_or(true)) continue;

@@ -58,12 +58,16 @@ inline const char* describe(experiments::ViInitCheck check) {
   switch (check) {
     case Check::consistency:
       return "Refinement under its covariance, biases drawn from their priors: index (degrees of freedom)";
+    case Check::walk:
+      return "Refinement under its covariance, biases that also walk: index (degrees of freedom)";
     case Check::closed_form:
       return "Closed form under its covariance, image noise alone: index (degrees of freedom)";
     case Check::accuracy:
       return "Closed form with the sensor's noise, biases known: errors, median / 95 %";
     case Check::gyroscope_bias:
       return "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %";
+    case Check::rest:
+      return "At rest, and at 0.05 m/s among features 2 to 8 m away: told right, and the covariance at rest";
     case Check::drift:
       return "40 % of the tracks drift by 8 px an image: errors, median / 95 %";
   }

@@ -8,6 +8,7 @@
 #include <fusion/detail/closed_form_uncertainty.hpp>
 #include <fusion/detail/closed_form_solver.hpp>
 #include <fusion/detail/closed_form_status.hpp>
+#include <fusion/detail/rest_parallax.hpp>
 
 #include <Eigen/Core>
 
@@ -158,10 +159,15 @@ class ClosedFormRun {
     result_.features_used = table_.features();
     result_.observations_used = table_.rays.size();
   }
-  /// Whether the forces are those of a body at rest: then that is the solution, with depths, which are free, of 1 m.
+  /// Whether forces and tracks are those of a body at rest: then that is the solution, with depths, which are free, of
+  /// 1 m.
   bool solveAtRest() {
-    const std::optional<Eigen::Vector3d> G = gravityAtRest(table_, options_.gravity, solver_.gravityScale());
+    const std::optional<Eigen::Vector3d> G =
+        gravityAtRest(table_, options_.gravity, solver_.gravityScale(), options_.prior.accelerometer_sigma);
     if (!G) return false;
+    const RestParallax parallax = RestParallaxTest(table_).run();
+    if (!parallax.atRest()) return false;
+    result_.unseen_speed_per_depth = parallax.least_speed;
     Candidate rest{Motion(solver_.bias()), {}};
     rest.y.set(rest.y.size - 4, *G);
     for (std::size_t i = 0; i < table_.features(); ++i) {

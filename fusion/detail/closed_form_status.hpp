@@ -103,10 +103,11 @@ inline FusionStatus statusOfRanks(const RankDiagnosis& d, const RayTable& table,
   return gravity_known ? Status::ambiguous : Status::gravity_undetermined;
 }
 
-/// G T²/2 of a body that stays where it is, if the forces are that: their length gravity's to 2 % (an accelerometer's
-/// bias), and their direction steady to 1 %.
+/// G T²/2 of a body that stays where it is, if the forces are that: their length gravity's to 2 %, or to four standard
+/// deviations of the accelerometer's bias (m/s²), and their direction steady to 1 %. Without the sensor's noise more can't
+/// be asked here: refineAtRest() does.
 inline std::optional<Eigen::Vector3d> gravityAtRest(const RayTable& table, const std::optional<double>& gravity,
-                                                    double scale) {
+                                                    double scale, double bias_sigma) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double squares = 0;
   for (const ScaledImage& image : table.firstCamera()) {
@@ -116,7 +117,8 @@ inline std::optional<Eigen::Vector3d> gravityAtRest(const RayTable& table, const
   }
   const Eigen::Vector3d G = sum / squares;
   const double length = G.norm(), expected = gravity ? *gravity / scale : length;
-  if (!(std::abs(length - expected) <= 0.02 * expected)) return std::nullopt;
+  const double bias = std::isfinite(bias_sigma) ? 4 * bias_sigma / scale : 0;
+  if (!(std::abs(length - expected) <= std::max(0.02 * expected, bias))) return std::nullopt;
   for (const ScaledImage& image : table.firstCamera()) {
     const Eigen::Vector3d moved = image.s - table.images[0].s + image.tau * image.tau * G;
     if (!(moved.norm() <= 0.01 * expected)) return std::nullopt;

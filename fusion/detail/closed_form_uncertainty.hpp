@@ -12,6 +12,15 @@
 
 namespace liestat::detail {
 
+/// The standard deviation of the direction of G about the axis across it for which it is largest (rad), by G's covariance
+/// (or that of a multiple of it, which must be the multiple of G too).
+inline double tiltSigma(const Eigen::Vector3d& G, const Eigen::Matrix3d& covariance) {
+  const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
+  const Eigen::Matrix2d tilt = across * covariance * across.transpose();
+  const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)), spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
+  return std::sqrt(half + spread) / G.norm();
+}
+
 /// Predicted standard deviations and covariances at the first minimiser.
 inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, const MotionCandidate& best,
                                ClosedFormResult& result) {
@@ -21,13 +30,7 @@ inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, 
   const bool determined = solver.covariance(root, best.y, scaled);
   const int m = solver.motionSize();
   if (determined) {
-    // The larger of the two sigmas across G.
-    const Eigen::Vector3d G = best.y.gravity();
-    const Eigen::Matrix<double, 2, 3> across = tangentRows(G.normalized());
-    const Eigen::Matrix2d tilt = across * scaled.matrix3(m - 3, m - 3) * across.transpose();
-    const double half = 0.5 * (tilt(0, 0) + tilt(1, 1)),
-                 spread = std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1));
-    result.tilt_sigma = std::sqrt(half + spread) / G.norm();
+    result.tilt_sigma = tiltSigma(best.y.gravity(), scaled.matrix3(m - 3, m - 3));
 
     // From (V', [b'], G') to (V, G, [b]).
     result.covariance.resize(m, m);

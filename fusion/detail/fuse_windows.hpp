@@ -52,23 +52,23 @@ LIESTAT_FUSION_INLINE Gaussian<InertialState> carried(const Gaussian<InertialSta
   return after;
 }
 
-LIESTAT_FUSION_INLINE WindowStates windowStates(const RefinementResult& refined, const InertialWindow& window) {
+LIESTAT_FUSION_INLINE WindowStates windowStates(const RefinementResult& refined) {
   WindowStates states;
   const auto none = [&states] {
     states.first.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
     states.last.covariance = states.first.covariance;
     return states;
   };
-  if (refined.status != FusionStatus::ok) return none();
-  // The refinement's unknowns: V (3), the last state (9: position, rotation, velocity), G, both biases.
-  const Eigen::Matrix<double, 21, 21>& covariance = refined.covariance.joint;
+  if (!refined.converged()) return none();
+  // The refinement's unknowns: V (3), the last state (9: position, rotation, velocity), G, both biases at either end.
+  const Eigen::Matrix<double, 27, 27>& covariance = refined.covariance.joint;
   const SE23d& last = refined.states.back();
   const Eigen::Matrix3d back = last.so3().inverse().matrix();
   const double length = refined.gravity.norm();
   const Eigen::Vector3d G = back * refined.gravity, V = back * Eigen::Vector3d(last.velocity());
 
   // Changes of (G in the body, velocity, biases); G and not its direction, whose length may be an unknown too.
-  Eigen::Matrix<double, 12, 21> at_first = Eigen::Matrix<double, 12, 21>::Zero(), at_last = at_first;
+  Eigen::Matrix<double, 12, 27> at_first = Eigen::Matrix<double, 12, 27>::Zero(), at_last = at_first;
   at_first.block<3, 3>(0, 12).setIdentity();
   at_first.block<3, 3>(3, 0).setIdentity();
   at_first.block<6, 6>(6, 15).setIdentity();
@@ -77,33 +77,23 @@ LIESTAT_FUSION_INLINE WindowStates windowStates(const RefinementResult& refined,
   at_last.block<3, 3>(0, 12) = back;
   at_last.block<3, 3>(3, 6) = detail::skew(V);
   at_last.block<3, 3>(3, 9).setIdentity();
-  at_last.block<6, 6>(6, 15).setIdentity();
-  const auto state = [&](const Eigen::Vector3d& gravity, const Eigen::Vector3d& velocity) {
-    return InertialState(S2d(gravity), velocity, refined.bias.gyroscope,
-                         Eigen::Vector3d(refined.bias.accelerometer - gravity));
+  at_last.block<6, 6>(6, 21).setIdentity();
+  const auto state = [](const Eigen::Vector3d& gravity, const Eigen::Vector3d& velocity, const ImuBias<double>& bias) {
+    return InertialState(S2d(gravity), velocity, bias.gyroscope, Eigen::Vector3d(bias.accelerometer - gravity));
   };
-  const auto tangent = [&](const InertialState& x, const Eigen::Matrix<double, 12, 21>& by_unknowns) {
+  const auto tangent = [&](const InertialState& x, const Eigen::Matrix<double, 12, 27>& by_unknowns) {
     Eigen::Matrix<double, 11, 12> J = detail::toInertialTangent(x.get<0>(), 1);
     J.topLeftCorner<2, 3>() /= length;
     return detail::product(J, by_unknowns);
   };
-  states.first.mean = state(refined.gravity, refined.velocity());
-  states.last.mean = state(G, V);
-  const Eigen::Matrix<double, 11, 21> A = tangent(states.first.mean, at_first), B = tangent(states.last.mean, at_last);
-  Eigen::Matrix<double, 11, 1> walked = Eigen::Matrix<double, 11, 1>::Zero();
-  for (const Preintegration<double>& motion : window.motions()) {
-    const ImuNoise<double>& noise = motion.options().noise;
-    walked.segment<3>(5).array() += noise.gyroscope_walk * noise.gyroscope_walk * motion.duration();
-    walked.tail<3>().array() += noise.accelerometer_walk * noise.accelerometer_walk * motion.duration();
-  }
+  states.first.mean = state(refined.gravity, refined.velocity(), refined.bias);
+  states.last.mean = state(G, V, refined.last_bias);
+  const Eigen::Matrix<double, 11, 27> A = tangent(states.first.mean, at_first), B = tangent(states.last.mean, at_last);
   states.first.covariance = detail::congruence(A, covariance);
   states.last.covariance = detail::congruence(B, covariance);
-  states.first.covariance.diagonal() += walked / 3;
-  states.last.covariance.diagonal() += walked / 3;
   // In sigmas, because those differ by factors of thousands.
   const Eigen::Matrix<double, 11, 1> unit = states.first.covariance.diagonal().cwiseSqrt();
-  detail::Matrix11 both = detail::productTransposed(detail::product(A, covariance), B);
-  both.diagonal() -= walked / 6;
+  const detail::Matrix11 both = detail::productTransposed(detail::product(A, covariance), B);
   const detail::Matrix11 cross = unit.cwiseInverse().asDiagonal() * both;
   const detail::Cholesky<double, 11> factor(
       detail::Matrix11(unit.cwiseInverse().asDiagonal() * states.first.covariance * unit.cwiseInverse().asDiagonal()));

@@ -6,6 +6,7 @@
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <fusion/init/gyroscope_bias.hpp>
+#include <fusion/init/refinement.hpp>
 #include <fusion/init/robust_initialisation.hpp>
 #include <stats/random.hpp>
 
@@ -13,13 +14,40 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
 namespace liestat {
 
-LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(InertialWindow window,
-                                                              const InitialisationOptions& options) {
+namespace detail {
+
+/// A window that the closed form takes for one at rest: gravity and biases with the inertial sensor's noise, if that is
+/// known, or a motion after all.
+inline void refineRest(const InertialWindow& window, const InitialisationOptions& options,
+                       RobustInitialisation& found) {
+  if (found.result.status != FusionStatus::stationary || found.result.solutions.empty()) return;
+  ClosedFormSolution& solution = found.result.solutions[0];
+  const Eigen::Vector3d accelerometer = window.bias().accelerometer;
+  RefinementResult rest =
+      refineAtRest(window.without(found.outliers), solution.gravity, {found.gyroscope_bias, accelerometer}, options);
+  if (rest.status == FusionStatus::stationary) {
+    solution.gravity = rest.gravity;
+    solution.accelerometer_bias = rest.bias.accelerometer - accelerometer;
+    found.gyroscope_bias = rest.bias.gyroscope;
+    found.bias_covariance = rest.covariance.of<InitialCovariance::gyroscope_bias>();
+    found.result.tilt_sigma = rest.tilt_sigma;
+    found.result.consistent = rest.prior_p >= 1e-4;
+    found.rest = std::move(rest);
+  } else if (rest.status != FusionStatus::bad_motion) {
+    found.result.status = FusionStatus::no_parallax;
+    found.result.solutions.clear();
+    found.result.consistent = false;
+    found.result.unseen_speed_per_depth = std::numeric_limits<double>::infinity();
+  }
+}
+
+inline RobustInitialisation searchMotion(InertialWindow window, const InitialisationOptions& options) {
   RobustInitialisation found;
   const BiasPrior& prior = options.prior;
   found.epipolar = estimateEpipolarGyroscopeBias(window, options);
@@ -99,6 +127,15 @@ LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(InertialWindow win
     found.result = std::move(estimate.result);
     restoreCounts();
   }
+  return found;
+}
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(InertialWindow window,
+                                                              const InitialisationOptions& options) {
+  RobustInitialisation found = detail::searchMotion(window, options);
+  detail::refineRest(window, options, found);
   return found;
 }
 

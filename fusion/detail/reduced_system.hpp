@@ -19,12 +19,12 @@
 
 namespace liestat::detail {
 
-/// Up to nine residuals, in sigmas, with their derivatives by up to nine blocks of three shared unknowns.
+/// Up to nine residuals, in sigmas, with their derivatives by up to thirteen blocks of three shared unknowns.
 struct ResidualRows {
-  static constexpr int most = 9;
+  static constexpr int most = 9, most_blocks = 13;
   int rows = 0, terms = 0;
-  std::array<int, most> block;
-  std::array<std::array<double, 3 * most>, most> by;  ///< [residual][3 · term + k]
+  std::array<int, most_blocks> block;
+  std::array<std::array<double, 3 * most_blocks>, most> by;  ///< [residual][3 · term + k]
   std::array<double, most> value;
 
   explicit ResidualRows(int count) : rows(count) {}
@@ -183,6 +183,15 @@ class ReducedSystem {
       for (std::size_t r = 0; r < m; ++r) result[r * m + c] = column[3 * size(blocks[r / 3]) + r % 3];
     }
     return result;
+  }
+
+  /// The variance of a linear function of the shared unknowns, by its gradient: after factor(0).
+  double variance(const std::vector<double>& gradient) const {
+    std::vector<double> x = gradient;
+    solve(x);
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += x[i] * gradient[i];
+    return sum;
   }
 
  private:

@@ -99,9 +99,15 @@ class RecordingRun {
 
   /// A window refined with the n-th part of the information of the prior of the biases; empty: nothing to start from.
   std::optional<RefinementResult> refined(const InitialisedWindow& w, std::size_t n) const {
-    if (!w.closedForm().hasMotion()) return std::nullopt;
+    const bool at_rest = w.closedForm().status == FusionStatus::stationary && !w.closedForm().solutions.empty();
+    if (!at_rest && !w.closedForm().hasMotion()) return std::nullopt;
     InitialisationOptions options = optionsOf(w);
     if (w.known_biases) options.prior = {w.measured.bias(), 1e-6, 1e-6};  // as good as exact
+    if (at_rest) {
+      if (n == 1 && w.found.rest) return w.found.rest;
+      return refineAtRest(w.measured.without(w.found.outliers), w.closedForm().solutions[0].gravity, w.measured.bias(),
+                          options);
+    }
     return refine(w.measured.without(w.found.outliers), w.closedForm().solutions[0], w.measured.bias(),
                   withSharedPrior(options, n));
   }
@@ -214,7 +220,7 @@ class RecordingRun {
       const InitialisedWindow& w = windows[i];
       const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
       if (!estimate) continue;
-      const auto meeting = fusion.add(windowStates(*estimate, w.measured), [&](const ImuBias<double>& bias) {
+      const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
         const auto between = motion(end, w.begin, bias);
         return between.ok() ? between.motion : Preintegration<double>({.noise = recording_.noise, .bias = bias});
       });

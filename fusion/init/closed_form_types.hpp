@@ -122,6 +122,10 @@ struct ClosedFormResult {
   std::size_t observations_used = 0;
   std::size_t degrees_of_freedom = 0;  ///< of the first solution's cost
 
+  /// With stationary and noise: a uniform motion of more than so many m/s for each metre to the features, which would
+  /// have shown in the tracks, is excluded (with a probability of 0.995); infinite: nothing is.
+  double unseen_speed_per_depth = std::numeric_limits<double>::infinity();
+
   /// Whether the first solution's cost is one of noise, by χ². If not: outliers, an unmodelled bias, bearings noisier
   /// than was said.
   bool consistent = false;

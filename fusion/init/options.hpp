@@ -30,7 +30,7 @@ struct ClosedFormOptions {
   bool singular_values = true;    ///< the diagnosis of ranks; exact data always have it
   double min_parallax = 4;        ///< with noise: RMS parallax of a feature that is used, in sigmas of a bearing
   bool remove_noise_bias = true;  ///< with noise: take off what noise adds to the system. Without, scale is too small
-  /// Limits to what counts as determined, with noise: the scale to 30 %, the vertical to 0.2 rad.
+  /// Limits to what counts as determined, with noise, in the refinement too: the scale to 30 %, the vertical to 0.2 rad.
   double max_scale_sigma = 0.3;
   double max_tilt_sigma = 0.2;
 };

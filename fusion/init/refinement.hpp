@@ -22,6 +22,14 @@ namespace liestat {
 RefinementResult refine(InertialWindow window, const ClosedFormSolution& start, const ImuBias<double>& start_bias,
                         const InitialisationOptions& options);
 
+/// The most probable gravity and biases of a window in which the body stays where it is (it may turn), from a first guess
+/// of gravity: `states` have no velocity and position, there are no `features`, and `covariance` says how far the
+/// accelerometer's bias and the tilt stand for each other. stationary: the readings scatter as their noise says
+/// (p ≥ 1e-3); no_parallax: they do not. Otherwise as refine(). Whether tracks show a motion is not asked: that is
+/// solveClosedForm()'s stationary.
+RefinementResult refineAtRest(InertialWindow window, const Eigen::Vector3d& gravity, const ImuBias<double>& start_bias,
+                              const InitialisationOptions& options);
+
 }  // namespace liestat
 
 #ifndef LIESTAT_COMPILED_FUSION

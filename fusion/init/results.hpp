@@ -11,6 +11,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <optional>
 #include <vector>
 
 namespace liestat {
@@ -47,49 +49,26 @@ struct EpipolarBiasResult {
   bool ok() const { return status == FusionStatus::ok && consistent; }
 };
 
-// initialiseRobustly(), in robust_initialisation.hpp
+// refine() and refineAtRest(), in refinement.hpp
 
-/// Indices are the window's.
-struct RobustInitialisation {
-  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
-  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
-  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
-  /// are the inliers.
-  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
-  /// bad_input: see result.fault.
-  FusionStatus status = FusionStatus::bad_input;
-  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
-  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
-  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  ClosedFormResult result;                             ///< for this bias, of the inliers
-  std::vector<std::size_t> inliers, outliers;          ///< ascending
-  EpipolarBiasResult epipolar;                         ///< where it began
-  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
-  std::size_t hypotheses = 0;
-  int rounds = 0;
-  int integrations = 0;  ///< how often the readings were integrated anew
-
-  /// Exactly one answer, which explains the data of the inliers.
-  bool ok() const { return status == FusionStatus::ok && result.ok(); }
-};
-
-// refine(), in refinement.hpp
-
-/// The joint covariance of all that a refinement tells but the states between the first and the last: 21 unknowns in
+/// The joint covariance of all that a refinement tells but what is between the first image and the last: 27 unknowns in
 /// blocks of three. The last state's are its right tangent; gravity is in the axes of t0, and singular along itself
-/// where its length is known. Position and heading of t0's frame are exact by definition.
+/// where its length is known. Position and heading of t0's frame are exact by definition. A bias that does not walk is
+/// the same at both ends, and so are its two blocks.
 struct InitialCovariance {
   /// The first row of each block.
   enum Block {
-    first_velocity = 0,      ///< V, at t0 (m/s)
-    last_position = 3,       ///< m
-    last_rotation = 6,       ///< rad
-    last_velocity = 9,       ///< m/s
-    gravity = 12,            ///< G (m/s²)
-    gyroscope_bias = 15,     ///< rad/s
-    accelerometer_bias = 18  ///< m/s²
+    first_velocity = 0,           ///< V, at t0 (m/s)
+    last_position = 3,            ///< m
+    last_rotation = 6,            ///< rad
+    last_velocity = 9,            ///< m/s
+    gravity = 12,                 ///< G (m/s²)
+    gyroscope_bias = 15,          ///< at t0 (rad/s)
+    accelerometer_bias = 18,      ///< at t0 (m/s²)
+    last_gyroscope_bias = 21,     ///< at the last image
+    last_accelerometer_bias = 24  ///< at the last image
   };
-  Eigen::Matrix<double, 21, 21> joint = Eigen::Matrix<double, 21, 21>::Zero();
+  Eigen::Matrix<double, 27, 27> joint = Eigen::Matrix<double, 27, 27>::Zero();
 
   Eigen::Matrix3d block(Block row, Block column) const { return joint.block<3, 3>(row, column); }
   /// The covariance of some blocks, in their order.
@@ -107,24 +86,36 @@ struct InitialCovariance {
   Eigen::Matrix<double, 12, 12> atFirst() const {
     return of<first_velocity, gravity, gyroscope_bias, accelerometer_bias>();
   }
-  /// That of the last state (position, rotation, velocity), then G and both biases: a filter starts from it.
-  Eigen::Matrix<double, 18, 18> atLast() const { return joint.bottomRightCorner<18, 18>(); }
+  /// That of the last state (position, rotation, velocity), then G and both biases there: a filter starts from it.
+  Eigen::Matrix<double, 18, 18> atLast() const {
+    return of<last_position, last_rotation, last_velocity, gravity, last_gyroscope_bias, last_accelerometer_bias>();
+  }
 };
 
 /// Everything is in the body's axes at the first image, t0.
 struct RefinementResult {
   /// ok, not_converged, undetermined, no_start (the start has no feature in front of its cameras), bad_motion or
-  /// bad_input (then see fault).
+  /// bad_input (then see fault). gravity_undetermined or scale_unobservable: it converged, but on the vertical or on the
+  /// scale the covariance says less than the options ask for (ClosedFormOptions::max_tilt_sigma, max_scale_sigma). Of
+  /// refineAtRest(): stationary, or no_parallax where the readings are not those of a body at rest.
   FusionStatus status = FusionStatus::bad_input;
   Fault fault;
 
   std::vector<SE23d> states;  ///< at each image: orientation, position, velocity; the first at the identity and 0
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
-  ImuBias<double> bias;                   ///< whole: not the change of the one that was integrated
+  ImuBias<double> bias;                   ///< at t0; whole: not the change of the one that was integrated
+  ImuBias<double> last_bias;              ///< at the last image; another where the sensor's noise has a walk
   std::vector<Eigen::Vector3d> features;  ///< NaN for a feature that was not used
 
   /// Covers the state from which a filter starts, and the velocity at t0.
   InitialCovariance covariance;
+
+  /// Relative standard deviation of the scale: of the images' positions along themselves.
+  double scale_sigma = std::numeric_limits<double>::infinity();
+  double tilt_sigma = std::numeric_limits<double>::infinity();  ///< rad, of the vertical: about its least known axis
+  /// The probability of biases as far from the prior's mean as these, if the prior is true: twice the smaller of both
+  /// sensors'. What the data do not tell of a bias does not count.
+  double prior_p = 1;
 
   double cost = 0;  ///< χ² of bearings, motions and priors
   std::size_t degrees_of_freedom = 0;
@@ -136,13 +127,46 @@ struct RefinementResult {
   Eigen::Vector3d velocity() const {
     return states.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(states[0].velocity());
   }
-  /// Whether the cost is one of noise: five sigmas of χ².
+  /// Whether the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
+  /// alone, with its thousands of bearings, hardly sees a bias.
   bool consistent() const {
     const double dof = static_cast<double>(degrees_of_freedom);
-    return cost <= dof + 5 * std::sqrt(2 * dof) + 12;
+    return cost <= dof + 5 * std::sqrt(2 * dof) + 12 && prior_p >= 1e-4;
+  }
+  /// Whether there are states with their covariance, be it a large one.
+  bool converged() const {
+    return status == FusionStatus::ok || status == FusionStatus::gravity_undetermined ||
+           status == FusionStatus::scale_unobservable || status == FusionStatus::stationary;
   }
   /// Exactly one answer, converged, that explains the data.
   bool ok() const { return status == FusionStatus::ok && consistent() && !must_reintegrate; }
+};
+
+// initialiseRobustly(), in robust_initialisation.hpp
+
+/// Indices are the window's.
+struct RobustInitialisation {
+  /// ok: motion and bias were found together (whether the motion is determined: see result.status).
+  /// bias_from_rotations: the motion does not tell the bias (at rest, constant velocity: see result.status and
+  /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
+  /// are the inliers.
+  /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
+  /// bad_input: see result.fault.
+  FusionStatus status = FusionStatus::bad_input;
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
+  /// With status ok from image noise and the prior, else that of `epipolar`; the prior's where the bias is neither.
+  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
+  ClosedFormResult result;                             ///< for this bias, of the inliers
+  std::vector<std::size_t> inliers, outliers;          ///< ascending
+  EpipolarBiasResult epipolar;                         ///< where it began
+  std::optional<RefinementResult> rest;                ///< where result.status is stationary and the noise is known
+  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
+  std::size_t hypotheses = 0;
+  int rounds = 0;
+  int integrations = 0;  ///< how often the readings were integrated anew
+
+  /// Exactly one answer, which explains the data of the inliers.
+  bool ok() const { return status == FusionStatus::ok && result.ok(); }
 };
 
 }  // namespace liestat

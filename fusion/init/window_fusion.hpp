@@ -4,7 +4,7 @@
 //
 //   liestat::WindowFusion fusion(9.81);  // |G|
 //   for (…) {  // disjoint windows, in the order of time, refined withSharedPrior(options, n)
-//     const auto meeting = fusion.add(liestat::windowStates(refined, window), integrate_gap);  // meeting.chi2 ~ χ²(11)
+//     const auto meeting = fusion.add(liestat::windowStates(refined), integrate_gap);  // meeting.chi2 ~ χ²(11)
 //   }
 //   if (fusion.ok()) … fusion.state(): at the last image of the last window, with its covariance
 //
@@ -52,10 +52,9 @@ struct WindowStates {
   bool ok() const { return first.covariance.allFinite() && independent.allFinite(); }
 };
 
-/// The states at the ends of a refined window. A refinement has one bias for the whole window, the mean of one that
-/// walks as the noise of the window's motions says: what it is at either end departs from that by a variance of a third
-/// of what it walks. Not ok() where the refinement did not succeed.
-WindowStates windowStates(const RefinementResult& refined, const InertialWindow& window);
+/// The states at the ends of a refined window, each with its own biases where these walk. Not ok() where the refinement
+/// did not succeed.
+WindowStates windowStates(const RefinementResult& refined);
 
 /// Collects windows in the order of time; see the header comment.
 class WindowFusion {

@@ -50,7 +50,7 @@ bool initialises() {
   const RefinementResult refined = refine(window, {}, {bias.bias, {}}, options);
   WindowFusion fusion(9.81);
   const auto between = [](const ImuBias<double>& biases) { return Preintegration<double>({.bias = biases}); };
-  const WindowFusion::Meeting meeting = fusion.add(windowStates(refined, window), between);
+  const WindowFusion::Meeting meeting = fusion.add(windowStates(refined), between);
   return rotations.ok() && closed.ok() && refined.ok() && meeting.status == Status::ok && fusion.ok() &&
          converged(refined.status) && accelerometerBias(fusion.state(), 9.81).covariance.allFinite() &&
          minimiseOnSphere(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Ones(), 1).count > 0 &&

@@ -37,12 +37,11 @@ bool allPassed(const std::vector<ViInitRow>& rows) {
 }
 
 TEST(ValidateViInit, eachCheckRunsAndKeepsItsPromises) {
-  // Rows a kind of window: 9 of the refinement; 2, and 3 with the bias; 6 of each accuracy; 5; 10.
-  const std::pair<ViInitCheck, std::size_t> expected[] = {{ViInitCheck::consistency, 5 * 9},
-                                                          {ViInitCheck::closed_form, 3 * 2 + 3 * 3},
-                                                          {ViInitCheck::accuracy, 4 * 6},
-                                                          {ViInitCheck::gyroscope_bias, 5},
-                                                          {ViInitCheck::drift, 10}};
+  // Rows a kind of window: 9 of the refinement, 5 with walks; 2, and 3 with the bias; 6 of each accuracy; 5; 2 at rest, 1 that moves; 10.
+  const std::pair<ViInitCheck, std::size_t> expected[] = {
+      {ViInitCheck::consistency, 5 * 9}, {ViInitCheck::walk, 3 * 5},       {ViInitCheck::closed_form, 3 * 2 + 3 * 3},
+      {ViInitCheck::accuracy, 4 * 6},    {ViInitCheck::gyroscope_bias, 5}, {ViInitCheck::rest, 2 * 2 + 1},
+      {ViInitCheck::drift, 10}};
   for (const auto& [check, count] : expected) {
     const auto rows = validateViInit(small({check}, 24));
     EXPECT_EQ(rows.size(), count) << name(check);
@@ -76,7 +75,7 @@ TEST(ValidateViInit, noiseThatNobodyToldFails) {
     wrong.windows = {2};
     const auto rows = validateViInit(wrong);
     EXPECT_FALSE(allPassed(rows)) << name(check);
-    if (check == ViInitCheck::consistency) {
+    if (check == ViInitCheck::consistency || check == ViInitCheck::walk) {
       // Four times the variance, of which the priors' part is told right from wrong too.
       const ViInitRow& row = find(rows, ViInitEstimator::refinement, ViInitQuantity::nees_v_g);
       EXPECT_NEAR(row.report->index, 20, 6);
@@ -100,11 +99,13 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
     const ClosedFormOutcome closed = trial(two_images, 1, rng);
     expectNone({closed.nees_v_g, closed.nees_all, closed.chi2.cost, closed.chi2.degrees_of_freedom});
   }
-  const RefinementOutcome refined = refinementTrial(two_images, 1, rng);
-  expectNone({refined.nees_v, refined.nees_v_g, refined.nees_all, refined.nees_last_state, refined.chi2.cost,
-              refined.chi2.degrees_of_freedom});
-  expectLost(refined.errors);
-  EXPECT_EQ(refined.scale_of_features, infinite);
+  for (const ViInitTrial<RefinementOutcome> trial : {refinementTrial, walkTrial}) {
+    const RefinementOutcome refined = trial(two_images, 1, rng);
+    expectNone({refined.nees_v, refined.nees_v_g, refined.nees_all, refined.nees_last_state, refined.nees_at_last,
+                refined.chi2.cost, refined.chi2.degrees_of_freedom});
+    expectLost(refined.errors);
+    EXPECT_EQ(refined.scale_of_features, infinite);
+  }
   const AccuracyOutcome accuracy = closedFormErrorsTrial(two_images, 1, rng);
   expectLost(accuracy.closed_form);
   expectLost(accuracy.least_squares);
@@ -112,6 +113,10 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
   EXPECT_EQ(gyroscope.bias, infinite);
   expectLost(gyroscope.estimated);
   expectLost(gyroscope.ignored);
+  const RestOutcome rest = restTrial(two_images, 1, rng);
+  EXPECT_FALSE(rest.stationary);
+  expectNone({rest.nees});
+  EXPECT_FALSE(slowTrial(two_images, 1, rng).stationary);
   const DriftOutcome drift = driftTrial(two_images, 1, rng);
   EXPECT_FALSE(drift.exact_selection);
   expectLost(drift.robust);

@@ -171,6 +171,133 @@ TEST(Refinement, CovariancesBelongTogether) {
   EXPECT_EQ(refine(recorded.window, recorded.start.solutions[0], {}, hasty).status, Status::not_converged);
 }
 
+// With walks the biases at both ends are unknowns of their own: the walk between them is what the densities allow.
+TEST(Refinement, BiasesWalk) {
+  const Recorded recorded({.images = 9, .features = 15, .window = 2}, 91);
+  ASSERT_FALSE(recorded.start.solutions.empty());
+  const auto refined = [&](double gyroscope_walk, double accelerometer_walk) {
+    const ImuNoise<double> noise{imu.gyroscope, imu.accelerometer, gyroscope_walk, accelerometer_walk};
+    InitialisationOptions close = options;
+    close.refinement.min_decrease = 1e-9;
+    const auto r = refine(windowOf(recorded.scene, recorded.readings, {.preintegration = {.noise = noise}}),
+                          recorded.start.solutions[0], {}, close);
+    EXPECT_TRUE(r.ok());
+    return r;
+  };
+  // The variance of the walk of an axis from the first image to the last.
+  const auto walked = [](const RefinementResult& r, InitialCovariance::Block first, InitialCovariance::Block last) {
+    return Eigen::Vector3d((r.covariance.block(first, first) + r.covariance.block(last, last) -
+                            r.covariance.block(first, last) - r.covariance.block(last, first))
+                               .diagonal());
+  };
+  using Block = InitialCovariance::Block;
+  const auto still = refined(0, 0), both = refined(1e-3, 1e-2), gyroscope = refined(1e-3, 0),
+             accelerometer = refined(0, 1e-2);
+  for (const RefinementResult* r : {&still, &accelerometer}) {
+    EXPECT_EQ(r->bias.gyroscope, r->last_bias.gyroscope);
+    EXPECT_LE(walked(*r, Block::gyroscope_bias, Block::last_gyroscope_bias).maxCoeff(), 1e-18);
+  }
+  for (const RefinementResult* r : {&still, &gyroscope}) {
+    EXPECT_EQ(r->bias.accelerometer, r->last_bias.accelerometer);
+    EXPECT_LE(walked(*r, Block::accelerometer_bias, Block::last_accelerometer_bias).maxCoeff(), 1e-15);
+  }
+  for (const RefinementResult* r : {&both, &gyroscope}) {
+    EXPECT_GT((r->bias.gyroscope - r->last_bias.gyroscope).norm(), 1e-6);
+    const Eigen::Vector3d variance = walked(*r, Block::gyroscope_bias, Block::last_gyroscope_bias);
+    EXPECT_GT(variance.minCoeff(), 0);
+    EXPECT_LE(variance.maxCoeff(), 1e-6 * 2);
+  }
+  for (const RefinementResult* r : {&both, &accelerometer}) {
+    EXPECT_GT((r->bias.accelerometer - r->last_bias.accelerometer).norm(), 1e-6);
+    const Eigen::Vector3d variance = walked(*r, Block::accelerometer_bias, Block::last_accelerometer_bias);
+    EXPECT_GT(variance.minCoeff(), 0);
+    EXPECT_LE(variance.maxCoeff(), 1e-4 * 2);
+  }
+  // A walk makes nothing better known; one that goes to zero goes to none.
+  for (int i = 0; i < 18; ++i) {
+    EXPECT_GE(both.covariance.atLast()(i, i), still.covariance.atLast()(i, i) * (1 - 1e-9)) << i;
+  }
+  const auto hardly = refined(1e-4 * imu.gyroscope, 1e-4 * imu.accelerometer);
+  EXPECT_NE(hardly.last_bias.gyroscope, hardly.bias.gyroscope);
+  EXPECT_LE((hardly.covariance.joint - still.covariance.joint).norm(), 1e-6 * still.covariance.joint.norm());
+  EXPECT_LE((hardly.velocity() - still.velocity()).norm(), 1e-7);
+  EXPECT_NEAR(hardly.cost, still.cost, 1e-6 * still.cost);
+}
+
+/// The scale of a trajectory against the true one, less 1.
+double scaleError(const RefinementResult& r, const Scene& scene) {
+  const SO3d back = scene.attitude(0).inverse();
+  double both = 0, own = 0;
+  for (std::size_t j = 1; j < r.states.size(); ++j) {
+    const Eigen::Vector3d p = back * Eigen::Vector3d(scene.position(scene.times[j]) - scene.position(0));
+    both += p.dot(r.states[j].translation());
+    own += p.squaredNorm();
+  }
+  return both / own - 1;
+}
+
+// The standard deviation of the scale is true, and so is the probability of the biases under their prior.
+TEST(Refinement, JudgesItsResult) {
+  constexpr int trials = 150;
+  double scale = 0;
+  int improbable = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Recorded recorded({.images = 11, .features = 15, .window = 2}, 300000 + static_cast<std::uint64_t>(trial));
+    ASSERT_FALSE(recorded.start.solutions.empty());
+    const auto refined = refine(recorded.window, recorded.start.solutions[0], {}, options);
+    ASSERT_TRUE(refined.converged());
+    EXPECT_TRUE(refined.ok());
+    scale += std::pow(scaleError(refined, recorded.scene) / refined.scale_sigma, 2);
+    improbable += refined.prior_p < 0.1;
+    // The larger axis of the vertical is that of the bias that the prior leaves, in the first place.
+    EXPECT_GT(refined.tilt_sigma, 0.1 * options.prior.accelerometer_sigma / Scene::g);
+    EXPECT_LT(refined.tilt_sigma, 1.5 * options.prior.accelerometer_sigma / Scene::g);
+  }
+  std::printf("scale: squared errors over predicted variances %.3f; %d of %d biases with p < 0.1\n", scale / trials,
+              improbable, trials);
+  EXPECT_NEAR(scale / trials, 1, 4 * std::sqrt(2. / trials));
+  EXPECT_LE(improbable, 0.1 * trials + 4 * std::sqrt(0.09 * trials));
+}
+
+// What converged may still be too vague, or against the prior: then it is not ok, and the status says why.
+TEST(Refinement, WithdrawsWhatIsTooVague) {
+  const Recorded recorded({.images = 11, .features = 15, .window = 2}, 92);
+  ASSERT_FALSE(recorded.start.solutions.empty());
+  const auto refined = [&](const InitialisationOptions& o) {
+    return refine(recorded.window, recorded.start.solutions[0], {}, o);
+  };
+  const auto good = refined(options);
+  EXPECT_TRUE(good.ok());
+  for (const double factor : {1e3, 3e4}) {
+    InitialisationOptions noisy = options;
+    noisy.inertial_noise_factor = factor;
+    const auto vague = refined(noisy);
+    EXPECT_FALSE(vague.ok());
+    EXPECT_TRUE(vague.converged());
+    EXPECT_TRUE(vague.scale_sigma > 0.3 || vague.tilt_sigma > 0.2);
+    EXPECT_EQ(vague.status, vague.tilt_sigma > 0.2 ? Status::gravity_undetermined : Status::scale_unobservable);
+    EXPECT_GT(vague.covariance.joint(0, 0), good.covariance.joint(0, 0));
+  }
+  InitialisationOptions strict = options;
+  strict.closed_form.max_scale_sigma = 0.99 * good.scale_sigma;
+  EXPECT_EQ(refined(strict).status, Status::scale_unobservable);
+  strict.closed_form.max_tilt_sigma = 0.99 * good.tilt_sigma;
+  EXPECT_EQ(refined(strict).status, Status::gravity_undetermined);
+  // A bias ten prior sigmas away hardly shows in the cost of the bearings.
+  for (const bool gyroscope : {false, true}) {
+    InitialisationOptions wrong = options;
+    if (gyroscope) {
+      wrong.prior.mean.gyroscope = recorded.bias.gyroscope + Eigen::Vector3d(0.1, 0, 0);
+    } else {
+      wrong.prior.mean.accelerometer = recorded.bias.accelerometer + Eigen::Vector3d(0.3, 0.3, 0.3);
+    }
+    const auto far = refined(wrong);
+    EXPECT_EQ(far.status, Status::ok);
+    EXPECT_LT(far.prior_p, 1e-4);
+    EXPECT_FALSE(far.ok());
+  }
+}
+
 TEST(Refinement, RefusesBadInput) {
   const Recorded recorded({.images = 6, .features = 10, .window = 1}, 78);
   ASSERT_FALSE(recorded.start.solutions.empty());

@@ -119,6 +119,112 @@ TEST(RobustInitialisation, AtRestAndAtConstantVelocity) {
   }
 }
 
+// A body at rest is called so whatever its accelerometer's bias is, with noise of pixels that is not what was said, and
+// with wild tracks; its gravity has the tilt that the bias can hide.
+TEST(RobustInitialisation, RestIsRest) {
+  struct Row {
+    double accelerometer, sigma;
+    std::size_t drifting;
+  };
+  int stationary = 0, all = 0;
+  for (const Row& row :
+       {Row{0, 1, 0}, Row{0.02, 1, 0}, Row{0.1, 1, 0}, Row{0.05, 0.7, 0}, Row{0.05, 1.3, 0}, Row{0.05, 1, 6}}) {
+    for (std::uint64_t seed = 0; seed < 12; ++seed) {
+      CounterRng random(seed, 7);
+      RecordedOptions how{.scene = {.images = 21, .features = 20, .motion = SceneMotion::stationary},
+                          .bias = 0.02,
+                          .sigma = row.sigma * pixel,
+                          .noise = adis,
+                          .drifting = row.drifting};
+      how.scene.bias = row.accelerometer * random.unitVector<3>();
+      if (seed % 2 == 0) how.scene.turn = SceneTurn::none;
+      const RecordedScene still(how, 900 + seed);
+      const auto found = initialise(still, seed);
+      ++all;
+      if (found.result.status != Status::stationary) continue;
+      ++stationary;
+      ASSERT_TRUE(found.rest);
+      EXPECT_TRUE(found.result.consistent);
+      const RefinementResult& rest = *found.rest;
+      EXPECT_LE(rest.velocity().norm(), 1e-6);
+      const Eigen::Vector3d G = still.scene.gravity;
+      const double tilt = std::atan2(rest.gravity.cross(G).norm(), rest.gravity.dot(G));
+      EXPECT_LE(tilt, 5 * rest.tilt_sigma);
+      // The prior of the accelerometer's bias, 0.1 m/s², where turns do not tell it.
+      if (seed % 2 == 0) {
+        EXPECT_NEAR(rest.tilt_sigma, 0.1 / 9.81, 0.05 * 0.1 / 9.81);
+      }
+      EXPECT_LE((rest.bias.gyroscope - still.bias).norm(), 0.002);
+      EXPECT_GT(found.result.unseen_speed_per_depth, 0.002);
+      EXPECT_LT(found.result.unseen_speed_per_depth, 0.1);
+    }
+  }
+  // Five in a thousand are not, and one by its readings.
+  std::printf("  %d of %d at rest were called so\n", stationary, all);
+  EXPECT_GE(stationary, all - 4);
+}
+
+// Uniform motion is rest to an inertial sensor: what is called stationary is slower, for the distance of its features,
+// than the result says would have been seen, and hardly anything is that moves as fast as it excludes.
+TEST(RobustInitialisation, SlowMotionIsNotRest) {
+  int excluded = 0, called = 0;
+  for (const double far : {4., 20., 80.}) {  // 1 m/s: 0.25, 0.05 and 0.0125 m/s among features 2 to 8 m away
+    for (const double seconds : {1., 2., 4.}) {
+      int stationary = 0;
+      constexpr int trials = 10;
+      for (std::uint64_t seed = 0; seed < trials; ++seed) {
+        const RecordedScene slow({.scene = {.images = static_cast<std::size_t>(10 * seconds) + 1,
+                                            .features = 20,
+                                            .motion = SceneMotion::constant_velocity,
+                                            .turn = SceneTurn::none,
+                                            .window = seconds,
+                                            .far = far},
+                                  .bias = 0.01,
+                                  .noise = adis},
+                                 1000 + seed);
+        const auto found = initialise(slow, seed);
+        EXPECT_FALSE(found.ok());
+        if (found.result.status != Status::stationary) continue;
+        ++stationary;
+        // The features' mean inverse distance: 1 m/s is that for each metre.
+        double inverse = 0;
+        for (const Eigen::Vector3d& P : slow.scene.features) inverse += 1 / (20 * P.norm());
+        ++called;
+        excluded += inverse > found.result.unseen_speed_per_depth;
+      }
+      std::printf("  1 m/s, %3.0f to %3.0f m, %.0f s: %d of %d stationary\n", 2 * far, 8 * far, seconds, stationary,
+                  trials);
+      if (far < 10 || (far < 30 && seconds > 1)) {
+        EXPECT_EQ(stationary, 0);
+      }
+    }
+  }
+  // Of the few that are called so, at most one moves faster than excluded.
+  EXPECT_GT(called, 0);
+  EXPECT_LE(excluded, 1);
+}
+
+// Tracks without parallax and readings that vary by less than a hundredth of gravity are not rest.
+TEST(RobustInitialisation, UnsteadyReadingsAreNotRest) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    RecordedScene shaken(
+        {.scene = {.images = 21, .features = 20, .motion = SceneMotion::stationary, .turn = SceneTurn::none},
+         .bias = 0.01,
+         .noise = adis},
+        1100 + seed);
+    EXPECT_EQ(initialise(shaken, seed).result.status, Status::stationary);
+    // An oscillation of 0.05 m/s² at 1 Hz: 1.3 mm.
+    for (ImuSample<double>& reading : shaken.readings) {
+      reading.specific_force.x() += 0.05 * std::sin(6.283185307179586 * reading.time);
+    }
+    shaken.window = windowOf(shaken.scene, shaken.readings, {.preintegration = {.noise = adis}});
+    const auto found = initialise(shaken, seed);
+    EXPECT_EQ(found.result.status, Status::no_parallax);
+    EXPECT_FALSE(found.rest);
+    EXPECT_TRUE(found.result.solutions.empty());
+  }
+}
+
 TEST(RobustInitialisation, WithoutReadingsOrTracks) {
   const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6},
                                3);

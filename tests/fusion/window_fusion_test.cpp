@@ -91,7 +91,7 @@ struct Fused {
       const InertialWindow window = recording.window(25 * k, 25 * k + 20);
       last = refined(window);
       ok = ok && last.ok();
-      states = windowStates(last, window);
+      states = windowStates(last);
       if (k == wrong) {
         // Ten deviations of the gyroscope's bias.
         states.first.mean.get<2>().x() += 10 * std::sqrt(states.first.covariance(5, 5));
@@ -112,7 +112,7 @@ TEST(WindowFusion, OfOneWindowIsItsPosterior) {
   ASSERT_TRUE(one.ok());
   WindowFusion fusion(Scene::g);
   EXPECT_FALSE(fusion.hasState());
-  const WindowStates states = windowStates(one, window);
+  const WindowStates states = windowStates(one);
   const auto none = [](const ImuBias<double>&) { return Preintegration<double>(); };
   EXPECT_EQ(fusion.add(states, none).status, liestat::Status::ok);
   ASSERT_TRUE(fusion.ok());
@@ -192,7 +192,7 @@ TEST(WindowFusion, IsConsistent) {
     const InertialWindow last = recording.window(50, 70);
     const RefinementResult alone = refined(last, 1);
     for (const int k : {0, 1}) {
-      const InertialState x = k == 0 ? windowStates(alone, last).last.mean : fused.fusion.state().mean;
+      const InertialState x = k == 0 ? windowStates(alone).last.mean : fused.fusion.state().mean;
       gyroscope[k] += (x.get<2>() - recording.bias.gyroscope).squaredNorm();
       accelerometer[k] += (accelerometerBias(x, Scene::g) - recording.bias.accelerometer).squaredNorm();
       tilts[k] += std::pow(distance(x.get<0>(), truth.get<0>()), 2);
@@ -235,10 +235,10 @@ TEST(WindowFusion, SeesAContradiction) {
 }
 
 TEST(WindowFusion, LeavesOutWhatHasNoCovariance) {
-  EXPECT_FALSE(windowStates({}, {}).ok());
+  EXPECT_FALSE(windowStates({}).ok());
   WindowFusion fusion(Scene::g);
   const auto none = [](const ImuBias<double>&) { return Preintegration<double>(); };
-  EXPECT_EQ(fusion.add(windowStates({}, {}), none).status, liestat::Status::ill_defined);
+  EXPECT_EQ(fusion.add(windowStates({}), none).status, liestat::Status::ill_defined);
   EXPECT_FALSE(fusion.ok());
   EXPECT_EQ(fusion.inflation(), 1);
 }

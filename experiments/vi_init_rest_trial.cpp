@@ -1,0 +1,66 @@
+#include <experiments/scene_readings.hpp>
+#include <experiments/vi_init_errors.hpp>
+#include <experiments/vi_init_trials.hpp>
+#include <fusion/init/robust_initialisation.hpp>
+
+namespace liestat::experiments {
+namespace {
+
+const InitialisationOptions options{
+    .bearing_noise = vi_init_bearing_noise,
+    .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05},
+    .closed_form = {.singular_values = false},
+};
+
+/// A scene without turns, measured with biases out of their priors.
+struct Measured {
+  ImuBias<double> bias;
+  InertialScene scene;
+  InertialWindow window;
+
+  Measured(const ViInitWindow& size, SceneMotion motion, double far, double noise, CounterRng& rng)
+      : bias{noise * options.prior.gyroscope_sigma * rng.normalVector<3>(),
+             noise * options.prior.accelerometer_sigma * rng.normalVector<3>()},
+        scene({.images = size.images,
+               .features = size.features,
+               .motion = motion,
+               .turn = SceneTurn::none,
+               .window = size.seconds,
+               .far = far,
+               .bias = bias.accelerometer},
+              rng()) {
+    const ImuNoise<double> simulated{.gyroscope = noise * vi_init_imu.gyroscope,
+                                     .accelerometer = noise * vi_init_imu.accelerometer};
+    const auto readings = readingsOf(scene, simulated, rng, bias.gyroscope);
+    scene.addNoise(noise * vi_init_bearing_noise, rng);
+    window = windowOf(scene, readings, {.preintegration = {.noise = vi_init_imu}});
+  }
+};
+
+}  // namespace
+
+RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+  const Measured measured(size, SceneMotion::stationary, 1, noise, rng);
+  const RobustInitialisation found = initialiseRobustly(measured.window, options);
+  RestOutcome outcome;
+  outcome.stationary = found.result.status == FusionStatus::stationary && found.rest;
+  if (!outcome.stationary || (noise == 1 && !found.result.consistent)) return outcome;
+  const RefinementResult& rest = *found.rest;
+  // A velocity of zero with a variance of one takes no part.
+  Eigen::Matrix<double, 12, 1> error;
+  error << Eigen::Vector3d::Zero(), rest.gravity - measured.scene.gravity,
+      rest.bias.gyroscope - measured.bias.gyroscope, rest.bias.accelerometer - measured.bias.accelerometer;
+  Eigen::Matrix<double, 12, 12> covariance = rest.covariance.atFirst();
+  covariance.topRows<3>().setZero();
+  covariance.leftCols<3>().setZero();
+  covariance.topLeftCorner<3, 3>().setIdentity();
+  outcome.nees = neesOnSphere<11>(error, covariance, rest.gravity);
+  return outcome;
+}
+
+SlowOutcome slowTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
+  const Measured measured(size, SceneMotion::constant_velocity, 20, noise, rng);
+  return {initialiseRobustly(measured.window, options).result.status == FusionStatus::stationary};
+}
+
+}  // namespace liestat::experiments
