@@ -14,6 +14,7 @@
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -133,7 +134,16 @@ template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSign
 AveragedHessian<M> averagedHessian(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
                                    const SquareOf<M>& covariance) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findAveragedHessian(detail::asSamples(samples), detail::asWeights(weights), mean, covariance);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findAveragedHessian(features, numbers, mean, covariance);
+        },
+        [] {
+          AveragedHessian<M> none;
+          none.change = std::numeric_limits<double>::quiet_NaN();
+          return none;
+        });
   } else {
     return {};
   }

@@ -10,6 +10,7 @@
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
 #include <stats/detail/settled_group_mean.hpp>
@@ -125,7 +126,12 @@ template <Executor E, detail::AnyRange R, detail::AnyRange W, class G = detail::
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples, W&& weights,
                                          const CertifiedGroupMeanOptions& options = {}) {
   if constexpr (detail::RequireGroupMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+    return detail::withRelativeWeights<G>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findCertifiedGroupMean<G>(executor, features, numbers, options);
+        },
+        [] { return detail::without<CertifiedGroupMean<G>>(Status::not_applicable, detail::bad_weights_reason); });
   } else {
     return {};
   }

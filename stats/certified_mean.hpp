@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/concentration.hpp>
 #include <stats/covariance.hpp>
 #include <stats/cut_locus.hpp>
@@ -175,7 +176,14 @@ template <Executor E, detail::AnyRange R, detail::AnyRange W, class M = detail::
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples, W&& weights,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::asWeights(weights), options);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows& rows) {
+          CertifiedMeanOptions<M> how = options;
+          how.known_noise = rows.of(options.known_noise);
+          return detail::findCertifiedMean<M>(executor, features, numbers, how);
+        },
+        [] { return detail::without<CertifiedMean<M>>(Status::not_applicable, detail::bad_weights_reason); });
   } else {
     return {};
   }

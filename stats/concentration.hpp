@@ -10,6 +10,7 @@
 
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/detail/search_space.hpp>
 #include <stats/mean.hpp>
 
@@ -170,7 +171,16 @@ Concentration concentration(R&& samples, const std::type_identity_t<M>& mean) {
 template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
 Concentration concentration(R&& samples, W&& weights, const std::type_identity_t<M>& mean) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findConcentration(detail::asSamples(samples), detail::asWeights(weights), mean);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findConcentration(features, numbers, mean);
+        },
+        [] {
+          Concentration none;
+          none.concentrated = false;
+          return none;
+        });
   } else {
     return {};
   }

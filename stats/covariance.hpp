@@ -8,6 +8,7 @@
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 #include <lie/detail/small_products.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
 #include <cmath>
@@ -56,14 +57,17 @@ template <Metric M, detail::AnyRange W, detail::AnyRange V>
 SquareOf<M> covarianceFromNoise(const MeanResult<M>& result, W&& weights, V&& noise) {
   SquareOf<M> sum = SquareOf<M>::Zero();
   if constexpr (detail::RequireMatrices<M, V>::ok && detail::RequireWeights<W>::ok) {
+    // As mean() saw them.
     const auto p = detail::asWeights(weights);
-    eigen_assert(p.size() == result.n);
+    const detail::WeightScale scale = detail::weightScale<ScalarOf<M>>(p, p.size());
+    eigen_assert(scale.kept == result.n);
+    if (!scale.valid) return SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
     std::size_t i = 0;
     for (const auto& v : noise) {
-      const ScalarOf<M> weight = static_cast<ScalarOf<M>>(p[i++]);
+      const ScalarOf<M> weight = static_cast<ScalarOf<M>>(scale(p[i++]));
       sum += weight * weight * v;
     }
-    eigen_assert(i == result.n);
+    eigen_assert(i == p.size());
   }
   return detail::sandwich(result, sum);
 }

@@ -7,6 +7,7 @@
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/search_space.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -160,7 +161,16 @@ CutLocusMass cutLocusMass(R&& samples, const MeanResult<std::type_identity_t<M>>
 template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
 CutLocusMass cutLocusMass(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean, double window) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findCutLocusMass(detail::asSamples(samples), detail::asWeights(weights), mean, window);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findCutLocusMass(features, numbers, mean, window);
+        },
+        [] {
+          CutLocusMass unknown;
+          unknown.hessian_change = std::numeric_limits<double>::quiet_NaN();
+          return unknown;
+        });
   } else {
     return {};
   }
@@ -181,7 +191,16 @@ template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSign
 CutLocusMass cutLocusNearby(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
                             const SquareOf<M>& covariance) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findCutLocusNearby(detail::asSamples(samples), detail::asWeights(weights), mean, covariance);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findCutLocusNearby(features, numbers, mean, covariance);
+        },
+        [] {
+          CutLocusMass unknown;
+          unknown.hessian_change = std::numeric_limits<double>::quiet_NaN();
+          return unknown;
+        });
   } else {
     return {};
   }

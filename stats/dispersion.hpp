@@ -4,6 +4,7 @@
 
 #include <lie/manifold.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
 #include <cmath>
@@ -76,7 +77,18 @@ Dispersion<M> dispersionAbout(R&& samples, const std::type_identity_t<M>& y) {
 template <detail::AnyRange R, detail::AnyRange W, class M = detail::SampleInSignature<R>>
 Dispersion<M> dispersionAbout(R&& samples, W&& weights, const std::type_identity_t<M>& y) {
   if constexpr (detail::RequireSamples<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findDispersion(detail::asSamples(samples), detail::asWeights(weights), y);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows& rows) {
+          Dispersion<M> result = detail::findDispersion(features, numbers, y);
+          for (FarthestFeature& f : result.farthest) f.index = rows[f.index];
+          return result;
+        },
+        [] {
+          Dispersion<M> none;
+          none.covariance.setConstant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+          return none;
+        });
   } else {
     return {};
   }

@@ -6,6 +6,7 @@
 #include <lie/detail/small_products.hpp>
 #include <stats/concentration.hpp>
 #include <stats/detail/angular_part.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
 namespace liestat {
@@ -105,7 +106,7 @@ using GroupInSignature = std::conditional_t<LieGroup<SampleInSignature<R>>, Samp
 }  // namespace detail
 
 /// Exponential barycentre of a range of group elements, weighted or not, by Newton's method. Empty: too_few. The same
-/// bits on any executor. What may be passed is said at mean().
+/// bits on any executor. What may be passed, and what weights are, is said at mean().
 template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
 GroupMeanResult<G> groupMean(const E& executor, R&& samples, const std::optional<std::type_identity_t<G>>& start = {}) {
   if constexpr (detail::RequireGroupMean<R>::ok) {
@@ -122,7 +123,12 @@ template <Executor E, detail::AnyRange R, detail::AnyRange W, class G = detail::
 GroupMeanResult<G> groupMean(const E& executor, R&& samples, W&& weights,
                              const std::optional<std::type_identity_t<G>>& start = {}) {
   if constexpr (detail::RequireGroupMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::groupBarycentre<G>(executor, detail::asSamples(samples), detail::asWeights(weights), start);
+    return detail::withRelativeWeights<G>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::groupBarycentre<G>(executor, features, numbers, start);
+        },
+        [] { return detail::without<GroupMeanResult<G>>(Status::not_applicable); });
   } else {
     return {};
   }

@@ -8,6 +8,7 @@
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/mean_pass.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/executor.hpp>
 #include <stats/start.hpp>
 #include <stats/status.hpp>
@@ -188,16 +189,22 @@ MeanResult<detail::SampleInSignature<R>> mean(R&& samples,
   return mean(SerialExecutor{}, samples, options);
 }
 
-/// Weighted Fréchet mean (WLSQ): minimises ½ Σ p_i d²(y, x_i). Weights are positive, one for each feature, in any range
-/// of numbers (std::vector, Eigen::VectorXd …); what they mean for the covariance is said in stats/covariance.hpp.
+/// Weighted Fréchet mean (WLSQ): minimises ½ Σ p_i d²(y, x_i). Weights are relative, one for each feature, in any range
+/// of numbers (std::vector, Eigen::VectorXd …); what they mean for the covariance is said in stats/covariance.hpp. A
+/// feature of weight zero is left out, and n counts the others. A weight that is negative or not finite, or none that is
+/// positive: status not_applicable. Where the largest is beyond 2^±30 all are multiplied by a power of two first, which
+/// the sums of the result show.
 template <Executor E, detail::AnyRange R, detail::AnyRange W>
 MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples, W&& weights,
                                               const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    const auto features = detail::asSamples(samples);
-    const auto numbers = detail::asWeights(weights);
-    eigen_assert(features.size() == numbers.size());
-    return detail::frechetMean<SampleOf<R>>(executor, features, numbers, options);
+    using M = SampleOf<R>;
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::frechetMean<M>(executor, features, numbers, options);
+        },
+        [] { return detail::without<MeanResult<M>>(Status::not_applicable); });
   } else {
     return {};
   }

@@ -16,6 +16,7 @@
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
@@ -193,8 +194,13 @@ template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSign
 std::vector<NearTie<M>> nearTies(R&& samples, W&& weights, const MeanResult<std::type_identity_t<M>>& mean,
                                  const SquareOf<M>& covariance, const NearTieOptions& options = {}) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findNearTies<M>(SerialExecutor{}, detail::asSamples(samples), detail::asWeights(weights), mean,
-                                   covariance, true, detail::NoNoise{}, options);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findNearTies<M>(SerialExecutor{}, features, numbers, mean, covariance, true, detail::NoNoise{},
+                                         options);
+        },
+        [] { return std::vector<NearTie<M>>(); });
   } else {
     return {};
   }

@@ -238,12 +238,19 @@ SplitValidation<M> validateMeanBySplitting(const E& executor, const std::vector<
     const std::vector<double> their_weights = detail::selected(weights, rows);
     MeanOptions<M> how;
     how.start = start;
-    const MeanResult<M> result = mean(some, their_weights, how);
-    const SquareOf<M> covariance =
-        known_noise.empty()
-            ? covarianceFromResiduals(result)
-            : detail::covarianceFromKnownNoise(some, their_weights, result, detail::selected(known_noise, rows));
-    return SplitEstimate<M>{{result.mean, covariance}, converged(result.status) && covariance.allFinite()};
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(some), detail::asWeights(their_weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows& kept) {
+          const MeanResult<M> result = detail::frechetMean<M>(SerialExecutor{}, features, numbers, how);
+          const SquareOf<M> covariance =
+              known_noise.empty() ? covarianceFromResiduals(result)
+                                  : detail::covarianceFromKnownNoise(features, numbers, result,
+                                                                     kept.of(detail::selected(known_noise, rows)));
+          return SplitEstimate<M>{{result.mean, covariance}, converged(result.status) && covariance.allFinite()};
+        },
+        [] {
+          return SplitEstimate<M>{{}, false};
+        });
   };
   return validateBySplitting<M>(executor, {weights, times}, lawOfHalves<M>(samples.size(), !known_noise.empty()),
                                 detail::startedAtTheWhole<M>(estimate, samples.size()), options);

@@ -17,6 +17,7 @@
 
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/weights.hpp>
 #include <stats/executor.hpp>
 #include <stats/mean.hpp>
 #include <stats/uniqueness_types.hpp>
@@ -39,7 +40,12 @@ double localRadius(R&& samples, const std::type_identity_t<M>& mean) {
 template <detail::AnyRange R, detail::AnyRange W, class M = detail::MetricInSignature<R>>
 double localRadius(R&& samples, W&& weights, const std::type_identity_t<M>& mean) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findLocalRadius(detail::asSamples(samples), detail::asWeights(weights), mean);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findLocalRadius(features, numbers, mean);
+        },
+        [] { return 0.0; });
   } else {
     return 0;
   }
@@ -65,7 +71,16 @@ template <Executor E, detail::AnyRange R, detail::AnyRange W, class M = detail::
 UniquenessResult<M> uniqueness(const E& executor, R&& samples, W&& weights,
                                const MeanResult<std::type_identity_t<M>>& mean, const UniquenessOptions& options = {}) {
   if constexpr (detail::RequireMean<R>::ok && detail::RequireWeights<W>::ok) {
-    return detail::findUniqueness(executor, detail::asSamples(samples), detail::asWeights(weights), mean, options);
+    return detail::withRelativeWeights<M>(
+        detail::asSamples(samples), detail::asWeights(weights),
+        [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
+          return detail::findUniqueness(executor, features, numbers, mean, options);
+        },
+        [&] {
+          UniquenessResult<M> nothing;
+          nothing.minimiser = mean.mean;
+          return nothing;
+        });
   } else {
     return {};
   }

@@ -34,6 +34,7 @@ UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
 /// residuals or from noise. Returns the mean.
 template <class M, class Iteration, class Certified>
 M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certified& result, const char* from) {
+  analysis.n = iteration.n;
   analysis.converged = converged(iteration.status);
   analysis.iterations = iteration.iterations;
   analysis.residual = iteration.residual;

@@ -40,6 +40,7 @@ struct NearRival {
 /// All that is known about a mean.
 struct MeanAnalysis {
   FeatureValue mean;
+  std::size_t n = 0;  ///< measurements that count: those of weight zero do not
   /// The status of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
   Status status = Status::ok;
   std::string reason = {};  ///< in words, where status is not ok
@@ -93,7 +94,8 @@ MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions
 /// `validate split`.
 void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, const AnalysisOptions& options);
 
-/// Adds the p-value of the fit, and notes on what is remarkable about the result, to an analysis of n measurements.
-void explain(MeanAnalysis& analysis, std::size_t n);
+/// Adds the p-value of the fit, and notes on what is remarkable about the result, to the analysis of so many
+/// measurements.
+void explain(MeanAnalysis& analysis, std::size_t measurements);
 
 }  // namespace liestat::cli

@@ -51,10 +51,18 @@ void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, con
   }
 }
 
-void explain(MeanAnalysis& analysis, std::size_t n) {
-  if (n == 1) {
+void explain(MeanAnalysis& analysis, std::size_t measurements) {
+  if (const std::size_t without = measurements - std::min(analysis.n, measurements); without > 0) {
+    analysis.notes.push_back(
+        fmt::format("{} {} no weight beside the others and {} not counted", without,
+                    without == 1 ? "measurement has" : "measurements have", without == 1 ? "is" : "are"));
+  }
+  // Weights hide differences in the dispersion, so the distances themselves are looked at.
+  const bool all_equal = std::all_of(analysis.largest.begin(), analysis.largest.end(),
+                                     [](const LargestResidual& r) { return !(r.value > 1e-14); });
+  if (analysis.n == 1) {
     analysis.notes.emplace_back("one measurement is its own mean");
-  } else if (analysis.dispersion.isZero(0) || !(analysis.dispersion.diagonal().maxCoeff() > 1e-28)) {
+  } else if (all_equal) {
     analysis.notes.emplace_back(analysis.covariance_from == "residuals"
                                     ? "all measurements are equal: a covariance from the residuals is zero, which says "
                                       "nothing about an error that they share"

@@ -80,6 +80,9 @@ class FeatureReader {
       }
       addRow();
     } while (reader_.next());
+    if (places_.weight != absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
+      throw InputError(name_, file_.lines.front(), "every weight is 0", "one above 0");
+    }
     // A text may have far more characters than its shortest rows would need.
     file_.lines.shrink_to_fit();
     file_.rotations.shrink_to_fit();
@@ -98,7 +101,7 @@ class FeatureReader {
     if (parts.contains(Part::direction)) file_.directions.push_back(readDirection());
     if (places_.weight != absent) {
       const double weight = value(places_.weight);
-      if (!(weight > 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "a positive number");
+      if (!(weight >= 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "0 or more");
       file_.weights.push_back(weight);
     }
     if (places_.time != absent) file_.times.push_back(value(places_.time) * layout_.time_unit);

@@ -24,7 +24,7 @@ struct FeatureFile {
   std::vector<Eigen::Quaterniond> rotations;  ///< of unit norm
   std::vector<Eigen::Vector3d> positions;     ///< points, or translations of frames
   std::vector<Eigen::Vector3d> directions;    ///< of unit norm
-  std::vector<double> weights;                ///< positive; empty if the file has none
+  std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
   std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
   std::vector<Covariance> covariances;  ///< positive definite, translation before rotation; empty if the file has none
   std::vector<std::size_t> lines;       ///< the line that each row stands in

@@ -143,7 +143,7 @@ std::string covarianceInWords(const Measurements& measurements, const MeanAnalys
   }
   const int k = degreesOfFreedom(measurements.feature);
   const std::string law = analysis.covariance_from == "residuals"
-                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, measurements.size())
+                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
                               : fmt::format("chi-square with {} degrees of freedom", k);
   return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
                      analysis.covariance_from == "residuals" ? "the residuals" : "the measurements' own covariances",

@@ -88,7 +88,7 @@ void setMeanFields(JsonObject& object, const std::string& source, const Measurem
     object.set("covariance_at", nullptr);
   }
   object.set("likelihood", measurements.likelihood).set("weighted", measurements.weighted);
-  object.set("n", measurements.size()).set("n_normalised", measurements.file.n_normalised);
+  object.set("n", analysis.n).set("n_normalised", measurements.file.n_normalised);
   object.set("largest_norm_error", measurements.file.largest_norm_error);
   object.set("status", name(analysis.status));
   if (analysis.status == Status::ok) {

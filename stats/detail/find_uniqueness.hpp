@@ -17,15 +17,6 @@
 
 namespace liestat::detail {
 
-template <class W>
-bool areValidWeights(const W& weights, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) {
-    const double p = static_cast<double>(weights[i]);
-    if (!(p >= 0) || !std::isfinite(p)) return false;
-  }
-  return true;
-}
-
 /// The mean of the I-th factors: their part of a mean, from which it starts.
 template <std::size_t I, Metric M, Executor E, class R, class W>
 auto factorMean(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean) {
@@ -99,7 +90,7 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
   result.cost = mean.cost;
   using std::isfinite;
   const std::size_t n = std::ranges::size(samples);
-  if (n == 0 || !isfinite(static_cast<double>(mean.cost)) || !areValidWeights(weights, n)) return result;
+  if (n == 0 || !isfinite(static_cast<double>(mean.cost))) return result;
   if constexpr (Factored<M>) {
     return uniquenessByFactors(executor, samples, weights, mean, options);
   } else if constexpr (compactFactor<M>() == CompactFactor::none) {

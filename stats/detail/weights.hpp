@@ -4,6 +4,7 @@
 
 #include <stats/detail/mean_pass.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/status.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,22 @@
 
 namespace liestat::detail {
 
-inline constexpr const char* bad_weights_reason = "a weight is negative or not finite, or all of them are zero";
+/// A result that says nothing but why there is none.
+template <class Result>
+Result without(Status status) {
+  Result result;
+  result.status = status;
+  return result;
+}
+template <class Result>
+Result without(Status status, const char* reason) {
+  Result result = without<Result>(status);
+  result.reason = reason;
+  return result;
+}
+
+inline constexpr const char* bad_weights_reason =
+    "a weight is negative or not finite, or there is none above zero for every feature";
 
 /// How weights become relative ones. Those whose largest is within 2^±30 stay as they are; others are multiplied by a
 /// power of two, which rounds nothing, until the largest is in [1, 2). A weight so far below the largest that the square
@@ -60,11 +76,10 @@ class KeptRows {
 
   /// The row of the i-th feature that is seen.
   std::size_t operator[](std::size_t i) const { return all_ ? i : rows_[i]; }
-  /// What belongs to the features that are seen; lists of another length than the data's, such as one value for all,
-  /// stay as they are.
+  /// What belongs to the features that are seen; one value for all, and an empty list, stay as they are.
   template <class T>
-  std::vector<T> of(const std::vector<T>& list, std::size_t n) const {
-    if (all_ || list.size() != n) return list;
+  std::vector<T> of(const std::vector<T>& list) const {
+    if (all_ || list.size() < 2) return list;
     std::vector<T> some;
     some.reserve(rows_.size());
     for (const std::size_t row : rows_) some.push_back(list[row]);

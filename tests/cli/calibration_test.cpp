@@ -126,6 +126,14 @@ TEST(CalibrationFiles, FilesThatBelongTogether) {
             sensor + ": it has an IMU, as has " + sensor + ", expected one in all files");
 }
 
+// What is no calibration is refused before it costs minutes.
+TEST(CalibrationFiles, LargeOnesAreRefusedAtOnce) {
+  std::string text;
+  for (int i = 0; text.size() <= 20000000; ++i) text += "key" + std::to_string(i) + ": 1\n";
+  const std::string message = errorOf([&] { parseCalibration(text, "f"); });
+  EXPECT_NE(message.find("expected a calibration, of at most 1000000"), std::string::npos) << message;
+}
+
 TEST(CalibrationFiles, BadOnesAreNamed) {
   const auto message = [](const std::string& text) { return errorOf([&] { parseCalibration(text, "f"); }); };
   /// The chain above with one thing changed.

@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <cstdlib>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <cli/temporary_directory.hpp>
 #include <cli/io/text.hpp>
@@ -65,6 +68,31 @@ TEST(ImageTrackFiles, TheLeftOfAStereoPair) {
   EXPECT_EQ(tracks.observations[1].u, 5);
   EXPECT_EQ(tracks.observations[1].v, 6);
   EXPECT_EQ(tracks.seen_once, 0U);
+}
+
+// Hashes and addresses serve as track numbers, too; a double has 53 bits.
+TEST(ImageTrackFiles, NumbersOfTracksUpTo2To63) {
+  const ImageTracks tracks = parse(
+      "frame,track,t_s,u,v\n0,9223372036854775807,0,1,2\n0,9223372036854775806,0,3,4\n"
+      "1,9223372036854775808,1,1,2\n1,9223372036854775807,1,1,2\n");
+  EXPECT_EQ(tracks.track_ids,
+            (std::vector<std::size_t>{9223372036854775806U, 9223372036854775807U, 9223372036854775808U}));
+  EXPECT_NE(errorOf([] { parse("frame,track,t_s,u,v\n0,9223372036854775809,0,1,2\n"); }).find("up to 2^63"),
+            std::string::npos);
+}
+
+TEST(ImageTrackFiles, TheUnitOfAClockIsSuspected) {
+  const std::int64_t now = 1600000000000000000;
+  // Images of the same day in microseconds, milliseconds and seconds, as seconds on the readings' clock.
+  for (const auto& [per_ns, unit] : {std::pair{1e3, "microseconds"}, {1e6, "milliseconds"}, {1e9, "seconds"}}) {
+    const double stamp = 1.6e18 / per_ns;
+    const std::string said = suspectedUnit(now, 1e-9 * (stamp - static_cast<double>(now)));
+    EXPECT_NE(said.find(std::string("images' times in ") + unit), std::string::npos) << said;
+    const std::string other = suspectedUnit(static_cast<std::int64_t>(stamp), 1e-9 * (1.6e18 - stamp));
+    EXPECT_NE(other.find(std::string("readings' times in ") + unit), std::string::npos) << other;
+  }
+  EXPECT_EQ(suspectedUnit(now, 3600), "");
+  EXPECT_EQ(suspectedUnit(0, 1000), "");
 }
 
 TEST(ImageTrackFiles, BadOnesAreNamed) {

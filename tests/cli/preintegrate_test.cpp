@@ -136,6 +136,7 @@ TEST(Preintegrate, WhatCannotBeUsedIsSaid) {
   EXPECT_EQ(some.status, 0) << "windows beside the gap";
   EXPECT_EQ(some.json["windows"][0]["status"], "ok");
   EXPECT_EQ(some.json["windows"][2]["status"], "gap");
+  EXPECT_EQ(some.json["windows"][2]["fault_time"], 0.4) << "the reading after the gap";
   EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--begin", "3"}).status, 2);
   EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--window", "7"}).status, 2);
   for (const char* window : {"1e-300", "nan", "inf", "0"}) {

@@ -181,8 +181,8 @@ TEST_F(Program, BadInputNamesFileAndLine) {
             "f.csv:3: the norm of the quaternion is 2, expected 1 within 0.001\n");
   EXPECT_EQ(refusal("x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n1,2,3,1,2,0,1,0,1\n").substr(0, 49),
             "f.csv:2: the covariance is not positive definite ");
-  EXPECT_EQ(refusal("x,y,z,weight\n1,2,3,1\n1,2,3,0\n"), "f.csv:3: weight is 0, expected a positive number\n");
-  EXPECT_EQ(refusal("x,y,z,weight\n1,2,3,-1\n"), "f.csv:2: weight is -1, expected a positive number\n");
+  EXPECT_EQ(refusal("x,y,z,weight\n1,2,3,0\n"), "f.csv:2: every weight is 0, expected one above 0\n");
+  EXPECT_EQ(refusal("x,y,z,weight\n1,2,3,-1\n"), "f.csv:2: weight is -1, expected 0 or more\n");
 }
 
 TEST_F(Program, WishesThatDoNotFitTheFile) {

@@ -290,9 +290,10 @@ TEST(Reading, MessagesStayOnOneLineWhateverTheTextHolds) {
             "f.csv:2: z is '" + std::string(40, 'a') + "...', expected a number");
 }
 
-TEST(Reading, WeightsArePositive) {
-  EXPECT_EQ(errorIn("x,y,z,weight\n1,2,3,1\n1,2,3,0\n"), "f.csv:3: weight is 0, expected a positive number");
-  EXPECT_EQ(errorIn("x,y,z,weight\n1,2,3,-2.5\n"), "f.csv:2: weight is -2.5, expected a positive number");
+TEST(Reading, WeightsAreNotNegative) {
+  EXPECT_EQ(read("x,y,z,weight\n1,2,3,1\n1,2,3,0\n").weights, (std::vector<double>{1, 0}));
+  EXPECT_EQ(errorIn("x,y,z,weight\n1,2,3,-2.5\n"), "f.csv:2: weight is -2.5, expected 0 or more");
+  EXPECT_EQ(errorIn("x,y,z,weight\n1,2,3,0\n1,2,3,0\n"), "f.csv:2: every weight is 0, expected one above 0");
 }
 
 TEST(Reading, CovariancesArePositiveDefinite) {

@@ -324,6 +324,36 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
   EXPECT_FALSE(std::filesystem::exists(directory / "bad"));
 }
 
+// A directory may hold files of these names that took somebody months.
+TEST(SimulateVi, ReplacesOnlyItsOwnFiles) {
+  const TemporaryDirectory directory;
+  const auto simulate = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> all{LIESTAT_PROGRAM, "simulate", "vi", "--end", "2", "--output", "out"};
+    all.insert(all.end(), options.begin(), options.end());
+    return runProgram(all, directory.path().string());
+  };
+  std::filesystem::create_directory(directory / "out");
+  directory.write("out/imu.csv", "mine\n");
+  const ProgramResult refused = simulate({});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_EQ(
+      refused.errors,
+      "out/imu.csv: the file is there, and not as liestat simulate vi has written it, expected another directory, "
+      "or --overwrite\n");
+  EXPECT_EQ(contentOf(directory / "out/imu.csv"), "mine\n");
+  EXPECT_FALSE(std::filesystem::exists(directory / "out/tracks.csv")) << "nothing is written before all is looked at";
+
+  ASSERT_EQ(simulate({"--overwrite"}).status, 0);
+  EXPECT_NE(contentOf(directory / "out/imu.csv"), "mine\n");
+  EXPECT_EQ(simulate({"--seed", "2"}).status, 0) << "its own files may be replaced";
+  directory.write("out/truth.csv", contentOf(directory / "out/truth.csv") + "# my remark\n");
+  EXPECT_EQ(simulate({}).status, 2) << "but not those that were changed since";
+  EXPECT_NE(contentOf(directory / "out/truth.csv").find("my remark"), std::string::npos);
+  std::filesystem::remove(directory / "out/truth.csv");
+  directory.write("out/liestat.txt", "a list of my own\n");
+  EXPECT_EQ(simulate({}).status, 2);
+}
+
 // The data's README, "Tracks from a real trajectory and a real IMU".
 TEST(SimulateVi, Euroc) {
   const char* data = std::getenv("LIESTAT_DATA");

@@ -1,0 +1,180 @@
+// Weights are relative: any common factor and any size of them give the same estimates, zero leaves a feature out, and
+// what is no weight gives a status.
+
+#include <stats/certified_group_mean.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/covariance.hpp>
+#include <stats/dispersion.hpp>
+#include <stats/group_mean.hpp>
+#include <stats/mean.hpp>
+
+#include <lie/lie.hpp>
+
+#include <support/product_samples.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using liestat_test::scattered;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t n = 12;
+
+std::vector<double> ordinaryWeights(double factor = 1) {
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < n; ++i) weights.push_back(factor * (0.5 + 0.1 * static_cast<double>(i)));
+  return weights;
+}
+
+template <class T>
+std::vector<T> without(std::vector<T> list, std::size_t i) {
+  list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
+  return list;
+}
+
+template <class Matrix>
+void expectNear(const Matrix& found, const Matrix& expected, double tolerance) {
+  EXPECT_LE((found - expected).norm(), tolerance * (1 + expected.norm()));
+}
+
+template <class M>
+class WeightsTest : public testing::Test {};
+using Manifolds = testing::Types<SO3d, SO3f, S2d, Frame3d, SemiOrientedFrame3d>;
+TYPED_TEST_SUITE(WeightsTest, Manifolds);
+
+TYPED_TEST(WeightsTest, OnlyRatiosMatter) {
+  using M = TypeParam;
+  const double tolerance = 64 * static_cast<double>(std::numeric_limits<ScalarOf<M>>::epsilon());
+  const auto samples = scattered<M>(static_cast<int>(n), 0.1);
+  const auto expected = certifiedMean(samples, ordinaryWeights());
+  ASSERT_EQ(expected.status, Status::ok);
+  // From the smallest normal numbers to the largest.
+  for (const double factor : {1e-300, 1e-165, 1e-9, 1e9, 1e155, 1e300}) {
+    const auto weights = ordinaryWeights(factor);
+    const auto found = certifiedMean(samples, weights);
+    ASSERT_EQ(found.status, Status::ok) << factor;
+    EXPECT_LE(static_cast<double>(distance(found.mean.mean, expected.mean.mean)), tolerance);
+    expectNear(found.estimate->covariance, expected.estimate->covariance, tolerance);
+    expectNear(dispersionAbout(samples, weights, found.mean.mean).covariance, expected.mean.dispersion(), 1e-5);
+    const std::vector<SquareOf<M>> noise(n, SquareOf<M>::Identity());
+    expectNear(covarianceFromNoise(found.mean, weights, noise),
+               covarianceFromNoise(expected.mean, ordinaryWeights(), noise), tolerance);
+    CertifiedMeanOptions<M> known;
+    known.known_noise = std::vector<SquareOf<M>>(n, SquareOf<M>(ScalarOf<M>(0.01) * SquareOf<M>::Identity()));
+    const auto with_noise = certifiedMean(samples, weights, known);
+    ASSERT_EQ(with_noise.status, Status::ok) << factor;
+    expectNear(with_noise.estimate->covariance, certifiedMean(samples, ordinaryWeights(), known).estimate->covariance,
+               tolerance);
+  }
+}
+
+TYPED_TEST(WeightsTest, ZeroLeavesAFeatureOut) {
+  using M = TypeParam;
+  const auto samples = scattered<M>(static_cast<int>(n), 0.1);
+  for (const std::size_t left_out : {std::size_t{0}, std::size_t{5}, n - 1}) {
+    auto weights = ordinaryWeights();
+    const auto others = certifiedMean(without(samples, left_out), without(weights, left_out));
+    // A weight whose square is no number beside the others' says as much.
+    for (const double nothing : {0., 1e-200}) {
+      weights[left_out] = nothing;
+      const auto found = certifiedMean(samples, weights);
+      EXPECT_EQ(found.mean.n, n - 1);
+      EXPECT_EQ(found.status, others.status);
+      EXPECT_EQ(distance(found.mean.mean, others.mean.mean), ScalarOf<M>(0));
+      expectNear(found.estimate->covariance, others.estimate->covariance, 0);
+      EXPECT_EQ(mean(samples, weights).n, n - 1);
+      const auto farthest = dispersionAbout(samples, weights, others.mean.mean).farthest;
+      const auto expected = dispersionAbout(without(samples, left_out), without(weights, left_out), others.mean.mean);
+      ASSERT_EQ(farthest.size(), expected.farthest.size());
+      for (std::size_t i = 0; i < farthest.size(); ++i) {
+        const std::size_t index = expected.farthest[i].index;
+        EXPECT_EQ(farthest[i].index, index + (index >= left_out ? 1 : 0));
+      }
+    }
+  }
+  // Known noise of each feature goes with it.
+  auto weights = ordinaryWeights();
+  weights[3] = 0;
+  CertifiedMeanOptions<M> all, others;
+  for (std::size_t i = 0; i < n; ++i) {
+    all.known_noise.push_back(
+        SquareOf<M>(ScalarOf<M>(0.01 + 0.001 * static_cast<double>(i)) * SquareOf<M>::Identity()));
+  }
+  others.known_noise = without(all.known_noise, 3);
+  const auto found = certifiedMean(samples, weights, all);
+  const auto expected = certifiedMean(without(samples, 3), without(weights, 3), others);
+  ASSERT_EQ(found.status, Status::ok);
+  expectNear(found.estimate->covariance, expected.estimate->covariance, 0);
+}
+
+TYPED_TEST(WeightsTest, WhatIsNoWeightGivesAStatus) {
+  using M = TypeParam;
+  const auto samples = scattered<M>(static_cast<int>(n), 0.1);
+  const auto refused = [&](const std::vector<double>& weights) {
+    const auto found = certifiedMean(samples, weights);
+    EXPECT_EQ(found.status, Status::not_applicable);
+    EXPECT_FALSE(found.estimate);
+    EXPECT_NE(std::string(found.reason), "");
+    EXPECT_EQ(mean(samples, weights).status, Status::not_applicable);
+    EXPECT_FALSE(converged(mean(samples, weights).status));
+    EXPECT_EQ(uniqueness(samples, weights, mean(samples)).unique, Uniqueness::not_certified);
+  };
+  for (const double bad : {-1e-300, -1., nan, infinity, -infinity}) {
+    auto weights = ordinaryWeights();
+    weights[4] = bad;
+    refused(weights);
+  }
+  refused(std::vector<double>(n, 0.0));
+}
+
+TEST(Weights, OfBarycentres) {
+  const auto samples = scattered<SE3d>(static_cast<int>(n), 0.1);
+  const auto expected = certifiedGroupMean(samples, ordinaryWeights());
+  ASSERT_EQ(expected.status, Status::ok);
+  for (const double factor : {1e-300, 1e155}) {
+    const auto found = certifiedGroupMean(samples, ordinaryWeights(factor));
+    ASSERT_EQ(found.status, Status::ok);
+    EXPECT_LE(log(found.mean.mean, expected.mean.mean).norm(), 1e-13);
+    expectNear(found.estimate->covariance, expected.estimate->covariance, 1e-12);
+  }
+  auto weights = ordinaryWeights();
+  weights[2] = 0;
+  const auto found = certifiedGroupMean(samples, weights);
+  EXPECT_EQ(found.mean.n, n - 1);
+  expectNear(found.estimate->covariance,
+             certifiedGroupMean(without(samples, 2), without(weights, 2)).estimate->covariance, 0);
+  weights[2] = nan;
+  EXPECT_EQ(certifiedGroupMean(samples, weights).status, Status::not_applicable);
+  EXPECT_EQ(groupMean(samples, weights).status, Status::not_applicable);
+}
+
+// Half of the weights 1e300, half 1e-300: the second half is not there.
+TEST(Weights, OfVeryDifferentSizes) {
+  const auto samples = scattered<SO3d>(static_cast<int>(n), 0.1);
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < n; ++i) weights.push_back(i < n / 2 ? 1e300 : 1e-300);
+  const auto found = certifiedMean(samples, weights);
+  const auto half = certifiedMean(std::vector<SO3d>(samples.begin(), samples.begin() + n / 2));
+  EXPECT_EQ(found.mean.n, n / 2);
+  EXPECT_LE(distance(found.mean.mean, half.mean.mean), 1e-15);
+  expectNear(found.estimate->covariance, half.estimate->covariance, 1e-14);
+}
+
+// In debug builds an assertion.
+TEST(Weights, OfAnotherNumber) {
+#ifdef NDEBUG
+  const auto samples = scattered<SO3d>(static_cast<int>(n), 0.1);
+  EXPECT_EQ(mean(samples, std::vector<double>(n - 1, 1.0)).status, Status::not_applicable);
+#endif
+}
+
+}  // namespace
