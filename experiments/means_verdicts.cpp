@@ -61,7 +61,7 @@ void judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Count
   for (std::size_t i = 0; i < n; ++i) samples.push_back(sampler.draw(i, rng));
   CertifiedMeanOptions<M> options;
   // A certificate that is not found changes no verdict; a rival that is, is found early.
-  options.uniqueness.budget = 2000;
+  options.uniqueness.budget = 200'000;
   const CertifiedMean<M> result = certifiedMean(samples, options);
   const M truth = ManifoldTraits<M>::origin();
   const auto misses = [&](const SquareOf<M>& covariance) {

@@ -30,7 +30,7 @@ template <Homogeneous M>
 struct CertifiedMahaOptions {
   MahaOptions<M> maha = {};         ///< its start, if there is one, is tried first
   UniquenessOptions uniqueness = {  ///< of the least-squares mean that gives the starts
-      .budget = 100'000};
+      .budget = 10'000'000};
   std::size_t starts_from_data = 6;  ///< features, spread over the data, that are starts too
   double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
   double distinct = 1e-4;            ///< and they are this far apart, rad and m

@@ -57,6 +57,9 @@ struct CertifiedMean {
 
 namespace detail {
 
+/// The search for ties gets this part of its budget where the data are as scattered as uniform ones.
+inline constexpr std::size_t scattered_budget_part = 50;
+
 inline constexpr const char* not_converged_reason = "the iteration for the mean did not converge";
 inline constexpr const char* rival_reason = "another feature explains the data as well";
 inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
@@ -95,7 +98,17 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   };
   result.mean = frechetMean<M>(executor, samples, weights, options.mean);
   if (result.mean.n == 0) return without(Status::too_few, "there are no features");
-  result.uniqueness = findUniqueness(executor, samples, weights, result.mean, options.uniqueness);
+  const bool known = !options.known_noise.empty();
+  // Of few data whose noise is known it is not asked to show that there is a mean.
+  const auto isScattered = [&](const Concentration& concentration) {
+    const bool modest =
+        known && (result.mean.n == 1 || (concentration.isModest() && isModestNoise<M>(options.known_noise)));
+    return !concentration.concentrated && !modest;
+  };
+  // What has no covariance anyway is searched for ties of the sample only as far as they are cheap.
+  UniquenessOptions search = options.uniqueness;
+  if (isScattered(findConcentration(samples, weights, result.mean.mean))) search.budget /= scattered_budget_part;
+  result.uniqueness = findUniqueness(executor, samples, weights, result.mean, search);
   if (result.uniqueness.improved) {
     MeanOptions<M> from_there = options.mean;
     from_there.start = result.uniqueness.minimiser;
@@ -106,7 +119,6 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 
   // The region is the one that the residuals show, whatever the noise is said to be; that of the known noise where
   // there are too few residuals.
-  const bool known = !options.known_noise.empty();
   const bool have_residuals = result.mean.n > static_cast<std::size_t>(ManifoldTraits<M>::DoF);
   if (!have_residuals && !known) return without(Status::too_few, too_few_reason);
   result.concentration = findConcentration(samples, weights, result.mean.mean);
@@ -121,6 +133,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.hessian_change = settled.change;
   if (!settled.first.allFinite()) return without(Status::ill_defined, hessian_reason);
   result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
+  if (isScattered(result.concentration)) return without(Status::ill_defined, scattered_reason);
   const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
   if (known) {
     const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
@@ -131,12 +144,6 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   } else {
     result.near_ties =
         findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
-  }
-  // Of few data whose noise is known it is not asked to show that there is a mean.
-  const bool modest =
-      known && (result.mean.n == 1 || (result.concentration.isModest() && isModestNoise<M>(options.known_noise)));
-  if (!result.concentration.concentrated && !modest) {
-    return without(Status::ill_defined, scattered_reason);
   }
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);

@@ -80,6 +80,22 @@ std::vector<M> startsOfRivals(const R& samples, const MeanResult<M>& mean) {
   return starts;
 }
 
+/// Of very many data every m-th with its weight, for descents that end near a minimum of all; else nothing.
+template <Metric M>
+struct Part {
+  std::vector<M> features;
+  std::vector<double> weights;
+
+  template <class R, class W>
+  Part(const R& samples, const W& all_weights) {
+    const std::size_t n = std::ranges::size(samples), stride = n > 20000 ? n / most_averaged : n + 1;
+    for (std::size_t i = 0; stride <= n && i < n; i += stride) {
+      features.push_back(M(samples[i]));
+      weights.push_back(static_cast<double>(all_weights[i]));
+    }
+  }
+};
+
 /// The noise of the data where it is not known.
 struct NoNoise {};
 
@@ -136,15 +152,23 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       return static_cast<double>(z.dot(T::metricWeights().cwiseProduct(z)));
     };
     const auto to_mean = T::placement(mean.mean).inverse();
-    std::vector<M> seen{mean.mean};
+    const auto isAmong = [](const std::vector<M>& list, const M& y) {
+      return std::any_of(list.begin(), list.end(),
+                         [&](const M& x) { return static_cast<double>(log(x, y).norm()) < 1e-3; });
+    };
+    const Part<M> part(samples, weights);
+    std::vector<M> seen{mean.mean}, seen_by_part;
     for (const M& start : startsOfRivals(samples, mean)) {
       MeanOptions<M> how;
       how.start = start;
+      if (!part.features.empty()) {
+        const MeanResult<M> near = frechetMean<M>(executor, part.features, part.weights, how);
+        if (!converged(near.status) || isAmong(seen_by_part, near.mean)) continue;
+        seen_by_part.push_back(near.mean);
+        how.start = near.mean;
+      }
       const MeanResult<M> found = frechetMean<M>(executor, samples, weights, how);
-      if (!converged(found.status)) continue;
-      const bool known = std::any_of(seen.begin(), seen.end(),
-                                     [&](const M& y) { return static_cast<double>(log(y, found.mean).norm()) < 1e-3; });
-      if (known) continue;
+      if (!converged(found.status) || isAmong(seen, found.mean)) continue;
       seen.push_back(found.mean);
       // The other coordinates of a minimum of the criterion are those of the mean.
       const Vector error = log(mean.mean, found.mean).template segment<K>(begin).template cast<double>();

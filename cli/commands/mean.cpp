@@ -2,7 +2,9 @@
 #include <cli/io/output_file.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
+#include <cli/show/progress.hpp>
 
+#include <cstdint>
 #include <memory>
 
 #include <cli/commands/measurement_options.hpp>
@@ -22,7 +24,13 @@ int runCommand(const Options& options, const Invocation& invocation) {
   AnalysisOptions how = options.analysis;
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
+  Progress progress("searching for other means", 1000);
+  how.progress = [&](double fraction) {
+    const auto done = static_cast<std::uint64_t>(1000 * fraction);
+    if (done > progress.done()) progress.advance(done - progress.done());
+  };
   MeanAnalysis analysis = analyseMean(measurements, how);
+  progress.finish();
   compareBlocks(analysis, measurements, how);
   if (how.inflate && !analysis.time_blocks) {
     throw InputError("liestat mean", 0, "--inflate, but blocks of time cannot be compared",
@@ -51,8 +59,8 @@ void addMeanCommand(const CommandList& app) {
   command.flag("--no-certify", options->no_certify, "Do without branch and bound where cheap certificates fail");
   command
       .option("--budget", options->analysis.budget,
-              "Cells of branch and bound (default 1000000, with more than 100000 measurements 2000)")
-      .range(std::size_t{1}, std::size_t{1000000000});
+              "Looks of branch and bound at measurements or bins of them, some 30 ns each (default 100000000)")
+      .range(std::size_t{1}, std::size_t{1000000000000});
   command.flag("--inflate", options->analysis.inflate,
                "Multiply the covariance by the factor by which blocks of time disagree");
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);

@@ -25,6 +25,7 @@ inline constexpr bool is_group = !Metric<M>;
 
 UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
   UniquenessOptions how;
+  how.progress = options.progress;
   how.branch_and_bound = options.certify;
   how.budget = options.budget;
   return how;
@@ -85,9 +86,9 @@ template <class M>
 M mahalanobisMean(const Measurements& measurements, const AnalysisOptions& options, MeanAnalysis& analysis) {
   CertifiedMahaOptions<M> how;
   how.maha.likelihood = measurements.likelihood;
-  const std::size_t most_cells = how.uniqueness.budget;
+  const std::size_t most = how.uniqueness.budget;
   how.uniqueness = uniquenessOptions(options);
-  how.uniqueness.budget = std::min(options.budget, most_cells);
+  how.uniqueness.budget = std::min(options.budget, most);
   const CertifiedMaha<M> result = certifiedMaha(ProgramExecutor{options.threads}, gaussiansOf<M>(measurements.file),
                                                 measurements.covariance_at, how);
   analysis.fit = result.fit;
@@ -137,10 +138,8 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
 }  // namespace
 
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options) {
-  AnalysisOptions how = options;
-  if (how.budget == 0) how.budget = measurements.size() > 100000 ? 2000 : 1000000;
   MeanAnalysis analysis =
-      experiments::withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, how); });
+      experiments::withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, options); });
   explain(analysis, measurements.size());
   return analysis;
 }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -80,9 +81,10 @@ struct MeanAnalysis {
 /// Options of analyseMean().
 struct AnalysisOptions {
   bool certify = true;     ///< branch and bound where the cheap certificates fail
-  std::size_t budget = 0;  ///< its cells; 0: a million, of very many measurements as many as take some seconds
+  std::size_t budget = UniquenessOptions{}.budget;  ///< of its looks at measurements or bins of them
   int threads = 0;         ///< 0: all
   bool charts = false;     ///< for a report
+  std::function<void(double)> progress = {};  ///< is told which part of that budget is spent
   bool inflate = false;    ///< multiply the covariance by the factor of compareBlocks()
 };
 

@@ -47,6 +47,7 @@ namespace {
 /// The standard deviations of the translation along the axes of the file's world, for features with a rotation.
 void setWorldDeviations(JsonObject& object, const char* field, Feature feature, const MeanAnalysis& analysis,
                         const Eigen::MatrixXd& covariance) {
+  object.set(field, nullptr);
   if (covariance.size() == 0) return;
   for (const TangentBlock& part : experiments::info(feature).tangent) {
     const auto list = worldDeviations(part, analysis.mean, covariance);

@@ -62,9 +62,12 @@ class CellSearch {
     distinct_ = distinct;
   }
   std::size_t cells() const { return cells_; }
+  std::size_t looks() const { return looks_; }
+  /// Counts what was spent on the search elsewhere.
+  void spend(std::size_t looks) { looks_ += looks; }
 
   enum class Step { done, split, exhausted };
-  /// Splits the most promising cell, which is shown to `visit` before.
+  /// Splits the most promising cell, which is shown to `visit` before; exhausted once the budget of looks is spent.
   template <class Visit>
   Step step(const Visit& visit) {
     while (!heap_.empty()) {
@@ -76,7 +79,7 @@ class CellSearch {
         return Step::done;
       }
       if (isExcluded(cell.centre, cell.half_side)) continue;
-      if (cells_ >= budget_ || cell.half_side < 1e-9) return Step::exhausted;
+      if (looks_ >= budget_ || cell.half_side < 1e-9) return Step::exhausted;
       visit(cell);
       split(cell);
       return Step::split;
@@ -136,6 +139,7 @@ class CellSearch {
     const std::vector<BallBound> bounds = boundsAt(centres, rho);
     for (std::size_t i = 0; i < bounds.size(); ++i) {
       const BallBound& bound = bounds[i];
+      looks_ += bound.looks;
       if (bound.lower > threshold_ || (bound.lower > same_ && isNearKnown(centres[i], rho))) continue;
       heap_.push_back({std::max(bound.lower, cell.lower), bound.centre, charts[i], h});
       std::push_heap(heap_.begin(), heap_.end(), later);
@@ -146,17 +150,19 @@ class CellSearch {
   const PackedData<Space>& data_;
   const TransverseTable<Space>& g_;
   double reach_;
-  std::size_t budget_, cells_ = 0;
+  std::size_t budget_, looks_ = 0, cells_ = 0;
   double threshold_ = std::numeric_limits<double>::infinity(), same_ = threshold_, distinct_ = 0;
   std::vector<Cell> heap_;
   std::vector<ExcludedBall<Space>> balls_;
 };
 
-/// Eq. (4) from a point: monotone, also across the cut locus. Returns where it comes to rest.
+/// Eq. (4) from a point: monotone, also across the cut locus. Returns where it comes to rest, and in `steps` after how
+/// many of them.
 template <class Space>
-typename Space::Point descend(const PackedData<Space>& data, typename Space::Point y, int steps = 60,
-                              double tolerance = 1e-5) {
-  for (int i = 0; i < steps; ++i) {
+typename Space::Point descend(const PackedData<Space>& data, typename Space::Point y, std::size_t& steps) {
+  constexpr std::size_t most = 60;
+  constexpr double tolerance = 1e-5;
+  for (steps = 0; steps < most; ++steps) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double weight = 0;
     for (std::size_t k = 0; k < data.roots; ++k) {

@@ -18,6 +18,7 @@ namespace liestat::detail {
 struct BallBound {
   double lower = 0;   ///< of the criterion in the ball
   double centre = 0;  ///< the criterion at the centre; with bins, at least it
+  std::size_t looks = 0;  ///< at data and bins
 };
 
 /// Bound of C(y) = ½ Σ p θ² in the ball of radius ρ about y.
@@ -25,9 +26,11 @@ template <class Space>
 BallBound boundInBall(const PackedData<Space>& data, const TransverseTable<Space>& g, const typename Space::Point& y,
                       double rho) {
   double centre = 0, lipschitz = 0, mixed = 0, curvature = 0;
+  std::size_t looks = 0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   const auto add = [&](const auto& self, const typename PackedData<Space>::Item& item) -> void {
     const Sighting s = data.space.see(y, item.point);
+    ++looks;
     const double reach = rho + item.radius;
     const bool smooth = s.gap() > 2 * reach;
     if (!smooth && item.begin < item.end && item.radius > 0.25 * rho) {
@@ -67,7 +70,7 @@ BallBound boundInBall(const PackedData<Space>& data, const TransverseTable<Space
   } else {
     mixed -= slope * rho - 0.5 * curvature * rho * rho;
   }
-  return {std::max(lipschitz, mixed), centre};
+  return {std::max(lipschitz, mixed), centre, looks};
 }
 
 /// How the data lie about a critical point: all that local certificates need.

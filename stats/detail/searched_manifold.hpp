@@ -36,7 +36,8 @@ class SearchedManifold final : public SearchedMean<Space> {
                                                               .base_converged = converged(base_.status),
                                                               .branch_and_bound = options.branch_and_bound,
                                                               .budget = options.budget,
-                                                              .max_rivals = options.max_rivals})
+                                                              .max_rivals = options.max_rivals,
+                                                              .progress = options.progress})
                                       .run();
     return {verdict.unique, base_.mean, improved_, base_.cost, rivals_, verdict.r_star, verdict.cells, verdict.proof};
   }
@@ -45,7 +46,8 @@ class SearchedManifold final : public SearchedMean<Space> {
   Found iterate(const Point& start) override {
     last_ = meanFrom(featureAt(space_, base_.mean, start));
     return {converged(last_.status), last_.cost < base_.cost,
-            relativePoint<Space>(ManifoldTraits<M>::placement(base_.mean).inverse(), last_.mean)};
+            relativePoint<Space>(ManifoldTraits<M>::placement(base_.mean).inverse(), last_.mean),
+            (static_cast<std::size_t>(last_.iterations) + 1) * last_.n};
   }
   void takeAsBase() override {
     base_ = last_;

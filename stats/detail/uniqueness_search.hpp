@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -47,6 +48,7 @@ class SearchedMean {
     bool converged;
     bool lower;   ///< its cost is below the base's
     Point point;  ///< its compact part
+    std::size_t looks;  ///< at features
   };
 
   /// The compact parts of the features.
@@ -70,8 +72,9 @@ struct SearchOptions {
   double a_priori_radius;  ///< data in a smaller ball have one mean
   bool base_converged;     ///< the base is a minimum
   bool branch_and_bound;
-  std::size_t budget;
+  std::size_t budget;  ///< looks at features and bins of them
   std::size_t max_rivals;
+  const std::function<void(double)>& progress;  ///< is told which part of the budget is spent
 };
 
 /// What a search says about the base.
@@ -106,8 +109,12 @@ class UniquenessSearch {
     ExcludedBall<Space> ball;
   };
 
+  /// What packing, ordering and grouping a datum cost, in looks.
+  static constexpr std::size_t looks_to_pack = 8;
+
   void setBase() {
     data_ = mean_.data();
+    looks_ += looks_to_pack * data_.items.size();
     profile_ = profile(data_, Space::fromChart(Space::Chart::Zero()));
     verdict_.r_star = convexityRadius<Space>(profile_);
   }
@@ -117,6 +124,13 @@ class UniquenessSearch {
     mean_.takeAsBase();
     options_.base_converged = true;
     setBase();
+  }
+
+  /// Says how far the budget is spent, a hundred times at most.
+  void tell(std::size_t looks) {
+    if (!options_.progress || looks < next_told_) return;
+    options_.progress(std::min(1.0, static_cast<double>(looks) / static_cast<double>(options_.budget)));
+    next_told_ = looks + options_.budget / 100;
   }
 
   bool prove(const char* proof) {
@@ -175,13 +189,12 @@ class UniquenessSearch {
   }
 
   bool searchIn(const PackedData<Space>& data, const TransverseTable<Space>& g) {
-    const std::size_t budget = options_.budget;
     const Point origin = Space::fromChart(Space::Chart::Zero());
     const double best = profile_.cost;
     const double threshold = best * (1 + options_.tie);
     std::vector<Minimum> rivals, others;
     bool found_better = false;
-    CellSearch<Space, E> search(executor_, data, g, reach(), budget > verdict_.cells ? budget - verdict_.cells : 0);
+    CellSearch<Space, E> search(executor_, data, g, reach(), options_.budget > looks_ ? options_.budget - looks_ : 0);
     constexpr double distinct = 1e-3;  // rad; nearer minima are one
     const double same = best * (1 - options_.tie);
     search.setThreshold(threshold, same, distinct);
@@ -190,7 +203,9 @@ class UniquenessSearch {
 
     // From a promising cell down to the minimum below it.
     const auto explore = [&](const typename CellSearch<Space, E>::Cell& cell) {
-      const Point rest = descend(data, Space::fromChart(cell.centre));
+      std::size_t steps = 0;
+      const Point rest = descend(data, Space::fromChart(cell.centre), steps);
+      search.spend(steps * data.roots);
       const auto known = [&](const Point& p, double within) {
         const auto near = [&](const Point& q) { return data_.space.see(q, p).angle < within; };
         return (options_.base_converged && near(origin)) ||
@@ -202,6 +217,7 @@ class UniquenessSearch {
       // The costs of bins are upper bounds, and a step through many data is dear.
       if (data.roots < data_.items.size() && cost_at_rest > 1.05 * best) return;
       const auto found = mean_.iterate(rest);
+      search.spend(found.looks);
       if (!found.converged) return;
       const Profile seen = profile(data_, found.point);
       Minimum m{found.point, seen.cost, {}};
@@ -226,8 +242,10 @@ class UniquenessSearch {
         if (!promising) next_exploration += 8 + next_exploration / 4;
         explore(cell);
       });
+      tell(looks_ + search.looks());
     }
     verdict_.cells += search.cells();
+    looks_ += search.looks();
     if (found_better) {
       adopt();
       return true;
@@ -247,6 +265,7 @@ class UniquenessSearch {
   PackedData<Space> data_;
   Profile profile_;
   SearchVerdict verdict_;
+  std::size_t looks_ = 0, next_told_ = 0;
 };
 
 }  // namespace liestat::detail

@@ -36,7 +36,7 @@ Verdicts scatteredMaha(double kappa, int n, std::uint64_t trials) {
     V.diagonal().array() += z.squaredNorm() / (20000 * ManifoldTraits<M>::DoF);
   }
   CertifiedMahaOptions<M> options;
-  options.uniqueness.budget = 2000;
+  options.uniqueness.budget = 200'000;
   Verdicts verdicts;
   for (std::uint64_t t = 0; t < trials; ++t) {
     CounterRng rng(13, t);
@@ -69,7 +69,7 @@ TEST(ScatteredFeatures, barycentresOfPoses) {
       std::vector<SE3d> samples;
       for (int i = 0; i < 30; ++i) samples.push_back(pose(law, rng));
       CertifiedGroupMeanOptions options;
-      options.uniqueness.budget = 2000;
+      options.uniqueness.budget = 200'000;
       const auto result = certifiedGroupMean(samples, options);
       const bool inside =
           result.estimate && detail::hotellingTail(mahalanobisSquared(*result.estimate, SE3d()), 6, 30) > 0.05;

@@ -376,7 +376,7 @@ TEST(BranchAndBound, aSmallBudgetIsNotACertificate) {
   std::size_t undecided = 0;
   for (std::uint64_t trial = 0; trial < 10; ++trial) {
     const auto samples = scattered<NonOrientedFrame3d>(trial, 30, 1);
-    const auto result = uniqueness(samples, mean(samples), {.budget = 50});
+    const auto result = uniqueness(samples, mean(samples), {.budget = 1500});
     undecided += result.unique == Uniqueness::not_certified;
     const auto cheap = uniqueness(samples, mean(samples), {.branch_and_bound = false});
     EXPECT_EQ(cheap.unique, Uniqueness::not_certified);
