@@ -65,6 +65,8 @@ struct InertialSceneOptions {
   Eigen::Vector3d camera = Eigen::Vector3d::Zero();  ///< p_c: its centre in the body (m)
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();    ///< of the accelerometer (m/s²), left in S_j
   bool level_acceleration = false;                   ///< constant acceleration at a right angle to gravity
+  std::size_t on_object = 0;                         ///< the first features are on a body that moves uniformly
+  double object_speed = 0.5;                         ///< m/s, in a direction that is drawn
 };
 
 /// A body's motion and what it sees. Options that are not finite make a window that the solvers refuse.
@@ -78,6 +80,7 @@ class InertialScene {
     drawMotion(random);
     drawTimes(random);
     drawFeatures(random);
+    if (options.on_object > 0) object_velocity = options.object_speed * random.unitVector<3>();
     build();
   }
 
@@ -85,6 +88,8 @@ class InertialScene {
   Eigen::Vector3d velocity, gravity;      ///< V (m/s), G (m/s²) in the body's axes at the first image
   std::vector<Eigen::Vector3d> features;  ///< P_i in the body's axes at the first image, from its origin (m)
   std::vector<double> times;              ///< of the images (s), the first 0
+  /// Of the body with the first features, in the body's axes at the first image (m/s).
+  Eigen::Vector3d object_velocity = Eigen::Vector3d::Zero();
 
   /// In the world: m, m/s, m/s².
   Eigen::Vector3d position(double t) const {
@@ -242,14 +247,16 @@ class InertialScene {
       image.displacement = moved - t * velocity - 0.5 * t * t * gravity - image.displacement_by_bias * options_.bias;
       window.images.push_back(image);
     }
-    for (const Eigen::Vector3d& point : points_) {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const Eigen::Vector3d& point = points_[i];
+      const Eigen::Vector3d drift = i < options_.on_object ? object_velocity : Eigen::Vector3d::Zero();
       const Eigen::Vector3d P = body_R_world * Eigen::Vector3d(point - position(0));
       features.push_back(P);
       FeatureTrack track;
       for (std::size_t j = 0; j < times.size(); ++j) {
         const Eigen::Matrix3d back = window.images[j].rotation.transpose();
         const Eigen::Vector3d moved = body_R_world * Eigen::Vector3d(position(times[j]) - position(0));
-        track.push_back({j, (back * (P - moved) - options_.camera).normalized()});
+        track.push_back({j, (back * (P + times[j] * drift - moved) - options_.camera).normalized()});
       }
       window.features.push_back(std::move(track));
     }

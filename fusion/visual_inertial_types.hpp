@@ -119,6 +119,7 @@ struct InitialisedWindow {
     if (closed == FusionStatus::stationary && refined && !isRefined()) return FusionStatus::no_parallax;
     if (closed != FusionStatus::ok) return closed;
     if (found.inliers.empty()) return FusionStatus::no_consensus;
+    if (found.second) return FusionStatus::ambiguous;
     if (refined ? refined->ok() : closedForm().consistent) return FusionStatus::ok;
     if (!refined || refined->status == FusionStatus::ok) return FusionStatus::inconsistent;
     return refined->converged() ? refined->status : FusionStatus::not_refined;

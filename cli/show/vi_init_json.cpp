@@ -86,6 +86,15 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   o.set("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
   o.set("scale_deviation", c.scale_sigma).set("tilt_deviation", c.tilt_sigma);
   o.set("unseen_speed_per_depth", c.unseen_speed_per_depth);
+  if (const auto& second = w.found.second) {
+    JsonObject motion;
+    motion.set("tracks", second->inliers.size()).set("velocity", second->result.solutions[0].velocity);
+    motion.set("gravity", second->result.solutions[0].gravity);
+    if (second->result.covariance.size() > 0) motion.set("covariance", Eigen::MatrixXd(second->result.covariance));
+    o.set("second_motion", motion);
+  } else {
+    o.set("second_motion", nullptr);
+  }
   o.set("integrated_gyroscope_bias", w.measured.bias().gyroscope);
   o.set("integrated_accelerometer_bias", w.measured.bias().accelerometer);
   o.set("gyroscope_bias", w.found.gyroscope_bias)

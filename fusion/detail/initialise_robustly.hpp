@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/detail/second_motion.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
@@ -136,6 +137,7 @@ LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(InertialWindow win
                                                               const InitialisationOptions& options) {
   RobustInitialisation found = detail::searchMotion(window, options);
   detail::refineRest(window, options, found);
+  detail::addSecondMotion(window, {found.gyroscope_bias, window.bias().accelerometer}, options, found);
   return found;
 }
 

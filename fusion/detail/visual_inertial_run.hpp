@@ -1,6 +1,7 @@
 // How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
 #pragma once
 
+#include <fusion/detail/second_motion.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/gyroscope_bias.hpp>
@@ -191,6 +192,7 @@ class RecordingRun {
       found.inliers = std::move(consensus.inliers);
       found.outliers = std::move(consensus.outliers);
       found.hypotheses = consensus.hypotheses;
+      addSecondMotion(w.measured, w.measured.bias(), options, found);
       return;
     }
     if (options_.consensus) {

@@ -46,6 +46,14 @@ struct ConsensusOptions {
   std::uint64_t seed = 1;        ///< of the draws: the same seed gives the same result
 };
 
+/// fusion/init/robust_initialisation.hpp: a second motion, among the tracks that do not agree with the first. Tracks that
+/// drift independently of each other agree on one by chance in less than one window of a hundred (docs/closed_form.md).
+struct SecondMotionOptions {
+  bool search = true;
+  double least_part = 0.2;       ///< of all tracks must agree on it,
+  std::size_t beyond_drawn = 3;  ///< and so many more than a hypothesis is made of
+};
+
 /// fusion/init/epipolar_gyroscope_bias.hpp
 struct EpipolarBiasOptions {
   /// RMS by which the directions of a pair of images must move, beyond what a rotation explains, in sigmas.
@@ -88,6 +96,7 @@ struct InitialisationOptions {
 
   ClosedFormOptions closed_form = {};
   ConsensusOptions consensus = {};
+  SecondMotionOptions second_motion = {};
   EpipolarBiasOptions epipolar = {};
   GyroscopeBiasOptions gyroscope_bias = {};
   RefinementOptions refinement = {};

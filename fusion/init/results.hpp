@@ -144,6 +144,12 @@ struct RefinementResult {
 
 // initialiseRobustly(), in robust_initialisation.hpp
 
+/// Tracks that do not agree with the first motion but with another, and what they say. Indices are the window's.
+struct SecondMotion {
+  ClosedFormResult result;           ///< with its covariance
+  std::vector<std::size_t> inliers;  ///< ascending, none of the first's
+};
+
 /// Indices are the window's.
 struct RobustInitialisation {
   /// ok: motion and bias were found together (whether the motion is determined: see result.status).
@@ -151,6 +157,8 @@ struct RobustInitialisation {
   /// bias_status). The bias is that of rotations, as good as epipolar.status says; without a consensus on the motion so
   /// are the inliers.
   /// no_consensus: too few tracks agree, be it on a motion or on rotations; the result is that of all.
+  /// ambiguous: two groups of tracks each agree on a motion, and nothing tells which of them is the world and which a
+  /// body that moves: the larger is in result and inliers, the other in second.
   /// bad_input: see result.fault.
   FusionStatus status = FusionStatus::bad_input;
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();  ///< rad/s, whole
@@ -159,6 +167,7 @@ struct RobustInitialisation {
   ClosedFormResult result;                             ///< for this bias, of the inliers
   std::vector<std::size_t> inliers, outliers;          ///< ascending
   EpipolarBiasResult epipolar;                         ///< where it began
+  std::optional<SecondMotion> second;                  ///< where status is ambiguous
   std::optional<RefinementResult> rest;                ///< where result.status is stationary and the noise is known
   FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
   std::size_t hypotheses = 0;

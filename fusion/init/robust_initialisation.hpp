@@ -6,7 +6,9 @@
 //
 // First the gyroscope's bias from rotations alone (epipolar_gyroscope_bias.hpp), which needs no motion and bears wrong
 // tracks; for it, and for others that came near where few agree, the consensus on the motion (consensus.hpp);
-// on the tracks that agree the bias and the motion together (gyroscope_bias.hpp), and again while tracks come or go.
+// on the tracks that agree the bias and the motion together (gyroscope_bias.hpp), and again while tracks come or go. In
+// the end a second motion is looked for among the tracks that do not agree: a body that moves among the features, or the
+// world behind it.
 #pragma once
 
 #include <fusion/imu/window.hpp>

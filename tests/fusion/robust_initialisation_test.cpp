@@ -225,6 +225,53 @@ TEST(RobustInitialisation, UnsteadyReadingsAreNotRest) {
   }
 }
 
+// Tracks on a body that moves uniformly are as good an answer as the world's, and nothing in the data says which is
+// which: both come, the larger group first.
+TEST(RobustInitialisation, ASecondMotionIsAmbiguous) {
+  constexpr std::size_t features = 40;
+  for (const std::size_t on_object : {12, 16, 20, 24}) {
+    int ambiguous = 0, ok = 0;
+    constexpr int trials = 10;
+    for (std::uint64_t seed = 0; seed < trials; ++seed) {
+      const RecordedScene recorded(
+          {.scene = {.images = 21, .features = features, .on_object = on_object}, .bias = 0.02, .noise = adis},
+          1200 + seed);
+      const auto found = initialise(recorded, seed);
+      ok += found.ok();
+      if (found.status != Status::ambiguous) continue;
+      ++ambiguous;
+      ASSERT_TRUE(found.second);
+      EXPECT_GE(found.inliers.size(), found.second->inliers.size());
+      // Each group is of one body, and its velocity is the camera's past that body.
+      const auto check = [&](const ClosedFormResult& result, const std::vector<std::size_t>& inliers) {
+        const std::size_t moving = static_cast<std::size_t>(
+            std::count_if(inliers.begin(), inliers.end(), [&](std::size_t i) { return i < on_object; }));
+        const bool is_object = 2 * moving > inliers.size();
+        EXPECT_LE(is_object ? inliers.size() - moving : moving, 2u);
+        const Eigen::Vector3d V = recorded.scene.velocity - (is_object ? 1. : 0.) * recorded.scene.object_velocity;
+        ASSERT_GE(result.covariance.rows(), 6);
+        EXPECT_LE((result.solutions[0].velocity - V).norm(), 0.3) << on_object << " " << seed;
+        return is_object;
+      };
+      EXPECT_NE(check(found.result, found.inliers), check(found.second->result, found.second->inliers));
+    }
+    std::printf("  %zu of %zu tracks on a body: %d of %d ambiguous, %d ok\n", on_object, features, ambiguous, trials,
+                ok);
+    EXPECT_GE(ambiguous, trials - 1);
+  }
+}
+
+TEST(RobustInitialisation, TracksThatDriftByThemselvesAreNoSecondMotion) {
+  int ambiguous = 0;
+  constexpr int trials = 40;
+  for (std::uint64_t seed = 0; seed < trials; ++seed) {
+    const RecordedScene recorded({.scene = {.images = 21, .features = 40}, .bias = 0.02, .noise = adis, .drifting = 20},
+                                 1300 + seed);
+    ambiguous += initialise(recorded, seed).status == Status::ambiguous;
+  }
+  EXPECT_LE(ambiguous, 1);
+}
+
 TEST(RobustInitialisation, WithoutReadingsOrTracks) {
   const RecordedScene recorded({.scene = {.images = 21, .features = 20}, .bias = 0.03, .noise = adis, .drifting = 6},
                                3);
