@@ -72,6 +72,7 @@ struct VisualInertialOptions {
   bool consensus = true;                       ///< tracks may be wrong
   bool refinement = true;                      ///< else the closed form alone
   double stretch = 12;                         ///< s: windows that are fused; 0: none
+  bool inflate = false;  ///< multiply the covariance of a stretch that is not ok by its inflation
   ImuScheme scheme = ImuScheme::averaged;
   double max_gap = 0.1;             ///< s, between readings
   std::size_t max_windows = 20000;  ///< more are bad_option
@@ -135,8 +136,14 @@ struct FusedStretch {
   bool has_state = false;            ///< whether there is one: each window may fail when it is refined again
   double chi2 = 0;                   ///< of the windows' distances from each other
   std::size_t degrees_of_freedom = 0;
+  double p = 1;                   ///< the probability of so large a χ² of windows that agree
+  double inflation = 1;           ///< factor of the covariances at which they would, at least 1
+  bool inflated = false;          ///< it was applied
   double gravity = 0;             ///< |G| that was used (m/s²)
   Gaussian<InertialState> state;  ///< at the end
+
+  /// Whether there is a state with a covariance that the windows do not contradict: p ≥ 1e-3, or it was inflated.
+  bool ok() const { return has_state && (p >= least_p_of_fusion || inflated); }
 };
 
 struct VisualInertialResult {

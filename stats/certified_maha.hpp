@@ -94,7 +94,7 @@ void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& oth
     if (other.status != Status::ok || !(ratio < options.near_ties.log_likelihood_ratio)) continue;
     const TangentOf<M> error = log(best.mean, other.mean);
     const double squared = static_cast<double>(mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(error, region));
-    if (chiSquaredTail(squared, ManifoldTraits<M>::DoF) > options.near_ties.region) continue;
+    if (chiSquaredTail(squared, std::size_t{ManifoldTraits<M>::DoF}) > options.near_ties.region) continue;
     const bool known = std::any_of(result.near_ties.begin(), result.near_ties.end(), [&](const NearTie<M>& tie) {
       return static_cast<double>(log(tie.feature, other.mean).norm()) < options.distinct;
     });

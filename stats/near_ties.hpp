@@ -173,7 +173,7 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       // The other coordinates of a minimum of the criterion are those of the mean.
       const Vector error = log(mean.mean, found.mean).template segment<K>(begin).template cast<double>();
       const double squared = mahalanobisSquared<double, K>(error, region);
-      if ((residual_law ? hotellingTail(squared, K, static_cast<double>(n)) : chiSquaredTail(squared, K)) >
+      if ((residual_law ? hotellingTail(squared, K, static_cast<double>(n)) : chiSquaredTail(squared, std::size_t{K})) >
           options.region) {
         continue;
       }

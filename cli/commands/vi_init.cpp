@@ -136,7 +136,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
   const bool any = std::any_of(result.windows.begin(), result.windows.end(), [](const ViWindow& w) { return w.ok(); });
-  return any ? exit_fine : exit_not_trusted;
+  // Stretches without a second window have nothing to contradict.
+  const bool fused = result.fusions.empty() || std::any_of(result.fusions.begin(), result.fusions.end(),
+                                                           [](const ViFusion& f) { return f.ok(); });
+  return any && fused ? exit_fine : exit_not_trusted;
 }
 
 }  // namespace
@@ -179,6 +182,8 @@ void addViInitCommand(const CommandList& app) {
   command.flag("--no-refinement", options->no_refinement, "The closed form alone");
   command.option("--fuse", how.stretch, "s: disjoint windows of such stretches are fused (default 12; 0: none)")
       .range(0., 1e6);
+  command.flag("--inflate", how.inflate,
+               "Multiply the covariance of windows together by the factor by which they disagree, where p < 0.001");
   command.option("--begin", how.begin, "s since the first reading, or the file's seconds (default: the first image)");
   command.option("--end", how.end, "The same (default: the last image)");
   command.option("--truth", options->truth, "EuRoC's ground truth, to compare with");

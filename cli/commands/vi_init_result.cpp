@@ -2,7 +2,6 @@
 
 #include <cli/io/input_error.hpp>
 #include <experiments/vi_init_errors.hpp>
-#include <stats/inference.hpp>
 
 #include <fmt/format.h>
 
@@ -104,7 +103,6 @@ ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& rec
     ViFusion& f = result.fusions.emplace_back();
     static_cast<FusedStretch&>(f) = std::move(stretch);
     if (!f.has_state) continue;
-    if (f.degrees_of_freedom > 0) f.p_value = chiSquaredSurvival(f.chi2, static_cast<double>(f.degrees_of_freedom));
     setState(f);
     if (const auto truth = truthAt(recording.truth, f.end)) compare(f, *truth);
   }

@@ -37,7 +37,6 @@ struct ViWindow : InitialisedWindow {
 
 /// The state that disjoint windows give together, compared with the ground truth where that is known.
 struct ViFusion : FusedStretch {
-  double p_value = 1;  ///< that windows which agree are so far apart
   /// In the body's axes: a unit vector, m/s, rad/s, m/s², with the RMS of the standard deviations of their coordinates.
   Eigen::Vector3d down, velocity, gyroscope_bias, accelerometer_bias;
   double down_sigma = 0, velocity_sigma = 0, gyroscope_sigma = 0, accelerometer_sigma = 0;

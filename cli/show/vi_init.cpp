@@ -88,7 +88,7 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
     std::vector<std::string> cells = {fmt::format("{:.1f}", f.end),
                                       fmt::format("{}", f.windows.size()),
                                       dof == 0 ? "" : fmt::format("{:.2f}", f.chi2 / static_cast<double>(dof)),
-                                      dof == 0 ? "" : fmt::format("{:.1g}", f.p_value),
+                                      dof == 0 ? "" : fmt::format("{:.1g}", f.p),
                                       fmt::format("{:.2f}", degrees * f.down_sigma),
                                       fmt::format("{:.4f}", f.gyroscope_sigma),
                                       fmt::format("{:.3f}", f.accelerometer_sigma)};
@@ -140,6 +140,15 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
         "deviations of gravity and the biases";
     text += with_truth ? ", and what is off:\n" : ":\n";
     text += fusionTable(result, with_truth);
+    for (const ViFusion& f : result.fusions) {
+      if (!f.has_state || f.p >= least_p_of_fusion) continue;
+      text += fmt::format(
+          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a factor "
+          "of {:.3g}{}\n",
+          f.inflated ? "" : "not ok: ", f.end, f.p, f.inflation,
+          f.inflated ? ", by which that of the fused state was multiplied"
+                     : "; the sensor's noise in motion is larger than its densities (--noise-factor), or --inflate");
+    }
   }
   std::vector<std::string> notes;
   if (recording.tracks.seen_once > 0) {

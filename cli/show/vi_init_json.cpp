@@ -115,7 +115,8 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
 JsonObject toJson(const ViFusion& f) {
   JsonObject o;
   o.set("begin", f.begin).set("end", f.end).set("windows", f.windows.size()).set("chi2", f.chi2);
-  o.set("degrees_of_freedom", f.degrees_of_freedom).set("p", f.p_value).set("ok", f.has_state);
+  o.set("degrees_of_freedom", f.degrees_of_freedom).set("p", f.p).set("ok", f.ok());
+  o.set("inflation", f.inflation).set("inflated", f.inflated);
   if (!f.has_state) return o;
   o.set("gravity_direction", f.down).set("velocity", f.velocity).set("gyroscope_bias", f.gyroscope_bias);
   o.set("accelerometer_bias", f.accelerometer_bias).set("covariance", f.state.covariance);

@@ -1,7 +1,6 @@
 // The definition of fusion/init/refinement.hpp.
 #pragma once
 
-#include <fusion/detail/chi_squared.hpp>
 #include <fusion/detail/closed_form_input.hpp>
 #include <fusion/detail/closed_form_uncertainty.hpp>
 #include <fusion/detail/compiled.hpp>
@@ -9,6 +8,7 @@
 #include <fusion/init/refinement.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 
 #include <Eigen/Core>
 

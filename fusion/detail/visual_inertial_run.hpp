@@ -234,7 +234,13 @@ class RecordingRun {
     stretch.has_state = fusion.hasState();
     stretch.chi2 = fusion.chi2();
     stretch.degrees_of_freedom = fusion.degrees_of_freedom();
+    stretch.p = fusion.p();
+    stretch.inflation = fusion.inflation();
     stretch.state = fusion.state();
+    if (options_.inflate && !stretch.ok()) {
+      stretch.inflated = true;
+      stretch.state.covariance *= stretch.inflation;
+    }
   }
 
   const VisualInertialRecording& recording_;

@@ -144,6 +144,9 @@ struct RefinementResult {
 
 // initialiseRobustly(), in robust_initialisation.hpp
 
+/// Fused windows (window_fusion.hpp) that are as far apart with less than this probability contradict each other.
+inline constexpr double least_p_of_fusion = 1e-3;
+
 /// Tracks that do not agree with the first motion but with another, and what they say. Indices are the window's.
 struct SecondMotion {
   ClosedFormResult result;           ///< with its covariance

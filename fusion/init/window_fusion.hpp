@@ -19,13 +19,13 @@
 #include <fusion/imu/window.hpp>
 #include <fusion/init/inertial_state.hpp>
 #include <fusion/init/results.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/status.hpp>
 
 #include <Eigen/Core>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 namespace liestat {
@@ -84,18 +84,17 @@ class WindowFusion {
 
   /// Whether there is a state.
   bool hasState() const { return windows_ > 0; }
-  /// Whether there is one and the windows do not contradict each other: five sigmas of χ².
-  bool ok() const {
-    const double dof = static_cast<double>(degrees_of_freedom_);
-    return hasState() && chi2_ <= dof + 5 * std::sqrt(2 * dof) + 12;
-  }
+  /// Whether there is one and the windows do not contradict each other.
+  bool ok() const { return hasState() && p() >= least_p_of_fusion; }
   /// At the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }
   /// The sum over all meetings: larger than χ² of so many degrees of freedom says that windows contradict each other,
-  /// or are noisier than their covariances say (chiSquaredSurvival of stats/inference.hpp is the probability).
+  /// or are noisier than their covariances say.
   double chi2() const { return chi2_; }
   std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
+  /// The probability of so large a sum where they do not.
+  double p() const { return detail::chiSquaredTail(chi2_, degrees_of_freedom_); }
   /// The factor of the covariances at which windows would be as far apart as these are; at least 1.
   double inflation() const {
     return degrees_of_freedom_ == 0 ? 1 : std::max(1., chi2_ / static_cast<double>(degrees_of_freedom_));

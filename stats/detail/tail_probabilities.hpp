@@ -1,8 +1,9 @@
-// Tail probabilities of Student's and Fisher's laws, for estimators that need Eigen alone (stats/laws.hpp has the laws,
+// Tail probabilities of Student's, Hotelling's and χ² laws, for estimators that need Eigen alone (stats/laws.hpp has the laws,
 // by Boost).
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace liestat::detail {
@@ -39,19 +40,20 @@ inline double hotellingTail(double t2, int k, double n) {
   return incompleteBeta(0.5 * (n - k), 0.5 * k, 1 / (1 + t2 / (n - 1)));
 }
 
-/// P(χ² > x) with k degrees of freedom: the upper incomplete gamma function, exact for whole k.
-inline double chiSquaredTail(double x, int k) {
-  if (!(x >= 0)) return std::numeric_limits<double>::quiet_NaN();
-  double term, sum;
-  if (k % 2 == 0) {
-    term = sum = std::exp(-0.5 * x);
-    for (int i = 1; i < k / 2; ++i) sum += term *= 0.5 * x / i;
-  } else {
-    sum = std::erfc(std::sqrt(0.5 * x));
-    term = std::sqrt(2 * x / 3.14159265358979323846) * std::exp(-0.5 * x);
-    for (int i = 1; 2 * i < k; ++i) sum += term, term *= x / (2 * i + 1);
+/// P(χ²ₙ > x) for x that is not too far out for a number (then 0); 1 for n = 0, NaN for NaN.
+inline double chiSquaredTail(double x, std::size_t n) {
+  if (n == 0 || x <= 0) return 1;
+  // Q(x, n + 2) = Q(x, n) + (x/2)^(n/2) exp(-x/2) / Γ(n/2 + 1).
+  const double half = 0.5 * x;
+  const bool odd = n % 2 == 1;
+  double tail = odd ? std::erfc(std::sqrt(half)) : std::exp(-half);
+  double log_factorial = odd ? std::lgamma(1.5) : 0;  // of k/2
+  for (std::size_t k = odd ? 1 : 2; k < n; k += 2) {
+    const double power = 0.5 * static_cast<double>(k);
+    if (k > 2) log_factorial += std::log(power);
+    tail += std::exp(power * std::log(half) - half - log_factorial);
   }
-  return sum;
+  return tail;
 }
 
 }  // namespace liestat::detail
