@@ -16,6 +16,33 @@ namespace liestat::cli {
 
 using namespace experiments;
 
+namespace {
+
+std::string verdictTable(const std::vector<VerdictRow>& verdicts) {
+  std::string text =
+      "\nVerdicts of certifiedMean, % of the trials: ok, of these outside of the 95 % region (miss), on the wrong\n"
+      "side (wrong); coverage of what is ok (cover) and of first-order covariances never withheld (plain)\n";
+  Table table({"feature, law", "n", "ok", "ambig", "ill", "miss", "wrong", "cover", "plain", ""});
+  for (const VerdictRow& row : verdicts) {
+    const auto percent = [&](double rate) { return fmt::format("{:.1f}", 100 * rate); };
+    table.row(
+        {fmt::format("{} {} {:.3g}", name(row.cell.feature).substr(0, 13), name(row.cell.law), row.cell.parameter),
+         fmt::format("{}", row.cell.n), percent(row.rate(row.ok)), percent(row.rate(row.ambiguous)),
+         percent(row.rate(row.ill_defined)), percent(row.rate(row.outside)), percent(row.rate(row.wrong)),
+         row.ok > 0 ? percent(row.coverage()) : "-", percent(1 - row.rate(row.plain_outside)),
+         verdictCell(row.passed)});
+  }
+  text += table.str();
+  for (const VerdictRow& row : verdicts) {
+    if (row.passed.value_or(true)) continue;
+    text += fmt::format("FAILED {} {} {:.3g} n={}: {}\n", name(row.cell.feature), name(row.cell.law),
+                        row.cell.parameter, row.cell.n, row.failure);
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string formatMeansTables(const std::vector<MeansRow>& rows, const std::vector<VerdictRow>& verdicts) {
   // One line of each table for a feature, spread, noise and n.
   using Key = std::tuple<Feature, double, Noise, std::size_t>;
@@ -146,25 +173,3 @@ JsonObject toJson(const MeansRow& row) {
 }
 
 }  // namespace liestat::cli
-std::string verdictTable(const std::vector<VerdictRow>& verdicts) {
-  std::string text =
-      "\nVerdicts of certifiedMean, % of the trials: ok, of these outside of the 95 % region (miss), on the wrong\n"
-      "side (wrong); coverage of what is ok (cover) and of first-order covariances never withheld (plain)\n";
-  Table table({"feature, law", "n", "ok", "ambig", "ill", "miss", "wrong", "cover", "plain", ""});
-  for (const VerdictRow& row : verdicts) {
-    const auto percent = [&](double rate) { return fmt::format("{:.1f}", 100 * rate); };
-    table.row(
-        {fmt::format("{} {} {:.3g}", name(row.cell.feature).substr(0, 13), name(row.cell.law), row.cell.parameter),
-         fmt::format("{}", row.cell.n), percent(row.rate(row.ok)), percent(row.rate(row.ambiguous)),
-         percent(row.rate(row.ill_defined)), percent(row.rate(row.outside)), percent(row.rate(row.wrong)),
-         row.ok > 0 ? percent(row.coverage()) : "-", percent(1 - row.rate(row.plain_outside)),
-         verdictCell(row.passed)});
-  }
-  text += table.str();
-  for (const VerdictRow& row : verdicts) {
-    if (row.passed.value_or(true)) continue;
-    text += fmt::format("FAILED {} {} {:.3g} n={}: {}\n", name(row.cell.feature), name(row.cell.law),
-                        row.cell.parameter, row.cell.n, row.failure);
-  }
-  return text;
-}
