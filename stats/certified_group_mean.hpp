@@ -76,7 +76,8 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
                          {},
                          twin.uniqueness.r_star,
                          twin.uniqueness.cells,
-                         twin.uniqueness.proof};
+                         twin.uniqueness.proof,
+                         twin.uniqueness.more_rivals};
     for (const Twin& rival : twin.uniqueness.rivals) {
       result.uniqueness.rivals.push_back(from(fromTwin<G>(rival)).mean);
     }

@@ -50,12 +50,13 @@ struct UniquenessResult {
   Uniqueness unique = Uniqueness::not_certified;
   /// The best minimum that was found: the given mean, unless `improved`.
   M minimiser = ManifoldTraits<M>::origin();
-  bool improved = false;   ///< the given mean is not the minimum: `minimiser` is lower
-  ScalarOf<M> cost = 0;    ///< C at the minimiser
-  std::vector<M> rivals;   ///< the other minimisers of equal cost that were found
-  double r_star = 0;       ///< radius about the minimiser in which it is the only minimum, rad
-  std::size_t cells = 0;   ///< of the global search; 0: it was not needed
-  const char* proof = "";  ///< which certificate holds, in words
+  bool improved = false;     ///< the given mean is not the minimum: `minimiser` is lower
+  ScalarOf<M> cost = 0;      ///< C at the minimiser
+  std::vector<M> rivals;     ///< the other minimisers of equal cost that were found
+  double r_star = 0;         ///< radius about the minimiser in which it is the only minimum, rad
+  std::size_t cells = 0;     ///< of the global search; 0: it was not needed
+  const char* proof = "";    ///< which certificate holds, in words
+  bool more_rivals = false;  ///< ambiguous, and `rivals` are not all: they form a continuum, or the search ended early
 };
 
 }  // namespace liestat

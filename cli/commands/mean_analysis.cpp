@@ -45,7 +45,7 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
   analysis.r_star = result.uniqueness.r_star;
   analysis.cells = result.uniqueness.cells;
   for (const M& rival : result.uniqueness.rivals) analysis.rivals.push_back(describe(rival));
-  analysis.more_rivals = analysis.rivals.size() >= UniquenessOptions{}.max_rivals;
+  analysis.more_rivals = result.uniqueness.more_rivals;
   for (const auto& tie : result.near_ties) analysis.near_ties.push_back({describe(tie.feature), tie.z});
   analysis.cut_locus_mass = result.cut_locus.mass;
   analysis.hessian_change = result.hessian_change;

@@ -60,7 +60,7 @@ struct MeanAnalysis {
   Uniqueness unique = Uniqueness::not_certified;
   std::string proof = {};  ///< in words
   std::vector<FeatureValue> rivals = {};
-  bool more_rivals = false;  ///< the search ended because the list was full
+  bool more_rivals = false;  ///< these are not all
   double r_star = 0;
   std::size_t cells = 0;
   std::vector<NearRival> near_ties = {};

@@ -200,9 +200,7 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   }
   text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
-  if (analysis.more_rivals) {
-    text += fmt::format("  rival      perhaps more: the search ended with these {}\n", analysis.rivals.size());
-  }
+  if (analysis.more_rivals) text += "  rival      and others: these are not all\n";
   for (const NearRival& rival : analysis.near_ties) {
     text += fmt::format("  near tie   {}: worse by {:.2g} standard deviations\n", oneLine(rival.feature), rival.z);
   }

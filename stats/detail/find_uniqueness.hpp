@@ -55,6 +55,7 @@ UniquenessResult<M> uniquenessByFactors(const E& executor, const R& samples, con
     certified = certified && part.unique != Uniqueness::not_certified;
     ambiguous = ambiguous || part.unique == Uniqueness::ambiguous;
     improved = improved || part.improved;
+    result.more_rivals = result.more_rivals || part.more_rivals;
     result.cost += part.cost;
     result.r_star = std::min(result.r_star, part.r_star);
     result.cells += part.cells;
@@ -75,6 +76,9 @@ UniquenessResult<M> uniquenessByFactors(const E& executor, const R& samples, con
       }
     }
   });
+  std::size_t tuples = 1;
+  forEachIndex<n>([&](auto i) { tuples *= 1 + std::get<i>(rivals).size(); });
+  result.more_rivals = result.more_rivals || minima.size() < tuples;
   for (std::size_t k = 1; k < minima.size(); ++k) {
     result.rivals.push_back(ManifoldTraits<M>::fromFactors(minima[k]));
   }

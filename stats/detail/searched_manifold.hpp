@@ -39,7 +39,8 @@ class SearchedManifold final : public SearchedMean<Space> {
                                                               .max_rivals = options.max_rivals,
                                                               .progress = options.progress})
                                       .run();
-    return {verdict.unique, base_.mean, improved_, base_.cost, rivals_, verdict.r_star, verdict.cells, verdict.proof};
+    return {verdict.unique, base_.mean,    improved_,     base_.cost,         rivals_,
+            verdict.r_star, verdict.cells, verdict.proof, verdict.more_rivals};
   }
 
   PackedData<Space> data() const override { return pack(space_, samples_, weights_, base_.mean); }

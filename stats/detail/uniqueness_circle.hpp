@@ -93,7 +93,9 @@ UniquenessResult<M> circleUniqueness(const E& executor, const R& samples, const 
       continue;
     }
     rival_angles.push_back(c.angle);
-    if (result.rivals.size() < options.max_rivals) result.rivals.push_back(polished(c.angle).mean);
+    result.more_rivals = result.rivals.size() >= options.max_rivals;
+    if (result.more_rivals) break;
+    result.rivals.push_back(polished(c.angle).mean);
   }
   largest = 0;
   for (const auto& [angle, p] : data) largest = std::max(largest, apart(angle, chosen));

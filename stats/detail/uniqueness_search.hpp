@@ -46,8 +46,8 @@ class SearchedMean {
   /// Where the iteration for a mean of the features ended.
   struct Found {
     bool converged;
-    bool lower;   ///< its cost is below the base's
-    Point point;  ///< its compact part
+    bool lower;         ///< its cost is below the base's
+    Point point;        ///< its compact part
     std::size_t looks;  ///< at features
   };
 
@@ -83,6 +83,7 @@ struct SearchVerdict {
   double r_star = 0;
   std::size_t cells = 0;
   const char* proof = "";
+  bool more_rivals = false;
 };
 
 /// All that one call of uniqueness() needs in a space.
@@ -169,6 +170,8 @@ class UniquenessSearch {
         mean_.addRival(Space::exp(Space::fromChart(Space::Chart::Zero()), 2 * to_first.z));
         verdict_.unique = Uniqueness::ambiguous;
         verdict_.proof = "two features as far apart as can be have several midpoints";
+        // On the sphere they are a great circle, in which rotations have two points.
+        verdict_.more_rivals = Space::dimension == 2;
         return true;
       }
     }
@@ -253,6 +256,7 @@ class UniquenessSearch {
     if (!rivals.empty()) {
       verdict_.unique = Uniqueness::ambiguous;
       verdict_.proof = "several minima of equal cost";
+      verdict_.more_rivals = step != CellSearch<Space, E>::Step::done;
       return false;
     }
     if (step == CellSearch<Space, E>::Step::done && options_.base_converged) prove("branch and bound");
