@@ -198,7 +198,8 @@ std::vector<VerdictCell> verdictCells(bool full) {
     return cells;
   }
   for (const Feature feature : all_features) {
-    if (feature == Feature::point) continue;
+    // Points have no cut locus, rigid motions no metric.
+    if (feature == Feature::point || !info(feature).has_metric) continue;
     for (const double kappa : {0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 20.0}) {
       for (const std::size_t n : {5, 10, 30, 100}) add_cell(feature, VerdictLaw::fisher, kappa, n, 4000);
     }

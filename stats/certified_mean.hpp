@@ -105,14 +105,21 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
         known && (result.mean.n == 1 || (concentration.isModest() && isModestNoise<M>(options.known_noise)));
     return !concentration.concentrated && !modest;
   };
-  // What has no covariance anyway is searched for ties of the sample only as far as they are cheap.
-  UniquenessOptions search = options.uniqueness;
-  if (isScattered(findConcentration(samples, weights, result.mean.mean))) search.budget /= scattered_budget_part;
-  result.uniqueness = findUniqueness(executor, samples, weights, result.mean, search);
-  if (result.uniqueness.improved) {
+  const auto search = [&](std::size_t budget_part) {
+    UniquenessOptions how = options.uniqueness;
+    how.budget /= budget_part;
+    result.uniqueness = findUniqueness(executor, samples, weights, result.mean, how);
+    if (!result.uniqueness.improved) return;
     MeanOptions<M> from_there = options.mean;
     from_there.start = result.uniqueness.minimiser;
     result.mean = frechetMean<M>(executor, samples, weights, from_there);
+  };
+  // What has no covariance anyway is searched for ties of the sample only as far as they are cheap.
+  const bool seems_scattered = isScattered(findConcentration(samples, weights, result.mean.mean));
+  search(seems_scattered ? scattered_budget_part : 1);
+  if (seems_scattered && result.uniqueness.improved &&
+      !isScattered(findConcentration(samples, weights, result.mean.mean))) {
+    search(1);
   }
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
   if (result.uniqueness.unique == Uniqueness::ambiguous) return without(Status::ambiguous, rival_reason);
@@ -133,7 +140,9 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.hessian_change = settled.change;
   if (!settled.first.allFinite()) return without(Status::ill_defined, hessian_reason);
   result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
-  if (isScattered(result.concentration)) return without(Status::ill_defined, scattered_reason);
+  // Of very many data near ties cost seconds, and here nothing depends on them.
+  const bool scattered = isScattered(result.concentration);
+  if (scattered && result.mean.n > most_averaged) return without(Status::ill_defined, scattered_reason);
   const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
   if (known) {
     const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
@@ -145,6 +154,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     result.near_ties =
         findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
   }
+  if (scattered) return without(Status::ill_defined, scattered_reason);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   SquareOf<M> covariance = settled.covariance;
@@ -163,9 +173,10 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, where that
 /// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well,
-/// exactly or up to the noise of the data (ambiguous), when the features are as scattered as uniform ones or the criterion is flat within the confidence region
-/// (ill_defined), or when there are no more features than dimensions and the noise is not known (too_few).
-/// A mean that is merely not certified to be unique keeps its covariance. The same bits on any executor.
+/// exactly or up to the noise of the data (ambiguous), when the features are as scattered as uniform ones or the
+/// criterion is flat within the confidence region (ill_defined), when there are no more features than dimensions and the
+/// noise is not known (too_few), or when the weights are none (not_applicable). A mean that is merely not certified to be
+/// unique keeps its covariance. The same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {

@@ -10,8 +10,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -79,15 +81,19 @@ TEST(ProductUniqueness, AWrongMinimumIsImproved) {
   EXPECT_GT(wrong, 0);
 }
 
-// A covariance is withheld for the product where it is for the part.
-TEST(ProductUniqueness, AnIllDefinedPartWithholdsTheCovariance) {
+// A covariance is withheld for the product where it is for the part, and for the same reason.
+TEST(ProductUniqueness, APartThatIsWithheldWithholdsTheCovariance) {
   using M = Product<Vector3d, NonOrientedFrame3d>;
-  const auto samples = scattered<M>(200, 0.9, 7);
-  const auto whole = certifiedMean(samples);
-  const auto part = certifiedMean(parts<1>(samples));
-  EXPECT_EQ(whole.status, part.status);
-  EXPECT_EQ(std::string(whole.reason), std::string(part.reason));
-  EXPECT_EQ(part.status, Status::ill_defined) << part.reason;
+  const std::array<std::pair<double, Status>, 3> rows{
+      {{0.3, Status::ok}, {0.9, Status::ambiguous}, {3, Status::ill_defined}}};
+  for (const auto& [spread, expected] : rows) {
+    const auto samples = scattered<M>(200, spread, 7);
+    const auto whole = certifiedMean(samples);
+    const auto part = certifiedMean(parts<1>(samples));
+    EXPECT_EQ(whole.status, part.status);
+    EXPECT_EQ(std::string(whole.reason), std::string(part.reason));
+    EXPECT_EQ(part.status, expected) << spread << ": " << part.reason;
+  }
 }
 
 }  // namespace
