@@ -7,6 +7,7 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
+#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
 
 #include <fmt/format.h>
@@ -30,6 +31,7 @@ struct Options {
   std::vector<std::string> calibration;
   std::vector<double> intrinsics;
   bool free_gravity = false, no_consensus = false, no_refinement = false, known_biases = false, true_biases = false;
+  bool calibrate_noise = false;
   double gravity = 9.81, noise_factor = 1, pixel_noise = 1;
   VisualInertialOptions how;
 };
@@ -117,16 +119,32 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
+/// Calibrates the sensor's noise and takes it over where that succeeds.
+NoiseCalibration calibrate(VisualInertialRecording& measured, const VisualInertialOptions& how) {
+  const NoiseCalibration found = withProgressBar("noise", [&](const auto& progress) {
+    return calibrateNoise(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
+  });
+  if (found.status != FusionStatus::ok) return found;
+  const double gyroscope = found.separable ? found.gyroscope.factor : found.common.factor;
+  const double accelerometer = found.separable ? found.accelerometer.factor : found.common.factor;
+  measured.noise.gyroscope *= gyroscope, measured.noise.gyroscope_walk *= gyroscope;
+  measured.noise.accelerometer *= accelerometer, measured.noise.accelerometer_walk *= accelerometer;
+  return found;
+}
+
 int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
-  const VisualInertialRecording measured = measurementsOf(recording, options);
+  VisualInertialRecording measured = measurementsOf(recording, options);
   const VisualInertialOptions how = optionsOf(recording, options);
+  std::optional<NoiseCalibration> noise;
+  if (options.calibrate_noise) noise = calibrate(measured, how);
   VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
   refuseFault(found, measured, recording.imu.start_ns, how, command_name);
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
+  result.noise = noise;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
   if (options.json != "-") printLines(viInitTable(recording, result));
   if (!options.json.empty()) {
@@ -158,6 +176,8 @@ void addViInitCommand(const CommandList& app) {
   command.option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
   command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's").list(4, 4);
   command.option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)").range(1e-3, 1e6);
+  command.flag("--calibrate-noise", options->calibrate_noise,
+               "Find the factor of these densities at which windows agree, and use it");
   command.option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
       .range(1e-6, 1e3);
   command.option("--window", how.window, "s (default 2)").range(0.1, 60.);

@@ -3,6 +3,7 @@
 #include <cli/io/calibration.hpp>
 #include <cli/io/image_tracks.hpp>
 #include <cli/io/imu_file.hpp>
+#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial_types.hpp>
 
 #include <cstddef>
@@ -48,11 +49,12 @@ struct ViFusion : FusedStretch {
 struct ViInitResult {
   std::vector<ViWindow> windows;
   std::vector<ViFusion> fusions;
-  std::optional<double> gravity;         ///< |G| that was given, m/s²
-  bool biases_given = false;             ///< and not estimated
-  double bearing_noise = 0;              ///< rad
-  std::size_t images_outside = 0;        ///< that the readings do not cover
-  std::size_t observations_outside = 0;  ///< pixels that the lens' model can't explain
+  std::optional<double> gravity;          ///< |G| that was given, m/s²
+  bool biases_given = false;              ///< and not estimated
+  std::optional<NoiseCalibration> noise;  ///< where it was asked for
+  double bearing_noise = 0;               ///< rad
+  std::size_t images_outside = 0;         ///< that the readings do not cover
+  std::size_t observations_outside = 0;   ///< pixels that the lens' model can't explain
 };
 
 /// Compares what was found with the recording's ground truth; gravity's length in m/s², none: it was not known.

@@ -103,6 +103,27 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
   return table.str();
 }
 
+std::string inWords(const char* what, const NoiseFactor& factor) {
+  return fmt::format("{} times {:.3g} (95 %: {:.3g} to {:.3g})", what, factor.factor, factor.low, factor.high);
+}
+
+std::string noiseInWords(const NoiseCalibration& found) {
+  if (found.status != FusionStatus::ok) {
+    return fmt::format(
+        "the sensor's noise is not told by {} meetings of windows: its densities were left as they are\n",
+        found.meetings);
+  }
+  const double dof = static_cast<double>(found.degrees_of_freedom);
+  std::string text = fmt::format(
+      "{} meetings of windows agree with the sensor's densities {}: chi2 {:.2f} per degree of freedom, {:.2f} "
+      "without\n",
+      found.meetings, inWords("", found.common), found.calibrated_chi2 / dof, found.chi2 / dof);
+  text += found.separable ? inWords("by themselves gyroscope", found.gyroscope) + ", " +
+                                inWords("accelerometer", found.accelerometer) + ", which were used\n"
+                          : "gyroscope and accelerometer cannot be told apart: the factor of both was used\n";
+  return text;
+}
+
 }  // namespace
 
 std::string viInitTable(const ViRecording& recording, const ViInitResult& result) {
@@ -143,13 +164,15 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     for (const ViFusion& f : result.fusions) {
       if (!f.has_state || f.p >= least_p_of_fusion) continue;
       text += fmt::format(
-          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a factor "
+          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a "
+          "factor "
           "of {:.3g}{}\n",
           f.inflated ? "" : "not ok: ", f.end, f.p, f.inflation,
           f.inflated ? ", by which that of the fused state was multiplied"
                      : "; the sensor's noise in motion is larger than its densities (--noise-factor), or --inflate");
     }
   }
+  if (result.noise) text += "\n" + noiseInWords(*result.noise);
   std::vector<std::string> notes;
   if (recording.tracks.seen_once > 0) {
     notes.push_back(fmt::format("{} tracks were seen once", recording.tracks.seen_once));

@@ -112,6 +112,21 @@ JsonObject toJson(const ViWindow& w, const ViRecording& recording, const std::ve
   return o;
 }
 
+JsonObject toJson(const NoiseFactor& factor) {
+  JsonObject o;
+  return o.set("factor", factor.factor).set("low", factor.low).set("high", factor.high);
+}
+
+JsonObject toJson(const NoiseCalibration& found) {
+  JsonObject o;
+  o.set("status", name(found.status)).set("windows", found.windows).set("meetings", found.meetings);
+  o.set("chi2", found.chi2).set("calibrated_chi2", found.calibrated_chi2);
+  o.set("degrees_of_freedom", found.degrees_of_freedom).set("common", toJson(found.common));
+  o.set("separable", found.separable);
+  if (found.separable) o.set("gyroscope", toJson(found.gyroscope)).set("accelerometer", toJson(found.accelerometer));
+  return o;
+}
+
 JsonObject toJson(const ViFusion& f) {
   JsonObject o;
   o.set("begin", f.begin).set("end", f.end).set("windows", f.windows.size()).set("chi2", f.chi2);
@@ -136,6 +151,7 @@ void setViInit(JsonObject& object, const ViRecording& recording, const ViInitRes
   object.set("tracks_seen_once", recording.tracks.seen_once).set("images_outside", result.images_outside);
   object.set("observations_outside", result.observations_outside).set("bearing_noise", result.bearing_noise);
   object.set("gravity", result.gravity);
+  object.set("noise_calibration", result.noise ? std::optional(toJson(*result.noise)) : std::nullopt);
   const ViInitSummary summary(result);
   JsonObject statuses;
   for (const auto& [status, count] : summary.statuses) statuses.set(status, count);

@@ -7,3 +7,4 @@
 #include <fusion/detail/fuse_windows.hpp>
 #include <fusion/detail/initialise_recording.hpp>
 #include <fusion/detail/refine.hpp>
+#include <fusion/detail/calibrate_noise.hpp>

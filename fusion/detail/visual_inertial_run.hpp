@@ -28,7 +28,7 @@ class RecordingRun {
  public:
   RecordingRun(const VisualInertialRecording& recording, const VisualInertialOptions& options,
                VisualInertialResult& result)
-      : recording_(recording), options_(options) {
+      : recording_(recording), options_(options), noise_(recording.noise) {
     std::vector<double> sigmas;
     by_image_.resize(times().size());
     for (std::size_t i = 0; i < recording.observations.size(); ++i) {
@@ -115,27 +115,75 @@ class RecordingRun {
 
   /// Disjoint windows that are ok, in stretches, each as one.
   std::vector<FusedStretch> fuse(const std::vector<InitialisedWindow>& windows) const {
+    std::vector<FusedStretch> stretches =
+        stretchesOf(windows, [](const InitialisedWindow& w) { return w.ok() && w.refined; });
+    for (FusedStretch& stretch : stretches) fuse(windows, stretch);
+    return stretches;
+  }
+
+  /// The windows that take part, in stretches.
+  template <class TakesPart>
+  std::vector<FusedStretch> stretchesOf(const std::vector<InitialisedWindow>& windows,
+                                        const TakesPart& takes_part) const {
     std::vector<FusedStretch> stretches;
     double free_from = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < windows.size(); ++i) {
       const InitialisedWindow& w = windows[i];
-      if (!w.ok() || !w.refined || w.begin < free_from) continue;
+      if (!takes_part(w) || w.begin < free_from) continue;
       const bool begins = stretches.empty() || w.end > stretches.back().begin + options_.stretch * (1 + 1e-9) ||
                           !hasReadings(stretches.back().end, w.begin);
       if (begins) stretches.emplace_back().begin = w.begin;
       stretches.back().windows.push_back(i);
       stretches.back().end = free_from = w.end;
     }
-    for (FusedStretch& stretch : stretches) fuse(windows, stretch);
     return stretches;
+  }
+
+  /// The run with readings of another noise, whose windows are to be integrated with it (InertialWindow::withNoise).
+  RecordingRun withNoise(const ImuNoise<double>& noise) const {
+    RecordingRun other = *this;
+    other.noise_ = noise;
+    return other;
+  }
+
+  /// Fuses a stretch; returns the meetings' sum of log-determinants.
+  double fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
+    const std::size_t n = stretch.windows.size();
+    stretch.gravity =
+        options_.initialisation.gravity.value_or(windows[stretch.windows.front()].refined->gravity.norm());
+    WindowFusion fusion(stretch.gravity);
+    double end = 0;
+    std::vector<std::size_t> used;
+    for (const std::size_t i : stretch.windows) {
+      const InitialisedWindow& w = windows[i];
+      const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
+      if (!estimate) continue;
+      const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
+        const auto between = motion(end, w.begin, bias);
+        return between.ok() ? between.motion : Preintegration<double>({.noise = noise_, .bias = bias});
+      });
+      if (meeting.status != Status::ok) continue;
+      used.push_back(i);
+      stretch.end = end = w.end;
+    }
+    stretch.windows = used;
+    stretch.has_state = fusion.hasState();
+    stretch.chi2 = fusion.chi2();
+    stretch.degrees_of_freedom = fusion.degrees_of_freedom();
+    stretch.p = fusion.p();
+    stretch.inflation = fusion.inflation();
+    stretch.state = fusion.state();
+    if (options_.inflate && !stretch.ok()) {
+      stretch.inflated = true;
+      stretch.state.covariance *= stretch.inflation;
+    }
+    return fusion.log_determinant();
   }
 
  private:
   const std::vector<double>& times() const { return recording_.image_times; }
   RecordingOptions<double> how(const ImuBias<double>& bias) const {
-    return {.preintegration = {.noise = recording_.noise, .bias = bias},
-            .scheme = options_.scheme,
-            .max_gap = options_.max_gap};
+    return {.preintegration = {.noise = noise_, .bias = bias}, .scheme = options_.scheme, .max_gap = options_.max_gap};
   }
   RecordingResult<double> motion(double from, double to, const ImuBias<double>& bias) const {
     return preintegrate<double>(recording_.readings, from, to, how(bias));
@@ -211,40 +259,9 @@ class RecordingRun {
     w.measured.integrate({found.gyroscope_bias, w.measured.bias().accelerometer});
   }
 
-  void fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
-    const std::size_t n = stretch.windows.size();
-    stretch.gravity =
-        options_.initialisation.gravity.value_or(windows[stretch.windows.front()].refined->gravity.norm());
-    WindowFusion fusion(stretch.gravity);
-    double end = 0;
-    std::vector<std::size_t> used;
-    for (const std::size_t i : stretch.windows) {
-      const InitialisedWindow& w = windows[i];
-      const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
-      if (!estimate) continue;
-      const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
-        const auto between = motion(end, w.begin, bias);
-        return between.ok() ? between.motion : Preintegration<double>({.noise = recording_.noise, .bias = bias});
-      });
-      if (meeting.status != Status::ok) continue;
-      used.push_back(i);
-      stretch.end = end = w.end;
-    }
-    stretch.windows = used;
-    stretch.has_state = fusion.hasState();
-    stretch.chi2 = fusion.chi2();
-    stretch.degrees_of_freedom = fusion.degrees_of_freedom();
-    stretch.p = fusion.p();
-    stretch.inflation = fusion.inflation();
-    stretch.state = fusion.state();
-    if (options_.inflate && !stretch.ok()) {
-      stretch.inflated = true;
-      stretch.state.covariance *= stretch.inflation;
-    }
-  }
-
   const VisualInertialRecording& recording_;
   const VisualInertialOptions& options_;
+  ImuNoise<double> noise_;
   std::vector<std::vector<const BearingMeasurement*>> by_image_;
   std::vector<bool> covered_;
   std::size_t tracks_ = 0;

@@ -61,6 +61,13 @@ class InertialWindow {
   /// The same where the biases are far; whether it was done.
   bool integrateIfFar(const ImuBias<double>& bias) { return hasReadings() && isFar(bias) && !integrate(bias); }
 
+  /// The window with readings of another noise; without readings it stays as it is.
+  InertialWindow withNoise(const ImuNoise<double>& noise) const {
+    InertialWindow other = *this;
+    other.how_.preintegration.noise = noise;
+    other.integrate(bias());
+    return other;
+  }
   /// The window with the tracks of some features left out; the others keep their places.
   InertialWindow without(std::span<const std::size_t> left_out) const {
     InertialWindow kept = *this;
