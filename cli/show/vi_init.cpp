@@ -143,7 +143,8 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     for (const ViFusion& f : result.fusions) {
       if (!f.has_state || f.p >= least_p_of_fusion) continue;
       text += fmt::format(
-          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a factor "
+          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a "
+          "factor "
           "of {:.3g}{}\n",
           f.inflated ? "" : "not ok: ", f.end, f.p, f.inflation,
           f.inflated ? ", by which that of the fused state was multiplied"
