@@ -72,7 +72,7 @@ struct VisualInertialOptions {
   bool consensus = true;                       ///< tracks may be wrong
   bool refinement = true;                      ///< else the closed form alone
   double stretch = 12;                         ///< s: windows that are fused; 0: none
-  bool inflate = false;  ///< multiply the covariance of a stretch that is not ok by its inflation
+  bool inflate = false;                        ///< multiply the covariance of a stretch that is not ok by its inflation
   ImuScheme scheme = ImuScheme::averaged;
   double max_gap = 0.1;             ///< s, between readings
   std::size_t max_windows = 20000;  ///< more are bad_option

@@ -80,12 +80,12 @@ struct MeanAnalysis {
 
 /// Options of analyseMean().
 struct AnalysisOptions {
-  bool certify = true;     ///< branch and bound where the cheap certificates fail
+  bool certify = true;                              ///< branch and bound where the cheap certificates fail
   std::size_t budget = UniquenessOptions{}.budget;  ///< of its looks at measurements or bins of them
-  int threads = 0;         ///< 0: all
-  bool charts = false;     ///< for a report
-  std::function<void(double)> progress = {};  ///< is told which part of that budget is spent
-  bool inflate = false;    ///< multiply the covariance by the factor of compareBlocks()
+  int threads = 0;                                  ///< 0: all
+  bool charts = false;                              ///< for a report
+  std::function<void(double)> progress = {};        ///< is told which part of that budget is spent
+  bool inflate = false;                             ///< multiply the covariance by the factor of compareBlocks()
 };
 
 /// Mean, covariance, dispersion and uniqueness of the measurements. The same bits for any number of threads.

@@ -53,9 +53,9 @@ void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, con
 
 void explain(MeanAnalysis& analysis, std::size_t measurements) {
   if (const std::size_t without = measurements - std::min(analysis.n, measurements); without > 0) {
-    analysis.notes.push_back(
-        fmt::format("{} {} no weight beside the others and {} not counted", without,
-                    without == 1 ? "measurement has" : "measurements have", without == 1 ? "is" : "are"));
+    analysis.notes.push_back(fmt::format("{} {} no weight beside the others and {} not counted", without,
+                                         without == 1 ? "measurement has" : "measurements have",
+                                         without == 1 ? "is" : "are"));
   }
   // Weights hide differences in the dispersion, so the distances themselves are looked at.
   const bool all_equal = std::all_of(analysis.largest.begin(), analysis.largest.end(),

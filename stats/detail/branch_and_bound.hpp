@@ -159,9 +159,8 @@ class CellSearch {
 /// Eq. (4) from a point: monotone, also across the cut locus. Returns where it comes to rest, and in `steps` after how
 /// many of them.
 template <class Space>
-typename Space::Point descend(const PackedData<Space>& data, typename Space::Point y, std::size_t& steps) {
-  constexpr std::size_t most = 60;
-  constexpr double tolerance = 1e-5;
+typename Space::Point descend(const PackedData<Space>& data, typename Space::Point y, std::size_t& steps,
+                              std::size_t most = 60, double tolerance = 1e-5) {
   for (steps = 0; steps < most; ++steps) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double weight = 0;

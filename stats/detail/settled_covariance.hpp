@@ -44,6 +44,9 @@ SettledCovariance<M> settleCovariance(const R& samples, const W& weights, const 
   result.first = result.covariance = covariance_of(mean);
   result.hessian = mean.hessian;
   if (!result.first.allFinite()) return result;
+  // A single datum is its own mean, with the covariance that it came with.
+  result.settled = mean.n == 1;
+  if (result.settled) return result;
   const double width = averagingWidth(mean.n);
   MeanResult<M> averaged = mean;
   for (int i = 0; i < 20; ++i) {

@@ -30,6 +30,8 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
   constexpr auto angular = angularCoordinates<M>();
   constexpr int K = angular.count;
   SettledMaha<M> settled{result.covariance, 0, true};
+  // A single measurement is its own mean, with the covariance that it came with.
+  if (std::ranges::size(samples) == 1) return settled;
   if constexpr (K > 0) {
     using Derivative = Eigen::Matrix<double, D, K>;
     using Matrix = Eigen::Matrix<double, D, D>;

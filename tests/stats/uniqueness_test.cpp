@@ -129,7 +129,8 @@ void boundsHold(const Space& space, std::uint64_t seed) {
     const auto coarse = detail::boundInBall(bins, g, y, rho);
     EXPECT_GE(coarse.centre, bound.centre * (1 - 1e-12)) << "trial " << trial;
     // About a minimum: no other point of the excluded ball is as low.
-    const typename Space::Point rest = detail::descend(data, y, 400, 1e-13);
+    std::size_t steps = 0;
+    const typename Space::Point rest = detail::descend(data, y, steps, 400, 1e-13);
     const auto seen = detail::profile(data, rest);
     const double convex = detail::convexityRadius<Space>(seen);
     const double excluded = detail::exclusionRadius(seen, g, convex, seen.cost);
