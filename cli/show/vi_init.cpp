@@ -103,6 +103,29 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
   return table.str();
 }
 
+/// Stretches whose windows contradict each other.
+std::string contradictionsInWords(const std::vector<ViFusion>& fusions) {
+  std::size_t with_state = 0, contradict = 0, inflated = 0;
+  double largest_p = 0, least = std::numeric_limits<double>::infinity(), largest = 0;
+  for (const ViFusion& f : fusions) {
+    with_state += f.has_state;
+    if (!f.has_state || f.p >= least_p_of_fusion) continue;
+    ++contradict;
+    inflated += f.inflated;
+    largest_p = std::max(largest_p, f.p);
+    least = std::min(least, f.inflation), largest = std::max(largest, f.inflation);
+  }
+  if (contradict == 0) return {};
+  return fmt::format(
+      "in {} of {} stretches windows contradict each other (p {:.1g} at most): their covariances are too small by "
+      "factors "
+      "of {:.3g} to {:.3g}{}\n",
+      contradict, with_state, largest_p, least, largest,
+      inflated > 0 ? ", which the fused states' were multiplied by"
+                   : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
+                     "--calibrate-noise and --noise-factor, or --inflate");
+}
+
 std::string inWords(const char* what, const NoiseFactor& factor) {
   return fmt::format("{} times {:.3g} (95 %: {:.3g} to {:.3g})", what, factor.factor, factor.low, factor.high);
 }
@@ -161,16 +184,7 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
         "deviations of gravity and the biases";
     text += with_truth ? ", and what is off:\n" : ":\n";
     text += fusionTable(result, with_truth);
-    for (const ViFusion& f : result.fusions) {
-      if (!f.has_state || f.p >= least_p_of_fusion) continue;
-      text += fmt::format(
-          "{}the windows up to {:.1f} s contradict each other (p = {:.1g}): their covariances are too small by a "
-          "factor "
-          "of {:.3g}{}\n",
-          f.inflated ? "" : "not ok: ", f.end, f.p, f.inflation,
-          f.inflated ? ", by which that of the fused state was multiplied"
-                     : "; the sensor's noise in motion is larger than its densities (--noise-factor), or --inflate");
-    }
+    text += contradictionsInWords(result.fusions);
   }
   if (result.noise) text += "\n" + noiseInWords(*result.noise);
   std::vector<std::string> notes;
