@@ -6,7 +6,7 @@
 namespace liestat::experiments {
 namespace {
 
-const InitialisationOptions options{
+const InitialisationOptions rest_options{
     .bearing_noise = vi_init_bearing_noise,
     .prior = {.gyroscope_sigma = 0.01, .accelerometer_sigma = 0.05},
     .closed_form = {.singular_values = false},
@@ -19,8 +19,8 @@ struct Measured {
   InertialWindow window;
 
   Measured(const ViInitWindow& size, SceneMotion motion, double far, double noise, CounterRng& rng)
-      : bias{noise * options.prior.gyroscope_sigma * rng.normalVector<3>(),
-             noise * options.prior.accelerometer_sigma * rng.normalVector<3>()},
+      : bias{noise * rest_options.prior.gyroscope_sigma * rng.normalVector<3>(),
+             noise * rest_options.prior.accelerometer_sigma * rng.normalVector<3>()},
         scene({.images = size.images,
                .features = size.features,
                .motion = motion,
@@ -41,7 +41,7 @@ struct Measured {
 
 RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   const Measured measured(size, SceneMotion::stationary, 1, noise, rng);
-  const RobustInitialisation found = initialiseRobustly(measured.window, options);
+  const RobustInitialisation found = initialiseRobustly(measured.window, rest_options);
   RestOutcome outcome;
   outcome.stationary = found.result.status == FusionStatus::stationary && found.rest;
   if (!outcome.stationary || (noise == 1 && !found.result.consistent)) return outcome;
@@ -60,7 +60,7 @@ RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
 
 SlowOutcome slowTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   const Measured measured(size, SceneMotion::constant_velocity, 20, noise, rng);
-  return {initialiseRobustly(measured.window, options).result.status == FusionStatus::stationary};
+  return {initialiseRobustly(measured.window, rest_options).result.status == FusionStatus::stationary};
 }
 
 }  // namespace liestat::experiments

@@ -133,7 +133,7 @@ inline RobustInitialisation searchMotion(InertialWindow window, const Initialisa
 
 }  // namespace detail
 
-LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(InertialWindow window,
+LIESTAT_FUSION_INLINE RobustInitialisation initialiseRobustly(const InertialWindow& window,
                                                               const InitialisationOptions& options) {
   RobustInitialisation found = detail::searchMotion(window, options);
   detail::refineRest(window, options, found);

@@ -43,9 +43,9 @@ inline Eigen::Matrix<double, 27, 27> jointCovariance(const RefinementProblem& pr
   if (problem.walks().accelerometer) addWalk(24, problem.accelerometerWalkBlock(end));
   Eigen::Matrix<double, 27, 27> unknowns = Eigen::Matrix<double, 27, 27>::Zero();
   const std::vector<double> inverse = system.inverse(blocks);
-  for (int i = 0; i < column; ++i) {
-    for (int j = 0; j < column; ++j) unknowns(i, j) = inverse[static_cast<std::size_t>(i * column + j)];
-  }
+  unknowns.topLeftCorner(column, column) =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(inverse.data(), column,
+                                                                                               column);
   return congruence(from, unknowns);
 }
 
@@ -57,7 +57,8 @@ inline double scaleSigma(const RefinementProblem& problem, const ReducedSystem& 
   for (std::size_t j = 1; j < X.size(); ++j) {
     const Eigen::Vector3d p = X[j].translation(), in_body = X[j].so3().inverse() * p;
     squares += p.squaredNorm();
-    for (int k = 0; k < 3; ++k) gradient[static_cast<std::size_t>(3 * problem.stateBlock(j, 0) + k)] = in_body[k];
+    const std::size_t first = 3 * static_cast<std::size_t>(problem.stateBlock(j, 0));
+    for (std::size_t k = 0; k < 3; ++k) gradient[first + k] = in_body[static_cast<int>(k)];
   }
   return std::sqrt(system.variance(gradient)) / squares;
 }

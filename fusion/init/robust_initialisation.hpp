@@ -17,7 +17,7 @@
 namespace liestat {
 
 /// Velocity, gravity, features and the gyroscope's bias of a window. Bad input: see result.fault.
-RobustInitialisation initialiseRobustly(InertialWindow window, const InitialisationOptions& options);
+RobustInitialisation initialiseRobustly(const InertialWindow& window, const InitialisationOptions& options);
 
 }  // namespace liestat
 
