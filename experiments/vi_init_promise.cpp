@@ -103,7 +103,7 @@ std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
     }
     case ViInitStatistic::fraction: {
       ViInitPromise promise;
-      promise.fraction = 0.99;
+      promise.fraction = row.check == Check::noise ? 0.9 : 0.99;
       return promise;
     }
     case ViInitStatistic::error:

@@ -92,6 +92,14 @@ struct SlowOutcome {
 };
 SlowOutcome slowTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
+/// The calibration of the sensor's noise: whether the 95 % intervals hold the factors.
+struct NoiseOutcome {
+  bool gyroscope = false, accelerometer = false, common = false;
+};
+/// A recording of twenty seconds whose gyroscope and accelerometer are so many times as noisy as the calibration is told.
+template <int gyroscope, int accelerometer>
+NoiseOutcome noiseTrial(const ViInitWindow& window, double noise, CounterRng& rng);
+
 /// 40 % of the tracks drift by a random walk of 8 pixels an image.
 struct DriftOutcome {
   bool exact_selection = false;           ///< exactly the other tracks were kept

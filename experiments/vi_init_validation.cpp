@@ -24,7 +24,7 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 14> quantities = {{
+constexpr std::array<QuantityEntry, 17> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
@@ -39,13 +39,18 @@ constexpr std::array<QuantityEntry, 14> quantities = {{
     {"bias", "rad/s", ViInitStatistic::error},
     {"selection", "", ViInitStatistic::fraction},
     {"told", "", ViInitStatistic::fraction},
+    {"gyroscope_interval", "", ViInitStatistic::fraction},
+    {"accelerometer_interval", "", ViInitStatistic::fraction},
+    {"common_interval", "", ViInitStatistic::fraction},
 }};
-static_assert(static_cast<std::size_t>(Quantity::told) + 1 == quantities.size());
+static_assert(static_cast<std::size_t>(Quantity::common_interval) + 1 == quantities.size());
 constexpr std::array estimators = {
     "refinement", "closed_form", "closed_form_with_bias", "least_squares", "bias_estimated", "bias_ignored",
-    "robust",     "oracle",      "no_selection",          "at_rest",       "slow_motion"};
-static_assert(static_cast<std::size_t>(Estimator::slow_motion) + 1 == estimators.size());
-constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias", "rest", "drift"};
+    "robust",     "oracle",      "no_selection",          "at_rest",       "slow_motion",    "noise_1_1",
+    "noise_4_4",  "noise_16_16", "noise_4_1",             "noise_1_4",     "noise_16_1",     "noise_1_16"};
+static_assert(static_cast<std::size_t>(Estimator::noise_1_16) + 1 == estimators.size());
+constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias",
+                              "noise",       "rest", "drift"};
 static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
@@ -59,6 +64,9 @@ struct Column {
   int dof = 0;                                   ///< of a distance
   double (*chi2_dof)(const Outcome&) = nullptr;  ///< degrees of freedom of a χ²
 };
+
+/// A trial of the calibration of noise takes a recording and not a window.
+constexpr std::size_t recordings_per_window = 20;
 
 /// A kind of window and the rows that its trials give.
 struct Experiment {
@@ -79,20 +87,27 @@ struct Experiment {
   double work() const {
     const double observations = static_cast<double>(window.images * window.features);
     if (check == Check::rest) return 40;
+    if (check == Check::noise) return 250. / recordings_per_window;
     return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
 
+/// The trials of a row: of recordings there are fewer.
+std::size_t trialsOf(Check check, const ViInitValidation& validation) {
+  return check == Check::noise ? std::max<std::size_t>(1, validation.trials / recordings_per_window)
+                               : validation.trials;
+}
+
 template <class Outcome>
-std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window,
+std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window, std::size_t trials,
                                const ViInitValidation& validation, const std::function<void(std::size_t)>& progress) {
   using Outcomes = std::vector<Outcome>;
-  const std::size_t n_chunks = chunkCount(validation.trials, 8);
+  const std::size_t n_chunks = chunkCount(trials, 8);
   return ProgramExecutor{validation.threads}.reduce(
       n_chunks,
       [&](std::size_t chunk) {
         Outcomes part;
-        const ChunkRange range = chunkRange(validation.trials, n_chunks, chunk);
+        const ChunkRange range = chunkRange(trials, n_chunks, chunk);
         for (std::size_t i = range.begin; i < range.end; ++i) {
           CounterRng rng(validation.seed, i);
           part.push_back(trial(window, validation.noise, rng));
@@ -110,10 +125,10 @@ Experiment experiment(Check check, ViInitTrial<Outcome> trial, const ViInitWindo
                       const std::vector<Column<Outcome>>& columns) {
   Experiment e{.check = check, .window = window, .rows = {}, .run = {}};
   for (const Column<Outcome>& c : columns) e.rows.push_back({c.estimator, c.quantity, c.dof});
-  e.run = [trial, window, columns](const ViInitValidation& validation,
+  e.run = [check, trial, window, columns](const ViInitValidation& validation,
                                    const std::function<void(std::size_t)>& progress) {
     std::vector<ViInitValues> values(columns.size());
-    for (const Outcome& outcome : runTrials(trial, window, validation, progress)) {
+    for (const Outcome& outcome : runTrials(trial, window, trialsOf(check, validation), validation, progress)) {
       for (std::size_t k = 0; k < columns.size(); ++k) {
         values[k].value.push_back(columns[k].value(outcome));
         if (columns[k].chi2_dof != nullptr) values[k].dof.push_back(columns[k].chi2_dof(outcome));
@@ -201,6 +216,22 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
                      {Estimator::bias_ignored, Quantity::gravity, [](const G& o) { return o.ignored.gravity; }},
                      {Estimator::bias_ignored, Quantity::scale, [](const G& o) { return o.ignored.scale; }}}));
 
+  using N = NoiseOutcome;
+  const auto addNoise = [&](Estimator estimator, ViInitTrial<N> trial, bool equal) {
+    std::vector<Column<N>> noise{
+        {estimator, Quantity::gyroscope_interval, [](const N& o) { return o.gyroscope ? 1. : 0.; }},
+        {estimator, Quantity::accelerometer_interval, [](const N& o) { return o.accelerometer ? 1. : 0.; }}};
+    if (equal) noise.push_back({estimator, Quantity::common_interval, [](const N& o) { return o.common ? 1. : 0.; }});
+    list.push_back(experiment(Check::noise, trial, {2, 11, 40}, noise));
+  };
+  addNoise(Estimator::noise_1_1, noiseTrial<1, 1>, true);
+  addNoise(Estimator::noise_4_4, noiseTrial<4, 4>, true);
+  addNoise(Estimator::noise_16_16, noiseTrial<16, 16>, true);
+  addNoise(Estimator::noise_4_1, noiseTrial<4, 1>, false);
+  addNoise(Estimator::noise_1_4, noiseTrial<1, 4>, false);
+  addNoise(Estimator::noise_16_1, noiseTrial<16, 1>, false);
+  addNoise(Estimator::noise_1_16, noiseTrial<1, 16>, false);
+
   using Rest = RestOutcome;
   using Slow = SlowOutcome;
   for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}}) {
@@ -260,7 +291,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   auto row = rows.begin();
   for (const Experiment& e : list) {
     const std::vector<ViInitValues> values = e.run(validation, [&](std::size_t done) {
-      const double share = static_cast<double>(done) / static_cast<double>(validation.trials);
+      const double share = static_cast<double>(done) / static_cast<double>(trialsOf(e.check, validation));
       if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work()) / all), 1000000);
     });
     for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);

@@ -21,12 +21,13 @@ enum class ViInitCheck {
   closed_form,     ///< the closed form under its covariance, with image noise alone
   accuracy,        ///< errors of the closed form, biases known
   gyroscope_bias,  ///< errors where the gyroscope has a bias of 0.05 rad/s
+  noise,           ///< the calibration of the sensor's noise where it is 1, 4, 16 times as large
   rest,            ///< what is at rest is called so, and what moves slowly is not; gravity and biases at rest
   drift            ///< errors where 40 % of the tracks drift
 };
 inline constexpr std::array all_vi_init_checks = {
     ViInitCheck::consistency,    ViInitCheck::walk, ViInitCheck::closed_form, ViInitCheck::accuracy,
-    ViInitCheck::gyroscope_bias, ViInitCheck::rest, ViInitCheck::drift};
+    ViInitCheck::gyroscope_bias, ViInitCheck::noise, ViInitCheck::rest, ViInitCheck::drift};
 std::string name(ViInitCheck check);
 
 /// The estimator that a row is about, and what it leaves out.
@@ -41,7 +42,15 @@ enum class ViInitEstimator {
   oracle,        ///< knows which tracks drift
   no_selection,  ///< takes all tracks
   at_rest,       ///< the initialisation of a body at rest
-  slow_motion    ///< and of one that moves at 0.05 m/s among features 2 to 8 m away
+  slow_motion,   ///< and of one that moves at 0.05 m/s among features 2 to 8 m away
+  /// The calibration of noise where the densities of gyroscope and accelerometer are so many times the given ones.
+  noise_1_1,
+  noise_4_4,
+  noise_16_16,
+  noise_4_1,
+  noise_1_4,
+  noise_16_1,
+  noise_1_16
 };
 std::string name(ViInitEstimator estimator);
 
@@ -60,7 +69,10 @@ enum class ViInitQuantity {
   scale_of_features,
   bias,       ///< of the gyroscope, length of the error
   selection,  ///< fraction of the windows in which exactly the right tracks were kept
-  told        ///< fraction of the windows in which rest and motion were told right
+  told,       ///< fraction of the windows in which rest and motion were told right
+  gyroscope_interval,      ///< fraction of the recordings in which the interval of the gyroscope's factor holds it
+  accelerometer_interval,  ///< and the accelerometer's
+  common_interval          ///< and that of both as one
 };
 std::string name(ViInitQuantity quantity);
 /// Its unit; empty for a pure number.
@@ -92,7 +104,7 @@ struct ViInitPromise {
 struct ViInitValidation {
   std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
-  std::size_t trials = 600;
+  std::size_t trials = 600;  ///< windows a row; for the calibration of noise a twentieth as many recordings
   double noise = 1;  ///< what is simulated over what the estimators are told
   std::uint64_t seed = 1;
   int threads = 0;

@@ -76,7 +76,7 @@ void addValidateViInitCommand(const CommandList& validate) {
   const Command app =
       validate.add("vi-init", "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
   app.option("--check", options->checks,
-             "consistency, closed_form, accuracy, gyroscope_bias, drift: a comma list (default: all)")
+             "consistency, walk, closed_form, accuracy, gyroscope_bias, noise, rest, drift: a comma list (default: all)")
       .list()
       .oneOf(names(all_vi_init_checks));
   app.option("--window", options->windows, "Only windows of so many seconds, of 1, 2, 3, 4: a comma list")
@@ -84,7 +84,7 @@ void addValidateViInitCommand(const CommandList& validate) {
       .oneOfNumbers({1., 2., 3., 4.});
   app.option("--noise", options->noise, "Noise that is simulated over the one that the estimators are told (default 1)")
       .range(0.01, 100.0);
-  app.flag("--full", options->full, "4000 windows a row; no time limit");
+  app.flag("--full", options->full, "4000 windows a row, 200 recordings; no time limit");
   const Option table1 = app.flag("--table1", options->table1, "The paper's table of cases, as it is recognised");
   const Option scene =
       app.option("--scene", options->scene,

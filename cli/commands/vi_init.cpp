@@ -119,17 +119,10 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   return how;
 }
 
-/// Calibrates the sensor's noise and takes it over where that succeeds.
-NoiseCalibration calibrate(VisualInertialRecording& measured, const VisualInertialOptions& how) {
-  const NoiseCalibration found = withProgressBar("noise", [&](const auto& progress) {
+NoiseCalibration calibrate(const VisualInertialRecording& measured, const VisualInertialOptions& how) {
+  return withProgressBar("noise", [&](const auto& progress) {
     return calibrateNoise(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
-  if (found.status != FusionStatus::ok) return found;
-  const double gyroscope = found.separable ? found.gyroscope.factor : found.common.factor;
-  const double accelerometer = found.separable ? found.accelerometer.factor : found.common.factor;
-  measured.noise.gyroscope *= gyroscope, measured.noise.gyroscope_walk *= gyroscope;
-  measured.noise.accelerometer *= accelerometer, measured.noise.accelerometer_walk *= accelerometer;
-  return found;
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
@@ -137,7 +130,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
   VisualInertialRecording measured = measurementsOf(recording, options);
   const VisualInertialOptions how = optionsOf(recording, options);
   std::optional<NoiseCalibration> noise;
-  if (options.calibrate_noise) noise = calibrate(measured, how);
+  if (options.calibrate_noise) {
+    noise = calibrate(measured, how);
+    measured.noise = noise->noise;
+  }
   VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });

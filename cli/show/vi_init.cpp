@@ -118,33 +118,41 @@ std::string contradictionsInWords(const std::vector<ViFusion>& fusions) {
   if (contradict == 0) return {};
   return fmt::format(
       "in {} of {} stretches windows contradict each other (p {:.1g} at most): their covariances are too small by "
-      "factors "
-      "of {:.3g} to {:.3g}{}\n",
+      "factors of {:.3g} to {:.3g}{}\n",
       contradict, with_state, largest_p, least, largest,
       inflated > 0 ? ", which the fused states' were multiplied by"
                    : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
                      "--calibrate-noise and --noise-factor, or --inflate");
 }
 
-std::string inWords(const char* what, const NoiseFactor& factor) {
-  return fmt::format("{} times {:.3g} (95 %: {:.3g} to {:.3g})", what, factor.factor, factor.low, factor.high);
+/// "4.1 (95 %: 3.2 to 5.3)", "1 (95 %: up to 2.1)".
+std::string inWords(const NoiseFactor& factor) {
+  const std::string range = factor.low > 0 && std::isfinite(factor.high)
+                                ? fmt::format("{:.3g} to {:.3g}", factor.low, factor.high)
+                            : factor.low > 0 ? fmt::format("from {:.3g}", factor.low)
+                                             : fmt::format("up to {:.3g}", factor.high);
+  return fmt::format("{:.3g} (95 %: {})", factor.factor, range);
 }
 
 std::string noiseInWords(const NoiseCalibration& found) {
   if (found.status != FusionStatus::ok) {
-    return fmt::format(
-        "the sensor's noise is not told by {} meetings of windows: its densities were left as they are\n",
-        found.meetings);
+    return fmt::format("the sensor's noise was not calibrated, and its densities are as given: {}\n",
+                       found.status == FusionStatus::undetermined
+                           ? fmt::format("{} meetings of windows do not tell it", found.meetings)
+                           : describe(found.status));
   }
   const double dof = static_cast<double>(found.degrees_of_freedom);
-  std::string text = fmt::format(
-      "{} meetings of windows agree with the sensor's densities {}: chi2 {:.2f} per degree of freedom, {:.2f} "
-      "without\n",
-      found.meetings, inWords("", found.common), found.calibrated_chi2 / dof, found.chi2 / dof);
-  text += found.separable ? inWords("by themselves gyroscope", found.gyroscope) + ", " +
-                                inWords("accelerometer", found.accelerometer) + ", which were used\n"
-                          : "gyroscope and accelerometer cannot be told apart: the factor of both was used\n";
-  return text;
+  const auto ends = [](const NoiseFactor& factor) { return factor.isTold() ? "" : ", not told"; };
+  std::string text = fmt::format("noise calibrated by {} meetings of windows: ", found.meetings);
+  if (found.separable || found.common_p < 0.05) {
+    text += fmt::format("gyroscope's densities times {}{}, accelerometer's {}{}", inWords(found.gyroscope),
+                        ends(found.gyroscope), inWords(found.accelerometer), ends(found.accelerometer));
+  } else {
+    text += fmt::format("all densities times {}{}; gyroscope and accelerometer cannot be told apart",
+                        inWords(found.common), ends(found.common));
+  }
+  return text + fmt::format(". Their chi2 per degree of freedom is {:.2f}, was {:.2f}\n", found.calibrated_chi2 / dof,
+                            found.chi2 / dof);
 }
 
 }  // namespace

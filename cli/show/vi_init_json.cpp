@@ -122,9 +122,12 @@ JsonObject toJson(const NoiseCalibration& found) {
   o.set("status", name(found.status)).set("windows", found.windows).set("meetings", found.meetings);
   o.set("chi2", found.chi2).set("calibrated_chi2", found.calibrated_chi2);
   o.set("degrees_of_freedom", found.degrees_of_freedom).set("common", toJson(found.common));
-  o.set("separable", found.separable);
-  if (found.separable) o.set("gyroscope", toJson(found.gyroscope)).set("accelerometer", toJson(found.accelerometer));
-  return o;
+  o.set("common_p", found.common_p).set("separable", found.separable);
+  o.set("gyroscope", toJson(found.gyroscope)).set("accelerometer", toJson(found.accelerometer));
+  JsonObject noise;
+  noise.set("gyroscope", found.noise.gyroscope).set("accelerometer", found.noise.accelerometer);
+  noise.set("gyroscope_walk", found.noise.gyroscope_walk).set("accelerometer_walk", found.noise.accelerometer_walk);
+  return o.set("noise", noise);
 }
 
 JsonObject toJson(const ViFusion& f) {

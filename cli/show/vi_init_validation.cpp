@@ -98,6 +98,17 @@ Table restTable(const std::vector<Group>& list) {
   return table;
 }
 
+/// How often intervals held the factors.
+Table noiseTable(const std::vector<Group>& list) {
+  Table table({"factors g, a", "T, n, N", "recordings", "gyroscope's", "accelerometer's", "of both", "verdict"});
+  for (const Group& g : list) {
+    table.row({inWords(g.first().estimator), g.window(), fmt::format("{}", g.first().trials),
+               ratio(g.of(Quantity::gyroscope_interval)), ratio(g.of(Quantity::accelerometer_interval)),
+               ratio(g.of(Quantity::common_interval)), g.verdict()});
+  }
+  return table;
+}
+
 }  // namespace
 
 std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
@@ -112,6 +123,8 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
     if (check == Check::rest) {
       text += restTable(list).str() + "\n";
+    } else if (check == Check::noise) {
+      text += noiseTable(list).str() + "\n";
     } else if (check != Check::closed_form && check != Check::walk) {
       text += errorsTable(list).str() + "\n";
     }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace liestat::cli {
@@ -52,6 +53,13 @@ inline std::vector<ViInitGroup> groups(const std::vector<experiments::ViInitRow>
   return list;
 }
 
+/// The factors of the densities of gyroscope and accelerometer in the calibration's rows.
+inline std::string inWords(experiments::ViInitEstimator estimator) {
+  std::string text = name(estimator).substr(std::string_view("noise_").size());
+  std::replace(text.begin(), text.end(), '_', ',');
+  return text;
+}
+
 /// The subject of a check, in a line.
 inline const char* describe(experiments::ViInitCheck check) {
   using Check = experiments::ViInitCheck;
@@ -66,6 +74,8 @@ inline const char* describe(experiments::ViInitCheck check) {
       return "Closed form with the sensor's noise, biases known: errors, median / 95 %";
     case Check::gyroscope_bias:
       return "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %";
+    case Check::noise:
+      return "Densities that are g and a times the given ones: how often 95 % intervals of the calibration hold that";
     case Check::rest:
       return "At rest, and at 0.05 m/s among features 2 to 8 m away: told right, and the covariance at rest";
     case Check::drift:

@@ -7,4 +7,3 @@
 #include <fusion/detail/fuse_windows.hpp>
 #include <fusion/detail/initialise_recording.hpp>
 #include <fusion/detail/refine.hpp>
-#include <fusion/detail/calibrate_noise.hpp>

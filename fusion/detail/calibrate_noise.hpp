@@ -5,15 +5,18 @@
 #include <fusion/detail/visual_inertial_run.hpp>
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
+#include <lie/detail/small_matrix.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,50 +24,188 @@ namespace liestat {
 
 namespace detail {
 
-/// Minus twice the log-likelihood of a recording's meetings, as a function of the logarithms of the factors of the
-/// gyroscope's and the accelerometer's densities.
-class MeetingLikelihood {
- public:
-  using Vector2 = Eigen::Vector2d;
+/// χ² of one degree of freedom stays below with a probability of 95 %.
+inline constexpr double likelihood_rise = 3.841458820694124;
 
+/// Logarithms of the factors of the gyroscope's and the accelerometer's densities.
+struct LogFactors {
+  static constexpr double least = -2.5, most = 6;  ///< 0.08 to 400
+  double gyroscope = 0, accelerometer = 0;
+
+  ImuNoise<double> of(ImuNoise<double> noise) const {
+    noise.gyroscope *= std::exp(gyroscope), noise.gyroscope_walk *= std::exp(gyroscope);
+    noise.accelerometer *= std::exp(accelerometer), noise.accelerometer_walk *= std::exp(accelerometer);
+    return noise;
+  }
+};
+
+/// Where a function of one variable is least between two bounds, and its value there: a grid, then the golden section.
+template <class Function>
+std::pair<double, double> minimumOf(const Function& f, double low, double high) {
+  constexpr int steps = 10;
+  const double step = (high - low) / steps;
+  std::pair<double, double> best{low, f(low)};
+  for (int i = 1; i <= steps; ++i) {
+    const double x = low + i * step;
+    if (const double y = f(x); y < best.second) best = {x, y};
+  }
+  constexpr double ratio = 0.6180339887498949;
+  double from = std::max(low, best.first - step), to = std::min(high, best.first + step);
+  double a = to - ratio * (to - from), b = from + ratio * (to - from), at_a = f(a), at_b = f(b);
+  while (to - from > 0.01) {
+    if (at_a < at_b) {
+      to = b, b = a, at_b = at_a, a = to - ratio * (to - from), at_a = f(a);
+    } else {
+      from = a, a = b, at_a = at_b, b = from + ratio * (to - from), at_b = f(b);
+    }
+  }
+  if (at_a < best.second) best = {a, at_a};
+  if (at_b < best.second) best = {b, at_b};
+  return best;
+}
+
+/// The interval around a minimum in which a function has not risen by likelihood_rise.
+template <class Function>
+NoiseFactor intervalOf(const Function& f, const std::pair<double, double>& minimum) {
+  const double limit = minimum.second + likelihood_rise;
+  const auto end = [&](double outside) {
+    if (!(f(outside) > limit)) return outside;
+    double inside = minimum.first;
+    while (std::abs(outside - inside) > 0.01) {
+      const double middle = 0.5 * (inside + outside);
+      (f(middle) > limit ? outside : inside) = middle;
+    }
+    return 0.5 * (inside + outside);
+  };
+  const double low = end(LogFactors::least), high = end(LogFactors::most);
+  NoiseFactor factor{.factor = std::exp(minimum.first)};
+  if (low > LogFactors::least) factor.low = std::exp(low);
+  if (high < LogFactors::most) factor.high = std::exp(high);
+  return factor;
+}
+
+/// Minus twice the log-likelihood of meetings near the factors at which they were computed: to either density squared
+/// the covariance of a difference is nearly linear, and the difference hardly moves.
+class MeetingModel {
+ public:
+  using Meetings = std::vector<RecordingRun::Meeting>;
+
+  /// Meetings at these factors, and with the one or the other raised by `step`. Those that are not in all are left out.
+  MeetingModel(const LogFactors& at, double step, const Meetings& here, const Meetings& gyroscope,
+               const Meetings& accelerometer)
+      : at_(at) {
+    const double rise = std::expm1(2 * step);
+    const auto find = [](const Meetings& meetings, std::size_t window) {
+      const auto found = std::find_if(meetings.begin(), meetings.end(), [&](const auto& m) { return m.window == window; });
+      return found == meetings.end() ? nullptr : &*found;
+    };
+    for (const RecordingRun::Meeting& meeting : here) {
+      const auto *by_g = find(gyroscope, meeting.window), *by_a = find(accelerometer, meeting.window);
+      const Matrix11& S = meeting.outcome.difference_covariance;
+      const Cholesky<double, 11> factor(S);
+      if (!by_g || !by_a || !factor.ok()) continue;
+      // In units of S, of which each density has a part from 0 to all.
+      const auto part = [&](const Matrix11& raised) {
+        const Matrix11 half = factor.halfSolve<11>(Matrix11((raised - S) / rise));
+        return atLeast(0, Matrix11(factor.halfSolve<11>(Matrix11(half.transpose()))));
+      };
+      Term term{factor.halfSolve<1>(meeting.outcome.difference), factor.logDeterminant(), {},
+                part(by_g->outcome.difference_covariance), part(by_a->outcome.difference_covariance)};
+      term.rest = atLeast(1e-6, Matrix11(Matrix11::Identity() - term.gyroscope - term.accelerometer));
+      terms_.push_back(term);
+    }
+  }
+
+  std::size_t meetings() const { return terms_.size(); }
+  double operator()(const LogFactors& x) const {
+    const double by_g = std::exp(2 * (x.gyroscope - at_.gyroscope));
+    const double by_a = std::exp(2 * (x.accelerometer - at_.accelerometer));
+    double cost = 0;
+    for (const Term& term : terms_) {
+      const Cholesky<double, 11> factor(Matrix11(term.rest + by_g * term.gyroscope + by_a * term.accelerometer));
+      if (!factor.ok()) return std::numeric_limits<double>::infinity();
+      cost += factor.halfSolve<1>(term.d).squaredNorm() + factor.logDeterminant() + term.log_determinant;
+    }
+    return cost;
+  }
+
+  /// The best of one factor, given the other.
+  std::pair<double, double> bestGyroscope(double accelerometer) const {
+    return minimumOf([&](double x) { return (*this)({x, accelerometer}); }, LogFactors::least, LogFactors::most);
+  }
+  std::pair<double, double> bestAccelerometer(double gyroscope) const {
+    return minimumOf([&](double x) { return (*this)({gyroscope, x}); }, LogFactors::least, LogFactors::most);
+  }
+  double gyroscopeProfile(double x) const { return bestAccelerometer(x).second; }
+  double accelerometerProfile(double x) const { return bestGyroscope(x).second; }
+  double common(double x) const { return (*this)({x, x}); }
+  /// The best of both.
+  LogFactors best() const {
+    const double x =
+        minimumOf([&](double g) { return gyroscopeProfile(g); }, LogFactors::least, LogFactors::most).first;
+    return {x, bestAccelerometer(x).first};
+  }
+
+ private:
+  /// The difference and the parts of its covariance S, whitened by S.
+  struct Term {
+    Eigen::Matrix<double, 11, 1> d;
+    double log_determinant;  ///< of S
+    Matrix11 rest, gyroscope, accelerometer;
+  };
+  /// The symmetric matrix with its eigenvalues raised to a bound.
+  static Matrix11 atLeast(double bound, const Matrix11& A) {
+    const Eigen::SelfAdjointEigenSolver<Matrix11> eigen(Matrix11(0.5 * (A + A.transpose())));
+    return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(bound).asDiagonal() * eigen.eigenvectors().transpose();
+  }
+
+  LogFactors at_;
+  std::vector<Term> terms_;
+};
+
+/// The meetings of a recording's windows, as functions of the densities.
+class RecordingMeetings {
+ public:
   /// The windows are those of initialiseRecording().
-  MeetingLikelihood(const VisualInertialRecording& recording, const RecordingRun& run,
+  RecordingMeetings(const VisualInertialRecording& recording, const RecordingRun& run,
                     const std::vector<InitialisedWindow>& windows, std::function<void()> advance)
       : recording_(recording), run_(run), windows_(windows), advance_(std::move(advance)) {
+    // Not those that are ok: with densities that are too small, windows are refused which the calibration would mend.
     for (FusedStretch& stretch : run.stretchesOf(windows, [](const InitialisedWindow& w) {
-           return w.closedForm().status == FusionStatus::ok && w.isRefined();
+           return w.closedForm().status == FusionStatus::ok && !w.found.second && w.isRefined();
          })) {
       if (stretch.windows.size() > 1) stretches_.push_back(std::move(stretch));
     }
   }
 
-  struct Value {
-    double cost = std::numeric_limits<double>::infinity();
-    double chi2 = 0;
-    std::size_t degrees_of_freedom = 0, windows = 0;
-  };
+  std::size_t stretches() const { return stretches_.size(); }
+  /// How many windows took part, and their distances, at the last factors asked for.
+  std::size_t windows() const { return fused_; }
+  double chi2() const { return chi2_; }
+  std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
 
-  /// Of all meetings; an infinite cost where windows fell out that others have kept.
-  Value operator()(const Vector2& log_factor) {
-    ImuNoise<double> noise = recording_.noise;
-    noise.gyroscope *= std::exp(log_factor[0]), noise.gyroscope_walk *= std::exp(log_factor[0]);
-    noise.accelerometer *= std::exp(log_factor[1]), noise.accelerometer_walk *= std::exp(log_factor[1]);
+  MeetingModel::Meetings at(const LogFactors& factors) {
+    const ImuNoise<double> noise = factors.of(recording_.noise);
     const RecordingRun run = run_.withNoise(noise);
     std::vector<InitialisedWindow> windows = windows_;
-    Value value;
-    double cost = 0;
+    MeetingModel::Meetings all;
+    chi2_ = 0, degrees_of_freedom_ = 0, fused_ = 0;
     for (FusedStretch stretch : stretches_) {
       for (const std::size_t i : stretch.windows) windows[i].measured = windows_[i].measured.withNoise(noise);
-      cost += run.fuse(windows, stretch);
-      cost += stretch.chi2;
-      value.chi2 += stretch.chi2;
-      value.degrees_of_freedom += stretch.degrees_of_freedom;
-      value.windows += stretch.windows.size();
+      const auto meetings = run.fuse(windows, stretch);
+      all.insert(all.end(), meetings.begin(), meetings.end());
+      chi2_ += stretch.chi2;
+      degrees_of_freedom_ += stretch.degrees_of_freedom;
+      fused_ += stretch.windows.size();
     }
-    if (degrees_of_freedom_ == 0) degrees_of_freedom_ = value.degrees_of_freedom;
-    if (value.degrees_of_freedom == degrees_of_freedom_ && std::isfinite(cost)) value.cost = cost;
     if (advance_) advance_();
-    return value;
+    return all;
+  }
+  MeetingModel modelAt(const LogFactors& factors) {
+    constexpr double step = 0.1;
+    const auto gyroscope = at({factors.gyroscope + step, factors.accelerometer});
+    const auto accelerometer = at({factors.gyroscope, factors.accelerometer + step});
+    return {factors, step, at(factors), gyroscope, accelerometer};
   }
 
  private:
@@ -73,137 +214,104 @@ class MeetingLikelihood {
   const std::vector<InitialisedWindow>& windows_;
   std::function<void()> advance_;
   std::vector<FusedStretch> stretches_;
-  std::size_t degrees_of_freedom_ = 0;
+  std::size_t fused_ = 0, degrees_of_freedom_ = 0;
+  double chi2_ = 0;
 };
-
-/// χ² of one degree of freedom stays below with a probability of 95 %.
-inline constexpr double likelihood_drop = 3.841458820694124;
-/// Logarithms of the factors that are looked at: 0.02 to 400.
-inline constexpr double least_log_factor = -4, most_log_factor = 6;
-
-/// The minimum of a function of one variable with one minimum, by a grid and the golden section.
-template <class Function>
-std::pair<double, double> minimise(const Function& f) {
-  std::pair<double, double> best{0, std::numeric_limits<double>::infinity()};
-  for (double x = -1.5; x <= 5; x += 1.5) {
-    if (const double y = f(x); y < best.second) best = {x, y};
-  }
-  constexpr double ratio = 0.6180339887498949;
-  double low = best.first - 1.5, high = best.first + 1.5;
-  double a = high - ratio * (high - low), b = low + ratio * (high - low), at_a = f(a), at_b = f(b);
-  while (high - low > 0.06) {
-    if (at_a < at_b) {
-      high = b, b = a, at_b = at_a, a = high - ratio * (high - low), at_a = f(a);
-    } else {
-      low = a, a = b, at_a = at_b, b = low + ratio * (high - low), at_b = f(b);
-    }
-  }
-  return at_a < at_b ? std::pair{a, at_a} : std::pair{b, at_b};
-}
-
-/// Where the function has risen by likelihood_drop on the way to `end`; `end` where it has not.
-template <class Function>
-double edge(const Function& f, std::pair<double, double> minimum, double end) {
-  double inside = minimum.first, outside = inside;
-  const double step = end > inside ? 0.5 : -0.5, limit = minimum.second + likelihood_drop;
-  for (double width = step; outside == inside; width *= 2) {
-    const double x = end > inside ? std::min(end, inside + width) : std::max(end, inside + width);
-    if (f(x) > limit) {
-      outside = x;
-    } else if (x == end) {
-      return end;
-    } else {
-      inside = outside = x;
-    }
-  }
-  while (std::abs(outside - inside) > 0.05) {
-    const double middle = 0.5 * (inside + outside);
-    (f(middle) > limit ? outside : inside) = middle;
-  }
-  return 0.5 * (inside + outside);
-}
-
-/// Both factors by themselves, by Newton's method on differences from the common one.
-template <class Function>
-bool separate(const Function& f, double common, NoiseCalibration& result) {
-  using Matrix2 = Eigen::Matrix2d;
-  using Vector2 = Eigen::Vector2d;
-  constexpr double h = 0.35;
-  Vector2 x(common, common);
-  double at_x = f(x);
-  Matrix2 H = Matrix2::Zero();
-  for (int pass = 0; pass < 8; ++pass) {
-    const Vector2 e0(h, 0), e1(0, h);
-    const double p0 = f(x + e0), m0 = f(x - e0), p1 = f(x + e1), m1 = f(x - e1);
-    const double mixed = f(x + e0 + e1) - f(x + e0 - e1) - f(x - e0 + e1) + f(x - e0 - e1);
-    const Vector2 g((p0 - m0) / (2 * h), (p1 - m1) / (2 * h));
-    H << (p0 - 2 * at_x + m0) / (h * h), mixed / (4 * h * h), 0, (p1 - 2 * at_x + m1) / (h * h);
-    H(1, 0) = H(0, 1);
-    if (!H.allFinite() || !(H(0, 0) > 0) || !(H.determinant() > 1e-3 * H(0, 0) * H(0, 0))) return false;
-    Vector2 step = -H.inverse() * g;
-    if (const double length = step.norm(); length > 1) step /= length;
-    double next = f(x + step);
-    for (int half = 0; half < 4 && !(next < at_x); ++half) step *= 0.5, next = f(x + step);
-    if (!(next < at_x)) break;
-    x += step, at_x = next;
-    if (step.norm() < 0.05) break;
-    if (x.minCoeff() < least_log_factor || x.maxCoeff() > most_log_factor) return false;
-  }
-  const Matrix2 covariance = 2 * H.inverse();
-  const auto factorOf = [&](int i) {
-    const double sd = std::sqrt(covariance(i, i));
-    return NoiseFactor{std::exp(x[i]), std::exp(x[i] - 1.96 * sd), std::exp(x[i] + 1.96 * sd)};
-  };
-  if (!(covariance(0, 0) > 0 && covariance(1, 1) > 0)) return false;
-  result.gyroscope = factorOf(0), result.accelerometer = factorOf(1);
-  const auto isNarrow = [](const NoiseFactor& factor) { return factor.high < 6 * factor.low; };
-  return isNarrow(result.gyroscope) && isNarrow(result.accelerometer);
-}
 
 }  // namespace detail
 
 LIESTAT_FUSION_INLINE NoiseCalibration
 calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,
                const std::function<void(std::size_t done, std::size_t all)>& progress) {
+  using detail::LogFactors;
+  constexpr int max_passes = 10;
   NoiseCalibration result;
+  result.noise = recording.noise;
   VisualInertialOptions how = options;
   how.refinement = true;
-  const double stretch = how.stretch > 0 ? how.stretch : VisualInertialOptions{}.stretch;
-  how.stretch = 0;
-  constexpr std::size_t trials = 80;
+  if (!(how.stretch > 0)) how.stretch = VisualInertialOptions{}.stretch;
+  VisualInertialResult initial;
   std::size_t windows = 0, done = 0;
-  const VisualInertialResult initial = initialiseRecording(recording, how, [&](std::size_t k, std::size_t all) {
-    windows = all;
-    if (progress) progress(k, all + trials);
-  });
+  constexpr std::size_t passes = 3 * max_passes + 1;
+  {
+    VisualInertialOptions alone = how;
+    alone.stretch = 0;
+    initial = initialiseRecording(recording, alone, [&](std::size_t k, std::size_t all) {
+      windows = all;
+      if (progress) progress(k, all + passes);
+    });
+  }
   result.fault = initial.fault;
   if (result.fault) return result;
-  how.stretch = stretch;
   VisualInertialResult unused;
   const detail::RecordingRun run(recording, how, unused);
-  detail::MeetingLikelihood likelihood(recording, run, initial.windows, [&] {
-    done = std::min(done + 1, trials);
-    if (progress) progress(windows + done, windows + trials);
+  detail::RecordingMeetings recorded(recording, run, initial.windows, [&] {
+    done = std::min(done + 1, passes);
+    if (progress) progress(windows + done, windows + passes);
   });
-  const auto given = likelihood({0, 0});
-  result.windows = given.windows;
-  result.degrees_of_freedom = given.degrees_of_freedom;
-  result.meetings = given.degrees_of_freedom / 11;
-  result.chi2 = given.chi2;
   result.status = FusionStatus::undetermined;
-  if (result.meetings == 0) return result;
-  const auto common = [&](double x) { return likelihood({x, x}).cost; };
-  const std::pair<double, double> minimum = detail::minimise(common);
-  if (!std::isfinite(minimum.second)) return result;
-  const double low = detail::edge(common, minimum, detail::least_log_factor);
-  const double high = detail::edge(common, minimum, detail::most_log_factor);
-  result.common = {std::exp(minimum.first), low <= detail::least_log_factor ? 0 : std::exp(low),
-                   high >= detail::most_log_factor ? std::numeric_limits<double>::infinity() : std::exp(high)};
-  result.calibrated_chi2 = likelihood({minimum.first, minimum.first}).chi2;
-  if (result.common.low == 0 && std::isinf(result.common.high)) return result;
+  if (recorded.stretches() == 0) return result;
+
+  LogFactors factors;
+  std::optional<detail::MeetingModel> model;
+  for (int pass = 0;; ++pass) {
+    model = recorded.modelAt(factors);
+    if (pass == 0) {
+      result.chi2 = result.calibrated_chi2 = recorded.chi2();
+      result.degrees_of_freedom = recorded.degrees_of_freedom();
+      result.windows = recorded.windows();
+    }
+    result.meetings = model->meetings();
+    if (model->meetings() == 0) return result;
+    const LogFactors best = model->best();
+    // Meetings are computed where each density has a share in them that can be told: below, the model says as much.
+    const LogFactors next{std::max({best.gyroscope, factors.gyroscope - 1, -1.}),
+                          std::max({best.accelerometer, factors.accelerometer - 1, -1.})};
+    if ((*model)(factors) - (*model)(next) < 0.05) break;
+    if (pass + 1 == max_passes) {
+      result.status = FusionStatus::not_converged;
+      return result;
+    }
+    // Differences move with the factors, so that full steps may go to and fro.
+    const double length = pass < 3 ? 1 : 0.5;
+    factors.gyroscope += length * (next.gyroscope - factors.gyroscope);
+    factors.accelerometer += length * (next.accelerometer - factors.accelerometer);
+  }
+
+  const LogFactors best = model->best();
+  const double least = (*model)(best);
+  result.gyroscope = detail::intervalOf([&](double x) { return model->gyroscopeProfile(x); }, {best.gyroscope, least});
+  result.accelerometer =
+      detail::intervalOf([&](double x) { return model->accelerometerProfile(x); }, {best.accelerometer, least});
+  const auto common = [&](double x) { return model->common(x); };
+  const auto best_common = detail::minimumOf(common, LogFactors::least, LogFactors::most);
+  result.common = detail::intervalOf(common, best_common);
+  result.common_p = detail::chiSquaredTail(std::max(0., best_common.second - least), 1);
+  result.separable = result.gyroscope.isTold() && result.accelerometer.isTold();
+  if (std::isinf(result.common.high)) return result;
+  // What is not told stays as it was, as far as that may be.
+  const auto held = [](const NoiseFactor& factor) { return std::log(std::clamp(1., factor.low, factor.high)); };
+  if (result.separable || result.common_p < 0.05) {
+    // The other one goes with it.
+    if (!result.gyroscope.isTold()) {
+      const double x = held(result.gyroscope);
+      result.gyroscope.factor = std::exp(x);
+      result.accelerometer.factor = std::exp(model->bestAccelerometer(x).first);
+    } else if (!result.accelerometer.isTold()) {
+      const double x = held(result.accelerometer);
+      result.accelerometer.factor = std::exp(x);
+      result.gyroscope.factor = std::exp(model->bestGyroscope(x).first);
+    }
+    factors = {std::log(result.gyroscope.factor), std::log(result.accelerometer.factor)};
+  } else {
+    const double x = result.common.isTold() ? best_common.first : held(result.common);
+    result.common.factor = std::exp(x);
+    factors = {x, x};
+  }
+  recorded.at(factors);
+  result.calibrated_chi2 = recorded.chi2();
+  result.noise = factors.of(recording.noise);
   result.status = FusionStatus::ok;
-  result.separable =
-      detail::separate([&](const Eigen::Vector2d& x) { return likelihood(x).cost; }, minimum.first, result);
   return result;
 }
 

@@ -124,16 +124,11 @@ LIESTAT_FUSION_INLINE WindowFusion::Meeting WindowFusion::meet(const WindowState
   if (mean.status != Status::ok) return meeting;
   meeting.chi2 = 2 * mean.cost;
   meeting.degrees_of_freedom = 11;
-  // A and B differ by N(0, A + B), and det(A + B) = det A det B/det of the mean's covariance.
-  const auto logDeterminant = [](const detail::Matrix11& covariance) {
-    return detail::Cholesky<double, 11>(covariance).logDeterminant();
-  };
-  meeting.log_determinant =
-      logDeterminant(both[0].covariance) + logDeterminant(both[1].covariance) - logDeterminant(mean.covariance);
+  meeting.difference = log(window.first.mean, both[0].mean);
+  meeting.difference_covariance = transport(both[0], window.first.mean).covariance + window.first.covariance;
   state_ = through(window, mean.estimate());
   ++windows_;
   chi2_ += meeting.chi2;
-  log_determinant_ += meeting.log_determinant;
   degrees_of_freedom_ += static_cast<std::size_t>(meeting.degrees_of_freedom);
   return meeting;
 }

@@ -5,6 +5,7 @@
 // the larger one need not be.
 #pragma once
 
+#include <fusion/imu/window.hpp>
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/results.hpp>
 #include <lie/detail/small_matrix.hpp>

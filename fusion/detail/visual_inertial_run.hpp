@@ -109,8 +109,14 @@ class RecordingRun {
       return refineAtRest(w.measured.without(w.found.outliers), w.closedForm().solutions[0].gravity, w.measured.bias(),
                           options);
     }
-    return refine(w.measured.without(w.found.outliers), w.closedForm().solutions[0], w.measured.bias(),
-                  withSharedPrior(options, n));
+    const ClosedFormSolution& closed = w.closedForm().solutions[0];
+    if (!w.isRefined()) {
+      return refine(w.measured.without(w.found.outliers), closed, w.measured.bias(), withSharedPrior(options, n));
+    }
+    // Again, with another noise or prior: on from the first result.
+    const ClosedFormSolution start{
+        .velocity = w.refined->velocity(), .gravity = w.refined->gravity, .features = w.refined->features};
+    return refine(w.measured.without(w.found.outliers), start, w.refined->bias, withSharedPrior(options, n));
   }
 
   /// Disjoint windows that are ok, in stretches, each as one.
@@ -146,14 +152,20 @@ class RecordingRun {
     return other;
   }
 
-  /// Fuses a stretch; returns the meetings' sum of log-determinants.
-  double fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
+  /// A window's meeting with those before it.
+  struct Meeting {
+    std::size_t window;  ///< of the result's
+    WindowFusion::Meeting outcome;
+  };
+  /// Fuses a stretch; returns its meetings.
+  std::vector<Meeting> fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
     const std::size_t n = stretch.windows.size();
     stretch.gravity =
         options_.initialisation.gravity.value_or(windows[stretch.windows.front()].refined->gravity.norm());
     WindowFusion fusion(stretch.gravity);
     double end = 0;
     std::vector<std::size_t> used;
+    std::vector<Meeting> meetings;
     for (const std::size_t i : stretch.windows) {
       const InitialisedWindow& w = windows[i];
       const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
@@ -163,6 +175,7 @@ class RecordingRun {
         return between.ok() ? between.motion : Preintegration<double>({.noise = noise_, .bias = bias});
       });
       if (meeting.status != Status::ok) continue;
+      if (meeting.degrees_of_freedom > 0) meetings.push_back({i, meeting});
       used.push_back(i);
       stretch.end = end = w.end;
     }
@@ -177,7 +190,7 @@ class RecordingRun {
       stretch.inflated = true;
       stretch.state.covariance *= stretch.inflation;
     }
-    return fusion.log_determinant();
+    return meetings;
   }
 
  private:

@@ -67,8 +67,10 @@ class WindowFusion {
     /// the first window.
     double chi2 = 0;
     int degrees_of_freedom = 0;
-    /// Of the covariance of the difference between the two; with chi2 minus twice the log-likelihood, up to a constant.
-    double log_determinant = 0;
+    /// What all before predict less what the window says, in the tangent space at the latter (to first order, of which
+    /// chi2 is the exact one), and the covariance that both together expect of it.
+    Eigen::Matrix<double, 11, 1> difference = Eigen::Matrix<double, 11, 1>::Zero();
+    detail::Matrix11 difference_covariance = detail::Matrix11::Zero();
   };
 
   /// Gravity's length in m/s².
@@ -95,8 +97,6 @@ class WindowFusion {
   /// or are noisier than their covariances say.
   double chi2() const { return chi2_; }
   std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
-  /// The sum over all meetings.
-  double log_determinant() const { return log_determinant_; }
   /// The probability of so large a sum where they do not.
   double p() const { return detail::chiSquaredTail(chi2_, degrees_of_freedom_); }
   /// The factor of the covariances at which windows would be as far apart as these are; at least 1.
@@ -115,7 +115,7 @@ class WindowFusion {
   double gravity_;
   Gaussian<InertialState> state_;
   std::size_t windows_ = 0, degrees_of_freedom_ = 0;
-  double chi2_ = 0, log_determinant_ = 0;
+  double chi2_ = 0;
 };
 
 }  // namespace liestat
