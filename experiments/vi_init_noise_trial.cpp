@@ -3,6 +3,7 @@
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/noise_calibration.hpp>
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -16,15 +17,18 @@ bool holds(const NoiseFactor& interval, double factor) { return interval.low <= 
 NoiseOutcome calibrated(const ViInitWindow& window, double gyroscope, double accelerometer, CounterRng& rng) {
   // A seed for each of what is drawn.
   const std::uint64_t seed = rng();
-  SyntheticImuOptions sensor{.bias = calibratedBias(seed)};
+  SyntheticImuOptions sensor;
+  sensor.bias = calibratedBias(seed);
   sensor.noise = {.gyroscope = gyroscope * adis16448.gyroscope,
                   .accelerometer = accelerometer * adis16448.accelerometer,
                   .gyroscope_walk = gyroscope * adis16448.gyroscope_walk,
                   .accelerometer_walk = accelerometer * adis16448.accelerometer_walk};
-  const double rate = static_cast<double>(window.images - 1) / window.seconds;
+  ViSceneOptions scene;
+  scene.image_rate = static_cast<double>(window.images - 1) / window.seconds;
+  scene.features = window.features;
+  scene.seed = seed;
   const SimulatedRecording recording =
-      simulateMotion(builtInTrajectory(recording_seconds, seed), 0, recording_seconds, defaultCamera(), sensor,
-                     {.image_rate = rate, .features = window.features, .seed = seed});
+      simulateMotion(builtInTrajectory(recording_seconds, seed), 0, recording_seconds, defaultCamera(), sensor, scene);
   std::vector<PixelMeasurement> pixels;
   for (const PixelObservation& seen : recording.observations) {
     pixels.push_back({.image = seen.image, .track = seen.track, .pixel = {seen.u, seen.v}});
@@ -37,8 +41,7 @@ NoiseOutcome calibrated(const ViInitWindow& window, double gyroscope, double acc
                       .observations = bearingsOf(pixels, std::span(&recording.camera.camera, 1), 1)},
                      {.window = window.seconds});
   if (found.status != FusionStatus::ok) return {};
-  return {holds(found.gyroscope, gyroscope), holds(found.accelerometer, accelerometer),
-          holds(found.common, gyroscope)};
+  return {holds(found.gyroscope, gyroscope), holds(found.accelerometer, accelerometer), holds(found.common, gyroscope)};
 }
 
 }  // namespace

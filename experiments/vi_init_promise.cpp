@@ -102,6 +102,7 @@ std::optional<ViInitPromise> viInitPromise(const ViInitRow& row) {
       return promise;
     }
     case ViInitStatistic::fraction: {
+      if (row.quantity == Quantity::moving) return {};
       ViInitPromise promise;
       promise.fraction = row.check == Check::noise ? 0.9 : 0.99;
       return promise;

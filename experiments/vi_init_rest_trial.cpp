@@ -58,9 +58,20 @@ RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   return outcome;
 }
 
+template <int far>
 SlowOutcome slowTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
-  const Measured measured(size, SceneMotion::constant_velocity, 20, noise, rng);
-  return {initialiseRobustly(measured.window, rest_options).result.status == FusionStatus::stationary};
+  const Measured measured(size, SceneMotion::constant_velocity, far, noise, rng);
+  const ClosedFormResult found = initialiseRobustly(measured.window, rest_options).result;
+  if (found.status != FusionStatus::stationary) return {};
+  double per_depth = 0;
+  for (const Eigen::Vector3d& P : measured.scene.features) {
+    per_depth += measured.scene.speed(0).norm() / (P.norm() * static_cast<double>(size.features));
+  }
+  return {true, per_depth > found.unseen_speed_per_depth};
 }
+template SlowOutcome slowTrial<4>(const ViInitWindow&, double, CounterRng&);
+template SlowOutcome slowTrial<20>(const ViInitWindow&, double, CounterRng&);
+template SlowOutcome slowTrial<80>(const ViInitWindow&, double, CounterRng&);
+template SlowOutcome slowTrial<400>(const ViInitWindow&, double, CounterRng&);
 
 }  // namespace liestat::experiments

@@ -85,11 +85,14 @@ struct RestOutcome {
   double nees = std::numeric_limits<double>::quiet_NaN();  ///< of gravity and both biases, 8 degrees of freedom
 };
 RestOutcome restTrial(const ViInitWindow& window, double noise, CounterRng& rng);
-/// A uniform motion of 1 m/s among features 40 to 160 m away: to images that is 0.05 m/s at 2 to 8 m, and to an inertial
-/// sensor it is rest.
+/// A uniform motion, which to an inertial sensor is rest.
 struct SlowOutcome {
   bool stationary = false;  ///< what it was called, and is not
+  bool excluded = false;    ///< it was, and the result says that so fast a motion would have been seen
 };
+/// At 1 m/s among features this many times 2 to 8 m away: to images that is one as much slower among features 2 to 8 m
+/// away.
+template <int far>
 SlowOutcome slowTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 
 /// The calibration of the sensor's noise: whether the 95 % intervals hold the factors.

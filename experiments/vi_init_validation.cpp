@@ -24,7 +24,7 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 17> quantities = {{
+constexpr std::array<QuantityEntry, 18> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
@@ -39,18 +39,22 @@ constexpr std::array<QuantityEntry, 17> quantities = {{
     {"bias", "rad/s", ViInitStatistic::error},
     {"selection", "", ViInitStatistic::fraction},
     {"told", "", ViInitStatistic::fraction},
+    {"moving", "", ViInitStatistic::fraction},
     {"gyroscope_interval", "", ViInitStatistic::fraction},
     {"accelerometer_interval", "", ViInitStatistic::fraction},
     {"common_interval", "", ViInitStatistic::fraction},
 }};
 static_assert(static_cast<std::size_t>(Quantity::common_interval) + 1 == quantities.size());
-constexpr std::array estimators = {
-    "refinement", "closed_form", "closed_form_with_bias", "least_squares", "bias_estimated", "bias_ignored",
-    "robust",     "oracle",      "no_selection",          "at_rest",       "slow_motion",    "noise_1_1",
-    "noise_4_4",  "noise_16_16", "noise_4_1",             "noise_1_4",     "noise_16_1",     "noise_1_16"};
+constexpr std::array estimators = {"refinement",    "closed_form",    "closed_form_with_bias",
+                                   "least_squares", "bias_estimated", "bias_ignored",
+                                   "robust",        "oracle",         "no_selection",
+                                   "at_rest",       "speed_250_mm",   "speed_50_mm",
+                                   "speed_12_mm",   "speed_2_mm",     "noise_1_1",
+                                   "noise_4_4",     "noise_16_16",    "noise_4_1",
+                                   "noise_1_4",     "noise_16_1",     "noise_1_16"};
 static_assert(static_cast<std::size_t>(Estimator::noise_1_16) + 1 == estimators.size());
-constexpr std::array checks = {"consistency", "walk", "closed_form", "accuracy", "gyroscope_bias",
-                              "noise",       "rest", "drift"};
+constexpr std::array checks = {"consistency",    "walk",  "closed_form", "accuracy",
+                               "gyroscope_bias", "noise", "rest",        "drift"};
 static_assert(all_vi_init_checks.size() == checks.size());
 
 const QuantityEntry& entry(Quantity quantity) { return quantities.at(static_cast<std::size_t>(quantity)); }
@@ -65,9 +69,6 @@ struct Column {
   double (*chi2_dof)(const Outcome&) = nullptr;  ///< degrees of freedom of a χ²
 };
 
-/// A trial of the calibration of noise takes a recording and not a window.
-constexpr std::size_t recordings_per_window = 20;
-
 /// A kind of window and the rows that its trials give.
 struct Experiment {
   Check check;
@@ -79,24 +80,23 @@ struct Experiment {
     int dof = 0;  ///< of a distance
   };
   std::vector<Row> rows;
-  /// All trials: the values of each row.
-  std::function<std::vector<ViInitValues>(const ViInitValidation&, const std::function<void(std::size_t)>& progress)>
-      run;
+  std::size_t share = 1;  ///< it has only one trial of so many
+  /// So many trials: the values of each row.
+  std::function<std::vector<ViInitValues>(std::size_t trials, const ViInitValidation&,
+                                          const std::function<void(std::size_t)>& progress)>
+      run = {};
 
-  /// Milliseconds of a trial, about: for the progress bar.
+  std::size_t trials(const ViInitValidation& validation) const {
+    return std::max<std::size_t>(1, validation.trials / share);
+  }
+  /// Milliseconds of a trial, about, over its share: for the progress bar.
   double work() const {
     const double observations = static_cast<double>(window.images * window.features);
-    if (check == Check::rest) return 40;
-    if (check == Check::noise) return 250. / recordings_per_window;
+    if (check == Check::rest) return 40. / static_cast<double>(share);
+    if (check == Check::noise) return 250. / static_cast<double>(share);
     return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
-
-/// The trials of a row: of recordings there are fewer.
-std::size_t trialsOf(Check check, const ViInitValidation& validation) {
-  return check == Check::noise ? std::max<std::size_t>(1, validation.trials / recordings_per_window)
-                               : validation.trials;
-}
 
 template <class Outcome>
 std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window, std::size_t trials,
@@ -123,12 +123,12 @@ std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& w
 template <class Outcome>
 Experiment experiment(Check check, ViInitTrial<Outcome> trial, const ViInitWindow& window,
                       const std::vector<Column<Outcome>>& columns) {
-  Experiment e{.check = check, .window = window, .rows = {}, .run = {}};
+  Experiment e{.check = check, .window = window, .rows = {}};
   for (const Column<Outcome>& c : columns) e.rows.push_back({c.estimator, c.quantity, c.dof});
-  e.run = [check, trial, window, columns](const ViInitValidation& validation,
+  e.run = [trial, window, columns](std::size_t trials, const ViInitValidation& validation,
                                    const std::function<void(std::size_t)>& progress) {
     std::vector<ViInitValues> values(columns.size());
-    for (const Outcome& outcome : runTrials(trial, window, trialsOf(check, validation), validation, progress)) {
+    for (const Outcome& outcome : runTrials(trial, window, trials, validation, progress)) {
       for (std::size_t k = 0; k < columns.size(); ++k) {
         values[k].value.push_back(columns[k].value(outcome));
         if (columns[k].chi2_dof != nullptr) values[k].dof.push_back(columns[k].chi2_dof(outcome));
@@ -223,6 +223,7 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
         {estimator, Quantity::accelerometer_interval, [](const N& o) { return o.accelerometer ? 1. : 0.; }}};
     if (equal) noise.push_back({estimator, Quantity::common_interval, [](const N& o) { return o.common ? 1. : 0.; }});
     list.push_back(experiment(Check::noise, trial, {2, 11, 40}, noise));
+    list.back().share = 20;
   };
   addNoise(Estimator::noise_1_1, noiseTrial<1, 1>, true);
   addNoise(Estimator::noise_4_4, noiseTrial<4, 4>, true);
@@ -240,9 +241,19 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
     addDistance<&Rest::nees>(rest, Estimator::at_rest, Quantity::nees_at_rest, 8);
     list.push_back(experiment(Check::rest, restTrial, window, rest));
   }
-  list.push_back(experiment<Slow>(
-      Check::rest, slowTrial, {2, 21, 20},
-      {{Estimator::slow_motion, Quantity::told, [](const Slow& o) { return o.stationary ? 0. : 1.; }}}));
+  const auto addSlow = [&](Estimator estimator, ViInitTrial<Slow> trial) {
+    for (const ViInitWindow& window : {ViInitWindow{1, 11, 20}, ViInitWindow{2, 21, 20}, ViInitWindow{4, 41, 20}}) {
+      list.push_back(
+          experiment<Slow>(Check::rest, trial, window,
+                           {{estimator, Quantity::told, [](const Slow& o) { return o.excluded ? 0. : 1.; }},
+                            {estimator, Quantity::moving, [](const Slow& o) { return o.stationary ? 0. : 1.; }}}));
+      list.back().share = 10;
+    }
+  };
+  addSlow(Estimator::speed_250_mm, slowTrial<4>);
+  addSlow(Estimator::speed_50_mm, slowTrial<20>);
+  addSlow(Estimator::speed_12_mm, slowTrial<80>);
+  addSlow(Estimator::speed_2_mm, slowTrial<400>);
 
   using D = DriftOutcome;
   std::vector<Column<D>> drift{
@@ -290,8 +301,8 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
   auto row = rows.begin();
   for (const Experiment& e : list) {
-    const std::vector<ViInitValues> values = e.run(validation, [&](std::size_t done) {
-      const double share = static_cast<double>(done) / static_cast<double>(trialsOf(e.check, validation));
+    const std::vector<ViInitValues> values = e.run(e.trials(validation), validation, [&](std::size_t done) {
+      const double share = static_cast<double>(done) / static_cast<double>(e.trials(validation));
       if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work()) / all), 1000000);
     });
     for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);

@@ -26,8 +26,8 @@ enum class ViInitCheck {
   drift            ///< errors where 40 % of the tracks drift
 };
 inline constexpr std::array all_vi_init_checks = {
-    ViInitCheck::consistency,    ViInitCheck::walk, ViInitCheck::closed_form, ViInitCheck::accuracy,
-    ViInitCheck::gyroscope_bias, ViInitCheck::noise, ViInitCheck::rest, ViInitCheck::drift};
+    ViInitCheck::consistency,    ViInitCheck::walk,  ViInitCheck::closed_form, ViInitCheck::accuracy,
+    ViInitCheck::gyroscope_bias, ViInitCheck::noise, ViInitCheck::rest,        ViInitCheck::drift};
 std::string name(ViInitCheck check);
 
 /// The estimator that a row is about, and what it leaves out.
@@ -42,7 +42,11 @@ enum class ViInitEstimator {
   oracle,        ///< knows which tracks drift
   no_selection,  ///< takes all tracks
   at_rest,       ///< the initialisation of a body at rest
-  slow_motion,   ///< and of one that moves at 0.05 m/s among features 2 to 8 m away
+  /// And of one that moves at 0.25, 0.05, 0.0125, 0.0025 m/s among features 2 to 8 m away.
+  speed_250_mm,
+  speed_50_mm,
+  speed_12_mm,
+  speed_2_mm,
   /// The calibration of noise where the densities of gyroscope and accelerometer are so many times the given ones.
   noise_1_1,
   noise_4_4,
@@ -69,7 +73,8 @@ enum class ViInitQuantity {
   scale_of_features,
   bias,       ///< of the gyroscope, length of the error
   selection,  ///< fraction of the windows in which exactly the right tracks were kept
-  told,       ///< fraction of the windows in which rest and motion were told right
+  told,  ///< fraction of the windows that were told right: rest called so; of slow motion: not called rest, or slower than what that excludes
+  moving,                  ///< fraction of the windows of slow motion that were not called rest; no promise
   gyroscope_interval,      ///< fraction of the recordings in which the interval of the gyroscope's factor holds it
   accelerometer_interval,  ///< and the accelerometer's
   common_interval          ///< and that of both as one
@@ -104,8 +109,8 @@ struct ViInitPromise {
 struct ViInitValidation {
   std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
-  std::size_t trials = 600;  ///< windows a row; for the calibration of noise a twentieth as many recordings
-  double noise = 1;  ///< what is simulated over what the estimators are told
+  std::size_t trials = 600;     ///< windows a row; for the calibration of noise a twentieth as many recordings
+  double noise = 1;             ///< what is simulated over what the estimators are told
   std::uint64_t seed = 1;
   int threads = 0;
 };

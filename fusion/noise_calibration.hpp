@@ -7,8 +7,8 @@
 // Data sheets tell the noise of a sensor at rest. In motion scale factors, vibration and time stamps add to it, which
 // the refinement of a window does not see, because bearings rule its cost; but where two windows meet (window_fusion.hpp)
 // their difference d has the covariance S that both expect, which grows with the densities. The factors minimise
-// Σ dᵀ S⁻¹ d + log det S over all meetings, minus twice the log-likelihood; intervals are those of its profiles, where
-// it has risen by χ²₁'s 95 %.
+// Σ dᵀ S⁻¹ d + log det S over all meetings, minus twice the log-likelihood; intervals are those of its profiles, for few
+// meetings widened by Student's law.
 #pragma once
 
 #include <fusion/visual_inertial_types.hpp>

@@ -89,11 +89,11 @@ Table errorsTable(const std::vector<Group>& list) {
 
 /// What was told right, and the covariance at rest.
 Table restTable(const std::vector<Group>& list) {
-  Table table({"", "T, n, N", "told right", "gravity, biases (8)", "95 %", "verdict"});
+  Table table({"", "T, n, N", "told right", "moves", "gravity, biases (8)", "95 %", "verdict"});
   for (const Group& g : list) {
     const ViInitRow* nees = g.of(Quantity::nees_at_rest);
-    table.row(
-        {name(g.first().estimator), g.window(), ratio(g.of(Quantity::told)), index(nees), covered(nees), g.verdict()});
+    table.row({name(g.first().estimator), g.window(), ratio(g.of(Quantity::told)), ratio(g.of(Quantity::moving)),
+               index(nees), covered(nees), g.verdict()});
   }
   return table;
 }

@@ -77,7 +77,7 @@ inline const char* describe(experiments::ViInitCheck check) {
     case Check::noise:
       return "Densities that are g and a times the given ones: how often 95 % intervals of the calibration hold that";
     case Check::rest:
-      return "At rest, and at 0.05 m/s among features 2 to 8 m away: told right, and the covariance at rest";
+      return "At rest, and slow among features 2 to 8 m away: told right, that it moves, and the covariance at rest";
     case Check::drift:
       return "40 % of the tracks drift by 8 px an image: errors, median / 95 %";
   }

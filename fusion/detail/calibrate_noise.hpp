@@ -24,8 +24,11 @@ namespace liestat {
 
 namespace detail {
 
-/// χ² of one degree of freedom stays below with a probability of 95 %.
-inline constexpr double likelihood_rise = 3.841458820694124;
+/// The probability that minus twice the log-likelihood is so much larger at the true factor than at the best one: of χ²₁
+/// for many meetings. Few tell their own scatter badly: then that of Student's law squared.
+inline double probabilityOfRise(double rise, std::size_t meetings) {
+  return 2 * studentTail(std::sqrt(std::max(0., rise)), static_cast<double>(meetings));
+}
 
 /// Logarithms of the factors of the gyroscope's and the accelerometer's densities.
 struct LogFactors {
@@ -64,16 +67,16 @@ std::pair<double, double> minimumOf(const Function& f, double low, double high) 
   return best;
 }
 
-/// The interval around a minimum in which a function has not risen by likelihood_rise.
+/// The 95 % interval around a minimum.
 template <class Function>
-NoiseFactor intervalOf(const Function& f, const std::pair<double, double>& minimum) {
-  const double limit = minimum.second + likelihood_rise;
+NoiseFactor intervalOf(const Function& f, const std::pair<double, double>& minimum, std::size_t meetings) {
+  const auto isOutside = [&](double x) { return probabilityOfRise(f(x) - minimum.second, meetings) < 0.05; };
   const auto end = [&](double outside) {
-    if (!(f(outside) > limit)) return outside;
+    if (!isOutside(outside)) return outside;
     double inside = minimum.first;
     while (std::abs(outside - inside) > 0.01) {
       const double middle = 0.5 * (inside + outside);
-      (f(middle) > limit ? outside : inside) = middle;
+      (isOutside(middle) ? outside : inside) = middle;
     }
     return 0.5 * (inside + outside);
   };
@@ -96,7 +99,8 @@ class MeetingModel {
       : at_(at) {
     const double rise = std::expm1(2 * step);
     const auto find = [](const Meetings& meetings, std::size_t window) {
-      const auto found = std::find_if(meetings.begin(), meetings.end(), [&](const auto& m) { return m.window == window; });
+      const auto found =
+          std::find_if(meetings.begin(), meetings.end(), [&](const auto& m) { return m.window == window; });
       return found == meetings.end() ? nullptr : &*found;
     };
     for (const RecordingRun::Meeting& meeting : here) {
@@ -109,8 +113,11 @@ class MeetingModel {
         const Matrix11 half = factor.halfSolve<11>(Matrix11((raised - S) / rise));
         return atLeast(0, Matrix11(factor.halfSolve<11>(Matrix11(half.transpose()))));
       };
-      Term term{factor.halfSolve<1>(meeting.outcome.difference), factor.logDeterminant(), {},
-                part(by_g->outcome.difference_covariance), part(by_a->outcome.difference_covariance)};
+      Term term{factor.halfSolve<1>(meeting.outcome.difference),
+                factor.logDeterminant(),
+                {},
+                part(by_g->outcome.difference_covariance),
+                part(by_a->outcome.difference_covariance)};
       term.rest = atLeast(1e-6, Matrix11(Matrix11::Identity() - term.gyroscope - term.accelerometer));
       terms_.push_back(term);
     }
@@ -280,13 +287,14 @@ calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOpt
 
   const LogFactors best = model->best();
   const double least = (*model)(best);
-  result.gyroscope = detail::intervalOf([&](double x) { return model->gyroscopeProfile(x); }, {best.gyroscope, least});
-  result.accelerometer =
-      detail::intervalOf([&](double x) { return model->accelerometerProfile(x); }, {best.accelerometer, least});
+  result.gyroscope = detail::intervalOf([&](double x) { return model->gyroscopeProfile(x); }, {best.gyroscope, least},
+                                        result.meetings);
+  result.accelerometer = detail::intervalOf([&](double x) { return model->accelerometerProfile(x); },
+                                            {best.accelerometer, least}, result.meetings);
   const auto common = [&](double x) { return model->common(x); };
   const auto best_common = detail::minimumOf(common, LogFactors::least, LogFactors::most);
-  result.common = detail::intervalOf(common, best_common);
-  result.common_p = detail::chiSquaredTail(std::max(0., best_common.second - least), 1);
+  result.common = detail::intervalOf(common, best_common, result.meetings);
+  result.common_p = detail::probabilityOfRise(best_common.second - least, result.meetings);
   result.separable = result.gyroscope.isTold() && result.accelerometer.isTold();
   if (std::isinf(result.common.high)) return result;
   // What is not told stays as it was, as far as that may be.

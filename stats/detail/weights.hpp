@@ -63,7 +63,7 @@ WeightScale weightScale(const W& weights, std::size_t n) {
   const int exponent = std::ilogb(largest);
   if (std::abs(exponent) > 30) scale.exponent = -exponent;
   scale.least = largest * std::sqrt(static_cast<double>(std::numeric_limits<Real>::min()));
-  for (std::size_t i = 0; i < n; ++i) scale.kept += scale.keeps(static_cast<double>(weights[i])) ? 1 : 0;
+  for (std::size_t i = 0; i < n; ++i) scale.kept += scale.keeps(static_cast<double>(weights[i])) ? 1U : 0U;
   scale.exact = scale.exponent == 0 && scale.kept == n;
   return scale;
 }

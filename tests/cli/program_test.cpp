@@ -449,7 +449,8 @@ TEST_F(Program, RealGroundTruth) {
   const std::string path = std::filesystem::absolute(dataDirectory()) / "vi/euroc/V1_02_medium_gt.csv";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "skipped: there is no " << path;
   for (const char* feature : {"frame", "se3", "point"}) {
-    const ProgramRun r = run({"mean", path, "--feature", feature, "--json", "out.json"});
+    const ProgramRun r = run(
+        {"mean", path, "--feature", feature, "--budget", instrumented ? "1000000" : "100000000", "--json", "out.json"});
     ASSERT_FALSE(r.json.is_null()) << r.errors;
     EXPECT_EQ(r.json["format"], "euroc");
     EXPECT_GT(r.json["n"], 16000);

