@@ -5,7 +5,8 @@
 // biases with a covariance; what disjoint windows say together is a Mahalanobis mean, carried from one to the next by
 // the inertial sensor. Their distance from each other is χ² if the covariances are true, and that is the only thing to
 // look at on a real recording, where the truth is not known: a sensor five times as noisy as its data sheet says is not
-// seen in the cost of any window, which is ruled by its bearings.
+// seen in the cost of any window, which is ruled by its bearings. What the noise is, the windows' distances tell.
+#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
 #include <stats/random.hpp>
 
@@ -90,6 +91,12 @@ void fly(double noise_factor) {
                 s.degrees_of_freedom, s.end);
     const InertialState& x = s.state.mean;
     off(s.end, x.get<0>().unit_vector(), {x.get<2>(), accelerometerBias(x, s.gravity)});
+  }
+  // What the densities would have to be for the windows to agree.
+  const NoiseCalibration noise = calibrateNoise(recording, {.stride = 2.5});
+  if (noise.status == FusionStatus::ok) {
+    std::printf("  they agree with the densities times %.1f (95 %%: %.1f to %.1f)\n", noise.common.factor,
+                noise.common.low, noise.common.high);
   }
   std::printf("\n");
 }
