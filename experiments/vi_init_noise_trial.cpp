@@ -14,18 +14,20 @@ constexpr double recording_seconds = 20;
 
 bool holds(const NoiseFactor& interval, double factor) { return interval.low <= factor && factor <= interval.high; }
 
-NoiseOutcome calibrated(const ViInitWindow& window, double gyroscope, double accelerometer, CounterRng& rng) {
+NoiseOutcome calibrated(const ViInitWindow& window, double noise, double gyroscope, double accelerometer,
+                        CounterRng& rng) {
   // A seed for each of what is drawn.
   const std::uint64_t seed = rng();
   SyntheticImuOptions sensor;
   sensor.bias = calibratedBias(seed);
-  sensor.noise = {.gyroscope = gyroscope * adis16448.gyroscope,
-                  .accelerometer = accelerometer * adis16448.accelerometer,
-                  .gyroscope_walk = gyroscope * adis16448.gyroscope_walk,
-                  .accelerometer_walk = accelerometer * adis16448.accelerometer_walk};
+  sensor.noise = {.gyroscope = noise * gyroscope * adis16448.gyroscope,
+                  .accelerometer = noise * accelerometer * adis16448.accelerometer,
+                  .gyroscope_walk = noise * gyroscope * adis16448.gyroscope_walk,
+                  .accelerometer_walk = noise * accelerometer * adis16448.accelerometer_walk};
   ViSceneOptions scene;
   scene.image_rate = static_cast<double>(window.images - 1) / window.seconds;
   scene.features = window.features;
+  scene.pixel_noise = noise;
   scene.seed = seed;
   const SimulatedRecording recording =
       simulateMotion(builtInTrajectory(recording_seconds, seed), 0, recording_seconds, defaultCamera(), sensor, scene);
@@ -48,7 +50,7 @@ NoiseOutcome calibrated(const ViInitWindow& window, double gyroscope, double acc
 
 template <int gyroscope, int accelerometer>
 NoiseOutcome noiseTrial(const ViInitWindow& window, double noise, CounterRng& rng) {
-  return calibrated(window, noise * gyroscope, noise * accelerometer, rng);
+  return calibrated(window, noise, gyroscope, accelerometer, rng);
 }
 
 template NoiseOutcome noiseTrial<1, 1>(const ViInitWindow&, double, CounterRng&);

@@ -87,13 +87,17 @@ struct Experiment {
       run = {};
 
   std::size_t trials(const ViInitValidation& validation) const {
+    if (check == Check::noise) return validation.recordings;
     return std::max<std::size_t>(1, validation.trials / share);
   }
-  /// Milliseconds of a trial, about, over its share: for the progress bar.
-  double work() const {
+  /// Milliseconds of all its trials, about: for the progress bar.
+  double work(const ViInitValidation& validation) const {
+    return workOfATrial() * static_cast<double>(trials(validation));
+  }
+  double workOfATrial() const {
     const double observations = static_cast<double>(window.images * window.features);
-    if (check == Check::rest) return 40. / static_cast<double>(share);
-    if (check == Check::noise) return 250. / static_cast<double>(share);
+    if (check == Check::rest) return 40;
+    if (check == Check::noise) return 500;
     return (check == Check::consistency ? 0.018 : check == Check::walk ? 0.027 : 0.004) * observations;
   }
 };
@@ -223,7 +227,6 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
         {estimator, Quantity::accelerometer_interval, [](const N& o) { return o.accelerometer ? 1. : 0.; }}};
     if (equal) noise.push_back({estimator, Quantity::common_interval, [](const N& o) { return o.common ? 1. : 0.; }});
     list.push_back(experiment(Check::noise, trial, {2, 11, 40}, noise));
-    list.back().share = 20;
   };
   addNoise(Estimator::noise_1_1, noiseTrial<1, 1>, true);
   addNoise(Estimator::noise_4_4, noiseTrial<4, 4>, true);
@@ -286,7 +289,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   std::vector<ViInitRow> rows;
   double all = 0, before = 0;
   for (const Experiment& e : list) {
-    all += e.work();
+    all += e.work(validation);
     for (const Experiment::Row& of : e.rows) {
       ViInitRow row;
       row.check = e.check;
@@ -303,10 +306,10 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   for (const Experiment& e : list) {
     const std::vector<ViInitValues> values = e.run(e.trials(validation), validation, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(e.trials(validation));
-      if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work()) / all), 1000000);
+      if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work(validation)) / all), 1000000);
     });
     for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);
-    before += e.work();
+    before += e.work(validation);
   }
   return rows;
 }

@@ -109,7 +109,8 @@ struct ViInitPromise {
 struct ViInitValidation {
   std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
-  std::size_t trials = 600;     ///< windows a row; for the calibration of noise a twentieth as many recordings
+  std::size_t trials = 600;     ///< windows a row; of slow motion a tenth of them
+  std::size_t recordings = 10;  ///< a row of the calibration of noise
   double noise = 1;             ///< what is simulated over what the estimators are told
   std::uint64_t seed = 1;
   int threads = 0;

@@ -6,6 +6,7 @@
 #include <cli/show/two_solutions.hpp>
 #include <cli/show/vi_init_validation.hpp>
 
+#include <algorithm>
 #include <memory>
 
 namespace liestat::cli {
@@ -57,7 +58,11 @@ int runCommand(const Options& options, const Invocation& invocation) {
   ViInitValidation validation;
   validation.checks = chosen(all_vi_init_checks, options.checks);
   validation.windows = options.windows;
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 4000 : 600;
+  if (options.full) validation.trials = 4000, validation.recordings = 200;
+  if (options.trials != 0) {
+    validation.trials = options.trials;
+    validation.recordings = std::max<std::size_t>(1, options.trials / 20);
+  }
   validation.noise = options.noise;
   validation.seed = options.seed;
   validation.threads = options.threads;
@@ -75,8 +80,9 @@ void addValidateViInitCommand(const CommandList& validate) {
   auto options = std::make_shared<Options>();
   const Command app =
       validate.add("vi-init", "Visual-inertial initialisation: accuracy, covariances, and the cases it recognises");
-  app.option("--check", options->checks,
-             "consistency, walk, closed_form, accuracy, gyroscope_bias, noise, rest, drift: a comma list (default: all)")
+  app.option(
+         "--check", options->checks,
+         "consistency, walk, closed_form, accuracy, gyroscope_bias, noise, rest, drift: a comma list (default: all)")
       .list()
       .oneOf(names(all_vi_init_checks));
   app.option("--window", options->windows, "Only windows of so many seconds, of 1, 2, 3, 4: a comma list")
@@ -92,8 +98,8 @@ void addValidateViInitCommand(const CommandList& validate) {
           .oneOf({"fig1", "fig2"});
   table1.excludes("--check").excludes("--window").excludes("--noise");
   scene.excludes(table1).excludes("--check").excludes("--window").excludes("--noise").excludes("--full");
-  addRunOptions(app, "600, with --full 4000; scenes of --table1: 100, 1000", options->trials, options->seed,
-                options->threads, options->output);
+  addRunOptions(app, "600, with --full 4000; recordings a twentieth, scenes of --table1: 100, 1000", options->trials,
+                options->seed, options->threads, options->output);
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 
