@@ -3,7 +3,8 @@
 // they bring dozens of types of expressions and the blocked kernels of its products with them, which are never run here
 // and cost a compiler seconds. Apart, so that users of a Cholesky factor do not compile them:
 //
-//   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to 13
+//   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to a maximum
+//   small_reduced.hpp      square roots of semi-definite matrices: closest, and reduced to independent rows
 //   small_columns.hpp      3×3 blocks in vector registers
 //   small_products.hpp     products of more rows than that, and A C Aᵀ
 //   nearest_rotation.hpp   the rotation nearest to a 3×3 matrix

@@ -1,7 +1,7 @@
 // Orthogonal factorisations of a few columns (singular values, triangular factors), which do not square the matrix and
 // so decide ranks at 1e-12. One of the headers of small matrices, which lie/detail/small_matrix.hpp lists.
 //
-// Sizes are run-time numbers of at most 13 and everything is plain loops in double: the fixed-size expressions of half
+// Sizes are run-time numbers of at most `Most`, 13 for SmallMatrix, and everything is plain loops in double: the fixed-size expressions of half
 // a dozen sizes took a compiler forty seconds, and these cost it nothing.
 #pragma once
 
@@ -9,26 +9,28 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
 namespace liestat::detail {
 
-/// A matrix of at most 13×13 in row-major order, zero at first. No allocation.
-struct SmallMatrix {
-  static constexpr int most = 13;
+/// A matrix of at most Most×Most in row-major order, zero at first. No allocation.
+template <int Most>
+struct BasicSmallMatrix {
+  static constexpr int most = Most;
   int rows = 0, cols = 0;
-  std::array<double, most * most> value{};
+  std::array<double, static_cast<std::size_t>(Most* Most)> value{};
 
-  SmallMatrix(int r, int c) : rows(r), cols(c) {}
-  static SmallMatrix identity(int n) {
-    SmallMatrix m(n, n);
+  BasicSmallMatrix(int r, int c) : rows(r), cols(c) {}
+  static BasicSmallMatrix identity(int n) {
+    BasicSmallMatrix m(n, n);
     for (int i = 0; i < n; ++i) m(i, i) = 1;
     return m;
   }
   template <int R, int C>
-  static SmallMatrix of(const Eigen::Matrix<double, R, C>& other) {
-    SmallMatrix m(R, C);
+  static BasicSmallMatrix of(const Eigen::Matrix<double, R, C>& other) {
+    BasicSmallMatrix m(R, C);
     for (int i = 0; i < R; ++i) {
       for (int j = 0; j < C; ++j) m(i, j) = other(i, j);
     }
@@ -41,8 +43,8 @@ struct SmallMatrix {
   const double& operator()(int i, int j) const { return row(i)[j]; }
 
   /// The r×c block at (i, j).
-  SmallMatrix block(int i, int j, int r, int c) const {
-    SmallMatrix m(r, c);
+  BasicSmallMatrix block(int i, int j, int r, int c) const {
+    BasicSmallMatrix m(r, c);
     for (int a = 0; a < r; ++a) {
       for (int b = 0; b < c; ++b) m(a, b) = (*this)(i + a, j + b);
     }
@@ -67,8 +69,8 @@ struct SmallMatrix {
     }
     return std::sqrt(square);
   }
-  friend SmallMatrix operator*(const SmallMatrix& a, const SmallMatrix& b) {
-    SmallMatrix m(a.rows, b.cols);
+  friend BasicSmallMatrix operator*(const BasicSmallMatrix& a, const BasicSmallMatrix& b) {
+    BasicSmallMatrix m(a.rows, b.cols);
     for (int i = 0; i < a.rows; ++i) {
       for (int k = 0; k < a.cols; ++k) {
         for (int j = 0; j < b.cols; ++j) m(i, j) += a(i, k) * b(k, j);
@@ -78,8 +80,11 @@ struct SmallMatrix {
   }
 };
 
-inline SmallMatrix transposed(const SmallMatrix& a) {
-  SmallMatrix m(a.cols, a.rows);
+using SmallMatrix = BasicSmallMatrix<13>;
+
+template <int Most>
+BasicSmallMatrix<Most> transposed(const BasicSmallMatrix<Most>& a) {
+  BasicSmallMatrix<Most> m(a.cols, a.rows);
   for (int i = 0; i < a.rows; ++i) {
     for (int j = 0; j < a.cols; ++j) m(j, i) = a(i, j);
   }
@@ -88,12 +93,13 @@ inline SmallMatrix transposed(const SmallMatrix& a) {
 
 /// Singular values, descending, of a small square matrix A = U diag(values) Vᵀ by Hestenes' one-sided Jacobi rotations:
 /// each value to its own relative accuracy where the columns allow it. u and v hold their vectors in rows.
+template <int Most>
 struct SmallSvd {
   int n;
-  SmallMatrix u, v;
-  std::array<double, SmallMatrix::most> values{};
+  BasicSmallMatrix<Most> u, v;
+  std::array<double, static_cast<std::size_t>(Most)> values{};
 
-  explicit SmallSvd(const SmallMatrix& a) : n(a.cols), u(n, n), v(SmallMatrix::identity(n)) {
+  explicit SmallSvd(const BasicSmallMatrix<Most>& a) : n(a.cols), u(n, n), v(BasicSmallMatrix<Most>::identity(n)) {
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) u(i, j) = a(j, i);
     }
@@ -121,7 +127,7 @@ struct SmallSvd {
     if (!(std::abs(c) > 2 * std::numeric_limits<double>::epsilon() * std::sqrt(a) * std::sqrt(b))) return false;
     const double zeta = (b - a) / (2 * c);
     const double t = std::copysign(1 / (std::abs(zeta) + std::hypot(1, zeta)), zeta), k = 1 / std::hypot(1, t);
-    for (SmallMatrix* m : {&u, &v}) {
+    for (BasicSmallMatrix<Most>* m : {&u, &v}) {
       for (int i = 0; i < n; ++i) {
         const double x = (*m)(p, i), y = (*m)(q, i);
         (*m)(p, i) = k * (x - t * y);
@@ -152,7 +158,7 @@ struct SmallSvd {
   }
   /// The image of a null vector says nothing: the unit vector that is furthest from the rows before, made orthogonal.
   void complete(int i) {
-    std::array<double, SmallMatrix::most> best{};
+    std::array<double, static_cast<std::size_t>(Most)> best{};
     double longest = -1;
     for (int unit = 0; unit < n; ++unit) {
       for (int j = 0; j < n; ++j) u(i, j) = j == unit;

@@ -9,6 +9,7 @@
 // double and Jet meet in the groups' operators: a constant SE3d times an SE3<Jet> is an SE3<Jet>.
 #pragma once
 
+#include <stats/constrained_types.hpp>
 #include <stats/propagation.hpp>
 
 #include <ceres/jet.h>
@@ -86,6 +87,37 @@ template <Homogeneous A, Homogeneous B, class F>
   requires std::is_invocable_v<F&, const A&, const B&>
 auto propagate(const Gaussian<A>& a, const Gaussian<B>& b, const CrossCovariance<A, B>& cross, F&& f) {
   return detail::linearized(f, a.mean, b.mean).of(a.covariance, b.covariance, cross);
+}
+
+/// An equation or a constraint of stats/constrained.hpp out of a function that is generic in the scalar: f(q, m), or f(q),
+/// returns a fixed-size vector or a number.
+template <class F>
+struct AutoDiff {
+  F f;
+
+  template <Homogeneous... M>
+  auto operator()(const M&... features) const {
+    using S = std::common_type_t<ScalarOf<M>...>;
+    return detail::evaluated<S>(f, features...);
+  }
+  template <Homogeneous Q, Homogeneous M>
+  auto linearize(const Q& q, const M& m) const {
+    const auto found = detail::linearized(f, q, m);
+    using Value = std::remove_cvref_t<decltype(found.value)>;
+    return EquationDerivatives<Value::RowsAtCompileTime, ManifoldTraits<Q>::DoF, ManifoldTraits<M>::DoF>{
+        found.value.template cast<double>(), found.by_a.template cast<double>(), found.by_b.template cast<double>()};
+  }
+  template <Homogeneous Q>
+  auto linearize(const Q& q) const {
+    const auto found = (*this)(q);
+    using Value = std::remove_cvref_t<decltype(found)>;
+    return ConstraintDerivatives<Value::RowsAtCompileTime, ManifoldTraits<Q>::DoF>{
+        found.template cast<double>(), jacobian(f, q).template cast<double>()};
+  }
+};
+template <class F>
+AutoDiff<F> autoDiff(F f) {
+  return {std::move(f)};
 }
 
 }  // namespace liestat

@@ -1,0 +1,172 @@
+// One measurement of a constrained estimate: its equations linearised, its own correction eliminated (Viéville, Lingrand
+// and Gaspard 2000, appendix A, corrected). Fixed sizes: P equations, N parameters, K coordinates of the measurement.
+#pragma once
+
+#include <lie/detail/small_matrix.hpp>
+#include <lie/detail/small_orthogonal.hpp>
+#include <lie/detail/small_products.hpp>
+#include <lie/detail/small_reduced.hpp>
+#include <stats/measurement_noise.hpp>
+
+#include <Eigen/Core>
+
+#include <cmath>
+
+namespace liestat::detail {
+
+/// With ε the correction of the measurement in the tangent space at what was observed and δ the step of the parameter,
+/// the equations are value + C δ + D (ε − ε₀) = 0. Whitened by the root L of S = D V Dᵀ they become Ĉ δ + λ̂ = r̂, where
+/// ε = G λ̂ is the shortest correction and ‖λ̂‖² its squared length.
+template <int P, int N, int K>
+struct MeasurementBlock {
+  using Values = Eigen::Matrix<double, P, 1>;
+  using Correction = Eigen::Matrix<double, K, 1>;
+  using Step = Eigen::Matrix<double, N, 1>;
+  using ByParameter = Eigen::Matrix<double, P, N>;
+  using ByMeasurement = Eigen::Matrix<double, P, K>;
+
+  ByParameter C;    ///< Ĉ
+  ByMeasurement D;  ///< L⁻¹ D
+  Values r, value;  ///< r̂; L⁻¹ value
+  Eigen::Matrix<double, K, P> G;
+  ReducedRoot<double, P> root;
+
+  /// Where the information is singular: directions N_i of the measurement are free. Zᵀ D N_i = 0 selects the equations
+  /// that do not depend on them; `recovery` is N_i (D N_i)⁺.
+  struct Free {
+    int dimension = 0;
+    Eigen::Matrix<double, P, P> selection;
+    Eigen::Matrix<double, K, P> recovery;
+    ByParameter C;
+    ByMeasurement D;
+    Values r;
+  } free;
+
+  template <NoiseModel Noise>
+  void build(const Noise& noise, Values values, ByParameter by_parameter, ByMeasurement by_measurement,
+             const Correction& at, Pivoting pivoting) {
+    Values observed = product(by_measurement, at) - values;
+    free.dimension = 0;
+    if constexpr (HasFreeDirections<Noise>) {
+      if (noise.freeDimension() > 0) {
+        free.dimension = noise.freeDimension();
+        free.C = by_parameter, free.D = by_measurement, free.r = observed;
+        eliminateFree(noise.freeBasis());
+        by_parameter = product(free.selection, by_parameter);
+        by_measurement = product(free.selection, by_measurement);
+        observed = product(free.selection, observed);
+        values = product(free.selection, values);
+      }
+    }
+    const Eigen::Matrix<double, K, P> spread = noise.template spread<P>(by_measurement);
+    root = ReducedRoot<double, P>(product(by_measurement, spread), pivoting);
+    C = root.template halfSolve<N>(by_parameter);
+    D = root.template halfSolve<K>(by_measurement);
+    r = root.template halfSolve<1>(observed);
+    value = root.template halfSolve<1>(values);
+    G = root.template halfSolve<K>(spread.transpose()).transpose();
+  }
+
+  /// λ̂ for a step of the parameter.
+  Values multipliers(const Step& step) const { return r - product(C, step); }
+  /// ε for a step of the parameter.
+  Correction correction(const Step& step) const { return recovered(product(G, multipliers(step)), free.r, step); }
+  /// The change of ε that takes the equations, whose values are `values` elsewhere, to zero to first order.
+  Correction correctionOf(const Values& values, const Step& step) const {
+    return recovered(product(G, Values(-whitened(values) - product(C, step))), -values, step);
+  }
+  /// Values of the equations in units of the noise.
+  Values whitened(const Values& values) const {
+    return root.template halfSolve<1>(free.dimension > 0 ? Values(product(free.selection, values)) : values);
+  }
+  /// The multipliers of the equations as they were given, from λ̂; with the sign of ½ ‖ε‖² + λᵀ c.
+  Values lagrange(const Values& whitened_multipliers) const {
+    const Values lambda = -root.halfSolveTransposed(whitened_multipliers);
+    if (free.dimension > 0) return product(free.selection.transpose(), lambda);
+    return lambda;
+  }
+
+ private:
+  void eliminateFree(const Eigen::Matrix<double, K, K>& basis) {
+    Eigen::Matrix<double, K, K> used = Eigen::Matrix<double, K, K>::Zero();
+    used.leftCols(free.dimension) = basis.leftCols(free.dimension);
+    const Eigen::Matrix<double, P, K> moved = product(free.D, used);
+    // Singular vectors of the transpose, filled up to a square; the zeros that fill it up are never mixed with the rest.
+    constexpr int size = P > K ? P : K;
+    BasicSmallMatrix<size> transposed(size, size);
+    for (int i = 0; i < K; ++i) {
+      for (int j = 0; j < P; ++j) transposed(i, j) = moved(j, i);
+    }
+    const SmallSvd svd(transposed);
+    Eigen::Matrix<double, K, P> inverse = Eigen::Matrix<double, K, P>::Zero();
+    free.selection.setZero();
+    int row = 0;
+    for (int k = 0; k < size; ++k) {
+      if (svd.value(k) > 1e-12 * svd.value(0)) {
+        for (int i = 0; i < K; ++i) {
+          for (int j = 0; j < P; ++j) inverse(i, j) += svd.u(k, i) * svd.v(k, j) / svd.value(k);
+        }
+        continue;
+      }
+      double inside = 0;
+      for (int j = 0; j < P; ++j) inside += svd.v(k, j) * svd.v(k, j);
+      if (inside < 0.5) continue;
+      for (int j = 0; j < P; ++j) free.selection(row, j) = svd.v(k, j);
+      ++row;
+    }
+    free.recovery = product(used, inverse);
+  }
+  Correction recovered(const Correction& weighed, const Values& observed, const Step& step) const {
+    if (free.dimension == 0) return weighed;
+    const Values open = observed - product(free.C, step) - product(free.D, weighed);
+    return weighed + product(free.recovery, open);
+  }
+};
+
+/// The same with the curvature of its equations: W = Q + Σ λ_k ∂²c_k/∂m², H_qm = Σ λ_k ∂²c_k/∂q∂m. The correction is
+/// base + slope δ, and the criterion gains ½ δᵀ A δ − bᵀ δ.
+template <int P, int N, int K>
+struct CurvedBlock {
+  Eigen::Matrix<double, N, N> A;
+  Eigen::Matrix<double, N, 1> b;
+  Eigen::Matrix<double, K, 1> base;
+  Eigen::Matrix<double, K, N> slope;
+  bool valid = false;  ///< false: W is not positive definite
+
+  /// `at` is ε₀.
+  CurvedBlock(const MeasurementBlock<P, N, K>& block, const Eigen::Matrix<double, K, K>& information,
+              const Eigen::Matrix<double, K, 1>& at, const Eigen::Matrix<double, N + K, N + K>& curvature) {
+    if (block.free.dimension > 0) return;
+    const Eigen::Matrix<double, K, K> W = information + curvature.template bottomRightCorner<K, K>();
+    const Cholesky<double, K> by_measurement(W);
+    if (!by_measurement.ok()) return;
+    // Δε = W⁻¹ (first - D̂ᵀ λ), D̂ Δε = second; columns: δ, and 1.
+    using First = Eigen::Matrix<double, K, N + 1>;
+    using Second = Eigen::Matrix<double, P, N + 1>;
+    First first;
+    first.template leftCols<N>() = -curvature.template bottomLeftCorner<K, N>();
+    first.template rightCols<1>() = -product(information, at);
+    Second second;
+    second.template leftCols<N>() = -block.C;
+    second.template rightCols<1>() = -block.value;
+    const First unconstrained = by_measurement.template solve<N + 1>(first);
+    const Eigen::Matrix<double, K, P> response =
+        by_measurement.template solve<P>(Eigen::Matrix<double, K, P>(block.D.transpose()));
+    Eigen::Matrix<double, P, P> S = product(block.D, response);
+    for (int k = block.root.rank(); k < P; ++k) S(k, k) = 1;  // equations that were left out
+    const Cholesky<double, P> by_equations(S);
+    if (!by_equations.ok()) return;
+    valid = true;
+    const Second lambda = by_equations.template solve<N + 1>(Second(product(block.D, unconstrained) - second));
+    const First solved = unconstrained - product(response, lambda);
+    slope = solved.template leftCols<N>();
+    base = at + solved.template rightCols<1>();
+    // H_qq δ + H_qm Δε + Ĉᵀ λ = A δ - b.
+    const Eigen::Matrix<double, N, K> mixed = curvature.template topRightCorner<N, K>();
+    const Eigen::Matrix<double, N, N + 1> sum = product(mixed, solved) + product(block.C.transpose(), lambda);
+    A = curvature.template topLeftCorner<N, N>() + sum.template leftCols<N>();
+    b = -sum.template rightCols<1>();
+  }
+};
+
+}  // namespace liestat::detail

@@ -1,0 +1,312 @@
+// Constrained estimation: its statistics, its iteration, what it says of bad data.
+
+#include <support/constrained_models.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <vector>
+
+namespace {
+
+using namespace liestat;
+using namespace liestat_test;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+const auto on_conic = autoDiff(OnConic{});
+const auto unit_length = autoDiff(UnitLength{});
+
+template <class Q, class Channel, class Constraint>
+auto run(const Q& start, const Channel& channel, const Constraint& constraint,
+         const ConstrainedOptions<Q>& options = {}) {
+  ConstrainedEstimator estimator(start, constraint, options, channel);
+  while (estimator.iterate()) {
+  }
+  return estimator;
+}
+
+/// dᵀ Λ⁺ d, for a covariance whose null space is q.
+double distanceOnSphere(const Vector6d& d, const Vector6d& q, const Eigen::Matrix<double, 6, 6>& covariance) {
+  const Eigen::Matrix<double, 6, 6> regular = covariance + q * q.transpose();
+  const Vector6d along = d - q * q.dot(d);
+  return along.dot(detail::Cholesky<double, 6>(regular).solve<1>(along));
+}
+
+// ------------------------------------------------------------------------------------------------------- statistics
+
+TEST(Constrained, AConicIsAsUncertainAsItSays) {
+  struct Row {
+    double sigma, mean, coverage;
+    int iterations;
+  };
+  // Curvature, which first order does not see, counts from 0.02 on; the note's figures.
+  for (const auto& [sigma, mean, coverage, iterations] :
+       {Row{0.005, 5, 0.95, 8}, Row{0.02, 5.12, 0.94, 13}, Row{0.05, 5.28, 0.93, 20}}) {
+    const int trials = 1000;
+    double chi2 = 0, squares = 0, inside = 0, steps = 0;
+    for (int t = 0; t < trials; ++t) {
+      const Ellipse ellipse(30, sigma, static_cast<std::uint64_t>(t));
+      const auto r = constrainedEstimate(ellipse.truth,
+                                         measurements(ellipse.points, IsotropicNoise<2>(sigma), on_conic), unit_length);
+      ASSERT_TRUE(r.ok()) << t << ": " << name(r.end);
+      EXPECT_EQ(r.degrees_of_freedom, 25);
+      EXPECT_EQ(r.free_parameters, 5);
+      EXPECT_LE(r.equation_error, 1e-15);
+      const double squared = distanceOnSphere(r.parameter - ellipse.truth, r.parameter, r.covariance);
+      chi2 += r.chi2, squares += squared, inside += squared < 11.0705, steps += r.iterations;
+    }
+    // Four standard errors of χ² with 25 and 5 degrees of freedom, and of a frequency.
+    EXPECT_NEAR(chi2 / trials, 25, 4 * std::sqrt(50. / trials) + 20 * sigma * sigma * 25) << sigma;
+    EXPECT_NEAR(squares / trials, mean, 4 * std::sqrt(12. / trials)) << sigma;
+    EXPECT_NEAR(inside / trials, coverage, 4 * std::sqrt(0.0475 / trials) + 0.005) << sigma;
+    EXPECT_LE(steps / trials, iterations) << sigma;
+  }
+}
+
+TEST(Constrained, ARotationIsTheSameAsNineNumbersAndAsAManifold) {
+  const int trials = 1000;
+  double chi2 = 0, squares = 0;
+  for (int t = 0; t < trials; ++t) {
+    const RotatedPairs data(5, static_cast<std::uint64_t>(t));
+    const auto channel = measurements(data.pairs, DiagonalNoise<6>(data.sigmas), autoDiff(Rotates{}));
+    const SO3d start = exp(data.truth, Eigen::Vector3d(0.1, -0.05, 0.08));
+    const auto numbers = constrainedEstimate(elements(start), channel, autoDiff(Orthogonal{}));
+    const auto rotation = constrainedEstimate(start, channel);
+    ASSERT_TRUE(numbers.ok() && rotation.ok()) << name(numbers.end) << " " << name(rotation.end);
+    EXPECT_EQ(numbers.degrees_of_freedom, 12);
+    EXPECT_EQ(rotation.degrees_of_freedom, 12);
+    EXPECT_EQ(numbers.free_parameters, 3);
+    EXPECT_NEAR(numbers.chi2, rotation.chi2, 1e-9 * (1 + rotation.chi2));
+    EXPECT_LE((numbers.parameter - elements(rotation.parameter)).norm(), 1e-10);
+    // ∂ elements / ∂ local coordinates carries one covariance to the other.
+    Eigen::Matrix<double, 9, 3> J;
+    for (int k = 0; k < 3; ++k) {
+      const double h = 1e-6;
+      J.col(k) = (elements(exp(rotation.parameter, Eigen::Vector3d(h * Eigen::Vector3d::Unit(k)))) -
+                  elements(exp(rotation.parameter, Eigen::Vector3d(-h * Eigen::Vector3d::Unit(k))))) /
+                 (2 * h);
+    }
+    EXPECT_LE((numbers.covariance - J * rotation.covariance * J.transpose()).norm(), 1e-7 * numbers.covariance.norm());
+    chi2 += rotation.chi2;
+    squares += mahalanobisSquared(Gaussian<SO3d>{rotation.parameter, rotation.covariance}, data.truth);
+  }
+  EXPECT_NEAR(chi2 / trials, 12, 4 * std::sqrt(24. / trials));
+  EXPECT_NEAR(squares / trials, 3, 4 * std::sqrt(6. / trials));
+}
+
+TEST(Constrained, APriorAddsItsRankToTheDegreesOfFreedom) {
+  const int trials = 400;
+  double chi2 = 0;
+  for (int t = 0; t < trials; ++t) {
+    const RotatedPairs data(20, static_cast<std::uint64_t>(t));
+    CounterRng rng(77, static_cast<std::uint64_t>(t));
+    ConstrainedOptions<Vector9d> options;
+    // A prior in the nine numbers, whose part off the rotations is data too: six equations and three tangent ones.
+    options.prior = ParameterPrior<Vector9d>{elements(data.truth) + 0.01 * rng.normalVector<9>(),
+                                             1e4 * Eigen::Matrix<double, 9, 9>::Identity()};
+    const auto r = constrainedEstimate(elements(data.truth),
+                                       measurements(data.pairs, DiagonalNoise<6>(data.sigmas), autoDiff(Rotates{})),
+                                       autoDiff(Orthogonal{}), options);
+    ASSERT_TRUE(r.ok()) << name(r.end);
+    EXPECT_EQ(r.degrees_of_freedom, 6 + 3 * 20);
+    chi2 += r.chi2;
+  }
+  EXPECT_NEAR(chi2 / trials, 66, 4 * std::sqrt(132. / trials));
+}
+
+TEST(Constrained, CorrectedMeasurementsHaveCovariances) {
+  const int trials = 4000, n = 12;
+  const double sigma = 0.005;
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero(), expected = Eigen::Matrix2d::Zero();
+  double corrections = 0, expected_corrections = 0;
+  for (int t = 0; t < trials; ++t) {
+    const Ellipse ellipse(n, sigma, static_cast<std::uint64_t>(t)), exact(n, 0, 0);
+    const auto channel = measurements(ellipse.points, IsotropicNoise<2>(sigma), on_conic);
+    const auto estimator = run(ellipse.truth, channel, unit_length);
+    ASSERT_TRUE(estimator.result().ok());
+    const Eigen::Vector2d e = estimator.corrected()[2] - exact.points[2];
+    sum += e * e.transpose(), expected += estimator.correctedCovariance(2);
+    corrections += estimator.correction(2).squaredNorm() / (sigma * sigma);
+    expected_corrections += estimator.expectedCorrection(2);
+    EXPECT_LE((estimator.corrected()[2] - ellipse.points[2] - estimator.correction(2)).norm(), 1e-15);
+  }
+  // A variance from so many trials is known to 2.2 %; four of these, and what first order leaves.
+  EXPECT_LE((sum - expected).norm(), 0.1 * expected.norm());
+  EXPECT_NEAR(corrections, expected_corrections, 0.1 * expected_corrections);
+}
+
+// -------------------------------------------------------------------------------------------------------- iteration
+
+// The nearest point of the unit circle to a point at radius ρ, started on the circle: Hessian Q converges linearly with
+// the ratio |1 - ρ|, and not at all beyond 2.
+TEST(Constrained, CurvatureConvergesWhereResidualsAreLarge) {
+  for (const double radius : {0.1, 0.5, 0.9, 1.5, 3.0, 10.0}) {
+    for (const double angle : {0.5, 2.5}) {
+      ConstrainedOptions<Eigen::Vector2d> options{.max_iterations = 500, .tolerance = 1e-10};
+      options.prior = ParameterPrior<Eigen::Vector2d>{{radius, 0}, Eigen::Matrix2d::Identity()};
+      const Eigen::Vector2d start(std::cos(angle), std::sin(angle));
+      const auto curved = constrainedEstimate(start, std::tuple<>(), unit_length, options);
+      EXPECT_TRUE(curved.ok()) << radius << " " << angle;
+      EXPECT_LE((curved.parameter - Eigen::Vector2d(1, 0)).norm(), 1e-9) << radius << " " << angle;
+      EXPECT_LE(curved.iterations, angle < 1 ? 12 : 16) << radius << " " << angle;
+      EXPECT_NEAR(curved.chi2, (1 - radius) * (1 - radius), 1e-9);
+      options.curvature = false;
+      const auto plain = constrainedEstimate(start, std::tuple<>(), unit_length, options);
+      if (radius > 0.3 && radius < 2) {
+        EXPECT_TRUE(plain.ok());
+        EXPECT_NEAR(plain.iterations, radius == 0.9 ? 11 : 33, angle < 1 ? 2 : 8) << radius;
+      } else {
+        EXPECT_GT(plain.iterations, 100);
+      }
+    }
+  }
+}
+
+/// Combinations of the equations, and two that are redundant.
+struct Mixed {
+  Eigen::Matrix<double, 3, 3> G;
+
+  template <class S>
+  Eigen::Matrix<S, 5, 1> operator()(const SO3<S>& R, const Eigen::Matrix<S, 6, 1>& m) const {
+    const Eigen::Matrix<S, 3, 1> values = G.cast<S>() * Rotates{}(R, m);
+    Eigen::Matrix<S, 5, 1> more;
+    more << values, values[0] + values[1], S(1e6) * values[2];
+    return more;
+  }
+};
+
+// Any regular combination of equations is the same set; the reduced root sees redundant ones.
+TEST(Constrained, EquationsMayBeMixed) {
+  CounterRng rng(5);
+  const RotatedPairs data(6, 3);
+  Mixed mixed;
+  for (int j = 0; j < 3; ++j) mixed.G.col(j) = rng.normalVector<3>();
+  const DiagonalNoise<6> noise(data.sigmas);
+  const auto plain = constrainedEstimate(SO3d(), measurements(data.pairs, noise, autoDiff(Rotates{})));
+  const auto other = constrainedEstimate(SO3d(), measurements(data.pairs, noise, autoDiff(mixed)));
+  ASSERT_TRUE(plain.ok() && other.ok()) << name(plain.end) << " " << name(other.end);
+  EXPECT_LE(distance(plain.parameter, other.parameter), 1e-10);
+  EXPECT_LE((plain.covariance - other.covariance).norm(), 1e-7 * plain.covariance.norm());
+  EXPECT_NEAR(plain.chi2, other.chi2, 1e-8 * plain.chi2);
+  EXPECT_EQ(plain.degrees_of_freedom, other.degrees_of_freedom);
+  EXPECT_EQ(other.equations, 18);
+  EXPECT_EQ(other.dropped_equations, 12);
+}
+
+TEST(Constrained, WithoutAPointTheEstimateMovesInOneStep) {
+  const Ellipse ellipse(30, 0.005, 4);
+  const IsotropicNoise<2> noise(0.005);
+  const auto all = measurements(ellipse.points, noise, on_conic);
+  const auto with = run(ellipse.truth, all, unit_length, {.tolerance = 1e-12});
+  ASSERT_TRUE(with.result().ok());
+  std::vector<Eigen::Vector2d> fewer(ellipse.points.begin() + 1, ellipse.points.end());
+  auto rest = measurements(fewer, noise, on_conic);
+  const auto cold = run(ellipse.truth, rest, unit_length, {.tolerance = 1e-12});
+  const auto list = with.corrected();
+  rest.corrected.assign(list.begin() + 1, list.end());
+  ConstrainedEstimator warm(with.result().parameter, unit_length, ConstrainedOptions<Vector6d>{.tolerance = 1e-12},
+                            rest);
+  warm.iterate();
+  const double change = (with.result().parameter - cold.result().parameter).norm();
+  EXPECT_LE((warm.result().parameter - cold.result().parameter).norm(), 0.01 * change);
+  while (warm.iterate()) {
+  }
+  EXPECT_LE((warm.result().parameter - cold.result().parameter).norm(), 1e-12);
+  EXPECT_LE(warm.result().iterations, cold.result().iterations);
+}
+
+TEST(Constrained, CanBeStoppedAndGoesStepByStep) {
+  const Ellipse ellipse(30, 0.05, 4);
+  const auto channel = measurements(ellipse.points, IsotropicNoise<2>(0.05), on_conic);
+  ConstrainedEstimator estimator(ellipse.truth, unit_length, ConstrainedOptions<Vector6d>{}, channel);
+  EXPECT_TRUE(estimator.iterate());
+  estimator.stop();
+  EXPECT_EQ(estimator.result().end, ConstrainedEnd::stopped);
+  EXPECT_FALSE(estimator.iterate());
+  EXPECT_EQ(estimator.result().iterations, 1);
+  EXPECT_TRUE(estimator.result().covariance.allFinite()) << "a result at any time";
+  const auto capped = constrainedEstimate(ellipse.truth, channel, unit_length, {.max_iterations = 2});
+  EXPECT_EQ(capped.end, ConstrainedEnd::capped);
+  EXPECT_EQ(capped.status(), Status::not_converged);
+}
+
+// ---------------------------------------------------------------------------------------------------------- bad data
+
+TEST(Constrained, OpenDirectionsAreNamed) {
+  // Four points leave one direction of a conic open.
+  const Ellipse ellipse(4, 0.001, 4);
+  const auto channel = measurements(ellipse.points, IsotropicNoise<2>(0.001), on_conic);
+  const auto r = constrainedEstimate(ellipse.truth, channel, unit_length);
+  EXPECT_EQ(r.end, ConstrainedEnd::unobservable);
+  EXPECT_EQ(r.status(), Status::ill_defined);
+  ASSERT_EQ(r.unobservable, 1);
+  EXPECT_FALSE(r.covariance.allFinite());
+  EXPECT_EQ(r.degrees_of_freedom, 0);
+  // Moving along it changes no equation.
+  const Vector6d direction = r.unobservable_basis.col(0);
+  EXPECT_NEAR(direction.norm(), 1, 1e-12);
+  const auto corrected = run(ellipse.truth, channel, unit_length).corrected();
+  for (const Eigen::Vector2d& m : corrected) EXPECT_NEAR(OnConic{}(direction, m)[0], 0, 1e-6);
+  // Nothing at all is known of a parameter without measurements.
+  const auto none = constrainedEstimate(
+      ellipse.truth, measurements(std::vector<Eigen::Vector2d>(), IsotropicNoise<2>(1), on_conic), unit_length);
+  EXPECT_EQ(none.end, ConstrainedEnd::too_few);
+  EXPECT_EQ(none.unobservable, 5);
+}
+
+TEST(Constrained, ContradictionsAreSaid) {
+  // x = 1 and x = 2.
+  const LinearConstraint<2, 2> both{Eigen::Matrix2d{{1, 0}, {1, 0}}, Eigen::Vector2d(1, 2)};
+  ConstrainedOptions<Eigen::Vector2d> options;
+  options.prior = ParameterPrior<Eigen::Vector2d>{{0, 0}, Eigen::Matrix2d::Identity()};
+  const auto r = constrainedEstimate(Eigen::Vector2d(0, 0), std::tuple<>(), both, options);
+  EXPECT_EQ(r.end, ConstrainedEnd::contradictory) << name(r.end);
+  EXPECT_EQ(r.constraints, 1);
+  EXPECT_EQ(r.dropped_constraints, 1);
+  // The same twice is none.
+  const LinearConstraint<2, 2> twice{Eigen::Matrix2d{{1, 0}, {3, 0}}, Eigen::Vector2d(1, 3)};
+  const auto fine = constrainedEstimate(Eigen::Vector2d(0, 0), std::tuple<>(), twice, options);
+  EXPECT_TRUE(fine.ok());
+  EXPECT_LE((fine.parameter - Eigen::Vector2d(1, 0)).norm(), 1e-12);
+  EXPECT_EQ(fine.degrees_of_freedom, 1);
+}
+
+TEST(Constrained, BadInputIsAStatus) {
+  const Ellipse ellipse(30, 0.005, 4);
+  const auto end = [&](const std::vector<Eigen::Vector2d>& points, double sigma, const Vector6d& start) {
+    const auto r = constrainedEstimate(start, measurements(points, IsotropicNoise<2>(sigma), on_conic), unit_length);
+    EXPECT_FALSE(r.ok());
+    return r.end;
+  };
+  std::vector<Eigen::Vector2d> points = ellipse.points;
+  points[3].y() = nan;
+  EXPECT_EQ(end(points, 0.005, ellipse.truth), ConstrainedEnd::bad_input);
+  for (const double sigma : {0.0, nan, std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(end(ellipse.points, sigma, ellipse.truth), ConstrainedEnd::bad_input) << sigma;
+  }
+  EXPECT_EQ(end(ellipse.points, 0.005, Vector6d::Constant(nan)), ConstrainedEnd::bad_input);
+  // All points the same: one equation.
+  EXPECT_EQ(end(std::vector<Eigen::Vector2d>(30, Eigen::Vector2d(1, 0)), 0.005, ellipse.truth),
+            ConstrainedEnd::unobservable);
+  // A start where the gradient of the constraint is zero.
+  EXPECT_NE(end(ellipse.points, 0.005, Vector6d::Zero()), ConstrainedEnd::running);
+  // Noises of another number.
+  const auto wrong = measurements(ellipse.points, std::vector(3, IsotropicNoise<2>(0.1)), on_conic);
+  EXPECT_EQ(constrainedEstimate(ellipse.truth, wrong, unit_length).end, ConstrainedEnd::bad_input);
+}
+
+TEST(Constrained, EveryEndHasAName) {
+  for (const ConstrainedEnd e : {ConstrainedEnd::running, ConstrainedEnd::converged, ConstrainedEnd::capped,
+                                 ConstrainedEnd::stalled, ConstrainedEnd::stopped, ConstrainedEnd::unobservable,
+                                 ConstrainedEnd::contradictory, ConstrainedEnd::too_few, ConstrainedEnd::bad_input}) {
+    EXPECT_NE(std::string(name(e)), "unknown");
+    EXPECT_EQ(statusOf(e) == Status::ok, e == ConstrainedEnd::converged);
+  }
+}
+
+}  // namespace
