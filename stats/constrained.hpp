@@ -21,7 +21,8 @@
 //
 // Equations are function objects: `e(q, m)` returns the values, `e.linearize(q, m)` an EquationDerivatives in local
 // frames. `autoDiff(f)` of stats/compat/jet.hpp makes one of a function that is generic in the scalar. Constraints are
-// the same without m.
+// the same without m. Equations that are redundant by construction, such as the three of R a - b = 0 between unit vectors,
+// say how many are independent, `static constexpr int rank = 2;`: away from the solution the others look independent.
 #pragma once
 
 #include <stats/constrained_types.hpp>
@@ -138,6 +139,7 @@ template <Homogeneous Q, class Constraint, class... Channels>
 class ConstrainedEstimator {
  public:
   static constexpr int N = ManifoldTraits<Q>::DoF;
+  static_assert(std::is_same_v<ScalarOf<Q>, double>, "constrained estimates are made in double");
 
   /// Starts at `start`; bad input ends it at once.
   ConstrainedEstimator(const Q& start, const Constraint& constraint, const ConstrainedOptions<Q>& options,
@@ -256,11 +258,10 @@ class ConstrainedEstimator {
       prior_cost_ = e.dot(detail::product(information, e));
     }
     prior_slope_ = -b_;
-    forAll([&](auto& state) { state.linearize(result_.parameter, Pivoting::largest, A_, b_); });
+    forAll([&](auto& state) { state.linearize(result_.parameter, A_, b_); });
     linearizeConstraint();
     system_ = detail::TangentSystem<N>(A_, basis_.freeBasis(), N - basis_.rank());
   }
-  using Pivoting = detail::Pivoting;
 
   /// The same with the curvature of all equations under the multipliers of the last step.
   void linearizeCurved() {

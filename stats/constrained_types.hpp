@@ -121,7 +121,7 @@ struct ConstrainedResult {
   double equation_error = std::numeric_limits<double>::quiet_NaN();
   int free_parameters = 0;                          ///< dimension of what the constraints leave free
   int equations = 0;                                ///< of the measurements, independent ones
-  int dropped_equations = 0;                        ///< of the measurements: redundant, or with a gradient of zero
+  int dropped_equations = 0;                        ///< redundant without having said so, or with a gradient of zero
   int constraints = 0;                              ///< of the parameter, independent ones
   int dropped_constraints = 0;                      ///< of the parameter: redundant, or with a gradient of zero
   std::size_t measurements = 0, uninformative = 0;  ///< all; those whose free directions take up all their equations

@@ -39,7 +39,7 @@ Eigen::Matrix<S, N, N> closestRoot(const Eigen::Matrix<S, N, N>& A) {
 /// Which of several redundant rows a reduced root keeps.
 enum class Pivoting {
   first,   ///< the first independent ones
-  largest  ///< the one whose remaining diagonal element is the largest part of the original, again and again
+  largest  ///< the one with the largest diagonal element that remains, again and again
 };
 
 /// The reduced root: Cholesky's factor of the rows and columns of S that are independent. Row k is left out when its
@@ -49,21 +49,22 @@ template <class S, int N>
 class ReducedRoot {
  public:
   ReducedRoot() = default;
-  explicit ReducedRoot(Eigen::Matrix<S, N, N> A, Pivoting pivoting = Pivoting::largest) {
+  /// Keeps at most `max_rank` rows.
+  explicit ReducedRoot(Eigen::Matrix<S, N, N> A, Pivoting pivoting = Pivoting::largest, int max_rank = N) {
     using std::sqrt;
     const Eigen::Matrix<S, N, 1> original = A.diagonal();
     const S least = S(10 * N) * std::numeric_limits<S>::epsilon();
     bool left[static_cast<std::size_t>(N)];
     for (bool& l : left) l = true;
-    while (rank_ < N) {
+    while (rank_ < max_rank) {
       int best = -1;
-      S best_part = least;
+      S largest(0);
       for (int k = 0; k < N; ++k) {
         // Written so that NaN is left out.
-        if (!left[k] || !(original[k] > S(0)) || !(A(k, k) > best_part * original[k])) continue;
+        if (!left[k] || !(A(k, k) > least * original[k]) || !(A(k, k) > largest)) continue;
         best = k;
         if (pivoting == Pivoting::first) break;
-        best_part = A(k, k) / original[k];
+        largest = A(k, k);
       }
       if (best < 0) return;
       left[best] = false;

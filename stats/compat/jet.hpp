@@ -89,10 +89,23 @@ auto propagate(const Gaussian<A>& a, const Gaussian<B>& b, const CrossCovariance
   return detail::linearized(f, a.mean, b.mean).of(a.covariance, b.covariance, cross);
 }
 
+namespace detail {
+
+/// The number of independent equations, of a function that says it.
+template <class F>
+struct SaysRank {};
+template <class F>
+  requires requires { F::rank; }
+struct SaysRank<F> {
+  static constexpr int rank = F::rank;
+};
+
+}  // namespace detail
+
 /// An equation or a constraint of stats/constrained.hpp out of a function that is generic in the scalar: f(q, m), or f(q),
 /// returns a fixed-size vector or a number.
 template <class F>
-struct AutoDiff {
+struct AutoDiff : detail::SaysRank<F> {
   F f;
 
   template <Homogeneous... M>
@@ -117,7 +130,7 @@ struct AutoDiff {
 };
 template <class F>
 AutoDiff<F> autoDiff(F f) {
-  return {std::move(f)};
+  return {{}, std::move(f)};
 }
 
 }  // namespace liestat

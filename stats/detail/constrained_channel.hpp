@@ -32,6 +32,17 @@ Eigen::Matrix<double, P, ManifoldTraits<M>::DoF> inCoordinatesAt(
   }
 }
 
+/// How many equations are independent: all of them, unless they say how many.
+template <class Equation, int P>
+constexpr int equationRank() {
+  if constexpr (requires { Equation::rank; }) {
+    static_assert(Equation::rank > 0 && Equation::rank <= P, "between one and the number of equations");
+    return Equation::rank;
+  } else {
+    return P;
+  }
+}
+
 /// Step of the differences by which curvatures are found.
 template <Homogeneous M>
 double differenceStep(const M& x) {
@@ -62,6 +73,7 @@ class ChannelState {
                                        .value)>::RowsAtCompileTime;
   static_assert(P != Eigen::Dynamic, "equations return a vector of fixed size");
   static_assert(Noise::dimension == K, "the noise has as many coordinates as the measurement");
+  static constexpr int rank = equationRank<typename Channel::Equation, P>();
   using Block = MeasurementBlock<P, N, K>;
   using Step = typename Block::Step;
   using Correction = typename Block::Correction;
@@ -85,11 +97,11 @@ class ChannelState {
   }
 
   /// Linearises at q and at the corrections; adds to A and b.
-  void linearize(const Q& q, Pivoting pivoting, Square& A, Step& b) {
+  void linearize(const Q& q, Square& A, Step& b) {
     for (std::size_t i = 0; i < size(); ++i) {
       const auto [values, by_parameter, by_measurement] = derivatives(q, i, at_[i]);
       Block& block = blocks_[i];
-      block.build(channel_->noiseOf(i), values, by_parameter, by_measurement, at_[i], pivoting);
+      block.build(channel_->noiseOf(i), values, by_parameter, by_measurement, at_[i], rank);
       addSums(block.C, block.r, A, b);
     }
   }
@@ -194,9 +206,9 @@ class ChannelState {
   int droppedEquations() const {
     int sum = 0;
     for (const Block& block : blocks_) {
-      sum += P - block.root.rank();
+      sum += rank - block.root.rank();
       // Those that find the free directions are not lost.
-      if (block.free.dimension > 0) sum -= P - selected(block);
+      if (block.free.dimension > 0) sum -= rank - std::min(rank, selected(block));
     }
     return sum;
   }

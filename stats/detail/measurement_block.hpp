@@ -44,7 +44,7 @@ struct MeasurementBlock {
 
   template <NoiseModel Noise>
   void build(const Noise& noise, Values values, ByParameter by_parameter, ByMeasurement by_measurement,
-             const Correction& at, Pivoting pivoting) {
+             const Correction& at, int max_rank) {
     Values observed = product(by_measurement, at) - values;
     free.dimension = 0;
     if constexpr (HasFreeDirections<Noise>) {
@@ -59,7 +59,7 @@ struct MeasurementBlock {
       }
     }
     const Eigen::Matrix<double, K, P> spread = noise.template spread<P>(by_measurement);
-    root = ReducedRoot<double, P>(product(by_measurement, spread), pivoting);
+    root = ReducedRoot<double, P>(product(by_measurement, spread), Pivoting::largest, max_rank);
     C = root.template halfSolve<N>(by_parameter);
     D = root.template halfSolve<K>(by_measurement);
     r = root.template halfSolve<1>(observed);
