@@ -163,7 +163,7 @@ class ConstrainedEstimator {
     if (result_.iterations >= options_.max_iterations) return finish(ConstrainedEnd::capped);
     const bool curved = slow_steps_ >= 3 && options_.curvature && result_.iterations > 0;
     linearize();
-    if (!A_.allFinite() || !b_.allFinite() || !constraint_values_.allFinite()) {
+    if (!finite_ || !A_.allFinite() || !b_.allFinite() || !constraint_values_.allFinite()) {
       return finish(result_.iterations == 0 ? ConstrainedEnd::bad_input : ConstrainedEnd::stalled);
     }
     ++result_.iterations;
@@ -258,7 +258,8 @@ class ConstrainedEstimator {
       prior_cost_ = e.dot(detail::product(information, e));
     }
     prior_slope_ = -b_;
-    forAll([&](auto& state) { state.linearize(result_.parameter, A_, b_); });
+    finite_ = true;
+    forAll([&](auto& state) { finite_ = state.linearize(result_.parameter, A_, b_) && finite_; });
     linearizeConstraint();
     system_ = detail::TangentSystem<N>(A_, basis_.freeBasis(), N - basis_.rank());
   }
@@ -470,7 +471,7 @@ class ConstrainedEstimator {
   Basis basis_;
   detail::TangentSystem<N> system_, curved_system_;
   ConstraintValues constraint_values_ = ConstraintValues::Zero(), constraint_multipliers_ = ConstraintValues::Zero();
-  bool have_basis_ = false;
+  bool have_basis_ = false, finite_ = true;
   double prior_cost_ = 0, penalty_ = 0, constraint_penalty_ = 0, last_length_ = 0, free_step_ = 0;
   int slow_steps_ = 0;
   bool cut_ = false;  // the last step was

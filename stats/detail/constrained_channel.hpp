@@ -96,14 +96,17 @@ class ChannelState {
     return true;
   }
 
-  /// Linearises at q and at the corrections; adds to A and b.
-  void linearize(const Q& q, Square& A, Step& b) {
+  /// Linearises at q and at the corrections; adds to A and b. False if something is not finite.
+  bool linearize(const Q& q, Square& A, Step& b) {
+    bool finite = true;
     for (std::size_t i = 0; i < size(); ++i) {
       const auto [values, by_parameter, by_measurement] = derivatives(q, i, at_[i]);
       Block& block = blocks_[i];
       block.build(channel_->noiseOf(i), values, by_parameter, by_measurement, at_[i], rank);
+      finite = finite && block.finite;
       addSums(block.C, block.r, A, b);
     }
+    return finite;
   }
   /// The same with the curvature of the equations, after linearize() and with the multipliers of the last step.
   void linearizeCurved(const Q& q, Square& A, Step& b) {

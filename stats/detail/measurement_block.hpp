@@ -30,6 +30,7 @@ struct MeasurementBlock {
   Values r, value;  ///< r̂; L⁻¹ value
   Eigen::Matrix<double, K, P> G;
   ReducedRoot<double, P> root;
+  bool finite = true;  ///< what was given
 
   /// Where the information is singular: directions N_i of the measurement are free. Zᵀ D N_i = 0 selects the equations
   /// that do not depend on them; `recovery` is N_i (D N_i)⁺.
@@ -46,6 +47,7 @@ struct MeasurementBlock {
   void build(const Noise& noise, Values values, ByParameter by_parameter, ByMeasurement by_measurement,
              const Correction& at, int max_rank) {
     Values observed = product(by_measurement, at) - values;
+    finite = observed.allFinite() && by_parameter.allFinite();
     free.dimension = 0;
     if constexpr (HasFreeDirections<Noise>) {
       if (noise.freeDimension() > 0) {

@@ -130,7 +130,7 @@ TEST(ConstrainedStep, EliminatesFreeDirectionsExactly) {
     const auto found = problem.solved({});
     ASSERT_TRUE(found.result.ok()) << name(found.result.end);
     const Eigen::VectorXd expected = problem.reference(problem.start, Eigen::Matrix<double, N, N>::Zero());
-    EXPECT_LE((found.x - expected).norm(), 1e-9 * expected.norm()) << seed;
+    EXPECT_LE((found.x - expected).norm(), 1e-11 * expected.norm()) << seed;
     // One of the two equations of each measurement finds its free direction.
     EXPECT_EQ(found.result.equations, static_cast<int>(M));
     EXPECT_EQ(found.result.dropped_equations, 0);

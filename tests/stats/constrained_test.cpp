@@ -1,6 +1,7 @@
 // Constrained estimation: its statistics, its iteration, what it says of bad data.
 
 #include <support/constrained_models.hpp>
+#include <stats/measurement_error.hpp>
 
 #include <gtest/gtest.h>
 
@@ -138,6 +139,36 @@ TEST(Constrained, CorrectedMeasurementsHaveCovariances) {
   // A variance from so many trials is known to 2.2 %; four of these, and what first order leaves.
   EXPECT_LE((sum - expected).norm(), 0.1 * expected.norm());
   EXPECT_NEAR(corrections, expected_corrections, 0.1 * expected_corrections);
+}
+
+TEST(MeasurementError, IsTheDistanceToTheModelInUnitsOfTheNoise) {
+  const double sigma = 0.02;
+  const Ellipse noisy(4000, sigma, 3);
+  const IsotropicNoise<2> noise(sigma);
+  double sum = 0, first = 0;
+  for (const Eigen::Vector2d& m : noisy.points) {
+    // Steps converge linearly, with the ratio distance × curvature: a quarter at three sigmas from a vertex.
+    const auto error = measurementError(noisy.truth, m, noise, on_conic, 12);
+    ASSERT_EQ(error.equations, 1);
+    EXPECT_LE(error.remaining, 1e-12);
+    sum += error.normalised();
+    const auto sampson = measurementError(noisy.truth, m, noise, on_conic);
+    const auto J = on_conic.linearize(noisy.truth, m);
+    EXPECT_NEAR(sampson.squared, J.value[0] * J.value[0] / (sigma * sigma * J.by_measurement.squaredNorm()),
+                1e-12 * (1 + sampson.squared));
+    first += sampson.squared;
+    // The nearest point is where the correction is along the normal.
+    const Eigen::Vector2d moved = error.corrected - m,
+                          normal = on_conic.linearize(noisy.truth, error.corrected).by_measurement;
+    EXPECT_LE(std::abs(moved.x() * normal.y() - moved.y() * normal.x()), 1e-4 * moved.norm() * normal.norm() + 1e-12);
+  }
+  // χ² with one degree of freedom.
+  EXPECT_NEAR(sum / 4000, 1, 4 * std::sqrt(2. / 4000));
+  EXPECT_NEAR(first / 4000, 1, 4 * std::sqrt(2. / 4000) + 0.01);
+  const auto none = measurementError(Vector6d(Vector6d::Zero()), noisy.points[0], noise, on_conic);
+  EXPECT_EQ(none.equations, 0);
+  EXPECT_EQ(none.squared, 0);
+  EXPECT_FALSE(measurementError(noisy.truth, Eigen::Vector2d(nan, 0), noise, on_conic).squared <= 1e300);
 }
 
 // -------------------------------------------------------------------------------------------------------- iteration

@@ -1,0 +1,59 @@
+// The error of a measurement under a parameter that was estimated without it: how far it must be corrected to meet its
+// equations (Viéville, Lingrand and Gaspard 2000, (22) to (24), with derivatives by the measurement). Robust search
+// classifies inliers and outliers by it.
+#pragma once
+
+#include <stats/constrained_types.hpp>
+#include <stats/detail/constrained_channel.hpp>
+#include <stats/measurement_noise.hpp>
+
+#include <limits>
+#include <type_traits>
+
+namespace liestat {
+
+/// What measurementError() returns.
+template <Homogeneous M>
+struct MeasurementError {
+  double squared = 0;  ///< ‖m̃ - m‖²_Q; of an inlier of the true parameter χ² with `equations` degrees of freedom
+  double remaining =
+      0;  ///< ‖c(m̃)‖² in units of the noise, the second term of (24): how far the steps were from the end
+  int equations = 0;  ///< independent ones
+  M corrected = ManifoldTraits<M>::origin();
+
+  /// Per equation, (24).
+  double normalised() const { return equations > 0 ? squared / equations : 0; }
+};
+
+/// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which is what a search needs; two or three
+/// classify where equations are curved. A measurement without equations (gradients of zero, or free in all of them) has
+/// none and no error; numbers that are not finite give NaN.
+template <Homogeneous Q, Homogeneous M, NoiseModel Noise, class Equation>
+MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise, const Equation& equation,
+                                     int steps = 1) {
+  constexpr int N = ManifoldTraits<Q>::DoF, K = ManifoldTraits<M>::DoF;
+  constexpr int P = std::remove_cvref_t<decltype(equation.linearize(q, m).value)>::RowsAtCompileTime;
+  using Block = detail::MeasurementBlock<P, N, K>;
+  Block block;
+  typename Block::Correction at = Block::Correction::Zero();
+  MeasurementError<M> error{.corrected = m};
+  for (int step = 0; step < steps; ++step) {
+    const auto J = equation.linearize(q, error.corrected);
+    block.build(noise, J.value.template cast<double>(), J.by_parameter.template cast<double>(),
+                detail::inCoordinatesAt<M, P>(m, error.corrected, J.by_measurement.template cast<double>()), at,
+                detail::equationRank<Equation, P>());
+    if (!block.finite) {
+      error.squared = error.remaining = std::numeric_limits<double>::quiet_NaN();
+      return error;
+    }
+    at = block.correction(Block::Step::Zero());
+    error.corrected = exp(m, TangentOf<M>(at.template cast<ScalarOf<M>>()));
+  }
+  error.squared = noise.squaredNorm(at);
+  error.equations = block.root.rank();
+  const typename Block::Values left = equation(q, error.corrected).template cast<double>();
+  error.remaining = block.whitened(left).squaredNorm();
+  return error;
+}
+
+}  // namespace liestat
