@@ -37,7 +37,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <functional>
+#include <limits>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -345,22 +345,29 @@ class ConstrainedEstimator {
     }
     if (!std::isfinite(length) || !std::isfinite(slope)) return finish(ConstrainedEnd::stalled);
 
-    const double parameter_step =
-        delta.norm() / (1 + (detail::is_vector<Q> ? coordinates(result_.parameter).norm() : 0));
-    const double equations = std::sqrt(here.squared_violation);
-    const bool met = here.constraint <= 1e-9 * (1 + (detail::is_vector<Q> ? coordinates(result_.parameter).norm() : 0));
-    const bool small = length <= options_.tolerance && equations <= 10 * options_.tolerance && free_step_ <= 1e-9 &&
-                       (parameter_step <= 1e-9 || length > 0 || result_.iterations > 1);
-    if (small && met && parameter_step <= 1e-6) return take(delta, ConstrainedEnd::converged);
-    // As small as rounding lets it be.
-    const double ratio = last_length_ > 0 ? length / last_length_ : 0;
-    if (length <= 1e-5 && met && ratio > 0.5 && slow_steps_ >= 6 && parameter_step <= 1e-9) {
+    const double size = parameterSize(), parameter_step = delta.norm() / size;
+    const bool met = here.constraint <= 1e-9 * size;
+    // As small as asked, or as rounding lets it be.
+    const double tolerance = std::max(options_.tolerance, 4 * rounding());
+    if (length <= tolerance && std::sqrt(here.squared_violation) <= 10 * tolerance && free_step_ <= 1e-9 && met &&
+        parameter_step <= 1e-6) {
       return take(delta, ConstrainedEnd::converged);
     }
+    const double ratio = last_length_ > 0 ? length / last_length_ : 0;
     // Linear convergence: the curvature joins, and stays.
     slow_steps_ = ratio > 0.4 || cut_ ? slow_steps_ + 1 : slow_steps_ >= 3 ? slow_steps_ : 0;
     last_length_ = length;
     return search(delta, here, slope, length, parameter_step, met);
+  }
+
+  double parameterSize() const { return 1 + (detail::is_vector<Q> ? coordinates(result_.parameter).norm() : 0); }
+  /// The length of one rounding error in each coordinate, in units of the noise.
+  double rounding() const {
+    double squared = 0;
+    forAll([&](const auto& state) { squared += state.roundingSquared(); });
+    const Step q = detail::is_vector<Q> ? coordinates(result_.parameter) : Step(Step::Ones());
+    const double of_parameter = std::abs(q.dot(detail::product(A_, q)));
+    return std::sqrt(squared + of_parameter * std::pow(std::numeric_limits<double>::epsilon(), 2));
   }
 
   bool search(const Step& delta, const Merit& here, double slope, double length, double parameter_step, bool met) {
@@ -433,8 +440,7 @@ class ConstrainedEstimator {
     result_.equation_error = equationError();
     result_.degrees_of_freedom = result_.constraints + kept + priorRank() - N + result_.unobservable;
     if (end != ConstrainedEnd::converged && end != ConstrainedEnd::stalled) return false;
-    const double size = 1 + (detail::is_vector<Q> ? coordinates(result_.parameter).norm() : 0);
-    if (basis_.largest(constraint_values_) > 1e-7 * size) {
+    if (basis_.largest(constraint_values_) > 1e-7 * parameterSize()) {
       result_.end = ConstrainedEnd::contradictory;
     } else if (end == ConstrainedEnd::converged && kept == 0 && !options_.prior && result_.unobservable > 0) {
       result_.end = ConstrainedEnd::too_few;

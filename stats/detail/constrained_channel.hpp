@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -147,6 +148,17 @@ class ChannelState {
     for (std::size_t i = 0; i < size(); ++i) {
       const auto& noise = channel_->noiseOf(i);
       sum += 0.5 * (noise.squaredNorm(next_[i]) - noise.squaredNorm(at_[i]) - noise.squaredNorm(next_[i] - at_[i]));
+    }
+    return sum;
+  }
+  /// The squared length of one rounding error in each coordinate, in units of the noise.
+  double roundingSquared() const {
+    constexpr double eps = std::numeric_limits<double>::epsilon();
+    double sum = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      Correction rounded = Correction::Constant(eps);
+      if constexpr (is_vector<M>) rounded = eps * channel_->measurements[i].template cast<double>();
+      sum += channel_->noiseOf(i).squaredNorm(rounded);
     }
     return sum;
   }

@@ -198,6 +198,36 @@ TEST(Constrained, CurvatureConvergesWhereResidualsAreLarge) {
   }
 }
 
+/// The equation of a conic in another unit.
+struct Rescaled {
+  double factor;
+  template <class S>
+  Eigen::Matrix<S, 1, 1> operator()(const Eigen::Matrix<S, 6, 1>& q, const Eigen::Matrix<S, 2, 1>& m) const {
+    return S(factor) * OnConic{}(q, m);
+  }
+};
+
+// Units of equations over 24 orders, of measurements over nine, noise down to the rounding of the coordinates.
+TEST(Constrained, ScalesDoNotMatter) {
+  for (const double unit : {1.0, 1e-3, 1e6}) {
+    for (const double noise : {1e-2, 1e-6, 1e-9, 1e-12}) {
+      Ellipse ellipse(30, noise, 4);
+      for (Eigen::Vector2d& m : ellipse.points) m *= unit;
+      Vector6d circle;
+      circle << 1, 0, 1, 0, 0, -unit * unit;
+      for (const double factor : {1.0, 1e12, 1e-12}) {
+        const auto r = constrainedEstimate(
+            Vector6d(circle.normalized()),
+            measurements(ellipse.points, IsotropicNoise<2>(noise * unit), autoDiff(Rescaled{factor})), unit_length);
+        EXPECT_TRUE(r.ok()) << unit << " " << noise << " " << factor << ": " << name(r.end);
+        EXPECT_NEAR(r.chi2, noise == 1e-2 ? 26.0647 : 26.0800, noise == 1e-12 ? 2e-3 : 1e-4);
+        EXPECT_LE(r.iterations, 12);
+        EXPECT_EQ(r.degrees_of_freedom, 25);
+      }
+    }
+  }
+}
+
 /// Combinations of the equations, and two that are redundant.
 struct Mixed {
   Eigen::Matrix<double, 3, 3> G;
