@@ -83,7 +83,7 @@ struct MeasurementBlock {
   }
   /// The multipliers of the equations as they were given, from λ̂; with the sign of ½ ‖ε‖² + λᵀ c.
   Values lagrange(const Values& whitened_multipliers) const {
-    const Values lambda = -root.halfSolveTransposed(whitened_multipliers);
+    Values lambda = -root.halfSolveTransposed(whitened_multipliers);
     if (free.dimension > 0) return product(free.selection.transpose(), lambda);
     return lambda;
   }
