@@ -30,7 +30,7 @@ struct Flight {
   Flight(double gyroscope, double accelerometer, double seconds)
       : scene({.images = static_cast<std::size_t>(5 * seconds) + 1, .features = 25, .window = seconds}, 7) {
     CounterRng random(3);
-    readings = readingsOf(scene, {gyroscope * nominal.gyroscope, accelerometer * nominal.accelerometer}, random, {});
+    readings = readingsOf(scene, {gyroscope * nominal.gyroscope, accelerometer * nominal.accelerometer}, random);
     scene.addNoise(pixel, random);
     recording = {.readings = readings,
                  .noise = nominal,
