@@ -185,7 +185,7 @@ class EpipolarFit {
   struct AtFixedWeights {
     EpipolarFit& fit;
     EpipolarProblem::Normal at = {}, next = {};
-    Eigen::Vector3d from = {}, step = {};
+    Eigen::Vector3d from = Eigen::Vector3d::Zero(), step = Eigen::Vector3d::Zero();
     bool linearised = false;
 
     double linearise() {
