@@ -1,0 +1,486 @@
+// Robust estimation with a hierarchy of models: which model explains the measurements, with which parameter, and which
+// measurements are outliers (T. Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's estimation
+// method", INRIA RR-4050, 2000, section 5; docs/hierarchy.md has the rules, and where they differ from the report).
+//
+//   Hierarchy<Eigen::Vector4d, Eigen::Matrix3d> search(models);   // shared_ptr to HierarchyModel, one without parents
+//   search.add(matches);
+//   while (search.iterate()) {}                                   // or until there is no time left
+//   const auto& found = search.state(search.best());
+//
+// The search can be interrupted after each hypothesis, and has an answer at any time. Measurements may be added and
+// removed at any time. When it has terminated the answer depends on the measurements alone, not on the order in which they
+// came: draws belong to what a measurement is, not to its place.
+#pragma once
+
+#include <stats/detail/keyed_measurements.hpp>
+#include <stats/detail/model_draws.hpp>
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/hierarchy_types.hpp>
+#include <stats/model_choice.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+
+template <class Measurement, class Parameter>
+class Hierarchy {
+ public:
+  using Model = HierarchyModel<Measurement, Parameter>;
+  using Models = std::vector<std::shared_ptr<const Model>>;
+  using State = ModelState<Parameter>;
+  using Id = std::uint64_t;
+
+  explicit Hierarchy(Models models, HierarchyOptions options = {})
+      : models_(std::move(models)), options_(std::move(options)) {
+    link();
+    if (!valid()) return;
+    for (const auto& model : models_) {
+      draws_.emplace_back(*model, options_.seed, options_.score, knownThreshold(model->equations()));
+    }
+    refined_.resize(models_.size());
+    restart();
+  }
+
+  /// Whether the models form a lattice: names that differ, parents that exist, no circle, one model without parents.
+  /// Otherwise nothing is ever estimated, and fault() says why.
+  bool valid() const { return fault_.empty(); }
+  const std::string& fault() const { return fault_; }
+
+  const Models& models() const { return models_; }
+  std::size_t size() const { return measurements_.size(); }
+  /// The names of the measurements, in the order of ModelState::errors.
+  std::vector<Id> ids() const {
+    std::vector<Id> all(size());
+    for (std::size_t i = 0; i < size(); ++i) all[i] = measurements_.id(i);
+    return all;
+  }
+
+  /// Adds a measurement; the name by which it is removed. Those that are not numbers count as outliers of all models.
+  Id add(const Measurement& measurement) {
+    const auto [at, id] = measurements_.add(measurement);
+    if (!valid()) return id;
+    for (auto& draws : draws_) draws.changed(measurements_, at, true);
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      State& state = states_[m];
+      if (!state.hasEstimate()) continue;
+      double error = 0;
+      models_[m]->errors(state.estimate.parameter, std::span<const Measurement>(&measurement, 1),
+                         std::span<double>(&error, 1));
+      state.errors.insert(state.errors.begin() + static_cast<std::ptrdiff_t>(at), error);
+      state.outdated = true;
+      classify(m);
+    }
+    restart();
+    return id;
+  }
+  /// Adds several.
+  std::vector<Id> add(std::span<const Measurement> several) {
+    if (several.size() < 8 || 4 * several.size() < size()) {
+      std::vector<Id> ids;
+      for (const Measurement& one : several) ids.push_back(add(one));
+      return ids;
+    }
+    const std::vector<Id> ids = measurements_.add(several);
+    if (!valid()) return ids;
+    for (auto& draws : draws_) draws.forget();
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (!states_[m].hasEstimate()) continue;
+      states_[m].errors = errorsOf(m, states_[m].estimate.parameter);
+      states_[m].outdated = true;
+      classify(m);
+    }
+    restart();
+    return ids;
+  }
+  std::vector<Id> add(const std::vector<Measurement>& several) { return add(std::span<const Measurement>(several)); }
+
+  /// Removes a measurement; false if there is none of that name.
+  bool remove(Id id) {
+    const std::size_t at = measurements_.place(id);
+    if (at == size()) return false;
+    if (valid()) {
+      for (auto& draws : draws_) draws.changed(measurements_, at, false);
+      for (State& state : states_) {
+        if (!state.hasEstimate()) continue;
+        state.errors.erase(state.errors.begin() + static_cast<std::ptrdiff_t>(at));
+        state.outdated = true;
+      }
+    }
+    measurements_.erase(at);
+    if (!valid()) return true;
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (states_[m].hasEstimate()) classify(m);
+    }
+    restart();
+    return true;
+  }
+
+  /// One hypothesis or one estimate; true while there is more to do. What `stop` ends is begun again by the next call.
+  bool iterate(const StopRequest& stop = {}) {
+    const std::size_t m = next();
+    if (m == none) return false;
+    Draws& draws = draws_[m];
+    State& state = states_[m];
+    bool gained = false, made = false;
+    while (draws.looked() < drawsNeeded(m)) {
+      if (!draws.known()) {
+        if (made) return true;
+        draws.make(measurements_, guideOf(m, draws.looked()));
+        made = true;
+      }
+      gained = draws.look() || gained;
+      if (made) break;
+    }
+    state.draws = draws.looked();
+    if (gained) takeHypothesis(m);
+    if (draws.looked() < drawsNeeded(m)) {
+      // An early look at what has been found, ever more seldom.
+      const bool due = state.draws >= 4 && std::has_single_bit(state.draws) && draws.lastGain() > state.draws / 2;
+      if (due && draws.hasBest() && !refine(m, stop)) return true;
+      return true;
+    }
+    if (draws.hasBest() && !refine(m, stop)) return true;
+    finish(m);
+    if (next() == none) terminate();
+    return next() != none;
+  }
+
+  HierarchyState progress() const {
+    if (!valid() || next() == none) return HierarchyState::terminated;
+    const bool any = std::any_of(states_.begin(), states_.end(), [](const State& s) { return s.hasEstimate(); });
+    return any ? HierarchyState::available : HierarchyState::initial;
+  }
+  /// What is known of a model, by its number in models().
+  const State& state(std::size_t model) const { return states_[model]; }
+  const std::vector<State>& states() const { return states_; }
+  std::size_t nullModel() const { return null_; }
+  /// The number of the model of this name; models().size() if there is none.
+  std::size_t find(const std::string& name) const {
+    std::size_t m = 0;
+    while (m < models_.size() && models_[m]->name() != name) ++m;
+    return m;
+  }
+  /// Whether `general` contains `specific`, through any number of models.
+  bool contains(std::size_t general, std::size_t specific) const { return contains_[general][specific]; }
+
+  /// The chosen model: the most specific one that no estimated generalisation rejects. Of several, the one with more
+  /// inliers; of those within 10 %, the one with more equations of a measurement, then with fewer parameters. The null model
+  /// while there is no estimate.
+  std::size_t best() const {
+    std::vector<std::size_t> chosen;
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (!survives(m)) continue;
+      bool most_specific = true;
+      for (std::size_t other = 0; other < models_.size(); ++other) {
+        if (contains_[m][other] && survives(other)) most_specific = false;
+      }
+      if (most_specific) chosen.push_back(m);
+    }
+    if (chosen.empty()) return null_;
+    std::size_t most = 0;
+    for (const std::size_t m : chosen) most = std::max(most, states_[m].inliers.size());
+    std::size_t best = none;
+    for (const std::size_t m : chosen) {
+      if (1.1 * static_cast<double>(states_[m].inliers.size()) < static_cast<double>(most)) continue;
+      if (best == none || isSimpler(m, best)) best = m;
+    }
+    return best;
+  }
+
+  /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
+  Rejection compare(std::size_t specific, std::size_t general) const {
+    const State &s = states_[specific], &g = states_[general];
+    std::size_t far = 0, explained = 0;
+    ModelFit fit_s{0, 0, models_[specific]->equations(), models_[specific]->freeParameters()};
+    ModelFit fit_g{0, 0, models_[general]->equations(), models_[general]->freeParameters()};
+    for (std::size_t i = 0; i < size(); ++i) {
+      const bool in_s = s.errors[i] < s.threshold, in_g = g.errors[i] < g.threshold;
+      if (!(s.errors[i] <= options_.support.guard * s.threshold)) {
+        ++far;
+        explained += in_g;
+      }
+      if (!in_s || !in_g) continue;
+      ++fit_s.measurements, ++fit_g.measurements;
+      fit_s.chi2 += s.errors[i], fit_g.chi2 += g.errors[i];
+    }
+    if (explained > options_.support.explained(far, fit_s.free_parameters, fit_g.free_parameters, fit_g.equations,
+                                               models_[general]->chance(g.threshold))) {
+      return Rejection::support;
+    }
+    return fitRejects(fit_s, fit_g, options_.phi) ? Rejection::fit : Rejection::none;
+  }
+
+ private:
+  static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+  using Draws = detail::ModelDraws<Measurement, Parameter>;
+  /// The last two estimates of a model, by what they were made from.
+  struct Refined {
+    std::uint64_t key = 0;
+    ModelEstimate<Parameter> estimate;
+  };
+
+  /// Looks parents up, and what contains what.
+  void link() {
+    const std::size_t n = models_.size();
+    parents_.resize(n), children_.resize(n), rank_.assign(n, 0);
+    contains_.assign(n, std::vector<char>(n, 0));
+    for (std::size_t m = 0; m < n && fault_.empty(); ++m) {
+      if (find(models_[m]->name()) != m) fault_ = "two models are called " + models_[m]->name();
+      const std::vector<std::string> names = models_[m]->parents();
+      if (names.empty() && null_ != none) fault_ = "two models have no parents";
+      if (names.empty()) null_ = m;
+      for (const std::string& parent : names) {
+        const std::size_t p = find(parent);
+        if (p == n) {
+          fault_ = models_[m]->name() + " has the parent " + parent + ", which is no model";
+          return;
+        }
+        parents_[m].push_back(p), children_[p].push_back(m);
+        contains_[m][p] = 1;
+      }
+    }
+    if (null_ == none && fault_.empty()) fault_ = "no model is without parents";
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t a = 0; a < n; ++a) {
+        for (std::size_t b = 0; b < n; ++b) contains_[a][b] = contains_[a][b] || (contains_[a][k] && contains_[k][b]);
+      }
+    }
+    for (std::size_t m = 0; m < n && fault_.empty(); ++m) {
+      if (contains_[m][m]) fault_ = models_[m]->name() + " contains itself";
+      rank_[m] = static_cast<std::size_t>(std::count(contains_[m].begin(), contains_[m].end(), 1));
+    }
+  }
+
+  double knownThreshold(int equations) const {
+    double low = 0, high = 1e4;
+    for (int k = 0; k < 100; ++k) {
+      const double middle = 0.5 * (low + high);
+      const bool beyond = detail::chiSquaredTail(middle, static_cast<std::size_t>(equations)) < options_.outlier_share;
+      (beyond ? high : low) = middle;
+    }
+    return high;
+  }
+  double thresholdOf(std::size_t m, std::span<const double> errors) const {
+    return options_.threshold ? options_.threshold(errors, models_[m]->equations())
+                              : knownThreshold(models_[m]->equations());
+  }
+  std::vector<double> errorsOf(std::size_t m, const Parameter& parameter) const {
+    std::vector<double> errors(size());
+    models_[m]->errors(parameter, measurements_.all(), errors);
+    return errors;
+  }
+
+  /// Begins again with the null model; estimates stay until there are others.
+  void restart() {
+    if (states_.empty()) states_.resize(models_.size());
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      draws_[m].restart();
+      states_[m].progress = State::Progress::idle;
+      states_[m].draws = 0;
+      if (!states_[m].hasEstimate()) states_[m] = State{};
+    }
+    states_[null_].progress = State::Progress::candidate;
+    decide();
+  }
+  /// The candidate that is next: of the most specific ones the one with the fewest draws, because the n-th draw improves
+  /// the best of those before it with probability 1/n. More general models wait, so that what guides them is final.
+  std::size_t next() const {
+    std::size_t best = none;
+    if (!valid()) return best;
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (states_[m].progress != State::Progress::candidate) continue;
+      if (best == none || rank_[m] < rank_[best] ||
+          (rank_[m] == rank_[best] && states_[m].draws < states_[best].draws)) {
+        best = m;
+      }
+    }
+    return best;
+  }
+  /// How many draws the model needs at what has been found.
+  std::size_t drawsNeeded(std::size_t m) const {
+    const std::size_t s = models_[m]->sampleSize();
+    if (size() < s || size() == 0) return 0;
+    if (s == 0) return 1;
+    const double found =
+        draws_[m].hasBest() ? static_cast<double>(draws_[m].best().inliers) / static_cast<double>(size()) : 0;
+    const double good = std::pow(std::max(found, options_.least_share), static_cast<double>(s));
+    const double needed = good < 1 ? std::log1p(-options_.confidence) / std::log1p(-good) : 1;
+    return static_cast<std::size_t>(std::ceil(std::min(needed, static_cast<double>(options_.max_draws))));
+  }
+  typename Draws::Guide guideOf(std::size_t m, std::size_t draw) const {
+    typename Draws::Guide guide;
+    if (!options_.guided || draw % 4 == 0) return guide;
+    std::vector<std::size_t> parents;
+    for (const std::size_t p : parents_[m]) {
+      const State& state = states_[p];
+      const bool final = state.progress == State::Progress::evaluated && state.hasEstimate() && !state.unsupported;
+      if (final && models_[p]->sampleSize() < models_[m]->sampleSize()) parents.push_back(p);
+    }
+    if (parents.empty()) return guide;
+    const std::size_t p = parents[(draw / 4 * 3 + draw % 4 - 1) % parents.size()];
+    const State& parent = states_[p];
+    const std::size_t missing = models_[m]->sampleSize() - models_[p]->sampleSize();
+    if (size() - parent.inliers.size() < missing) return guide;
+    draws_[p].sampleOf(draws_[p].bestDraw(), measurements_, guideOf(p, draws_[p].bestDraw()), guide.kept);
+    guide.excluded.assign(size(), 0);
+    for (std::size_t i = 0; i < size(); ++i) guide.excluded[i] = parent.errors[i] < parent.threshold;
+    for (const std::size_t i : guide.kept) guide.excluded[i] = 1;
+    return guide;
+  }
+
+  void takeHypothesis(std::size_t m) {
+    State& state = states_[m];
+    const auto& best = draws_[m].best();
+    state.hypothesis = best.parameter;
+    state.score = static_cast<double>(best.score) / 0x1p32 / static_cast<double>(size());
+    state.hypothesis_inliers = best.inliers;
+    std::vector<std::size_t> sample;
+    draws_[m].sampleOf(draws_[m].bestDraw(), measurements_, guideOf(m, draws_[m].bestDraw()), sample);
+    state.sample.clear();
+    for (const std::size_t i : sample) state.sample.push_back(measurements_.id(i));
+  }
+
+  /// The estimate from the best hypothesis: from its inliers, and once again from those of that estimate. To go on until
+  /// nothing changes makes a threshold that follows the errors collapse. False if `stop` ended it.
+  bool refine(std::size_t m, const StopRequest& stop) {
+    State& state = states_[m];
+    const Parameter& hypothesis = draws_[m].best().parameter;
+    std::uint64_t key = detail::mixBits(draws_[m].drawKey(draws_[m].bestDraw()), draws_[m].bestSolution());
+    for (const std::size_t i : sampleOfBest(m)) key = detail::mixBits(key, measurements_.key(i));
+    Parameter parameter = hypothesis;
+    std::vector<double> errors = errorsOf(m, hypothesis);
+    double threshold = thresholdOf(m, errors);
+    std::vector<Refined> made;
+    ModelEstimate<Parameter> estimate;
+    for (int pass = 0; pass < 2; ++pass) {
+      std::vector<Measurement> inliers;
+      std::uint64_t set = 0;
+      for (std::size_t i = 0; i < size(); ++i) {
+        if (!(errors[i] < threshold)) continue;
+        inliers.push_back(measurements_[i]);
+        set = detail::mixBits(set, measurements_.key(i));
+      }
+      const std::uint64_t pass_key = detail::mixBits(key, set);
+      if (pass > 0 && pass_key == made.back().key) break;  // the same inliers
+      const auto cached =
+          std::find_if(refined_[m].begin(), refined_[m].end(), [&](const Refined& r) { return r.key == pass_key; });
+      ModelEstimate<Parameter> found;
+      if (cached != refined_[m].end()) {
+        found = cached->estimate;
+      } else {
+        found = models_[m]->estimate(parameter, inliers, stop);
+        if (stop && stop()) return false;
+      }
+      made.push_back({pass_key, found});
+      if (!found.usable()) break;
+      estimate = std::move(found);
+      parameter = estimate.parameter;
+      errors = errorsOf(m, parameter);
+      threshold = thresholdOf(m, errors);
+    }
+    refined_[m] = std::move(made);
+    state.estimate = std::move(estimate);
+    state.threshold = threshold;
+    state.errors = std::move(errors);
+    state.outdated = false;
+    classify(m);
+    decide();
+    return true;
+  }
+  std::vector<std::size_t> sampleOfBest(std::size_t m) const {
+    std::vector<std::size_t> sample;
+    draws_[m].sampleOf(draws_[m].bestDraw(), measurements_, guideOf(m, draws_[m].bestDraw()), sample);
+    return sample;
+  }
+  /// Inliers, and what follows from them, by the errors and the threshold.
+  void classify(std::size_t m) {
+    State& state = states_[m];
+    const Model& model = *models_[m];
+    state.inliers.clear();
+    state.fit = {0, 0, model.equations(), model.freeParameters()};
+    double relevance = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (state.errors[i] < 2 * state.threshold) relevance += 1 - state.errors[i] / state.threshold;
+      if (!(state.errors[i] < state.threshold)) continue;
+      state.inliers.push_back(measurements_.id(i));
+      state.fit.chi2 += state.errors[i];
+      ++state.fit.measurements;
+    }
+    state.relevance = size() > 0 ? relevance / static_cast<double>(size()) : 0;
+    const std::size_t chance = binomialQuantile(options_.support.probability, size(), model.chance(state.threshold));
+    const auto own = static_cast<double>(model.freeParameters()) / model.equations();
+    state.unsupported =
+        static_cast<double>(state.inliers.size()) <= static_cast<double>(model.sampleSize() + chance) + own;
+  }
+  /// Draws of the model have ended: what comes next.
+  void finish(std::size_t m) {
+    State& state = states_[m];
+    if (!draws_[m].hasBest()) state = State{};
+    state.progress = State::Progress::evaluated;
+    state.draws = draws_[m].looked();
+    decide();
+    bool more = m == null_ || !state.hasEstimate() || state.unsupported;
+    for (const std::size_t p : parents_[m]) {
+      if (more || !isFinal(p)) continue;
+      more = compare(p, m) != Rejection::none;
+    }
+    if (!more) return;
+    for (const std::size_t child : children_[m]) {
+      if (states_[child].progress == State::Progress::idle) states_[child].progress = State::Progress::candidate;
+    }
+  }
+  bool isFinal(std::size_t m) const {
+    return states_[m].progress == State::Progress::evaluated && states_[m].hasEstimate();
+  }
+  /// Nothing is left of models that these measurements do not reach.
+  void terminate() {
+    for (State& state : states_) {
+      if (state.progress == State::Progress::idle) state = State{};
+    }
+    decide();
+  }
+  /// Who is rejected by whom.
+  void decide() {
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      states_[m].rejection = Rejection::none, states_[m].rejected_by.reset();
+      if (!states_[m].hasEstimate()) continue;
+      for (std::size_t g = 0; g < models_.size() && states_[m].rejection == Rejection::none; ++g) {
+        if (!contains_[g][m] || !states_[g].hasEstimate()) continue;
+        states_[m].rejection = compare(m, g);
+        if (states_[m].rejection != Rejection::none) states_[m].rejected_by = g;
+      }
+    }
+  }
+  bool survives(std::size_t m) const { return states_[m].hasEstimate() && states_[m].rejection == Rejection::none; }
+  bool isSimpler(std::size_t a, std::size_t b) const {
+    const Model &x = *models_[a], &y = *models_[b];
+    if (x.equations() != y.equations()) return x.equations() > y.equations();
+    if (x.freeParameters() != y.freeParameters()) return x.freeParameters() < y.freeParameters();
+    return states_[a].relevance > states_[b].relevance;
+  }
+
+  Models models_;
+  HierarchyOptions options_;
+  std::string fault_;
+  std::size_t null_ = none;
+  std::vector<std::vector<std::size_t>> parents_, children_;
+  std::vector<std::vector<char>> contains_;
+  std::vector<std::size_t> rank_;
+  detail::KeyedMeasurements<Measurement> measurements_;
+  std::vector<Draws> draws_;
+  std::vector<State> states_;
+  std::vector<std::vector<Refined>> refined_;
+};
+
+}  // namespace liestat
