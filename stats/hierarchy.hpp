@@ -201,7 +201,7 @@ class Hierarchy {
   /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
   Rejection compare(std::size_t specific, std::size_t general) const {
     const State &s = states_[specific], &g = states_[general];
-    std::size_t far = 0, explained = 0;
+    std::size_t far = 0, explained = 0, common = 0, only_general = 0;
     ModelFit fit_s{0, 0, models_[specific]->equations(), models_[specific]->freeParameters()};
     ModelFit fit_g{0, 0, models_[general]->equations(), models_[general]->freeParameters()};
     for (std::size_t i = 0; i < size(); ++i) {
@@ -210,14 +210,17 @@ class Hierarchy {
         ++far;
         explained += in_g;
       }
+      if (in_g) ++(in_s ? common : only_general);
       if (!in_s || !in_g) continue;
       ++fit_s.measurements, ++fit_g.measurements;
       fit_s.chi2 += s.errors[i], fit_g.chi2 += g.errors[i];
     }
-    if (explained > options_.support.explained(far, fit_s.free_parameters, fit_g.free_parameters, fit_g.equations,
-                                               models_[general]->chance(g.threshold))) {
-      return Rejection::support;
-    }
+    const auto by_chance = [&](std::size_t of) {
+      return options_.support.explained(of, fit_s.free_parameters, fit_g.free_parameters, fit_g.equations,
+                                        models_[general]->chance(g.threshold));
+    };
+    // Near or far: what leaves most of the other's inliers is not the model of them.
+    if (explained > by_chance(far) || only_general > common + by_chance(size() - common)) return Rejection::support;
     return fitRejects(fit_s, fit_g, options_.phi) ? Rejection::fit : Rejection::none;
   }
 
@@ -430,15 +433,25 @@ class Hierarchy {
     state.progress = State::Progress::evaluated;
     state.draws = draws_[m].looked();
     decide();
-    bool more = m == null_ || !state.hasEstimate() || state.unsupported;
+    bool all = m == null_ || !state.hasEstimate() || state.unsupported;
     for (const std::size_t p : parents_[m]) {
-      if (more || !isFinal(p)) continue;
-      more = compare(p, m) != Rejection::none;
+      if (all || !isFinal(p)) continue;
+      all = compare(p, m) != Rejection::none;
     }
-    if (!more) return;
     for (const std::size_t child : children_[m]) {
-      if (states_[child].progress == State::Progress::idle) states_[child].progress = State::Progress::candidate;
+      if (states_[child].progress != State::Progress::idle) continue;
+      if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
+  }
+  /// Whether a general model, which was not estimated, could reject a specific one by its support: whether there are enough
+  /// measurements that the specific one is far from.
+  bool mayReject(std::size_t general, std::size_t specific) const {
+    const State& state = states_[specific];
+    std::size_t far = 0;
+    for (const double error : state.errors) far += !(error <= options_.support.guard * state.threshold);
+    const Model &g = *models_[general], &s = *models_[specific];
+    return far > options_.support.explained(far, s.freeParameters(), g.freeParameters(), g.equations(),
+                                            g.chance(knownThreshold(g.equations())));
   }
   bool isFinal(std::size_t m) const {
     return states_[m].progress == State::Progress::evaluated && states_[m].hasEstimate();
