@@ -45,8 +45,9 @@ class Hierarchy {
       : models_(std::move(models)), options_(std::move(options)) {
     link();
     if (!valid()) return;
+    thresholds_ = detail::errorThresholds(options_.outlier_share);
     for (const auto& model : models_) {
-      draws_.emplace_back(*model, options_.seed, options_.score, knownThreshold(model->equations()));
+      draws_.emplace_back(*model, options_.seed, options_.score, thresholds_);
     }
     refined_.resize(models_.size());
     restart();
@@ -202,21 +203,21 @@ class Hierarchy {
   Rejection compare(std::size_t specific, std::size_t general) const {
     const State &s = states_[specific], &g = states_[general];
     std::size_t far = 0, explained = 0, common = 0, only_general = 0;
-    ModelFit fit_s{0, 0, models_[specific]->equations(), models_[specific]->freeParameters()};
-    ModelFit fit_g{0, 0, models_[general]->equations(), models_[general]->freeParameters()};
+    ModelFit fit_s{0, 0, models_[specific]->freeParameters()};
+    ModelFit fit_g{0, 0, models_[general]->freeParameters()};
     for (std::size_t i = 0; i < size(); ++i) {
-      const bool in_s = s.errors[i] < s.threshold, in_g = g.errors[i] < g.threshold;
-      if (!(s.errors[i] <= options_.support.guard * s.threshold)) {
+      const double limit = limitOf(specific, s.threshold, i);
+      const bool in_s = s.errors[i] < limit, in_g = g.errors[i] < limitOf(general, g.threshold, i);
+      if (!(s.errors[i] <= options_.support.guard * limit)) {
         ++far;
         explained += in_g;
       }
       if (in_g) ++(in_s ? common : only_general);
       if (!in_s || !in_g) continue;
-      ++fit_s.measurements, ++fit_g.measurements;
-      fit_s.chi2 += s.errors[i], fit_g.chi2 += g.errors[i];
+      add(fit_s, specific, i, s.errors[i]), add(fit_g, general, i, g.errors[i]);
     }
     const auto by_chance = [&](std::size_t of) {
-      return options_.support.explained(of, fit_s.free_parameters, fit_g.free_parameters, fit_g.equations,
+      return options_.support.explained(of, fit_s.free_parameters, fit_g.free_parameters, models_[general]->equations(),
                                         models_[general]->chance(g.threshold));
     };
     // Near or far: what leaves most of the other's inliers is not the model of them.
@@ -266,13 +267,16 @@ class Hierarchy {
   }
 
   double knownThreshold(int equations) const {
-    double low = 0, high = 1e4;
-    for (int k = 0; k < 100; ++k) {
-      const double middle = 0.5 * (low + high);
-      const bool beyond = detail::chiSquaredTail(middle, static_cast<std::size_t>(equations)) < options_.outlier_share;
-      (beyond ? high : low) = middle;
-    }
-    return high;
+    return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::most_equations))];
+  }
+  /// The threshold for one measurement, from that of measurements with the usual number of equations.
+  double limitOf(std::size_t m, double threshold, std::size_t i) const {
+    const int usual = models_[m]->equations(), here = models_[m]->equationsOf(measurements_[i]);
+    return here == usual ? threshold : threshold * knownThreshold(here) / knownThreshold(usual);
+  }
+  void add(ModelFit& fit, std::size_t m, std::size_t i, double error) const {
+    fit.chi2 += error;
+    fit.equations += static_cast<std::size_t>(models_[m]->equationsOf(measurements_[i]));
   }
   double thresholdOf(std::size_t m, std::span<const double> errors) const {
     return options_.threshold ? options_.threshold(errors, models_[m]->equations())
@@ -337,7 +341,7 @@ class Hierarchy {
     if (size() - parent.inliers.size() < missing) return guide;
     draws_[p].sampleOf(draws_[p].bestDraw(), measurements_, guideOf(p, draws_[p].bestDraw()), guide.kept);
     guide.excluded.assign(size(), 0);
-    for (std::size_t i = 0; i < size(); ++i) guide.excluded[i] = parent.errors[i] < parent.threshold;
+    for (std::size_t i = 0; i < size(); ++i) guide.excluded[i] = parent.errors[i] < limitOf(p, parent.threshold, i);
     for (const std::size_t i : guide.kept) guide.excluded[i] = 1;
     return guide;
   }
@@ -370,7 +374,7 @@ class Hierarchy {
       std::vector<Measurement> inliers;
       std::uint64_t set = 0;
       for (std::size_t i = 0; i < size(); ++i) {
-        if (!(errors[i] < threshold)) continue;
+        if (!(errors[i] < limitOf(m, threshold, i))) continue;
         inliers.push_back(measurements_[i]);
         set = detail::mixBits(set, measurements_.key(i));
       }
@@ -411,14 +415,14 @@ class Hierarchy {
     State& state = states_[m];
     const Model& model = *models_[m];
     state.inliers.clear();
-    state.fit = {0, 0, model.equations(), model.freeParameters()};
+    state.fit = {0, 0, model.freeParameters()};
     double relevance = 0;
     for (std::size_t i = 0; i < size(); ++i) {
-      if (state.errors[i] < 2 * state.threshold) relevance += 1 - state.errors[i] / state.threshold;
-      if (!(state.errors[i] < state.threshold)) continue;
+      const double limit = limitOf(m, state.threshold, i);
+      if (state.errors[i] < 2 * limit) relevance += 1 - state.errors[i] / limit;
+      if (!(state.errors[i] < limit)) continue;
       state.inliers.push_back(measurements_.id(i));
-      state.fit.chi2 += state.errors[i];
-      ++state.fit.measurements;
+      add(state.fit, m, i, state.errors[i]);
     }
     state.relevance = size() > 0 ? relevance / static_cast<double>(size()) : 0;
     const std::size_t chance = binomialQuantile(options_.support.probability, size(), model.chance(state.threshold));
@@ -448,7 +452,9 @@ class Hierarchy {
   bool mayReject(std::size_t general, std::size_t specific) const {
     const State& state = states_[specific];
     std::size_t far = 0;
-    for (const double error : state.errors) far += !(error <= options_.support.guard * state.threshold);
+    for (std::size_t i = 0; i < size(); ++i) {
+      far += !(state.errors[i] <= options_.support.guard * limitOf(specific, state.threshold, i));
+    }
     const Model &g = *models_[general], &s = *models_[specific];
     return far > options_.support.explained(far, s.freeParameters(), g.freeParameters(), g.equations(),
                                             g.chance(knownThreshold(g.equations())));
@@ -494,6 +500,7 @@ class Hierarchy {
   std::vector<Draws> draws_;
   std::vector<State> states_;
   std::vector<std::vector<Refined>> refined_;
+  std::vector<double> thresholds_;  // for known noise, by the number of equations
 };
 
 }  // namespace liestat

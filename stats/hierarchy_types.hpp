@@ -49,13 +49,15 @@ class HierarchyModel {
   /// has none.
   virtual std::vector<std::string> parents() const = 0;
   virtual int freeParameters() const = 0;  ///< k = n - p
-  virtual int equations() const = 0;       ///< p_i, independent ones of a measurement
+  virtual int equations() const = 0;       ///< p_i, independent ones of a measurement, 1 to 32
+  /// Those of this one, where measurements are of several kinds.
+  virtual int equationsOf(const Measurement&) const { return equations(); }
   virtual int measurementDimension() const = 0;
   virtual std::size_t sampleSize() const = 0;  ///< at most 16; 0 only without free parameters
 
   /// Adds the parameters that a minimal sample allows to `solutions`: none for a degenerate one.
   virtual void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const = 0;
-  /// The squared error of each measurement in units of its noise, of an inlier χ² with equations() degrees of freedom.
+  /// The squared error of each measurement in units of its noise, of an inlier χ² with equationsOf() degrees of freedom.
   virtual void errors(const Parameter& parameter, std::span<const Measurement> measurements,
                       std::span<double> squared) const = 0;
   /// The estimate from inliers, started at a parameter; `stop` is asked between its steps, and what it ends has the status

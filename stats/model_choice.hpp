@@ -20,15 +20,12 @@ namespace liestat {
 
 /// How a model fits some measurements. Two fits are compared over the same measurements.
 struct ModelFit {
-  double chi2 = 0;               ///< 2 L², the sum of squared errors in units of the noise
-  std::size_t measurements = 0;  ///< that the sum is over
-  int equations = 1;             ///< p_i, of each measurement
-  int free_parameters = 0;       ///< k = n - p
+  double chi2 = 0;            ///< 2 L², the sum of squared errors in units of the noise
+  std::size_t equations = 0;  ///< Σ p_i, of the measurements that the sum is over
+  int free_parameters = 0;    ///< k = n - p
 
   /// r, residual ones: Σ p_i - k. Without any the fit says nothing.
-  double degreesOfFreedom() const {
-    return static_cast<double>(equations) * static_cast<double>(measurements) - free_parameters;
-  }
+  double degreesOfFreedom() const { return static_cast<double>(equations) - free_parameters; }
   /// 2 L²/r, one on average for a right model.
   double normalised() const { return chi2 / degreesOfFreedom(); }
 };

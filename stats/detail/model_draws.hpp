@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stats/detail/keyed_measurements.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 #include <stats/hierarchy_types.hpp>
 
 #include <algorithm>
@@ -16,6 +17,22 @@
 #include <vector>
 
 namespace liestat::detail {
+
+inline constexpr int most_equations = 32;
+
+/// What the squared error of a measurement with 0 to 32 equations exceeds with the given probability.
+inline std::vector<double> errorThresholds(double probability) {
+  std::vector<double> thresholds(1, 0.0);
+  for (std::size_t p = 1; p <= most_equations; ++p) {
+    double low = 0, high = 1e4;
+    for (int k = 0; k < 100; ++k) {
+      const double middle = 0.5 * (low + high);
+      (chiSquaredTail(middle, p) < probability ? high : low) = middle;
+    }
+    thresholds.push_back(high);
+  }
+  return thresholds;
+}
 
 /// What a measurement adds to a score, as an integer, so that sums do not depend on their order.
 inline std::int64_t scoreOf(HypothesisScore score, double squared_error, double threshold) {
@@ -78,7 +95,7 @@ class ModelDraws {
     for (const Parameter& solution : solutions_) {
       model_->errors(solution, measurements.all(), errors_);
       Hypothesis hypothesis{solution};
-      for (const double e : errors_) count(hypothesis, e, 1);
+      for (std::size_t i = 0; i < errors_.size(); ++i) count(hypothesis, measurements[i], errors_[i], 1);
       draw.hypotheses.push_back(std::move(hypothesis));
     }
   }
@@ -117,7 +134,7 @@ class ModelDraws {
       for (Hypothesis& hypothesis : draw.hypotheses) {
         double error = 0;
         model_->errors(hypothesis.parameter, one, std::span<double>(&error, 1));
-        count(hypothesis, error, added ? 1 : -1);
+        count(hypothesis, one[0], error, added ? 1 : -1);
       }
     }
   }
@@ -129,15 +146,16 @@ class ModelDraws {
     std::uint64_t largest = 0;
     std::vector<Hypothesis> hypotheses;
   };
-  void count(Hypothesis& hypothesis, double error, int sign) const {
-    hypothesis.score += sign * scoreOf(score_, error, threshold_);
-    if (error < threshold_) hypothesis.inliers += static_cast<std::size_t>(sign);
+  void count(Hypothesis& hypothesis, const Measurement& measurement, double error, int sign) const {
+    const double threshold = thresholds_[static_cast<std::size_t>(model_->equationsOf(measurement))];
+    hypothesis.score += sign * scoreOf(score_, error, threshold);
+    if (error < threshold) hypothesis.inliers += static_cast<std::size_t>(sign);
   }
 
   const Model* model_;
   std::uint64_t seed_;
   HypothesisScore score_;
-  double threshold_;
+  std::vector<double> thresholds_;  // by the number of equations
   std::vector<Draw> draws_;
   std::size_t looked_ = 0, best_draw_ = none, best_solution_ = none, last_gain_ = 0;
   // Kept for their memory.

@@ -91,7 +91,7 @@ TEST(VievilleAppendixB, FTestHasItsLevelWithResidualDegreesOfFreedomAlone) {
     for (int k = 0; k < r_general; ++k) general += std::pow(rng.normal(), 2);
     for (int k = 0; k < r - r_general; ++k) extra += std::pow(rng.normal(), 2);
     // 20 measurements with one equation, three parameters more.
-    const ModelFit specific{general + extra, 20, 1, 0}, wide{general, 20, 1, 3};
+    const ModelFit specific{general + extra, 20, 0}, wide{general, 20, 3};
     rejected += fitRejects(specific, wide, FTestPhi{probability});
     // d = n - p + Σ p_i of (7): 20 and 23.
     by_printed += general / 23 < printedPhi(20, 23, probability) * (general + extra) / 20;
@@ -106,8 +106,8 @@ TEST(VievilleSection5, DefaultPhiRejectsBeyondOnePlusKappa) {
   for (const auto& [kappa, level] : {std::pair{8.8, 0.998}, {3.1, 0.957}}) {
     const double r = 1e6, chi2 = 1 + kappa;
     for (const double step : {-0.01, 0.01}) {
-      const ModelFit specific{r + chi2 + step, static_cast<std::size_t>(r), 1, 0};
-      const ModelFit general{r, static_cast<std::size_t>(r), 1, 1};
+      const ModelFit specific{r + chi2 + step, static_cast<std::size_t>(r), 0};
+      const ModelFit general{r, static_cast<std::size_t>(r), 1};
       EXPECT_EQ(fitRejects(specific, general, ExponentialPhi{kappa}), step > 0);
     }
     EXPECT_NEAR(detail::lawCdf(detail::ChiSquaredLaw(1), chi2), level, 5e-4);

@@ -51,13 +51,13 @@ TEST(ModelChoice, SupportCountsFreedomAndChance) {
 TEST(ModelChoice, FitNeedsDegreesOfFreedom) {
   const ExponentialPhi phi;
   // As many parameters as equations: nothing to compare.
-  EXPECT_FALSE(fitRejects({100, 3, 1, 0}, {0, 3, 1, 3}, phi));
+  EXPECT_FALSE(fitRejects({100, 3, 0}, {0, 3, 3}, phi));
   // Not nested.
-  EXPECT_FALSE(fitRejects({100, 50, 1, 2}, {1, 50, 1, 2}, phi));
-  EXPECT_FALSE(fitRejects({nan, 50, 1, 1}, {1, 50, 1, 2}, phi));
-  EXPECT_TRUE(fitRejects({100, 50, 1, 1}, {1, 50, 1, 2}, phi));
-  EXPECT_FALSE(fitRejects({50, 50, 1, 1}, {48, 50, 1, 2}, phi));
-  EXPECT_DOUBLE_EQ((ModelFit{90, 50, 2, 10}.normalised()), 1);
+  EXPECT_FALSE(fitRejects({100, 50, 2}, {1, 50, 2}, phi));
+  EXPECT_FALSE(fitRejects({nan, 50, 1}, {1, 50, 2}, phi));
+  EXPECT_TRUE(fitRejects({100, 50, 1}, {1, 50, 2}, phi));
+  EXPECT_FALSE(fitRejects({50, 50, 1}, {48, 50, 2}, phi));
+  EXPECT_DOUBLE_EQ((ModelFit{90, 100, 10}.normalised()), 1);
 }
 
 TEST(ModelChoice, KappaIsFittedToLabels) {
@@ -70,7 +70,7 @@ TEST(ModelChoice, KappaIsFittedToLabels) {
     double general = 0, extra = 0;
     for (int k = 0; k < 95; ++k) general += std::pow(rng.normal(), 2);
     for (int k = 0; k < 3; ++k) extra += std::pow(rng.normal() + (pair.general_is_right ? 7 : 0), 2);
-    pair.specific = {general + extra, 100, 1, 2}, pair.general = {general, 100, 1, 5};
+    pair.specific = {general + extra, 100, 2}, pair.general = {general, 100, 5};
     pairs.push_back(pair);
   }
   const double kappa = fitKappa(pairs);
