@@ -60,8 +60,8 @@ class ModelDraws {
     std::vector<char> excluded;  // empty: all are admitted
   };
 
-  ModelDraws(const Model& model, std::uint64_t seed, HypothesisScore score, double threshold)
-      : model_(&model), seed_(seed), score_(score), threshold_(threshold) {
+  ModelDraws(const Model& model, std::uint64_t seed, HypothesisScore score, std::vector<double> thresholds)
+      : model_(&model), seed_(seed), score_(score), thresholds_(std::move(thresholds)) {
     for (const char c : model.name()) seed_ = mixBits(seed_, static_cast<unsigned char>(c));
   }
 
