@@ -21,6 +21,7 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -187,19 +188,20 @@ class RobustSearch {
   }
 
   /// True if the hypothesis cannot be better than the best, or is not with all but the probability `rejection_risk`:
-  /// of contributions whose range is c, k of n drawn at random, the mean is below that of all by
-  /// c √(log(1/risk) (1 - (k-1)/n) / 2k) with no more than this probability (R. Serfling 1974).
+  /// the mean of k contributions drawn at random from n, of range c, is below the mean of all by
+  /// c √(log(1/risk) (1 - (k-1)/n) / 2k) with no more than this probability (R. Serfling 1974). The j-th look takes
+  /// 6/(πj)² of the risk, which adds up to all of it.
   bool isHopeless([[maybe_unused]] const Parameter& parameter, [[maybe_unused]] CounterRng& rng) {
     if constexpr (rejects) {
       if (!options_.early_rejection || !best_.parameter) return false;
       const std::size_t n = model_->size();
       const double all = static_cast<double>(n), range = 1 - Rule::lowest;
       const double required = rule_.required(n, best_.score) - 1e-9 * all;  // whatever the order of a sum rounds
-      const double log_risk = options_.rejection_risk > 0 ? -std::log(options_.rejection_risk)
-                                                          : std::numeric_limits<double>::infinity();
+      const double risk = options_.rejection_risk * 6 / (3.14159265358979323846 * 3.14159265358979323846);
       const std::size_t* measurements = order_.data() + below(n, rng);
       std::array<double, block> errors;
       double sum = 0;
+      std::size_t look = 1;
       for (std::size_t k = 0; k < n;) {
         const std::size_t count = std::min(block, n - k);
         model_->errors(parameter, std::span<const std::size_t>(measurements + k, count),
@@ -209,8 +211,11 @@ class RobustSearch {
         k += count;
         const double seen = static_cast<double>(k);
         if (sum + (all - seen) < required) return true;
-        const double chance = range * std::sqrt(0.5 * log_risk * seen * (1 - (seen - 1) / all));
-        if (sum + chance < required * (seen / all)) return true;
+        if (!(risk > 0)) continue;
+        const double chance = std::log(static_cast<double>(look * look) / risk);
+        ++look;
+        const double margin = range * std::sqrt(0.5 * chance * seen * (1 - (seen - 1) / all));
+        if (sum + margin < required * (seen / all)) return true;
       }
     }
     return false;
