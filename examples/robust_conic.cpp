@@ -79,12 +79,13 @@ int main() {
   RobustSearch search(model, Relevance{2 * threshold}, {.inlier_threshold = threshold});
   const auto stop = anyOf(NoGainFor{500}, DrawsReached{5000});
   while (!search.confidenceReached(0.999) && !stop(search.history(), search.draws())) search.iterate();
-  for (const auto& entry : search.history().entries()) std::printf("draw %4zu  relevance %.3f\n", entry.draw, entry.score);
+  for (const auto& entry : search.history().entries())
+    std::printf("draw %4zu  relevance %.3f\n", entry.draw, entry.score);
   const auto found = search.refined();
   if (!found.parameter) return 1;
   const auto result = model.estimate(*found.parameter, found.inliers);
-  std::printf("%zu inliers after %zu draws, chi2 %.1f for %d degrees of freedom\n", found.inliers.size(), search.draws(),
-              result.chi2, result.degrees_of_freedom);
+  std::printf("%zu inliers after %zu draws, chi2 %.1f for %d degrees of freedom\n", found.inliers.size(),
+              search.draws(), result.chi2, result.degrees_of_freedom);
   for (int k = 0; k < 6; ++k) std::printf(" %8.4f ± %.4f", result.parameter[k], std::sqrt(result.covariance(k, k)));
   std::printf("\n");
 

@@ -34,7 +34,7 @@ template <class T>
 concept RobustModel = requires(const T& model, const typename T::Parameter& parameter,
                                std::span<const std::size_t> measurements, std::span<double> errors,
                                std::vector<typename T::Parameter>& solutions) {
-  { std::integral_constant<std::size_t, T::sample_size>{} };
+  {std::integral_constant<std::size_t, T::sample_size>{}};
   { model.size() } -> std::convertible_to<std::size_t>;
   model.solve(measurements, solutions);
   model.errors(parameter, errors);
@@ -52,8 +52,8 @@ concept ModelOfSome = RobustModel<T> && requires(const T& model, const typename 
 /// A model with a cheap estimate from several measurements, a linear one or a few Gauss–Newton steps: each new best is
 /// then improved by it (O. Chum, J. Matas and J. Kittler, Locally optimized RANSAC, 2003).
 template <class T>
-concept PolishedModel = RobustModel<T> && requires(const T& model, const typename T::Parameter& parameter,
-                                                   std::span<const std::size_t> measurements) {
+concept PolishedModel = RobustModel<T> &&
+    requires(const T& model, const typename T::Parameter& parameter, std::span<const std::size_t> measurements) {
   { model.polish(parameter, measurements) } -> std::convertible_to<std::optional<typename T::Parameter>>;
 };
 

@@ -61,7 +61,8 @@ TEST(RelevanceOf, ExponentialErrors) {
                              quantiles(100000 - good, [&](double p) { return 50 * T * p; });
       const double u = L_0 / (2 * T), R = Relevance{T}(errors);
       EXPECT_NEAR(R, w * (1 - 2 * u + (1 + 2 * u) * std::exp(-1 / u)), 1e-4) << w << " " << L_0;
-      if (u < 0.1) EXPECT_NEAR(R, w * (1 - L_0 / T), 1e-3) << "the printed form, for small u";
+      const double rest = w * (1 + 2 * u) * std::exp(-1 / u);  // the printed o(…)
+      EXPECT_NEAR(R - rest, w * (1 - L_0 / T), 1e-4) << "the printed form";
     }
   }
 }
@@ -96,7 +97,7 @@ TEST(Fig7, TheCurveOfTheTrueValueIsTheSharpest) {
     for (const double value : x) e.push_back(std::abs(value - v));
     for (double from = 0; from < 40; from += 2) {
       const double expected = integral(from, from + 2, [&](double t) { return law.curve(v, t); });
-      const double counted = InlierCount{from + 2}(e) - InlierCount{from}(e);
+      const double counted = InlierCount{from + 2}(e)-InlierCount{from}(e);
       EXPECT_NEAR(counted / n, expected, 4.5 * std::sqrt(expected / n)) << v << " " << from;
     }
     const double R = integral(0, 10, [&](double t) { return (1 - 2 * t / 10) * law.curve(v, t); });
@@ -148,8 +149,8 @@ TEST(Fig8, BiasOfTheScores) {
                              {.2, .6, 50}, {.2, .8, 20}, {.2, .6, 20}, {.2, .8, 10}, {.2, .6, 10}};
   // The design note's corrected table, means and standard deviations of 1000 repetitions; the printed row of R is within
   // two standard deviations of it, the printed 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
-  const Cell R_e[] = {{-0.0, .5}, {-0.1, .6}, {-0.3, .9}, {-1.2, 1.5}, {-0.1, .6},
-                      {0.0, 2.3}, {-0.1, .6}, {-0.3, 1.5}, {0.1, .8},  {0.9, 1.6}};
+  const Cell R_e[] = {{-0.0, .5}, {-0.1, .6}, {-0.3, .9},  {-1.2, 1.5}, {-0.1, .6},
+                      {0.0, 2.3}, {-0.1, .6}, {-0.3, 1.5}, {0.1, .8},   {0.9, 1.6}};
   const Cell R_e2[] = {{0.0, .9},  {0.0, 1.0}, {0.0, 1.2}, {0.1, 1.7}, {0.0, 1.0},
                        {0.0, 1.1}, {0.0, 1.0}, {0.0, 1.3}, {0.4, 1.1}, {1.7, 1.9}};
   const Cell S_A[] = {{0.0, .6}, {0.0, .6}, {0.0, .7}, {-0.1, 1.2}, {0.0, .7},
@@ -158,7 +159,7 @@ TEST(Fig8, BiasOfTheScores) {
                       {0.0, .8}, {0.0, .8}, {0.0, .9}, {0.5, .9},  {2.0, 1.6}};
   const Cell* rows[] = {R_e, R_e2, S_A, S_B};
   const char* names[] = {"R |e|", "R e2", "S_A", "S_B"};
-  const std::size_t trials = trialsOf(1000, 25);
+  const std::size_t trials = trialsOf(1000, 10);
   double mean[4][10] = {}, deviation[4][10] = {};
   int jumps[4][10] = {};
   for (std::size_t c = 0; c < 10; ++c) {
@@ -187,10 +188,11 @@ TEST(Fig8, BiasOfTheScores) {
       const Cell& expected = rows[row][c];
       // Four standard errors of both samples, and the rounding of the table.
       const double total = static_cast<double>(trials);
-      EXPECT_NEAR(m, expected.mean, 0.05 + 4 * expected.deviation * std::sqrt(1 / total + 1 / 1000.)) << names[row] << c;
+      EXPECT_NEAR(m, expected.mean, 0.05 + 4 * expected.deviation * std::sqrt(1 / total + 1 / 1000.))
+          << names[row] << c;
       const double of_deviation = 0.05 + 4 * expected.deviation * std::sqrt(1 / total + 1 / 1000.);
       EXPECT_LT(s, expected.deviation + of_deviation) << names[row] << c;
-      if (law.delta < 20) EXPECT_GT(s, expected.deviation - of_deviation) << names[row] << c;
+      EXPECT_GT(s, law.delta < 20 ? expected.deviation - of_deviation : 0) << names[row] << c;
       // At most two in a thousand at δ = 50, five at 20: what the table's standard deviations leave.
       const double rate = law.delta == 50 ? 0.002 : 0.005;
       EXPECT_LE(jumps[row][c], rate * total + 4 * std::sqrt(rate * total) + 1) << names[row] << c;
@@ -212,9 +214,13 @@ TEST(Threshold, OfTheHistogramIsThatOfTheNote) {
     int n;
     double outliers, mean, deviation;
     double fallback = 6.6349;
-  } const cells[] = {{100, 0.2, 2.6, 0.4}, {300, 0.2, 3.3, 0.3}, {1000, 0.2, 3.8, 0.3},
+  } const cells[] = {{100, 0.2, 2.6, 0.4},
+                     {300, 0.2, 3.3, 0.3},
+                     {1000, 0.2, 3.8, 0.3},
                      // here minima below 1.5 standard deviations count: this one admits 0.9 to 2.9
-                     {100, 0.8, 1.8, 0.4, 2.25}, {300, 0.8, 2.3, 0.4}, {1000, 0.8, 3.0, 0.4}};
+                     {100, 0.8, 1.8, 0.4, 2.25},
+                     {300, 0.8, 2.3, 0.4},
+                     {1000, 0.8, 3.0, 0.4}};
   const int trials = static_cast<int>(trialsOf(1000));
   for (const auto& cell : cells) {
     double sum = 0, squares = 0;
@@ -287,13 +293,14 @@ TEST(ReportsErrata, Equation25TakesTheShareOfInliersForThatOfOutliers) {
 }
 
 TEST(ReportsErrata, Equation26NeedsTheSquareOfTheError) {
-  constexpr double alpha = 3, beta = 0.5, gamma = 0.4, T = 1.5;
+  constexpr double alpha = 3, beta = 0.5, gamma = 0.4, T = 1;
   const auto ours = [&](double x) { return alpha * (1 - gamma * x * x / 2) + beta; };
   const auto printed = [&](double x) { return alpha * (1 - gamma * x / 2) + beta; };
   for (int n = 0; n < 4; ++n) {
-    const double of_28 = (alpha + beta) * std::pow(T, n + 1) / (n + 1) - alpha * gamma / 2 * std::pow(T, n + 3) / (n + 3);
+    const double of_28 =
+        (alpha + beta) * std::pow(T, n + 1) / (n + 1) - alpha * gamma / 2 * std::pow(T, n + 3) / (n + 3);
     EXPECT_NEAR(integral(0, T, [&](double x) { return std::pow(x, n) * ours(x); }), of_28, 1e-6);
-    EXPECT_GT(std::abs(integral(0, T, [&](double x) { return std::pow(x, n) * printed(x); }) - of_28), 0.02);
+    EXPECT_GT(std::abs(integral(0, T, [&](double x) { return std::pow(x, n) * printed(x); }) - of_28), 0.015);
   }
   // What follows from (28), and defines the relevance.
   const double mu_0 = integral(0, T, ours), mu_1 = integral(0, T, [&](double x) { return x * ours(x); });
@@ -309,7 +316,7 @@ TEST(ReportsErrata, Equation28IsAMoment) {
   EXPECT_NEAR(integral(0, T, [&](double x) { return x * (alpha * (1 - gamma * x * x / 2) + beta); }), right, 1e-6);
 }
 
-TEST(ReportsErrata, WhatFollows31HasTheOtherSignAndAFactor) {
+TEST(ReportsErrata, WhatFollows31HasTheOtherSignAndTheCount) {
   constexpr double N_0 = 4, slope = -0.7, convexity = -0.6, T = 1.5;
   const auto N = [&](double x) { return N_0 + slope * x + convexity * x * x / 2; };
   const double RM = integral(0, T, N) - 2 / T * integral(0, T, [&](double x) { return x * N(x); });
@@ -321,7 +328,7 @@ TEST(ReportsErrata, WhatFollows31HasTheOtherSignAndAFactor) {
 TEST(ReportsErrata, Fig8NeedsCandidatesBeyondTheModes) {
   // Among {0..μ_2} the bias is never above δ: the printed +1 at δ = 0 cannot occur.
   int above = 0, within = 0;
-  for (std::uint64_t k = 0; k < 20; ++k) {
+  for (std::uint64_t k = 0; k < 60; ++k) {
     const Numbers x = sampleOf({.8, 1, 0}, 1000 + k);
     within += bias(InlierCount{25}, x, true, 10) > 0;
     above += bias(InlierCount{25}, x, true, 30) > 0;

@@ -200,8 +200,8 @@ TEST(HistogramThreshold, FallsBack) {
   };
   fallsBack({});
   fallsBack({nan, nan, infinity, -1});
-  fallsBack(Errors(100, 1e6));                      // nothing in the histogram
-  fallsBack(Errors(100, 0), 0.1);                   // a minimum far below any plausible one
+  fallsBack(Errors(100, 1e6));     // nothing in the histogram
+  fallsBack(Errors(100, 0), 0.1);  // a minimum far below any plausible one
   fallsBack(errorsOf(100, 0, 1), nan);
   fallsBack(errorsOf(100, 0, 1), -1);
   fallsBack(errorsOf(100, 0, 1), infinity);
