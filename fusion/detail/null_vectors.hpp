@@ -5,18 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace liestat::detail {
 
 /// Orthonormal vectors that solve Rows linear equations in nine unknowns, in the rows of `basis`. False where an
 /// equation depends on those before it to about 1e-12 of its own size, or is not finite.
-template <int Rows>
+template <std::size_t Rows>
 bool nullBasis(double (&a)[Rows][9], double (&basis)[9 - Rows][9]) {
   // Gauss' and Jordan's elimination; the largest entry of each row is its pivot.
+  constexpr int rows = static_cast<int>(Rows);
   int pivots[Rows];
   bool free[9] = {true, true, true, true, true, true, true, true, true};
-  for (int i = 0; i < Rows; ++i) {
+  for (int i = 0; i < rows; ++i) {
     double size = 0;
     for (int j = 0; j < 9; ++j) size = a[i][j] * a[i][j] + size;
     // Jordan's part is done when the row is reached: less to do in the rows above.
@@ -49,7 +51,7 @@ bool nullBasis(double (&a)[Rows][9], double (&basis)[9 - Rows][9]) {
     double* b = basis[row];
     for (int k = 0; k < 9; ++k) b[k] = 0;
     b[j] = 1;
-    for (int i = 0; i < Rows; ++i) b[pivots[i]] = -a[i][j];
+    for (int i = 0; i < rows; ++i) b[pivots[i]] = -a[i][j];
     for (int k = 0; k < row; ++k) {
       double dot = 0;
       for (int c = 0; c < 9; ++c) dot += basis[k][c] * b[c];
@@ -76,7 +78,7 @@ bool leastVector(Eigen::Matrix<double, N, N> A, Eigen::Matrix<double, N, 1>& x) 
     A(j, j) += rounding;
     for (int i = j + 1; i < N; ++i) A(j, i) = A(i, j);
   }
-  int order[N];
+  Eigen::Matrix<int, N, 1> order;
   for (int i = 0; i < N; ++i) order[i] = i;
   for (int j = 0; j < N; ++j) {
     int pivot = j;

@@ -14,7 +14,7 @@ namespace liestat::detail {
 
 /// Roots (z : w) of Σ a_k z^k w^(N-k), max(|z|, |w|) = 1. Two roots closer than about 1e-7 may be given as one, and so
 /// may two that are complex and that close to the real line.
-template <int N>
+template <std::size_t N>
 class RealRoots {
  public:
   struct Root {
@@ -29,8 +29,8 @@ class RealRoots {
     for (int quarter = 0; quarter < 4; ++quarter) {
       negative_ = quarter % 2 == 1;
       reversed_ = quarter >= 2;
-      for (int k = 0; k <= N; ++k) {
-        const double x = a[index(reversed_ ? N - k : k)];
+      for (int k = 0; k <= n; ++k) {
+        const double x = a[index(reversed_ ? n - k : k)];
         polynomial_[index(k)] = negative_ && k % 2 == 1 ? -x : x;
       }
       search();
@@ -41,7 +41,7 @@ class RealRoots {
   const Root& operator[](int i) const { return roots_[index(i)]; }
 
  private:
-  static constexpr int max_depth = 24;
+  static constexpr int n = static_cast<int>(N), max_depth = 24;
   static constexpr std::size_t index(int k) { return static_cast<std::size_t>(k); }
   struct Piece {
     double b[N + 1];
@@ -50,7 +50,7 @@ class RealRoots {
   };
 
   void keep(double x) {
-    if (size_ == N) return;
+    if (size_ == n) return;
     const double value = negative_ ? -x : x;
     roots_[index(size_++)] = reversed_ ? Root{negative_ ? -1. : 1., x} : Root{value, 1};
   }
@@ -58,7 +58,7 @@ class RealRoots {
   static int changes(const double* b) {
     int count = 0;
     double last = 0;
-    for (int k = 0; k <= N; ++k) {
+    for (int k = 0; k <= n; ++k) {
       if (b[k] == 0) continue;
       count += last * b[k] < 0 ? 1 : 0;
       last = b[k] > 0 ? 1 : -1;
@@ -72,12 +72,12 @@ class RealRoots {
     Piece stack[max_depth + 2];
     Piece& all = stack[0];
     double binomial = 1;
-    for (int k = 0; k <= N; ++k) {
+    for (int k = 0; k <= n; ++k) {
       all.b[k] = polynomial_[index(k)] / binomial;
-      binomial *= static_cast<double>(N - k) / (k + 1);
+      binomial *= static_cast<double>(n - k) / (k + 1);
     }
-    for (int row = 1; row <= N; ++row) {
-      for (int k = N; k >= row; --k) all.b[k] += all.b[k - 1];
+    for (int row = 1; row <= n; ++row) {
+      for (int k = n; k >= row; --k) all.b[k] += all.b[k - 1];
     }
     all.low = 0;
     all.width = 1;
@@ -96,8 +96,8 @@ class RealRoots {
       // The right half takes the place of the whole, the left half goes on top.
       Piece& left = stack[top + 1];
       left.b[0] = piece.b[0];
-      for (int row = 1; row <= N; ++row) {
-        for (int k = 0; k <= N - row; ++k) piece.b[k] = 0.5 * (piece.b[k] + piece.b[k + 1]);
+      for (int row = 1; row <= n; ++row) {
+        for (int k = 0; k <= n - row; ++k) piece.b[k] = 0.5 * (piece.b[k] + piece.b[k + 1]);
         left.b[row] = piece.b[0];
       }
       left.low = piece.low;
@@ -115,7 +115,7 @@ class RealRoots {
     double x = p0 * p1 < 0 ? low + piece.width * p0 / (p0 - p1) : 0.5 * (low + high);
     for (int i = 0; i < 60; ++i) {
       double p = polynomial_[N], slope = 0;
-      for (int k = N - 1; k >= 0; --k) {
+      for (int k = n - 1; k >= 0; --k) {
         slope = slope * x + p;
         p = p * x + polynomial_[index(k)];
       }
