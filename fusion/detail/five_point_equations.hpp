@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -59,9 +60,10 @@ struct Cubics {
 /// Nistér's elimination.
 class FivePointEquations {
  public:
-  /// False where the ten equations do not determine the ten highest monomials to 1e-13 of the largest.
-  bool eliminate(const double (&basis)[4][9]) {
-    double a[10][20];
+  /// The smallest pivot, of coefficients of order one: zero where the ten equations do not determine the ten highest
+  /// monomials; all digits but its own are left in the result.
+  double eliminate(const double (&basis)[4][9]) {
+    double a[10][20], smallest = 1;
     fill(basis, a);
     // Rows above the last six are needed only to clear what lies below them.
     for (int j = 0; j < 10; ++j) {
@@ -69,7 +71,8 @@ class FivePointEquations {
       for (int i = j + 1; i < 10; ++i) {
         if (std::abs(a[i][j]) > std::abs(a[pivot][j])) pivot = i;
       }
-      if (!(std::abs(a[pivot][j]) > 1e-13)) return false;
+      smallest = std::min(smallest, std::abs(a[pivot][j]));
+      if (!(smallest > 1e-14)) return 0;
       if (pivot != j) {
         for (int k = j; k < 20; ++k) std::swap(a[j][k], a[pivot][k]);
       }
@@ -106,7 +109,7 @@ class FivePointEquations {
       one_[i][3] = p[6] - q[7];
       one_[i][4] = -q[6];
     }
-    return true;
+    return smallest;
   }
 
   /// The determinant of the three equations, by z⁰ to z¹⁰.

@@ -26,6 +26,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -141,11 +142,24 @@ inline MatrixSolutions<1> solveAffineEpipolar(std::span<const Eigen::Vector4d> m
   Eigen::Vector4d mean = Eigen::Vector4d::Zero(), a;
   for (const Eigen::Vector4d& m : matches) mean += m;
   mean /= static_cast<double>(matches.size());
-  Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
-  for (const Eigen::Vector4d& m : matches) A += (m - mean) * (m - mean).transpose();
-  // Points whose spread is rounding determine nothing.
-  if (!(A.trace() > 1e-28 * static_cast<double>(matches.size()) * mean.squaredNorm())) return result;
-  if (!detail::leastVector<4>(A, a)) return result;
+  if (matches.size() == 4) {
+    // The vector across three differences: the minors of three rows.
+    const Eigen::Vector4d p = matches[1] - matches[0], q = matches[2] - matches[0], r = matches[3] - matches[0];
+    const auto minor = [&](int i, int j, int k) {
+      return p[i] * (q[j] * r[k] - q[k] * r[j]) + p[j] * (q[k] * r[i] - q[i] * r[k]) +
+             p[k] * (q[i] * r[j] - q[j] * r[i]);
+    };
+    a = Eigen::Vector4d(minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2));
+    const double size = a.norm(), extent = std::sqrt(p.squaredNorm() + q.squaredNorm() + r.squaredNorm());
+    if (!(size > 1e-9 * extent * extent * extent) || !(extent > 1e-14 * mean.norm())) return result;
+    a /= size;
+  } else {
+    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+    for (const Eigen::Vector4d& m : matches) A += (m - mean) * (m - mean).transpose();
+    // Points whose spread is rounding determine nothing.
+    if (!(A.trace() > 1e-28 * static_cast<double>(matches.size()) * mean.squaredNorm())) return result;
+    if (!detail::leastVector<4>(A, a)) return result;
+  }
   Eigen::Matrix3d F;
   F << 0, 0, a[2], 0, 0, a[3], a[0], a[1], -a.dot(mean);
   F *= std::sqrt(2 / F.squaredNorm());
@@ -180,17 +194,25 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
     for (int i = 0; i < roots.size(); ++i) keep(roots[i].z * A + roots[i].w * B);
     return result;
   }
-  Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Zero();
-  for (const Eigen::Vector4d& m : matches) {
-    const Eigen::Vector4d q = normalised.apply(m);
-    const Eigen::Vector3d u(q[0], q[1], 1), v(q[2], q[3], 1);
-    const Eigen::Matrix3d square = u * u.transpose();
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j <= i; ++j) N.block<3, 3>(3 * i, 3 * j) += v[i] * v[j] * square;
-    }
-  }
   Eigen::Matrix<double, 9, 1> f;
-  if (!detail::leastVector<9>(N, f)) return result;
+  if (matches.size() == 8) {
+    // Eight equations as they are: their squares would lose half the digits.
+    double rows[8][9], basis[1][9];
+    for (std::size_t i = 0; i < 8; ++i) detail::epipolarRow(normalised.apply(matches[i]), rows[i]);
+    if (!detail::nullBasis(rows, basis)) return result;
+    std::copy(basis[0], basis[0] + 9, f.data());
+  } else {
+    Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Zero();
+    for (const Eigen::Vector4d& m : matches) {
+      const Eigen::Vector4d q = normalised.apply(m);
+      const Eigen::Vector3d u(q[0], q[1], 1), v(q[2], q[3], 1);
+      const Eigen::Matrix3d square = u * u.transpose();
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j <= i; ++j) N.block<3, 3>(3 * i, 3 * j) += v[i] * v[j] * square;
+      }
+    }
+    if (!detail::leastVector<9>(N, f)) return result;
+  }
   Eigen::Matrix3d F;
   F << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];
   // The nearest matrix of rank 2 lacks what F makes of its last right singular vector.

@@ -18,6 +18,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -40,8 +41,28 @@ inline MatrixSolutions<10> solveEssential(std::span<const Eigen::Vector4d> match
     second[i] = Eigen::Vector3d(m[2], m[3], 1);
   }
   if (!detail::nullBasis(rows, basis)) return result;
+  // Where a pivot is small, roots lose as many digits: another basis of the same matrices does better nearly always.
   detail::FivePointEquations equations;
-  if (!equations.eliminate(basis)) return result;
+  double pivot = equations.eliminate(basis);
+  for (int attempt = 0; attempt < 2 && pivot < 1e-3; ++attempt) {
+    double turned[4][9];
+    for (int k = 0; k < 9; ++k) {
+      const double a = basis[0][k] + basis[1][k], b = basis[0][k] - basis[1][k], c = basis[2][k] + basis[3][k],
+                   d = basis[2][k] - basis[3][k];
+      turned[0][k] = 0.5 * (b - d);
+      turned[1][k] = 0.5 * (a + c);
+      turned[2][k] = 0.5 * (b + d);
+      turned[3][k] = 0.5 * (a - c);
+    }
+    detail::FivePointEquations others;
+    const double other = others.eliminate(turned);
+    if (other > pivot) {
+      pivot = other;
+      equations = others;
+      std::copy(&turned[0][0], &turned[0][0] + 36, &basis[0][0]);
+    }
+  }
+  if (!(pivot > 1e-13)) return result;
   const detail::RealRoots<10> roots(equations.determinant(), 1e-9);
   for (int i = 0; i < roots.size(); ++i) {
     const Eigen::Vector4d c = equations.coefficients(roots[i].z, roots[i].w);

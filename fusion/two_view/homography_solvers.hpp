@@ -145,12 +145,22 @@ inline MatrixSolutions<1> solveAffine(std::span<const Eigen::Vector4d> matches) 
   MatrixSolutions<1> result;
   if (matches.size() < 3) return result;
   const detail::CentredMatches sums(matches);
-  const double determinant = sums.first.determinant(), trace = sums.first.trace();
-  // The determinant is the square of an area.
-  if (!sums.spread || !(determinant > 1e-18 * trace * trace)) return result;
+  if (!sums.spread) return result;
+  Eigen::Matrix2d mixed = sums.mixed, moments = sums.first;
+  double determinant = moments.determinant(), least = 1e-18 * moments.trace() * moments.trace();
+  if (matches.size() == 3) {
+    // The differences themselves, not their squares.
+    const Eigen::Vector4d a = matches[1] - matches[0], b = matches[2] - matches[0];
+    moments << a[0], b[0], a[1], b[1];
+    mixed << a[2], b[2], a[3], b[3];
+    least = 1e-9 * moments.squaredNorm();
+    determinant = moments.determinant();
+  }
+  // The determinant is the square of an area, or an area.
+  if (!(std::abs(determinant) > least)) return result;
   Eigen::Matrix2d adjugate;
-  adjugate << sums.first(1, 1), -sums.first(0, 1), -sums.first(1, 0), sums.first(0, 0);
-  const Eigen::Matrix2d A = sums.mixed * adjugate / determinant;
+  adjugate << moments(1, 1), -moments(0, 1), -moments(1, 0), moments(0, 0);
+  const Eigen::Matrix2d A = mixed * adjugate / determinant;
   if (A.allFinite() && A.determinant() > 1e-9 * A.squaredNorm())
     result.add(detail::affineMap(A, sums.mean_second - A * sums.mean));
   return result;
