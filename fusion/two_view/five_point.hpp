@@ -1,0 +1,85 @@
+// Essential matrices of five matches: all real ones, up to ten.
+//
+// The matrices that obey the five equations ũ'ᵀ E ũ = 0 are x X + y Y + z Z + W; 2 E Eᵀ E = tr(E Eᵀ) E and det E = 0 are
+// ten cubic equations for x, y, z. Elimination leaves three equations linear in (x, y, 1) with polynomials in z, whose
+// determinant has degree ten (D. Nistér, "An efficient solution to the five-point relative pose problem", PAMI 26,
+// 2004). Each real root is then polished as a pose: Newton's method on the five equations, by rotation and direction,
+// so that the equations hold to rounding and the matrix is [t]× R exactly.
+#pragma once
+
+#include <fusion/detail/five_point_equations.hpp>
+#include <fusion/detail/null_vectors.hpp>
+#include <fusion/detail/real_roots.hpp>
+#include <fusion/two_view/epipolar_solvers.hpp>
+#include <fusion/two_view/solutions.hpp>
+#include <lie/detail/essential_matrix.hpp>
+#include <lie/detail/trig.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+namespace liestat {
+
+/// Essential matrices E = [t]× R, |t| = 1, of exactly five matches in normalised coordinates; x' = R x + t. Points of a
+/// plane are no exception. None where the five equations depend on each other to 1e-12 of their size, where the views
+/// differ by a rotation alone or not at all (every t solves), or if not finite.
+inline MatrixSolutions<10> solveEssential(std::span<const Eigen::Vector4d> matches) {
+  MatrixSolutions<10> result;
+  if (matches.size() != 5) return result;
+  double rows[5][9], basis[4][9];
+  std::array<Eigen::Vector3d, 5> first, second;
+  for (std::size_t i = 0; i < 5; ++i) {
+    const Eigen::Vector4d& m = matches[i];
+    detail::epipolarRow(m, rows[i]);
+    first[i] = Eigen::Vector3d(m[0], m[1], 1);
+    second[i] = Eigen::Vector3d(m[2], m[3], 1);
+  }
+  if (!detail::nullBasis(rows, basis)) return result;
+  // Where a pivot is small, roots lose as many digits: another basis of the same matrices does better nearly always.
+  detail::FivePointEquations equations;
+  double pivot = equations.eliminate(basis);
+  for (int attempt = 0; attempt < 2 && pivot < 1e-3; ++attempt) {
+    double turned[4][9];
+    for (int k = 0; k < 9; ++k) {
+      const double a = basis[0][k] + basis[1][k], b = basis[0][k] - basis[1][k], c = basis[2][k] + basis[3][k],
+                   d = basis[2][k] - basis[3][k];
+      turned[0][k] = 0.5 * (b - d);
+      turned[1][k] = 0.5 * (a + c);
+      turned[2][k] = 0.5 * (b + d);
+      turned[3][k] = 0.5 * (a - c);
+    }
+    detail::FivePointEquations others;
+    const double other = others.eliminate(turned);
+    if (other > pivot) {
+      pivot = other;
+      equations = others;
+      std::copy(&turned[0][0], &turned[0][0] + 36, &basis[0][0]);
+    }
+  }
+  if (!(pivot > 1e-13)) return result;
+  const detail::RealRoots<10> roots(equations.determinant(), 1e-9);
+  for (int i = 0; i < roots.size(); ++i) {
+    const Eigen::Vector4d c = equations.coefficients(roots[i].z, roots[i].w);
+    Eigen::Matrix3d E;
+    for (int k = 0; k < 9; ++k) {
+      const double entry = c[0] * basis[0][k] + c[1] * basis[1][k] + c[2] * basis[2][k] + c[3] * basis[3][k];
+      E(k / 3, k % 3) = entry;
+    }
+    if (!detail::polishEssential(first, second, E)) continue;
+    bool known = false;
+    for (const Eigen::Matrix3d& other : result) {
+      const double same = other.cwiseProduct(E).sum();
+      known = known || same * same > 4 * (1 - 1e-13);
+    }
+    if (!known) result.add(E);
+  }
+  return result;
+}
+
+}  // namespace liestat
