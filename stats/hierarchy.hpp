@@ -14,13 +14,12 @@
 
 #include <stats/detail/keyed_measurements.hpp>
 #include <stats/detail/model_draws.hpp>
-#include <stats/detail/tail_probabilities.hpp>
 #include <stats/hierarchy_types.hpp>
 #include <stats/model_choice.hpp>
+#include <stats/robust.hpp>
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -321,9 +320,7 @@ class Hierarchy {
     if (s == 0) return 1;
     const double found =
         draws_[m].hasBest() ? static_cast<double>(draws_[m].best().inliers) / static_cast<double>(size()) : 0;
-    const double good = std::pow(std::max(found, options_.least_share), static_cast<double>(s));
-    const double needed = good < 1 ? std::log1p(-options_.confidence) / std::log1p(-good) : 1;
-    return static_cast<std::size_t>(std::ceil(std::min(needed, static_cast<double>(options_.max_draws))));
+    return std::min(options_.max_draws, sampleCount(std::max(found, options_.least_share), s, options_.confidence));
   }
   typename Draws::Guide guideOf(std::size_t m, std::size_t draw) const {
     typename Draws::Guide guide;
@@ -419,7 +416,7 @@ class Hierarchy {
     double relevance = 0;
     for (std::size_t i = 0; i < size(); ++i) {
       const double limit = limitOf(m, state.threshold, i);
-      if (state.errors[i] < 2 * limit) relevance += 1 - state.errors[i] / limit;
+      relevance += Relevance{2 * limit}.contribution(state.errors[i]);
       if (!(state.errors[i] < limit)) continue;
       state.inliers.push_back(measurements_.id(i));
       add(state.fit, m, i, state.errors[i]);

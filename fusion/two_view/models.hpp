@@ -1,17 +1,19 @@
 // The models of the motion between two views as a hierarchy (stats/hierarchy.hpp): what a match obeys under each, what it
 // leaves free, and which contains which (Viéville, Lingrand and Gaspard 2000, section 7).
 //
-//   name                  equation      q                          free  sample  contains
-//   none                  ũ' ~ H ũ      -                            0     0     -
-//   retinal translation   H = [I τ]     τ                            2     1     none
-//   zoom                  diag(s,s,1)   ln s; about the centre       1     1     none
-//   retinal displacement  [Q τ]         SE2                          3     2     retinal translation
-//   rotation              R             SO3                          3     2     none
-//   homography            any           vec H, ‖H‖² = 3              8     4     retinal displacement, zoom, rotation
-//   translation           ũ'ᵀ F ũ = 0,  S2, direction of t           2     2     retinal translation, zoom
-//                         F = [t]×
-//   essential             [t]× R        Essential, x' = R x + t      5     5     translation, rotation, retinal displacement
-//   fundamental           rank 2        vec F, ‖F‖² = 2              7     7     essential, homography, zoom
+//   name                  equation      with                         free  sample  contains
+//   none                  ũ' ~ H ũ      H = I                        0     0       -
+//   retinal translation                 H = [I τ; 0 1]               2     1       none
+//   zoom                                H = diag(s, s, 1)            1     1       none
+//   retinal displacement                H = [Q τ; 0 1], Q Qᵀ = I     3     2       retinal translation
+//   rotation                            H Hᵀ = I                     3     2       none
+//   homography                          ‖H‖² = 3                     8     4       retinal displacement, zoom, rotation
+//   translation           ũ'ᵀ F ũ = 0   F = [t]×, ‖F‖² = 2           2     2       retinal translation, zoom
+//   essential                           F = [t]× R, |t| = 1          5     5       translation, rotation, retinal displ.
+//   fundamental                         det F = 0, ‖F‖² = 2          7     7       essential, homography, zoom, transl.
+//
+// The parameter is the nine entries of the matrix, column after column, under those constraints, as in the report; of
+// `essential` it is the pose, a point of Essential, with the tangent (direction, rotation).
 //
 // `essential` does not contain `homography`: a homography of a plane in two views of one camera obeys more than that.
 // Coordinates are normalised, u = (p - c)/f; the models below homography and fundamental but for retinal translation and
@@ -51,12 +53,28 @@ enum class TwoViewCalibration {
   uncalibrated  ///< centred, in any unit: rotation and essential are left out
 };
 
-/// The default lattice. ModelEstimate::covariance is that of q in its local frame (above).
-std::vector<std::shared_ptr<const TwoViewModel>> twoViewModels(
-    const TwoViewImages& images, TwoViewCalibration calibration = TwoViewCalibration::calibrated);
+using TwoViewModels = std::vector<std::shared_ptr<const TwoViewModel>>;
+
+namespace detail {
+
+/// The part of the lattice that homographies make, and that of epipolar geometries.
+TwoViewModels homographyModels(const TwoViewImages& images, TwoViewCalibration calibration);
+TwoViewModels epipolarModels(const TwoViewImages& images, TwoViewCalibration calibration);
+
+}  // namespace detail
+
+/// The default lattice. ModelEstimate::covariance is 9×9, of the rank that is free, and 5×5 for `essential`.
+inline TwoViewModels twoViewModels(const TwoViewImages& images,
+                                   TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
+  TwoViewModels models = detail::homographyModels(images, calibration);
+  const TwoViewModels epipolar = detail::epipolarModels(images, calibration);
+  models.insert(models.end(), epipolar.begin(), epipolar.end());
+  return models;
+}
 
 }  // namespace liestat
 
 #ifndef LIESTAT_COMPILED_FUSION
-#include <fusion/detail/two_view_models.hpp>
+#include <fusion/detail/epipolar_models.hpp>
+#include <fusion/detail/homography_models.hpp>
 #endif

@@ -5,6 +5,7 @@
 #include <stats/detail/keyed_measurements.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/hierarchy_types.hpp>
+#include <stats/robust.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -36,11 +37,10 @@ inline std::vector<double> errorThresholds(double probability) {
 
 /// What a measurement adds to a score, as an integer, so that sums do not depend on their order.
 inline std::int64_t scoreOf(HypothesisScore score, double squared_error, double threshold) {
-  constexpr double unit = 0x1p32;
-  const double reach = score == HypothesisScore::relevance ? 2 * threshold : threshold;
-  if (!(squared_error < reach)) return 0;
-  const double part = score == HypothesisScore::inliers ? 1 : 1 - squared_error / threshold;
-  return static_cast<std::int64_t>(std::lround(part * unit));
+  const double part = score == HypothesisScore::relevance ? Relevance{2 * threshold}.contribution(squared_error)
+                      : score == HypothesisScore::inliers ? InlierCount{threshold}.contribution(squared_error)
+                                                          : TruncatedCost{threshold}.contribution(squared_error);
+  return static_cast<std::int64_t>(std::lround(part * 0x1p32));
 }
 
 template <class Measurement, class Parameter>

@@ -1,0 +1,184 @@
+// Motions that a homography tells: families, equation and models of fusion/two_view/models.hpp.
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <fusion/detail/two_view_estimate.hpp>
+#include <fusion/two_view/errors.hpp>
+#include <fusion/two_view/homography_solvers.hpp>
+#include <fusion/two_view/models.hpp>
+#include <stats/constrained.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <numbers>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// What the entries of H obey in each model.
+enum class HomographyFamily { retinal_translation, zoom, retinal_displacement, rotation, homography };
+
+struct HomographyConstraint {
+  HomographyFamily family;
+  static constexpr int P = 8;
+
+  Eigen::Matrix<double, P, 1> operator()(const Entries& q) const { return linearize(q).value; }
+  EntryConstraints<P> linearize(const Entries& q) const {
+    ConstraintRows<P> rows(q);
+    if (family == HomographyFamily::homography) {
+      rows.norm(3);
+    } else if (family == HomographyFamily::rotation) {
+      // H Hᵀ = I, by its upper triangle.
+      for (int i = 0; i < 3; ++i) {
+        for (int j = i; j < 3; ++j) {
+          double dot = i == j ? -1 : 0;
+          Eigen::Matrix<double, 1, 9> J = Eigen::Matrix<double, 1, 9>::Zero();
+          for (int k = 0; k < 3; ++k) {
+            dot += q[entry(i, k)] * q[entry(j, k)];
+            J[entry(i, k)] += q[entry(j, k)];
+            J[entry(j, k)] += q[entry(i, k)];
+          }
+          rows.add(dot, J);
+        }
+      }
+    } else {
+      rows.fixed(entry(2, 0), 0), rows.fixed(entry(2, 1), 0), rows.fixed(entry(2, 2), 1);
+      if (family == HomographyFamily::retinal_displacement) {
+        const double c = q[entry(0, 0)], s = q[entry(1, 0)];
+        rows.equal(entry(0, 0), entry(1, 1)), rows.opposite(entry(0, 1), entry(1, 0));
+        Eigen::Matrix<double, 1, 9> J = Eigen::Matrix<double, 1, 9>::Zero();
+        J[entry(0, 0)] = 2 * c, J[entry(1, 0)] = 2 * s;
+        rows.add(c * c + s * s - 1, J);
+      } else {
+        rows.fixed(entry(0, 1), 0), rows.fixed(entry(1, 0), 0);
+        if (family == HomographyFamily::zoom) {
+          rows.equal(entry(0, 0), entry(1, 1)), rows.fixed(entry(0, 2), 0), rows.fixed(entry(1, 2), 0);
+        } else {
+          rows.fixed(entry(0, 0), 1), rows.fixed(entry(1, 1), 1);
+        }
+      }
+    }
+    return rows.rows();
+  }
+};
+
+/// (h₃·ũ) u' - (h₁·ũ, h₂·ũ) = 0.
+struct HomographyEquation {
+  Eigen::Vector2d operator()(const Entries& q, const Eigen::Vector4d& m) const {
+    const Eigen::Matrix3d H = matrixOf(q);
+    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
+    return {w * m[2] - (H(0, 0) * m[0] + H(0, 1) * m[1] + H(0, 2)),
+            w * m[3] - (H(1, 0) * m[0] + H(1, 1) * m[1] + H(1, 2))};
+  }
+  EquationDerivatives<2, 9, 4> linearize(const Entries& q, const Eigen::Vector4d& m) const {
+    const Eigen::Matrix3d H = matrixOf(q);
+    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
+    EquationDerivatives<2, 9, 4> result;
+    result.value = (*this)(q, m);
+    auto& J = result.by_parameter;
+    auto& D = result.by_measurement;
+    J.setZero(), D.setZero();
+    for (int k = 0; k < 2; ++k) {
+      const double u = m[2 + k];
+      J(k, entry(k, 0)) = -m[0], J(k, entry(k, 1)) = -m[1], J(k, entry(k, 2)) = -1;
+      J(k, entry(2, 0)) = u * m[0], J(k, entry(2, 1)) = u * m[1], J(k, entry(2, 2)) = u;
+      D(k, 0) = u * H(2, 0) - H(k, 0), D(k, 1) = u * H(2, 1) - H(k, 1), D(k, 2 + k) = w;
+    }
+    return result;
+  }
+};
+
+/// The parts that models of homographies have in common.
+class HomographyTypeModel : public TwoViewModel {
+ public:
+  HomographyTypeModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
+  std::string name() const override { return card_.name; }
+  std::vector<std::string> parents() const override { return card_.parents; }
+  int freeParameters() const override { return card_.free_parameters; }
+  int equations() const override { return 2; }
+  int measurementDimension() const override { return 4; }
+  std::size_t sampleSize() const override { return card_.sample_size; }
+  void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
+    homographyErrors(q.matrix, matches, images_.noise, squared);
+  }
+  /// The disc about the mapped point, of the whole image.
+  double chance(double threshold) const override {
+    const double variance = 0.5 * (std::pow(images_.noise.first, 2) + std::pow(images_.noise.second, 2));
+    return std::min(1.0, 2 * std::numbers::pi * threshold * variance / (images_.size.x() * images_.size.y()));
+  }
+
+ protected:
+  TwoViewModelCard card_;
+  TwoViewImages images_;
+};
+
+/// Nothing moves.
+class NoMotionModel : public HomographyTypeModel {
+ public:
+  using HomographyTypeModel::HomographyTypeModel;
+  void solve(std::span<const Measurement>, std::vector<Parameter>& solutions) const override {
+    solutions.emplace_back();
+  }
+  ModelEstimate<Parameter> estimate(const Parameter&, std::span<const Measurement> inliers,
+                                    const StopRequest&) const override {
+    ModelEstimate<Parameter> result;
+    result.status = Status::ok;
+    result.chi2 = 0, result.equation_error = 0;
+    for (const Measurement& m : inliers) result.chi2 += homographyError(result.parameter.matrix, m, images_.noise);
+    result.degrees_of_freedom = 2 * static_cast<int>(inliers.size());
+    return result;
+  }
+};
+
+using HomographySolver = MatrixSolutions<1> (*)(std::span<const Eigen::Vector4d>);
+
+class HomographyModel : public HomographyTypeModel {
+ public:
+  HomographyModel(HomographyFamily family, HomographySolver solver, TwoViewModelCard card, const TwoViewImages& images)
+      : HomographyTypeModel(std::move(card), images), constraint_{family}, solver_(solver) {}
+  void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
+    for (const Eigen::Matrix3d& H : solver_(sample)) solutions.emplace_back().matrix = H;
+  }
+  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
+                                    const StopRequest& stop) const override {
+    const Entries q = entriesOf(start.matrix);
+    return estimateTwoView<Entries, HomographyConstraint, HomographyEquation>(
+        q, constraint_, inliers, images_.noise, stop,
+        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixOf(found); });
+  }
+
+ private:
+  HomographyConstraint constraint_;
+  HomographySolver solver_;
+};
+
+LIESTAT_FUSION_INLINE TwoViewModels homographyModels(const TwoViewImages& images, TwoViewCalibration calibration) {
+  using Names = std::vector<std::string>;
+  const auto model = [&](HomographyFamily family, HomographySolver solver, const char* name, const Names& parents,
+                         int free_parameters, std::size_t sample_size) {
+    return std::make_shared<HomographyModel>(family, solver,
+                                             TwoViewModelCard{name, parents, free_parameters, sample_size}, images);
+  };
+  TwoViewModels models = {std::make_shared<NoMotionModel>(TwoViewModelCard{"none", {}, 0, 0}, images)};
+  models.push_back(
+      model(HomographyFamily::retinal_translation, solveRetinalTranslation, "retinal translation", {"none"}, 2, 1));
+  models.push_back(model(HomographyFamily::zoom, solveZoom, "zoom", {"none"}, 1, 1));
+  models.push_back(model(HomographyFamily::retinal_displacement, solveRetinalDisplacement, "retinal displacement",
+                         {"retinal translation"}, 3, 2));
+  Names below_homography = {"retinal displacement", "zoom"};
+  if (calibration == TwoViewCalibration::calibrated) {
+    models.push_back(model(HomographyFamily::rotation, solveRotation, "rotation", {"none"}, 3, 2));
+    below_homography.push_back("rotation");
+  }
+  models.push_back(model(HomographyFamily::homography, solveHomography, "homography", below_homography, 8, 4));
+  return models;
+}
+
+}  // namespace liestat::detail
