@@ -147,10 +147,10 @@ class Hierarchy {
     if (draws.looked() < drawsNeeded(m)) {
       // An early look at what has been found, ever more seldom.
       const bool due = state.draws >= 4 && std::has_single_bit(state.draws) && draws.lastGain() > state.draws / 2;
-      if (due && draws.hasBest() && !refine(m, stop)) return true;
+      if (due && draws.hasBest()) refine(m, 1, stop);
       return true;
     }
-    if (draws.hasBest() && !refine(m, stop)) return true;
+    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop)) return true;
     finish(m);
     if (next() == none) terminate();
     return next() != none;
@@ -227,7 +227,7 @@ class Hierarchy {
  private:
   static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   using Draws = detail::ModelDraws<Measurement, Parameter>;
-  /// The last two estimates of a model, by what they were made from.
+  /// An estimate of a model, by what it was made from.
   struct Refined {
     std::uint64_t key = 0;
     ModelEstimate<Parameter> estimate;
@@ -336,7 +336,7 @@ class Hierarchy {
     const State& parent = states_[p];
     const std::size_t missing = models_[m]->sampleSize() - models_[p]->sampleSize();
     if (size() - parent.inliers.size() < missing) return guide;
-    draws_[p].sampleOf(draws_[p].bestDraw(), measurements_, guideOf(p, draws_[p].bestDraw()), guide.kept);
+    guide.kept = sampleOf(p, draws_[p].bestDraw());
     guide.excluded.assign(size(), 0);
     for (std::size_t i = 0; i < size(); ++i) guide.excluded[i] = parent.errors[i] < limitOf(p, parent.threshold, i);
     for (const std::size_t i : guide.kept) guide.excluded[i] = 1;
@@ -349,62 +349,82 @@ class Hierarchy {
     state.hypothesis = best.parameter;
     state.score = static_cast<double>(best.score) / 0x1p32 / static_cast<double>(size());
     state.hypothesis_inliers = best.inliers;
-    std::vector<std::size_t> sample;
-    draws_[m].sampleOf(draws_[m].bestDraw(), measurements_, guideOf(m, draws_[m].bestDraw()), sample);
     state.sample.clear();
-    for (const std::size_t i : sample) state.sample.push_back(measurements_.id(i));
+    for (const std::size_t i : sampleOf(m, draws_[m].bestDraw())) state.sample.push_back(measurements_.id(i));
   }
 
-  /// The estimate from the best hypothesis: from its inliers, and once again from those of that estimate. To go on until
-  /// nothing changes makes a threshold that follows the errors collapse. False if `stop` ended it.
-  bool refine(std::size_t m, const StopRequest& stop) {
-    State& state = states_[m];
-    const Parameter& hypothesis = draws_[m].best().parameter;
-    std::uint64_t key = detail::mixBits(draws_[m].drawKey(draws_[m].bestDraw()), draws_[m].bestSolution());
-    for (const std::size_t i : sampleOfBest(m)) key = detail::mixBits(key, measurements_.key(i));
-    Parameter parameter = hypothesis;
-    std::vector<double> errors = errorsOf(m, hypothesis);
-    double threshold = thresholdOf(m, errors);
-    std::vector<Refined> made;
+  /// An estimate with what follows from it.
+  struct Candidate {
     ModelEstimate<Parameter> estimate;
+    std::vector<double> errors;
+    double threshold = 0;
+    std::int64_t score = 0;
+  };
+  /// The estimate from a hypothesis: from its inliers, and once again from those of that estimate. To go on until nothing
+  /// changes makes a threshold that follows the errors collapse. None if `stop` ended it.
+  std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
+                                  const StopRequest& stop) const {
+    Parameter parameter = draws_[m].at(place).parameter;
+    std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
+    for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
+    Candidate candidate;
+    candidate.errors = errorsOf(m, parameter);
+    candidate.threshold = thresholdOf(m, candidate.errors);
+    std::uint64_t last = 0;
     for (int pass = 0; pass < 2; ++pass) {
       std::vector<Measurement> inliers;
       std::uint64_t set = 0;
       for (std::size_t i = 0; i < size(); ++i) {
-        if (!(errors[i] < limitOf(m, threshold, i))) continue;
+        if (!(candidate.errors[i] < limitOf(m, candidate.threshold, i))) continue;
         inliers.push_back(measurements_[i]);
         set = detail::mixBits(set, measurements_.key(i));
       }
       const std::uint64_t pass_key = detail::mixBits(key, set);
-      if (pass > 0 && pass_key == made.back().key) break;  // the same inliers
-      const auto cached =
-          std::find_if(refined_[m].begin(), refined_[m].end(), [&](const Refined& r) { return r.key == pass_key; });
+      if (pass > 0 && pass_key == last) break;  // the same inliers
+      last = pass_key;
+      const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == pass_key; });
       ModelEstimate<Parameter> found;
-      if (cached != refined_[m].end()) {
-        found = cached->estimate;
+      if (known != made.end()) {
+        found = known->estimate;
       } else {
         found = models_[m]->estimate(parameter, inliers, stop);
-        if (stop && stop()) return false;
+        if (stop && stop()) return std::nullopt;
+        made.push_back({pass_key, found});
       }
-      made.push_back({pass_key, found});
       if (!found.usable()) break;
-      estimate = std::move(found);
-      parameter = estimate.parameter;
-      errors = errorsOf(m, parameter);
-      threshold = thresholdOf(m, errors);
+      candidate.estimate = std::move(found);
+      parameter = candidate.estimate.parameter;
+      candidate.errors = errorsOf(m, parameter);
+      candidate.threshold = thresholdOf(m, candidate.errors);
     }
-    refined_[m] = std::move(made);
-    state.estimate = std::move(estimate);
-    state.threshold = threshold;
-    state.errors = std::move(errors);
+    for (std::size_t i = 0; i < size(); ++i) {
+      candidate.score += detail::scoreOf(options_.score, candidate.errors[i], limitOf(m, candidate.threshold, i));
+    }
+    return candidate;
+  }
+  /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
+  /// others may hold an estimate that begins with it. False if `stop` ended it.
+  bool refine(std::size_t m, std::size_t count, const StopRequest& stop) {
+    std::optional<Candidate> best;
+    for (const auto& place : draws_[m].ranked(count)) {
+      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
+      if (!candidate) return false;
+      const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
+                          (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
+      if (better) best = std::move(candidate);
+    }
+    State& state = states_[m];
+    state.estimate = std::move(best->estimate);
+    state.threshold = best->threshold;
+    state.errors = std::move(best->errors);
     state.outdated = false;
     classify(m);
     decide();
     return true;
   }
-  std::vector<std::size_t> sampleOfBest(std::size_t m) const {
+  std::vector<std::size_t> sampleOf(std::size_t m, std::size_t draw) const {
     std::vector<std::size_t> sample;
-    draws_[m].sampleOf(draws_[m].bestDraw(), measurements_, guideOf(m, draws_[m].bestDraw()), sample);
+    draws_[m].sampleOf(draw, measurements_, guideOf(m, draw), sample);
     return sample;
   }
   /// Inliers, and what follows from them, by the errors and the threshold.
@@ -433,6 +453,10 @@ class Hierarchy {
     if (!draws_[m].hasBest()) state = State{};
     state.progress = State::Progress::evaluated;
     state.draws = draws_[m].looked();
+    // Those that may be asked for again.
+    const std::size_t most = 4 * std::max<std::size_t>(options_.refined_hypotheses, 1);
+    auto& made = refined_[m];
+    if (made.size() > most) made.erase(made.begin(), made.end() - static_cast<std::ptrdiff_t>(most));
     decide();
     bool all = m == null_ || !state.hasEstimate() || state.unsupported;
     for (const std::size_t p : parents_[m]) {

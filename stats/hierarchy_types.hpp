@@ -27,9 +27,10 @@ struct ModelEstimate {
   Parameter parameter{};
   /// Of the parameter in the model's own coordinates, which its documentation names; empty where there is none.
   Eigen::MatrixXd information = {}, covariance = {};
-  double chi2 = std::numeric_limits<double>::quiet_NaN();            ///< D² = 2 L² over the inliers
+  double chi2 = std::numeric_limits<double>::quiet_NaN();            ///< D² = 2 L² over those
   double equation_error = std::numeric_limits<double>::quiet_NaN();  ///< E²: how well the equations are met
   int degrees_of_freedom = 0;
+  std::size_t measurements = 0;  ///< that took part
 
   /// Whether there is a parameter to go on with.
   bool usable() const { return status == Status::ok || status == Status::ill_defined; }
@@ -83,6 +84,8 @@ struct HierarchyOptions {
   double confidence = 0.999;
   double least_share = 0.25;     ///< ... or at this share, if that is larger
   std::size_t max_draws = 2000;  ///< ... or here
+  /// Of so many hypotheses of a model, the best ones, the estimate is made; that with the best score is taken.
+  std::size_t refined_hypotheses = 5;
   /// Whether three draws of four keep the sample of an estimated parent and take what is missing from its outliers.
   bool guided = false;
   SupportTest support = {};

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -61,6 +62,11 @@ class ConstraintRows {
   int next_ = 0;
 };
 
+/// Matches of which the parameter fits so much by itself (ConstrainedEstimator::leverage) take no part. A wrong match that
+/// lies on its epipolar line by chance has often a parallax that no other one has: it agrees with all others, and moves
+/// the estimate by many of its standard deviations. Where all matches are few, three times their mean is the bound.
+inline constexpr double most_leverage = 0.5;
+
 /// The projection estimate; `finish` takes the parameter that was found into the result.
 template <class Q, class Constraint, class Equation, class Finish>
 ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constraint& constraint,
@@ -69,14 +75,28 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   using Noise = DiagonalNoise<4>;
   using Channel = MeasurementChannel<Eigen::Vector4d, Noise, Equation>;
   const Noise sigma(Eigen::Vector4d(noise.first, noise.first, noise.second, noise.second));
-  const Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
   ConstrainedOptions<Q> options;
   options.max_iterations = 50;
-  ConstrainedEstimator<Q, Constraint, Channel> estimator(start, constraint, options, matches);
-  while (estimator.iterate()) {
-    if (stop && stop()) estimator.stop();
+  Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
+  ConstrainedResult<Q> found;
+  for (int pass = 0; pass < 4; ++pass) {
+    ConstrainedEstimator<Q, Constraint, Channel> estimator(start, constraint, options, matches);
+    while (estimator.iterate()) {
+      if (stop && stop()) estimator.stop();
+    }
+    const ConstrainedResult<Q>& next = estimator.result();
+    if (pass > 0 && !next.ok()) break;
+    found = next;
+    if (!found.ok()) break;
+    const double mean = static_cast<double>(found.free_parameters) / found.equations;
+    Channel vouched_for{{}, {sigma}, {Equation{}}};
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (estimator.leverage(i) > std::max(most_leverage, 3 * mean)) continue;
+      vouched_for.measurements.push_back(matches.measurements[i]);
+    }
+    if (vouched_for.size() == matches.size()) break;
+    matches.measurements = std::move(vouched_for.measurements);
   }
-  const auto& found = estimator.result();
   ModelEstimate<TwoViewMotionModel> result;
   result.status = found.status();
   finish(found.parameter, result.parameter);
@@ -85,6 +105,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   result.chi2 = found.chi2;
   result.equation_error = found.equation_error;
   result.degrees_of_freedom = found.degrees_of_freedom;
+  result.measurements = found.measurements;
   return result;
 }
 

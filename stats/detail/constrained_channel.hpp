@@ -246,6 +246,7 @@ class ChannelState {
   double expectedSquare(std::size_t i, const Square& covariance) const {
     return blocks_[i].root.rank() - congruence(blocks_[i].C, covariance).trace();
   }
+  int equationsOf(std::size_t i) const { return blocks_[i].root.rank(); }
 
  private:
   struct Derivatives {

@@ -73,8 +73,27 @@ class ModelDraws {
   std::size_t lastGain() const { return last_gain_; }
   bool hasBest() const { return best_draw_ != none; }
   const Hypothesis& best() const { return draws_[best_draw_].hypotheses[best_solution_]; }
+  /// Where a hypothesis is.
+  struct Place {
+    std::size_t draw, solution;
+  };
+  const Hypothesis& at(const Place& place) const { return draws_[place.draw].hypotheses[place.solution]; }
+  /// The best so many of the draws that were looked at, the best first.
+  std::vector<Place> ranked(std::size_t count) const {
+    std::vector<Place> places;
+    for (std::size_t t = 0; t < looked_; ++t) {
+      for (std::size_t k = 0; k < draws_[t].hypotheses.size(); ++k) places.push_back({t, k});
+    }
+    const auto better = [&](const Place& a, const Place& b) {
+      if (at(a).score != at(b).score) return at(a).score > at(b).score;
+      return a.draw != b.draw ? a.draw < b.draw : a.solution < b.solution;
+    };
+    count = std::min(count, places.size());
+    std::partial_sort(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(count), places.end(), better);
+    places.resize(count);
+    return places;
+  }
   std::size_t bestDraw() const { return best_draw_; }
-  std::size_t bestSolution() const { return best_solution_; }
   /// Whether the next draw is known already.
   bool known() const { return looked_ < draws_.size() && draws_[looked_].valid; }
   std::uint64_t drawKey(std::size_t draw) const { return mixBits(seed_, draw); }

@@ -1,0 +1,157 @@
+#include <experiments/two_view_validation.hpp>
+
+#include <experiments/parallel.hpp>
+#include <fusion/two_view/models.hpp>
+#include <stats/hierarchy.hpp>
+#include <stats/validation.hpp>
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace liestat::experiments {
+namespace {
+
+
+/// eᵀ Σ⁺ e for a covariance of known rank.
+double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, int rank) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+  double sum = 0;
+  for (int k = 0; k < rank; ++k) {
+    const Eigen::Index i = covariance.rows() - 1 - k;
+    sum += std::pow(eigen.eigenvectors().col(i).dot(error), 2) / eigen.eigenvalues()[i];
+  }
+  return sum;
+}
+
+std::size_t indexOf(const std::string& model) {
+  std::size_t k = 0;
+  while (k < default_two_view_motions.size() && nameOf(default_two_view_motions[k]) != model) ++k;
+  return k;
+}
+
+struct Trial {
+  std::size_t chosen = 0;
+  std::optional<double> distance;
+};
+
+Trial runTrial(const TwoViewSceneOptions& options, std::uint64_t seed) {
+  const TwoViewScene scene(options, seed);
+  const double sigma = options.sigma / options.focal_length;
+  const TwoViewImages images{{sigma, sigma}, Eigen::Vector2d(options.width, options.height) / options.focal_length};
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(twoViewModels(images), {.seed = seed});
+  search.add(scene.matches);
+  while (search.iterate()) {
+  }
+  Trial trial;
+  trial.chosen = indexOf(search.models()[search.best()]->name());
+  const std::size_t m = search.find(nameOf(options.motion));
+  const auto& state = search.state(m);
+  const int rank = search.models()[m]->freeParameters();
+  if (!state.hasEstimate() || rank == 0) return trial;
+  const auto& estimate = state.estimate;
+  if (options.motion == TwoViewMotion::essential) {
+    const Essentiald truth(SO3d::fitToSO3(scene.R), scene.t);
+    trial.distance = squaredDistance(log(estimate.parameter.pose, truth), estimate.covariance, rank);
+  } else {
+    Eigen::Matrix3d truth = isEpipolar(options.motion) ? scene.F : scene.H;
+    if ((truth.array() * estimate.parameter.matrix.array()).sum() < 0) truth = -truth;
+    const Eigen::Matrix3d e = truth - estimate.parameter.matrix;
+    trial.distance =
+        squaredDistance(Eigen::Map<const Eigen::Matrix<double, 9, 1>>(e.data()), estimate.covariance, rank);
+  }
+  return trial;
+}
+
+int dimensionOf(TwoViewMotion motion) {
+  for (const auto& model : twoViewModels({})) {
+    if (model->name() == nameOf(motion)) return model->freeParameters();
+  }
+  return 0;
+}
+
+/// Whether `right` of `trials` is within four standard errors of a share, or above it.
+bool reaches(double right, double trials, double share) {
+  return right >= share * trials - 4 * std::sqrt(share * (1 - share) * trials);
+}
+
+}  // namespace
+
+std::string name(TwoViewMotion motion) {
+  std::string text = nameOf(motion);
+  std::replace(text.begin(), text.end(), ' ', '_');
+  return text;
+}
+
+std::size_t TwoViewChoice::right() const { return chosen[indexOf(nameOf(truth))]; }
+
+double TwoViewValidationResult::average() const {
+  double sum = 0;
+  for (const TwoViewChoice& c : choices) sum += static_cast<double>(c.right()) / static_cast<double>(c.trials);
+  return sum / static_cast<double>(choices.size());
+}
+
+Tally TwoViewValidationResult::tally() const {
+  Tally count = experiments::tally(choices);
+  count.judged += average_passed.has_value();
+  count.failed += !average_passed.value_or(true);
+  return count;
+}
+
+TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
+                                        const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  TwoViewValidationResult result;
+  const std::uint64_t all = validation.trials * validation.motions.size();
+  std::uint64_t before = 0;
+  for (const TwoViewMotion motion : validation.motions) {
+    const TwoViewSceneOptions options{.motion = motion,
+                                      .matches = validation.matches,
+                                      .outliers = validation.outliers,
+                                      .sigma = validation.sigma};
+    const int k = dimensionOf(motion);
+    std::vector<std::size_t> chosen(validation.trials);
+    const ValidationOptions how{.trials = validation.trials,
+                                .seed = validation.seed,
+                                .chunk_size = 4,
+                                .progress = [&](std::size_t done, std::size_t) {
+                                  if (progress) progress(before + done, all);
+                                }};
+    auto reports = validateAll(ProgramExecutor{validation.threads}, how, {ReferenceLaw::chiSquared(std::max(k, 1))},
+                               [&](CounterRng&, std::uint64_t number) {
+                                 // Each trial has a place of its own.
+                                 const Trial trial = runTrial(options, validation.seed * 1000003 + number);
+                                 chosen[number] = trial.chosen;
+                                 TrialOutcome outcome;
+                                 outcome.failed = !trial.distance && k > 0;
+                                 outcome.mu2 = trial.distance.value_or(0);
+                                 return std::vector<TrialOutcome>{outcome};
+                               });
+    before += validation.trials;
+    TwoViewChoice choice;
+    choice.truth = motion;
+    choice.trials = validation.trials;
+    for (const std::size_t c : chosen) ++choice.chosen[c];
+    choice.passed = reaches(static_cast<double>(choice.right()), static_cast<double>(choice.trials), promised_row);
+    result.choices.push_back(choice);
+    if (k == 0) continue;
+    TwoViewRow row;
+    row.motion = motion;
+    row.setReport(std::move(reports[0]));
+    // Errors beyond the 0.99 quantile are cut off, outliers below it are not: what that makes of the index, and the
+    // curvature of the longest motions (docs/two_view.md).
+    row.promise = ValidationTolerance{.index = 0.1, .ks = 0.05, .failure_fraction = 0.01, .tail = 0.02};
+    row.judge(run_false_alarm / static_cast<double>(validation.motions.size()));
+    row.forgetDistances();
+    result.rows.push_back(std::move(row));
+  }
+  if (validation.motions.size() == default_two_view_motions.size()) {
+    result.average_passed =
+        reaches(result.average() * static_cast<double>(all), static_cast<double>(all), promised_average);
+  }
+  return result;
+}
+
+}  // namespace liestat::experiments

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <experiments/judged_report.hpp>
+#include <experiments/two_view_scene.hpp>
+#include <stats/validation_report.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// The simulated motions of `liestat validate two-view`: which model the hierarchy chooses, and whether the truth lies
+/// where the covariance of the true model's estimate says.
+struct TwoViewValidation {
+  std::vector<TwoViewMotion> motions{default_two_view_motions.begin(), default_two_view_motions.end()};
+  std::size_t trials = 50;  ///< a motion
+  std::uint64_t seed = 1;
+  int threads = 0;
+  std::size_t matches = 100;
+  double outliers = 0.2;  ///< share of the matches
+  double sigma = 0.5;     ///< px
+};
+
+/// The name of a motion in options and JSON fields.
+std::string name(TwoViewMotion motion);
+
+/// Which model was chosen how often.
+struct TwoViewChoice {
+  TwoViewMotion truth = TwoViewMotion::none;
+  std::size_t trials = 0;
+  std::array<std::size_t, default_two_view_motions.size()> chosen = {};
+  /// Whether that many right choices are likely at the share that is promised.
+  std::optional<bool> passed;
+  std::size_t right() const;
+};
+/// The choices that a row of 500 trials is promised to reach: none under 90 %, 96 % on average.
+inline constexpr double promised_row = 0.9, promised_average = 0.96;
+
+/// The squared distance of the true parameter from the true model's estimate.
+struct TwoViewRow : JudgedReport {
+  TwoViewMotion motion = TwoViewMotion::none;
+};
+
+struct TwoViewValidationResult {
+  std::vector<TwoViewRow> rows;         ///< of motions with a parameter
+  std::vector<TwoViewChoice> choices;   ///< of all motions
+  std::optional<bool> average_passed;   ///< where all motions were asked for
+  double average() const;               ///< share of right choices
+  Tally tally() const;                  ///< of choices and their average
+};
+
+/// Runs everything; in the order of the motions.
+TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
+                                        const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+}  // namespace liestat::experiments
