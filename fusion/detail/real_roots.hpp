@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 
@@ -54,14 +55,20 @@ class RealRoots {
     const double value = negative_ ? -x : x;
     roots_[index(size_++)] = reversed_ ? Root{negative_ ? -1. : 1., x} : Root{value, 1};
   }
-  /// Changes of sign, zeros left out; two or more count as two.
+  /// Changes of sign, zeros left out.
   static int changes(const double* b) {
+    unsigned negative = 0, zero = 0;
+    for (int k = 0; k <= n; ++k) {
+      negative |= (b[k] < 0 ? 1U : 0U) << k;
+      zero |= (b[k] == 0 ? 1U : 0U) << k;
+    }
+    if (zero == 0) return std::popcount((negative ^ (negative >> 1)) & ((1U << n) - 1));
     int count = 0;
     double last = 0;
     for (int k = 0; k <= n; ++k) {
       if (b[k] == 0) continue;
-      count += last * b[k] < 0 ? 1 : 0;
-      last = b[k] > 0 ? 1 : -1;
+      count += (last < 0 && b[k] > 0) || (last > 0 && b[k] < 0) ? 1 : 0;
+      last = b[k];
     }
     return count;
   }

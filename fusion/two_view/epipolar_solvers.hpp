@@ -102,18 +102,18 @@ struct EpipolarNormalisation {
   }
 };
 
-/// The coefficients of ũ'ᵀ F ũ by the entries of F, row after row.
-inline void epipolarRow(const Eigen::Vector4d& m, double (&row)[9]) {
+/// The coefficients of ũ'ᵀ F ũ by the entries of F, row after row, and a zero.
+inline NineColumns<1> epipolarEquation(const Eigen::Vector4d& m) {
   const double x = m[0], y = m[1], x2 = m[2], y2 = m[3];
-  row[0] = x2 * x;
-  row[1] = x2 * y;
-  row[2] = x2;
-  row[3] = y2 * x;
-  row[4] = y2 * y;
-  row[5] = y2;
-  row[6] = x;
-  row[7] = y;
-  row[8] = 1;
+  NineColumns<1> equation;
+  equation << x2 * x, x2 * y, x2, y2 * x, y2 * y, y2, x, y, 1, 0;
+  return equation;
+}
+/// The matrix with the given entries, row after row.
+inline Eigen::Matrix3d matrixOf(const NineColumns<1>& f) {
+  Eigen::Matrix3d F;
+  F << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];
+  return F;
 }
 
 }  // namespace detail
@@ -182,11 +182,12 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
     if (of_matches.allFinite()) result.add(of_matches);
   };
   if (matches.size() == 7) {
-    double rows[7][9], basis[2][9];
-    for (std::size_t i = 0; i < 7; ++i) detail::epipolarRow(normalised.apply(matches[i]), rows[i]);
-    if (!detail::nullBasis(rows, basis)) return result;
-    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    const Eigen::Matrix3d A = Eigen::Map<const RowMajor>(basis[0]), B = Eigen::Map<const RowMajor>(basis[1]);
+    detail::NineColumns<7> equations;
+    detail::NineColumns<2> basis;
+    for (int i = 0; i < 7; ++i)
+      equations.col(i) = detail::epipolarEquation(normalised.apply(matches[static_cast<std::size_t>(i)]));
+    if (!detail::nullBasis<7>(equations, basis)) return result;
+    const Eigen::Matrix3d A = detail::matrixOf(basis.col(0)), B = detail::matrixOf(basis.col(1));
     // det(z A + w B), by z's powers.
     const Eigen::Matrix3d a = detail::cofactors(A), b = detail::cofactors(B);
     const detail::RealRoots<3> roots(
@@ -197,10 +198,12 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
   Eigen::Matrix<double, 9, 1> f;
   if (matches.size() == 8) {
     // Eight equations as they are: their squares would lose half the digits.
-    double rows[8][9], basis[1][9];
-    for (std::size_t i = 0; i < 8; ++i) detail::epipolarRow(normalised.apply(matches[i]), rows[i]);
-    if (!detail::nullBasis(rows, basis)) return result;
-    std::copy(basis[0], basis[0] + 9, f.data());
+    detail::NineColumns<8> equations;
+    detail::NineColumns<1> basis;
+    for (int i = 0; i < 8; ++i)
+      equations.col(i) = detail::epipolarEquation(normalised.apply(matches[static_cast<std::size_t>(i)]));
+    if (!detail::nullBasis<8>(equations, basis)) return result;
+    f = basis.head<9>();
   } else {
     Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Zero();
     for (const Eigen::Vector4d& m : matches) {

@@ -18,7 +18,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -32,45 +31,39 @@ namespace liestat {
 inline MatrixSolutions<10> solveEssential(std::span<const Eigen::Vector4d> matches) {
   MatrixSolutions<10> result;
   if (matches.size() != 5) return result;
-  double rows[5][9], basis[4][9];
+  detail::NineColumns<5> rows;
+  detail::NineColumns<4> basis;
   std::array<Eigen::Vector3d, 5> first, second;
   for (std::size_t i = 0; i < 5; ++i) {
     const Eigen::Vector4d& m = matches[i];
-    detail::epipolarRow(m, rows[i]);
+    rows.col(static_cast<Eigen::Index>(i)) = detail::epipolarEquation(m);
     first[i] = Eigen::Vector3d(m[0], m[1], 1);
     second[i] = Eigen::Vector3d(m[2], m[3], 1);
   }
-  if (!detail::nullBasis(rows, basis)) return result;
+  if (!detail::nullBasis<5>(rows, basis)) return result;
   // Where a pivot is small, roots lose as many digits: another basis of the same matrices does better nearly always.
   detail::FivePointEquations equations;
   double pivot = equations.eliminate(basis);
   for (int attempt = 0; attempt < 2 && pivot < 1e-3; ++attempt) {
-    double turned[4][9];
-    for (int k = 0; k < 9; ++k) {
-      const double a = basis[0][k] + basis[1][k], b = basis[0][k] - basis[1][k], c = basis[2][k] + basis[3][k],
-                   d = basis[2][k] - basis[3][k];
-      turned[0][k] = 0.5 * (b - d);
-      turned[1][k] = 0.5 * (a + c);
-      turned[2][k] = 0.5 * (b + d);
-      turned[3][k] = 0.5 * (a - c);
-    }
+    // An orthogonal matrix without zeros, other than its own inverse.
+    const detail::NineColumns<1> p = basis.col(0) + basis.col(1), m = basis.col(0) - basis.col(1),
+                                 q = basis.col(2) + basis.col(3), n = basis.col(2) - basis.col(3);
+    detail::NineColumns<4> turned;
+    turned << 0.5 * (m - n), 0.5 * (p + q), 0.5 * (m + n), 0.5 * (p - q);
     detail::FivePointEquations others;
     const double other = others.eliminate(turned);
     if (other > pivot) {
       pivot = other;
       equations = others;
-      std::copy(&turned[0][0], &turned[0][0] + 36, &basis[0][0]);
+      basis = turned;
     }
   }
   if (!(pivot > 1e-13)) return result;
   const detail::RealRoots<10> roots(equations.determinant(), 1e-9);
   for (int i = 0; i < roots.size(); ++i) {
     const Eigen::Vector4d c = equations.coefficients(roots[i].z, roots[i].w);
-    Eigen::Matrix3d E;
-    for (int k = 0; k < 9; ++k) {
-      const double entry = c[0] * basis[0][k] + c[1] * basis[1][k] + c[2] * basis[2][k] + c[3] * basis[3][k];
-      E(k / 3, k % 3) = entry;
-    }
+    Eigen::Matrix3d E =
+        detail::matrixOf(c[0] * basis.col(0) + c[1] * basis.col(1) + c[2] * basis.col(2) + c[3] * basis.col(3));
     if (!detail::polishEssential(first, second, E)) continue;
     bool known = false;
     for (const Eigen::Matrix3d& other : result) {
