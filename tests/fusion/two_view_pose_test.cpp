@@ -1,8 +1,9 @@
-// Five points, poses of essential matrices and planes, focal lengths of fundamental matrices.
+// Five points, three with the vertical, poses of essential matrices and planes, focal lengths of fundamental matrices.
 
 #include <fusion/two_view/five_point.hpp>
 #include <fusion/two_view/focal_lengths.hpp>
 #include <fusion/two_view/pose.hpp>
+#include <fusion/two_view/upright.hpp>
 #include <support/two_view_checks.hpp>
 
 #include <gtest/gtest.h>
@@ -92,6 +93,56 @@ TEST(FivePoint, DegenerateSamplesHaveNoSolution) {
       EXPECT_TRUE(solveEssential(broken).empty());
     }
   }
+}
+
+TEST(Upright, FindsTheTruth) {
+  std::vector<double> errors;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    CounterRng random(seed, 0, 9);
+    const Eigen::Vector3d up = random.uniform(0.1, 10) * random.unitVector<3>();
+    const TwoViewScene scene({.outliers = 0}, seed);
+    for (std::size_t i = 0; i + 3 <= 60; i += 3) {
+      const Matches sample = Matches(scene.exact).subspan(i, 3);
+      const auto found = solveEssentialUpright(sample, up, 3 * scene.R * up);
+      errors.push_back(nearest(found, scene.F));
+      for (const Eigen::Matrix3d& E : found) {
+        EXPECT_NEAR(E.squaredNorm(), 2, 1e-13);
+        for (const Eigen::Vector4d& m : sample) EXPECT_LT(residual(E, m), 1e-9);
+        // The rotation keeps the vertical: E = [t]× R, one of two rotations.
+        double kept = 1;
+        for (const TwoViewPose& pose : posesOfEssential(E)) {
+          kept = std::min(kept, (pose.R * up.normalized() - scene.R * up.normalized()).norm());
+        }
+        EXPECT_LT(kept, 1e-7);
+      }
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 1e-13);
+  EXPECT_LT(errors[errors.size() - 3], 1e-9);
+}
+
+TEST(Upright, DegenerateSamplesHaveNoSolution) {
+  const Eigen::Vector3d up(0.1, -1, 0.2);
+  for (const TwoViewMotion motion : {TwoViewMotion::none, TwoViewMotion::rotation}) {
+    const TwoViewScene scene({.motion = motion, .outliers = 0}, 3);
+    for (std::size_t k = 0; k < 90; k += 3) {
+      EXPECT_TRUE(solveEssentialUpright(Matches(scene.exact).subspan(k, 3), up, scene.R * up).empty());
+    }
+  }
+  const TwoViewScene scene({.outliers = 0}, 3);
+  std::vector<Eigen::Vector4d> sample(scene.exact.begin(), scene.exact.begin() + 3);
+  ASSERT_FALSE(solveEssentialUpright(sample, up, scene.R * up).empty());
+  // Along the y axis the other way: half a turn.
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitY();
+  EXPECT_LT(nearest(solveEssentialUpright(sample, down, scene.R * down), scene.F), 1e-9);
+  EXPECT_TRUE(solveEssentialUpright(sample, Eigen::Vector3d::Zero(), up).empty());
+  EXPECT_TRUE(solveEssentialUpright(sample, up, Eigen::Vector3d::Constant(std::nan(""))).empty());
+  EXPECT_TRUE(solveEssentialUpright(Matches(sample).first(2), up, scene.R * up).empty());
+  sample[1] = sample[0];
+  EXPECT_TRUE(solveEssentialUpright(sample, up, scene.R * up).empty());
+  sample[1][2] = std::nan("");
+  EXPECT_TRUE(solveEssentialUpright(sample, up, scene.R * up).empty());
 }
 
 TEST(TwoViewPose, EssentialMatrixGivesThePoseBack) {
