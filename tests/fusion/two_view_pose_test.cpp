@@ -69,6 +69,44 @@ TEST(FivePoint, PlanesAndTranslationsAreNoException) {
   }
 }
 
+/// Smallest to largest singular value of the five equations' derivatives by the pose.
+double conditionAt(const TwoViewPose& pose, Matches sample) {
+  const Eigen::Vector3d p = pose.t.unitOrthogonal(), q = pose.t.cross(p);
+  Eigen::Matrix<double, 5, 5> J;
+  for (int i = 0; i < 5; ++i) {
+    const Eigen::Vector4d& m = sample[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d v(m[2], m[3], 1), y = pose.R * Eigen::Vector3d(m[0], m[1], 1), n = y.cross(v);
+    J.row(i) << y.cross(v.cross(pose.t)).transpose(), n.dot(p), n.dot(q);
+  }
+  const detail::SmallSvd svd(detail::SmallMatrix::of<5, 5>(J));
+  return svd.value(4) / svd.value(0);
+}
+
+// Points of a grid and motions along axes make bases with zeros and solutions that share coordinates.
+TEST(FivePoint, PointsOfAGrid) {
+  for (const Eigen::Vector3d& way : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 1, 1)}) {
+    CounterRng random(5);
+    const TwoViewPose pose{Eigen::Matrix3d::Identity(), way.normalized()};
+    int well = 0, found = 0;
+    const auto integer = [&](double low, double high) { return std::floor(random.uniform(low, high)); };
+    for (int trial = 0; trial < 1000; ++trial) {
+      std::vector<Eigen::Vector4d> sample;
+      for (int i = 0; i < 5; ++i) {
+        const double x = integer(-2, 3), y = integer(-2, 3), z = integer(4, 8);
+        const Eigen::Vector3d second = Eigen::Vector3d(x, y, z) + 0.5 * way;
+        sample.emplace_back(x / z, y / z, second.x() / second.z(), second.y() / second.z());
+      }
+      const auto solutions = solveEssential(sample);
+      // Equal points, or all in one plane with a camera.
+      if (solutions.empty() || conditionAt(pose, sample) < 1e-5) continue;
+      ++well;
+      found += nearest(solutions, essentialFromPose(pose)) < 1e-8 ? 1 : 0;
+    }
+    EXPECT_GT(well, 500);
+    EXPECT_GE(found, 0.998 * well) << way.transpose();
+  }
+}
+
 TEST(FivePoint, DegenerateSamplesHaveNoSolution) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
