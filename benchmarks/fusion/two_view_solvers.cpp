@@ -1,11 +1,9 @@
 // The closed-form solvers of two-view motion: one solve of a minimal sample, or of more matches, averaged over samples
 // of many scenes with half a pixel of noise. `solutions` is their mean number.
 #include <experiments/two_view_scene.hpp>
-#include <fusion/two_view/epipolar_solvers.hpp>
-#include <fusion/two_view/five_point.hpp>
 #include <fusion/two_view/focal_lengths.hpp>
-#include <fusion/two_view/homography_solvers.hpp>
 #include <fusion/two_view/pose.hpp>
+#include <fusion/two_view/solvers.hpp>
 
 #include <benchmark/benchmark.h>
 

@@ -1,19 +1,7 @@
 // Closed-form solvers for motions between two images that are told by an epipolar geometry, ũ'ᵀ F ũ = 0, ũ = (u, 1).
 //
-// A match is (u.x, u.y, u'.x, u'.y) in normalised coordinates, u = (p - c)/f; fundamental and affine epipolar geometry
-// take any coordinates. Each takes its minimal number of matches or more, and then solves linear least squares, a start
-// for an estimator that knows the noise of each match. ‖F‖² = 2, as of [t]× R with |t| = 1. Essential matrices:
-// fusion/two_view/five_point.hpp.
-//
-//   matches  solver                       F
-//   2        solveTranslation             [t]×: x' = x + t, with the sign that puts most points in front
-//   4        solveAffineEpipolar          zero but for F13, F23, F31, F32, F33: two affine cameras
-//   7        solveFundamental             det F = 0: up to three; of eight or more one
-//
-// A solver gives no solution for a sample that does not determine it, told without a scale: an equation that depends on
-// the others to 1e-12 of its size, or normal equations that lack a second direction to 1e-13 of their trace; for a
-// translation, matches that move by less than 1e-12 rad or all along one epipolar line to 1e-9; not finite; fewer
-// matches than needed.
+// Translation, affine and general epipolar geometry; essential matrices are in five_point.hpp and upright.hpp. ‖F‖² = 2,
+// as of [t]× R with |t| = 1. Which samples have no solution: fusion/two_view/solvers.hpp.
 #pragma once
 
 #include <fusion/detail/match_sums.hpp>

@@ -1,8 +1,7 @@
 // Closed-form solvers of two-view motion: exact data of many scenes, more matches than needed, any unit and origin, and
 // samples that determine nothing.
 
-#include <fusion/two_view/epipolar_solvers.hpp>
-#include <fusion/two_view/homography_solvers.hpp>
+#include <fusion/two_view/solvers.hpp>
 #include <support/two_view_checks.hpp>
 
 #include <gtest/gtest.h>
