@@ -266,6 +266,24 @@ TEST(RobustSearch, ARiskOfRejectionIsKeptAndSavesMost) {
   EXPECT_LT(static_cast<double>(with), 0.5 * static_cast<double>(without));
 }
 
+TEST(RobustSearch, LessThanTheLeastScoreIsNothing) {
+  std::size_t with = 0, without = 0;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const TruncatedCost rule{threshold};
+    // Uniform points: the best line has some ten of 500 near it.
+    const auto noise = lineScene<LineModelOfSome>(0, 500, seed);
+    EXPECT_FALSE(searched(noise, rule, {.seed = seed, .least_score = 50}).best().parameter);
+    EXPECT_TRUE(searched(noise, rule, {.seed = seed}).best().parameter);
+    const auto model = lineScene<LineModelOfSome>(150, 350, seed);
+    const auto a = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6, .least_score = 50}),
+               b = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6});
+    EXPECT_EQ(a.best().draw, b.best().draw);
+    EXPECT_EQ(a.best().score, b.best().score);
+    with += a.evaluatedErrors(), without += b.evaluatedErrors();
+  }
+  EXPECT_LT(with, without);
+}
+
 TEST(RobustSearch, PolishRaisesTheBest) {
   double with = 0, without = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
