@@ -41,8 +41,8 @@ concept RobustModel = requires(const T& model, const typename T::Parameter& para
   { model.refine(parameter, measurements) } -> std::convertible_to<std::optional<typename T::Parameter>>;
 };
 
-/// A model that also has the errors of some measurements, in the order in which they are named: hypotheses are then given
-/// up as soon as they cannot be better than the best.
+/// A model that also has the errors of some measurements, in the order in which they are named: hypotheses are then
+/// given up as soon as they cannot be better than the best.
 template <class T>
 concept ModelOfSome = RobustModel<T> && requires(const T& model, const typename T::Parameter& parameter,
                                                  std::span<const std::size_t> measurements, std::span<double> errors) {
@@ -103,12 +103,13 @@ class RobustSearch {
     history_.reserve(64);
     if constexpr (rejects) orderMeasurements();
   }
+  RobustSearch(const Model&&, const Rule&, const RobustSearchOptions& = {}) = delete;  // the model must live on
 
   /// One draw: a minimal sample, its solutions, their scores. True if the best improved. With fewer measurements than a
-  /// sample needs nothing happens.
+  /// sample needs, or none, nothing happens.
   bool iterate() {
     ++draws_;
-    if (model_->size() < sample_size || sample_size == 0) return false;
+    if (model_->size() < std::max<std::size_t>(sample_size, 1)) return false;
     CounterRng rng(options_.seed, draws_);
     drawSample(rng);
     solutions_.clear();
@@ -140,9 +141,9 @@ class RobustSearch {
   /// So many draws are done.
   bool confidenceReached(double confidence) const { return draws_ >= neededDraws(confidence); }
 
-  /// The best, refined once: estimated from its inliers, classified again, estimated again. To repeat that until nothing
-  /// changes makes a threshold that follows the scale collapse. An estimate stands if the cost that it minimises, the
-  /// truncated one, is not higher; the score may be lower where the rule is another. Else what was best.
+  /// The best, refined once: estimated from its inliers, classified again, estimated again. To repeat that until
+  /// nothing changes makes a threshold that follows the scale collapse. An estimate stands if the cost that it
+  /// minimises, the truncated one, is not higher; the score may be lower where the rule is another. Else what was best.
   RobustEstimate<Parameter> refined() const {
     RobustEstimate<Parameter> result = best_;
     if (!result.parameter) return result;
@@ -170,7 +171,7 @@ class RobustSearch {
   /// Distinct measurements, each set with the same probability (Floyd's algorithm).
   void drawSample(CounterRng& rng) {
     const std::size_t n = model_->size();
-    for (std::size_t k = 0; k < sample_size; ++k) {
+    for (std::size_t k = 0; k != sample_size; ++k) {
       const std::size_t j = n - sample_size + k, i = below(j + 1, rng);
       const auto end = sample_.begin() + static_cast<std::ptrdiff_t>(k);
       sample_[k] = std::find(sample_.begin(), end, i) == end ? i : j;
@@ -190,10 +191,10 @@ class RobustSearch {
     std::copy_n(order_.begin(), n, order_.begin() + static_cast<std::ptrdiff_t>(n));
   }
 
-  /// True if the hypothesis cannot become the best, or does not with all but the probability `rejection_risk`: the mean of
-  /// k numbers of [0, 1] drawn at random from several with the mean μ is m < μ or less with no more than the probability
-  /// exp(-k D), D = m log(m/μ) + (1 - m) log((1 - m)/(1 - μ)) (W. Hoeffding 1963, theorem 1 and section 6). The j-th look
-  /// takes 6/(πj)² of the risk, which adds up to all of it.
+  /// True if the hypothesis cannot become the best, or does not with all but the probability `rejection_risk`: the mean
+  /// of k numbers of [0, 1] drawn at random from several with the mean μ is m < μ or less with no more than the
+  /// probability exp(-k D), D = m log(m/μ) + (1 - m) log((1 - m)/(1 - μ)) (W. Hoeffding 1963, theorem 1 and section 6).
+  /// The j-th look takes 6/(πj)² of the risk, which adds up to all of it.
   bool isHopeless([[maybe_unused]] const Parameter& parameter, [[maybe_unused]] CounterRng& rng) {
     if constexpr (rejects) {
       const double to_beat = std::max(best_.score, options_.least_score);

@@ -318,6 +318,23 @@ TEST(RobustSearch, StopsWhenTheDrawsAreEnough) {
   EXPECT_GE(found, 190);
 }
 
+TEST(RobustSearch, AModelWithoutFreedomNeedsNoSample) {
+  struct TheAxis : LineModel {
+    static constexpr std::size_t sample_size = 0;
+    void solve(std::span<const std::size_t>, std::vector<Eigen::Vector3d>& solutions) const {
+      solutions.emplace_back(0, 1, 0);
+    }
+  };
+  TheAxis axis;
+  axis.sigma = 1;
+  axis.points = {{0, 0}, {1, 1}, {2, 10}};
+  RobustSearch search(axis, InlierCount{threshold});
+  EXPECT_TRUE(search.iterate());
+  EXPECT_FALSE(search.iterate());
+  EXPECT_EQ(search.best().score, 2);
+  EXPECT_TRUE(search.confidenceReached(0.9999)) << "one draw is all";
+}
+
 TEST(RobustSearch, IsDeterministic) {
   const auto model = lineScene<LineModelOfSome>(40, 40, 1);
   const auto run = [&](std::uint64_t seed) { return searched(model, Relevance{2 * threshold}, {.seed = seed}).best(); };
