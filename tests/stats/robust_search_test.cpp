@@ -319,13 +319,15 @@ TEST(RobustSearch, StopsWhenTheDrawsAreEnough) {
   EXPECT_GE(found, 190);
 }
 
+/// A model of no freedom.
+struct TheAxis : LineModel {
+  static constexpr std::size_t sample_size = 0;
+  void solve(std::span<const std::size_t>, std::vector<Eigen::Vector3d>& solutions) const {
+    solutions.emplace_back(0, 1, 0);
+  }
+};
+
 TEST(RobustSearch, AModelWithoutFreedomNeedsNoSample) {
-  struct TheAxis : LineModel {
-    static constexpr std::size_t sample_size = 0;
-    void solve(std::span<const std::size_t>, std::vector<Eigen::Vector3d>& solutions) const {
-      solutions.emplace_back(0, 1, 0);
-    }
-  };
   TheAxis axis;
   axis.sigma = 1;
   axis.points = {{0, 0}, {1, 1}, {2, 10}};
