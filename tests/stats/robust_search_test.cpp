@@ -224,8 +224,8 @@ void rejectionChangesNothing(const Rule& rule, double largest_share) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const auto model = lineScene<LineModelOfSome>(300, 200, seed);
     const auto a = searched(model, rule, {.seed = seed}),
-               b = searched(model, rule, {.seed = seed, .early_rejection = false}),
-               c = searched(static_cast<const LineModel&>(model), rule, {.seed = seed});
+               b = searched(model, rule, {.seed = seed, .early_rejection = false});
+    const auto c = searched(static_cast<const LineModel&>(model), rule, {.seed = seed});
     for (const auto& other : {b.best(), c.best()}) {
       EXPECT_EQ(a.best().score, other.score);
       EXPECT_EQ(a.best().draw, other.draw);
