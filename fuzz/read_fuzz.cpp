@@ -2,6 +2,7 @@
 //
 //   build/sanitize/fuzz/read_fuzz -max_total_time=120 new_corpus fuzz/corpus/read
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -38,7 +39,9 @@ void check(const liestat::cli::FeatureFile& file) {
   for (const auto& rotation : file.rotations) require(std::abs(rotation.norm() - 1) < 1e-14);
   for (const auto& position : file.positions) require(position.allFinite());
   for (const auto& direction : file.directions) require(std::abs(direction.norm() - 1) < 1e-14);
-  for (const double weight : file.weights) require(weight > 0 && std::isfinite(weight));
+  // A weight of zero leaves a row out; some row stays.
+  for (const double weight : file.weights) require(weight >= 0 && std::isfinite(weight));
+  require(file.weights.empty() || *std::max_element(file.weights.begin(), file.weights.end()) > 0);
   for (const double time : file.times) require(std::isfinite(time));
   for (const auto& covariance : file.covariances) require(covariance.allFinite() && covariance(0, 0) > 0);
 }

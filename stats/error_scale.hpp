@@ -24,9 +24,9 @@ struct ErrorThreshold {
 
 /// The first local minimum or saddle of the histogram of |e| on [0, 2√T], smoothed over √T/2, that lies below half of
 /// its highest level before: there inliers end and outliers begin. T is that of Relevance, twice the largest error
-/// expected of an inlier. Without a minimum, or with one that is implausible (|e| below 0.58 or above 1.94 times that of
-/// the fallback, which for one equation is 1.5 and 5 standard deviations) the fallback: χ²_{0.99} of the equations of
-/// one measurement.
+/// expected of an inlier. Without a minimum, or with one that is implausible (|e| below 0.58 or above 1.94 times that
+/// of the fallback, which for one equation is 1.5 and 5 standard deviations) the fallback: χ²_{0.99} of the equations
+/// of one measurement.
 inline ErrorThreshold histogramThreshold(std::span<const double> errors, double T, double fallback = 6.6349) {
   constexpr std::size_t bins = 80, reach = 10;  // a bin is √T/40, the window 2·10 + 1 of them
   const ErrorThreshold none{fallback, false};

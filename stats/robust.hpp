@@ -1,11 +1,11 @@
 // Parts of a robust estimation (Viéville, Lingrand and Gaspard 2000, section 4; docs/robust.md): how a hypothesis is
-// scored by the errors of all measurements, how the best score rose and when that is enough, how many random samples are
-// needed, and where the errors of inliers end (stats/error_scale.hpp). The search itself is stats/robust_search.hpp. Needs
-// the standard library alone.
+// scored by the errors of all measurements, how the best score rose and when that is enough, how many random samples
+// are needed, and where the errors of inliers end (stats/error_scale.hpp). The search itself is
+// stats/robust_search.hpp. Needs the standard library alone.
 //
 // An error is the squared distance of a measurement from the model in units of its noise (measurementError() of
-// stats/measurement_error.hpp): of an inlier of the true model χ² with as many degrees of freedom as the measurement has
-// equations. An error that is NaN belongs to an outlier, here and everywhere below.
+// stats/measurement_error.hpp): of an inlier of the true model χ² with as many degrees of freedom as the measurement
+// has equations. An error that is NaN belongs to an outlier, here and everywhere below.
 #pragma once
 
 #include <stats/error_scale.hpp>

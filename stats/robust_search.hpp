@@ -41,8 +41,8 @@ concept RobustModel = requires(const T& model, const typename T::Parameter& para
   { model.refine(parameter, measurements) } -> std::convertible_to<std::optional<typename T::Parameter>>;
 };
 
-/// A model that also has the errors of some measurements, in the order in which they are named: hypotheses are then given
-/// up as soon as they cannot be better than the best.
+/// A model that also has the errors of some measurements, in the order in which they are named: hypotheses are then
+/// given up as soon as they cannot be better than the best.
 template <class T>
 concept ModelOfSome = RobustModel<T> && requires(const T& model, const typename T::Parameter& parameter,
                                                  std::span<const std::size_t> measurements, std::span<double> errors) {
@@ -65,9 +65,12 @@ struct RobustSearchOptions {
   /// This changes no result.
   bool early_rejection = true;
   /// The probability at which a hypothesis that would be the best may be given up by mistake, because the measurements
-  /// seen so far, drawn at random, speak against it (Hoeffding's and Serfling's bounds). 0: never. At 1e-3 most wrong
-  /// hypotheses cost a few dozen measurements, however many there are.
+  /// seen so far, drawn at random, speak against it (Hoeffding's bound). 0: never. At 1e-3 most wrong hypotheses cost a
+  /// few dozen measurements, however many there are.
   double rejection_risk = 0;
+  /// Hypotheses that score no more than this are nothing: they never become the best, and are given up early before
+  /// there is any.
+  double least_score = -std::numeric_limits<double>::infinity();
   /// Improve each new best by the model's polish(), where it has one.
   bool local_optimisation = true;
   int polish_rounds = 4;  ///< at most; fewer where the score does not rise
@@ -100,19 +103,20 @@ class RobustSearch {
     history_.reserve(64);
     if constexpr (rejects) orderMeasurements();
   }
+  RobustSearch(const Model&&, const Rule&, const RobustSearchOptions& = {}) = delete;  // the model must live on
 
   /// One draw: a minimal sample, its solutions, their scores. True if the best improved. With fewer measurements than a
-  /// sample needs nothing happens.
+  /// sample needs, or none, nothing happens.
   bool iterate() {
     ++draws_;
-    if (model_->size() < sample_size || sample_size == 0) return false;
+    if (model_->size() < std::max<std::size_t>(sample_size, 1)) return false;
     CounterRng rng(options_.seed, draws_);
     drawSample(rng);
     solutions_.clear();
     model_->solve(std::span<const std::size_t>(sample_), solutions_);
     bool improved = false;
     for (const Parameter& solution : solutions_) {
-      if (isHopeless(solution, rng) || !evaluate(solution, best_.score)) continue;
+      if (isHopeless(solution, rng) || !evaluate(solution)) continue;
       std::swap(best_, candidate_);
       best_.draw = draws_;
       improved = true;
@@ -137,9 +141,9 @@ class RobustSearch {
   /// So many draws are done.
   bool confidenceReached(double confidence) const { return draws_ >= neededDraws(confidence); }
 
-  /// The best, refined once: estimated from its inliers, classified again, estimated again. To repeat that until nothing
-  /// changes makes a threshold that follows the scale collapse. An estimate stands if the cost that it minimises, the
-  /// truncated one, is not higher; the score may be lower where the rule is another. Else what was best.
+  /// The best, refined once: estimated from its inliers, classified again, estimated again. To repeat that until
+  /// nothing changes makes a threshold that follows the scale collapse. An estimate stands if the cost that it
+  /// minimises, the truncated one, is not higher; the score may be lower where the rule is another. Else what was best.
   RobustEstimate<Parameter> refined() const {
     RobustEstimate<Parameter> result = best_;
     if (!result.parameter) return result;
@@ -162,12 +166,12 @@ class RobustSearch {
 
  private:
   static constexpr bool rejects = ModelOfSome<Model> && BoundedRule<Rule>;
-  static constexpr std::size_t block = 32;
+  static constexpr std::size_t block = 16;
 
   /// Distinct measurements, each set with the same probability (Floyd's algorithm).
   void drawSample(CounterRng& rng) {
     const std::size_t n = model_->size();
-    for (std::size_t k = 0; k < sample_size; ++k) {
+    for (std::size_t k = 0; k != sample_size; ++k) {
       const std::size_t j = n - sample_size + k, i = below(j + 1, rng);
       const auto end = sample_.begin() + static_cast<std::ptrdiff_t>(k);
       sample_[k] = std::find(sample_.begin(), end, i) == end ? i : j;
@@ -187,42 +191,43 @@ class RobustSearch {
     std::copy_n(order_.begin(), n, order_.begin() + static_cast<std::ptrdiff_t>(n));
   }
 
-  /// True if the hypothesis cannot be better than the best, or is not with all but the probability `rejection_risk`:
-  /// the mean of k contributions drawn at random from n, of range c, is below the mean of all by
-  /// c √(log(1/risk) (1 - (k-1)/n) / 2k) with no more than this probability (R. Serfling 1974). The j-th look takes
-  /// 6/(πj)² of the risk, which adds up to all of it.
+  /// True if the hypothesis cannot become the best, or does not with all but the probability `rejection_risk`: the mean
+  /// of k numbers of [0, 1] drawn at random from several with the mean μ is m < μ or less with no more than the
+  /// probability exp(-k D), D = m log(m/μ) + (1 - m) log((1 - m)/(1 - μ)) (W. Hoeffding 1963, theorem 1 and section 6).
+  /// The j-th look takes 6/(πj)² of the risk, which adds up to all of it.
   bool isHopeless([[maybe_unused]] const Parameter& parameter, [[maybe_unused]] CounterRng& rng) {
     if constexpr (rejects) {
-      if (!options_.early_rejection || !best_.parameter) return false;
+      const double to_beat = std::max(best_.score, options_.least_score);
+      if (!options_.early_rejection || !(to_beat > -std::numeric_limits<double>::infinity())) return false;
       const std::size_t n = model_->size();
       const double all = static_cast<double>(n), range = 1 - Rule::lowest;
-      const double required = rule_.required(n, best_.score) - 1e-9 * all;  // whatever the order of a sum rounds
+      const double required = rule_.required(n, to_beat) - 1e-9 * all;  // whatever the order of a sum rounds
       const double risk = options_.rejection_risk * 6 / (3.14159265358979323846 * 3.14159265358979323846);
+      const double mean = std::min((required / all - Rule::lowest) / range, 1.0);
       const std::size_t* measurements = order_.data() + below(n, rng);
       std::array<double, block> errors;
       double sum = 0;
       std::size_t look = 1;
-      for (std::size_t k = 0; k < n;) {
+      for (std::size_t k = 0; k < n; ++look) {
         const std::size_t count = std::min(block, n - k);
         model_->errors(parameter, std::span<const std::size_t>(measurements + k, count),
                        std::span<double>(errors.data(), count));
         evaluated_ += count;
-        for (std::size_t i = 0; i < count; ++i) sum += rule_.contribution(errors[i], best_.score);
+        for (std::size_t i = 0; i < count; ++i) sum += rule_.contribution(errors[i], to_beat);
         k += count;
         const double seen = static_cast<double>(k);
         if (sum + (all - seen) < required) return true;
-        if (!(risk > 0)) continue;
-        const double chance = std::log(static_cast<double>(look * look) / risk);
-        ++look;
-        const double margin = range * std::sqrt(0.5 * chance * seen * (1 - (seen - 1) / all));
-        if (sum + margin < required * (seen / all)) return true;
+        const double m = (sum / seen - Rule::lowest) / range;
+        if (!(risk > 0) || !(m < mean)) continue;
+        const double divergence = (m > 0 ? m * std::log(m / mean) : 0) + (1 - m) * std::log((1 - m) / (1 - mean));
+        if (seen * divergence > std::log(static_cast<double>(look * look) / risk)) return true;
       }
     }
     return false;
   }
 
-  /// Makes the parameter the candidate; true if it scores higher than `score` and has inliers.
-  bool evaluate(const Parameter& parameter, double score) {
+  /// Makes the parameter the candidate; true if it scores higher than the best and has inliers.
+  bool evaluate(const Parameter& parameter) {
     model_->errors(parameter, errors_);
     evaluated_ += errors_.size();
     if constexpr (requires { rule_(errors_, scratch_); }) {
@@ -230,7 +235,7 @@ class RobustSearch {
     } else {
       candidate_.score = rule_(errors_);
     }
-    if (!(candidate_.score > score)) return false;
+    if (!(candidate_.score > std::max(best_.score, options_.least_score))) return false;
     listInliers(errors_, candidate_.inliers);
     candidate_.parameter = parameter;
     candidate_.refined = false;
@@ -241,7 +246,7 @@ class RobustSearch {
     if (!options_.local_optimisation) return;
     for (int round = 0; round < options_.polish_rounds && best_.inliers.size() > sample_size; ++round) {
       const std::optional<Parameter> better = model_->polish(*best_.parameter, best_.inliers);
-      if (!better || !evaluate(*better, best_.score)) return;
+      if (!better || !evaluate(*better)) return;
       std::swap(best_, candidate_);
       best_.draw = draws_;
       best_.refined = true;

@@ -62,38 +62,27 @@ class FivePointEquations {
  public:
   /// The smallest pivot, of coefficients of order one: zero where the ten equations do not determine the ten highest
   /// monomials; all digits but its own are left in the result.
-  double eliminate(const double (&basis)[4][9]) {
-    double a[10][20], smallest = 1;
+  double eliminate(const Eigen::Matrix<double, 10, 4>& basis) {
+    // An equation a column.
+    Eigen::Matrix<double, 20, 10> a;
+    double smallest = 1;
     fill(basis, a);
-    // Rows above the last six are needed only to clear what lies below them.
+    // Those before the last six are needed only to clear what comes after.
     for (int j = 0; j < 10; ++j) {
       int pivot = j;
-      for (int i = j + 1; i < 10; ++i) {
-        if (std::abs(a[i][j]) > std::abs(a[pivot][j])) pivot = i;
-      }
-      smallest = std::min(smallest, std::abs(a[pivot][j]));
+      for (int i = j + 1; i < 10; ++i) pivot = std::abs(a(j, i)) > std::abs(a(j, pivot)) ? i : pivot;
+      smallest = std::min(smallest, std::abs(a(j, pivot)));
       if (!(smallest > 1e-14)) return 0;
-      if (pivot != j) {
-        for (int k = j; k < 20; ++k) std::swap(a[j][k], a[pivot][k]);
-      }
-      const double inverse = 1 / a[j][j];
-      for (int i = j + 1; i < 10; ++i) {
-        const double factor = a[i][j] * inverse;
-        for (int k = j + 1; k < 20; ++k) a[i][k] -= factor * a[j][k];
-      }
-      if (j >= 4) {
-        for (int k = j + 1; k < 20; ++k) a[j][k] *= inverse;
-      }
+      if (pivot != j) a.col(j).swap(a.col(pivot));
+      a.col(j) *= 1 / a(j, j);
+      for (int i = j + 1; i < 10; ++i) a.col(i) -= a(j, i) * a.col(j);
     }
     for (int j = 9; j > 4; --j) {
-      for (int i = 4; i < j; ++i) {
-        const double factor = a[i][j];
-        for (int k = 10; k < 20; ++k) a[i][k] -= factor * a[j][k];
-      }
+      for (int i = 4; i < j; ++i) a.col(i).tail<10>() -= a(j, i) * a.col(j).tail<10>();
     }
-    // Rows 4 to 9 begin with x²z, x², y²z, y², xyz, xy: each pair gives an equation without these.
+    // Equations 4 to 9 begin with x²z, x², y²z, y², xyz, xy: each pair gives an equation without these.
     for (int i = 0; i < 3; ++i) {
-      const double *p = a[4 + 2 * i] + 10, *q = a[5 + 2 * i] + 10;
+      const double *p = a.data() + 20 * (4 + 2 * i) + 10, *q = p + 20;
       for (int v = 0; v < 2; ++v) {
         // By z⁰ to z³ times x, or y.
         double* b = v == 0 ? x_[i] : y_[i];
@@ -168,14 +157,12 @@ class FivePointEquations {
   }
 
  private:
-  static void fill(const double (&basis)[4][9], double (&a)[10][20]) {
+  static void fill(const Eigen::Matrix<double, 10, 4>& basis, Eigen::Matrix<double, 20, 10>& a) {
     double e[9][4];
     for (int k = 0; k < 9; ++k) {
-      for (int v = 0; v < 4; ++v) e[k][v] = basis[v][k];
+      for (int v = 0; v < 4; ++v) e[k][v] = basis(k, v);
     }
-    for (int i = 0; i < 10; ++i) {
-      for (int k = 0; k < 20; ++k) a[i][k] = 0;
-    }
+    a.setZero();
     // Λ = E Eᵀ - ½ tr(E Eᵀ).
     double lambda[3][3][10] = {};
     for (int i = 0; i < 3; ++i) {
@@ -192,7 +179,7 @@ class FivePointEquations {
     }
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
-        for (int k = 0; k < 3; ++k) Cubics::addCubic(lambda[i][k], e[3 * k + j], a[3 * i + j]);
+        for (int k = 0; k < 3; ++k) Cubics::addCubic(lambda[i][k], e[3 * k + j], a.data() + 20 * (3 * i + j));
       }
     }
     for (int j = 0; j < 3; ++j) {
@@ -201,7 +188,7 @@ class FivePointEquations {
       Cubics::addProduct(p, q, minor);
       for (int v = 0; v < 4; ++v) negative[v] = -r[v];
       Cubics::addProduct(negative, s, minor);
-      Cubics::addCubic(minor, e[j], a[9]);
+      Cubics::addCubic(minor, e[j], a.data() + 180);
     }
   }
 

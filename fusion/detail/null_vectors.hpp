@@ -5,63 +5,48 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 
 namespace liestat::detail {
 
-/// Orthonormal vectors that solve Rows linear equations in nine unknowns, in the rows of `basis`. False where an
-/// equation depends on those before it to about 1e-12 of its own size, or is not finite.
-template <std::size_t Rows>
-bool nullBasis(double (&a)[Rows][9], double (&basis)[9 - Rows][9]) {
-  // Gauss' and Jordan's elimination; the largest entry of each row is its pivot.
-  constexpr int rows = static_cast<int>(Rows);
-  int pivots[Rows];
+/// Equations in nine unknowns in the columns, and a zero below each: ten rows are five packets.
+template <int Count>
+using NineColumns = Eigen::Matrix<double, 10, Count>;
+
+/// Orthonormal vectors that solve Count linear equations in nine unknowns. False where an equation depends on those
+/// before it to about 1e-12 of its own size, or is not finite.
+template <int Count>
+bool nullBasis(NineColumns<Count>& a, NineColumns<9 - Count>& basis) {
+  // Gauss' and Jordan's elimination; the largest coefficient of each equation is its pivot.
+  Eigen::Matrix<int, Count, 1> pivots;
   bool free[9] = {true, true, true, true, true, true, true, true, true};
-  for (int i = 0; i < rows; ++i) {
-    double size = 0;
-    for (int j = 0; j < 9; ++j) size = a[i][j] * a[i][j] + size;
-    // Jordan's part is done when the row is reached: less to do in the rows above.
-    for (int k = 0; k < i; ++k) {
-      const double factor = a[i][pivots[k]];
-      for (int j = 0; j < 9; ++j) a[i][j] -= factor * a[k][j];
-    }
-    int pivot = -1;
+  for (int i = 0; i < Count; ++i) {
+    const double size = a.col(i).squaredNorm();
+    // Jordan's part is done when the equation is reached: less to do in those before.
+    for (int k = 0; k < i; ++k) a.col(i) -= a(pivots[k], i) * a.col(k);
+    int pivot = 0;
     double largest = 0;
     for (int j = 0; j < 9; ++j) {
-      const double x = free[j] ? std::abs(a[i][j]) : 0;
-      if (x > largest) {
-        largest = x;
-        pivot = j;
-      }
+      const double x = free[j] ? std::abs(a(j, i)) : 0;
+      pivot = x > largest ? j : pivot;
+      largest = x > largest ? x : largest;
     }
     if (!(largest * largest > 1e-24 * size) || !std::isfinite(size)) return false;
-    const double inverse = 1 / a[i][pivot];
-    for (int j = 0; j < 9; ++j) a[i][j] *= inverse;
-    for (int k = 0; k < i; ++k) {
-      const double factor = a[k][pivot];
-      for (int j = 0; j < 9; ++j) a[k][j] -= factor * a[i][j];
-    }
+    a.col(i) *= 1 / a(pivot, i);
+    for (int k = 0; k < i; ++k) a.col(k) -= a(pivot, k) * a.col(i);
     pivots[i] = pivot;
     free[pivot] = false;
   }
-  int row = 0;
+  int column = 0;
   for (int j = 0; j < 9; ++j) {
     if (!free[j]) continue;
-    double* b = basis[row];
-    for (int k = 0; k < 9; ++k) b[k] = 0;
+    auto b = basis.col(column);
+    b.setZero();
     b[j] = 1;
-    for (int i = 0; i < rows; ++i) b[pivots[i]] = -a[i][j];
-    for (int k = 0; k < row; ++k) {
-      double dot = 0;
-      for (int c = 0; c < 9; ++c) dot += basis[k][c] * b[c];
-      for (int c = 0; c < 9; ++c) b[c] -= dot * basis[k][c];
-    }
-    double square = 0;
-    for (int c = 0; c < 9; ++c) square += b[c] * b[c];
-    const double inverse = 1 / std::sqrt(square);
-    for (int c = 0; c < 9; ++c) b[c] *= inverse;
-    ++row;
+    for (int i = 0; i < Count; ++i) b[pivots[i]] = -a(j, i);
+    for (int k = 0; k < column; ++k) b -= basis.col(k).dot(b) * basis.col(k);
+    b *= 1 / b.norm();
+    ++column;
   }
   return true;
 }

@@ -56,14 +56,21 @@ class RealRoots {
   }
   /// Changes of sign, zeros left out; two or more count as two.
   static int changes(const double* b) {
-    int count = 0;
-    double last = 0;
+    unsigned negative = 0, known = 0;
     for (int k = 0; k <= n; ++k) {
-      if (b[k] == 0) continue;
-      count += last * b[k] < 0 ? 1 : 0;
-      last = b[k] > 0 ? 1 : -1;
+      negative |= (b[k] < 0 ? 1U : 0U) << k;
+      known |= (b[k] != 0 ? 1U : 0U) << k;
     }
-    return count;
+    if (known != (2U << n) - 1) {
+      // A zero takes the sign of the one before it, those at the front that of the first other one.
+      unsigned last = known == 0 ? 0 : (negative / (known & (~known + 1))) & 1U;
+      for (int k = 0; k <= n; ++k) {
+        if ((known >> k & 1U) != 0) last = negative >> k & 1U;
+        negative |= last << k;
+      }
+    }
+    const unsigned changed = (negative ^ (negative >> 1)) & ((1U << n) - 1);
+    return changed == 0 ? 0 : (changed & (changed - 1)) == 0 ? 1 : 2;
   }
 
   /// The roots in [0, 1) of a quarter that begins with 0 or infinity on the positive side, in (0, 1) of the negative

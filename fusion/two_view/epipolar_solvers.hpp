@@ -1,19 +1,7 @@
 // Closed-form solvers for motions between two images that are told by an epipolar geometry, ũ'ᵀ F ũ = 0, ũ = (u, 1).
 //
-// A match is (u.x, u.y, u'.x, u'.y) in normalised coordinates, u = (p - c)/f; fundamental and affine epipolar geometry
-// take any coordinates. Each takes its minimal number of matches or more, and then solves linear least squares, a start
-// for an estimator that knows the noise of each match. ‖F‖² = 2, as of [t]× R with |t| = 1. Essential matrices:
-// fusion/two_view/five_point.hpp.
-//
-//   matches  solver                       F
-//   2        solveTranslation             [t]×: x' = x + t, with the sign that puts most points in front
-//   4        solveAffineEpipolar          zero but for F13, F23, F31, F32, F33: two affine cameras
-//   7        solveFundamental             det F = 0: up to three; of eight or more one
-//
-// A solver gives no solution for a sample that does not determine it, told without a scale: an equation that depends on
-// the others to 1e-12 of its size, or normal equations that lack a second direction to 1e-13 of their trace; for a
-// translation, matches that move by less than 1e-12 rad or all along one epipolar line to 1e-9; not finite; fewer
-// matches than needed.
+// Translation, affine and general epipolar geometry; essential matrices are in five_point.hpp and upright.hpp. ‖F‖² = 2,
+// as of [t]× R with |t| = 1. Which samples have no solution: fusion/two_view/solvers.hpp.
 #pragma once
 
 #include <fusion/detail/match_sums.hpp>
@@ -102,18 +90,18 @@ struct EpipolarNormalisation {
   }
 };
 
-/// The coefficients of ũ'ᵀ F ũ by the entries of F, row after row.
-inline void epipolarRow(const Eigen::Vector4d& m, double (&row)[9]) {
+/// The coefficients of ũ'ᵀ F ũ by the entries of F, row after row, and a zero.
+inline NineColumns<1> epipolarEquation(const Eigen::Vector4d& m) {
   const double x = m[0], y = m[1], x2 = m[2], y2 = m[3];
-  row[0] = x2 * x;
-  row[1] = x2 * y;
-  row[2] = x2;
-  row[3] = y2 * x;
-  row[4] = y2 * y;
-  row[5] = y2;
-  row[6] = x;
-  row[7] = y;
-  row[8] = 1;
+  NineColumns<1> equation;
+  equation << x2 * x, x2 * y, x2, y2 * x, y2 * y, y2, x, y, 1, 0;
+  return equation;
+}
+/// The matrix with the given entries, row after row.
+inline Eigen::Matrix3d matrixOf(const NineColumns<1>& f) {
+  Eigen::Matrix3d F;
+  F << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];
+  return F;
 }
 
 }  // namespace detail
@@ -182,11 +170,12 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
     if (of_matches.allFinite()) result.add(of_matches);
   };
   if (matches.size() == 7) {
-    double rows[7][9], basis[2][9];
-    for (std::size_t i = 0; i < 7; ++i) detail::epipolarRow(normalised.apply(matches[i]), rows[i]);
-    if (!detail::nullBasis(rows, basis)) return result;
-    using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    const Eigen::Matrix3d A = Eigen::Map<const RowMajor>(basis[0]), B = Eigen::Map<const RowMajor>(basis[1]);
+    detail::NineColumns<7> equations;
+    detail::NineColumns<2> basis;
+    for (int i = 0; i < 7; ++i)
+      equations.col(i) = detail::epipolarEquation(normalised.apply(matches[static_cast<std::size_t>(i)]));
+    if (!detail::nullBasis<7>(equations, basis)) return result;
+    const Eigen::Matrix3d A = detail::matrixOf(basis.col(0)), B = detail::matrixOf(basis.col(1));
     // det(z A + w B), by z's powers.
     const Eigen::Matrix3d a = detail::cofactors(A), b = detail::cofactors(B);
     const detail::RealRoots<3> roots(
@@ -197,10 +186,12 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
   Eigen::Matrix<double, 9, 1> f;
   if (matches.size() == 8) {
     // Eight equations as they are: their squares would lose half the digits.
-    double rows[8][9], basis[1][9];
-    for (std::size_t i = 0; i < 8; ++i) detail::epipolarRow(normalised.apply(matches[i]), rows[i]);
-    if (!detail::nullBasis(rows, basis)) return result;
-    std::copy(basis[0], basis[0] + 9, f.data());
+    detail::NineColumns<8> equations;
+    detail::NineColumns<1> basis;
+    for (int i = 0; i < 8; ++i)
+      equations.col(i) = detail::epipolarEquation(normalised.apply(matches[static_cast<std::size_t>(i)]));
+    if (!detail::nullBasis<8>(equations, basis)) return result;
+    f = basis.head<9>();
   } else {
     Eigen::Matrix<double, 9, 9> N = Eigen::Matrix<double, 9, 9>::Zero();
     for (const Eigen::Vector4d& m : matches) {

@@ -18,13 +18,26 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
 
 namespace liestat {
+namespace detail {
+
+/// Another orthogonal basis of the same space: the product with a quaternion of no special direction.
+inline NineColumns<4> turnedBasis(const NineColumns<4>& b) {
+  constexpr double w = 0.31, x = 0.56, y = -0.42, z = 0.6436;  // of length one to 1e-3
+  NineColumns<4> turned;
+  turned.col(0) = w * b.col(0) - x * b.col(1) - y * b.col(2) - z * b.col(3);
+  turned.col(1) = x * b.col(0) + w * b.col(1) - z * b.col(2) + y * b.col(3);
+  turned.col(2) = y * b.col(0) + z * b.col(1) + w * b.col(2) - x * b.col(3);
+  turned.col(3) = z * b.col(0) - y * b.col(1) + x * b.col(2) + w * b.col(3);
+  return turned;
+}
+
+}  // namespace detail
 
 /// Essential matrices E = [t]× R, |t| = 1, of exactly five matches in normalised coordinates; x' = R x + t. Points of a
 /// plane are no exception. None where the five equations depend on each other to 1e-12 of their size, where the views
@@ -32,45 +45,36 @@ namespace liestat {
 inline MatrixSolutions<10> solveEssential(std::span<const Eigen::Vector4d> matches) {
   MatrixSolutions<10> result;
   if (matches.size() != 5) return result;
-  double rows[5][9], basis[4][9];
+  detail::NineColumns<5> rows;
+  detail::NineColumns<4> basis;
   std::array<Eigen::Vector3d, 5> first, second;
   for (std::size_t i = 0; i < 5; ++i) {
     const Eigen::Vector4d& m = matches[i];
-    detail::epipolarRow(m, rows[i]);
+    rows.col(static_cast<Eigen::Index>(i)) = detail::epipolarEquation(m);
     first[i] = Eigen::Vector3d(m[0], m[1], 1);
     second[i] = Eigen::Vector3d(m[2], m[3], 1);
   }
-  if (!detail::nullBasis(rows, basis)) return result;
-  // Where a pivot is small, roots lose as many digits: another basis of the same matrices does better nearly always.
+  if (!detail::nullBasis<5>(rows, basis)) return result;
+  // In a basis with zeros, as of points on a grid, two solutions may have one z: turned, it has none. Where a pivot is
+  // small, roots lose as many digits: a further turn does better nearly always.
   detail::FivePointEquations equations;
+  basis = detail::turnedBasis(basis);
   double pivot = equations.eliminate(basis);
   for (int attempt = 0; attempt < 2 && pivot < 1e-3; ++attempt) {
-    double turned[4][9];
-    for (int k = 0; k < 9; ++k) {
-      const double a = basis[0][k] + basis[1][k], b = basis[0][k] - basis[1][k], c = basis[2][k] + basis[3][k],
-                   d = basis[2][k] - basis[3][k];
-      turned[0][k] = 0.5 * (b - d);
-      turned[1][k] = 0.5 * (a + c);
-      turned[2][k] = 0.5 * (b + d);
-      turned[3][k] = 0.5 * (a - c);
-    }
+    const detail::NineColumns<4> turned = detail::turnedBasis(basis);
     detail::FivePointEquations others;
     const double other = others.eliminate(turned);
-    if (other > pivot) {
-      pivot = other;
-      equations = others;
-      std::copy(&turned[0][0], &turned[0][0] + 36, &basis[0][0]);
-    }
+    if (!(other > pivot)) break;
+    pivot = other;
+    equations = others;
+    basis = turned;
   }
   if (!(pivot > 1e-13)) return result;
   const detail::RealRoots<10> roots(equations.determinant(), 1e-9);
   for (int i = 0; i < roots.size(); ++i) {
     const Eigen::Vector4d c = equations.coefficients(roots[i].z, roots[i].w);
-    Eigen::Matrix3d E;
-    for (int k = 0; k < 9; ++k) {
-      const double entry = c[0] * basis[0][k] + c[1] * basis[1][k] + c[2] * basis[2][k] + c[3] * basis[3][k];
-      E(k / 3, k % 3) = entry;
-    }
+    Eigen::Matrix3d E =
+        detail::matrixOf(c[0] * basis.col(0) + c[1] * basis.col(1) + c[2] * basis.col(2) + c[3] * basis.col(3));
     if (!detail::polishEssential(first, second, E)) continue;
     bool known = false;
     for (const Eigen::Matrix3d& other : result) {

@@ -70,7 +70,7 @@ inline std::optional<PhysicalMotion> motionFromFundamental(const Eigen::Matrix3d
   if (!focal) return std::nullopt;
   const Eigen::Vector3d k(focal->first, focal->first, 1), k2(focal->second, focal->second, 1);
   const Eigen::Matrix3d E = k2.asDiagonal() * F * k.asDiagonal();
-  const CheiralPose chosen = chooseByCheirality(E, matches, 1e-12, *focal);
+  const CheiralPose chosen = poseByCheirality(E, matches, 1e-12, *focal);
   if (chosen.in_front == 0) return std::nullopt;
   return PhysicalMotion{*focal, chosen.pose};
 }

@@ -1,228 +1,26 @@
-// Closed-form solvers for motions between two images that are told by a homography, ũ' ~ H ũ, ũ = (u, 1).
-//
-// A match is (u.x, u.y, u'.x, u'.y) in normalised coordinates, u = (p - c)/f; those that know nothing of the camera
-// (retinal translation to homography) take any coordinates. Each takes its minimal number of matches or more; with more
-// it solves linear or closed-form least squares, a start for an estimator that knows the noise of each match.
-//
-//   matches  solver                       H
-//   1        solveRetinalTranslation      [I τ; 0 1]
-//   1        solveZoom                    diag(s, s, 1): about the centre c of the image; s > 0
-//   2        solveRetinalDisplacement     [Q τ; 0 1], Q a turn in the image
-//   2        solveFreeZoom                [s I τ; 0 1], s > 0
-//   2        solveSimilarity              [s Q τ; 0 1], s > 0
-//   3        solveAffine                  [A τ; 0 1], det A > 0
-//   2        solveRotation                R: the camera turns
-//   2        solveRotationZoom            diag(r, r, 1) R: it turns and its focal length changes by r; up to two, no
-//                                         more than two matches
-//   4        solveHomography              any, det H > 0, ‖H‖² = 3
-//
-// A solver gives no solution for a sample that does not determine it, told without a scale: points that agree to
-// sixteen roundings of their coordinates where two are needed; a triangle whose area is below 1e-9 of the square of the
-// sample's extent (affine, homography); bearings within 1e-9 rad (rotation); not finite; fewer matches than needed.
+// Closed-form solver for the homography of a plane, ũ' ~ H ũ, and the test of orientation. Which samples have no solution:
+// fusion/two_view/solvers.hpp.
 #pragma once
 
 #include <fusion/detail/match_sums.hpp>
 #include <fusion/detail/null_vectors.hpp>
 #include <fusion/two_view/solutions.hpp>
-#include <lie/detail/nearest_rotation.hpp>
-#include <lie/detail/small_matrix.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <span>
 
 namespace liestat {
 namespace detail {
 
-/// The homography with the given upper two rows.
-inline Eigen::Matrix3d affineMap(const Eigen::Matrix2d& A, const Eigen::Vector2d& shift) {
-  Eigen::Matrix3d H;
-  H << A(0, 0), A(0, 1), shift.x(), A(1, 0), A(1, 1), shift.y(), 0, 0, 1;
-  return H;
-}
-
-/// The scale s > 0 of b = s a by total least squares, which both images' noise enters alike: min Σ|b - s a|²/(1 + s²).
-inline double commonScale(double a_a, double b_b, double a_b) {
-  const double half = 0.5 * (b_b - a_a), root = std::sqrt(half * half + a_b * a_b);
-  // The form without cancellation of (half + root)/a_b.
-  return half > 0 ? (half + root) / a_b : a_b / (root - half);
-}
-
 /// Twice the area of the triangle of three points.
 inline double area(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// The bearing of an image point.
-inline Eigen::Vector3d bearing(double x, double y) {
-  const double inverse = 1 / std::sqrt(x * x + y * y + 1);
-  return Eigen::Vector3d(inverse * x, inverse * y, inverse);
-}
-
-/// The rotation R with b_i nearest to R a_i for two pairs of unit vectors, to equal shares. False where the two
-/// vectors of a pair are parallel to 1e-9.
-inline bool rotationOfTwo(const Eigen::Vector3d& a1, const Eigen::Vector3d& a2, const Eigen::Vector3d& b1,
-                          const Eigen::Vector3d& b2, Eigen::Matrix3d& R) {
-  // Sum and difference of unit vectors are orthogonal: two of the axes of a frame.
-  const Eigen::Vector3d sa = a1 + a2, da = a1 - a2, sb = b1 + b2, db = b1 - b2;
-  const double nsa = sa.squaredNorm(), nda = da.squaredNorm(), nsb = sb.squaredNorm(), ndb = db.squaredNorm();
-  if (!(std::min(std::min(nsa, nsb), std::min(nda, ndb)) > 1e-18)) return false;
-  const Eigen::Vector3d ua = sa / std::sqrt(nsa), va = da / std::sqrt(nda), ub = sb / std::sqrt(nsb),
-                        vb = db / std::sqrt(ndb), wa = ua.cross(va), wb = ub.cross(vb);
-  for (int j = 0; j < 3; ++j) R.col(j) = ub * ua[j] + vb * va[j] + wb * wa[j];
-  return R.allFinite();
-}
-
 }  // namespace detail
-
-/// Translation of the image: the mean difference.
-inline MatrixSolutions<1> solveRetinalTranslation(std::span<const Eigen::Vector4d> matches) {
-  MatrixSolutions<1> result;
-  if (matches.empty()) return result;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector4d& m : matches) sum += m.tail<2>() - m.head<2>();
-  sum /= static_cast<double>(matches.size());
-  if (sum.allFinite()) result.add(detail::affineMap(Eigen::Matrix2d::Identity(), sum));
-  return result;
-}
-
-/// Zoom about the centre, by total least squares. None where the points lie at the centre, or on opposite sides of it.
-inline MatrixSolutions<1> solveZoom(std::span<const Eigen::Vector4d> matches) {
-  MatrixSolutions<1> result;
-  double a_a = 0, b_b = 0, a_b = 0;
-  for (const Eigen::Vector4d& m : matches) {
-    a_a += m.head<2>().squaredNorm();
-    b_b += m.tail<2>().squaredNorm();
-    a_b += m.head<2>().dot(m.tail<2>());
-  }
-  if (!(a_b > 0) || !std::isfinite(a_a + b_b)) return result;
-  const double s = detail::commonScale(a_a, b_b, a_b);
-  if (s > 0 && std::isfinite(s))
-    result.add(detail::affineMap(s * Eigen::Matrix2d::Identity(), Eigen::Vector2d::Zero()));
-  return result;
-}
-
-namespace detail {
-
-/// Turn and scale about the means: scaled, by a turn or not.
-inline MatrixSolutions<1> solvePlaneSimilarity(std::span<const Eigen::Vector4d> matches, bool turns, bool scales) {
-  MatrixSolutions<1> result;
-  if (matches.size() < 2) return result;
-  const CentredMatches sums(matches);
-  if (!sums.spread) return result;
-  double c = sums.mixed.trace(), s = turns ? sums.mixed(1, 0) - sums.mixed(0, 1) : 0;
-  const double size = std::sqrt(c * c + s * s), scale_of_sums = std::sqrt(sums.first.trace() * sums.second.trace());
-  // Where these vanish every turn does as well as any other; without a turn the scale must be positive.
-  if (!(size > 1e-12 * scale_of_sums) || (!turns && !(c > 0))) return result;
-  c /= size;
-  s /= size;
-  const double scale = scales ? commonScale(sums.first.trace(), sums.second.trace(), size) : 1;
-  const Eigen::Matrix2d A = scale * (Eigen::Matrix2d() << c, -s, s, c).finished();
-  if (A.allFinite() && scale > 0) result.add(affineMap(A, sums.mean_second - A * sums.mean));
-  return result;
-}
-
-}  // namespace detail
-
-/// Displacement of the image, a turn and a translation: least squares, symmetric in the two images.
-inline MatrixSolutions<1> solveRetinalDisplacement(std::span<const Eigen::Vector4d> matches) {
-  return detail::solvePlaneSimilarity(matches, true, false);
-}
-/// Zoom about any point, by total least squares.
-inline MatrixSolutions<1> solveFreeZoom(std::span<const Eigen::Vector4d> matches) {
-  return detail::solvePlaneSimilarity(matches, false, true);
-}
-/// Turn, zoom and translation of the image, by total least squares.
-inline MatrixSolutions<1> solveSimilarity(std::span<const Eigen::Vector4d> matches) {
-  return detail::solvePlaneSimilarity(matches, true, true);
-}
-
-/// Affine map, by least squares in the second image. None where it turns the image over.
-inline MatrixSolutions<1> solveAffine(std::span<const Eigen::Vector4d> matches) {
-  MatrixSolutions<1> result;
-  if (matches.size() < 3) return result;
-  const detail::CentredMatches sums(matches);
-  if (!sums.spread) return result;
-  Eigen::Matrix2d mixed = sums.mixed, moments = sums.first;
-  double determinant = moments.determinant(), least = 1e-18 * moments.trace() * moments.trace();
-  if (matches.size() == 3) {
-    // The differences themselves, not their squares.
-    const Eigen::Vector4d a = matches[1] - matches[0], b = matches[2] - matches[0];
-    moments << a[0], b[0], a[1], b[1];
-    mixed << a[2], b[2], a[3], b[3];
-    least = 1e-9 * moments.squaredNorm();
-    determinant = moments.determinant();
-  }
-  // The determinant is the square of an area, or an area.
-  if (!(std::abs(determinant) > least)) return result;
-  Eigen::Matrix2d adjugate;
-  adjugate << moments(1, 1), -moments(0, 1), -moments(1, 0), moments(0, 0);
-  const Eigen::Matrix2d A = mixed * adjugate / determinant;
-  if (A.allFinite() && A.determinant() > 1e-9 * A.squaredNorm())
-    result.add(detail::affineMap(A, sums.mean_second - A * sums.mean));
-  return result;
-}
-
-/// Rotation of the camera: least squares of the bearing vectors.
-inline MatrixSolutions<1> solveRotation(std::span<const Eigen::Vector4d> matches) {
-  MatrixSolutions<1> result;
-  if (matches.size() < 2) return result;
-  Eigen::Matrix3d R;
-  if (matches.size() == 2) {
-    const Eigen::Vector4d &m = matches[0], &k = matches[1];
-    if (detail::rotationOfTwo(detail::bearing(m[0], m[1]), detail::bearing(k[0], k[1]), detail::bearing(m[2], m[3]),
-                              detail::bearing(k[2], k[3]), R)) {
-      result.add(R);
-    }
-    return result;
-  }
-  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector4d& m : matches) M += detail::bearing(m[2], m[3]) * detail::bearing(m[0], m[1]).transpose();
-  // The nearest rotation needs two singular values: the cofactors are of the size of their product.
-  if (!(detail::cofactors(M).norm() > 1e-16 * M.squaredNorm())) return result;
-  const Eigen::Vector4d q = detail::nearestQuaternion(M);
-  R = Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix();
-  if (R.allFinite()) result.add(R);
-  return result;
-}
-
-/// Rotation of the camera whose focal length changes to r times the first, of exactly two matches: the angle between
-/// the two rays is the same in both views, a quadratic equation for 1/r².
-inline MatrixSolutions<2> solveRotationZoom(std::span<const Eigen::Vector4d> matches) {
-  MatrixSolutions<2> result;
-  if (matches.size() != 2) return result;
-  const Eigen::Vector4d &m = matches[0], &k = matches[1];
-  const Eigen::Vector3d a1 = detail::bearing(m[0], m[1]), a2 = detail::bearing(k[0], k[1]);
-  // (κ b₁·b₂ + 1)² = c² (κ |b₁|² + 1)(κ |b₂|² + 1), c the cosine and κ = 1/r²; written with the squared sine s² = 1 -
-  // c², which is small: κ² ((b₁·b₂)² - c² B₁ B₂) + κ (2 b₁·b₂ - c² (B₁ + B₂)) + s² = 0.
-  const Eigen::Vector2d b1 = m.tail<2>(), b2 = k.tail<2>();
-  const double s2 = a1.cross(a2).squaredNorm(), c = a1.dot(a2), cross = detail::area(b1, b2);
-  const double B1 = b1.squaredNorm(), B2 = b2.squaredNorm();
-  const double q2 = s2 * B1 * B2 - cross * cross, q1 = s2 * (B1 + B2) - (b1 - b2).squaredNorm(), q0 = s2;
-  if (!(s2 > 1e-18) || !((b1 - b2).squaredNorm() > 1e-18 * (B1 + B2))) return result;
-  const double discriminant = q1 * q1 - 4 * q2 * q0;
-  if (!(discriminant >= 0)) return result;
-  const double half = -0.5 * (q1 + (q1 >= 0 ? 1 : -1) * std::sqrt(discriminant));
-  // One root as it is, the other by the product of both; where the leading coefficient vanishes, there is but one.
-  const double roots[] = {q0 / half, half / q2};
-  for (int i = 0; i < (discriminant > 0 ? 2 : 1); ++i) {
-    const double kappa = roots[i];
-    // The squared equation does not know the sign of the cosine.
-    if (!(kappa > 0) || !std::isfinite(kappa) || !((kappa * b1.dot(b2) + 1) * c > 0)) continue;
-    const double inverse = std::sqrt(kappa);
-    Eigen::Matrix3d H;
-    if (!detail::rotationOfTwo(a1, a2, detail::bearing(inverse * b1.x(), inverse * b1.y()),
-                               detail::bearing(inverse * b2.x(), inverse * b2.y()), H)) {
-      continue;
-    }
-    H.topRows<2>() /= inverse;
-    if (H.allFinite()) result.add(H);
-  }
-  return result;
-}
 
 /// Whether the two images show the triangles of the first four matches the same way round, as two views of one side of
 /// a plane do; false also where three points are collinear in an image. A homography sample that fails is wrong, and

@@ -85,10 +85,11 @@ struct CheiralPose {
   std::size_t in_front = 0;             ///< 0 where no pose has any
   std::array<std::size_t, 4> counts{};  ///< of the poses in the order of posesOfEssential
 };
-/// Matches, in coordinates in which E's cameras have the given focal lengths. Those whose rays are parallel to `min_parallax` count for no pose; the first of equals is chosen. Two of the four
-/// poses differ from the others by the sign of t alone: two tests of signs a match.
-inline CheiralPose chooseByCheirality(const Eigen::Matrix3d& E, std::span<const Eigen::Vector4d> matches,
-                                      double min_parallax = 1e-12, const FocalLengths& focal = {}) {
+/// The matches are in coordinates in which the cameras of E have the given focal lengths. Those whose rays are parallel
+/// to `min_parallax` count for no pose; the first of equals is chosen. Two of the four poses differ from the others by
+/// the sign of t alone: two tests of signs a match.
+inline CheiralPose poseByCheirality(const Eigen::Matrix3d& E, std::span<const Eigen::Vector4d> matches,
+                                    double min_parallax = 1e-12, const FocalLengths& focal = {}) {
   CheiralPose result;
   const Solutions<TwoViewPose, 4> poses = posesOfEssential(E);
   if (poses.empty()) return result;

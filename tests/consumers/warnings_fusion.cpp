@@ -18,6 +18,9 @@
 #include <fusion/init/sphere_least_squares.hpp>
 #include <fusion/init/window_fusion.hpp>
 #include <fusion/status.hpp>
+#include <fusion/two_view/focal_lengths.hpp>
+#include <fusion/two_view/pose.hpp>
+#include <fusion/two_view/solvers.hpp>
 #if __has_include(<ceres/ceres.h>)
 #include <fusion/compat/ceres.hpp>
 #endif
@@ -57,6 +60,22 @@ bool initialises() {
          describe(refined.fault).empty();
 }
 
+bool movesBetweenTwoViews() {
+  const std::vector<Eigen::Vector4d> m(9, Eigen::Vector4d::Zero());
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitY();
+  const bool plane = !solveRetinalTranslation(m).empty() && solveZoom(m).empty() &&
+                     solveRetinalDisplacement(m).empty() && solveFreeZoom(m).empty() && solveSimilarity(m).empty() &&
+                     solveAffine(m).empty() && solveRotation(m).empty() && solveRotationZoom(m).empty() &&
+                     solveHomography(m).empty() && !keepsOrientation(m);
+  const bool epipolar = solveTranslation(m).empty() && solveAffineEpipolar(m).empty() && solveFundamental(m).empty() &&
+                        solveEssential(m).empty() && solveEssentialUpright(m, up, up).empty() &&
+                        !isOriented(Eigen::Matrix3d::Identity(), m);
+  const CheiralPose chosen = poseByCheirality(essentialFromPose({Eigen::Matrix3d::Identity(), up}), m);
+  return plane && epipolar && toPose(toEssential(chosen.pose)).t.allFinite() &&
+         posesOfHomography(Eigen::Matrix3d::Identity(), m).size() == 1 &&
+         !motionFromFundamental(fundamentalFromMotion({{}, chosen.pose}), m);
+}
+
 bool sees() {
   const Camera camera{.fu = 450, .fv = 450, .cu = 320, .cv = 240, .distortion = Distortion::radtan};
   const auto bearing = camera.bearingWithSigma({100, 100});
@@ -65,4 +84,6 @@ bool sees() {
 
 }  // namespace
 
-int main() { return preintegrates<double>() && preintegrates<float>() && initialises() && sees() ? 0 : 1; }
+int main() {
+  return preintegrates<double>() && preintegrates<float>() && initialises() && movesBetweenTwoViews() && sees() ? 0 : 1;
+}

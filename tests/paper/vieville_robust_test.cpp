@@ -1,5 +1,6 @@
-// Viéville, Lingrand and Gaspard 2000, section 4: the relevance of known distributions of errors, Stewart's distribution
-// (figs. 7 and 8), thresholds, and what the report says differently from what is right (docs/robust.md lists that).
+// Viéville, Lingrand and Gaspard 2000, section 4: the relevance of known distributions of errors, Stewart's
+// distribution (figs. 7 and 8), thresholds, and what the report says differently from what is right (docs/robust.md
+// lists that).
 
 #include <paper/full_run.hpp>
 #include <stats/random.hpp>
@@ -147,8 +148,8 @@ struct Cell {
 TEST(Fig8, BiasOfTheScores) {
   const Stewart columns[] = {{.1, 1, 0},   {.2, 1, 0},   {.5, 1, 0},   {.8, 1, 0},   {.2, .8, 50},
                              {.2, .6, 50}, {.2, .8, 20}, {.2, .6, 20}, {.2, .8, 10}, {.2, .6, 10}};
-  // The design note's corrected table, means and standard deviations of 1000 repetitions; the printed row of R is within
-  // two standard deviations of it, the printed 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
+  // The design note's corrected table, means and standard deviations of 1000 repetitions; the printed row of R is
+  // within two standard deviations of it, the printed 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
   const Cell R_e[] = {{-0.0, .5}, {-0.1, .6}, {-0.3, .9},  {-1.2, 1.5}, {-0.1, .6},
                       {0.0, 2.3}, {-0.1, .6}, {-0.3, 1.5}, {0.1, .8},   {0.9, 1.6}};
   const Cell R_e2[] = {{0.0, .9},  {0.0, 1.0}, {0.0, 1.2}, {0.1, 1.7}, {0.0, 1.0},
@@ -338,8 +339,8 @@ TEST(ReportsErrata, Fig8NeedsCandidatesBeyondTheModes) {
 }
 
 TEST(ReportsErrata, Fig8sCodeMinimisesTheRelevanceAndTakesOutliersForInliers) {
-  // r := r - (1 - 2 i / h): with that sign the best candidate is not the true value but one where inliers are at the end
-  // of the window.
+  // r := r - (1 - 2 i / h): with that sign the best candidate is not the true value but one where inliers are at the
+  // end of the window.
   const Numbers x = sampleOf({.2, 1, 0}, 77);
   const auto printed = [](std::span<const double> e) { return -Relevance{10}(e); };
   EXPECT_LE(std::abs(bias(Relevance{10}, x, false, 30)), 3);
