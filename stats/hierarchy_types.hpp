@@ -32,8 +32,10 @@ struct ModelEstimate {
   int degrees_of_freedom = 0;
   std::size_t measurements = 0;  ///< that took part
 
-  /// Whether there is a parameter to go on with.
-  bool usable() const { return status == Status::ok || status == Status::ill_defined; }
+  /// Whether there is a parameter to go on with: an iteration that was not given the time to end has one, too.
+  bool usable() const {
+    return (converged(status) || status == Status::not_converged) && chi2 < std::numeric_limits<double>::infinity();
+  }
 };
 
 /// A model of a hierarchy: its measurement equations, what it leaves free, and the models that it contains. All

@@ -38,7 +38,7 @@ struct EpipolarConstraint {
         rows.opposite(entry(i, (i + 1) % 3), entry((i + 1) % 3, i));
       }
     } else {
-      const Eigen::Matrix3d F = matrixOf(q);
+      const Eigen::Matrix3d F = matrixFrom(q);
       Eigen::Matrix<double, 1, 9> J;
       for (int k = 0; k < 3; ++k) {
         J.segment<3>(3 * k) = F.col((k + 1) % 3).cross(F.col((k + 2) % 3)).transpose();
@@ -68,10 +68,10 @@ struct EpipolarForm {
 struct EpipolarEquation {
   using Value = Eigen::Matrix<double, 1, 1>;
   Value operator()(const Entries& q, const Eigen::Vector4d& m) const {
-    return Value(EpipolarForm(matrixOf(q), m).value);
+    return Value(EpipolarForm(matrixFrom(q), m).value);
   }
   EquationDerivatives<1, 9, 4> linearize(const Entries& q, const Eigen::Vector4d& m) const {
-    const EpipolarForm form(matrixOf(q), m);
+    const EpipolarForm form(matrixFrom(q), m);
     return {Value(form.value), form.by_entries, form.by_match};
   }
 };
@@ -133,10 +133,10 @@ class EpipolarModel : public EpipolarTypeModel {
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
-    const Entries q = entriesOf(start.matrix) * (std::sqrt(2.0) / start.matrix.norm());
+    const Entries q = entriesFrom(start.matrix) * (std::sqrt(2.0) / start.matrix.norm());
     return estimateTwoView<Entries, EpipolarConstraint, EpipolarEquation>(
         q, constraint_, inliers, images_.noise, stop,
-        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixOf(found); });
+        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixFrom(found); });
   }
 
  private:

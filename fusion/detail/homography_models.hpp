@@ -5,7 +5,9 @@
 #include <fusion/detail/two_view_estimate.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/homography_solvers.hpp>
+#include <fusion/two_view/image_motion_solvers.hpp>
 #include <fusion/two_view/models.hpp>
+#include <fusion/two_view/rotation_solvers.hpp>
 #include <stats/constrained.hpp>
 
 #include <Eigen/Core>
@@ -72,13 +74,13 @@ struct HomographyConstraint {
 /// (h₃·ũ) u' - (h₁·ũ, h₂·ũ) = 0.
 struct HomographyEquation {
   Eigen::Vector2d operator()(const Entries& q, const Eigen::Vector4d& m) const {
-    const Eigen::Matrix3d H = matrixOf(q);
+    const Eigen::Matrix3d H = matrixFrom(q);
     const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
     return {w * m[2] - (H(0, 0) * m[0] + H(0, 1) * m[1] + H(0, 2)),
             w * m[3] - (H(1, 0) * m[0] + H(1, 1) * m[1] + H(1, 2))};
   }
   EquationDerivatives<2, 9, 4> linearize(const Entries& q, const Eigen::Vector4d& m) const {
-    const Eigen::Matrix3d H = matrixOf(q);
+    const Eigen::Matrix3d H = matrixFrom(q);
     const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
     EquationDerivatives<2, 9, 4> result;
     result.value = (*this)(q, m);
@@ -148,10 +150,10 @@ class HomographyModel : public HomographyTypeModel {
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
-    const Entries q = entriesOf(start.matrix);
+    const Entries q = entriesFrom(start.matrix);
     return estimateTwoView<Entries, HomographyConstraint, HomographyEquation>(
         q, constraint_, inliers, images_.noise, stop,
-        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixOf(found); });
+        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixFrom(found); });
   }
 
  private:

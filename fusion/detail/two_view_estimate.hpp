@@ -24,8 +24,8 @@ namespace liestat::detail {
 /// The entries of a 3×3 matrix, column after column.
 using Entries = Eigen::Matrix<double, 9, 1>;
 
-inline Entries entriesOf(const Eigen::Matrix3d& M) { return Eigen::Map<const Entries>(M.data()); }
-inline Eigen::Matrix3d matrixOf(const Entries& entries) { return Eigen::Map<const Eigen::Matrix3d>(entries.data()); }
+inline Entries entriesFrom(const Eigen::Matrix3d& M) { return Eigen::Map<const Entries>(M.data()); }
+inline Eigen::Matrix3d matrixFrom(const Entries& entries) { return Eigen::Map<const Eigen::Matrix3d>(entries.data()); }
 /// Where entry (row, column) is.
 constexpr int entry(int row, int column) { return 3 * column + row; }
 
@@ -76,7 +76,9 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   using Channel = MeasurementChannel<Eigen::Vector4d, Noise, Equation>;
   const Noise sigma(Eigen::Vector4d(noise.first, noise.first, noise.second, noise.second));
   ConstrainedOptions<Q> options;
-  options.max_iterations = 50;
+  options.max_iterations = 20;
+  options.tolerance = 1e-4;   // standard deviations
+  options.curvature = false;  // residuals are small
   Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
   ConstrainedResult<Q> found;
   for (int pass = 0; pass < 4; ++pass) {
