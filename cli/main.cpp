@@ -9,5 +9,5 @@ int main(int argc, char** argv) {
                          {"validate",
                           validate_description,
                           {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,
-                           addValidateSplitCommand, addValidateViInitCommand}}});
+                           addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
 }

@@ -15,7 +15,6 @@
 namespace liestat::experiments {
 namespace {
 
-
 /// eᵀ Σ⁺ e for a covariance of known rank.
 double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, int rank) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
@@ -107,10 +106,8 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
   const std::uint64_t all = validation.trials * validation.motions.size();
   std::uint64_t before = 0;
   for (const TwoViewMotion motion : validation.motions) {
-    const TwoViewSceneOptions options{.motion = motion,
-                                      .matches = validation.matches,
-                                      .outliers = validation.outliers,
-                                      .sigma = validation.sigma};
+    const TwoViewSceneOptions options{
+        .motion = motion, .matches = validation.matches, .outliers = validation.outliers, .sigma = validation.sigma};
     const int k = dimensionOf(motion);
     std::vector<std::size_t> chosen(validation.trials);
     const ValidationOptions how{.trials = validation.trials,

@@ -47,15 +47,16 @@ struct TwoViewRow : JudgedReport {
 };
 
 struct TwoViewValidationResult {
-  std::vector<TwoViewRow> rows;         ///< of motions with a parameter
-  std::vector<TwoViewChoice> choices;   ///< of all motions
-  std::optional<bool> average_passed;   ///< where all motions were asked for
-  double average() const;               ///< share of right choices
-  Tally tally() const;                  ///< of choices and their average
+  std::vector<TwoViewRow> rows;        ///< of motions with a parameter
+  std::vector<TwoViewChoice> choices;  ///< of all motions
+  std::optional<bool> average_passed;  ///< where all motions were asked for
+  double average() const;              ///< share of right choices
+  Tally tally() const;                 ///< of choices and their average
 };
 
 /// Runs everything; in the order of the motions.
-TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
-                                        const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+TwoViewValidationResult validateTwoView(
+    const TwoViewValidation& validation,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
 
 }  // namespace liestat::experiments

@@ -216,8 +216,8 @@ class Hierarchy {
       add(fit_s, specific, i, s.errors[i]), add(fit_g, general, i, g.errors[i]);
     }
     const auto by_chance = [&](std::size_t of) {
-      return options_.support.explained(of, fit_s.free_parameters, fit_g.free_parameters, models_[general]->equations(),
-                                        models_[general]->chance(g.threshold));
+      return options_.support.explained(of, models_[general]->freedomBeyond(*models_[specific]),
+                                        models_[general]->equations(), models_[general]->chance(g.threshold));
     };
     // Near or far: what leaves most of the other's inliers is not the model of them.
     if (explained > by_chance(far) || only_general > common + by_chance(size() - common)) return Rejection::support;
@@ -477,8 +477,8 @@ class Hierarchy {
       far += !(state.errors[i] <= options_.support.guard * limitOf(specific, state.threshold, i));
     }
     const Model &g = *models_[general], &s = *models_[specific];
-    return far > options_.support.explained(far, s.freeParameters(), g.freeParameters(), g.equations(),
-                                            g.chance(knownThreshold(g.equations())));
+    return far >
+           options_.support.explained(far, g.freedomBeyond(s), g.equations(), g.chance(knownThreshold(g.equations())));
   }
   bool isFinal(std::size_t m) const {
     return states_[m].progress == State::Progress::evaluated && states_[m].hasEstimate();

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -56,6 +57,11 @@ class HierarchyModel {
   /// Those of this one, where measurements are of several kinds.
   virtual int equationsOf(const Measurement&) const { return equations(); }
   virtual int measurementDimension() const = 0;
+  /// f, dimension of what this model leaves open where its measurements obey a more specific one: so many equations more
+  /// it can meet whatever they are. At most the difference of the free parameters where both have as many equations.
+  virtual int freedomBeyond(const HierarchyModel& specific) const {
+    return std::max(0, freeParameters() - specific.freeParameters());
+  }
   virtual std::size_t sampleSize() const = 0;  ///< at most 16; 0 only without free parameters
 
   /// Adds the parameters that a minimal sample allows to `solutions`: none for a degenerate one.

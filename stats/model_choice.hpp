@@ -75,12 +75,10 @@ struct SupportTest {
   double guard = 9;
   double probability = 0.999;  ///< with which chance explains no more
 
-  /// How many such measurements chance and the freedom of the general model explain: ⌈(k' - k)⁺/p'⌉ + Binom⁻¹(P; far, π'),
-  /// π' the share of random measurements that the general model takes for inliers.
-  std::size_t explained(std::size_t far, int specific_parameters, int general_parameters, int general_equations,
-                        double share) const {
-    const int more = std::max(0, general_parameters - specific_parameters);
-    return static_cast<std::size_t>((more + general_equations - 1) / general_equations) +
+  /// How many such measurements chance and the freedom of the general model explain: ⌈f/p'⌉ + Binom⁻¹(P; far, π'), f its
+  /// freedom beyond the specific model, π' the share of random measurements that it takes for inliers.
+  std::size_t explained(std::size_t far, int freedom, int general_equations, double share) const {
+    return static_cast<std::size_t>((std::max(0, freedom) + general_equations - 1) / general_equations) +
            binomialQuantile(probability, far, share);
   }
 };

@@ -14,6 +14,7 @@ void addValidateMeansCommand(const CommandList& validate);
 void addValidatePreintegrationCommand(const CommandList& validate);
 void addValidatePropagationCommand(const CommandList& validate);
 void addValidateSplitCommand(const CommandList& validate);
+void addValidateTwoViewCommand(const CommandList& validate);
 void addValidateViInitCommand(const CommandList& validate);
 
 /// The line of `liestat --help` on the commands that begin with `validate`.

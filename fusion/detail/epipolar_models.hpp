@@ -7,6 +7,7 @@
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/five_point.hpp>
 #include <fusion/two_view/models.hpp>
+#include <fusion/two_view/pose.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/essential.hpp>
 #include <stats/constrained.hpp>
@@ -87,16 +88,6 @@ struct PoseEquation {
   }
 };
 
-/// Of the four poses of an essential matrix the one that most matches lie in front of.
-inline Essentiald poseInFront(const Eigen::Matrix3d& E, std::span<const Eigen::Vector4d> matches) {
-  std::vector<Eigen::Vector3d> first, second;
-  for (const Eigen::Vector4d& m : matches) {
-    first.emplace_back(m[0], m[1], 1), second.emplace_back(m[2], m[3], 1);
-  }
-  const auto poses = decomposeEssential(E);
-  return poses[chooseByCheirality(poses, second, first).best];
-}
-
 /// The parts that models of epipolar geometries have in common.
 class EpipolarTypeModel : public TwoViewModel {
  public:
@@ -106,6 +97,11 @@ class EpipolarTypeModel : public TwoViewModel {
   int freeParameters() const override { return card_.free_parameters; }
   int equations() const override { return 1; }
   int measurementDimension() const override { return 4; }
+  /// What a homography moves has the epipolar geometries [e']× H, for any epipole e'.
+  int freedomBeyond(const TwoViewModel& specific) const override {
+    const int more = std::max(0, freeParameters() - specific.freeParameters());
+    return specific.equations() == 2 && freeParameters() > 2 ? 2 : more;
+  }
   std::size_t sampleSize() const override { return card_.sample_size; }
   void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
     epipolarErrors(q.matrix, matches, images_.noise, squared);

@@ -51,22 +51,12 @@ inline Solutions<TwoViewPose, 4> posesOfEssential(const Eigen::Matrix3d& E) {
   Solutions<TwoViewPose, 4> result;
   const double largest = E.cwiseAbs().maxCoeff();
   if (!(largest > 0) || !E.allFinite()) return result;
-  const detail::EssentialParts<double> parts = detail::essentialParts<double>(E / largest);
-  // Of a matrix that is essential only nearly, the columns are made orthonormal.
-  const auto rotation = [](const Eigen::Matrix3d& nearly) {
-    Eigen::Matrix3d R;
-    R.col(0) = nearly.col(0).normalized();
-    R.col(2) = R.col(0).cross(nearly.col(1)).normalized();
-    R.col(1) = R.col(2).cross(R.col(0));
-    return R;
-  };
-  const Eigen::Matrix3d R = rotation(parts.rotation), twisted = rotation(parts.twisted);
-  const Eigen::Vector3d& t = parts.direction;
-  if (!R.allFinite() || !twisted.allFinite() || !t.allFinite()) return result;
-  result.add({R, t});
-  result.add({twisted, -t});
-  result.add({twisted, t});
-  result.add({R, -t});
+  std::array<TwoViewPose, 4> poses;
+  const auto essentials = decomposeEssential(Eigen::Matrix3d(E / largest));
+  std::transform(essentials.begin(), essentials.end(), poses.begin(), [](const Essentiald& e) { return toPose(e); });
+  const auto finite = [](const TwoViewPose& pose) { return pose.R.allFinite() && pose.t.allFinite(); };
+  if (!std::all_of(poses.begin(), poses.end(), finite)) return result;
+  for (const TwoViewPose& pose : poses) result.add(pose);
   return result;
 }
 

@@ -42,10 +42,10 @@ TEST(ModelChoice, BinomialQuantileIsThatOfTheSums) {
 TEST(ModelChoice, SupportCountsFreedomAndChance) {
   const SupportTest test;
   // Without chance, what the free parameters more explain by themselves, rounded up.
-  EXPECT_EQ(test.explained(50, 0, 3, 2, 0), 2u);
-  EXPECT_EQ(test.explained(50, 3, 8, 2, 0), 3u);
-  EXPECT_EQ(test.explained(50, 8, 5, 1, 0), 0u);
-  EXPECT_EQ(test.explained(50, 8, 9, 1, 0.1), 1 + binomialQuantile(0.999, 50, 0.1));
+  EXPECT_EQ(test.explained(50, 3, 2, 0), 2u);
+  EXPECT_EQ(test.explained(50, 5, 2, 0), 3u);
+  EXPECT_EQ(test.explained(50, -3, 1, 0), 0u);
+  EXPECT_EQ(test.explained(50, 1, 1, 0.1), 1 + binomialQuantile(0.999, 50, 0.1));
 }
 
 TEST(ModelChoice, FitNeedsDegreesOfFreedom) {

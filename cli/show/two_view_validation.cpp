@@ -1,0 +1,122 @@
+#include <cli/show/two_view_validation.hpp>
+
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <cli/show/validation.hpp>
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+using namespace experiments;
+namespace {
+
+constexpr const char* short_names[] = {"none", "rtrans", "zoom", "rdisp", "rot", "homog", "trans", "ess", "fund"};
+static_assert(std::size(short_names) == default_two_view_motions.size());
+
+std::vector<std::string> choiceHeaders() {
+  std::vector<std::string> headers{"truth"};
+  headers.insert(headers.end(), std::begin(short_names), std::end(short_names));
+  return headers;
+}
+/// Shares of the chosen models in per cent.
+std::vector<std::string> choiceCells(const TwoViewChoice& choice) {
+  std::vector<std::string> cells{short_names[static_cast<std::size_t>(choice.truth)]};
+  for (const std::size_t count : choice.chosen) {
+    cells.push_back(fmt::format("{:.1f}", 100 * static_cast<double>(count) / static_cast<double>(choice.trials)));
+  }
+  return cells;
+}
+const std::vector<std::string> distance_headers{"model", "k", "index", "SE", "95 % covers", "K-S p", "verdict"};
+std::vector<std::string> distanceCells(const TwoViewRow& row) {
+  const ValidationReport& r = row.report;
+  return {name(row.motion),
+          fmt::format("{}", r.dof),
+          number(r.index),
+          number(r.index_se, 2),
+          number(100 * r.coverage[2].observed),
+          number(r.ks_p_value, 2),
+          verdictCell(row.passed)};
+}
+
+}  // namespace
+
+std::string formatTwoViewTables(const TwoViewValidationResult& result) {
+  Table choices(choiceHeaders()), distances(distance_headers);
+  for (const TwoViewChoice& choice : result.choices) choices.row(choiceCells(choice));
+  for (const TwoViewRow& row : result.rows) distances.row(distanceCells(row));
+  std::string text = fmt::format("\nModels that were chosen, %\n{}mean of the diagonal: {:.1f} %\n", choices.str(),
+                                 100 * result.average());
+  if (!result.rows.empty()) {
+    text += fmt::format("\nSquared distance of the truth from the true model's estimate; index k expected\n{}",
+                        distances.str());
+  }
+  for (const TwoViewRow& row : result.rows) {
+    if (!row.passed.value_or(true)) text += fmt::format("\nFAILED {}: {}", name(row.motion), reason(row.verdict));
+  }
+  for (const TwoViewChoice& choice : result.choices) {
+    if (!choice.passed.value_or(true)) {
+      text += fmt::format("\nFAILED {}: chosen in {} of {} trials, {:.0f} % are promised", name(choice.truth),
+                          choice.right(), choice.trials, 100 * promised_row);
+    }
+  }
+  if (!result.average_passed.value_or(true)) {
+    text += fmt::format("\nFAILED mean of the diagonal: {:.0f} % are promised", 100 * promised_average);
+  }
+  const Tally count = tally(result.rows) + result.tally();
+  if (count.failed > 0) text += "\n";
+  return text + "\n" + verdictLines(count, "of distances and choices");
+}
+
+JsonObject toJson(const TwoViewRow& row) {
+  JsonObject o;
+  o.set("motion", name(row.motion));
+  setStatistics(o, row.report);
+  o.set("tail", row.tail).set("failures", row.report.failures).set("passed", row.passed);
+  return o;
+}
+
+JsonObject toJson(const TwoViewChoice& choice) {
+  JsonObject o, chosen;
+  for (std::size_t m = 0; m < choice.chosen.size(); ++m)
+    chosen.set(name(default_two_view_motions[m]), choice.chosen[m]);
+  o.set("motion", name(choice.truth)).set("trials", choice.trials).set("chosen", chosen).set("passed", choice.passed);
+  return o;
+}
+
+void writeTwoViewReport(const std::string& directory, const std::string& command_line,
+                        const TwoViewValidationResult& result) {
+  Report report(directory, "Two-view motion: is the right model chosen, and is its covariance true?");
+  report.paragraph(
+      "Each trial moves a camera by one of nine motions, takes matches with noise and outliers, and runs the hierarchy "
+      "of "
+      "models over them. The table has the models that were chosen. For the true model's estimate the squared "
+      "Mahalanobis "
+      "distance of the true parameter follows a chi-square law if the covariance is true; its mean, the index, is then "
+      "the number k of free parameters.");
+  report.code(command_line);
+  report.section("Models that were chosen");
+  std::vector<std::vector<std::string>> choices, distances;
+  for (const TwoViewChoice& choice : result.choices) choices.push_back(choiceCells(choice));
+  report.table(choiceHeaders(), choices,
+               fmt::format("Per cent of the trials; mean of the diagonal {:.1f} %.", 100 * result.average()));
+  if (!result.rows.empty()) {
+    report.section("Distances of the truth");
+    std::vector<Panel> histograms;
+    for (const TwoViewRow& row : result.rows) {
+      distances.push_back(distanceCells(row));
+      histograms.push_back(histogramPanel(row, name(row.motion)));
+    }
+    report.table(distance_headers, distances);
+    report.plot({.name = "distances",
+                 .caption = "Squared distances with the density that they should have.",
+                 .panels = histograms,
+                 .columns = 4});
+  }
+  report.write();
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,103 @@
+// `liestat validate two-view`: what it judges, its tables, and what the program writes.
+
+#include <cli/show/two_view_validation.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <cli/io/run_program.hpp>
+#include <cli/temporary_directory.hpp>
+
+namespace liestat::cli {
+using namespace experiments;
+namespace {
+
+using Json = nlohmann::json;
+
+TwoViewValidation small(std::size_t trials) {
+  TwoViewValidation validation;
+  validation.trials = trials;
+  return validation;
+}
+
+TEST(ValidateTwoView, everyMotionIsJudged) {
+  const TwoViewValidationResult result = validateTwoView(small(4));
+  EXPECT_EQ(result.choices.size(), 9U);
+  EXPECT_EQ(result.rows.size(), 8U) << "no motion has no parameter";
+  for (const TwoViewChoice& choice : result.choices) {
+    std::size_t sum = 0;
+    for (const std::size_t count : choice.chosen) sum += count;
+    EXPECT_EQ(sum, 4U);
+    EXPECT_TRUE(choice.passed.value_or(false)) << name(choice.truth);
+  }
+  EXPECT_TRUE(result.average_passed.value_or(false));
+  const std::string text = formatTwoViewTables(result);
+  EXPECT_NE(text.find("PASSED"), std::string::npos) << text;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+}
+
+TEST(ValidateTwoView, isTheSameForAnyNumberOfThreads) {
+  TwoViewValidation validation = small(6);
+  validation.motions = {TwoViewMotion::essential};
+  validation.threads = 1;
+  const TwoViewValidationResult one = validateTwoView(validation);
+  validation.threads = 2;
+  const TwoViewValidationResult two = validateTwoView(validation);
+  EXPECT_EQ(one.rows[0].report.index, two.rows[0].report.index);
+  EXPECT_EQ(one.choices[0].chosen, two.choices[0].chosen);
+}
+
+TEST(ValidateTwoView, aFailureIsShown) {
+  // So few inliers that no estimate can hold.
+  TwoViewValidation validation = small(20);
+  validation.motions = {TwoViewMotion::fundamental};
+  validation.outliers = 0.85;
+  TwoViewValidationResult result = validateTwoView(validation);
+  EXPECT_FALSE(result.choices[0].passed.value_or(true));
+  EXPECT_FALSE(result.average_passed.has_value()) << "an average of one motion is none";
+  const std::string text = formatTwoViewTables(result);
+  EXPECT_NE(text.find("FAILED fundamental: chosen in "), std::string::npos) << text;
+}
+
+TEST(ValidateTwoViewProgram, writesRowsAndAReport) {
+  const TemporaryDirectory directory;
+  const ProgramResult result = runProgram({LIESTAT_PROGRAM, "validate", "two-view", "--trials", "5", "--motion",
+                                           "rotation,translation", "--json", "out.json", "--report", "report"},
+                                          directory.path().string());
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  ASSERT_EQ(json["rows"].size(), 2U);
+  for (const Json& row : json["rows"]) {
+    for (const char* field : {"motion", "trials", "dof", "law", "index", "ks_p", "coverage95", "tail", "passed"}) {
+      EXPECT_TRUE(row.contains(field)) << field;
+    }
+  }
+  EXPECT_EQ(json["rows"][0]["motion"], "rotation");
+  EXPECT_EQ(json["rows"][0]["dof"], 3);
+  EXPECT_EQ(json["choices"][1]["chosen"]["translation"].get<int>(), 5);
+  EXPECT_NE(contentOf(directory / "report/index.html").find("</html>"), std::string::npos);
+}
+
+TEST(ValidateTwoViewProgram, refusesWhatItDoesNotKnow) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--motion", "dolly"},
+                                                    {"--outliers", "1"},
+                                                    {"--sigma", "0"},
+                                                    {"--matches", "3"},
+                                                    {"--trials", "0"}}) {
+    std::vector<std::string> command{LIESTAT_PROGRAM, "validate", "two-view"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const ProgramResult result = runProgram(command, ".");
+    EXPECT_EQ(result.status, 2) << arguments[0];
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+  }
+}
+
+}  // namespace
+}  // namespace liestat::cli
