@@ -148,12 +148,12 @@ class EssentialModel : public EpipolarTypeModel {
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
-    return estimateTwoView<Essentiald, NoConstraint, PoseEquation>(poseInFront(start.matrix, inliers), {}, inliers,
-                                                                   images_.noise, stop,
-                                                                   [](const Essentiald& found, Parameter& parameter) {
-                                                                     parameter.pose = found;
-                                                                     parameter.matrix = found.essentialMatrix();
-                                                                   });
+    return estimateTwoView<Essentiald, NoConstraint, PoseEquation>(
+        toEssential(poseByCheirality(start.matrix, inliers).pose), {}, inliers, images_.noise, stop,
+        [](const Essentiald& found, Parameter& parameter) {
+          parameter.pose = found;
+          parameter.matrix = found.essentialMatrix();
+        });
   }
 };
 

@@ -135,6 +135,7 @@ class NoMotionModel : public HomographyTypeModel {
     result.chi2 = 0, result.equation_error = 0;
     for (const Measurement& m : inliers) result.chi2 += homographyError(result.parameter.matrix, m, images_.noise);
     result.degrees_of_freedom = 2 * static_cast<int>(inliers.size());
+    result.measurements = inliers.size();
     return result;
   }
 };
