@@ -53,7 +53,7 @@ double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& cova
 }
 
 TEST(TwoViewModels, EstimatesHaveTheCovarianceThatTheySay) {
-  constexpr int trials = 150;
+  constexpr int trials = 60;
   for (const TwoViewMotion motion : experiments::default_two_view_motions) {
     double distance = 0, chi2 = 0, freedom = 0;
     int rank = 0, capped = 0;
@@ -137,8 +137,8 @@ TEST(TwoViewModels, EstimatesObeyTheirConstraints) {
 }
 
 TEST(TwoViewModels, TheHierarchyFindsTheMotion) {
-  // Of 500 trials a motion at least 96 % are right on average (validate two-view); 15 a motion here.
-  constexpr std::uint64_t trials = 15;
+  // `validate two-view` has 50 trials a motion and more, of which 96 % are right on average.
+  constexpr std::uint64_t trials = 5;
   std::size_t right = 0;
   for (const TwoViewMotion motion : experiments::default_two_view_motions) {
     std::size_t of_this = 0;
@@ -155,7 +155,7 @@ TEST(TwoViewModels, TheHierarchyFindsTheMotion) {
       // Of 80 inliers one in a hundred lies beyond the threshold.
       EXPECT_GE(found.inliers.size(), 72u) << nameOf(motion) << " " << seed;
     }
-    EXPECT_GE(of_this, trials - 3) << nameOf(motion);
+    EXPECT_GE(of_this, trials - 1) << nameOf(motion);
     right += of_this;
   }
   EXPECT_GE(static_cast<double>(right), 0.93 * 9 * trials);

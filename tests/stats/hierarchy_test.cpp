@@ -171,7 +171,7 @@ TEST(Hierarchy, EqualMeasurementsAreTakenOneByOne) {
   EXPECT_EQ(a->state(a->best()).estimate.parameter, b->state(b->best()).estimate.parameter);
 }
 
-TEST(Hierarchy, AnOutlierCostsNoEstimate) {
+TEST(Hierarchy, AnOutlierCostsHardlyAnEstimate) {
   const auto models = curveModels();
   const auto estimates = [&] {
     int sum = 0;
@@ -191,14 +191,16 @@ TEST(Hierarchy, AnOutlierCostsNoEstimate) {
   EXPECT_EQ(chosen(search), "line");
   EXPECT_TRUE(search.state(search.best()).outdated);
   finish(search);
-  EXPECT_EQ(estimates(), before) << "an outlier of all models";
+  // Of the refined hypotheses few are of draws that now take the outlier.
+  EXPECT_LE(estimates(), before + before / 4) << "an outlier of all models";
   EXPECT_EQ(chosen(search), "line");
   search.remove(outlier);
   finish(search);
-  EXPECT_EQ(estimates(), before);
+  EXPECT_LE(estimates(), before + before / 4);
+  const int then = estimates();
   search.add(Eigen::Vector2d(1, 1.01));
   finish(search);
-  EXPECT_GT(estimates(), before) << "an inlier";
+  EXPECT_GT(estimates(), then + before / 4) << "an inlier";
 }
 
 TEST(Hierarchy, ChangesItsMindWithTheMeasurements) {

@@ -130,7 +130,10 @@ inline std::vector<Eigen::Vector2d> curvePoints(const Eigen::Vector3d& q, int in
     const double x = rng.uniform(-3, 3);
     points.emplace_back(x, q[0] + x * (q[1] + x * q[2]) + curve_sigma * rng.normal());
   }
-  for (int i = 0; i < outliers; ++i) points.emplace_back(rng.uniform(-3, 3), rng.uniform(-curve_height, curve_height));
+  for (int i = 0; i < outliers; ++i) {
+    const double x = rng.uniform(-3, 3);
+    points.emplace_back(x, rng.uniform(-curve_height, curve_height));
+  }
   return points;
 }
 
