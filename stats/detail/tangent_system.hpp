@@ -77,10 +77,11 @@ class ConstraintBasis {
     }
     return lambda;
   }
-  /// The largest |c_k| over the length of its gradient, those left out included.
+  /// The largest |c_k| over the length of its gradient, those left out included; where there is no gradient, |c_k|: nothing
+  /// will ever meet that equation.
   double largest(const Values& c) const {
     double most = 0;
-    for (int k = 0; k < P; ++k) most = std::max(most, std::abs(c[k]) * scale_[k]);
+    for (int k = 0; k < P; ++k) most = std::max(most, std::abs(c[k]) * (scale_[k] > 0 ? scale_[k] : 1));
     return most;
   }
 
