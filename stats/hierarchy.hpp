@@ -91,7 +91,7 @@ class Hierarchy {
       for (const Measurement& one : several) ids.push_back(add(one));
       return ids;
     }
-    const std::vector<Id> ids = measurements_.add(several);
+    std::vector<Id> ids = measurements_.add(several);
     if (!valid()) return ids;
     for (auto& draws : draws_) draws.forget();
     for (std::size_t m = 0; m < models_.size(); ++m) {
