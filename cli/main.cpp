@@ -4,8 +4,10 @@ int main(int argc, char** argv) {
   using namespace liestat::cli;
   // In the order in which the help lists them.
   return runCommandLine(argc, argv,
-                        {{"", "", {addMeanCommand, addPreintegrateCommand, addViInitCommand}},
-                         {"simulate", "Files of simulated measurements with their truth", {addSimulateViCommand}},
+                        {{"", "", {addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
+                         {"simulate",
+                          "Files of simulated measurements with their truth",
+                          {addSimulateTwoViewCommand, addSimulateViCommand}},
                          {"validate",
                           validate_description,
                           {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,

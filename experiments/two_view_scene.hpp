@@ -58,6 +58,22 @@ inline constexpr std::array<TwoViewMotion, 9> default_two_view_motions = {
     TwoViewMotion::translation, TwoViewMotion::essential,
     TwoViewMotion::fundamental};
 
+/// These and the five more.
+inline constexpr std::array<TwoViewMotion, 14> all_two_view_motions = {TwoViewMotion::none,
+                                                                       TwoViewMotion::retinal_translation,
+                                                                       TwoViewMotion::zoom,
+                                                                       TwoViewMotion::retinal_displacement,
+                                                                       TwoViewMotion::rotation,
+                                                                       TwoViewMotion::homography,
+                                                                       TwoViewMotion::translation,
+                                                                       TwoViewMotion::essential,
+                                                                       TwoViewMotion::fundamental,
+                                                                       TwoViewMotion::free_zoom,
+                                                                       TwoViewMotion::similarity,
+                                                                       TwoViewMotion::affine,
+                                                                       TwoViewMotion::affine_epipolar,
+                                                                       TwoViewMotion::rotation_zoom};
+
 /// Name of a motion, as in the tables.
 inline const char* nameOf(TwoViewMotion motion) {
   constexpr const char* names[] = {"none",

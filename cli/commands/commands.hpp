@@ -9,6 +9,8 @@ namespace liestat::cli {
 void addMeanCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
+void addTwoViewCommand(const CommandList& program);
+void addSimulateTwoViewCommand(const CommandList& simulate);
 void addSimulateViCommand(const CommandList& simulate);
 void addValidateMeansCommand(const CommandList& validate);
 void addValidatePreintegrationCommand(const CommandList& validate);

@@ -18,6 +18,7 @@ enum class Style {
   errorbars,     ///< a point at x, y with a bar from low to high
   boxes,         ///< histogram bars at x of height y; `width` where they are not as wide as their distance
   filled_curve,  ///< the area between low and high over x
+  label,         ///< the series' name as a text at its first point, not in the legend
 };
 
 /// Data of one name. Lists that the style does not use stay empty, the others have the same length.

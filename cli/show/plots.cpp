@@ -142,6 +142,8 @@ std::string styleText(const Series& series, std::string_view colour) {
       return fmt::format("with boxes lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
     case Style::filled_curve:
       return fmt::format("with filledcurves fs transparent solid 0.18 noborder lc rgb '{}'", colour);
+    case Style::label:
+      break;
   }
   return {};
 }
@@ -183,7 +185,7 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   script +=
       fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText('x', panel.x, x) + axisText('y', panel.y, y);
   script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
-  script += "unset arrow\n";
+  script += "unset arrow\nunset label\n";
   for (const ReferenceLine& line : panel.references) {
     const bool horizontal = line.direction == ReferenceLine::Direction::horizontal;
     if (!drawable(line.at, horizontal ? panel.y : panel.x)) continue;
@@ -198,16 +200,23 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     }
   }
   const auto named = std::count_if(panel.series.begin(), panel.series.end(), [&](const Series& series) {
-    return !series.name.empty() && drawable(series, panel);
+    return !series.name.empty() && series.style != Style::label && drawable(series, panel);
   });
+  for (const Series& series : panel.series) {
+    if (series.style != Style::label || series.x.empty() || series.y.empty()) continue;
+    if (!drawable(series.x[0], panel.x) || !drawable(series.y[0], panel.y)) continue;
+    script += fmt::format("set label {} at first {}, first {} center front font ',10'\n", quotedText(series.name),
+                          series.x[0], series.y[0]);
+  }
   script += named > 1 ? "set key\n" : "unset key\n";
 
   std::string commands;
   std::size_t colour = 0;
   for (const Series& series : panel.series) {
-    const std::size_t own = series.colour ? *series.colour : colour++;
+    const bool is_label = series.style == Style::label;
+    const std::size_t own = series.colour || is_label ? series.colour.value_or(0) : colour++;
     if (series.x.empty()) continue;
-    if (drawable(series, panel)) {
+    if (!is_label && drawable(series, panel)) {
       const bool enlarged = named > 1 && series.style == Style::points && !series.name.empty();
       const bool in_legend = named > 1 && !enlarged;
       // The header is part of the first block.

@@ -1,0 +1,124 @@
+#include <cli/commands/commands.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/show/json.hpp>
+#include <experiments/two_view_scene.hpp>
+#include <experiments/two_view_validation.hpp>
+#include <lie/so3.hpp>
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+using namespace experiments;
+namespace {
+
+constexpr const char* command_name = "liestat simulate two-view";
+
+struct Options {
+  std::string output, truth, motion = "essential";
+  std::vector<double> image_size = {640, 480};
+  bool overwrite = false;
+  std::uint64_t seed = 1;
+  TwoViewSceneOptions scene;
+};
+
+std::string matchesCsv(const TwoViewScene& scene) {
+  std::string text = "x1,y1,x2,y2,inlier\n";
+  for (std::size_t i = 0; i < scene.pixels.size(); ++i) {
+    const Eigen::Vector4d& m = scene.pixels[i];
+    text += fmt::format("{},{},{},{},{}\n", m[0], m[1], m[2], m[3], scene.inlier[i] ? 1 : 0);
+  }
+  return text;
+}
+
+JsonObject truthOf(const TwoViewScene& scene, const Invocation& invocation, std::uint64_t seed) {
+  const TwoViewSceneOptions& o = scene.options;
+  JsonObject object = jsonEnvelope(invocation.command_line, seed);
+  object.set("motion", name(o.motion)).set("sigma", o.sigma);
+  object.set("intrinsics", std::vector<double>{o.focal_length, o.focal_length, 0.5 * o.width, 0.5 * o.height});
+  object.set("focal_ratio", scene.focal_ratio);
+  object.set("rotation_vector", Eigen::Vector3d(SO3d::fitToSO3(scene.R).log())).set("translation", scene.t);
+  if (isEpipolar(o.motion)) {
+    object.set("fundamental_normalised", scene.F);
+  } else {
+    object.set("homography_normalised", scene.H);
+  }
+  if (o.motion == TwoViewMotion::homography) {
+    object.set("plane_normal", scene.plane_normal).set("plane_distance", scene.plane_distance);
+  }
+  return object;
+}
+
+void requireFree(const std::string& path) {
+  if (path.empty() || path == "-" || !std::filesystem::exists(path)) return;
+  throw InputError(path, 0, "the file is there", "another name, or --overwrite");
+}
+
+int runCommand(Options options, const Invocation& invocation) {
+  TwoViewSceneOptions& scene_options = options.scene;
+  scene_options.width = options.image_size[0], scene_options.height = options.image_size[1];
+  for (const TwoViewMotion motion : all_two_view_motions) {
+    if (name(motion) == options.motion) scene_options.motion = motion;
+  }
+  for (const double value : {scene_options.outliers, scene_options.sigma, scene_options.focal_length,
+                             scene_options.width, scene_options.height}) {
+    if (!std::isfinite(value)) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+  }
+  if (!options.overwrite) requireFree(options.output), requireFree(options.truth);
+  const TwoViewScene scene(scene_options, options.seed);
+  writeOutput(options.output, matchesCsv(scene));
+  if (!options.truth.empty()) writeJson(options.truth, truthOf(scene, invocation, options.seed));
+  if (options.output != "-" && options.truth != "-") {
+    const auto n = [](double x) { return fmt::format("{:g}", x); };
+    const double f = scene_options.focal_length, w = scene_options.width, h = scene_options.height;
+    const std::vector<std::string> words = {"liestat",
+                                            "two-view",
+                                            options.output,
+                                            "--intrinsics",
+                                            fmt::format("{:g},{:g},{:g},{:g}", f, f, 0.5 * w, 0.5 * h),
+                                            "--image-size",
+                                            fmt::format("{:g},{:g}", w, h),
+                                            "--sigma",
+                                            n(scene_options.sigma > 0 ? scene_options.sigma : 1)};
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    std::size_t good = 0;
+    for (const bool inlier : scene.inlier) good += inlier ? 1 : 0;
+    printLines(fmt::format("{} matches, {} of them wrong, of the motion '{}'\n\n{}\n", scene.pixels.size(),
+                           scene.pixels.size() - good, nameOf(scene_options.motion),
+                           commandLine(static_cast<int>(pointers.size()), pointers.data())));
+  }
+  return exit_fine;
+}
+
+}  // namespace
+
+void addSimulateTwoViewCommand(const CommandList& simulate) {
+  auto options = std::make_shared<Options>();
+  const Command command = simulate.add("two-view", "Matches between two images, wrong ones among them, for two-view");
+  command.option("--output", options->output, "CSV file x1,y1,x2,y2,inlier ('-': standard output)").required();
+  command.option("--truth", options->truth, "JSON file of the motion");
+  command.flag("--overwrite", options->overwrite, "Replace files of these names");
+  std::vector<std::string> motions;
+  for (const TwoViewMotion motion : all_two_view_motions) motions.push_back(name(motion));
+  command.option("--motion", options->motion, "Default essential; a list is in docs/program.md").oneOf(motions);
+  command.option("--matches", options->scene.matches, "Default 100").range(std::size_t{1}, std::size_t{1000000});
+  command.option("--outliers", options->scene.outliers, "Share of wrong matches (default 0.2)").range(0.0, 1.0);
+  command.option("--sigma", options->scene.sigma, "Standard deviation of image coordinates, px (default 0.5)")
+      .range(0.0, 1e3);
+  command.option("--focal-length", options->scene.focal_length, "px (default 600)").range(1.0, 1e6);
+  command.option("--image-size", options->image_size, "W,H, px (default 640,480)").list(2, 2).positive();
+  command.option("--seed", options->seed, "Seed; the same seed gives the same file (default 1)");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+}
+
+}  // namespace liestat::cli

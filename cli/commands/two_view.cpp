@@ -1,0 +1,104 @@
+#include <cli/commands/commands.hpp>
+#include <cli/io/calibration.hpp>
+#include <cli/io/camera.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/numeric_table.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/show/json.hpp>
+#include <cli/show/two_view.hpp>
+#include <fusion/two_view/two_view.hpp>
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* command_name = "liestat two-view";
+
+struct Options {
+  std::string file, json, report;
+  std::vector<std::string> calibration;
+  std::vector<double> intrinsics, second_intrinsics, image_size;
+  TwoViewMotionOptions estimate;
+};
+
+std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
+  const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
+  std::vector<Eigen::Vector4d> matches;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    matches.emplace_back(table(i, 0), table(i, 1), table(i, 2), table(i, 3));
+  }
+  return matches;
+}
+
+void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
+  if (!options.calibration.empty()) {
+    const Calibration calibration = readCalibration(options.calibration);
+    if (calibration.cameras.empty()) {
+      throw InputError(options.calibration.front(), 0, "there is no camera", "cam0");
+    }
+    estimate.first = calibration.cameras.front().camera;
+  }
+  if (!options.intrinsics.empty()) estimate.first = cameraFromIntrinsics(options.intrinsics);
+  if (!options.second_intrinsics.empty()) {
+    if (!estimate.first) throw InputError(command_name, 0, "only the second camera is known", "--intrinsics too");
+    estimate.second = cameraFromIntrinsics(options.second_intrinsics);
+  }
+  if (!options.image_size.empty()) estimate.image_size = Eigen::Vector2d(options.image_size[0], options.image_size[1]);
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  TwoViewMotionOutput output;
+  output.file = options.file;
+  output.matches = readMatches(options.file);
+  TwoViewMotionOptions estimate = options.estimate;
+  takeCameras(options, estimate);
+  output.sigma = estimate.sigma;
+  output.estimate = estimateTwoViewMotion(output.matches, estimate);
+  if (options.json != "-") printLines(formatTwoViewMotion(output));
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, estimate.search.seed);
+    setTwoViewMotion(object, output);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) writeTwoViewMotionReport(options.report, invocation.command_line, output);
+  return output.estimate.ok() ? exit_fine : exit_not_trusted;
+}
+
+}  // namespace
+
+void addTwoViewCommand(const CommandList& program) {
+  auto options = std::make_shared<Options>();
+  const Command command =
+      program.add("two-view", "How the camera moved between two images, from matches, wrong ones among them");
+  command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px); '-' is standard input").required();
+  command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv of the camera, px (default: not known)").list(4, 4);
+  command.option("--second-intrinsics", options->second_intrinsics, "The same of the second image's (default: equal)")
+      .list(4, 4);
+  command.option("--calibration", options->calibration,
+                 "YAML of the camera, with its distortion (EuRoC, Kalibr, OpenVINS); --intrinsics go before it");
+  command.option("--image-size", options->image_size, "W,H, px (default: the camera's, or the matches' bounding box)")
+      .list(2, 2)
+      .positive();
+  command.option("--sigma", options->estimate.sigma, "Standard deviation of each image coordinate, px (default 1)")
+      .range(1e-6, 1e6);
+  command
+      .option("--outlier-share", options->estimate.search.outlier_share,
+              "Of the right matches' errors that lie beyond the threshold (default 0.01)")
+      .range(1e-6, 0.5);
+  command
+      .option("--draws", options->estimate.search.max_draws, "At most so many minimal samples a model (default 2000)")
+      .range(std::size_t{1}, std::size_t{10000000});
+  command.option("--seed", options->estimate.search.seed, "Seed of the draws (default 1)");
+  command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Directory for a page with matches, errors and the lattice of models");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+}
+
+}  // namespace liestat::cli

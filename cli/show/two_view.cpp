@@ -1,0 +1,293 @@
+#include <cli/show/two_view.hpp>
+
+#include <cli/io/output_file.hpp>
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// Whether the row's model was looked at and found anything.
+bool hasEstimate(const TwoViewModelRow& row) { return row.status != Status::too_few; }
+
+std::string verdictOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
+  const TwoViewModelRow& row = estimate.lattice[m];
+  if (!hasEstimate(row)) return row.draws > 0 ? "nothing found" : "not looked at";
+  std::string verdict;
+  if (row.rejection == Rejection::none) {
+    verdict = m == estimate.chosen ? "chosen" : "not rejected";
+  } else {
+    verdict = row.rejected_by + (row.rejection == Rejection::support ? " has more support" : " fits better");
+  }
+  return row.unsupported ? verdict + "; could be chance" : verdict;
+}
+
+const std::vector<std::string> lattice_headers{"model", "free", "draws", "inliers", "relevance", "rms px", "verdict"};
+std::vector<std::vector<std::string>> latticeRows(const TwoViewMotionEstimate& estimate) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
+    const TwoViewModelRow& row = estimate.lattice[m];
+    std::vector<std::string> cells{row.name, fmt::format("{}", row.free_parameters)};
+    if (hasEstimate(row)) {
+      cells.insert(cells.end(), {fmt::format("{}", row.draws), fmt::format("{}", row.inliers),
+                                 fmt::format("{:.3f}", row.relevance), number(row.rms, 3)});
+    } else {
+      cells.insert(cells.end(), {row.draws > 0 ? fmt::format("{}", row.draws) : "", "", "", ""});
+    }
+    cells.push_back(verdictOf(estimate, m));
+    rows.push_back(std::move(cells));
+  }
+  return rows;
+}
+
+const std::vector<std::string> parameter_headers{"parameter", "value", "sd", "unit"};
+std::vector<std::vector<std::string>> parameterRows(const PhysicalParameters& physical) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < physical.size(); ++i) {
+    const bool angle = physical.units[i] == "rad";
+    const double unit = angle ? degrees : 1;
+    rows.push_back({physical.names[i], number(unit * physical.values[static_cast<Eigen::Index>(i)], 5),
+                    number(unit * physical.deviation(i), 2), angle ? "deg" : physical.units[i]});
+  }
+  return rows;
+}
+
+std::string summary(const TwoViewMotionOutput& output) {
+  const TwoViewMotionEstimate& e = output.estimate;
+  std::string text =
+      fmt::format("{} matches of {}, noise {:g} px, {}\n", output.matches.size(), output.file, output.sigma,
+                  e.calibrated ? "calibrated"
+                               : "without intrinsics: the centre of the image is taken for the principal "
+                                 "point, and rotation and essential are left out");
+  text += fmt::format("images of {:.6g} x {:.6g} px{}\n", e.image_size.x(), e.image_size.y(),
+                      e.size_from_matches ? ", the bounding box of the matches: --image-size says it better" : "");
+  return text;
+}
+std::string answer(const TwoViewMotionOutput& output) {
+  const TwoViewMotionEstimate& e = output.estimate;
+  if (e.lattice.empty()) return "no model\n";
+  std::string text = fmt::format("{}: {} of {} matches agree", e.chosenModel().name, e.inliers, output.matches.size());
+  if (hasEstimate(e.chosenModel())) text += fmt::format(", rms {} px", number(e.chosenModel().rms, 3));
+  text += "\n";
+  if (!e.ok()) text += fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(e.status), e.reason);
+  return text;
+}
+/// What a table of physical parameters is headed by where there are two.
+std::string headingOf(const TwoViewMotionEstimate& e, std::size_t i) {
+  if (e.physical.size() < 2) return "";
+  return i == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
+                : "the other one:\n";
+}
+
+JsonObject toJson(const PhysicalParameters& physical) {
+  JsonObject o;
+  std::vector<double> values(physical.values.begin(), physical.values.end()), deviations;
+  for (std::size_t i = 0; i < physical.size(); ++i) deviations.push_back(physical.deviation(i));
+  return o.set("names", physical.names)
+      .set("units", physical.units)
+      .set("values", values)
+      .set("deviations", deviations)
+      .set("covariance", physical.covariance);
+}
+JsonObject toJson(const TwoViewMotionEstimate& estimate, std::size_t m) {
+  const TwoViewModelRow& row = estimate.lattice[m];
+  JsonObject o;
+  o.set("model", row.name).set("parents", row.parents).set("free_parameters", row.free_parameters);
+  o.set("equations", row.equations).set("evaluated", row.evaluated).set("draws", row.draws);
+  if (!hasEstimate(row)) return o.set("status", nullptr);
+  o.set("status", name(row.status)).set("inliers", row.inliers).set("relevance", row.relevance);
+  o.set("chi2", row.chi2).set("degrees_of_freedom", row.degrees_of_freedom).set("rms", row.rms);
+  o.set("unsupported", row.unsupported).set("rejection", name(row.rejection));
+  return row.rejected_by.empty() ? o.set("rejected_by", nullptr) : o.set("rejected_by", row.rejected_by);
+}
+
+/// Each match as a line from its first to its second point.
+void addMatch(Series& lines, Series& ends, const Eigen::Vector4d& m) {
+  lines.x.insert(lines.x.end(), {m[0], m[2], nan});
+  lines.y.insert(lines.y.end(), {m[1], m[3], nan});
+  ends.x.push_back(m[2]), ends.y.push_back(m[3]);
+}
+Plot matchPlot(const TwoViewMotionOutput& output) {
+  Plot plot{.name = "matches",
+            .caption =
+                "Matches that agree with the chosen model, and the others: lines go from the point in the first "
+                "image to the dot, the point in the second."};
+  for (const bool inlier : {true, false}) {
+    Series lines{.style = Style::lines, .colour = inlier ? 0U : 1U};
+    Series ends{.style = Style::points, .colour = inlier ? 0U : 1U};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < output.matches.size(); ++i) {
+      if (output.estimate.inlier[i] != inlier) continue;
+      addMatch(lines, ends, output.matches[i]);
+      ++count;
+    }
+    Panel panel{.title = fmt::format("{} {}", count, inlier ? "inliers" : "outliers"),
+                .x = {.label = "x, px"},
+                .y = {.label = "y, px"},
+                .series = {lines, ends},
+                .equal_aspect = true};
+    if (!output.estimate.size_from_matches) {
+      panel.x.low = 0, panel.x.high = output.estimate.image_size.x();
+      panel.y.low = output.estimate.image_size.y(), panel.y.high = 0;  // y points down
+    } else {
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (const Eigen::Vector4d& m : output.matches) {
+        low = std::min({low, m[1], m[3]}), high = std::max({high, m[1], m[3]});
+      }
+      panel.y.low = high, panel.y.high = low;
+    }
+    plot.panels.push_back(std::move(panel));
+  }
+  return plot;
+}
+/// The models by their free parameters, with lines to the models that they contain.
+Plot latticePlot(const TwoViewMotionEstimate& estimate) {
+  std::map<std::string, Eigen::Vector2d> at;
+  std::map<int, std::size_t> on_level, seen;
+  for (const TwoViewModelRow& row : estimate.lattice) ++on_level[row.free_parameters];
+  for (const TwoViewModelRow& row : estimate.lattice) {
+    const auto count = static_cast<double>(on_level[row.free_parameters]);
+    const auto k = static_cast<double>(seen[row.free_parameters]++);
+    // Levels are staggered, so that lines do not run through the names between them.
+    const double shift = row.free_parameters % 2 == 0 ? -0.12 : 0.12;
+    at[row.name] = {k - 0.5 * (count - 1) + (count < 2 ? shift : 0.5 * shift), row.free_parameters};
+  }
+  Panel panel{.x = {.low = -1.6, .high = 1.6}, .y = {.label = "free parameters", .low = -0.6, .high = 8.9}};
+  Series edges{.style = Style::lines, .colour = 6};
+  for (const TwoViewModelRow& row : estimate.lattice) {
+    for (const std::string& parent : row.parents) {
+      const auto p = at.find(parent);
+      if (p == at.end()) continue;
+      edges.x.insert(edges.x.end(), {at[row.name].x(), p->second.x(), nan});
+      edges.y.insert(edges.y.end(), {at[row.name].y(), p->second.y(), nan});
+    }
+  }
+  panel.series.push_back(edges);
+  Series chosen{.name = "chosen", .style = Style::stars, .colour = 2};
+  Series rejected{.name = "rejected", .style = Style::points, .colour = 1};
+  Series idle{.name = "not estimated", .style = Style::points, .colour = 5};
+  Series others{.name = "not rejected", .style = Style::points, .colour = 0};
+  std::vector<Series> labels;
+  for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
+    const TwoViewModelRow& row = estimate.lattice[m];
+    Series& kind = m == estimate.chosen               ? chosen
+                   : !hasEstimate(row)                ? idle
+                   : row.rejection == Rejection::none ? others
+                                                      : rejected;
+    kind.x.push_back(at[row.name].x()), kind.y.push_back(at[row.name].y());
+    std::string text = row.name;
+    if (hasEstimate(row)) text += fmt::format(": {} inliers, {} px", row.inliers, number(row.rms, 2));
+    labels.push_back({.name = text, .style = Style::label, .x = {at[row.name].x()}, .y = {at[row.name].y() + 0.38}});
+  }
+  for (const Series& kind : {chosen, rejected, others, idle}) {
+    if (!kind.x.empty()) panel.series.push_back(kind);
+  }
+  panel.series.insert(panel.series.end(), labels.begin(), labels.end());
+  return {.name = "lattice",
+          .caption =
+              "The models, the number of their free parameters, the matches that agree with each and the noise "
+              "that these show. A line leads down from a model to one that it contains.",
+          .panels = {panel}};
+}
+Plot errorPlot(const TwoViewMotionOutput& output) {
+  std::vector<double> errors;
+  const double limit = std::sqrt(output.estimate.threshold) * output.sigma;
+  for (const double e : output.estimate.errors) errors.push_back(output.sigma * std::sqrt(e));
+  Panel panel{.x = {.label = "error, px"},
+              .y = {.label = "matches"},
+              .series = {histogram("", errors, 0, 4 * limit, 40, false)},
+              .references = {{ReferenceLine::Direction::vertical, limit}}};
+  return {.name = "errors",
+          .caption =
+              "Distances of the matches from the chosen model (in four dimensions, of both images). The dotted "
+              "line is the threshold of inliers; larger errors than four times that are not shown.",
+          .panels = {panel}};
+}
+
+}  // namespace
+
+std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
+  const TwoViewMotionEstimate& e = output.estimate;
+  std::string text = summary(output) + "\n" + answer(output);
+  for (std::size_t i = 0; i < e.physical.size(); ++i) {
+    Table table(parameter_headers);
+    for (const auto& row : parameterRows(e.physical[i])) table.row(row);
+    text += "\n" + headingOf(e, i) + table.str();
+  }
+  if (e.ok() && e.physical.empty() && e.chosenModel().name == "fundamental") {
+    text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
+  }
+  Table lattice(lattice_headers);
+  for (const auto& row : latticeRows(e)) lattice.row(row);
+  return text + "\n" + lattice.str();
+}
+
+void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
+  const TwoViewMotionEstimate& e = output.estimate;
+  object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
+  object.set("calibrated", e.calibrated).set("image_size", e.image_size).set("size_from_matches", e.size_from_matches);
+  object.set("status", name(e.status));
+  if (e.reason.empty()) {
+    object.set("reason", nullptr);
+  } else {
+    object.set("reason", e.reason);
+  }
+  object.set("model", e.chosenModel().name).set("inliers", e.inliers).set("matrix", e.matrix);
+  object.set("matrix_acts_on", e.chosenModel().equations == 2 ? "second ~ matrix * first, pixels"
+                                                              : "second' * matrix * first = 0, pixels");
+  std::vector<JsonObject> physical, lattice;
+  for (const PhysicalParameters& p : e.physical) physical.push_back(toJson(p));
+  for (std::size_t m = 0; m < e.lattice.size(); ++m) lattice.push_back(toJson(e, m));
+  object.set("parameters", physical);
+  if (e.relative_pose) {
+    JsonObject pose;
+    pose.set("quaternion_xyzw", Eigen::Vector4d(e.relative_pose->mean.so3().params()));
+    pose.set("direction", Eigen::Vector3d(e.relative_pose->mean.direction().unit_vector()));
+    pose.set("covariance", e.relative_pose->covariance);
+    pose.set("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
+    object.set("second_T_first", pose);
+  } else {
+    object.set("second_T_first", nullptr);
+  }
+  object.set("lattice", lattice);
+  std::vector<double> inlier, errors;
+  for (std::size_t i = 0; i < e.inlier.size(); ++i) inlier.push_back(e.inlier[i] ? 1 : 0);
+  object.set("inlier", inlier).set("squared_errors", e.errors);
+}
+
+void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
+                              const TwoViewMotionOutput& output) {
+  const TwoViewMotionEstimate& e = output.estimate;
+  Report report(directory, "The motion between two images");
+  report.code(command_line);
+  report.paragraph(summary(output));
+  report.paragraph(answer(output));
+  if (!e.physical.empty()) report.section("Parameters");
+  for (std::size_t i = 0; i < e.physical.size(); ++i) {
+    report.table(parameter_headers, parameterRows(e.physical[i]), headingOf(e, i));
+  }
+  report.section("Matches");
+  report.plot(matchPlot(output));
+  if (e.threshold > 0) report.plot(errorPlot(output));
+  report.section("Models");
+  report.plot(latticePlot(e));
+  report.table(lattice_headers, latticeRows(e),
+               "The chosen model is the most specific one that no model which contains it rejects: by more support "
+               "among matches that the specific one is far from, or by a better fit to the common inliers.");
+  printLines("\n" + report.write() + "\n");
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cli/show/json.hpp>
+#include <fusion/two_view/two_view.hpp>
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// What `liestat two-view` shows.
+struct TwoViewMotionOutput {
+  std::string file;
+  std::vector<Eigen::Vector4d> matches;  ///< px
+  double sigma = 1;
+  TwoViewMotionEstimate estimate;
+};
+
+/// The chosen model, its parameters and the lattice, for the terminal.
+std::string formatTwoViewMotion(const TwoViewMotionOutput& output);
+
+/// Adds the fields of the estimate.
+void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output);
+
+/// Writes a page with matches, errors and the lattice into a directory.
+void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
+                              const TwoViewMotionOutput& output);
+
+}  // namespace liestat::cli

@@ -1,0 +1,276 @@
+// estimateTwoViewMotion: pixels in, model, physical parameters and their covariance out.
+
+#include <gtest/gtest.h>
+
+#include <experiments/two_view_scene.hpp>
+#include <fusion/two_view/two_view.hpp>
+#include <lie/s2.hpp>
+#include <lie/so3.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace liestat {
+namespace {
+
+using experiments::TwoViewMotion;
+using experiments::TwoViewScene;
+using experiments::TwoViewSceneOptions;
+
+Camera cameraOf(const TwoViewSceneOptions& scene, double focal_length) {
+  Camera camera;
+  camera.fu = camera.fv = focal_length;
+  camera.cu = 0.5 * scene.width, camera.cv = 0.5 * scene.height;
+  camera.width = static_cast<int>(scene.width), camera.height = static_cast<int>(scene.height);
+  return camera;
+}
+TwoViewMotionOptions optionsOf(const TwoViewScene& scene) {
+  TwoViewMotionOptions options;
+  options.sigma = scene.options.sigma;
+  options.first = cameraOf(scene.options, scene.options.focal_length);
+  return options;
+}
+
+/// Squared Mahalanobis distance of the true values under a covariance of rank k, by its pseudo-inverse.
+double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, Eigen::Index k) {
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(covariance);
+  factor.setThreshold(1e-8);
+  EXPECT_EQ(factor.rank(), k);
+  return error.dot(factor.solve(error));
+}
+
+/// The values that the scene's motion has, in the order of the physical parameters.
+Eigen::VectorXd truthOf(const TwoViewScene& scene) {
+  const double f = scene.options.focal_length;
+  const Eigen::Vector3d rotation = SO3d::fitToSO3(scene.R).log(), t = scene.t;
+  Eigen::VectorXd truth;
+  switch (scene.options.motion) {
+    case TwoViewMotion::retinal_translation:
+      truth = f * scene.H.col(2).head<2>();
+      break;
+    case TwoViewMotion::zoom:
+      truth = Eigen::VectorXd::Constant(1, scene.focal_ratio);
+      break;
+    case TwoViewMotion::retinal_displacement:
+      truth.resize(3);
+      truth << std::atan2(scene.H(1, 0), scene.H(0, 0)), f * scene.H.col(2).head<2>();
+      break;
+    case TwoViewMotion::rotation:
+      truth = rotation;
+      break;
+    case TwoViewMotion::translation:
+      truth = t.normalized();
+      break;
+    case TwoViewMotion::essential:
+      truth.resize(6);
+      truth << rotation, t.normalized();
+      break;
+    case TwoViewMotion::homography:
+      truth.resize(9);
+      truth << rotation, t / scene.plane_distance, scene.plane_normal;
+      break;
+    case TwoViewMotion::fundamental:
+      truth.resize(8);
+      truth << f, f * scene.focal_ratio, rotation, t.normalized();
+      break;
+    default:
+      break;
+  }
+  return truth;
+}
+/// The error in parameters; of a rotation the one that the covariance is of, R·Exp(e).
+Eigen::VectorXd errorOf(const PhysicalParameters& found, const Eigen::VectorXd& truth) {
+  Eigen::VectorXd error = found.values - truth;
+  for (std::size_t i = 0; i + 2 < found.size(); ++i) {
+    if (found.names[i] != "rotation x") continue;
+    const auto at = static_cast<Eigen::Index>(i);
+    const Eigen::Vector3d is = found.values.segment<3>(at), was = truth.segment<3>(at);
+    error.segment<3>(at) = (SO3d::exp(was).inverse() * SO3d::exp(is)).log();
+  }
+  return error;
+}
+
+class TwoViewMotions : public testing::TestWithParam<TwoViewMotion> {};
+
+TEST_P(TwoViewMotions, parametersLieWhereTheirCovarianceSays) {
+  const TwoViewMotion motion = GetParam();
+  constexpr int trials = 12;
+  double sum = 0;
+  int counted = 0;
+  Eigen::Index k = 0;
+  for (std::uint64_t seed = 1; seed <= trials; ++seed) {
+    const TwoViewScene scene({.motion = motion, .sigma = 0.2}, seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    ASSERT_TRUE(found.ok()) << found.reason;
+    if (found.chosenModel().name != nameOf(motion)) continue;  // who is chosen how often: validate two-view
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < scene.inlier.size(); ++i) wrong += scene.inlier[i] != found.inlier[i];
+    EXPECT_LE(wrong, 12U);
+    if (motion == TwoViewMotion::none) {
+      EXPECT_TRUE(found.physical.empty());
+      ++counted;
+      continue;
+    }
+    const Eigen::VectorXd truth = truthOf(scene);
+    k = found.chosenModel().free_parameters;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const PhysicalParameters& physical : found.physical) {
+      ASSERT_EQ(physical.values.size(), truth.size());
+      nearest = std::min(nearest, squaredDistance(errorOf(physical, truth), physical.covariance, k));
+    }
+    if (found.physical.empty()) continue;  // a fundamental matrix that tells no focal lengths
+    sum += nearest;
+    ++counted;
+    if (motion == TwoViewMotion::essential) {
+      ASSERT_TRUE(found.relative_pose.has_value());
+      const Essentiald true_pose(SO3d::fitToSO3(scene.R), scene.t);
+      EXPECT_NEAR(mahalanobisSquared(*found.relative_pose, true_pose), nearest, 0.02 * nearest + 1e-6);
+    }
+  }
+  ASSERT_GE(counted, trials - 4);
+  if (k == 0) return;
+  // χ² with k degrees of freedom has the variance 2k; the index is up to a fifth high (docs/two_view.md).
+  const double mean = sum / counted, expected = static_cast<double>(k);
+  EXPECT_LT(mean, 1.2 * expected + 4 * std::sqrt(2 * expected / counted));
+  EXPECT_GT(mean, expected - 4 * std::sqrt(2 * expected / counted));
+}
+
+INSTANTIATE_TEST_SUITE_P(all, TwoViewMotions, testing::ValuesIn(experiments::default_two_view_motions),
+                         [](const auto& tested) {
+                           std::string text = experiments::nameOf(tested.param);
+                           std::replace(text.begin(), text.end(), ' ', '_');
+                           return text;
+                         });
+
+TEST(TwoViewMotion, withoutIntrinsicsTheFocalLengthsAreParameters) {
+  int told = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::fundamental, .matches = 200, .sigma = 0.2}, seed);
+    TwoViewMotionOptions options = optionsOf(scene);
+    options.first.reset();
+    options.image_size = Eigen::Vector2d(scene.options.width, scene.options.height);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, options);
+    ASSERT_TRUE(found.ok());
+    EXPECT_FALSE(found.calibrated);
+    for (const TwoViewModelRow& row : found.lattice) EXPECT_TRUE(row.name != "essential" && row.name != "rotation");
+    if (found.physical.empty()) continue;
+    const PhysicalParameters& p = found.physical.front();
+    EXPECT_EQ(p.names[0], "focal length");
+    EXPECT_EQ(p.units[0], "px");
+    const Eigen::VectorXd error = errorOf(p, truthOf(scene));
+    for (Eigen::Index i = 0; i < error.size(); ++i) {
+      EXPECT_LT(std::abs(error[i]), 5 * p.deviation(static_cast<std::size_t>(i)))
+          << p.names[static_cast<std::size_t>(i)];
+    }
+    ++told;
+  }
+  EXPECT_GE(told, 4);
+}
+
+TEST(TwoViewMotion, theMatrixIsThatOfPixels) {
+  for (const TwoViewMotion motion : {TwoViewMotion::homography, TwoViewMotion::fundamental}) {
+    const TwoViewScene scene({.motion = motion, .outliers = 0, .sigma = 0.01}, 3);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    EXPECT_NEAR(found.matrix.norm(), 1, 1e-12);
+    for (const Eigen::Vector4d& m : scene.pixels) {
+      const MatchNoise noise{0.01, 0.01};
+      const double error = found.chosenModel().equations == 2 ? homographyError(found.matrix, m, noise)
+                                                              : epipolarError(found.matrix, m, noise);
+      EXPECT_LT(error, 30);
+    }
+  }
+}
+
+TEST(TwoViewMotion, lensesAreUndistorted) {
+  const TwoViewScene scene({.motion = TwoViewMotion::essential, .sigma = 0.3}, 5);
+  TwoViewMotionOptions options = optionsOf(scene);
+  Camera& camera = *options.first;
+  camera.distortion = Distortion::radtan;
+  camera.coefficients << -0.2, 0.05, 0, 0;
+  std::vector<Eigen::Vector4d> pixels;
+  for (const Eigen::Vector4d& m : scene.matches) {
+    Eigen::Vector4d& p = pixels.emplace_back();
+    p << camera.project(m.head<2>().homogeneous()).value(), camera.project(m.tail<2>().homogeneous()).value();
+  }
+  const TwoViewMotionEstimate found = estimateTwoViewMotion(pixels, options);
+  EXPECT_EQ(found.chosenModel().name, "essential");
+  EXPECT_GE(found.inliers, 74U);
+  options.first->distortion = Distortion::none;
+  EXPECT_LT(estimateTwoViewMotion(pixels, options).inliers, 70U);
+}
+
+TEST(TwoViewMotion, anyOrderGivesTheSameAnswer) {
+  const TwoViewScene scene({.motion = TwoViewMotion::rotation}, 2);
+  std::vector<Eigen::Vector4d> reversed(scene.pixels.rbegin(), scene.pixels.rend());
+  const TwoViewMotionEstimate a = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+  const TwoViewMotionEstimate b = estimateTwoViewMotion(reversed, optionsOf(scene));
+  EXPECT_EQ(a.chosen, b.chosen);
+  EXPECT_LT((a.matrix - b.matrix).norm(), 1e-12);
+  for (std::size_t i = 0; i < a.inlier.size(); ++i) EXPECT_EQ(a.inlier[i], b.inlier[a.inlier.size() - 1 - i]);
+}
+
+TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0}, 1);
+  const TwoViewMotionOptions options = optionsOf(scene);
+  const auto of = [&](const std::vector<Eigen::Vector4d>& matches) { return estimateTwoViewMotion(matches, options); };
+
+  EXPECT_EQ(of({}).status, Status::too_few);
+  EXPECT_EQ(of({Eigen::Vector4d::Constant(nan)}).status, Status::too_few);
+  EXPECT_EQ(of({}).chosenModel().name, "none");
+
+  // Fewer than a sample of the true model.
+  const TwoViewMotionEstimate few = of({scene.pixels.begin(), scene.pixels.begin() + 3});
+  EXPECT_EQ(few.status, Status::ill_defined);
+  EXPECT_FALSE(few.reason.empty());
+
+  const TwoViewMotionEstimate same = of(std::vector<Eigen::Vector4d>(40, Eigen::Vector4d(100, 100, 120, 110)));
+  EXPECT_EQ(same.status, Status::ill_defined);
+  EXPECT_EQ(same.reason, "all matches are the same one");
+
+  // All points on a line, moved by a translation of the image: no more than that can be seen.
+  std::vector<Eigen::Vector4d> line;
+  for (int i = 0; i < 60; ++i) line.emplace_back(10 * i, 5 * i + 20, 10 * i + 15, 5 * i + 13);
+  const TwoViewMotionEstimate collinear = of(line);
+  EXPECT_TRUE(collinear.ok()) << collinear.reason;
+  EXPECT_EQ(collinear.chosenModel().name, "retinal translation");
+
+  // No motion.
+  std::vector<Eigen::Vector4d> still;
+  for (const Eigen::Vector4d& m : scene.pixels) still.emplace_back(m[0], m[1], m[0], m[1]);
+  EXPECT_EQ(of(still).chosenModel().name, "none");
+  EXPECT_TRUE(of(still).ok());
+
+  // Matches that are not finite are outliers.
+  std::vector<Eigen::Vector4d> some = scene.pixels;
+  some[4][2] = nan, some[7][0] = std::numeric_limits<double>::infinity();
+  const TwoViewMotionEstimate rest = of(some);
+  EXPECT_TRUE(rest.ok());
+  EXPECT_EQ(rest.chosenModel().name, "essential");
+  EXPECT_FALSE(rest.inlier[4] || rest.inlier[7]);
+
+  // Random matches: whatever fits could be chance.
+  const TwoViewScene noise({.motion = TwoViewMotion::none, .matches = 60, .outliers = 1}, 1);
+  EXPECT_EQ(of(noise.pixels).status, Status::ill_defined);
+
+  TwoViewMotionOptions bad = options;
+  bad.sigma = 0;
+  EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable);
+  bad = options;
+  bad.image_size = Eigen::Vector2d(640, nan);
+  EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable);
+  bad = options;
+  bad.stop = [] { return true; };
+  EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_converged);
+}
+
+}  // namespace
+}  // namespace liestat
