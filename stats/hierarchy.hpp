@@ -178,6 +178,57 @@ class Hierarchy {
   /// inliers; of those within 10 %, the one with more equations of a measurement, then with fewer parameters. The null model
   /// while there is no estimate.
   std::size_t best() const {
+    return bestOf([&](std::size_t m) { return survives(m); });
+  }
+  /// The same by other tests than those of the options.
+  template <class Phi>
+  std::size_t best(const SupportTest& support, const Phi& phi) const {
+    std::vector<char> survivors(models_.size(), 0);
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      survivors[m] = states_[m].hasEstimate();
+      for (std::size_t g = 0; g < models_.size() && survivors[m]; ++g) {
+        if (!contains_[g][m] || !states_[g].hasEstimate()) continue;
+        survivors[m] = compare(m, g, support, phi) == Rejection::none;
+      }
+    }
+    return bestOf([&](std::size_t m) { return survivors[m] != 0; });
+  }
+
+  /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
+  Rejection compare(std::size_t specific, std::size_t general) const {
+    return compare(specific, general, options_.support, options_.phi);
+  }
+  /// The same by other tests than those of the options.
+  template <class Phi>
+  Rejection compare(std::size_t specific, std::size_t general, const SupportTest& support, const Phi& phi) const {
+    const State &s = states_[specific], &g = states_[general];
+    std::size_t far = 0, explained = 0, common = 0, only_general = 0;
+    ModelFit fit_s{0, 0, models_[specific]->freeParameters()};
+    ModelFit fit_g{0, 0, models_[general]->freeParameters()};
+    for (std::size_t i = 0; i < size(); ++i) {
+      const double limit = limitOf(specific, s.threshold, i);
+      const bool in_s = s.errors[i] < limit, in_g = g.errors[i] < limitOf(general, g.threshold, i);
+      if (!(s.errors[i] <= support.guard * limit)) {
+        ++far;
+        explained += in_g;
+      }
+      if (in_g) ++(in_s ? common : only_general);
+      if (!in_s || !in_g) continue;
+      add(fit_s, specific, i, s.errors[i]), add(fit_g, general, i, g.errors[i]);
+    }
+    const auto by_chance = [&](std::size_t of) {
+      return support.explained(of, models_[general]->freedomBeyond(*models_[specific]), models_[general]->equations(),
+                               models_[general]->chance(g.threshold));
+    };
+    // Near or far: what leaves most of the other's inliers is not the model of them.
+    if (explained > by_chance(far) || only_general > common + by_chance(size() - common)) return Rejection::support;
+    return fitRejects(fit_s, fit_g, phi) ? Rejection::fit : Rejection::none;
+  }
+
+ private:
+  /// Of the models that are not rejected, the most specific ones, and of those the best.
+  template <class Survives>
+  std::size_t bestOf(const Survives& survives) const {
     std::vector<std::size_t> chosen;
     for (std::size_t m = 0; m < models_.size(); ++m) {
       if (!survives(m)) continue;
@@ -198,33 +249,6 @@ class Hierarchy {
     return best;
   }
 
-  /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
-  Rejection compare(std::size_t specific, std::size_t general) const {
-    const State &s = states_[specific], &g = states_[general];
-    std::size_t far = 0, explained = 0, common = 0, only_general = 0;
-    ModelFit fit_s{0, 0, models_[specific]->freeParameters()};
-    ModelFit fit_g{0, 0, models_[general]->freeParameters()};
-    for (std::size_t i = 0; i < size(); ++i) {
-      const double limit = limitOf(specific, s.threshold, i);
-      const bool in_s = s.errors[i] < limit, in_g = g.errors[i] < limitOf(general, g.threshold, i);
-      if (!(s.errors[i] <= options_.support.guard * limit)) {
-        ++far;
-        explained += in_g;
-      }
-      if (in_g) ++(in_s ? common : only_general);
-      if (!in_s || !in_g) continue;
-      add(fit_s, specific, i, s.errors[i]), add(fit_g, general, i, g.errors[i]);
-    }
-    const auto by_chance = [&](std::size_t of) {
-      return options_.support.explained(of, models_[general]->freedomBeyond(*models_[specific]),
-                                        models_[general]->equations(), models_[general]->chance(g.threshold));
-    };
-    // Near or far: what leaves most of the other's inliers is not the model of them.
-    if (explained > by_chance(far) || only_general > common + by_chance(size() - common)) return Rejection::support;
-    return fitRejects(fit_s, fit_g, options_.phi) ? Rejection::fit : Rejection::none;
-  }
-
- private:
   static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   using Draws = detail::ModelDraws<Measurement, Parameter>;
   /// An estimate of a model, by what it was made from.
@@ -458,7 +482,7 @@ class Hierarchy {
     auto& made = refined_[m];
     if (made.size() > most) made.erase(made.begin(), made.end() - static_cast<std::ptrdiff_t>(most));
     decide();
-    bool all = m == null_ || !state.hasEstimate() || state.unsupported;
+    bool all = options_.all_models || m == null_ || !state.hasEstimate() || state.unsupported;
     for (const std::size_t p : parents_[m]) {
       if (all || !isFinal(p)) continue;
       all = compare(p, m) != Rejection::none;

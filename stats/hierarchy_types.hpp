@@ -96,6 +96,8 @@ struct HierarchyOptions {
   std::size_t refined_hypotheses = 5;
   /// Whether three draws of four keep the sample of an estimated parent and take what is missing from its outliers.
   bool guided = false;
+  /// Whether every model is estimated, not only those that the walk reaches: what criteria that compare all of them need.
+  bool all_models = false;
   SupportTest support = {};
   std::function<double(double r, double r_general)> phi = ExponentialPhi{};  ///< (36)
   /// The threshold on squared errors for the measurements of a model, from its errors and its number of equations. Empty:

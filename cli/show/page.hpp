@@ -40,6 +40,7 @@ struct Axis {
   std::optional<double> low = {};  ///< else from the data
   std::optional<double> high = {};
   bool logarithmic = false;
+  bool numbers = true;  ///< false: the scale means nothing
 };
 
 /// A dotted line across the panel.

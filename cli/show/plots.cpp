@@ -113,7 +113,10 @@ std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
 
 std::string axisText(char letter, const Axis& axis, const Extent& data) {
   std::string script = fmt::format("set {0}label {1}{2}\nset format {0} '{3}'\n", letter, quotedText(axis.label),
-                                   letter == 'x' ? " offset 0,0.6" : "", axis.logarithmic ? "%.6g" : "% .6g");
+                                   letter == 'x' ? " offset 0,0.6" : "",
+                                   !axis.numbers      ? ""
+                                   : axis.logarithmic ? "%.6g"
+                                                      : "% .6g");
   if (axis.logarithmic) return script + fmt::format("set logscale {}\n", letter) + logarithmicAxis(letter, axis, data);
   const auto end = [](const std::optional<double>& value) {
     return value && std::isfinite(*value) ? fmt::format("{}", *value) : std::string("*");

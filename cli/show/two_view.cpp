@@ -13,6 +13,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -28,27 +29,48 @@ std::string verdictOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
   if (!hasEstimate(row)) return row.draws > 0 ? "nothing found" : "not looked at";
   std::string verdict;
   if (row.rejection == Rejection::none) {
-    verdict = m == estimate.chosen ? "chosen" : "not rejected";
+    verdict = m == estimate.chosen ? "- chosen" : "-";
   } else {
-    verdict = row.rejected_by + (row.rejection == Rejection::support ? " has more support" : " fits better");
+    verdict = fmt::format("{} of {}", name(row.rejection), row.rejected_by);
   }
-  return row.unsupported ? verdict + "; could be chance" : verdict;
+  return row.unsupported && row.rejection == Rejection::none ? verdict + ", could be chance" : verdict;
 }
 
-const std::vector<std::string> lattice_headers{"model", "free", "draws", "inliers", "relevance", "rms px", "verdict"};
+const std::vector<std::string> lattice_headers{"model",     "free",   "draws",      "inliers",
+                                               "relevance", "rms px", "rejected by"};
 std::vector<std::vector<std::string>> latticeRows(const TwoViewMotionEstimate& estimate) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
     const TwoViewModelRow& row = estimate.lattice[m];
-    std::vector<std::string> cells{row.name, fmt::format("{}", row.free_parameters)};
-    if (hasEstimate(row)) {
-      cells.insert(cells.end(), {fmt::format("{}", row.draws), fmt::format("{}", row.inliers),
-                                 fmt::format("{:.3f}", row.relevance), number(row.rms, 3)});
-    } else {
-      cells.insert(cells.end(), {row.draws > 0 ? fmt::format("{}", row.draws) : "", "", "", ""});
+    const bool found = hasEstimate(row);
+    rows.push_back({row.name, fmt::format("{}", row.free_parameters), row.draws > 0 ? fmt::format("{}", row.draws) : "",
+                    found ? fmt::format("{}", row.inliers) : "", found ? fmt::format("{:.3f}", row.relevance) : "",
+                    found ? number(row.rms, 3) : "", verdictOf(estimate, m)});
+  }
+  return rows;
+}
+/// The same for the terminal, which is narrower.
+std::string latticeTable(const TwoViewMotionEstimate& estimate) {
+  constexpr std::size_t draws = 2, relevance = 4;
+  const auto narrow = [](std::vector<std::string> cells) {
+    cells.erase(cells.begin() + relevance), cells.erase(cells.begin() + draws);
+    return cells;
+  };
+  Table table(narrow(lattice_headers));
+  for (const auto& row : latticeRows(estimate)) table.row(narrow(row));
+  return table.str();
+}
+
+/// The entries of the matrix, where they are all that is known.
+std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionEstimate& e) {
+  std::vector<std::vector<std::string>> rows;
+  if (e.matrix_covariance.rows() != 9) return rows;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const double variance = e.matrix_covariance(3 * j + i, 3 * j + i);
+      rows.push_back({fmt::format("{}{}{}", e.chosenModel().equations == 2 ? 'H' : 'F', i + 1, j + 1),
+                      number(e.matrix(i, j), 6), number(std::sqrt(variance), 2), "px, norm 1"});
     }
-    cells.push_back(verdictOf(estimate, m));
-    rows.push_back(std::move(cells));
   }
   return rows;
 }
@@ -67,13 +89,14 @@ std::vector<std::vector<std::string>> parameterRows(const PhysicalParameters& ph
 
 std::string summary(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
-  std::string text =
-      fmt::format("{} matches of {}, noise {:g} px, {}\n", output.matches.size(), output.file, output.sigma,
-                  e.calibrated ? "calibrated"
-                               : "without intrinsics: the centre of the image is taken for the principal "
-                                 "point, and rotation and essential are left out");
-  text += fmt::format("images of {:.6g} x {:.6g} px{}\n", e.image_size.x(), e.image_size.y(),
-                      e.size_from_matches ? ", the bounding box of the matches: --image-size says it better" : "");
+  std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n",
+                                 output.matches.size(), output.file, output.sigma, e.image_size.x(), e.image_size.y());
+  if (e.size_from_matches) text += "that size is the bounding box of the matches: --image-size says it better\n";
+  if (!e.calibrated) {
+    text +=
+        "without intrinsics: the principal point is taken to be the centre of the image,\n"
+        "rotation and essential are left out\n";
+  }
   return text;
 }
 std::string answer(const TwoViewMotionOutput& output) {
@@ -156,17 +179,19 @@ Plot matchPlot(const TwoViewMotionOutput& output) {
 /// The models by their free parameters, with lines to the models that they contain.
 Plot latticePlot(const TwoViewMotionEstimate& estimate) {
   std::map<std::string, Eigen::Vector2d> at;
-  std::map<int, std::size_t> on_level, seen;
-  for (const TwoViewModelRow& row : estimate.lattice) ++on_level[row.free_parameters];
+  // Homographies on the left, epipolar geometries on the right; levels are staggered, so that lines do not run through the
+  // names between them.
+  std::map<std::pair<int, int>, int> on_level, seen;
+  const auto level = [](const TwoViewModelRow& row) { return std::pair(row.equations, row.free_parameters); };
+  for (const TwoViewModelRow& row : estimate.lattice) ++on_level[level(row)];
   for (const TwoViewModelRow& row : estimate.lattice) {
-    const auto count = static_cast<double>(on_level[row.free_parameters]);
-    const auto k = static_cast<double>(seen[row.free_parameters]++);
-    // Levels are staggered, so that lines do not run through the names between them.
-    const double shift = row.free_parameters % 2 == 0 ? -0.12 : 0.12;
-    at[row.name] = {k - 0.5 * (count - 1) + (count < 2 ? shift : 0.5 * shift), row.free_parameters};
+    const double k = seen[level(row)]++ - 0.5 * (on_level[level(row)] - 1);
+    const double middle = (row.equations == 2 ? -0.75 : 0.95) + (row.free_parameters % 2 == 0 ? -0.2 : 0.2);
+    at[row.name] = {middle + 1.25 * k, row.free_parameters};
   }
-  Panel panel{.x = {.low = -1.6, .high = 1.6}, .y = {.label = "free parameters", .low = -0.6, .high = 8.9}};
-  Series edges{.style = Style::lines, .colour = 6};
+  Panel panel{.x = {.low = -1.9, .high = 1.9, .numbers = false},
+              .y = {.label = "free parameters", .low = -0.6, .high = 8.9}};
+  Series edges{.style = Style::lines, .colour = 6, .dashed = true};
   for (const TwoViewModelRow& row : estimate.lattice) {
     for (const std::string& parent : row.parents) {
       const auto p = at.find(parent);
@@ -227,12 +252,15 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
     for (const auto& row : parameterRows(e.physical[i])) table.row(row);
     text += "\n" + headingOf(e, i) + table.str();
   }
-  if (e.ok() && e.physical.empty() && e.chosenModel().name == "fundamental") {
-    text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
+  if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
+    Table table(parameter_headers);
+    for (const auto& row : matrixRows(e)) table.row(row);
+    text += "\n" + table.str();
+    if (e.chosenModel().name == "fundamental") {
+      text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
+    }
   }
-  Table lattice(lattice_headers);
-  for (const auto& row : latticeRows(e)) lattice.row(row);
-  return text + "\n" + lattice.str();
+  return text + "\n" + latticeTable(e);
 }
 
 void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
@@ -248,6 +276,11 @@ void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
   object.set("model", e.chosenModel().name).set("inliers", e.inliers).set("matrix", e.matrix);
   object.set("matrix_acts_on", e.chosenModel().equations == 2 ? "second ~ matrix * first, pixels"
                                                               : "second' * matrix * first = 0, pixels");
+  if (e.matrix_covariance.rows() == 9) {
+    object.set("matrix_covariance", e.matrix_covariance);
+  } else {
+    object.set("matrix_covariance", nullptr);
+  }
   std::vector<JsonObject> physical, lattice;
   for (const PhysicalParameters& p : e.physical) physical.push_back(toJson(p));
   for (std::size_t m = 0; m < e.lattice.size(); ++m) lattice.push_back(toJson(e, m));
@@ -278,6 +311,10 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   if (!e.physical.empty()) report.section("Parameters");
   for (std::size_t i = 0; i < e.physical.size(); ++i) {
     report.table(parameter_headers, parameterRows(e.physical[i]), headingOf(e, i));
+  }
+  if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
+    report.section("Parameters");
+    report.table(parameter_headers, matrixRows(e));
   }
   report.section("Matches");
   report.plot(matchPlot(output));

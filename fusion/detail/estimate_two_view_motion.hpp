@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/detail/two_view_estimate.hpp>
 #include <fusion/two_view/two_view.hpp>
 #include <stats/hierarchy.hpp>
 
@@ -43,6 +44,23 @@ inline TwoViewCoordinates coordinatesOf(const std::optional<Camera>& camera, con
                                         const Eigen::Vector2d& corner) {
   if (camera) return {camera, {camera->fu, camera->fv}, {camera->cu, camera->cv}};
   return {std::nullopt, Eigen::Vector2d::Constant(0.5 * size.norm()), corner + 0.5 * size};
+}
+
+/// The covariance of A M B/‖A M B‖, entries column after column.
+inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel>& estimate, const Eigen::Matrix3d& A,
+                                          const Eigen::Matrix3d& B) {
+  Eigen::MatrixXd covariance = estimate.covariance;
+  if (covariance.rows() == 5) {
+    const Eigen::Matrix<double, 9, 5> J = estimate.parameter.pose.essentialMatrixJacobian();
+    covariance = J * covariance * J.transpose();
+  }
+  if (covariance.rows() != 9) return {};
+  const Eigen::Matrix3d M = A * estimate.parameter.matrix * B;
+  const Entries unit = entriesFrom(M / M.norm());
+  Eigen::Matrix<double, 9, 9> J;
+  for (int k = 0; k < 9; ++k) J.col(k) = entriesFrom(A * matrixFrom(Entries(Entries::Unit(k))) * B) / M.norm();
+  J -= unit * (unit.transpose() * J).eval();
+  return J * covariance * J.transpose();
 }
 
 inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel>& search, std::size_t m,
@@ -144,9 +162,10 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   result.inliers = agreeing.size(), result.threshold = state.threshold;
   const Eigen::Matrix3d& M = state.estimate.parameter.matrix;
   const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();
-  result.matrix = model.equations() == 2 ? Eigen::Matrix3d(K2 * M * to_first)
-                                         : Eigen::Matrix3d(K2.inverse().transpose() * M * to_first);
-  result.matrix /= result.matrix.norm();
+  const Eigen::Matrix3d to_second = model.equations() == 2 ? K2 : Eigen::Matrix3d(K2.inverse().transpose());
+  const Eigen::Matrix3d in_pixels = to_second * M * to_first;
+  result.matrix = in_pixels / in_pixels.norm();
+  result.matrix_covariance = detail::covarianceInPixels(state.estimate, to_second, to_first);
   result.physical = physicalParameters(model.name(), state.estimate, agreeing, calibration,
                                        {first.focalLength(), second.focalLength()});
   if (model.name() == "essential" && state.estimate.covariance.rows() == 5) {

@@ -82,8 +82,9 @@ struct TwoViewMotionEstimate {
   std::size_t chosen = 0;  ///< number in the lattice
   /// H or F of the chosen model in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  std::vector<bool> inlier;    ///< of each match
-  std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
+  Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
+  std::vector<bool> inlier;           ///< of each match
+  std::vector<double> errors;         ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
   /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of both
   /// first. None of `none`, nor of a fundamental matrix that tells no focal lengths.

@@ -41,10 +41,13 @@ TwoViewMotionOptions optionsOf(const TwoViewScene& scene) {
 
 /// Squared Mahalanobis distance of the true values under a covariance of rank k, by its pseudo-inverse.
 double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, Eigen::Index k) {
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(covariance);
+  // In units of the deviations: pixels and radians stand side by side.
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd scaled = scale.cwiseProduct(error);
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(scale.asDiagonal() * covariance * scale.asDiagonal());
   factor.setThreshold(1e-8);
   EXPECT_EQ(factor.rank(), k);
-  return error.dot(factor.solve(error));
+  return scaled.dot(factor.solve(scaled));
 }
 
 /// The values that the scene's motion has, in the order of the physical parameters.
@@ -102,12 +105,12 @@ class TwoViewMotions : public testing::TestWithParam<TwoViewMotion> {};
 
 TEST_P(TwoViewMotions, parametersLieWhereTheirCovarianceSays) {
   const TwoViewMotion motion = GetParam();
-  constexpr int trials = 12;
+  constexpr int trials = 6;
   double sum = 0;
   int counted = 0;
   Eigen::Index k = 0;
   for (std::uint64_t seed = 1; seed <= trials; ++seed) {
-    const TwoViewScene scene({.motion = motion, .sigma = 0.2}, seed);
+    const TwoViewScene scene({.motion = motion, .matches = 80, .sigma = 0.2}, seed);
     const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
     ASSERT_TRUE(found.ok()) << found.reason;
     if (found.chosenModel().name != nameOf(motion)) continue;  // who is chosen how often: validate two-view
@@ -135,7 +138,7 @@ TEST_P(TwoViewMotions, parametersLieWhereTheirCovarianceSays) {
       EXPECT_NEAR(mahalanobisSquared(*found.relative_pose, true_pose), nearest, 0.02 * nearest + 1e-6);
     }
   }
-  ASSERT_GE(counted, trials - 4);
+  ASSERT_GE(counted, trials - 2);
   if (k == 0) return;
   // χ² with k degrees of freedom has the variance 2k; the index is up to a fifth high (docs/two_view.md).
   const double mean = sum / counted, expected = static_cast<double>(k);
@@ -152,8 +155,8 @@ INSTANTIATE_TEST_SUITE_P(all, TwoViewMotions, testing::ValuesIn(experiments::def
 
 TEST(TwoViewMotion, withoutIntrinsicsTheFocalLengthsAreParameters) {
   int told = 0;
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const TwoViewScene scene({.motion = TwoViewMotion::fundamental, .matches = 200, .sigma = 0.2}, seed);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::fundamental, .matches = 150, .sigma = 0.2}, seed);
     TwoViewMotionOptions options = optionsOf(scene);
     options.first.reset();
     options.image_size = Eigen::Vector2d(scene.options.width, scene.options.height);
@@ -172,7 +175,7 @@ TEST(TwoViewMotion, withoutIntrinsicsTheFocalLengthsAreParameters) {
     }
     ++told;
   }
-  EXPECT_GE(told, 4);
+  EXPECT_GE(told, 3);
 }
 
 TEST(TwoViewMotion, theMatrixIsThatOfPixels) {
@@ -194,7 +197,7 @@ TEST(TwoViewMotion, lensesAreUndistorted) {
   TwoViewMotionOptions options = optionsOf(scene);
   Camera& camera = *options.first;
   camera.distortion = Distortion::radtan;
-  camera.coefficients << -0.2, 0.05, 0, 0;
+  camera.coefficients << -0.4, 0.1, 0, 0;
   std::vector<Eigen::Vector4d> pixels;
   for (const Eigen::Vector4d& m : scene.matches) {
     Eigen::Vector4d& p = pixels.emplace_back();
@@ -204,7 +207,7 @@ TEST(TwoViewMotion, lensesAreUndistorted) {
   EXPECT_EQ(found.chosenModel().name, "essential");
   EXPECT_GE(found.inliers, 74U);
   options.first->distortion = Distortion::none;
-  EXPECT_LT(estimateTwoViewMotion(pixels, options).inliers, 70U);
+  EXPECT_LT(estimateTwoViewMotion(pixels, options).inliers + 10, found.inliers);
 }
 
 TEST(TwoViewMotion, anyOrderGivesTheSameAnswer) {

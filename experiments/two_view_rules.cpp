@@ -1,0 +1,119 @@
+#include <experiments/two_view_rules.hpp>
+
+#include <experiments/parallel.hpp>
+#include <fusion/two_view/models.hpp>
+#include <stats/hierarchy.hpp>
+#include <stats/model_choice.hpp>
+#include <stats/model_choice_f_test.hpp>
+#include <stats/validation.hpp>
+
+#include <algorithm>
+#include <limits>
+
+namespace liestat::experiments {
+namespace {
+
+using Search = Hierarchy<Eigen::Vector4d, TwoViewMotionModel>;
+
+/// What a rule is called, and the number of the model that it chooses.
+struct Rule {
+  const char* name;
+  std::function<std::size_t(const Search&, double sigma)> choose;
+};
+
+template <class Phi>
+Rule tests(const char* name, double guard, const Phi& phi) {
+  return {name, [=](const Search& search, double) { return search.best(SupportTest{.guard = guard}, phi); }};
+}
+/// The model with the smallest value of a criterion.
+template <class Criterion>
+Rule smallest(const char* name, const Criterion& criterion) {
+  return {name, [=](const Search& search, double sigma) {
+            std::size_t best = search.nullModel();
+            double least = std::numeric_limits<double>::infinity();
+            for (std::size_t m = 0; m < search.models().size(); ++m) {
+              const auto& state = search.state(m);
+              if (!state.hasEstimate()) continue;
+              const TwoViewModel& model = *search.models()[m];
+              const CriterionInput input{state.errors, model.measurementDimension(), model.equations(),
+                                         model.freeParameters()};
+              const double value = criterion(input, state.threshold, sigma);
+              if (value < least) least = value, best = m;
+            }
+            return best;
+          }};
+}
+
+const std::vector<Rule>& rules() {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  static const std::vector<Rule> all = {
+      {"support, exp(-8.8 d/r): default", [](const Search& search, double) { return search.best(); }},
+      tests("support without guard, exp(-8.8 d/r)", 1, ExponentialPhi{}),
+      tests("support without guard, exp(-3.1 d/r)", 1, ExponentialPhi{3.1}),
+      tests("support, F test 0.999", 9, FTestPhi{}),
+      tests("support without guard, F test 0.999", 1, FTestPhi{}),
+      tests("support without guard, F test 0.99", 1, FTestPhi{0.99}),
+      tests("majority alone, F test 0.999", infinity, FTestPhi{}),
+      tests("support, Phi = 1", 9, [](double, double) { return 1.0; }),
+      smallest("information criterion", [](const CriterionInput& input, double threshold,
+                                           double sigma) { return informationCriterion(input, threshold, sigma); }),
+      smallest("GRIC", [](const CriterionInput& input, double, double) { return gric(input); }),
+      smallest("geometric AIC",
+               [](const CriterionInput& input, double threshold, double) { return geometricAic(input, threshold); })};
+  return all;
+}
+
+}  // namespace
+
+double TwoViewRuleRow::average() const {
+  double sum = 0;
+  for (const std::size_t r : right) sum += static_cast<double>(r);
+  return sum / static_cast<double>(trials * right.size());
+}
+std::size_t TwoViewRuleRow::worst() const {
+  return static_cast<std::size_t>(std::min_element(right.begin(), right.end()) - right.begin());
+}
+
+std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& comparison,
+                                                const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  std::vector<TwoViewRuleRow> rows;
+  for (const Rule& rule : rules()) rows.push_back({rule.name, comparison.trials, {}});
+  const std::uint64_t all = comparison.trials * default_two_view_motions.size();
+  std::uint64_t before = 0;
+  for (std::size_t k = 0; k < default_two_view_motions.size(); ++k) {
+    const TwoViewSceneOptions options{.motion = default_two_view_motions[k],
+                                      .matches = comparison.matches,
+                                      .outliers = comparison.outliers,
+                                      .sigma = comparison.sigma};
+    // A row of each trial, a column of each rule.
+    std::vector<char> right(comparison.trials * rules().size(), 0);
+    const ValidationOptions how{.trials = comparison.trials,
+                                .seed = comparison.seed,
+                                .chunk_size = 4,
+                                .progress = [&](std::size_t done, std::size_t) {
+                                  if (progress) progress(before + done, all);
+                                }};
+    validateAll(ProgramExecutor{comparison.threads}, how, {ReferenceLaw::chiSquared(1)},
+                [&](CounterRng&, std::uint64_t number) {
+                  const std::uint64_t seed = comparison.seed * 1000003 + number;
+                  const TwoViewScene scene(options, seed);
+                  const double sigma = options.sigma / options.focal_length;
+                  const TwoViewImages images{{sigma, sigma},
+                                             Eigen::Vector2d(options.width, options.height) / options.focal_length};
+                  Search search(twoViewModels(images), {.seed = seed, .all_models = true});
+                  search.add(scene.matches);
+                  while (search.iterate()) {
+                  }
+                  for (std::size_t r = 0; r < rules().size(); ++r) {
+                    const std::size_t m = rules()[r].choose(search, sigma);
+                    right[number * rules().size() + r] = search.models()[m]->name() == nameOf(options.motion);
+                  }
+                  return std::vector<TrialOutcome>{TrialOutcome{}};
+                });
+    before += comparison.trials;
+    for (std::size_t i = 0; i < right.size(); ++i) rows[i % rows.size()].right[k] += right[i] != 0;
+  }
+  return rows;
+}
+
+}  // namespace liestat::experiments

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <experiments/two_view_scene.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// The rules by which a model may be chosen, side by side over the same trials and the same estimates of all models.
+struct TwoViewRuleComparison {
+  std::size_t trials = 20;  ///< a motion
+  std::uint64_t seed = 1;
+  int threads = 0;
+  std::size_t matches = 100;
+  double outliers = 0.2;
+  double sigma = 0.5;  ///< px
+};
+
+/// How often a rule chose the right model.
+struct TwoViewRuleRow {
+  std::string rule;
+  std::size_t trials = 0;                                            ///< a motion
+  std::array<std::size_t, default_two_view_motions.size()> right{};  ///< of each motion
+  double average() const;                                            ///< share of right choices over all motions
+  std::size_t worst() const;                                         ///< number of the motion with the fewest
+};
+
+/// The default rule first; then tests with other bounds, the information criterion, GRIC and the geometric AIC.
+std::vector<TwoViewRuleRow> compareTwoViewRules(
+    const TwoViewRuleComparison& comparison,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+}  // namespace liestat::experiments
