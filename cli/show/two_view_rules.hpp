@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cli/show/json.hpp>
+#include <experiments/two_view_rules.hpp>
+
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// The rules with their shares of right choices, for the terminal.
+std::string formatTwoViewRules(const std::vector<experiments::TwoViewRuleRow>& rows);
+
+/// One rule as JSON.
+JsonObject toJson(const experiments::TwoViewRuleRow& row);
+
+}  // namespace liestat::cli
