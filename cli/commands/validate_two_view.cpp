@@ -1,6 +1,8 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/show/two_view_rules.hpp>
 #include <cli/show/two_view_validation.hpp>
+#include <experiments/two_view_rules.hpp>
 
 #include <memory>
 #include <string>
@@ -14,11 +16,31 @@ struct Options {
   TwoViewValidation validation;
   std::vector<std::string> motions;
   std::size_t trials = 0;
-  bool full = false;
+  bool full = false, rules = false;
   ValidationOutput output;
 };
 
+/// Nothing is promised of the rules, so nothing is judged.
+int compareRules(const Options& options, const Invocation& invocation) {
+  TwoViewRuleComparison comparison;
+  comparison.trials = options.trials != 0 ? options.trials : options.full ? 500 : 20;
+  comparison.seed = options.validation.seed, comparison.threads = options.validation.threads;
+  comparison.matches = options.validation.matches, comparison.outliers = options.validation.outliers;
+  comparison.sigma = options.validation.sigma;
+  const std::vector<TwoViewRuleRow> rows = withProgressBar(
+      "validate two-view", [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
+  if (options.output.json != "-") printLines(formatTwoViewRules(rows));
+  if (!options.output.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, comparison.seed);
+    std::vector<JsonObject> list;
+    for (const TwoViewRuleRow& row : rows) list.push_back(toJson(row));
+    writeJson(options.output.json, object.set("rules", list));
+  }
+  return exit_fine;
+}
+
 int runCommand(const Options& options, const Invocation& invocation) {
+  if (options.rules) return compareRules(options, invocation);
   TwoViewValidation validation = options.validation;
   validation.motions = chosen(default_two_view_motions, options.motions);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 500 : 50;
@@ -52,6 +74,8 @@ void addValidateTwoViewCommand(const CommandList& validate) {
   app.option("--sigma", options->validation.sigma, "Standard deviation of image coordinates, px (default 0.5)")
       .range(1e-3, 10.0);
   app.flag("--full", options->full, "500 trials a motion");
+  app.flag("--rules", options->rules,
+           "Compare rules by which the model may be chosen instead; all models are estimated");
   addRunOptions(app, "50, with --full 500", options->trials, options->validation.seed, options->validation.threads,
                 options->output);
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
