@@ -91,6 +91,28 @@ TEST(Hierarchy, SaysWhyAModelIsRejected) {
   EXPECT_EQ(bent.state(bent.find("line")).rejection, Rejection::fit);
 }
 
+TEST(Hierarchy, OtherRulesChooseFromTheSameEstimates) {
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const auto& [name, q] = truths[seed % truths.size()];
+    Curves search(curveModels(), {.all_models = true}), lazy(curveModels());
+    search.add(curvePoints(q, 60, 20, seed)), lazy.add(curvePoints(q, 60, 20, seed));
+    finish(search), finish(lazy);
+    for (const auto& state : search.states())
+      EXPECT_EQ(state.progress, ModelState<Eigen::Vector3d>::Progress::evaluated);
+    EXPECT_EQ(search.best(), search.best(SupportTest{}, ExponentialPhi{})) << "the rule of the options";
+    EXPECT_EQ(search.best(), lazy.best()) << "models that the walk does not reach would not be chosen";
+    // With so large a Φ every general model rejects what it contains.
+    const auto generous = [](double r, double r_general) { return 10 * r / r_general; };
+    EXPECT_EQ(search.models()[search.best(SupportTest{}, generous)]->name(), "parabola");
+    for (std::size_t m = 0; m < search.models().size(); ++m) {
+      for (std::size_t g = 0; g < search.models().size(); ++g) {
+        if (!search.contains(g, m)) continue;
+        EXPECT_EQ(search.compare(m, g), search.compare(m, g, SupportTest{}, ExponentialPhi{}));
+      }
+    }
+  }
+}
+
 TEST(Hierarchy, IsTheSameForAnyOrderOfAddingAndRemoving) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     const auto& q = truths[seed % truths.size()].second;
