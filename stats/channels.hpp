@@ -45,7 +45,7 @@ template <class... C>
 std::tuple<std::vector<C>...> byChannel(std::span<const std::variant<C...>> mixed) {
   std::tuple<std::vector<C>...> channels;
   const auto put = [&channels]<std::size_t... I>(const auto& m, std::index_sequence<I...>) {
-    const auto put_one = [&m](auto& channel, const auto* value) {
+    const auto put_one = [](auto& channel, const auto* value) {
       if (value) channel.push_back(*value);
     };
     (put_one(std::get<I>(channels), std::get_if<I>(&m)), ...);
