@@ -17,8 +17,9 @@ namespace liestat::detail {
 /// Measurements in the order of their keys. Equal ones are told apart by a number.
 template <class Measurement>
 class KeyedMeasurements {
-  static_assert(requires(const Measurement& m) { contentKey(m); },
-                "a type of measurements brings a function contentKey with it (stats/content_key.hpp)");
+  static_assert(
+      requires(const Measurement& m) { contentKey(m); },
+      "a type of measurements brings a function contentKey with it (stats/content_key.hpp)");
 
  public:
   using Id = std::uint64_t;

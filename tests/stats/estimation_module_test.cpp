@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -251,33 +250,29 @@ struct Padded {
 };
 
 TEST(ContentKey, DoesNotSeePadding) {
-  // The same values in memory that was something else before: in a struct, and in the tail of a variant.
-  using Mixed = std::variant<double, Padded, Eigen::Vector4d>;
-  static_assert(sizeof(Padded) > sizeof(char) + sizeof(double) && std::is_trivially_copyable_v<Padded>);
-  std::array<std::uint64_t, 2> keys{}, mixed_keys{};
-  for (const int fill : {0, 1}) {
-    alignas(Padded) unsigned char storage[sizeof(Padded)];
-    std::memset(storage, fill * 0xff, sizeof storage);
-    auto* padded = new (storage) Padded;
-    padded->kind = 'a', padded->value = 1.5;
-    const auto at = static_cast<std::size_t>(fill);
-    keys[at] = contentKey(*padded);
-    alignas(Mixed) unsigned char tail[sizeof(Mixed)];
-    std::memset(tail, fill * 0xff, sizeof tail);
-    auto* mixed = new (tail) Mixed(2.5);
-    mixed_keys[at] = contentKey(*mixed);
-    mixed->~Mixed();
-  }
-  EXPECT_EQ(keys[0], keys[1]);
-  EXPECT_EQ(mixed_keys[0], mixed_keys[1]);
+  static_assert(std::is_trivially_copyable_v<Padded>);
+  const auto over = [](int byte) {
+    Padded p;
+    std::memset(static_cast<void*>(&p), byte, sizeof p);
+    p.kind = 'a', p.value = 1.5;
+    return p;
+  };
+  Padded a = over(0), b = over(0xff);
+  EXPECT_NE(std::memcmp(&a, &b, sizeof a), 0) << "there is padding";
+  EXPECT_EQ(contentKey(a), contentKey(b));
+  // What an alternative that is larger has left behind is padding, too.
+  using Mixed = std::variant<double, Padded>;
+  Mixed c(a), d(Padded{'b', 7});
+  c = 2.5, d = 2.5;
+  EXPECT_EQ(contentKey(c), contentKey(d));
 }
 
 TEST(EstimationModule, ChoosesAModelFromBothChannels) {
-  // The level of a right choice is that of the hierarchy, more than 99 in 100; 15 trials of four models, of which four
-  // standard errors are four.
+  // The hierarchy's level of a right choice is more than 99 in 100: of 24 trials more than three are wrong with a
+  // probability of 1e-4.
   int right = 0;
   for (const auto& [name, q] : truths) {
-    for (std::uint64_t seed = 0; seed < 15; ++seed) {
+    for (std::uint64_t seed = 0; seed < 6; ++seed) {
       Module module(curves());
       Scene(q, 20, 8, seed).setAll(module);
       EXPECT_EQ(module.size(), 56u);
@@ -288,30 +283,31 @@ TEST(EstimationModule, ChoosesAModelFromBothChannels) {
       ASSERT_TRUE(found->estimate);
       EXPECT_EQ(found->measurements, 56u);
       ASSERT_EQ(found->inliers.size(), 2u);
-      // One inlier in a hundred is beyond the threshold: of twenty with probability 1e-6 more than five.
+      // One inlier in a hundred is beyond the threshold: of twenty more than five with probability 4e-8.
       for (const auto& names : found->inliers) {
         EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
         EXPECT_GE(std::count_if(names.begin(), names.end(), [](Name n) { return n < 20; }), 15);
         EXPECT_LE(names.size(), 22u);
       }
-      // D² over r, E², precision: the covariance is that of forty measurements, three of which say nothing new.
+      // D² is χ² with about sixty degrees of freedom, its standard deviation eleven; the squared Mahalanobis distance
+      // of the parameter is χ² with at most three, above 30 with probability 1e-6.
       EXPECT_NEAR(found->estimate->chi2, found->estimate->degrees_of_freedom, 4 * std::sqrt(2 * 60.0));
       EXPECT_NEAR(found->criterion, 1, 4 * std::sqrt(2 / 55.0));
       EXPECT_EQ(found->estimate->equation_error, 0);
       const Eigen::Index k = found->estimate->covariance.rows();
       const Eigen::VectorXd off = (found->estimate->parameter - q).head(k);
-      EXPECT_LE(off.dot(found->estimate->information * off), 40) << name << " " << seed;
+      EXPECT_LE(off.dot(found->estimate->information * off), 30) << name << " " << seed;
       if (k > 0) {
         const Eigen::MatrixXd one = found->estimate->information * found->estimate->covariance;
         EXPECT_TRUE(one.isIdentity(1e-9));
       }
     }
   }
-  EXPECT_GE(right, 56);
+  EXPECT_GE(right, 21);
 }
 
 TEST(EstimationModule, OfAnyOrderOfSettingAndUnsettingIsAFreshRun) {
-  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
     const Scene scene(truths[seed % 4].second, 15, 6, seed), other(truths[(seed + 1) % 4].second, 15, 6, seed + 20);
     Module fresh(curves()), module(curves());
     scene.setAll(fresh);
@@ -345,7 +341,7 @@ TEST(EstimationModule, OfAnyOrderOfSettingAndUnsettingIsAFreshRun) {
         EXPECT_TRUE(module.set(i - n, Measurement(scene.edgels[i - n])));
       }
       if (++changes % 4 == 0) module.step();
-      if (changes % 17 == 0) module.run();
+      if (changes % 23 == 0) module.run();
     }
     EXPECT_EQ(module.size(), 2 * n);
     expectEqual(*finish(module), *fresh.output());
