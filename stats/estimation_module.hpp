@@ -3,12 +3,12 @@
 // outside (T. Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's estimation method", INRIA
 // RR-4050, 2000, section 6; docs/estimation_module.md).
 //
-//   using Measurement = std::variant<Point, Tangent>;                  // a channel for each
-//   EstimationModule<Measurement, Parameter, Camera> module(modelsOf, camera);   // Camera -> models of the hierarchy
-//   module.set<0>(17, point);                                          // replaces what was set on channel 0 as 17
+//   using Measurement = std::variant<Point, Tangent>;   // a channel for each
+//   EstimationModule<Measurement, Parameter, Camera> module(models_of_camera, camera);
+//   module.set<0>(17, point);                           // replaces what was set on channel 0 as 17
 //   module.start();
-//   module.run();                                                      // or while (module.step()) {}
-//   const auto found = module.output();                                // model, parameter, covariance, inliers
+//   module.run();                                       // or while (module.step()) {}
+//   const auto found = module.output();                 // model, parameter, covariance, inliers
 //
 // Any thread may call anything, but step(), run() and search() belong to one thread at a time. The models are those of
 // stats/hierarchy.hpp, which does the work. Models that are generated at run time and canonical forms of their equations
@@ -16,6 +16,7 @@
 #pragma once
 
 #include <stats/channels.hpp>
+#include <stats/estimation_module_types.hpp>
 #include <stats/hierarchy.hpp>
 
 #include <algorithm>
@@ -23,7 +24,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -36,42 +36,6 @@
 #include <vector>
 
 namespace liestat {
-
-enum class ModuleControl {
-  stopped,  ///< as it is made: step() and run() do nothing
-  running,
-  suspended  ///< step() does nothing, run() waits
-};
-constexpr const char* name(ModuleControl control) {
-  return control == ModuleControl::stopped ? "stopped" : control == ModuleControl::running ? "running" : "suspended";
-}
-
-/// The answer of the module at some time, after the inputs that its last step took in.
-template <class Parameter>
-struct ModuleOutput {
-  HierarchyState progress = HierarchyState::initial;
-  std::string fault = {};        ///< what is wrong with the models; nothing is then estimated
-  std::size_t measurements = 0;  ///< that were there, inliers or not
-  std::string model = {};        ///< chosen, the null model while there is nothing else
-  /// Status, parameter, information and covariance, D² (`chi2`), E² (`equation_error`). Empty while there is no estimate.
-  std::optional<ModelEstimate<Parameter>> estimate = {};
-  bool outdated = false;    ///< the estimate is of earlier measurements; inliers and criterion are of these
-  bool unsupported = true;  ///< there is no estimate, or its inliers could be chance
-  /// The normalised criterion 2 L²/r over the inliers: one on average for a right model.
-  double criterion = std::numeric_limits<double>::quiet_NaN();
-  std::vector<std::vector<std::uint64_t>> inliers = {};  ///< their names, ascending, by channel
-};
-
-/// Signals are sent by the thread that runs the module, at the end of a step, and may call anything but step() and run().
-template <class Parameter>
-struct ModuleOptions {
-  using Signal = std::function<void(const ModuleOutput<Parameter>&)>;
-  HierarchyOptions search = {};
-  Signal model_found = {};    ///< a supported model is chosen, another one than before or after a new state
-  Signal terminated = {};     ///< nothing is left to do; again after new inputs
-  Signal cost_below = {};     ///< the criterion of a supported model has fallen below `cost_threshold`
-  double cost_threshold = 0;  ///< of the normalised criterion; 0: no such signal
-};
 
 /// `State` holds the constants of the models and measurement equations, from which the factory makes the models.
 template <class Measurement_, class Parameter_, class State_ = std::monostate>

@@ -368,6 +368,13 @@ TEST(EstimationModule, AValueReplacesTheOneOfItsName) {
   // What was read before has stayed.
   EXPECT_EQ(with->measurements, 40u);
   EXPECT_EQ(last->measurements, 39u);
+  // Of equal values the one that is named goes.
+  for (const Name twin : {50u, 51u, 52u}) module.set<0>(twin, Eigen::Vector2d(0, -1));
+  EXPECT_TRUE(module.unset(0, 51));
+  const auto twins = finish(module);
+  const std::vector<Name> high(std::lower_bound(twins->inliers[0].begin(), twins->inliers[0].end(), 50u),
+                               twins->inliers[0].end());
+  EXPECT_EQ(high, (std::vector<Name>{50, 52}));
 }
 
 TEST(EstimationModule, ANewStateBeginsWithTheNullModel) {
@@ -429,6 +436,19 @@ TEST(EstimationModule, SuspendedByAnotherThreadItWaits) {
   EXPECT_TRUE(finished);
   scene.setAll(fresh);
   expectEqual(*module.output(), *finish(fresh));
+}
+
+TEST(EstimationModule, StopEndsAWait) {
+  Module module(curves());
+  Scene({-1, 2, 0}, 10, 0, 3).setAll(module);
+  module.start();
+  module.suspend();
+  bool finished = true;
+  std::thread worker([&] { finished = module.run(); });
+  EXPECT_TRUE(module.stop());
+  worker.join();
+  EXPECT_FALSE(finished);
+  EXPECT_FALSE(module.output()->estimate);
 }
 
 TEST(EstimationModule, IsControlledAndFedByOtherThreads) {
@@ -576,7 +596,8 @@ TEST(EstimationModule, SignalsMayCallTheModule) {
 
 TEST(EstimationModule, HasAnAnswerAtAnyTime) {
   const Scene scene({1, 0.5, -0.6}, 30, 10, 9);
-  Module module(curves());
+  const auto watch = std::make_shared<Watch>();
+  Module module(curves(watch));
   EXPECT_EQ(module.output()->model, "zero");
   EXPECT_FALSE(module.output()->estimate);
   EXPECT_TRUE(std::isnan(module.output()->criterion));
@@ -585,7 +606,11 @@ TEST(EstimationModule, HasAnAnswerAtAnyTime) {
   bool had = false;
   std::vector<std::string> models;
   for (bool more = true; more;) {
+    const int draws = watch->draws, steps = watch->steps;
     more = module.step();
+    // One hypothesis; five of them, refined twice, in ten steps each.
+    EXPECT_LE(watch->draws - draws, 1);
+    EXPECT_LE(watch->steps - steps, 100);
     const auto now = module.output();
     EXPECT_EQ(now->measurements, 80u);
     EXPECT_FALSE(had && !now->estimate);
