@@ -572,6 +572,18 @@ TEST(EstimationModule, EachSignalComesOnce) {
   scene.setAll(module);
   finish(module);
   EXPECT_EQ(sent(), (Signals{"line", "end"}));
+
+  // A null model that is right is found, too, and after a new state again.
+  options.cost_threshold = 5;
+  options.cost_below = [&](const Module::Output&) { signals.push_back("cost"); };
+  Module still(curves(), Constants{}, options);
+  running = &still;
+  Scene({0, 0, 0}, 30, 5, 1).setAll(still);
+  finish(still);
+  EXPECT_EQ(sent(), (Signals{"zero", "cost", "end"}));
+  still.setState({});
+  finish(still);
+  EXPECT_EQ(sent(), (Signals{"zero", "cost", "end"}));
 }
 
 TEST(EstimationModule, SignalsMayCallTheModule) {
@@ -651,7 +663,10 @@ TEST(EstimationModule, BadInputIsSaid) {
   EXPECT_FALSE(module.start());
   EXPECT_TRUE(module.suspend());
   EXPECT_FALSE(module.start());
+  module.set<0>(5, Eigen::Vector2d(1, 1));
   EXPECT_FALSE(module.step());
+  EXPECT_EQ(module.output()->measurements, 0u) << "nothing is done while it is suspended";
+  EXPECT_TRUE(module.unset(0, 5));
   EXPECT_TRUE(module.stop());
   // Nothing at all.
   EXPECT_EQ(finish(module)->model, "zero");
