@@ -62,7 +62,7 @@ class EstimationModule {
   }
 
   /// Sets the measurement of this name on a channel, instead of the one that was there. What is set counts from the next
-  /// step on; numbers that are not finite are outliers of all models.
+  /// step on (ModuleOptions::steps_between_inputs may delay it); numbers that are not finite are outliers of all models.
   template <std::size_t Channel>
   void set(Name name, const MeasurementOn<Channel>& value) {
     set(name, detail::ChannelsOf<Measurement>::template make<Channel>(value));
@@ -164,6 +164,10 @@ class EstimationModule {
     std::vector<Measurement> values;
     {
       const std::lock_guard lock(mutex_);
+      if (!new_state_ && wait_ > 0 && search_.progress() != HierarchyState::terminated) {
+        --wait_;
+        return;
+      }
       if (std::exchange(new_state_, false)) {
         state = state_;
         for (const auto& [key, value] : inputs_) changed_.insert(key);
@@ -188,6 +192,7 @@ class EstimationModule {
     const std::vector<Id> ids = search_.add(values);
     for (std::size_t i = 0; i < ids.size(); ++i) ids_[keys[i]] = ids[i], keys_[ids[i]] = keys[i];
     if (!state && changed.empty()) return;
+    wait_ = options_.steps_between_inputs;
     was_terminated_ = false;
     published_.reset();
     publish();
@@ -249,6 +254,7 @@ class EstimationModule {
   Search search_;
   std::map<Key, Id> ids_;
   std::unordered_map<Id, Key> keys_;
+  std::size_t wait_ = 0;                    // steps before inputs are taken in again
   std::optional<std::uint64_t> published_;  // the revision of output_
   // What was signalled.
   std::optional<std::string> found_;

@@ -43,6 +43,9 @@ template <class Parameter>
 struct ModuleOptions {
   using Signal = std::function<void(const ModuleOutput<Parameter>&)>;
   HierarchyOptions search = {};
+  /// Measurements wait for so many steps after the last ones, unless nothing is left to do. They begin the walk through the
+  /// models again, so that a new one with every step would keep it at the null model. 0: they are taken in at once.
+  std::size_t steps_between_inputs = 0;
   Signal model_found = {};    ///< a supported model is chosen, another one than before or after a new state
   Signal terminated = {};     ///< nothing is left to do; again after new inputs
   Signal cost_below = {};     ///< the criterion of a supported model has fallen below `cost_threshold`

@@ -650,6 +650,37 @@ TEST(EstimationModule, HasAnAnswerAtAnyTime) {
   EXPECT_TRUE(std::binary_search(last->inliers[1].begin(), last->inliers[1].end(), 39u));
 }
 
+TEST(EstimationModule, AStreamOfInputsMayWait) {
+  const Scene scene({1, 0.5, -0.6}, 100, 30, 3);
+  // A new point with every second step, 100 in all: how often the answer is the parabola.
+  const auto run = [&](std::size_t wait) {
+    Module::Options options;
+    options.steps_between_inputs = wait;
+    Module module(curves(), Constants{}, options);
+    for (std::size_t i = 0; i < 30; ++i) module.set<0>(i, scene.points[i]);
+    module.start();
+    int found = 0;
+    for (std::size_t i = 30; i < scene.points.size(); ++i) {
+      module.set<0>(i, scene.points[i]);
+      module.step(), module.step();
+      found += module.output()->model == "parabola";
+    }
+    // A new state does not wait.
+    module.step();
+    module.setState({});
+    module.step();
+    EXPECT_EQ(module.output()->measurements, scene.points.size());
+    EXPECT_EQ(module.output()->model, "zero");
+    finish(module);
+    Module fresh(curves());
+    for (std::size_t i = 0; i < scene.points.size(); ++i) fresh.set<0>(i, scene.points[i]);
+    expectEqual(*module.output(), *finish(fresh));
+    return found;
+  };
+  EXPECT_EQ(run(0), 0);
+  EXPECT_GE(run(1000), 30) << "once terminated, the next come in together";
+}
+
 TEST(EstimationModule, BadInputIsSaid) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Module module(curves());
