@@ -161,6 +161,8 @@ class Hierarchy {
     const bool any = std::any_of(states_.begin(), states_.end(), [](const State& s) { return s.hasEstimate(); });
     return any ? HierarchyState::available : HierarchyState::initial;
   }
+  /// Grows with every change of estimates, inliers or verdicts.
+  std::uint64_t revision() const { return revision_; }
   /// What is known of a model, by its number in models().
   const State& state(std::size_t model) const { return states_[model]; }
   const std::vector<State>& states() const { return states_; }
@@ -516,6 +518,7 @@ class Hierarchy {
   }
   /// Who is rejected by whom.
   void decide() {
+    ++revision_;
     for (std::size_t m = 0; m < models_.size(); ++m) {
       states_[m].rejection = Rejection::none, states_[m].rejected_by.reset();
       if (!states_[m].hasEstimate()) continue;
@@ -538,6 +541,7 @@ class Hierarchy {
   HierarchyOptions options_;
   std::string fault_;
   std::size_t null_ = none;
+  std::uint64_t revision_ = 0;
   std::vector<std::vector<std::size_t>> parents_, children_;
   std::vector<std::vector<char>> contains_;
   std::vector<std::size_t> rank_;

@@ -1,11 +1,9 @@
 // Measurements ordered by what they are, so that neither draws nor sums depend on when they came.
 #pragma once
 
-#include <lie/manifold.hpp>
-#include <lie/rn.hpp>
+#include <stats/content_key.hpp>
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -16,31 +14,13 @@
 
 namespace liestat::detail {
 
-/// A bijection of 64 bits whose values look random (the finaliser of D. Stafford's "Mix13").
-constexpr std::uint64_t mixBits(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
-  return mixBits(mixBits(a + 0x9e3779b97f4a7c15u) ^ b);
-}
-
-/// A number for the coordinates of a measurement; zeros of both signs are the same. Types of your own bring a function of
-/// this name with them.
-template <Homogeneous M>
-std::uint64_t contentKey(const M& measurement) {
-  const auto x = log(ManifoldTraits<M>::origin(), measurement);
-  std::uint64_t key = 0;
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
-    key = mixBits(key, std::bit_cast<std::uint64_t>(static_cast<double>(x[i]) + 0.0));
-  }
-  return key;
-}
-
 /// Measurements in the order of their keys. Equal ones are told apart by a number.
 template <class Measurement>
 class KeyedMeasurements {
+  static_assert(
+      requires(const Measurement& m) { contentKey(m); },
+      "a type of measurements brings a function contentKey with it (stats/content_key.hpp)");
+
  public:
   using Id = std::uint64_t;
 
