@@ -1,7 +1,7 @@
 #include <experiments/two_view_pairs.hpp>
 
 #include <experiments/parallel.hpp>
-#include <fusion/two_view/distinct_matches.hpp>
+#include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/repeated_extraction.hpp>
 
@@ -45,10 +45,10 @@ struct Normalised {
     };
     normalise(of.matches, all), normalise(of.validation, validation);
     images = {{how.sigma / unit, how.sigma / unit}, of.size / unit};
-    if (!how.distinct) {
+    if (how.contradicted) {
       kept = all;
     } else {
-      for (const std::size_t i : distinctMatches(all, images.noise)) kept.push_back(all[i]);
+      for (const std::size_t i : uncontradictedMatches(all, images.noise)) kept.push_back(all[i]);
     }
   }
   double pixels(double squared_error) const { return std::sqrt(squared_error) * unit; }
@@ -258,7 +258,7 @@ auto repeat(const TwoViewPairsValidation& how, const F& f) {
 PairChoice summarise(const Normalised& pair, const std::vector<ChoiceRun>& runs) {
   PairChoice row;
   row.family = pair.pair->family, row.name = pair.pair->name;
-  row.tentative = pair.all.size(), row.distinct = pair.kept.size(), row.runs = runs.size();
+  row.tentative = pair.all.size(), row.kept = pair.kept.size(), row.runs = runs.size();
   for (const ChoiceRun& run : runs) {
     row.right += run.right, row.degenerate += run.degenerate;
     const auto known =

@@ -51,16 +51,15 @@ struct TwoViewPairsValidation {
   std::size_t runs = 10;  ///< of each pair; medians are over these
   std::uint64_t seed = 1;
   int threads = 0;
-  /// Whether matches that repeat or contradict others (fusion/two_view/distinct_matches.hpp) are left out of the choice
-  /// of the model.
-  bool distinct = true;
+  /// Whether matches that others contradict (fusion/two_view/contradictions.hpp) take part.
+  bool contradicted = false;
 };
 
 /// The choice between a plane and depth, of one pair.
 struct PairChoice {
   PairFamily family = PairFamily::homogr;
   std::string name;
-  std::size_t tentative = 0, distinct = 0;                  ///< matches
+  std::size_t tentative = 0, kept = 0;                      ///< matches, and those that took part
   std::vector<std::pair<std::string, std::size_t>> chosen;  ///< models and how often they were
   std::size_t right = 0, runs = 0;  ///< runs that chose a homography (homogr) or a fundamental matrix (kusvod2)
   double homography_inliers = 0, fundamental_inliers = 0;  ///< medians

@@ -30,7 +30,7 @@ int runPairs(const Options& options, const Invocation& invocation) {
   validation.sigma = options.sigma.value_or(validation.sigma);
   validation.runs = options.trials != 0 ? options.trials : validation.runs;
   validation.seed = options.validation.seed, validation.threads = options.validation.threads;
-  validation.distinct = !options.all_matches;
+  validation.contradicted = options.all_matches;
   const TwoViewPairsResult result = withProgressBar(
       "validate two-view", [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
   if (options.output.json != "-") printLines(formatTwoViewPairs(result));
@@ -85,7 +85,7 @@ void addValidateTwoViewCommand(const CommandList& validate) {
       .excludes("--matches")
       .excludes("--outliers")
       .excludes("--full");
-  app.flag("--all-matches", options->all_matches, "Also matches of --pairs that repeat or contradict others");
+  app.flag("--all-matches", options->all_matches, "Also matches of --pairs that contradict each other");
   addRunOptions(app, "50, with --full 500, of real pairs 10", options->trials, options->validation.seed,
                 options->validation.threads, options->output);
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });

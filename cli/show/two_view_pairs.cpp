@@ -17,8 +17,7 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-const std::vector<std::string> choice_headers{"pair", "n",   "kept",  "right",  "chosen", "H",
-                                              "F",    "far", "expl.", "chance", "plane",  "valid., px"};
+const std::vector<std::string> choice_headers{"pair", "kept/n", "chosen", "H", "F", "far", "new", "max", "plane", "px"};
 const std::vector<std::string> structure_headers{"pair", "n",      "planes", "found",      "wrong",
                                                  "%",    "purity", "cover",  "first wrong"};
 const std::vector<std::string> plane_headers{"pair", "n", "right", "found", "inliers", "of them right", "distance, px"};
@@ -37,8 +36,7 @@ Rows choiceRows(const std::vector<PairChoice>& choices, PairFamily family) {
     for (const auto& [model, count] : row.chosen) {
       chosen += fmt::format("{}{} {}", chosen.empty() ? "" : ", ", shortName(model), count);
     }
-    rows.push_back({row.name, fmt::format("{}", row.tentative), fmt::format("{}", row.distinct),
-                    row.chosenRight() ? "yes" : "no", chosen, number(row.homography_inliers),
+    rows.push_back({row.name, fmt::format("{}/{}", row.kept, row.tentative), chosen, number(row.homography_inliers),
                     number(row.fundamental_inliers), number(row.far), number(row.explained), number(row.allowed),
                     fmt::format("{}", row.degenerate), fmt::format("{:.2f}", row.validation_error)});
   }
@@ -69,11 +67,15 @@ const char* titleOf(PairFamily family) {
                                       : "kusvod2: scenes in depth; right is a fundamental matrix";
 }
 constexpr const char* choice_notes =
-    "n tentative matches, kept those that neither repeat nor contradict another one; models that were chosen, in how "
-    "many runs; medians: inliers of homography and fundamental matrix, matches far from the homography, those of them "
-    "that the fundamental matrix explains, how many chance and its freedom explain; plane: runs in which five of the "
-    "seven matches that made the best fundamental matrix are on a plane (DEGENSAC's rule); distance of the validation "
-    "points from the right model's estimate.";
+    "kept: tentative matches that no other one contradicts; chosen: models, and in how many runs. Medians over the "
+    "runs: "
+    "inliers of homography (H) and fundamental matrix (F); far: matches far from the homography; new: those of them "
+    "that "
+    "the fundamental matrix explains; max: so many chance and its freedom explain. plane: runs in which five of the "
+    "seven "
+    "matches that made the best fundamental matrix are on a plane (DEGENSAC's rule). px: distance of the validation "
+    "points "
+    "from the right model's estimate, median of medians.";
 constexpr const char* structure_notes =
     "Labelled planes, homographies that were found one after the other, and with the best assignment of the found ones "
     "to the labels: wrong labels, share of inliers with the right label, share of labelled matches that were found; "
@@ -106,7 +108,11 @@ std::string formatTwoViewPairs(const TwoViewPairsResult& result) {
     checks.row({check.text, number(check.value), number(check.bound), verdictCell(check.passed)});
   }
   if (!result.checks.empty()) text += "\n" + checks.str();
-  return text + "\n" + verdictLines(result.tally(), "of real pairs");
+  const Tally count = result.tally();
+  return text + fmt::format("\n{} of {} promises are kept\n{}\n", count.judged - count.failed, count.judged,
+                            count.judged == 0 ? "nothing was promised"
+                            : count.passed()  ? "PASSED"
+                                              : "FAILED");
 }
 
 JsonObject toJson(const TwoViewPairsResult& result, JsonObject envelope) {
@@ -118,7 +124,7 @@ JsonObject toJson(const TwoViewPairsResult& result, JsonObject envelope) {
                           .set("family", name(row.family))
                           .set("pair", row.name)
                           .set("tentative", row.tentative)
-                          .set("kept", row.distinct)
+                          .set("kept", row.kept)
                           .set("runs", row.runs)
                           .set("right", row.right)
                           .set("chosen", chosen)
