@@ -6,7 +6,8 @@
 //   adelaide-rmf   several planes, each match labelled with its own
 //   evd            one plane seen from far apart, inliers labelled
 //
-// One set of parameters for all: noise of σ px in both images, nothing known of the cameras, the hierarchy's defaults.
+// One set of parameters for all: noise of σ px in both images, nothing known of the cameras, the hierarchy's
+// defaults but for ten hypotheses of a model that are refined.
 #pragma once
 
 #include <experiments/judged_report.hpp>
@@ -96,7 +97,7 @@ struct PairPlane {
   std::size_t supported = 0, runs = 0;    ///< runs that found a homography that chance does not explain
 };
 
-/// A promise about all pairs of a kind: a count or an error with its bound.
+/// A promise about all pairs of a kind, a count with its bound; or a count to compare it with, which is not judged.
 struct PairCheck {
   std::string text;
   double value = 0, bound = 0;

@@ -105,7 +105,7 @@ std::string formatTwoViewPairs(const TwoViewPairsResult& result) {
   add("evd: a plane from far apart, few right matches", plane_headers, planeRows(result.planes));
   Table checks({"promise", "measured", "bound", "verdict"});
   for (const PairCheck& check : result.checks) {
-    checks.row({check.text, number(check.value), number(check.bound), verdictCell(check.passed)});
+    checks.row({check.text, number(check.value), check.passed ? number(check.bound) : "", verdictCell(check.passed)});
   }
   if (!result.checks.empty()) text += "\n" + checks.str();
   const Tally count = result.tally();
@@ -189,7 +189,8 @@ void writeTwoViewPairsReport(const std::string& directory, const std::string& co
     report.section("Promises");
     Rows rows;
     for (const PairCheck& check : result.checks) {
-      rows.push_back({check.text, number(check.value), number(check.bound), verdictCell(check.passed)});
+      rows.push_back(
+          {check.text, number(check.value), check.passed ? number(check.bound) : "", verdictCell(check.passed)});
     }
     report.table({"promise", "measured", "bound", "verdict"}, rows);
   }
