@@ -1,10 +1,13 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/io/two_view_pairs.hpp>
+#include <cli/show/two_view_pairs.hpp>
 #include <cli/show/two_view_rules.hpp>
 #include <cli/show/two_view_validation.hpp>
 #include <experiments/two_view_rules.hpp>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,9 +19,31 @@ struct Options {
   TwoViewValidation validation;
   std::vector<std::string> motions;
   std::size_t trials = 0;
+  std::optional<double> sigma;
   bool full = false, rules = false;
+  std::string pairs;
+  bool all_matches = false;
   ValidationOutput output;
 };
+
+int runPairs(const Options& options, const Invocation& invocation) {
+  const std::vector<TwoViewPair> pairs = readTwoViewPairs(options.pairs);
+  TwoViewPairsValidation validation;
+  validation.sigma = options.sigma.value_or(validation.sigma);
+  validation.runs = options.trials != 0 ? options.trials : validation.runs;
+  validation.seed = options.validation.seed, validation.threads = options.validation.threads;
+  validation.contradicted = options.all_matches;
+  const TwoViewPairsResult result = withProgressBar(
+      "validate two-view", [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
+  if (options.output.json != "-") printLines(formatTwoViewPairs(result));
+  if (!options.output.json.empty()) {
+    writeJson(options.output.json, toJson(result, jsonEnvelope(invocation.command_line, validation.seed)));
+  }
+  if (!options.output.report.empty()) {
+    writeTwoViewPairsReport(options.output.report, invocation.command_line, result);
+  }
+  return result.tally().failed == 0 ? exit_fine : exit_validation_failed;
+}
 
 /// Nothing is promised of the rules, so nothing is judged.
 int compareRules(const Options& options, const Invocation& invocation) {
@@ -26,7 +51,7 @@ int compareRules(const Options& options, const Invocation& invocation) {
   comparison.trials = options.trials != 0 ? options.trials : options.full ? 500 : 20;
   comparison.seed = options.validation.seed, comparison.threads = options.validation.threads;
   comparison.matches = options.validation.matches, comparison.outliers = options.validation.outliers;
-  comparison.sigma = options.validation.sigma;
+  comparison.sigma = options.sigma.value_or(comparison.sigma);
   const std::vector<TwoViewRuleRow> rows = withProgressBar(
       "validate two-view", [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
   if (options.output.json != "-") printLines(formatTwoViewRules(rows));
@@ -40,8 +65,10 @@ int compareRules(const Options& options, const Invocation& invocation) {
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
+  if (!options.pairs.empty()) return runPairs(options, invocation);
   if (options.rules) return compareRules(options, invocation);
   TwoViewValidation validation = options.validation;
+  validation.sigma = options.sigma.value_or(validation.sigma);
   validation.motions = chosen(default_two_view_motions, options.motions);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 500 : 50;
   const TwoViewValidationResult result =
@@ -71,13 +98,22 @@ void addValidateTwoViewCommand(const CommandList& validate) {
   app.option("--matches", options->validation.matches, "Matches of a trial (default 100)")
       .range(std::size_t{10}, std::size_t{100000});
   app.option("--outliers", options->validation.outliers, "Share of wrong matches (default 0.2)").range(0.0, 0.9);
-  app.option("--sigma", options->validation.sigma, "Standard deviation of image coordinates, px (default 0.5)")
+  app.option("--sigma", options->sigma, "Standard deviation of image coordinates, px (default 0.5, of real pairs 1)")
       .range(1e-3, 10.0);
   app.flag("--full", options->full, "500 trials a motion");
+  app.option("--pairs", options->pairs,
+             "Real pairs instead: a directory with the folders homogr, kusvod2, adelaide-rmf, evd, or some of them")
+      .excludes("--motion")
+      .excludes("--matches")
+      .excludes("--outliers")
+      .excludes("--full");
+  app.flag("--all-matches", options->all_matches, "Also matches of --pairs that contradict each other");
   app.flag("--rules", options->rules,
-           "Compare rules by which the model may be chosen instead; all models are estimated");
-  addRunOptions(app, "50, with --full 500", options->trials, options->validation.seed, options->validation.threads,
-                options->output);
+           "Compare rules by which the model may be chosen instead; all models are estimated")
+      .excludes("--pairs")
+      .excludes("--motion");
+  addRunOptions(app, "50, with --full 500, of real pairs 10", options->trials, options->validation.seed,
+                options->validation.threads, options->output);
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

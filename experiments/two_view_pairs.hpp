@@ -1,0 +1,124 @@
+// What the hierarchy of two-view motion makes of real pairs of images whose truth is known in part: `liestat validate
+// two-view --pairs DIR`. Four kinds of pairs, by the folder that they are in:
+//
+//   homogr         a plane or a rotation; validation points, which satisfy a homography
+//   kusvod2        scenes in depth; validation points, which satisfy a fundamental matrix
+//   adelaide-rmf   several planes, each match labelled with its own
+//   evd            one plane seen from far apart, inliers labelled
+//
+// One set of parameters for all: noise of σ px in both images, nothing known of the cameras, the hierarchy's
+// defaults but for ten hypotheses of a model that are refined.
+#pragma once
+
+#include <experiments/judged_report.hpp>
+#include <stats/hierarchy_types.hpp>
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// Which of the four kinds a pair is.
+enum class PairFamily { homogr, kusvod2, adelaide, evd };
+/// The name of the folder.
+inline std::string name(PairFamily family) {
+  constexpr const char* names[] = {"homogr", "kusvod2", "adelaide-rmf", "evd"};
+  return names[static_cast<std::size_t>(family)];
+}
+inline constexpr PairFamily pair_families[] = {PairFamily::homogr, PairFamily::kusvod2, PairFamily::adelaide,
+                                               PairFamily::evd};
+
+/// A pair of images: matches (x, y, x', y') in px.
+struct TwoViewPair {
+  PairFamily family = PairFamily::homogr;
+  std::string name;
+  std::vector<Eigen::Vector4d> matches;  ///< tentative
+  /// Of each match, where the family has labels: the structure that it belongs to, 0 for a wrong match.
+  std::vector<std::size_t> labels;
+  std::vector<Eigen::Vector4d> validation;  ///< right matches that no estimate sees
+  /// A corner of both images, and width and height (px).
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero(), size = Eigen::Vector2d::Ones();
+};
+
+struct TwoViewPairsValidation {
+  double sigma = 1;       ///< px
+  std::size_t runs = 10;  ///< of each pair; medians are over these
+  std::uint64_t seed = 1;
+  int threads = 0;
+  /// Whether matches that others contradict (fusion/two_view/contradictions.hpp) take part.
+  bool contradicted = false;
+};
+
+/// The choice between a plane and depth, of one pair.
+struct PairChoice {
+  PairFamily family = PairFamily::homogr;
+  std::string name;
+  std::size_t tentative = 0, kept = 0;                      ///< matches, and those that took part
+  std::vector<std::pair<std::string, std::size_t>> chosen;  ///< models and how often they were
+  std::size_t right = 0, runs = 0;  ///< runs that chose a homography (homogr) or a fundamental matrix (kusvod2)
+  double homography_inliers = 0, fundamental_inliers = 0;  ///< medians
+  /// The test of support between the two, medians: matches far from the homography, those of them that the fundamental
+  /// matrix explains, and how many chance and its freedom explain.
+  double far = 0, explained = 0, allowed = 0;
+  /// Residuals 2L²/r of the two over the inliers of both, medians.
+  double homography_cost = 0, fundamental_cost = 0;
+  /// Runs in which DEGENSAC's rule says that a plane dominates: five of the seven matches that made the best fundamental
+  /// matrix are on one.
+  std::size_t degenerate = 0;
+  /// The median distance (Sampson's, px) of the validation points from the homography (homogr) or the fundamental matrix
+  /// (kusvod2), whichever was chosen; a more specific model's where the walk did not reach that one.
+  double validation_error = 0;
+  bool chosenRight() const { return 2 * right > runs; }
+};
+
+/// Labels against the structures that were extracted with homographies alone.
+struct PairStructures {
+  std::string name;
+  std::size_t matches = 0, labelled = 0;  ///< and structures that are labelled
+  /// With the best assignment of structures to labels, medians: structures found, wrong labels, the share of inliers with
+  /// the label of their structure (purity), the share of labelled matches that are inliers of theirs (coverage).
+  double found = 0, wrong = 0, purity = 0, coverage = 0;
+  double first_wrong = 0;  ///< wrong labels of the first structure alone, where one is labelled
+};
+
+/// A dominant plane among few right matches.
+struct PairPlane {
+  std::string name;
+  std::size_t matches = 0, labelled = 0;  ///< and right ones
+  double inliers = 0, right = 0;          ///< of the homography, medians, and those that are labelled right
+  double label_error = 0;                 ///< median distance (px) of right matches from it
+  std::size_t supported = 0, runs = 0;    ///< runs that found a homography that chance does not explain
+};
+
+/// A promise about all pairs of a kind, a count with its bound; or a count to compare it with, which is not judged.
+struct PairCheck {
+  std::string text;
+  double value = 0, bound = 0;
+  std::optional<bool> passed;
+};
+
+struct TwoViewPairsResult {
+  std::vector<PairChoice> choices;
+  std::vector<PairStructures> structures;
+  std::vector<PairPlane> planes;
+  std::vector<PairCheck> checks;
+  Tally tally() const { return experiments::tally(checks); }
+};
+
+/// Runs everything, in the order of the pairs.
+TwoViewPairsResult validateTwoViewPairs(
+    const std::vector<TwoViewPair>& pairs, const TwoViewPairsValidation& validation,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+/// For each row of a table of overlaps the column that it is given, so that their sum is largest and no column is given
+/// twice; columns() for none.
+std::vector<std::size_t> bestAssignment(const Eigen::MatrixXd& overlaps);
+
+}  // namespace liestat::experiments

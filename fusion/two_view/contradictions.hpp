@@ -1,0 +1,58 @@
+// Matches between two images that contradict each other: one point matched with two. Descriptors of repeated structure do
+// that, and to a robust estimate it is the same error counted often: ten points matched with one lie on the epipolar
+// lines of every geometry whose epipole that one is, and a homography that shrinks enough maps them all to it. At most
+// one of them is right; without the others the choice between models is a better one (docs/two_view.md). Needs Eigen
+// alone.
+#pragma once
+
+#include <fusion/two_view/errors.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace liestat {
+
+/// Whether each match is contradicted by another: they have one point in common, and not the other. Points within `reach`
+/// standard deviations of a coordinate are one point. Matches that are not numbers contradict none. Nothing depends on the
+/// order. O(n log n) where few points have the same abscissa.
+inline std::vector<bool> contradictedMatches(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
+                                             double reach = 2) {
+  std::vector<bool> contradicted(matches.size(), false);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (matches[i].allFinite()) order.push_back(i);
+  }
+  for (const Eigen::Index image : {0, 2}) {
+    const double here = reach * (image == 0 ? noise.first : noise.second);
+    const double there = reach * (image == 0 ? noise.second : noise.first);
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t i, std::size_t j) { return matches[i][image] < matches[j][image]; });
+    for (std::size_t a = 0; a < order.size(); ++a) {
+      for (std::size_t b = a + 1; b < order.size(); ++b) {
+        const Eigen::Vector4d difference = matches[order[b]] - matches[order[a]];
+        if (difference[image] > here) break;
+        if (difference.segment<2>(image).norm() <= here && difference.segment<2>(2 - image).norm() > there) {
+          contradicted[order[a]] = contradicted[order[b]] = true;
+        }
+      }
+    }
+  }
+  return contradicted;
+}
+
+/// The places of the matches that none contradicts, ascending.
+inline std::vector<std::size_t> uncontradictedMatches(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
+                                                      double reach = 2) {
+  const std::vector<bool> contradicted = contradictedMatches(matches, noise, reach);
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < contradicted.size(); ++i) {
+    if (!contradicted[i]) places.push_back(i);
+  }
+  return places;
+}
+
+}  // namespace liestat
