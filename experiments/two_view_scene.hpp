@@ -258,7 +258,7 @@ class TwoViewScene {
     if (isEpipolar(options.motion)) {
       if (options.motion != TwoViewMotion::affine_epipolar) {
         const Eigen::Vector3d inverse(1 / focal_ratio, 1 / focal_ratio, 1);
-        F = inverse.asDiagonal() * detail::skew(t) * R;
+        F = inverse.asDiagonal() * liestat::detail::skew(t) * R;
       }
       F *= std::sqrt(2.) / F.norm();
     }
