@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
                          {"simulate", "Files of simulated measurements with their truth", {addSimulateViCommand}},
                          {"validate",
                           validate_description,
-                          {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,
-                           addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
+                          {addValidateEstimatorCommand, addValidateMeansCommand, addValidatePreintegrationCommand,
+                           addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand,
+                           addValidateTwoViewCommand, addValidateViInitCommand}}});
 }
