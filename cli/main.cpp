@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
                           {addSimulateTwoViewCommand, addSimulateViCommand}},
                          {"validate",
                           validate_description,
-                          {addValidateMeansCommand, addValidatePreintegrationCommand, addValidatePropagationCommand,
-                           addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
+                          {addValidateEstimatorCommand, addValidateMeansCommand, addValidatePreintegrationCommand,
+                           addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand,
+                           addValidateTwoViewCommand, addValidateViInitCommand}}});
 }

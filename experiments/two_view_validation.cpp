@@ -1,11 +1,10 @@
 #include <experiments/two_view_validation.hpp>
 
 #include <experiments/parallel.hpp>
+#include <experiments/semidefinite_distance.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
 #include <stats/validation.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -14,17 +13,6 @@
 
 namespace liestat::experiments {
 namespace {
-
-/// eᵀ Σ⁺ e for a covariance of known rank.
-double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, int rank) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  double sum = 0;
-  for (int k = 0; k < rank; ++k) {
-    const Eigen::Index i = covariance.rows() - 1 - k;
-    sum += std::pow(eigen.eigenvectors().col(i).dot(error), 2) / eigen.eigenvalues()[i];
-  }
-  return sum;
-}
 
 std::size_t indexOf(const std::string& model) {
   std::size_t k = 0;

@@ -92,19 +92,22 @@ BasicSmallMatrix<Most> transposed(const BasicSmallMatrix<Most>& a) {
 }
 
 /// Singular values, descending, of a small square matrix A = U diag(values) Vᵀ by Hestenes' one-sided Jacobi rotations:
-/// each value to its own relative accuracy where the columns allow it. u and v hold their vectors in rows.
+/// each value to its own relative accuracy where the columns allow it. u and v hold their vectors in rows. Columns that
+/// rotations have reduced to their own rounding errors are not turned any more: of a singular matrix these never become
+/// orthogonal, and all sweeps would be spent on them.
 template <int Most>
 struct SmallSvd {
   int n;
   BasicSmallMatrix<Most> u, v;
   std::array<double, static_cast<std::size_t>(Most)> values{};
+  int sweeps = 0;
 
   explicit SmallSvd(const BasicSmallMatrix<Most>& a) : n(a.cols), u(n, n), v(BasicSmallMatrix<Most>::identity(n)) {
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) u(i, j) = a(j, i);
     }
     bool turned = true;
-    for (int sweep = 0; turned && sweep < 60; ++sweep) {
+    for (; turned && sweeps < 60; ++sweeps) {
       turned = false;
       for (int p = 0; p < n; ++p) {
         for (int q = p + 1; q < n; ++q) turned = rotate(p, q) || turned;
@@ -125,8 +128,13 @@ struct SmallSvd {
     const double a = dot(p, p), b = dot(q, q), c = dot(p, q);
     // Written so that NaN ends the sweeps.
     if (!(std::abs(c) > 2 * std::numeric_limits<double>::epsilon() * std::sqrt(a) * std::sqrt(b))) return false;
+    double &left = rounding_[static_cast<std::size_t>(p)], &right = rounding_[static_cast<std::size_t>(q)];
+    if (a <= left || b <= right) return false;
     const double zeta = (b - a) / (2 * c);
     const double t = std::copysign(1 / (std::abs(zeta) + std::hypot(1, zeta)), zeta), k = 1 / std::hypot(1, t);
+    const double unit = std::pow(8 * std::numeric_limits<double>::epsilon(), 2);
+    const double of_p = k * k * (left + unit * a), of_q = k * k * (right + unit * b);
+    left = of_p + t * t * of_q, right = t * t * of_p + of_q;
     for (BasicSmallMatrix<Most>* m : {&u, &v}) {
       for (int i = 0; i < n; ++i) {
         const double x = (*m)(p, i), y = (*m)(q, i);
@@ -142,7 +150,9 @@ struct SmallSvd {
       for (int k = i + 1; k < n; ++k) {
         if (dot(k, k) > dot(best, best)) best = k;
       }
-      for (int j = 0; j < n && best != i; ++j) {
+      if (best == i) continue;
+      std::swap(rounding_[static_cast<std::size_t>(i)], rounding_[static_cast<std::size_t>(best)]);
+      for (int j = 0; j < n; ++j) {
         std::swap(u(i, j), u(best, j));
         std::swap(v(i, j), v(best, j));
       }
@@ -153,7 +163,7 @@ struct SmallSvd {
       const double length = std::sqrt(dot(i, i));
       values[static_cast<std::size_t>(i)] = length;
       for (int j = 0; j < n && length > 0; ++j) u(i, j) /= length;
-      if (length == 0) complete(i);
+      if (length * length <= rounding_[static_cast<std::size_t>(i)]) complete(i);
     }
   }
   /// The image of a null vector says nothing: the unit vector that is furthest from the rows before, made orthogonal.
@@ -175,6 +185,8 @@ struct SmallSvd {
     }
     for (int j = 0; j < n; ++j) u(i, j) = best[static_cast<std::size_t>(j)];
   }
+
+  std::array<double, static_cast<std::size_t>(Most)> rounding_{};  // squares: what the rotations left in each column
 };
 
 /// The pseudo-inverse of a symmetric positive semi-definite 3×3 matrix; eigenvalues below 1e-12 of the trace are zero.

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <experiments/judged_report.hpp>
+#include <stats/validation_report.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// What the constrained estimator (stats/constrained.hpp) estimates in `liestat validate estimator`.
+enum class EstimatorExperiment {
+  conic,             ///< six coefficients with ‖q‖ = 1 from 30 points on an ellipse
+  corrected_points,  ///< the same from 12 points, which are what is looked at
+  rotation_numbers,  ///< nine numbers with R Rᵀ = I from 5 pairs of points
+  rotation,          ///< the same as a point of SO(3)
+  prior_numbers,     ///< nine numbers from 20 pairs and a prior of information 10⁴ I
+  prior,             ///< a point of SO(3) from 20 pairs and a prior of information 10⁴ I
+  homography,        ///< nine numbers with ‖H‖² = 3 from 60 matches, two equations each
+  fundamental        ///< nine numbers with det F = 0 and ‖F‖² = 2 from 60 matches
+};
+inline constexpr std::array all_estimator_experiments = {
+    EstimatorExperiment::conic,      EstimatorExperiment::corrected_points, EstimatorExperiment::rotation_numbers,
+    EstimatorExperiment::rotation,   EstimatorExperiment::prior_numbers,    EstimatorExperiment::prior,
+    EstimatorExperiment::homography, EstimatorExperiment::fundamental};
+/// The name in options, tables and JSON fields.
+std::string name(EstimatorExperiment experiment);
+
+/// What is compared with a law.
+enum class EstimatorQuantity {
+  criterion,        ///< 2L²: χ² with r degrees of freedom
+  parameter,        ///< squared distance of the true parameter under the estimate's covariance
+  correction,       ///< squared correction of one measurement over its expectation
+  corrected_point,  ///< squared distance of one true measurement under the covariance of the corrected one
+};
+std::string name(EstimatorQuantity quantity);
+
+struct EstimatorValidation {
+  std::vector<EstimatorExperiment> experiments{all_estimator_experiments.begin(), all_estimator_experiments.end()};
+  std::size_t trials = 2000;  ///< a row
+  std::uint64_t seed = 1;
+  int threads = 0;
+  /// Standard deviation of the noise that is drawn over that which the estimator is told.
+  double noise_factor = 1;
+};
+
+struct EstimatorRow : JudgedReport {
+  EstimatorExperiment experiment = EstimatorExperiment::conic;
+  EstimatorQuantity quantity = EstimatorQuantity::criterion;
+  double sigma = 0;  ///< that the estimator is told, in the unit of the scene; of matches px
+  bool has_iterations = true;
+  /// What the design note gives for mean and 95 % coverage; NaN where it gives nothing.
+  double note_index = std::numeric_limits<double>::quiet_NaN();
+  double note_coverage = std::numeric_limits<double>::quiet_NaN();
+  /// Of corrected points: ‖mean of e eᵀ - mean of the covariances‖ over the norm of the latter; else NaN.
+  double covariance_deviation = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Runs everything; rows in the order of the experiments.
+std::vector<EstimatorRow> validateEstimator(
+    const EstimatorValidation& validation,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+}  // namespace liestat::experiments

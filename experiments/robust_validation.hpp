@@ -1,0 +1,89 @@
+#pragma once
+
+#include <experiments/judged_report.hpp>
+#include <stats/validation_report.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// What is sought among outliers in `liestat validate robust`.
+enum class RobustStructure {
+  conic,      ///< an ellipse, samples of five points, one equation each; 100 points with σ = 0.005
+  homography  ///< a plane in two images, samples of four matches, two equations each; 100 matches with σ = 0.5 px
+};
+inline constexpr std::array all_robust_structures = {RobustStructure::conic, RobustStructure::homography};
+std::string name(RobustStructure structure);
+
+/// The scores of stats/robust.hpp.
+enum class RobustScore { relevance, truncated_cost, inlier_count, trimmed_quantile };
+inline constexpr std::array all_robust_scores = {RobustScore::relevance, RobustScore::truncated_cost,
+                                                 RobustScore::inlier_count, RobustScore::trimmed_quantile};
+std::string name(RobustScore score);
+
+struct RobustValidation {
+  std::vector<RobustStructure> structures{all_robust_structures.begin(), all_robust_structures.end()};
+  std::vector<RobustScore> scores{all_robust_scores.begin(), all_robust_scores.end()};
+  std::vector<double> outliers{0, 0.3, 0.5, 0.7};  ///< shares of the measurements
+  std::size_t measurements = 100;
+  std::size_t trials = 100;  ///< a row
+  std::uint64_t seed = 1;
+  int threads = 0;
+  double confidence = 0.99;  ///< that one of the draws was of inliers alone: the search's stop rule
+  double draw_factor = 1;    ///< so many times the draws that the rule asks for
+  /// Standard deviation of the noise that is drawn over that which the search is told.
+  double noise_factor = 1;
+};
+
+/// The largest share of outliers at which a row is judged.
+inline constexpr double robust_promise = 0.5;
+
+/// Searches for one structure with one score. The distances are the squared ones of the true parameter from the refined
+/// estimate, divided by `cut_factor`, of trials in which the structure was found.
+struct RobustRow : JudgedReport {
+  RobustStructure structure = RobustStructure::conic;
+  RobustScore score = RobustScore::relevance;
+  double outliers = 0;
+  std::size_t trials = 0, found = 0;  ///< found: nine tenths of the inliers and more are inliers of the estimate
+  double confidence = 0;              ///< that was asked for
+  /// What cutting the inliers' errors at a threshold t makes of the distances, to first order: P(χ²_p < t)/P(χ²_{p+2} < t)
+  /// with p equations a measurement.
+  double cut_factor = 1;
+  std::optional<bool>
+      found_passed;        ///< whether so many are likely where each is found with that probability; if judged
+  double right = 0;        ///< share of the inliers that the estimate has as inliers
+  double wrong = 0;        ///< share of the outliers that it has; NaN without any
+  double draws = 0;        ///< mean number of them
+  std::size_t needed = 0;  ///< sampleCount() for the true number of inliers
+};
+
+/// The thresholds that are found in the errors under the refined estimate, where noise is not known: lengths in standard
+/// deviations. Of structures with one equation a measurement.
+struct ThresholdRow {
+  RobustStructure structure = RobustStructure::conic;
+  double outliers = 0;
+  std::size_t trials = 0;
+  double histogram_found = 0;                    ///< share of the trials in which the histogram had a minimum
+  double histogram_mean = 0, histogram_sd = 0;   ///< of √threshold in these
+  double moments_found = 0;                      ///< share of the trials with a root
+  double moments_median = 0, moments_tenth = 0;  ///< median and tenth of √T; 4.42 expected
+};
+
+struct RobustValidationResult {
+  std::vector<RobustRow> rows;
+  std::vector<ThresholdRow> thresholds;
+  Tally tally() const;  ///< of what was found
+};
+
+/// Runs everything; rows in the order of structures, outliers, scores.
+RobustValidationResult validateRobust(const RobustValidation& validation,
+                                      const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+}  // namespace liestat::experiments

@@ -1,0 +1,82 @@
+// Singular values of small matrices (lie/detail/small_orthogonal.hpp): singular matrices, and columns of all sizes.
+
+#include <lie/detail/small_orthogonal.hpp>
+
+#include <Eigen/QR>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace {
+
+using namespace liestat::detail;
+
+constexpr double eps = std::numeric_limits<double>::epsilon();
+
+template <int N>
+Eigen::Matrix<double, N, N> matrixOf(const BasicSmallMatrix<N>& rows) {
+  Eigen::Matrix<double, N, N> M;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) M(i, j) = rows(i, j);
+  }
+  return M;
+}
+
+/// A = Uᵀ diag(values) V with the vectors in rows, U and V orthogonal, values descending; a few sweeps.
+template <int N>
+SmallSvd<N> checked(const Eigen::Matrix<double, N, N>& A) {
+  const SmallSvd<N> svd(BasicSmallMatrix<N>::template of<N, N>(A));
+  const Eigen::Matrix<double, N, N> U = matrixOf<N>(svd.u), V = matrixOf<N>(svd.v);
+  const Eigen::Matrix<double, N, 1> values = Eigen::Map<const Eigen::Matrix<double, N, 1>>(svd.values.data());
+  const auto I = Eigen::Matrix<double, N, N>::Identity();
+  EXPECT_LE((U * U.transpose() - I).norm(), 100 * eps * N) << A;
+  EXPECT_LE((V * V.transpose() - I).norm(), 100 * eps * N) << A;
+  EXPECT_LE((U.transpose() * values.asDiagonal() * V - A).norm(), 100 * eps * A.norm()) << A;
+  EXPECT_TRUE(std::is_sorted(svd.values.begin(), svd.values.end(), std::greater<>()));
+  EXPECT_LE(svd.sweeps, 12) << A;
+  return svd;
+}
+
+template <int N>
+Eigen::Matrix<double, N, N> random(std::mt19937_64& rng) {
+  std::normal_distribution<double> normal;
+  Eigen::Matrix<double, N, N> A;
+  for (int i = 0; i < N * N; ++i) A.data()[i] = normal(rng);
+  return A;
+}
+
+TEST(SmallSvd, OfSingularMatricesEndsAfterAFewSweeps) {
+  std::mt19937_64 rng(1);
+  for (int trial = 0; trial < 200; ++trial) {
+    for (int rank = 1; rank <= 9; ++rank) {
+      // Dependent rows; rows of zeros below others; dependent columns.
+      Eigen::Matrix<double, 9, 9> A = random<9>(rng), B = random<9>(rng), C = A;
+      A.rightCols(9 - rank).setZero();
+      C.bottomRows(9 - rank).setZero();
+      EXPECT_LE(checked<9>(A * B).value(8), rank < 9 ? 1e-13 : 1e9);
+      EXPECT_GT(checked<9>(A * B).value(rank - 1), 1e-9);
+      checked<9>(C);
+      checked<9>(A);
+    }
+  }
+  checked<9>(Eigen::Matrix<double, 9, 9>::Zero());
+  checked<9>(Eigen::Matrix<double, 9, 9>::Ones());
+}
+
+TEST(SmallSvd, SmallValuesOfScaledColumnsAreAccurate) {
+  // Q diag(d): the values are those of d, over thirty decades, each to its own accuracy.
+  std::mt19937_64 rng(2);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Eigen::Matrix<double, 6, 6> Q =
+        Eigen::HouseholderQR<Eigen::Matrix<double, 6, 6>>(random<6>(rng)).householderQ();
+    Eigen::Matrix<double, 6, 1> d;
+    for (int k = 0; k < 6; ++k) d[k] = std::pow(10., -6 * ((k + trial) % 6));
+    const SmallSvd<6> svd(BasicSmallMatrix<6>::of<6, 6>(Eigen::Matrix<double, 6, 6>(Q * d.asDiagonal())));
+    for (int k = 0; k < 6; ++k) EXPECT_NEAR(svd.value(k) / std::pow(10., -6 * k), 1, 1e-13) << k;
+  }
+}
+
+}  // namespace
