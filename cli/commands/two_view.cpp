@@ -25,6 +25,7 @@ struct Options {
   std::string file, json, report;
   std::vector<std::string> calibration;
   std::vector<double> intrinsics, second_intrinsics, image_size;
+  std::size_t motions = 1;
   TwoViewMotionOptions estimate;
 };
 
@@ -53,6 +54,19 @@ void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
   if (!options.image_size.empty()) estimate.image_size = Eigen::Vector2d(options.image_size[0], options.image_size[1]);
 }
 
+int runSeveral(const Options& options, const TwoViewMotionOptions& estimate, TwoViewMotionsOutput output,
+               const Invocation& invocation) {
+  output.motions = estimateTwoViewMotions(output.matches, estimate, options.motions);
+  if (options.json != "-") printLines(formatTwoViewMotions(output));
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, estimate.search.seed);
+    setTwoViewMotions(object, output);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) writeTwoViewMotionsReport(options.report, invocation.command_line, output);
+  return output.motions.status == Status::ok && !output.motions.structures.empty() ? exit_fine : exit_not_trusted;
+}
+
 int runCommand(const Options& options, const Invocation& invocation) {
   TwoViewMotionOutput output;
   output.file = options.file;
@@ -60,6 +74,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   TwoViewMotionOptions estimate = options.estimate;
   takeCameras(options, estimate);
   output.sigma = estimate.sigma;
+  if (options.motions > 1)
+    return runSeveral(options, estimate, {output.file, output.matches, output.sigma, {}}, invocation);
   output.estimate = estimateTwoViewMotion(output.matches, estimate);
   if (options.json != "-") printLines(formatTwoViewMotion(output));
   if (!options.json.empty()) {
@@ -95,6 +111,10 @@ void addTwoViewCommand(const CommandList& program) {
   command
       .option("--draws", options->estimate.search.max_draws, "At most so many minimal samples a model (default 2000)")
       .range(std::size_t{1}, std::size_t{10000000});
+  command
+      .option("--motions", options->motions,
+              "Up to so many motions: the inliers of each are taken out and the search goes on (default 1)")
+      .range(std::size_t{1}, std::size_t{1000});
   command.option("--seed", options->estimate.search.seed, "Seed of the draws (default 1)");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Directory for a page with matches, errors and the lattice of models");

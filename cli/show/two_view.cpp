@@ -62,14 +62,14 @@ std::string latticeTable(const TwoViewMotionEstimate& estimate) {
 }
 
 /// The entries of the matrix, where they are all that is known.
-std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionEstimate& e) {
+std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionResult& e, bool homography) {
   std::vector<std::vector<std::string>> rows;
   if (e.matrix_covariance.rows() != 9) return rows;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const double variance = e.matrix_covariance(3 * j + i, 3 * j + i);
-      rows.push_back({fmt::format("{}{}{}", e.chosenModel().equations == 2 ? 'H' : 'F', i + 1, j + 1),
-                      number(e.matrix(i, j), 6), number(std::sqrt(variance), 2), "px, norm 1"});
+      rows.push_back({fmt::format("{}{}{}", homography ? 'H' : 'F', i + 1, j + 1), number(e.matrix(i, j), 6),
+                      number(std::sqrt(variance), 2), "px, norm 1"});
     }
   }
   return rows;
@@ -87,17 +87,19 @@ std::vector<std::vector<std::string>> parameterRows(const PhysicalParameters& ph
   return rows;
 }
 
-std::string summary(const TwoViewMotionOutput& output) {
-  const TwoViewMotionEstimate& e = output.estimate;
-  std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n",
-                                 output.matches.size(), output.file, output.sigma, e.image_size.x(), e.image_size.y());
-  if (e.size_from_matches) text += "that size is the bounding box of the matches: --image-size says it better\n";
-  if (!e.calibrated) {
+std::string summary(const std::string& file, std::size_t matches, double sigma, const TwoViewImageFrame& frame) {
+  std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n", matches, file,
+                                 sigma, frame.image_size.x(), frame.image_size.y());
+  if (frame.size_from_matches) text += "that size is the bounding box of the matches: --image-size says it better\n";
+  if (!frame.calibrated) {
     text +=
         "without intrinsics: the principal point is taken to be the centre of the image,\n"
         "rotation and essential are left out\n";
   }
   return text;
+}
+std::string summary(const TwoViewMotionOutput& output) {
+  return summary(output.file, output.matches.size(), output.sigma, output.estimate);
 }
 std::string answer(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
@@ -109,7 +111,7 @@ std::string answer(const TwoViewMotionOutput& output) {
   return text;
 }
 /// What a table of physical parameters is headed by where there are two.
-std::string headingOf(const TwoViewMotionEstimate& e, std::size_t i) {
+std::string headingOf(const TwoViewMotionResult& e, std::size_t i) {
   if (e.physical.size() < 2) return "";
   return i == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
                 : "the other one:\n";
@@ -124,6 +126,30 @@ JsonObject toJson(const PhysicalParameters& physical) {
       .set("values", values)
       .set("deviations", deviations)
       .set("covariance", physical.covariance);
+}
+/// The fields of a motion.
+void setMotion(JsonObject& object, const TwoViewMotionResult& motion, bool homography) {
+  object.set("matrix", motion.matrix);
+  object.set("matrix_acts_on", homography ? "second ~ matrix * first, pixels" : "second' * matrix * first = 0, pixels");
+  if (motion.matrix_covariance.rows() == 9) {
+    object.set("matrix_covariance", motion.matrix_covariance);
+  } else {
+    object.set("matrix_covariance", nullptr);
+  }
+  std::vector<JsonObject> physical;
+  for (const PhysicalParameters& p : motion.physical) physical.push_back(toJson(p));
+  object.set("parameters", physical);
+  if (motion.relative_pose) {
+    const Essentiald& mean = motion.relative_pose->mean;
+    JsonObject pose;
+    pose.set("quaternion_xyzw", Eigen::Vector4d(mean.so3().params()));
+    pose.set("direction", Eigen::Vector3d(mean.direction().unit_vector()));
+    pose.set("covariance", motion.relative_pose->covariance);
+    pose.set("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
+    object.set("second_T_first", pose);
+  } else {
+    object.set("second_T_first", nullptr);
+  }
 }
 JsonObject toJson(const TwoViewMotionEstimate& estimate, std::size_t m) {
   const TwoViewModelRow& row = estimate.lattice[m];
@@ -143,36 +169,42 @@ void addMatch(Series& lines, Series& ends, const Eigen::Vector4d& m) {
   lines.y.insert(lines.y.end(), {m[1], m[3], nan});
   ends.x.push_back(m[2]), ends.y.push_back(m[3]);
 }
+/// Some of the matches, in the frame of the image.
+Panel matchPanel(const std::string& title, const std::vector<std::size_t>& chosen, std::size_t colour,
+                 const std::vector<Eigen::Vector4d>& matches, const TwoViewImageFrame& frame) {
+  Series lines{.style = Style::lines, .colour = colour}, ends{.style = Style::points, .colour = colour};
+  for (const std::size_t i : chosen) addMatch(lines, ends, matches[i]);
+  Panel panel{.title = title,
+              .x = {.label = "x, px"},
+              .y = {.label = "y, px"},  // points down
+              .series = {lines, ends},
+              .equal_aspect = true};
+  if (!frame.size_from_matches) {
+    panel.x.low = 0, panel.x.high = frame.image_size.x();
+    panel.y.low = frame.image_size.y(), panel.y.high = 0;
+    return panel;
+  }
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Eigen::Vector2d low(infinity, infinity), high = -low;
+  for (const Eigen::Vector4d& m : matches) {
+    low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
+  }
+  panel.x.low = low.x(), panel.x.high = high.x();
+  panel.y.low = high.y(), panel.y.high = low.y();
+  return panel;
+}
 Plot matchPlot(const TwoViewMotionOutput& output) {
   Plot plot{.name = "matches",
             .caption =
                 "Matches that agree with the chosen model, and the others: lines go from the point in the first "
                 "image to the dot, the point in the second."};
   for (const bool inlier : {true, false}) {
-    Series lines{.style = Style::lines, .colour = inlier ? 0U : 1U};
-    Series ends{.style = Style::points, .colour = inlier ? 0U : 1U};
-    std::size_t count = 0;
+    std::vector<std::size_t> chosen;
     for (std::size_t i = 0; i < output.matches.size(); ++i) {
-      if (output.estimate.inlier[i] != inlier) continue;
-      addMatch(lines, ends, output.matches[i]);
-      ++count;
+      if (output.estimate.inlier[i] == inlier) chosen.push_back(i);
     }
-    Panel panel{.title = fmt::format("{} {}", count, inlier ? "inliers" : "outliers"),
-                .x = {.label = "x, px"},
-                .y = {.label = "y, px"},
-                .series = {lines, ends},
-                .equal_aspect = true};
-    if (!output.estimate.size_from_matches) {
-      panel.x.low = 0, panel.x.high = output.estimate.image_size.x();
-      panel.y.low = output.estimate.image_size.y(), panel.y.high = 0;  // y points down
-    } else {
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (const Eigen::Vector4d& m : output.matches) {
-        low = std::min({low, m[1], m[3]}), high = std::max({high, m[1], m[3]});
-      }
-      panel.y.low = high, panel.y.high = low;
-    }
-    plot.panels.push_back(std::move(panel));
+    plot.panels.push_back(matchPanel(fmt::format("{} {}", chosen.size(), inlier ? "inliers" : "outliers"), chosen,
+                                     inlier ? 0 : 1, output.matches, output.estimate));
   }
   return plot;
 }
@@ -254,7 +286,7 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   }
   if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
     Table table(parameter_headers);
-    for (const auto& row : matrixRows(e)) table.row(row);
+    for (const auto& row : matrixRows(e, e.chosenModel().equations == 2)) table.row(row);
     text += "\n" + table.str();
     if (e.chosenModel().name == "fundamental") {
       text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
@@ -273,28 +305,10 @@ void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
   } else {
     object.set("reason", e.reason);
   }
-  object.set("model", e.chosenModel().name).set("inliers", e.inliers).set("matrix", e.matrix);
-  object.set("matrix_acts_on", e.chosenModel().equations == 2 ? "second ~ matrix * first, pixels"
-                                                              : "second' * matrix * first = 0, pixels");
-  if (e.matrix_covariance.rows() == 9) {
-    object.set("matrix_covariance", e.matrix_covariance);
-  } else {
-    object.set("matrix_covariance", nullptr);
-  }
-  std::vector<JsonObject> physical, lattice;
-  for (const PhysicalParameters& p : e.physical) physical.push_back(toJson(p));
+  object.set("model", e.chosenModel().name).set("inliers", e.inliers);
+  setMotion(object, e, e.chosenModel().equations == 2);
+  std::vector<JsonObject> lattice;
   for (std::size_t m = 0; m < e.lattice.size(); ++m) lattice.push_back(toJson(e, m));
-  object.set("parameters", physical);
-  if (e.relative_pose) {
-    JsonObject pose;
-    pose.set("quaternion_xyzw", Eigen::Vector4d(e.relative_pose->mean.so3().params()));
-    pose.set("direction", Eigen::Vector3d(e.relative_pose->mean.direction().unit_vector()));
-    pose.set("covariance", e.relative_pose->covariance);
-    pose.set("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
-    object.set("second_T_first", pose);
-  } else {
-    object.set("second_T_first", nullptr);
-  }
   object.set("lattice", lattice);
   std::vector<double> inlier, errors;
   for (std::size_t i = 0; i < e.inlier.size(); ++i) inlier.push_back(e.inlier[i] ? 1 : 0);
@@ -314,7 +328,7 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   }
   if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
     report.section("Parameters");
-    report.table(parameter_headers, matrixRows(e));
+    report.table(parameter_headers, matrixRows(e, e.chosenModel().equations == 2));
   }
   report.section("Matches");
   report.plot(matchPlot(output));
@@ -324,6 +338,106 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   report.table(lattice_headers, latticeRows(e),
                "The chosen model is the most specific one that no model which contains it rejects: by more support "
                "among matches that the specific one is far from, or by a better fit to the common inliers.");
+  printLines("\n" + report.write() + "\n");
+}
+
+namespace {
+
+const std::vector<std::string> structure_headers{"motion", "model", "matches", "rms px"};
+std::vector<std::vector<std::string>> structureRows(const TwoViewMotions& motions) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t k = 0; k < motions.structures.size(); ++k) {
+    const TwoViewStructure& s = motions.structures[k];
+    rows.push_back({fmt::format("{}", k + 1), s.model, fmt::format("{}", s.inliers.size()), number(s.rms, 3)});
+  }
+  return rows;
+}
+std::string endOf(const TwoViewMotionsOutput& output) {
+  std::string text = fmt::format("{} matches belong to none\n", output.motions.rest.size());
+  if (output.motions.status != Status::ok) {
+    text += fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(output.motions.status), output.motions.reason);
+  } else if (output.motions.structures.empty()) {
+    text += "NOT TO BE TRUSTED: no model is supported, inliers could be chance\n";
+  }
+  return text;
+}
+/// The parameters of a motion, or its matrix.
+std::vector<std::vector<std::string>> rowsOf(const TwoViewStructure& structure, std::size_t i) {
+  return structure.physical.empty() ? matrixRows(structure, structure.equations == 2)
+                                    : parameterRows(structure.physical[i]);
+}
+std::size_t tablesOf(const TwoViewStructure& structure) {
+  if (!structure.physical.empty()) return structure.physical.size();
+  return structure.matrix_covariance.rows() == 9 ? 1 : 0;
+}
+
+}  // namespace
+
+std::string formatTwoViewMotions(const TwoViewMotionsOutput& output) {
+  Table table(structure_headers);
+  for (const auto& row : structureRows(output.motions)) table.row(row);
+  std::string text =
+      summary(output.file, output.matches.size(), output.sigma, output.motions) + "\n" + table.str() + endOf(output);
+  for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
+    const TwoViewStructure& s = output.motions.structures[k];
+    text += fmt::format("\n{}: {}\n", k + 1, s.model);
+    for (std::size_t i = 0; i < tablesOf(s); ++i) {
+      Table parameters(parameter_headers);
+      for (const auto& row : rowsOf(s, i)) parameters.row(row);
+      text += headingOf(s, i) + parameters.str();
+    }
+  }
+  return text;
+}
+
+void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output) {
+  const TwoViewMotions& m = output.motions;
+  object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
+  object.set("calibrated", m.calibrated).set("image_size", m.image_size).set("size_from_matches", m.size_from_matches);
+  object.set("status", name(m.status));
+  if (m.reason.empty()) {
+    object.set("reason", nullptr);
+  } else {
+    object.set("reason", m.reason);
+  }
+  std::vector<double> motion(output.matches.size(), 0);  // of each match: the number of its motion, 0 for none
+  std::vector<JsonObject> list;
+  for (std::size_t k = 0; k < m.structures.size(); ++k) {
+    const TwoViewStructure& s = m.structures[k];
+    JsonObject o;
+    o.set("model", s.model).set("status", name(s.status)).set("inliers", s.inliers.size()).set("rms", s.rms);
+    setMotion(o, s, s.equations == 2);
+    list.push_back(o);
+    for (const std::size_t i : s.inliers) motion[i] = static_cast<double>(k + 1);
+  }
+  object.set("motions", list).set("motion", motion);
+}
+
+void writeTwoViewMotionsReport(const std::string& directory, const std::string& command_line,
+                               const TwoViewMotionsOutput& output) {
+  Report report(directory, "Motions between two images");
+  report.code(command_line);
+  report.paragraph(summary(output.file, output.matches.size(), output.sigma, output.motions));
+  report.table(structure_headers, structureRows(output.motions), endOf(output));
+  std::vector<std::pair<std::string, std::vector<std::size_t>>> groups;
+  for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
+    const TwoViewStructure& s = output.motions.structures[k];
+    groups.emplace_back(fmt::format("{}: {}, {} matches", k + 1, s.model, s.inliers.size()), s.inliers);
+  }
+  groups.emplace_back(fmt::format("{} matches of none", output.motions.rest.size()), output.motions.rest);
+  Plot plot{.name = "matches",
+            .caption =
+                "The matches of each motion, in the order in which they were found: lines go from the point in the "
+                "first image to the dot, the point in the second."};
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    plot.panels.push_back(matchPanel(groups[k].first, groups[k].second, k, output.matches, output.motions));
+  }
+  report.plot(plot);
+  for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
+    const TwoViewStructure& s = output.motions.structures[k];
+    if (tablesOf(s) > 0) report.section(groups[k].first);
+    for (std::size_t i = 0; i < tablesOf(s); ++i) report.table(parameter_headers, rowsOf(s, i), headingOf(s, i));
+  }
   printLines("\n" + report.write() + "\n");
 }
 

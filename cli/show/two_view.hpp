@@ -19,6 +19,14 @@ struct TwoViewMotionOutput {
   TwoViewMotionEstimate estimate;
 };
 
+/// What `liestat two-view --motions` shows.
+struct TwoViewMotionsOutput {
+  std::string file;
+  std::vector<Eigen::Vector4d> matches;  ///< px
+  double sigma = 1;
+  TwoViewMotions motions;
+};
+
 /// The chosen model, its parameters and the lattice, for the terminal.
 std::string formatTwoViewMotion(const TwoViewMotionOutput& output);
 
@@ -28,5 +36,11 @@ void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output);
 /// Writes a page with matches, errors and the lattice into a directory.
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
                               const TwoViewMotionOutput& output);
+
+/// The same of several motions.
+std::string formatTwoViewMotions(const TwoViewMotionsOutput& output);
+void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output);
+void writeTwoViewMotionsReport(const std::string& directory, const std::string& command_line,
+                               const TwoViewMotionsOutput& output);
 
 }  // namespace liestat::cli

@@ -1,10 +1,11 @@
-// The definition of estimateTwoViewMotion().
+// The definitions of estimateTwoViewMotion() and estimateTwoViewMotions().
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/two_view_estimate.hpp>
 #include <fusion/two_view/two_view.hpp>
 #include <stats/hierarchy.hpp>
+#include <stats/repeated_extraction.hpp>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -13,6 +14,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -84,59 +87,87 @@ inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel
   return row;
 }
 
+/// Matches as the models take them.
+struct TwoViewInput {
+  TwoViewImageFrame frame;
+  Status status = Status::ok;
+  std::string reason;   ///< why there is nothing to estimate
+  bool differ = false;  ///< not all matches are the same one
+  TwoViewCoordinates first, second;
+  TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
+  TwoViewModels models;
+  std::vector<Eigen::Vector4d> normalised;
+
+  TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
+    frame.calibrated = options.first.has_value();
+    if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
+    // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
+    const double infinity = std::numeric_limits<double>::infinity();
+    Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low, corner = Eigen::Vector2d::Zero();
+    const Eigen::Vector4d* one = nullptr;
+    for (const Eigen::Vector4d& m : matches) {
+      if (!m.allFinite()) continue;
+      if (one == nullptr) one = &m;
+      differ = differ || m != *one;
+      low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
+    }
+    Eigen::Vector2d& size = frame.image_size;
+    if (options.image_size) {
+      size = *options.image_size;
+    } else if (options.first && options.first->width > 0 && options.first->height > 0) {
+      size = {options.first->width, options.first->height};
+    } else if (one != nullptr) {
+      // One match alone, or several on a line, leave no area.
+      size = (high - low).cwiseMax(std::max(1.0, options.sigma));
+      frame.size_from_matches = true;
+      corner = low;
+    }
+    first = coordinatesOf(options.first, size, corner);
+    second = coordinatesOf(options.second ? options.second : options.first, size, corner);
+    const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
+                               size.cwiseQuotient(second.focal)};
+    models = twoViewModels(images, calibration);
+    if (one == nullptr) {
+      status = Status::too_few, reason = "there is no finite match";
+    } else if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !size.allFinite() || !(size.minCoeff() > 0)) {
+      status = Status::not_applicable, reason = "noise and size of the images must be finite and positive";
+    } else {
+      for (const Eigen::Vector4d& m : matches) {
+        Eigen::Vector4d& u = normalised.emplace_back();
+        u << first(m.head<2>()), second(m.tail<2>());
+      }
+    }
+  }
+
+  /// What an estimate says of the motion, by the matches that agree with it.
+  void describe(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
+                std::span<const Eigen::Vector4d> agreeing, TwoViewMotionResult& result) const {
+    const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();
+    const Eigen::Matrix3d to_second = model.equations() == 2 ? K2 : Eigen::Matrix3d(K2.inverse().transpose());
+    const Eigen::Matrix3d in_pixels = to_second * estimate.parameter.matrix * to_first;
+    result.matrix = in_pixels / in_pixels.norm();
+    result.matrix_covariance = covarianceInPixels(estimate, to_second, to_first);
+    result.physical =
+        physicalParameters(model.name(), estimate, agreeing, calibration, {first.focalLength(), second.focalLength()});
+    if (model.name() == "essential" && estimate.covariance.rows() == 5) {
+      result.relative_pose = Gaussian<Essentiald>{estimate.parameter.pose, estimate.covariance};
+    }
+  }
+};
+
 }  // namespace detail
 
 LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
                                                                   const TwoViewMotionOptions& options) {
+  const detail::TwoViewInput input(matches, options);
   TwoViewMotionEstimate result;
-  result.calibrated = options.first.has_value();
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-
-  // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
-  const double infinity = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low, corner = Eigen::Vector2d::Zero();
-  bool any = false, differ = false;
-  const Eigen::Vector4d* one = nullptr;
-  for (const Eigen::Vector4d& m : matches) {
-    if (!m.allFinite()) continue;
-    any = true;
-    if (one == nullptr) one = &m;
-    differ = differ || m != *one;
-    low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
-  }
-  if (options.image_size) {
-    result.image_size = *options.image_size;
-  } else if (options.first && options.first->width > 0 && options.first->height > 0) {
-    result.image_size = {options.first->width, options.first->height};
-  } else if (any) {
-    // One match alone, or several on a line, leave no area.
-    result.image_size = (high - low).cwiseMax(std::max(1.0, options.sigma));
-    result.size_from_matches = true;
-    corner = low;
-  }
-  result.errors.assign(matches.size(), nan);
+  static_cast<TwoViewImageFrame&>(result) = input.frame;
+  result.status = input.status, result.reason = input.reason;
+  result.errors.assign(matches.size(), std::numeric_limits<double>::quiet_NaN());
   result.inlier.assign(matches.size(), false);
-  const bool sizes = result.image_size.allFinite() && result.image_size.minCoeff() > 0;
-  if (!any || !(options.sigma > 0) || !std::isfinite(options.sigma) || !sizes) {
-    result.reason = !any ? "there is no finite match" : "noise and size of the images must be finite and positive";
-    result.status = any ? Status::not_applicable : Status::too_few;
-  }
-
-  const detail::TwoViewCoordinates first = detail::coordinatesOf(options.first, result.image_size, corner);
-  const detail::TwoViewCoordinates second =
-      detail::coordinatesOf(options.second ? options.second : options.first, result.image_size, corner);
-  const TwoViewCalibration calibration =
-      result.calibrated ? TwoViewCalibration::calibrated : TwoViewCalibration::uncalibrated;
-  const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
-                             result.image_size.cwiseQuotient(second.focal)};
-  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(twoViewModels(images, calibration), options.search);
-  std::vector<Eigen::Vector4d> normalised;
-  if (result.reason.empty()) {
-    for (const Eigen::Vector4d& m : matches) {
-      Eigen::Vector4d& u = normalised.emplace_back();
-      u << first(m.head<2>()), second(m.tail<2>());
-    }
-    search.add(normalised);
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, options.search);
+  if (result.ok()) {
+    search.add(input.normalised);
     while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
     }
   }
@@ -144,7 +175,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     result.lattice.push_back(detail::rowOf(search, m, options.sigma));
   }
   result.chosen = search.best();
-  if (!result.reason.empty()) return result;
+  if (!result.ok()) return result;
 
   const ModelState<TwoViewMotionModel>& state = search.state(result.chosen);
   const TwoViewModel& model = *search.models()[result.chosen];
@@ -153,35 +184,59 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     return result;
   }
   // Errors in the order of the matches; inliers are those of the threshold.
-  model.errors(state.estimate.parameter, normalised, result.errors);
+  model.errors(state.estimate.parameter, input.normalised, result.errors);
   std::vector<Eigen::Vector4d> agreeing;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     result.inlier[i] = result.errors[i] < state.threshold;
-    if (result.inlier[i]) agreeing.push_back(normalised[i]);
+    if (result.inlier[i]) agreeing.push_back(input.normalised[i]);
   }
   result.inliers = agreeing.size(), result.threshold = state.threshold;
-  const Eigen::Matrix3d& M = state.estimate.parameter.matrix;
-  const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();
-  const Eigen::Matrix3d to_second = model.equations() == 2 ? K2 : Eigen::Matrix3d(K2.inverse().transpose());
-  const Eigen::Matrix3d in_pixels = to_second * M * to_first;
-  result.matrix = in_pixels / in_pixels.norm();
-  result.matrix_covariance = detail::covarianceInPixels(state.estimate, to_second, to_first);
-  result.physical = physicalParameters(model.name(), state.estimate, agreeing, calibration,
-                                       {first.focalLength(), second.focalLength()});
-  if (model.name() == "essential" && state.estimate.covariance.rows() == 5) {
-    result.relative_pose = Gaussian<Essentiald>{state.estimate.parameter.pose, state.estimate.covariance};
-  }
+  input.describe(model, state.estimate, agreeing, result);
 
   result.status = state.estimate.status;
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!result.ok()) {
     result.reason = "the estimate of the chosen model did not converge";
-  } else if (!differ) {
+  } else if (!input.differ) {
     result.status = Status::ill_defined, result.reason = "all matches are the same one";
   } else if (state.unsupported) {
     result.status = Status::ill_defined;
     result.reason = "no model is supported: the inliers of the chosen one could be chance";
+  }
+  return result;
+}
+
+LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eigen::Vector4d> matches,
+                                                            const TwoViewMotionOptions& options, std::size_t most) {
+  const detail::TwoViewInput input(matches, options);
+  TwoViewMotions result;
+  static_cast<TwoViewImageFrame&>(result) = input.frame;
+  result.status = input.status, result.reason = input.reason;
+  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.normalised,
+                                                                 {.hierarchy = options.search, .max_structures = most});
+  while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
+  }
+  result.rest = search.rest();
+  if (result.status != Status::ok) return result;
+  for (const auto& found : search.structures()) {
+    const TwoViewModel& model = *input.models[found.model];
+    std::vector<Eigen::Vector4d> own;
+    for (const std::size_t i : found.inliers) own.push_back(input.normalised[i]);
+    std::vector<double> errors(own.size());
+    model.errors(found.estimate.parameter, own, errors);
+    const ModelFit fit{std::accumulate(errors.begin(), errors.end(), 0.0),
+                       own.size() * static_cast<std::size_t>(model.equations()), model.freeParameters()};
+    TwoViewStructure& structure = result.structures.emplace_back();
+    structure.model = found.name, structure.equations = model.equations();
+    structure.status = found.estimate.status, structure.inliers = found.inliers;
+    structure.rms = options.sigma * std::sqrt(fit.normalised());
+    input.describe(model, found.estimate, own, structure);
+  }
+  if (!search.terminated()) {
+    result.status = Status::not_converged, result.reason = "the search was stopped";
+  } else if (!input.differ) {
+    result.status = Status::ill_defined, result.reason = "all matches are the same one";
   }
   return result;
 }

@@ -72,31 +72,57 @@ struct TwoViewModelRow {
   std::string rejected_by;
 };
 
-/// The motion between two images.
-struct TwoViewMotionEstimate {
-  /// ok; too_few: no finite match; not_converged: stopped, or the estimate of the chosen model did not end;
-  /// ill_defined: the chosen model's inliers could be chance, or all matches are the same one.
-  Status status = Status::too_few;
-  std::string reason;  ///< in words, unless ok
-  std::vector<TwoViewModelRow> lattice;
-  std::size_t chosen = 0;  ///< number in the lattice
-  /// H or F of the chosen model in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
+/// A motion as its model tells it.
+struct TwoViewMotionResult {
+  /// H or F in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
-  std::vector<bool> inlier;           ///< of each match
-  std::vector<double> errors;         ///< squared, in units of the noise; NaN of matches that are not finite
-  std::size_t inliers = 0;
   /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of both
-  /// first. None of `none`, nor of a fundamental matrix that tells no focal lengths.
+  /// first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal lengths.
   std::vector<PhysicalParameters> physical;
   /// Of `essential`: second_T_first up to scale, and its covariance in the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
-  Eigen::Vector2d image_size = Eigen::Vector2d::Zero();  ///< as it was taken, px
+};
+
+/// What is taken of the images.
+struct TwoViewImageFrame {
+  Eigen::Vector2d image_size = Eigen::Vector2d::Zero();  ///< px
   bool calibrated = false, size_from_matches = false;
+};
+
+/// The motion between two images.
+struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
+  /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the estimate
+  /// of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches are the
+  /// same one.
+  Status status = Status::too_few;
+  std::string reason;  ///< in words, unless ok
+  std::vector<TwoViewModelRow> lattice;
+  std::size_t chosen = 0;      ///< number in the lattice
+  std::vector<bool> inlier;    ///< of each match
+  std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
+  std::size_t inliers = 0;
   double threshold = 0;  ///< of the chosen model, on squared errors
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
+};
+
+/// One of several motions in the same images: of an object, or of a plane of the scene.
+struct TwoViewStructure : TwoViewMotionResult {
+  std::string model;
+  int equations = 0;                 ///< of a match: 2, the matrix is H, or 1, it is F
+  Status status = Status::ok;        ///< of the estimate from its own inliers
+  std::vector<std::size_t> inliers;  ///< places of its matches, ascending
+  double rms = 0;                    ///< σ sqrt(χ²/r) of these, px
+};
+
+/// Several motions, in the order in which they were found.
+struct TwoViewMotions : TwoViewImageFrame {
+  Status status = Status::too_few;  ///< as TwoViewMotionEstimate's; ok without a structure, too
+  std::string reason;
+  std::vector<TwoViewStructure> structures;
+  std::vector<std::size_t> rest;  ///< matches that belong to none
 };
 
 /// The estimate from matches in pixels. Matches that are not finite, or that no direction of a camera belongs to, are
@@ -104,6 +130,12 @@ struct TwoViewMotionEstimate {
 /// same answer.
 TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
                                             const TwoViewMotionOptions& options);
+
+/// Several motions: the matches that agree with the first are taken out, and the search runs again over the rest, until
+/// chance explains what is found or there are `most` (stats/repeated_extraction.hpp). Each match belongs to the motion that
+/// explains it best.
+TwoViewMotions estimateTwoViewMotions(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options,
+                                      std::size_t most = 20);
 
 /// The physical parameters of a model of the lattice by its name and its estimate, in the units of the matches that it
 /// was estimated from: `unit` says how many px are one unit in each image. `matches` tell on which side of the cameras

@@ -106,6 +106,26 @@ TEST(TwoViewCommand, thePageHasMatchesErrorsAndLattice) {
   }
 }
 
+TEST(TwoViewCommand, severalMotionsAreListed) {
+  const TemporaryDirectory directory;
+  std::string both = contentOf(simulate(directory, "homography", {"--outliers", "0"}));
+  const std::string second = contentOf(simulate(directory, "zoom", {"--outliers", "0", "--matches", "60"}));
+  both += second.substr(second.find('\n') + 1);
+  std::vector<std::string> words = asked(directory.write("both.csv", both));
+  words.insert(words.end(), {"--motions", "5", "--json", directory / "out.json", "--report", directory / "page"});
+  const ProgramOutput out = run(words);
+  ASSERT_EQ(out.exit_code, 0) << out.error << out.output;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  ASSERT_EQ(json["motions"].size(), 2U);
+  EXPECT_EQ(json["motions"][0]["model"], "homography");
+  EXPECT_EQ(json["motions"][1]["model"], "zoom");
+  ASSERT_EQ(json["motion"].size(), 160U);
+  std::size_t right = 0;
+  for (std::size_t i = 0; i < 160; ++i) right += json["motion"][i] == (i < 100 ? 1 : 2) ? 1 : 0;
+  EXPECT_GE(right, 150U);
+  EXPECT_NE(contentOf(directory / "page/index.html").find("matches of none"), std::string::npos);
+}
+
 TEST(TwoViewCommand, answersThatAreNotTrustedExitWith3) {
   const TemporaryDirectory directory;
   const std::string file = simulate(directory, "none", {"--outliers", "1", "--matches", "40"});

@@ -220,6 +220,42 @@ TEST(TwoViewMotion, anyOrderGivesTheSameAnswer) {
   for (std::size_t i = 0; i < a.inlier.size(); ++i) EXPECT_EQ(a.inlier[i], b.inlier[a.inlier.size() - 1 - i]);
 }
 
+TEST(TwoViewMotion, severalPlanesAreFoundOneAfterTheOther) {
+  // Three planes of one camera's image, each with a motion of its own, and wrong matches.
+  std::vector<Eigen::Vector4d> matches;
+  std::vector<std::size_t> owner;
+  TwoViewMotionOptions options;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const TwoViewScene scene({.motion = TwoViewMotion::homography, .matches = 60 - 10 * k, .outliers = 0}, 20 + k);
+    matches.insert(matches.end(), scene.pixels.begin(), scene.pixels.end());
+    owner.insert(owner.end(), scene.pixels.size(), k);
+    options = optionsOf(scene);
+  }
+  const TwoViewScene noise({.motion = TwoViewMotion::none, .matches = 40, .outliers = 1}, 4);
+  matches.insert(matches.end(), noise.pixels.begin(), noise.pixels.end());
+  const TwoViewMotions found = estimateTwoViewMotions(matches, options);
+  EXPECT_EQ(found.status, Status::ok) << found.reason;
+  ASSERT_EQ(found.structures.size(), 3U);
+  std::size_t belonging = found.rest.size();
+  for (const TwoViewStructure& s : found.structures) {
+    EXPECT_EQ(s.model, "homography");
+    EXPECT_EQ(s.equations, 2);
+    EXPECT_EQ(s.matrix_covariance.rows(), 9);
+    EXPECT_FALSE(s.physical.empty());
+    EXPECT_NEAR(s.rms, 0.5, 0.12);
+    std::vector<std::size_t> counts(4, 0);
+    for (const std::size_t i : s.inliers) ++counts[i < owner.size() ? owner[i] : 3];
+    const std::size_t most = *std::max_element(counts.begin(), counts.end());
+    EXPECT_GE(most, 38U) << "of the 40 of the smallest plane";
+    EXPECT_LE(s.inliers.size() - most, 3U);
+    belonging += s.inliers.size();
+  }
+  EXPECT_EQ(belonging, matches.size()) << "each match has one place";
+  EXPECT_EQ(estimateTwoViewMotions(matches, options, 2).structures.size(), 2U);
+  EXPECT_EQ(estimateTwoViewMotions({}, options).status, Status::too_few);
+  EXPECT_TRUE(estimateTwoViewMotions(noise.pixels, options).structures.empty());
+}
+
 TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0}, 1);
