@@ -101,9 +101,9 @@ Eigen::VectorXd errorOf(const PhysicalParameters& found, const Eigen::VectorXd& 
   return error;
 }
 
-class TwoViewMotions : public testing::TestWithParam<TwoViewMotion> {};
+class EachMotion : public testing::TestWithParam<TwoViewMotion> {};
 
-TEST_P(TwoViewMotions, parametersLieWhereTheirCovarianceSays) {
+TEST_P(EachMotion, parametersLieWhereTheirCovarianceSays) {
   const TwoViewMotion motion = GetParam();
   constexpr int trials = 6;
   double sum = 0;
@@ -146,7 +146,7 @@ TEST_P(TwoViewMotions, parametersLieWhereTheirCovarianceSays) {
   EXPECT_GT(mean, expected - 4 * std::sqrt(2 * expected / counted));
 }
 
-INSTANTIATE_TEST_SUITE_P(all, TwoViewMotions, testing::ValuesIn(experiments::default_two_view_motions),
+INSTANTIATE_TEST_SUITE_P(all, EachMotion, testing::ValuesIn(experiments::default_two_view_motions),
                          [](const auto& tested) {
                            std::string text = experiments::nameOf(tested.param);
                            std::replace(text.begin(), text.end(), ' ', '_');
