@@ -45,7 +45,7 @@ Rule smallest(const char* name, const Criterion& criterion) {
 }
 
 const std::vector<Rule>& rules() {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr double no_guard = std::numeric_limits<double>::infinity();
   static const std::vector<Rule> all = {
       {"support, exp(-8.8 d/r): default", [](const Search& search, double) { return search.best(); }},
       tests("support without guard, exp(-8.8 d/r)", 1, ExponentialPhi{}),
@@ -53,7 +53,7 @@ const std::vector<Rule>& rules() {
       tests("support, F test 0.999", 9, FTestPhi{}),
       tests("support without guard, F test 0.999", 1, FTestPhi{}),
       tests("support without guard, F test 0.99", 1, FTestPhi{0.99}),
-      tests("majority alone, F test 0.999", infinity, FTestPhi{}),
+      tests("majority alone, F test 0.999", no_guard, FTestPhi{}),
       tests("support, Phi = 1", 9, [](double, double) { return 1.0; }),
       smallest("information criterion", [](const CriterionInput& input, double threshold,
                                            double sigma) { return informationCriterion(input, threshold, sigma); }),

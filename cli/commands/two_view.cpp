@@ -115,6 +115,9 @@ void addTwoViewCommand(const CommandList& program) {
       .option("--motions", options->motions,
               "Up to so many motions: the inliers of each are taken out and the search goes on (default 1)")
       .range(std::size_t{1}, std::size_t{1000});
+  command.flag("--planes", options->estimate.planes_only, "Homographies alone: with --motions the planes of a scene");
+  command.flag("--keep-contradictions", options->estimate.keep_contradictions,
+               "Use matches that contradict each other (one point matched with two), too");
   command.option("--seed", options->estimate.search.seed, "Seed of the draws (default 1)");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Directory for a page with matches, errors and the lattice of models");

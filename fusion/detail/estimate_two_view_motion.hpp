@@ -3,6 +3,7 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/two_view_estimate.hpp>
+#include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/two_view.hpp>
 #include <stats/hierarchy.hpp>
 #include <stats/repeated_extraction.hpp>
@@ -18,6 +19,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -97,6 +99,7 @@ struct TwoViewInput {
   TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
   TwoViewModels models;
   std::vector<Eigen::Vector4d> normalised;
+  std::vector<std::size_t> used;  ///< places of those that take part
 
   TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
     frame.calibrated = options.first.has_value();
@@ -126,7 +129,7 @@ struct TwoViewInput {
     second = coordinatesOf(options.second ? options.second : options.first, size, corner);
     const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
                                size.cwiseQuotient(second.focal)};
-    models = twoViewModels(images, calibration);
+    models = options.planes_only ? homographyModels(images, calibration) : twoViewModels(images, calibration);
     if (one == nullptr) {
       status = Status::too_few, reason = "there is no finite match";
     } else if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !size.allFinite() || !(size.minCoeff() > 0)) {
@@ -136,7 +139,19 @@ struct TwoViewInput {
         Eigen::Vector4d& u = normalised.emplace_back();
         u << first(m.head<2>()), second(m.tail<2>());
       }
+      if (options.keep_contradictions) {
+        used.resize(matches.size());
+        std::iota(used.begin(), used.end(), std::size_t{0});
+      } else {
+        used = uncontradictedMatches(normalised, images.noise);
+      }
     }
+  }
+  /// The matches that take part.
+  std::vector<Eigen::Vector4d> usedMatches() const {
+    std::vector<Eigen::Vector4d> all;
+    for (const std::size_t i : used) all.push_back(normalised[i]);
+    return all;
   }
 
   /// What an estimate says of the motion, by the matches that agree with it.
@@ -167,7 +182,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   result.inlier.assign(matches.size(), false);
   Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, options.search);
   if (result.ok()) {
-    search.add(input.normalised);
+    search.add(input.usedMatches());
     while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
     }
   }
@@ -217,22 +232,30 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
                                                                  {.hierarchy = options.search, .max_structures = most});
   while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
   }
-  result.rest = search.rest();
-  if (result.status != Status::ok) return result;
+  std::vector<char> taken(matches.size(), 0);
   for (const auto& found : search.structures()) {
     const TwoViewModel& model = *input.models[found.model];
     std::vector<Eigen::Vector4d> own;
-    for (const std::size_t i : found.inliers) own.push_back(input.normalised[i]);
+    std::vector<std::size_t> places;
+    for (const std::size_t i : found.inliers) {
+      places.push_back(input.used[i]);
+      taken[places.back()] = 1;
+      own.push_back(input.normalised[places.back()]);
+    }
     std::vector<double> errors(own.size());
     model.errors(found.estimate.parameter, own, errors);
     const ModelFit fit{std::accumulate(errors.begin(), errors.end(), 0.0),
                        own.size() * static_cast<std::size_t>(model.equations()), model.freeParameters()};
     TwoViewStructure& structure = result.structures.emplace_back();
     structure.model = found.name, structure.equations = model.equations();
-    structure.status = found.estimate.status, structure.inliers = found.inliers;
+    structure.status = found.estimate.status, structure.inliers = std::move(places);
     structure.rms = options.sigma * std::sqrt(fit.normalised());
     input.describe(model, found.estimate, own, structure);
   }
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    if (taken[i] == 0) result.rest.push_back(i);
+  }
+  if (result.status != Status::ok) return result;
   if (!search.terminated()) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!input.differ) {

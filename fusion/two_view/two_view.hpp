@@ -39,6 +39,8 @@ struct TwoViewMotionOptions {
   /// Width and height of both images, px. By default those of the cameras, else the bounding box of the matches. The
   /// centre of an image of unknown camera is the middle of this.
   std::optional<Eigen::Vector2d> image_size = {};
+  bool planes_only = false;          ///< the models of homographies alone: planes of a scene, one by one
+  bool keep_contradictions = false;  ///< use matches that contradict each other, too (contradictions.hpp)
   HierarchyOptions search = {};
   StopRequest stop = {};  ///< true ends the search: the answer is what has been found so far
 };
@@ -125,8 +127,8 @@ struct TwoViewMotions : TwoViewImageFrame {
   std::vector<std::size_t> rest;  ///< matches that belong to none
 };
 
-/// The estimate from matches in pixels. Matches that are not finite, or that no direction of a camera belongs to, are
-/// outliers of all models. Nothing is thrown: the status says what is wrong. The same matches in another order give the
+/// The estimate from matches in pixels. Matches that contradict each other take no part in it, but may be inliers of what
+/// is found. Those that are not finite, or that no direction of a camera belongs to, are outliers of all models. Nothing is thrown: the status says what is wrong. The same matches in another order give the
 /// same answer.
 TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
                                             const TwoViewMotionOptions& options);

@@ -233,6 +233,7 @@ TEST(TwoViewMotion, severalPlanesAreFoundOneAfterTheOther) {
   }
   const TwoViewScene noise({.motion = TwoViewMotion::none, .matches = 40, .outliers = 1}, 4);
   matches.insert(matches.end(), noise.pixels.begin(), noise.pixels.end());
+  options.planes_only = true;
   const TwoViewMotions found = estimateTwoViewMotions(matches, options);
   EXPECT_EQ(found.status, Status::ok) << found.reason;
   ASSERT_EQ(found.structures.size(), 3U);
