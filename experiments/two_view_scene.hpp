@@ -58,6 +58,17 @@ inline constexpr std::array<TwoViewMotion, 9> default_two_view_motions = {
     TwoViewMotion::translation, TwoViewMotion::essential,
     TwoViewMotion::fundamental};
 
+/// Motions of the optional models.
+inline constexpr std::array<TwoViewMotion, 5> optional_two_view_motions = {
+    TwoViewMotion::free_zoom, TwoViewMotion::similarity, TwoViewMotion::affine, TwoViewMotion::affine_epipolar,
+    TwoViewMotion::rotation_zoom};
+/// All of them, each at the number of its enumerator.
+inline constexpr auto all_two_view_motions = [] {
+  std::array<TwoViewMotion, default_two_view_motions.size() + optional_two_view_motions.size()> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<TwoViewMotion>(i);
+  return all;
+}();
+
 /// Name of a motion, as in the tables.
 inline const char* nameOf(TwoViewMotion motion) {
   constexpr const char* names[] = {"none",

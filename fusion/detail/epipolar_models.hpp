@@ -3,6 +3,7 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/two_view_estimate.hpp>
+#include <fusion/detail/two_view_lattice.hpp>
 #include <fusion/two_view/epipolar_solvers.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/five_point.hpp>
@@ -24,32 +25,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// What the entries of F obey: those of a translation, F = [t]×, or det F = 0; ‖F‖² = 2.
-struct EpipolarConstraint {
-  bool translation = false;
-  static constexpr int P = 7;
-
-  Eigen::Matrix<double, P, 1> operator()(const Entries& q) const { return linearize(q).value; }
-  EntryConstraints<P> linearize(const Entries& q) const {
-    ConstraintRows<P> rows(q);
-    if (translation) {
-      for (int i = 0; i < 3; ++i) {
-        rows.fixed(entry(i, i), 0);
-        rows.opposite(entry(i, (i + 1) % 3), entry((i + 1) % 3, i));
-      }
-    } else {
-      const Eigen::Matrix3d F = matrixFrom(q);
-      Eigen::Matrix<double, 1, 9> J;
-      for (int k = 0; k < 3; ++k) {
-        J.segment<3>(3 * k) = F.col((k + 1) % 3).cross(F.col((k + 2) % 3)).transpose();
-      }
-      rows.add(J.head<3>().dot(F.col(0)), J);
-    }
-    rows.norm(2);
-    return rows.rows();
-  }
-};
 
 /// ũ'ᵀ F ũ = 0 and its derivatives by F's entries and by the match.
 struct EpipolarForm {
@@ -119,13 +94,17 @@ class EpipolarTypeModel : public TwoViewModel {
 };
 
 /// F under constraints.
-template <auto solver>
 class EpipolarModel : public EpipolarTypeModel {
  public:
-  EpipolarModel(bool translation, TwoViewModelCard card, const TwoViewImages& images)
-      : EpipolarTypeModel(std::move(card), images), constraint_{translation} {}
+  EpipolarModel(EpipolarFamily family, TwoViewSolver solver, TwoViewModelCard card, const TwoViewImages& images)
+      : EpipolarTypeModel(std::move(card), images), constraint_{family}, solver_(solver) {}
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
-    for (const Eigen::Matrix3d& F : solver(sample)) solutions.emplace_back().matrix = F;
+    solver_(sample, solutions);
+  }
+  /// Of an affine map there are affine epipolar geometries of any one direction of the lines.
+  int freedomBeyond(const TwoViewModel& specific) const override {
+    if (constraint_.family == EpipolarFamily::affine && specific.equations() == 2) return 1;
+    return EpipolarTypeModel::freedomBeyond(specific);
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
@@ -137,6 +116,7 @@ class EpipolarModel : public EpipolarTypeModel {
 
  private:
   EpipolarConstraint constraint_;
+  TwoViewSolver solver_;
 };
 
 /// A pose up to scale.
@@ -157,18 +137,22 @@ class EssentialModel : public EpipolarTypeModel {
   }
 };
 
-LIESTAT_FUSION_INLINE TwoViewModels epipolarModels(const TwoViewImages& images, TwoViewCalibration calibration) {
-  using Names = std::vector<std::string>;
-  TwoViewModels models = {std::make_shared<EpipolarModel<solveTranslation>>(
-      true, TwoViewModelCard{"translation", {"retinal translation", "zoom"}, 2, 2}, images)};
-  Names below_fundamental = {"homography", "zoom", "translation"};
-  if (calibration == TwoViewCalibration::calibrated) {
-    models.push_back(std::make_shared<EssentialModel>(
-        TwoViewModelCard{"essential", {"translation", "rotation", "retinal displacement"}, 5, 5}, images));
-    below_fundamental.push_back("essential");
+LIESTAT_FUSION_INLINE TwoViewModels epipolarModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+  using Family = EpipolarFamily;
+  const TwoViewLattice lattice(options);
+  TwoViewModels models;
+  const auto card = [&](const char* name, int free_parameters, std::size_t sample_size) {
+    return TwoViewModelCard{name, lattice.parents(name), free_parameters, sample_size};
+  };
+  models.push_back(std::make_shared<EpipolarModel>(Family::translation, addSolutions<solveTranslation>,
+                                                   card("translation", 2, 2), images));
+  if (lattice.has("affine epipolar")) {
+    models.push_back(std::make_shared<EpipolarModel>(Family::affine, addSolutions<solveAffineEpipolar>,
+                                                     card("affine epipolar", 4, 4), images));
   }
-  models.push_back(std::make_shared<EpipolarModel<solveFundamental>>(
-      false, TwoViewModelCard{"fundamental", below_fundamental, 7, 7}, images));
+  if (lattice.has("essential")) models.push_back(std::make_shared<EssentialModel>(card("essential", 5, 5), images));
+  models.push_back(std::make_shared<EpipolarModel>(Family::fundamental, addSolutions<solveFundamental>,
+                                                   card("fundamental", 7, 7), images));
   return models;
 }
 

@@ -18,6 +18,19 @@
 // `essential` does not contain `homography`: a homography of a plane in two views of one camera obeys more than that.
 // Coordinates are normalised, u = (p - c)/f; the models below homography and fundamental but for retinal translation and
 // displacement mean something only then.
+//
+// Optional models (TwoViewModelOptions); a model that is left out is replaced by those that it contains:
+//
+//   name                  equation      with                         free  sample  contains
+//   free zoom             ũ' ~ H ũ      H = [s I τ; 0 1]             3     2       retinal translation, zoom
+//   similarity                          H = [s Q τ; 0 1]             4     2       retinal displacement, free zoom
+//   affine                              H = [A τ; 0 1]               6     3       similarity
+//   rotation and zoom                   H = diag(r, r, 1) R          4     2       rotation, zoom
+//   affine epipolar       ũ'ᵀ F ũ = 0   F11 = F12 = F21 = F22 = 0    4     4       affine
+//
+// Homography contains affine and rotation and zoom, fundamental contains affine epipolar, translation contains free zoom,
+// and essential contains similarity: a plane parallel to the image, seen by a camera that moves and turns about its axis.
+// Free zoom holds at s = 1, too, where its centre is at infinity: a retinal translation is one of it, not a limit.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -27,6 +40,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -53,23 +67,39 @@ enum class TwoViewCalibration {
   uncalibrated  ///< centred, in any unit: rotation and essential are left out
 };
 
+/// Models that the default lattice does not have.
+enum class TwoViewNode { free_zoom, similarity, affine, rotation_zoom, affine_epipolar };
+
+/// Which lattice it shall be.
+struct TwoViewModelOptions {
+  TwoViewCalibration calibration = TwoViewCalibration::calibrated;
+  /// Models beyond the default ones, in any order. Where cameras are uncalibrated rotation_zoom is left out.
+  std::vector<TwoViewNode> nodes = {};
+
+  bool has(TwoViewNode node) const { return std::find(nodes.begin(), nodes.end(), node) != nodes.end(); }
+};
+
 using TwoViewModels = std::vector<std::shared_ptr<const TwoViewModel>>;
 
 namespace detail {
 
 /// The part of the lattice that homographies make, and that of epipolar geometries.
-TwoViewModels homographyModels(const TwoViewImages& images, TwoViewCalibration calibration);
-TwoViewModels epipolarModels(const TwoViewImages& images, TwoViewCalibration calibration);
+TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+TwoViewModels epipolarModels(const TwoViewImages& images, const TwoViewModelOptions& options);
 
 }  // namespace detail
 
-/// The default lattice. ModelEstimate::covariance is 9×9, of the rank that is free, and 5×5 for `essential`.
-inline TwoViewModels twoViewModels(const TwoViewImages& images,
-                                   TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
-  TwoViewModels models = detail::homographyModels(images, calibration);
-  const TwoViewModels epipolar = detail::epipolarModels(images, calibration);
+/// The lattice. ModelEstimate::covariance is 9×9, of the rank that is free, and 5×5 for `essential`.
+inline TwoViewModels twoViewModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+  TwoViewModels models = detail::homographyModels(images, options);
+  const TwoViewModels epipolar = detail::epipolarModels(images, options);
   models.insert(models.end(), epipolar.begin(), epipolar.end());
   return models;
+}
+/// The default lattice.
+inline TwoViewModels twoViewModels(const TwoViewImages& images,
+                                   TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
+  return twoViewModels(images, TwoViewModelOptions{.calibration = calibration});
 }
 
 }  // namespace liestat
