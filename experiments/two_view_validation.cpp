@@ -6,8 +6,6 @@
 #include <stats/hierarchy.hpp>
 #include <stats/validation.hpp>
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,17 +13,6 @@
 
 namespace liestat::experiments {
 namespace {
-
-/// eᵀ Σ⁺ e for a covariance of known rank.
-double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, int rank) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  double sum = 0;
-  for (int k = 0; k < rank; ++k) {
-    const Eigen::Index i = covariance.rows() - 1 - k;
-    sum += std::pow(eigen.eigenvectors().col(i).dot(error), 2) / eigen.eigenvalues()[i];
-  }
-  return sum;
-}
 
 std::size_t indexOf(const std::string& model) {
   std::size_t k = 0;
@@ -50,17 +37,7 @@ Trial runTrial(const TwoViewSceneOptions& options, std::uint64_t seed) {
   const auto& state = search.state(m);
   const int rank = search.models()[m]->freeParameters();
   if (!state.hasEstimate() || rank == 0) return trial;
-  const auto& estimate = state.estimate;
-  if (options.motion == TwoViewMotion::essential) {
-    const Essentiald truth(SO3d::fitToSO3(scene.R), scene.t);
-    trial.distance = squaredDistance(log(estimate.parameter.pose, truth), estimate.covariance, rank);
-  } else {
-    Eigen::Matrix3d truth = isEpipolar(options.motion) ? scene.F : scene.H;
-    if ((truth.array() * estimate.parameter.matrix.array()).sum() < 0) truth = -truth;
-    const Eigen::Matrix3d e = truth - estimate.parameter.matrix;
-    trial.distance =
-        squaredDistance(Eigen::Map<const Eigen::Matrix<double, 9, 1>>(e.data()), estimate.covariance, rank);
-  }
+  trial.distance = distanceOfTruth(scene, state.estimate, rank);
   return trial;
 }
 

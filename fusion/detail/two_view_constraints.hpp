@@ -1,6 +1,10 @@
-// What the nine entries of H or F obey in each model of fusion/two_view/models.hpp.
+// What the nine entries of H or F, or the pose, obey in each model of fusion/two_view/models.hpp.
 #pragma once
 
+#include <fusion/two_view/models.hpp>
+#include <fusion/two_view/upright.hpp>
+#include <lie/detail/trig.hpp>
+#include <lie/essential.hpp>
 #include <stats/constrained_types.hpp>
 
 #include <Eigen/Core>
@@ -169,6 +173,31 @@ struct EpipolarConstraint {
     rows.norm(2);
     return rows.rows();
   }
+};
+
+/// R first ~ second, verticals of length one: R first has no part across the second one.
+class UprightConstraint {
+ public:
+  explicit UprightConstraint(const TwoViewVerticals& verticals) : first_(verticals.first.normalized()) {
+    // The axes across are the other two rows of a rotation that takes the vertical to y.
+    const Eigen::Matrix3d rotation = toVertical(verticals.second.normalized());
+    across_.row(0) = rotation.row(0), across_.row(1) = rotation.row(2);
+  }
+  Eigen::Vector2d operator()(const Essentiald& q) const { return across_ * (q.so3().matrix() * first_); }
+  ConstraintDerivatives<2, 5> linearize(const Essentiald& q) const {
+    const Eigen::Matrix3d frame = ManifoldTraits<S2<double>>::placement(q.direction()).matrix();
+    const Eigen::Vector3d turned = q.so3().matrix() * first_;
+    ConstraintDerivatives<2, 5> result;
+    result.value = across_ * turned;
+    result.by_parameter.leftCols<2>().setZero();
+    // R first moves by A v_r × R first.
+    result.by_parameter.rightCols<3>() = -across_ * skew(turned) * frame;
+    return result;
+  }
+
+ private:
+  Eigen::Vector3d first_;
+  Eigen::Matrix<double, 2, 3> across_;
 };
 
 }  // namespace liestat::detail

@@ -31,9 +31,13 @@ class TwoViewLattice {
     add("homography", {"affine", "rotation and zoom"});
     add("translation", {"free zoom"});
     add("affine epipolar", {"affine"}, options.has(Node::affine_epipolar));
-    add("essential", {"translation", "rotation", "similarity"}, calibrated);
+    // A translation keeps every vertical as it is.
+    const bool upright = calibrated && options.verticals.has_value();
+    add("upright", {upright && sameVertical(*options.verticals) ? "translation" : "none"}, upright);
+    add("essential", {"translation", "rotation", "similarity", "upright"}, calibrated);
+    add("shared focal length", {"essential"}, options.has(Node::shared_focal));
     // Zoom and translation lead here without a detour.
-    add("fundamental", {"homography", "affine epipolar", "essential", "zoom", "translation"});
+    add("fundamental", {"homography", "affine epipolar", "shared focal length", "zoom", "translation"});
   }
 
   bool has(const std::string& name) const { return entry(name).present; }
@@ -65,6 +69,9 @@ class TwoViewLattice {
   };
   void add(std::string name, Names parents, bool present = true) {
     entries_.push_back({std::move(name), std::move(parents), present});
+  }
+  static bool sameVertical(const TwoViewVerticals& verticals) {
+    return (verticals.first.normalized() - verticals.second.normalized()).norm() < 1e-9;
   }
   const Entry& entry(const std::string& name) const {
     return *std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.name == name; });
