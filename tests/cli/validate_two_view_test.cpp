@@ -52,7 +52,7 @@ TEST(ValidateTwoView, optionalModelsAreRowsOfTheirOwn) {
   EXPECT_EQ(result.average(), 1) << "of the default lattice's motions alone";
   EXPECT_FALSE(result.average_passed.has_value());
   const std::string text = formatTwoViewTables(result);
-  for (const char* line : {"affine              100.0", "rotation and zoom   100.0"}) {
+  for (const char* line : {"affine                 100.0", "rotation and zoom      100.0"}) {
     EXPECT_NE(text.find(line), std::string::npos) << text;
   }
   std::istringstream lines(text);

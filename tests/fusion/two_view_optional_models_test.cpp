@@ -240,7 +240,7 @@ TEST(TwoViewOptionalModels, EstimatesHaveTheCovarianceThatTheySay) {
     }
     EXPECT_LE(capped, 2) << nameOf(motion);
     // Axes may nearly meet.
-    EXPECT_LE(refused, motion == TwoViewMotion::shared_focal ? 3 : 0) << nameOf(motion);
+    EXPECT_LE(refused, motion == TwoViewMotion::shared_focal ? trials / 10 : 0) << nameOf(motion);
     const int used = trials - refused;
     // The bounds of the default lattice's test.
     EXPECT_NEAR(chi2 / freedom, 1, 4 * std::sqrt(2 / freedom) + 0.01) << nameOf(motion);
@@ -251,10 +251,9 @@ TEST(TwoViewOptionalModels, EstimatesHaveTheCovarianceThatTheySay) {
 TEST(TwoViewOptionalModels, TheHierarchyFindsTheMotion) {
   // Beside the default lattice, and with all of them in it.
   for (const bool alone : {true, false}) {
-    const std::uint64_t trials = alone ? 3 : 2;
+    const std::uint64_t trials = alone ? 2 : 1;
     std::size_t right = 0;
     for (const TwoViewMotion motion : experiments::optional_two_view_motions) {
-      std::size_t of_this = 0;
       for (std::uint64_t seed = 0; seed < trials; ++seed) {
         const TwoViewScene scene({.motion = motion}, seed);
         const TwoViewImages images = experiments::imagesOf(scene.options);
@@ -266,14 +265,12 @@ TEST(TwoViewOptionalModels, TheHierarchyFindsTheMotion) {
         while (search.iterate()) {
         }
         if (search.models()[search.best()]->name() != nameOf(motion)) continue;
-        ++of_this;
+        ++right;
         // Of 80 inliers one in a hundred lies beyond the threshold.
         EXPECT_GE(search.state(search.best()).inliers.size(), 72u) << nameOf(motion) << " " << seed;
       }
-      EXPECT_GE(of_this, trials - 1) << nameOf(motion);
-      right += of_this;
     }
-    EXPECT_GE(right, experiments::optional_two_view_motions.size() * trials - 1);
+    EXPECT_GE(right + 1, experiments::optional_two_view_motions.size() * trials) << (alone ? "alone" : "together");
   }
 }
 
