@@ -119,10 +119,10 @@ class SharedFocalModel : public EpipolarTypeModel {
     parameter.focal_length = motion.focal_length;
     return parameter;
   }
-  /// Whether the matches tell the focal length: log f to 0.05, beyond which first order is not true, optical axes
+  /// Whether the matches tell the focal length: log f to 0.1, beyond which first order is not true, optical axes
   /// that pass each other by three standard deviations, and more than one plane.
   bool isTold(const ModelEstimate<Parameter>& found, std::span<const Measurement> inliers) const {
-    if (!(found.covariance(5, 5) <= 0.05 * 0.05)) return false;
+    if (!(found.covariance(5, 5) <= 0.1 * 0.1)) return false;
     const Eigen::Matrix<double, 1, 5> J = found.parameter.pose.essentialMatrixJacobian().row(entry(2, 2));
     const double apart = found.parameter.pose.essentialMatrix()(2, 2);
     const double variance = (J * found.covariance.topLeftCorner<5, 5>() * J.transpose())(0);

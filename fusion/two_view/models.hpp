@@ -37,7 +37,7 @@
 //
 // Upright needs the verticals g, g' in both cameras' frames, which it takes as exact. Shared focal length, K = diag(f, f,
 // 1), has no estimate (Status::not_applicable) where the matches do not tell f: the optical axes meet within three
-// standard deviations or are parallel, a plane explains nine tenths of the matches, or log f is not told to 0.05. Six
+// standard deviations or are parallel, a plane explains nine tenths of the matches, or log f is not told to 0.1. Six
 // matches would determine it; its samples have seven (fusion/two_view/shared_focal.hpp).
 #pragma once
 
