@@ -11,7 +11,8 @@
 // Motions, with the defaults of the options: translation in the image 8 to 40 px; zoom by 1.08 to 1.3, in or out; turns
 // in the image by 3 to 15 degrees; rotations by 4 to 12 degrees about any axis (3 to 12 with a translation);
 // translations of 0.3 to 0.7 m among points at 3 to 9 m; planes with a normal (a, b, 1), |a|, |b| < 0.6; focal lengths
-// that change by 1.25 to 1.6, in or out. Points are uniform in the first image, and seen in both; outliers are uniform
+// that change by 1.25 to 1.6, in or out, or are by so much not what they were taken for; with such a focal length of both
+// views turns by 8 to 20 degrees and translations of 1 to 2 m. Points are uniform in the first image, and seen in both; outliers are uniform
 // in both.
 //
 // Each scene is a function of its options and its seed alone: motion and points are drawn from stream 0, noise from
@@ -33,7 +34,7 @@
 
 namespace liestat::experiments {
 
-/// How the image moves: nine models of two-view motion, and five more between them.
+/// How the image moves: nine models of two-view motion, and seven more between them.
 enum class TwoViewMotion {
   none,
   retinal_translation,
@@ -48,7 +49,9 @@ enum class TwoViewMotion {
   similarity,
   affine,           ///< a similarity after a stretch by up to 1.3 along an axis of any direction
   affine_epipolar,  ///< two affine views of points in space
-  rotation_zoom     ///< rotation, and the focal length changes
+  rotation_zoom,    ///< rotation, and the focal length changes
+  upright,          ///< essential, of which the vertical is known in both views
+  shared_focal      ///< essential, and both focal lengths are by the same factor not what they were taken for
 };
 /// The nine of the default lattice, in the order of the note's confusion matrix.
 inline constexpr std::array<TwoViewMotion, 9> default_two_view_motions = {
@@ -58,21 +61,16 @@ inline constexpr std::array<TwoViewMotion, 9> default_two_view_motions = {
     TwoViewMotion::translation, TwoViewMotion::essential,
     TwoViewMotion::fundamental};
 
-/// These and the five more.
-inline constexpr std::array<TwoViewMotion, 14> all_two_view_motions = {TwoViewMotion::none,
-                                                                       TwoViewMotion::retinal_translation,
-                                                                       TwoViewMotion::zoom,
-                                                                       TwoViewMotion::retinal_displacement,
-                                                                       TwoViewMotion::rotation,
-                                                                       TwoViewMotion::homography,
-                                                                       TwoViewMotion::translation,
-                                                                       TwoViewMotion::essential,
-                                                                       TwoViewMotion::fundamental,
-                                                                       TwoViewMotion::free_zoom,
-                                                                       TwoViewMotion::similarity,
-                                                                       TwoViewMotion::affine,
-                                                                       TwoViewMotion::affine_epipolar,
-                                                                       TwoViewMotion::rotation_zoom};
+/// Motions of the optional models.
+inline constexpr std::array<TwoViewMotion, 7> optional_two_view_motions = {
+    TwoViewMotion::free_zoom,     TwoViewMotion::similarity, TwoViewMotion::affine,      TwoViewMotion::affine_epipolar,
+    TwoViewMotion::rotation_zoom, TwoViewMotion::upright,    TwoViewMotion::shared_focal};
+/// All of them, each at the number of its enumerator.
+inline constexpr auto all_two_view_motions = [] {
+  std::array<TwoViewMotion, default_two_view_motions.size() + optional_two_view_motions.size()> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<TwoViewMotion>(i);
+  return all;
+}();
 
 /// Name of a motion, as in the tables.
 inline const char* nameOf(TwoViewMotion motion) {
@@ -89,13 +87,16 @@ inline const char* nameOf(TwoViewMotion motion) {
                                    "similarity",
                                    "affine",
                                    "affine epipolar",
-                                   "rotation and zoom"};
+                                   "rotation and zoom",
+                                   "upright",
+                                   "shared focal length"};
   return names[static_cast<std::size_t>(motion)];
 }
 /// Whether a motion is told by a fundamental matrix, not by a homography.
 inline bool isEpipolar(TwoViewMotion motion) {
   return motion == TwoViewMotion::translation || motion == TwoViewMotion::essential ||
-         motion == TwoViewMotion::fundamental || motion == TwoViewMotion::affine_epipolar;
+         motion == TwoViewMotion::fundamental || motion == TwoViewMotion::affine_epipolar ||
+         motion == TwoViewMotion::upright || motion == TwoViewMotion::shared_focal;
 }
 
 /// The parameters of the drawing.
@@ -112,9 +113,11 @@ struct TwoViewSceneOptions {
 class TwoViewScene {
  public:
   TwoViewSceneOptions options;
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< rotation of the camera, where the motion has one
-  Eigen::Vector3d t = Eigen::Vector3d::Zero();      ///< its translation (m)
-  double focal_ratio = 1;                           ///< f'/f
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();      ///< rotation of the camera, where the motion has one
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();          ///< its translation (m)
+  double focal_ratio = 1;                               ///< f'/f
+  double focal_scale = 1;                               ///< of both views, in units of the coordinates
+  Eigen::Vector3d vertical = Eigen::Vector3d::UnitY();  ///< in the first camera's frame; R·vertical in the second's
   /// The plane n·x = d in the first camera's frame, of `homography`.
   Eigen::Vector3d plane_normal = Eigen::Vector3d::UnitZ();
   double plane_distance = 1;                        ///< m
@@ -193,7 +196,7 @@ class TwoViewScene {
   void drawMotion(CounterRng& random) {
     R.setIdentity();
     t.setZero();
-    focal_ratio = 1;
+    focal_ratio = focal_scale = 1;
     H.setIdentity();
     F.setZero();
     const auto move = [&] {
@@ -270,11 +273,23 @@ class TwoViewScene {
         focal_ratio = ratio(random, 1.25, 1.6);
         H = Eigen::Vector3d(focal_ratio, focal_ratio, 1).asDiagonal() * R;
         break;
+      case TwoViewMotion::upright:
+        move();
+        vertical = turnInSpace(random, 0, 20) * Eigen::Vector3d::UnitY();
+        break;
+      case TwoViewMotion::shared_focal: {
+        R = turnInSpace(random, 8, 20);
+        const double length = random.uniform(1, 2);
+        t = length * random.unitVector<3>();
+        focal_scale = ratio(random, 1.25, 1.6);
+        break;
+      }
     }
     if (isEpipolar(options.motion)) {
       if (options.motion != TwoViewMotion::affine_epipolar) {
-        const Eigen::Vector3d inverse(1 / focal_ratio, 1 / focal_ratio, 1);
-        F = inverse.asDiagonal() * liestat::detail::skew(t) * R;
+        const Eigen::Vector3d first(1 / focal_scale, 1 / focal_scale, 1),
+            second(1 / (focal_scale * focal_ratio), 1 / (focal_scale * focal_ratio), 1);
+        F = second.asDiagonal() * liestat::detail::skew(t) * R * first.asDiagonal();
       }
       F *= std::sqrt(2.) / F.norm();
     }
@@ -293,8 +308,9 @@ class TwoViewScene {
         x.head<2>() = affine_second_ * Eigen::Vector3d(u.x(), u.y(), z) + affine_shift_;
         x.z() = 1;
       } else if (isEpipolar(options.motion)) {
-        x = R * (random.uniform(options.min_depth, options.max_depth) * u.homogeneous()) + t;
-        x.head<2>() *= focal_ratio;
+        const Eigen::Vector3d ray(u.x() / focal_scale, u.y() / focal_scale, 1);
+        x = R * (random.uniform(options.min_depth, options.max_depth) * ray) + t;
+        x.head<2>() *= focal_scale * focal_ratio;
       } else {
         x = H * u.homogeneous();
       }

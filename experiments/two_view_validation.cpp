@@ -2,6 +2,7 @@
 
 #include <experiments/parallel.hpp>
 #include <experiments/semidefinite_distance.hpp>
+#include <experiments/two_view_lattice.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
 #include <stats/validation.hpp>
@@ -16,7 +17,7 @@ namespace {
 
 std::size_t indexOf(const std::string& model) {
   std::size_t k = 0;
-  while (k < default_two_view_motions.size() && nameOf(default_two_view_motions[k]) != model) ++k;
+  while (k + 1 < all_two_view_motions.size() && nameOf(all_two_view_motions[k]) != model) ++k;
   return k;
 }
 
@@ -27,9 +28,7 @@ struct Trial {
 
 Trial runTrial(const TwoViewSceneOptions& options, std::uint64_t seed) {
   const TwoViewScene scene(options, seed);
-  const double sigma = options.sigma / options.focal_length;
-  const TwoViewImages images{{sigma, sigma}, Eigen::Vector2d(options.width, options.height) / options.focal_length};
-  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(twoViewModels(images), {.seed = seed});
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(modelsFor(scene), {.seed = seed});
   search.add(scene.matches);
   while (search.iterate()) {
   }
@@ -39,23 +38,15 @@ Trial runTrial(const TwoViewSceneOptions& options, std::uint64_t seed) {
   const auto& state = search.state(m);
   const int rank = search.models()[m]->freeParameters();
   if (!state.hasEstimate() || rank == 0) return trial;
-  const auto& estimate = state.estimate;
-  if (options.motion == TwoViewMotion::essential) {
-    const Essentiald truth(SO3d::fitToSO3(scene.R), scene.t);
-    trial.distance = squaredDistance(log(estimate.parameter.pose, truth), estimate.covariance, rank);
-  } else {
-    Eigen::Matrix3d truth = isEpipolar(options.motion) ? scene.F : scene.H;
-    if ((truth.array() * estimate.parameter.matrix.array()).sum() < 0) truth = -truth;
-    const Eigen::Matrix3d e = truth - estimate.parameter.matrix;
-    trial.distance =
-        squaredDistance(Eigen::Map<const Eigen::Matrix<double, 9, 1>>(e.data()), estimate.covariance, rank);
-  }
+  // Where all good estimates were refused there may be one from a few matches, which other models reject.
+  if (options.motion == TwoViewMotion::shared_focal && search.best() != m) return trial;
+  trial.distance = distanceOfTruth(scene, state.estimate, rank);
   return trial;
 }
 
-int dimensionOf(TwoViewMotion motion) {
-  for (const auto& model : twoViewModels({})) {
-    if (model->name() == nameOf(motion)) return model->freeParameters();
+int dimensionOf(const TwoViewSceneOptions& options) {
+  for (const auto& model : modelsFor(TwoViewScene(options, 0))) {
+    if (model->name() == nameOf(options.motion)) return model->freeParameters();
   }
   return 0;
 }
@@ -73,12 +64,13 @@ std::string name(TwoViewMotion motion) {
   return text;
 }
 
-std::size_t TwoViewChoice::right() const { return chosen[indexOf(nameOf(truth))]; }
-
 double TwoViewValidationResult::average() const {
-  double sum = 0;
-  for (const TwoViewChoice& c : choices) sum += static_cast<double>(c.right()) / static_cast<double>(c.trials);
-  return sum / static_cast<double>(choices.size());
+  double sum = 0, count = 0;
+  for (const TwoViewChoice& c : choices) {
+    if (c.optional()) continue;
+    sum += static_cast<double>(c.right()) / static_cast<double>(c.trials), ++count;
+  }
+  return sum / count;
 }
 
 Tally TwoViewValidationResult::tally() const {
@@ -96,7 +88,7 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
   for (const TwoViewMotion motion : validation.motions) {
     const TwoViewSceneOptions options{
         .motion = motion, .matches = validation.matches, .outliers = validation.outliers, .sigma = validation.sigma};
-    const int k = dimensionOf(motion);
+    const int k = dimensionOf(options);
     std::vector<std::size_t> chosen(validation.trials);
     const ValidationOptions how{.trials = validation.trials,
                                 .seed = validation.seed,
@@ -128,13 +120,18 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
     // Errors beyond the 0.99 quantile are cut off, outliers below it are not: what that makes of the index, and the
     // curvature of the longest motions (docs/two_view.md).
     row.promise = ValidationTolerance{.index = 0.1, .ks = 0.05, .failure_fraction = 0.01, .tail = 0.02};
+    // One that may be refused has distances where it was chosen, and how often that is, is judged above.
+    if (motion == TwoViewMotion::shared_focal) row.promise->failure_fraction = 1 - promised_row;
     row.judge(run_false_alarm / static_cast<double>(validation.motions.size()));
     row.forgetDistances();
     result.rows.push_back(std::move(row));
   }
-  if (validation.motions.size() == default_two_view_motions.size()) {
-    result.average_passed =
-        reaches(result.average() * static_cast<double>(all), static_cast<double>(all), promised_average);
+  const auto asked = [&](TwoViewMotion motion) {
+    return std::find(validation.motions.begin(), validation.motions.end(), motion) != validation.motions.end();
+  };
+  if (std::all_of(default_two_view_motions.begin(), default_two_view_motions.end(), asked)) {
+    const auto nine = static_cast<double>(validation.trials * default_two_view_motions.size());
+    result.average_passed = reaches(result.average() * nine, nine, promised_average);
   }
   return result;
 }

@@ -69,7 +69,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.rules) return compareRules(options, invocation);
   TwoViewValidation validation = options.validation;
   validation.sigma = options.sigma.value_or(validation.sigma);
-  validation.motions = chosen(default_two_view_motions, options.motions);
+  if (options.full || !options.motions.empty()) validation.motions = chosen(all_two_view_motions, options.motions);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 500 : 50;
   const TwoViewValidationResult result =
       withProgressBar("validate two-view", [&](const auto& progress) { return validateTwoView(validation, progress); });
@@ -84,6 +84,12 @@ int runCommand(const Options& options, const Invocation& invocation) {
       choices);
 }
 
+std::string optionalNames() {
+  std::string text;
+  for (const TwoViewMotion motion : optional_two_view_motions) text += (text.empty() ? "" : ", ") + name(motion);
+  return text;
+}
+
 }  // namespace
 
 void addValidateTwoViewCommand(const CommandList& validate) {
@@ -92,15 +98,16 @@ void addValidateTwoViewCommand(const CommandList& validate) {
       validate.add("two-view", "Motion between two images: is the right model chosen, and does its covariance hold?");
   app.option("--motion", options->motions,
              "none, retinal_translation, zoom, retinal_displacement, rotation, homography, translation, essential, "
-             "fundamental: a comma list (default: all)")
+             "fundamental, and of optional models " +
+                 optionalNames() + ": a comma list (default: the first nine, with --full all)")
       .list()
-      .oneOf(names(default_two_view_motions));
+      .oneOf(names(all_two_view_motions));
   app.option("--matches", options->validation.matches, "Matches of a trial (default 100)")
       .range(std::size_t{10}, std::size_t{100000});
   app.option("--outliers", options->validation.outliers, "Share of wrong matches (default 0.2)").range(0.0, 0.9);
   app.option("--sigma", options->sigma, "Standard deviation of image coordinates, px (default 0.5, of real pairs 1)")
       .range(1e-3, 10.0);
-  app.flag("--full", options->full, "500 trials a motion");
+  app.flag("--full", options->full, "500 trials a motion, optional models too");
   app.option("--pairs", options->pairs,
              "Real pairs instead: a directory with the folders homogr, kusvod2, adelaide-rmf, evd, or some of them")
       .excludes("--motion")

@@ -22,13 +22,43 @@ std::vector<std::string> choiceHeaders() {
   headers.insert(headers.end(), std::begin(short_names), std::end(short_names));
   return headers;
 }
+std::string percent(std::size_t count, const TwoViewChoice& choice) {
+  return fmt::format("{:.1f}", 100 * static_cast<double>(count) / static_cast<double>(choice.trials));
+}
 /// Shares of the chosen models in per cent.
 std::vector<std::string> choiceCells(const TwoViewChoice& choice) {
   std::vector<std::string> cells{short_names[static_cast<std::size_t>(choice.truth)]};
-  for (const std::size_t count : choice.chosen) {
-    cells.push_back(fmt::format("{:.1f}", 100 * static_cast<double>(count) / static_cast<double>(choice.trials)));
-  }
+  for (std::size_t m = 0; m < default_two_view_motions.size(); ++m) cells.push_back(percent(choice.chosen[m], choice));
   return cells;
+}
+const std::vector<std::string> optional_headers{"truth", "chosen, %", "others, %"};
+/// The share of the optional model of a motion, and what was chosen instead of it.
+std::vector<std::string> optionalCells(const TwoViewChoice& choice) {
+  std::string others;
+  for (std::size_t m = 0; m < default_two_view_motions.size(); ++m) {
+    if (choice.chosen[m] == 0) continue;
+    others += fmt::format("{}{} {}", others.empty() ? "" : ", ", short_names[m], percent(choice.chosen[m], choice));
+  }
+  return {nameOf(choice.truth), percent(choice.right(), choice), others};
+}
+struct ChoiceTables {
+  std::vector<std::vector<std::string>> nine, optional;
+};
+ChoiceTables choiceTables(const TwoViewValidationResult& result) {
+  ChoiceTables tables;
+  for (const TwoViewChoice& choice : result.choices) {
+    if (choice.optional()) {
+      tables.optional.push_back(optionalCells(choice));
+    } else {
+      tables.nine.push_back(choiceCells(choice));
+    }
+  }
+  return tables;
+}
+std::string tableText(const std::vector<std::string>& headers, const std::vector<std::vector<std::string>>& rows) {
+  Table table(headers);
+  for (const auto& row : rows) table.row(row);
+  return table.str();
 }
 const std::vector<std::string> distance_headers{"model", "k", "index", "SE", "95 % covers", "K-S p", "verdict"};
 std::vector<std::string> distanceCells(const TwoViewRow& row) {
@@ -45,11 +75,17 @@ std::vector<std::string> distanceCells(const TwoViewRow& row) {
 }  // namespace
 
 std::string formatTwoViewTables(const TwoViewValidationResult& result) {
-  Table choices(choiceHeaders()), distances(distance_headers);
-  for (const TwoViewChoice& choice : result.choices) choices.row(choiceCells(choice));
+  Table distances(distance_headers);
   for (const TwoViewRow& row : result.rows) distances.row(distanceCells(row));
-  std::string text = fmt::format("\nModels that were chosen, %\n{}mean of the diagonal: {:.1f} %\n", choices.str(),
-                                 100 * result.average());
+  const ChoiceTables choices = choiceTables(result);
+  std::string text;
+  if (!choices.nine.empty()) {
+    text += fmt::format("\nModels that were chosen, %\n{}mean of the diagonal: {:.1f} %\n",
+                        tableText(choiceHeaders(), choices.nine), 100 * result.average());
+  }
+  if (!choices.optional.empty()) {
+    text += "\nOptional models, each beside the default lattice\n" + tableText(optional_headers, choices.optional);
+  }
   if (!result.rows.empty()) {
     text += fmt::format("\nSquared distance of the truth from the true model's estimate; index k expected\n{}",
                         distances.str());
@@ -81,8 +117,11 @@ JsonObject toJson(const TwoViewRow& row) {
 
 JsonObject toJson(const TwoViewChoice& choice) {
   JsonObject o, chosen;
-  for (std::size_t m = 0; m < choice.chosen.size(); ++m)
-    chosen.set(name(default_two_view_motions[m]), choice.chosen[m]);
+  for (std::size_t m = 0; m < choice.chosen.size(); ++m) {
+    // The default lattice, and the model that this motion is tried with.
+    if (m >= default_two_view_motions.size() && all_two_view_motions[m] != choice.truth) continue;
+    chosen.set(name(all_two_view_motions[m]), choice.chosen[m]);
+  }
   o.set("motion", name(choice.truth)).set("trials", choice.trials).set("chosen", chosen).set("passed", choice.passed);
   return o;
 }
@@ -91,18 +130,22 @@ void writeTwoViewReport(const std::string& directory, const std::string& command
                         const TwoViewValidationResult& result) {
   Report report(directory, "Two-view motion: is the right model chosen, and is its covariance true?");
   report.paragraph(
-      "Each trial moves a camera by one of nine motions, takes matches with noise and outliers, and runs the hierarchy "
-      "of "
+      "Each trial moves a camera by one motion, takes matches with noise and outliers, and runs the hierarchy of "
       "models over them. The table has the models that were chosen. For the true model's estimate the squared "
       "Mahalanobis "
       "distance of the true parameter follows a chi-square law if the covariance is true; its mean, the index, is then "
       "the number k of free parameters.");
   report.code(command_line);
   report.section("Models that were chosen");
-  std::vector<std::vector<std::string>> choices, distances;
-  for (const TwoViewChoice& choice : result.choices) choices.push_back(choiceCells(choice));
-  report.table(choiceHeaders(), choices,
-               fmt::format("Per cent of the trials; mean of the diagonal {:.1f} %.", 100 * result.average()));
+  std::vector<std::vector<std::string>> distances;
+  const ChoiceTables choices = choiceTables(result);
+  if (!choices.nine.empty()) {
+    report.table(choiceHeaders(), choices.nine,
+                 fmt::format("Per cent of the trials; mean of the diagonal {:.1f} %.", 100 * result.average()));
+  }
+  if (!choices.optional.empty()) {
+    report.table(optional_headers, choices.optional, "Optional models, each beside the default lattice.");
+  }
   if (!result.rows.empty()) {
     report.section("Distances of the truth");
     std::vector<Panel> histograms;

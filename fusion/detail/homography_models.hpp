@@ -3,6 +3,7 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/two_view_estimate.hpp>
+#include <fusion/detail/two_view_lattice.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/homography_solvers.hpp>
 #include <fusion/two_view/image_motion_solvers.hpp>
@@ -23,53 +24,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// What the entries of H obey in each model.
-enum class HomographyFamily { retinal_translation, zoom, retinal_displacement, rotation, homography };
-
-struct HomographyConstraint {
-  HomographyFamily family;
-  static constexpr int P = 8;
-
-  Eigen::Matrix<double, P, 1> operator()(const Entries& q) const { return linearize(q).value; }
-  EntryConstraints<P> linearize(const Entries& q) const {
-    ConstraintRows<P> rows(q);
-    if (family == HomographyFamily::homography) {
-      rows.norm(3);
-    } else if (family == HomographyFamily::rotation) {
-      // H Hᵀ = I, by its upper triangle.
-      for (int i = 0; i < 3; ++i) {
-        for (int j = i; j < 3; ++j) {
-          double dot = i == j ? -1 : 0;
-          Eigen::Matrix<double, 1, 9> J = Eigen::Matrix<double, 1, 9>::Zero();
-          for (int k = 0; k < 3; ++k) {
-            dot += q[entry(i, k)] * q[entry(j, k)];
-            J[entry(i, k)] += q[entry(j, k)];
-            J[entry(j, k)] += q[entry(i, k)];
-          }
-          rows.add(dot, J);
-        }
-      }
-    } else {
-      rows.fixed(entry(2, 0), 0), rows.fixed(entry(2, 1), 0), rows.fixed(entry(2, 2), 1);
-      if (family == HomographyFamily::retinal_displacement) {
-        const double c = q[entry(0, 0)], s = q[entry(1, 0)];
-        rows.equal(entry(0, 0), entry(1, 1)), rows.opposite(entry(0, 1), entry(1, 0));
-        Eigen::Matrix<double, 1, 9> J = Eigen::Matrix<double, 1, 9>::Zero();
-        J[entry(0, 0)] = 2 * c, J[entry(1, 0)] = 2 * s;
-        rows.add(c * c + s * s - 1, J);
-      } else {
-        rows.fixed(entry(0, 1), 0), rows.fixed(entry(1, 0), 0);
-        if (family == HomographyFamily::zoom) {
-          rows.equal(entry(0, 0), entry(1, 1)), rows.fixed(entry(0, 2), 0), rows.fixed(entry(1, 2), 0);
-        } else {
-          rows.fixed(entry(0, 0), 1), rows.fixed(entry(1, 1), 1);
-        }
-      }
-    }
-    return rows.rows();
-  }
-};
 
 /// (h₃·ũ) u' - (h₁·ũ, h₂·ũ) = 0.
 struct HomographyEquation {
@@ -140,14 +94,12 @@ class NoMotionModel : public HomographyTypeModel {
   }
 };
 
-using HomographySolver = MatrixSolutions<1> (*)(std::span<const Eigen::Vector4d>);
-
 class HomographyModel : public HomographyTypeModel {
  public:
-  HomographyModel(HomographyFamily family, HomographySolver solver, TwoViewModelCard card, const TwoViewImages& images)
+  HomographyModel(HomographyFamily family, TwoViewSolver solver, TwoViewModelCard card, const TwoViewImages& images)
       : HomographyTypeModel(std::move(card), images), constraint_{family}, solver_(solver) {}
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
-    for (const Eigen::Matrix3d& H : solver_(sample)) solutions.emplace_back().matrix = H;
+    solver_(sample, solutions);
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
@@ -159,28 +111,28 @@ class HomographyModel : public HomographyTypeModel {
 
  private:
   HomographyConstraint constraint_;
-  HomographySolver solver_;
+  TwoViewSolver solver_;
 };
 
-LIESTAT_FUSION_INLINE TwoViewModels homographyModels(const TwoViewImages& images, TwoViewCalibration calibration) {
-  using Names = std::vector<std::string>;
-  const auto model = [&](HomographyFamily family, HomographySolver solver, const char* name, const Names& parents,
-                         int free_parameters, std::size_t sample_size) {
-    return std::make_shared<HomographyModel>(family, solver,
-                                             TwoViewModelCard{name, parents, free_parameters, sample_size}, images);
-  };
+LIESTAT_FUSION_INLINE TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+  using Family = HomographyFamily;
+  const TwoViewLattice lattice(options);
   TwoViewModels models = {std::make_shared<NoMotionModel>(TwoViewModelCard{"none", {}, 0, 0}, images)};
-  models.push_back(
-      model(HomographyFamily::retinal_translation, solveRetinalTranslation, "retinal translation", {"none"}, 2, 1));
-  models.push_back(model(HomographyFamily::zoom, solveZoom, "zoom", {"none"}, 1, 1));
-  models.push_back(model(HomographyFamily::retinal_displacement, solveRetinalDisplacement, "retinal displacement",
-                         {"retinal translation"}, 3, 2));
-  Names below_homography = {"retinal displacement", "zoom"};
-  if (calibration == TwoViewCalibration::calibrated) {
-    models.push_back(model(HomographyFamily::rotation, solveRotation, "rotation", {"none"}, 3, 2));
-    below_homography.push_back("rotation");
-  }
-  models.push_back(model(HomographyFamily::homography, solveHomography, "homography", below_homography, 8, 4));
+  const auto add = [&](Family family, TwoViewSolver solver, const char* name, int free_parameters,
+                       std::size_t sample_size) {
+    if (!lattice.has(name)) return;
+    models.push_back(std::make_shared<HomographyModel>(
+        family, solver, TwoViewModelCard{name, lattice.parents(name), free_parameters, sample_size}, images));
+  };
+  add(Family::retinal_translation, addSolutions<solveRetinalTranslation>, "retinal translation", 2, 1);
+  add(Family::zoom, addSolutions<solveZoom>, "zoom", 1, 1);
+  add(Family::free_zoom, addSolutions<solveFreeZoom>, "free zoom", 3, 2);
+  add(Family::retinal_displacement, addSolutions<solveRetinalDisplacement>, "retinal displacement", 3, 2);
+  add(Family::similarity, addSolutions<solveSimilarity>, "similarity", 4, 2);
+  add(Family::affine, addSolutions<solveAffine>, "affine", 6, 3);
+  add(Family::rotation, addSolutions<solveRotation>, "rotation", 3, 2);
+  add(Family::rotation_zoom, addSolutions<solveRotationZoom>, "rotation and zoom", 4, 2);
+  add(Family::homography, addSolutions<solveHomography>, "homography", 8, 4);
   return models;
 }
 

@@ -1,7 +1,7 @@
-// What the models of two-view motion have in common: nine entries of a matrix as parameter, under the constraints of each
-// model, and the estimate of it.
+// What the models of two-view motion have in common: the estimate of the parameter under the constraints of each model.
 #pragma once
 
+#include <fusion/detail/two_view_constraints.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/models.hpp>
 #include <lie/detail/small_products.hpp>
@@ -20,47 +20,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// The entries of a 3×3 matrix, column after column.
-using Entries = Eigen::Matrix<double, 9, 1>;
-
-inline Entries entriesFrom(const Eigen::Matrix3d& M) { return Eigen::Map<const Entries>(M.data()); }
-inline Eigen::Matrix3d matrixFrom(const Entries& entries) { return Eigen::Map<const Eigen::Matrix3d>(entries.data()); }
-/// Where entry (row, column) is.
-constexpr int entry(int row, int column) { return 3 * column + row; }
-
-/// Up to P constraints on the entries; rows that are not used stay zero.
-template <int P>
-using EntryConstraints = ConstraintDerivatives<P, 9>;
-
-/// Constraints that are written one after the other.
-template <int P>
-class ConstraintRows {
- public:
-  explicit ConstraintRows(const Entries& q) : q_(q) { rows_.value.setZero(), rows_.by_parameter.setZero(); }
-  /// a·q[i] + b·q[j] = c.
-  void linear(int i, double a, int j, double b, double c) {
-    rows_.value[next_] = a * q_[i] + b * q_[j] - c;
-    rows_.by_parameter(next_, i) += a;
-    rows_.by_parameter(next_, j) += b;
-    ++next_;
-  }
-  void fixed(int i, double value) { linear(i, 1, i, 0, value); }
-  void equal(int i, int j) { linear(i, 1, j, -1, 0); }
-  void opposite(int i, int j) { linear(i, 1, j, 1, 0); }
-  /// Any other, with its derivatives.
-  void add(double value, const Eigen::Matrix<double, 1, 9>& by_entries) {
-    rows_.value[next_] = value;
-    rows_.by_parameter.row(next_++) = by_entries;
-  }
-  void norm(double squared) { add(q_.squaredNorm() - squared, 2 * q_.transpose()); }
-  const EntryConstraints<P>& rows() const { return rows_; }
-
- private:
-  Entries q_;
-  EntryConstraints<P> rows_;
-  int next_ = 0;
-};
 
 /// Matches of which the parameter fits so much by itself (ConstrainedEstimator::leverage) take no part. A wrong match that
 /// lies on its epipolar line by chance has often a parallax that no other one has: it agrees with all others, and moves
@@ -118,5 +77,12 @@ struct TwoViewModelCard {
   int free_parameters = 0;
   std::size_t sample_size = 0;
 };
+
+/// The matrices that a closed-form solver finds, as parameters.
+using TwoViewSolver = void (*)(std::span<const Eigen::Vector4d>, std::vector<TwoViewMotionModel>&);
+template <auto solver>
+void addSolutions(std::span<const Eigen::Vector4d> sample, std::vector<TwoViewMotionModel>& solutions) {
+  for (const Eigen::Matrix3d& M : solver(sample)) solutions.emplace_back().matrix = M;
+}
 
 }  // namespace liestat::detail

@@ -18,6 +18,27 @@
 // `essential` does not contain `homography`: a homography of a plane in two views of one camera obeys more than that.
 // Coordinates are normalised, u = (p - c)/f; the models below homography and fundamental but for retinal translation and
 // displacement mean something only then.
+//
+// Optional models (TwoViewModelOptions); a model that is left out is replaced by those that it contains:
+//
+//   name                  equation      with                         free  sample  contains
+//   free zoom             ũ' ~ H ũ      H = [s I τ; 0 1]             3     2       retinal translation, zoom
+//   similarity                          H = [s Q τ; 0 1]             4     2       retinal displacement, free zoom
+//   affine                              H = [A τ; 0 1]               6     3       similarity
+//   rotation and zoom                   H = diag(r, r, 1) R          4     2       rotation, zoom
+//   affine epipolar       ũ'ᵀ F ũ = 0   F11 = F12 = F21 = F22 = 0    4     4       affine
+//   upright                             F = [t]× R, R g = g'         3     3       none; translation if g = g'
+//   shared focal length                 F = K⁻ᵀ [t]× R K⁻¹           6     7       essential
+//
+// Homography contains affine and rotation and zoom, fundamental contains affine epipolar and shared focal length,
+// translation contains free zoom, and essential contains upright and similarity: a plane parallel to the image, seen by a
+// camera that moves and turns about its axis. Uncalibrated shared focal length contains translation and similarity.
+// Free zoom holds at s = 1, too, where its centre is at infinity: a retinal translation is one of it, not a limit.
+//
+// Upright needs the verticals g, g' in both cameras' frames, which it takes as exact. Shared focal length, K = diag(f, f,
+// 1), has no estimate (Status::not_applicable) where the matches do not tell f: the optical axes meet within three
+// standard deviations or are parallel, a plane explains nine tenths of the matches, or log f is not told to 0.1. Six
+// matches would determine it; its samples have seven (fusion/two_view/shared_focal.hpp).
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -27,15 +48,19 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace liestat {
 
-/// The parameter of a model of two-view motion: H or F, and for `essential` the pose that it belongs to.
+/// The parameter of a model of two-view motion: H or F, and for `essential`, `upright` and `shared focal length` the pose
+/// that it belongs to.
 struct TwoViewMotionModel {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Essentiald pose = Essentiald();  ///< second_T_first up to scale, on the side that most matches lie in front of
+  double focal_length = 1;         ///< of both views in the unit of the matches, of `shared focal length`
 };
 
 using TwoViewModel = HierarchyModel<Eigen::Vector4d, TwoViewMotionModel>;
@@ -53,23 +78,49 @@ enum class TwoViewCalibration {
   uncalibrated  ///< centred, in any unit: rotation and essential are left out
 };
 
+/// Models that the default lattice does not have.
+enum class TwoViewNode { free_zoom, similarity, affine, rotation_zoom, affine_epipolar, shared_focal };
+
+/// The vertical in the frames of both cameras, of any length: both up, or both down.
+struct TwoViewVerticals {
+  Eigen::Vector3d first = Eigen::Vector3d::UnitY(), second = Eigen::Vector3d::UnitY();
+};
+
+/// Which lattice it shall be.
+struct TwoViewModelOptions {
+  TwoViewCalibration calibration = TwoViewCalibration::calibrated;
+  /// Models beyond the default ones, in any order. Where cameras are uncalibrated rotation_zoom is left out.
+  std::vector<TwoViewNode> nodes = {};
+  /// With them `upright` is a model, where cameras are calibrated.
+  std::optional<TwoViewVerticals> verticals = {};
+
+  bool has(TwoViewNode node) const { return std::find(nodes.begin(), nodes.end(), node) != nodes.end(); }
+};
+
 using TwoViewModels = std::vector<std::shared_ptr<const TwoViewModel>>;
 
 namespace detail {
 
-/// The part of the lattice that homographies make, and that of epipolar geometries.
-TwoViewModels homographyModels(const TwoViewImages& images, TwoViewCalibration calibration);
-TwoViewModels epipolarModels(const TwoViewImages& images, TwoViewCalibration calibration);
+/// The part of the lattice that homographies make, that of epipolar geometries, and optional ones of these.
+TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+TwoViewModels epipolarModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+TwoViewModels poseModels(const TwoViewImages& images, const TwoViewModelOptions& options);
 
 }  // namespace detail
 
-/// The default lattice. ModelEstimate::covariance is 9×9, of the rank that is free, and 5×5 for `essential`.
+/// The lattice. ModelEstimate::covariance is 9×9, of the rank that is free; of `essential` 5×5 in the tangent of the pose,
+/// of `upright` the same of rank three, of `shared focal length` 6×6, the last one log f.
+inline TwoViewModels twoViewModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+  TwoViewModels models = detail::homographyModels(images, options);
+  for (const TwoViewModels& more : {detail::epipolarModels(images, options), detail::poseModels(images, options)}) {
+    models.insert(models.end(), more.begin(), more.end());
+  }
+  return models;
+}
+/// The default lattice.
 inline TwoViewModels twoViewModels(const TwoViewImages& images,
                                    TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
-  TwoViewModels models = detail::homographyModels(images, calibration);
-  const TwoViewModels epipolar = detail::epipolarModels(images, calibration);
-  models.insert(models.end(), epipolar.begin(), epipolar.end());
-  return models;
+  return twoViewModels(images, TwoViewModelOptions{.calibration = calibration});
 }
 
 }  // namespace liestat
@@ -77,4 +128,5 @@ inline TwoViewModels twoViewModels(const TwoViewImages& images,
 #ifndef LIESTAT_COMPILED_FUSION
 #include <fusion/detail/epipolar_models.hpp>
 #include <fusion/detail/homography_models.hpp>
+#include <fusion/detail/pose_models.hpp>
 #endif

@@ -22,6 +22,7 @@
 //   3   =    solveEssentialUpright        [t]× R, the vertical known in both views: up to four
 //   4   *    solveAffineEpipolar          zero but for F13, F23, F31, F32, F33: two affine cameras
 //   5   =    solveEssential               [t]× R: up to ten
+//   7   =    solveSharedFocal             K⁻ᵀ [t]× R K⁻¹, one focal length of both views, with the pose: up to three
 //   7   *    solveFundamental             det F = 0: up to three; of eight or more one
 //
 // A solver gives no solution for a sample that does not determine it, told without a scale: points that agree to
@@ -36,4 +37,5 @@
 #include <fusion/two_view/homography_solvers.hpp>
 #include <fusion/two_view/image_motion_solvers.hpp>
 #include <fusion/two_view/rotation_solvers.hpp>
+#include <fusion/two_view/shared_focal.hpp>
 #include <fusion/two_view/upright.hpp>

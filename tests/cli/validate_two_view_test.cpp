@@ -43,6 +43,30 @@ TEST(ValidateTwoView, everyMotionIsJudged) {
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
 }
 
+TEST(ValidateTwoView, optionalModelsAreRowsOfTheirOwn) {
+  TwoViewValidation validation = small(4);
+  validation.motions = {TwoViewMotion::retinal_translation, TwoViewMotion::affine, TwoViewMotion::rotation_zoom};
+  const TwoViewValidationResult result = validateTwoView(validation);
+  ASSERT_EQ(result.choices.size(), 3U);
+  EXPECT_EQ(result.rows.size(), 3U);
+  EXPECT_EQ(result.average(), 1) << "of the default lattice's motions alone";
+  EXPECT_FALSE(result.average_passed.has_value());
+  const std::string text = formatTwoViewTables(result);
+  for (const char* line : {"affine                 100.0", "rotation and zoom      100.0"}) {
+    EXPECT_NE(text.find(line), std::string::npos) << text;
+  }
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+  TwoViewChoice mistaken = result.choices[1];
+  mistaken.chosen[static_cast<std::size_t>(TwoViewMotion::affine)] = 3;
+  mistaken.chosen[static_cast<std::size_t>(TwoViewMotion::homography)] = 1;
+  TwoViewValidationResult alone;
+  alone.choices = {mistaken};
+  const std::string others = formatTwoViewTables(alone);
+  EXPECT_NE(others.find("75.0  homog 25.0"), std::string::npos) << others;
+  EXPECT_EQ(others.find("mean of the diagonal"), std::string::npos) << others;
+}
+
 TEST(ValidateTwoView, isTheSameForAnyNumberOfThreads) {
   TwoViewValidation validation = small(6);
   validation.motions = {TwoViewMotion::essential};
