@@ -1,11 +1,11 @@
 // The lattice that a simulated motion is tried with, and how far the truth is from an estimate.
 #pragma once
 
+#include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/models.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <optional>
@@ -46,17 +46,6 @@ inline TwoViewModels modelsFor(const TwoViewScene& scene) {
     options.verticals = TwoViewVerticals{scene.vertical, scene.R * scene.vertical};
   }
   return twoViewModels(imagesOf(scene.options), options);
-}
-
-/// eᵀ Σ⁺ e for a covariance of known rank.
-inline double squaredDistance(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance, int rank) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  double sum = 0;
-  for (int k = 0; k < rank; ++k) {
-    const Eigen::Index i = covariance.rows() - 1 - k;
-    sum += std::pow(eigen.eigenvectors().col(i).dot(error), 2) / eigen.eigenvalues()[i];
-  }
-  return sum;
 }
 
 /// The squared Mahalanobis distance of the true parameter from an estimate of the true model, which has `rank` free

@@ -1,7 +1,6 @@
 #include <experiments/two_view_validation.hpp>
 
 #include <experiments/parallel.hpp>
-#include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_lattice.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>

@@ -45,7 +45,7 @@ JsonObject truthOf(const TwoViewScene& scene, const Invocation& invocation, std:
   JsonObject object = jsonEnvelope(invocation.command_line, seed);
   object.set("motion", name(o.motion)).set("sigma", o.sigma);
   object.set("intrinsics", std::vector<double>{o.focal_length, o.focal_length, 0.5 * o.width, 0.5 * o.height});
-  object.set("focal_ratio", scene.focal_ratio);
+  object.set("focal_scale", scene.focal_scale).set("focal_ratio", scene.focal_ratio);
   object.set("rotation_vector", Eigen::Vector3d(SO3d::fitToSO3(scene.R).log())).set("translation", scene.t);
   if (isEpipolar(o.motion)) {
     object.set("fundamental_normalised", scene.F);

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,10 +25,18 @@ constexpr const char* command_name = "liestat two-view";
 struct Options {
   std::string file, json, report;
   std::vector<std::string> calibration;
-  std::vector<double> intrinsics, second_intrinsics, image_size;
+  std::vector<double> intrinsics, second_intrinsics, image_size, verticals;
+  std::vector<std::string> nodes;
   std::size_t motions = 1;
   TwoViewMotionOptions estimate;
 };
+
+const std::map<std::string, TwoViewNode> node_names = {{"free_zoom", TwoViewNode::free_zoom},
+                                                       {"similarity", TwoViewNode::similarity},
+                                                       {"affine", TwoViewNode::affine},
+                                                       {"rotation_zoom", TwoViewNode::rotation_zoom},
+                                                       {"affine_epipolar", TwoViewNode::affine_epipolar},
+                                                       {"shared_focal", TwoViewNode::shared_focal}};
 
 std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
   const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
@@ -50,6 +59,13 @@ void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
   if (!options.second_intrinsics.empty()) {
     if (!estimate.first) throw InputError(command_name, 0, "only the second camera is known", "--intrinsics too");
     estimate.second = cameraFromIntrinsics(options.second_intrinsics);
+  }
+  for (const std::string& node : options.nodes) estimate.nodes.push_back(node_names.at(node));
+  if (!options.verticals.empty()) {
+    if (!estimate.first) throw InputError(command_name, 0, "verticals without a camera", "--intrinsics too");
+    const Eigen::Map<const Eigen::Vector3d> first(options.verticals.data()), second(options.verticals.data() + 3);
+    if (!(first.norm() > 0 && second.norm() > 0)) throw InputError(command_name, 0, "a vertical is zero", "directions");
+    estimate.verticals = TwoViewVerticals{first, second};
   }
   if (!options.image_size.empty()) estimate.image_size = Eigen::Vector2d(options.image_size[0], options.image_size[1]);
 }
@@ -115,6 +131,18 @@ void addTwoViewCommand(const CommandList& program) {
       .option("--motions", options->motions,
               "Up to so many motions: the inliers of each are taken out and the search goes on (default 1)")
       .range(std::size_t{1}, std::size_t{1000});
+  std::vector<std::string> names;
+  for (const auto& [node, value] : node_names) names.push_back(node);
+  command
+      .option("--models", options->nodes,
+              "Models beyond the default ones: free_zoom, similarity, affine, rotation_zoom, affine_epipolar, "
+              "shared_focal; a comma list")
+      .list()
+      .oneOf(names);
+  command
+      .option("--verticals", options->verticals,
+              "x,y,z,x',y',z': the vertical in both cameras' frames; a motion that keeps it is then a model")
+      .list(6, 6);
   command.flag("--planes", options->estimate.planes_only, "Homographies alone: with --motions the planes of a scene");
   command.flag("--keep-contradictions", options->estimate.keep_contradictions,
                "Use matches that contradict each other (one point matched with two), too");

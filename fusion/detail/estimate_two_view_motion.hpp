@@ -55,12 +55,22 @@ inline TwoViewCoordinates coordinatesOf(const std::optional<Camera>& camera, con
 inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel>& estimate, const Eigen::Matrix3d& A,
                                           const Eigen::Matrix3d& B) {
   Eigen::MatrixXd covariance = estimate.covariance;
-  if (covariance.rows() == 5) {
-    const Eigen::Matrix<double, 9, 5> J = estimate.parameter.pose.essentialMatrixJacobian();
+  Eigen::Matrix3d M = estimate.parameter.matrix;
+  if (covariance.rows() == 5 || covariance.rows() == 6) {
+    // A pose, and with six log f: M ~ D [t]× R D, D = diag(1/f, 1/f, 1).
+    const bool with_focal_length = covariance.rows() == 6;
+    const double f = with_focal_length ? estimate.parameter.focal_length : 1;
+    const Eigen::Matrix3d D = Eigen::Vector3d(1 / f, 1 / f, 1).asDiagonal();
+    const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
+    const Eigen::Matrix<double, 9, 5> by_pose = estimate.parameter.pose.essentialMatrixJacobian();
+    M = D * estimate.parameter.pose.essentialMatrix() * D;
+    Eigen::MatrixXd J(9, covariance.rows());
+    for (int k = 0; k < 5; ++k) J.col(k) = entriesFrom(D * matrixFrom(Entries(by_pose.col(k))) * D);
+    if (with_focal_length) J.col(5) = entriesFrom(-(flat * M + M * flat));
     covariance = J * covariance * J.transpose();
   }
   if (covariance.rows() != 9) return {};
-  const Eigen::Matrix3d M = A * estimate.parameter.matrix * B;
+  M = A * M * B;
   const Entries unit = entriesFrom(M / M.norm());
   Eigen::Matrix<double, 9, 9> J;
   for (int k = 0; k < 9; ++k) J.col(k) = entriesFrom(A * matrixFrom(Entries(Entries::Unit(k))) * B) / M.norm();
@@ -129,7 +139,8 @@ struct TwoViewInput {
     second = coordinatesOf(options.second ? options.second : options.first, size, corner);
     const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
                                size.cwiseQuotient(second.focal)};
-    models = options.planes_only ? homographyModels(images, calibration) : twoViewModels(images, calibration);
+    const TwoViewModelOptions lattice{calibration, options.nodes, options.verticals};
+    models = options.planes_only ? homographyModels(images, lattice) : twoViewModels(images, lattice);
     if (one == nullptr) {
       status = Status::too_few, reason = "there is no finite match";
     } else if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !size.allFinite() || !(size.minCoeff() > 0)) {
@@ -164,7 +175,7 @@ struct TwoViewInput {
     result.matrix_covariance = covarianceInPixels(estimate, to_second, to_first);
     result.physical =
         physicalParameters(model.name(), estimate, agreeing, calibration, {first.focalLength(), second.focalLength()});
-    if (model.name() == "essential" && estimate.covariance.rows() == 5) {
+    if (estimate.covariance.rows() == 5) {
       result.relative_pose = Gaussian<Essentiald>{estimate.parameter.pose, estimate.covariance};
     }
   }

@@ -145,15 +145,21 @@ LIESTAT_FUSION_INLINE std::vector<PhysicalParameters> physicalParameters(
   const Eigen::Matrix3d& M = estimate.parameter.matrix;
   const Eigen::MatrixXd& covariance = estimate.covariance;
   detail::PhysicalList list;
-  if (model == "essential") {
-    if (covariance.rows() != 5) return {};
+  if (covariance.rows() == 5 || covariance.rows() == 6) {
+    // A pose, and with six log f.
+    const Eigen::Index focal = covariance.rows() - 5;
     const Essentiald& pose = estimate.parameter.pose;
     const Eigen::Matrix3d A = ManifoldTraits<S2d>::placement(pose.direction()).matrix();
+    Eigen::MatrixXd shown = Eigen::MatrixXd::Zero(focal + 6, covariance.rows());
+    if (focal == 1) {
+      const double f = unit.second * estimate.parameter.focal_length;
+      list.add("focal length", "px", f);
+      shown(0, 5) = f;
+    }
     list.add("rotation", "rad", pose.so3().log());
     list.add("direction", "", pose.direction().unit_vector());
-    Eigen::MatrixXd shown = Eigen::MatrixXd::Zero(6, 5);
-    shown.block<3, 3>(0, 2) = pose.so3().matrix().transpose() * A;
-    shown.block<3, 2>(3, 0) = A.leftCols<2>();
+    shown.block<3, 3>(focal, 2) = pose.so3().matrix().transpose() * A;
+    shown.block<3, 2>(focal + 3, 0) = A.leftCols<2>();
     return {list.with(shown * covariance * shown.transpose())};
   }
   if (covariance.rows() != 9) return {};
@@ -167,16 +173,52 @@ LIESTAT_FUSION_INLINE std::vector<PhysicalParameters> physicalParameters(
     J(0, entry(0, 0)) = 1;
     return {linear(J)};
   }
-  if (model == "retinal translation" || model == "retinal displacement") {
-    const Eigen::Index turns = model == "retinal displacement" ? 1 : 0;
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(turns + 2, 9);
-    if (turns == 1) {
-      list.add("turn", "rad", std::atan2(M(1, 0), M(0, 0)));
-      J(0, entry(0, 0)) = -M(1, 0), J(0, entry(1, 0)) = M(0, 0);
+  if (model == "affine") {
+    const char* const names[2][2] = {{"A11", "A12"}, {"A21", "A22"}};
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, 9);
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        list.add(names[i][j], "", M(i, j));
+        J(2 * i + j, entry(i, j)) = 1;
+      }
     }
     list.add("shift", "px", unit.second * M.col(2).head<2>());
-    for (int k = 0; k < 2; ++k) J(turns + k, entry(k, 2)) = unit.second;
+    for (int k = 0; k < 2; ++k) J(4 + k, entry(k, 2)) = unit.second;
     return {linear(J)};
+  }
+  const bool turns = model == "retinal displacement" || model == "similarity";
+  const bool zooms = model == "free zoom" || model == "similarity";
+  if (turns || zooms || model == "retinal translation") {
+    // The first column is s (cos, sin).
+    const Eigen::Index shift = (turns ? 1 : 0) + (zooms ? 1 : 0);
+    const double c = M(0, 0), s = M(1, 0), squared = c * c + s * s, zoom = std::sqrt(squared);
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(shift + 2, 9);
+    if (zooms) {
+      list.add("zoom", "", zoom);
+      J(0, entry(0, 0)) = c / zoom, J(0, entry(1, 0)) = s / zoom;
+    }
+    if (turns) {
+      list.add("turn", "rad", std::atan2(s, c));
+      J(shift - 1, entry(0, 0)) = -s / squared, J(shift - 1, entry(1, 0)) = c / squared;
+    }
+    list.add("shift", "px", unit.second * M.col(2).head<2>());
+    for (int k = 0; k < 2; ++k) J(shift + k, entry(k, 2)) = unit.second;
+    return {linear(J)};
+  }
+  if (model == "rotation and zoom") {
+    // H = diag(r, r, 1) R up to scale: the third row's length is that scale.
+    const double scale = M.row(2).norm(), r = std::sqrt(0.5 * M.topRows<2>().squaredNorm()) / scale;
+    const Eigen::Matrix3d Z = Eigen::Vector3d(r, r, 1).asDiagonal();
+    const Eigen::Matrix3d R = Z.inverse() * M / scale;
+    list.add("zoom", "", r);
+    list.add("rotation", "rad", SO3d::fitToSO3(R).log());
+    Eigen::MatrixXd J(9, 5);
+    const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
+    J.col(0) = detail::entriesFrom(scale * flat * R);
+    J.middleCols<3>(1) = scale * detail::byRotation(Z, R, Eigen::Matrix3d::Identity());
+    J.col(4) = detail::entriesFrom(Z * R);
+    const Eigen::MatrixXd all = detail::coordinateCovariance(J, covariance);
+    return {list.with(all.topLeftCorner<4, 4>())};
   }
   if (model == "rotation") {
     list.add("rotation", "rad", SO3d::fitToSO3(M).log());

@@ -39,8 +39,10 @@ struct TwoViewMotionOptions {
   /// Width and height of both images, px. By default those of the cameras, else the bounding box of the matches. The
   /// centre of an image of unknown camera is the middle of this.
   std::optional<Eigen::Vector2d> image_size = {};
-  bool planes_only = false;          ///< the models of homographies alone: planes of a scene, one by one
-  bool keep_contradictions = false;  ///< use matches that contradict each other, too (contradictions.hpp)
+  std::vector<TwoViewNode> nodes = {};             ///< models beyond the default ones
+  std::optional<TwoViewVerticals> verticals = {};  ///< in both cameras' frames; with them `upright` is a model
+  bool planes_only = false;                        ///< the models of homographies alone: planes of a scene, one by one
+  bool keep_contradictions = false;                ///< use matches that contradict each other, too (contradictions.hpp)
   HierarchyOptions search = {};
   StopRequest stop = {};  ///< true ends the search: the answer is what has been found so far
 };
@@ -82,7 +84,8 @@ struct TwoViewMotionResult {
   /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of both
   /// first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal lengths.
   std::vector<PhysicalParameters> physical;
-  /// Of `essential`: second_T_first up to scale, and its covariance in the tangent (direction, rotation).
+  /// Of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, and its covariance in
+  /// the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
 };
 

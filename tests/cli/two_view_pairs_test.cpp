@@ -60,6 +60,13 @@ TEST(Contradictions, ArePointsWithTwoPartners) {
   EXPECT_EQ(uncontradictedMatches(matches, noise), (std::vector<std::size_t>{2, 3, 6, 7, 8}));
   EXPECT_EQ(uncontradictedMatches(matches, noise, 0.5), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
   EXPECT_TRUE(contradictedMatches({}, noise).empty());
+  // Right matches that stand close, a pixel apart in an image that is twice as large, and with noise of a pixel.
+  CounterRng rng(5);
+  std::vector<Eigen::Vector4d> dense;
+  for (int i = 0; i < 20; ++i) {
+    for (int j = 0; j < 20; ++j) dense.push_back(Eigen::Vector4d(i, j, 2 * i, 2 * j) + rng.normalVector<4>());
+  }
+  EXPECT_GE(uncontradictedMatches(dense, {1, 1}).size(), dense.size() - 4);
 }
 
 TEST(Contradictions, AreThoseOfAllPairsInAnyOrder) {
@@ -72,9 +79,9 @@ TEST(Contradictions, AreThoseOfAllPairsInAnyOrder) {
   std::vector<bool> expected(matches.size(), false);
   for (std::size_t i = 0; i < matches.size(); ++i) {
     for (std::size_t j = 0; j < matches.size(); ++j) {
-      const bool first = (matches[i] - matches[j]).head<2>().norm() <= 1;
-      const bool second = (matches[i] - matches[j]).tail<2>().norm() <= 1;
-      if (first != second) expected[i] = true;
+      const double first = (matches[i] - matches[j]).head<2>().norm(),
+                   second = (matches[i] - matches[j]).tail<2>().norm();
+      if ((first <= 1 && second > 4) || (second <= 1 && first > 4)) expected[i] = true;
     }
   }
   EXPECT_GT(std::count(expected.begin(), expected.end(), true), 50);
