@@ -243,6 +243,7 @@ PlaneRun runPlane(const Normalised& pair, std::uint64_t seed) {
 template <class Run>
 double medianOf(const std::vector<Run>& runs, double Run::*number) {
   std::vector<double> values;
+  values.reserve(runs.size());
   for (const Run& run : runs) values.push_back(run.*number);
   return median(values);
 }

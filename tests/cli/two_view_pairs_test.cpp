@@ -215,10 +215,11 @@ TEST(RealPairs, PlanesAndDepthAreToldApart) {
     beyond[k] += !(row.validation_error <= (k == 0 ? 2.0 : 1.3));
     EXPECT_LE(row.kept, row.tentative);
   }
+  // The promises over ten seeds; of the errors on homogr, where two of ten runs of a pair may be off, one pair more.
   EXPECT_GE(right[0], 7);
-  EXPECT_GE(right[1], 8 - 0.5) << "one run of valbonne or castle is the noise of two seeds";
+  EXPECT_GE(right[1], 8);
   EXPECT_GE(right[0] + right[1], 16);
-  EXPECT_LE(beyond[0], 2) << "all but one over ten seeds; two runs make a median of two";
+  EXPECT_LE(beyond[0], 2);
   EXPECT_LE(beyond[1], 2);
   const std::string text = formatTwoViewPairs(result);
   std::istringstream lines(text);
