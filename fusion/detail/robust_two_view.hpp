@@ -4,6 +4,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/detail/match_columns.hpp>
 #include <fusion/detail/match_sums.hpp>
+#include <fusion/detail/seven_points.hpp>
 #include <fusion/two_view/epipolar_solvers.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/five_point.hpp>
@@ -25,6 +26,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -91,9 +93,9 @@ struct FundamentalKind {
   static constexpr int equations = 1, coordinates = 8;
 
   static void solve(std::span<const Eigen::Vector4d> sample, std::vector<Eigen::Matrix3d>& solutions) {
-    for (const Eigen::Matrix3d& F : solveFundamental(sample)) {
+    solveSevenPoints(sample, [&](const Eigen::Matrix3d& F) {
       if (isOriented(F, sample)) solutions.push_back(F);
-    }
+    });
   }
   static EntryTangent<8> tangent(const Eigen::Matrix3d& F) {
     EntryTangent<8> t;
@@ -420,13 +422,27 @@ std::optional<RobustMatrix> robustMatrix(std::span<const Eigen::Vector4d> matche
   // A wrong hypothesis fits its own sample, and others by chance.
   search_options.least_score = static_cast<double>(Kind::sample_size) + by_chance + 3 * std::sqrt(by_chance);
   RobustSearch search(model, TruncatedCost{threshold}, search_options);
-  while (search.draws() < options.max_draws && !search.confidenceReached(options.confidence)) search.iterate();
+  // Right matches are those within χ²_{0.999}, less those that are by chance.
+  std::vector<double> errors(n);
+  const double wide = Kind::equations == 2 ? 13.8155 : 10.8276;
+  const double wide_band = backgroundOf<Kind>(matches, noise, wide).band;
+  double right_matches = 0;
+  std::size_t needed = std::numeric_limits<std::size_t>::max();
+  while (search.draws() < std::min(options.max_draws, needed)) {
+    if (!search.iterate()) continue;
+    model.errors(*search.best().parameter, errors);
+    const auto fitting =
+        static_cast<double>(std::count_if(errors.begin(), errors.end(), [&](double e) { return e < wide; }));
+    right_matches = std::round(fitting - (static_cast<double>(n) - fitting) * wide_band / (1 - wide_band));
+    right_matches = std::max(right_matches, static_cast<double>(search.best().inliers.size()));
+    needed = sampleCount(static_cast<std::size_t>(right_matches), n, Kind::sample_size, options.confidence);
+  }
   result.draws = search.draws();
   if (!search.best().parameter) return std::nullopt;
 
   RobustMatrix found{*search.best().parameter, {}};
   result.status = Status::not_converged;
-  std::vector<double> errors(n), weights(n, 0.0);
+  std::vector<double> weights(n, 0.0);
   for (const std::size_t i : search.best().inliers) weights[i] = 1;
   RightMatches<Kind> right(model, background, threshold);
   // Shares and leverages settle first, then the estimate: to a hundredth of its standard deviation.
@@ -455,9 +471,8 @@ std::optional<RobustMatrix> robustMatrix(std::span<const Eigen::Vector4d> matche
     result.status = Status::ill_defined;
   }
   double p = 1;
-  const std::size_t of_best = search.best().inliers.size();
   for (std::size_t k = 0; k < Kind::sample_size; ++k) {
-    p *= of_best > k ? static_cast<double>(of_best - k) / static_cast<double>(n - k) : 0;
+    p *= std::max(right_matches - static_cast<double>(k), 0.) / static_cast<double>(n - k);
   }
   result.confidence = p < 1 ? -std::expm1(static_cast<double>(result.draws) * std::log1p(-p)) : 1;
   return found;

@@ -29,7 +29,8 @@
 namespace liestat {
 
 struct TwoViewRobustOptions {
-  /// The search ends when with this probability a sample of inliers alone was drawn, for as many inliers as the best has.
+  /// The search ends when with this probability a sample of right matches alone was drawn. Right matches of the best are
+  /// as many as have errors below χ²_{0.999}, less those that do by chance.
   double confidence = 0.9999;
   /// A match is an inlier if its squared error is below this, in units of the noise. 0: χ²_{0.99} of its equations, 9.21
   /// for a homography, 6.63 for an epipolar geometry.
@@ -50,7 +51,7 @@ struct TwoViewRobustResult {
   std::vector<std::size_t> inliers;  ///< ascending
   double score = 0;                  ///< Σ max(0, 1 - e/threshold) over all matches, e their squared errors
   double chi2 = std::numeric_limits<double>::quiet_NaN();  ///< sum of the squared errors of the inliers
-  double confidence = 0;  ///< that a sample of inliers alone was drawn; below the option's if the draws ran out
+  double confidence = 0;  ///< that a sample of right matches alone was drawn; below the option's if the draws ran out
   std::size_t draws = 0;
 
   bool ok() const { return status == Status::ok; }

@@ -2,6 +2,7 @@
 // benchmarks/fusion/two_view_robust.cpp has more matches.
 
 #include <experiments/two_view_scene.hpp>
+#include <fusion/detail/seven_points.hpp>
 #include <fusion/two_view/robust.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -12,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace {
@@ -126,6 +128,31 @@ TEST(TwoViewRobust, PosesAreWithinTheirCovariance) {
     EXPECT_LE(counts.missed, 0.03 * static_cast<double>(counts.right)) << outliers;
     EXPECT_LE(counts.wrong, 0.015 * outliers * 300 * trials) << outliers;
   }
+}
+
+TEST(TwoViewRobust, SevenPointsAreSolvedAsByTheSolver) {
+  const TwoViewScene scene = sceneOf(TwoViewMotion::fundamental, 0.3, 9);
+  std::size_t solutions = 0, missed = 0, more = 0;
+  for (std::size_t i = 0; i + 7 <= scene.matches.size(); i += 7) {
+    const auto sample = std::span(scene.matches).subspan(i, 7);
+    std::vector<Eigen::Matrix3d> found;
+    detail::solveSevenPoints(sample,
+                             [&](const Eigen::Matrix3d& F) { found.push_back(F * (std::sqrt(2.) / F.norm())); });
+    const auto expected = solveFundamental(sample);
+    for (const Eigen::Matrix3d& F : expected) {
+      ++solutions;
+      const auto same = [&](const Eigen::Matrix3d& G) {
+        return std::abs(std::abs((F.array() * G.array()).sum()) - 2) < 1e-9;
+      };
+      missed += std::none_of(found.begin(), found.end(), same) ? 1U : 0U;
+    }
+    more += found.size() > expected.size() ? 1U : 0U;
+  }
+  EXPECT_GE(solutions, 60U);
+  EXPECT_EQ(missed, 0U);
+  EXPECT_EQ(more, 0U);
+  // Equal matches determine nothing.
+  detail::solveSevenPoints(std::vector<Eigen::Vector4d>(7, scene.matches[0]), [](const Eigen::Matrix3d&) { FAIL(); });
 }
 
 TEST(TwoViewRobust, TheSeedIsTheResult) {
