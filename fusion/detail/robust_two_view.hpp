@@ -307,7 +307,7 @@ Background backgroundOf(std::span<const Eigen::Vector4d> matches, const MatchNoi
 ///
 /// Wrong matches that lie on their epipolar line by chance have often a parallax, and so a leverage, that few right ones
 /// have, and would move the estimate by many of its standard deviations. So the share is that among matches of about the
-/// same leverage: how many of them fit, less those that would by chance and one standard deviation of these.
+/// same leverage: how many of them fit, less those that would by chance and three standard deviations of these.
 template <class Kind>
 class RightMatches {
  public:
@@ -334,7 +334,7 @@ class RightMatches {
     }
     std::array<double, classes> all{}, fitting{};
     std::size_t highest = classes;
-    double lone = 0;
+    double lone = 0;  // how many are taken from each class
     if constexpr (Kind::equations == 1) {
       const auto right = std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0.5; });
       const double most = std::clamp(3. * free_parameters / static_cast<double>(right), 0.5, 0.9);
@@ -344,6 +344,10 @@ class RightMatches {
       all[bins_[i]] += 1;
       if (errors[i] < threshold_ && behind_[i] == 0) fitting[bins_[i]] += 1;
     }
+    // One that is alone in its class may be there by chance, unless few are at all.
+    double by_chance = 0;
+    for (std::size_t b = 0; b < classes; ++b) by_chance += (all[b] - fitting[b]) * background_.band;
+    lone *= std::min(1., 5 * by_chance);
     for (std::size_t b = 0; b < classes; ++b) {
       const double chance = (all[b] - fitting[b]) * background_.band;
       const double share =

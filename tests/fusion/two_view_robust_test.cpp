@@ -276,6 +276,33 @@ TEST(TwoViewRobust, BadInputIsSaid) {
   expectStatus(line, Status::ill_defined, "collinear");
 }
 
+TEST(TwoViewRobust, FewMatchesAreSaidOrEstimated) {
+  std::size_t estimated = 0;
+  for (std::size_t n = 0; n <= 20; ++n) {
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      std::vector<Eigen::Vector4d> matches = sceneOf(TwoViewMotion::essential, 0.2, seed, n).matches;
+      // Some of them twice.
+      if (seed == 4) std::copy_n(matches.begin(), n / 2, matches.begin() + static_cast<std::ptrdiff_t>(n - n / 2));
+      const TwoViewRobustOptions options{.max_draws = 200};
+      const RobustHomography h = robustHomography(matches, normalised, options);
+      const RobustFundamental f = robustFundamental(matches, normalised, options);
+      const RobustEssential e = robustEssential(matches, normalised, options);
+      EXPECT_EQ(h.ok(), h.covariance.allFinite()) << n << " " << seed;
+      EXPECT_EQ(f.ok(), f.covariance.allFinite()) << n << " " << seed;
+      EXPECT_EQ(e.ok(), e.pose.covariance.allFinite()) << n << " " << seed;
+      EXPECT_EQ(h.status == Status::too_few, n <= 4);
+      EXPECT_EQ(f.status == Status::too_few, n <= 7);
+      EXPECT_EQ(e.status == Status::too_few, n <= 5);
+      for (const TwoViewRobustResult* found :
+           {static_cast<const TwoViewRobustResult*>(&f), static_cast<const TwoViewRobustResult*>(&e)}) {
+        EXPECT_LE(found->inliers.size(), n);
+        estimated += found->ok() ? 1U : 0U;
+      }
+    }
+  }
+  EXPECT_GE(estimated, 40U);
+}
+
 TEST(TwoViewRobust, RandomMatchesAreNoModel) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     expectStatus(sceneOf(TwoViewMotion::essential, 1, seed, 200).matches, Status::ill_defined, "all wrong", normalised);
