@@ -29,7 +29,9 @@ int main() {
     Eigen::Vector4d& match = pixels.emplace_back();
     match << *first, *second;
     match += sigma * random.normalVector<4>();
-    if (pixels.size() % 3 == 0) match[2] = random.uniform(0, 1280);  // a wrong match
+    if (pixels.size() % 3 != 0) continue;
+    match[2] = random.uniform(0, 1280);  // a wrong match
+    match[3] = random.uniform(0, 960);
   }
 
   // One model: a search and an estimate in less than a millisecond. Coordinates are normalised, u = (p - c)/f.

@@ -49,8 +49,8 @@ concept ModelOfSome = RobustModel<T> && requires(const T& model, const typename 
   model.errors(parameter, measurements, errors);
 };
 
-/// A model with a cheap estimate from several measurements, a linear one or a few Gauss–Newton steps: each new best is
-/// then improved by it (O. Chum, J. Matas and J. Kittler, Locally optimized RANSAC, 2003).
+/// A model with a cheap estimate from several measurements, a linear one or a few Gauss–Newton steps: each hypothesis that
+/// is better than those before it is then improved by it (O. Chum, J. Matas and J. Kittler, Locally optimized RANSAC, 2003).
 template <class T>
 concept PolishedModel = RobustModel<T> &&
     requires(const T& model, const typename T::Parameter& parameter, std::span<const std::size_t> measurements) {
@@ -71,7 +71,7 @@ struct RobustSearchOptions {
   /// Hypotheses that score no more than this are nothing: they never become the best, and are given up early before
   /// there is any.
   double least_score = -std::numeric_limits<double>::infinity();
-  /// Improve each new best by the model's polish(), where it has one.
+  /// Improve each hypothesis that is better than those before it by the model's polish(), where it has one.
   bool local_optimisation = true;
   int polish_rounds = 4;  ///< at most; fewer where the score does not rise
 };
@@ -98,6 +98,7 @@ class RobustSearch {
       : model_(&model), rule_(rule), options_(options), errors_(model.size()) {
     best_.inliers.reserve(model.size());
     candidate_.inliers.reserve(model.size());
+    polished_.inliers.reserve(model.size());
     scratch_.reserve(model.size());
     solutions_.reserve(16);
     history_.reserve(64);
@@ -116,15 +117,16 @@ class RobustSearch {
     model_->solve(std::span<const std::size_t>(sample_), solutions_);
     bool improved = false;
     for (const Parameter& solution : solutions_) {
-      if (isHopeless(solution, rng) || !evaluate(solution)) continue;
+      if (isHopeless(solution, rng) || !evaluate(solution, unpolished_, candidate_)) continue;
+      unpolished_ = candidate_.score;
+      if constexpr (PolishedModel<Model>) polish();
+      if (!(candidate_.score > best_.score)) continue;
       std::swap(best_, candidate_);
       best_.draw = draws_;
       improved = true;
     }
-    if (!improved) return false;
-    if constexpr (PolishedModel<Model>) polishBest();
-    history_.add(draws_, best_.score);
-    return true;
+    if (improved) history_.add(draws_, best_.score);
+    return improved;
   }
 
   std::size_t draws() const { return draws_; }
@@ -197,7 +199,7 @@ class RobustSearch {
   /// The j-th look takes 6/(πj)² of the risk, which adds up to all of it.
   bool isHopeless([[maybe_unused]] const Parameter& parameter, [[maybe_unused]] CounterRng& rng) {
     if constexpr (rejects) {
-      const double to_beat = std::max(best_.score, options_.least_score);
+      const double to_beat = std::max(unpolished_, options_.least_score);
       if (!options_.early_rejection || !(to_beat > -std::numeric_limits<double>::infinity())) return false;
       const std::size_t n = model_->size();
       const double all = static_cast<double>(n), range = 1 - Rule::lowest;
@@ -226,31 +228,42 @@ class RobustSearch {
     return false;
   }
 
-  /// Makes the parameter the candidate; true if it scores higher than the best and has inliers.
-  bool evaluate(const Parameter& parameter) {
+  /// Makes an estimate of the parameter; true if it scores higher than that and has inliers.
+  bool evaluate(const Parameter& parameter, double to_beat, RobustEstimate<Parameter>& estimate) {
     model_->errors(parameter, errors_);
     evaluated_ += errors_.size();
     if constexpr (requires { rule_(errors_, scratch_); }) {
-      candidate_.score = rule_(errors_, scratch_);
+      estimate.score = rule_(errors_, scratch_);
     } else {
-      candidate_.score = rule_(errors_);
+      estimate.score = rule_(errors_);
     }
-    if (!(candidate_.score > std::max(best_.score, options_.least_score))) return false;
-    listInliers(errors_, candidate_.inliers);
-    candidate_.parameter = parameter;
-    candidate_.refined = false;
-    return !candidate_.inliers.empty();
+    if (!(estimate.score > std::max(to_beat, options_.least_score))) return false;
+    listInliers(errors_, estimate.inliers);
+    estimate.parameter = parameter;
+    estimate.refined = false;
+    return !estimate.inliers.empty();
   }
 
-  void polishBest() {
+  /// The candidate; where it has hardly an inlier that the best has not, that would lead to the best again.
+  void polish() {
     if (!options_.local_optimisation) return;
-    for (int round = 0; round < options_.polish_rounds && best_.inliers.size() > sample_size; ++round) {
-      const std::optional<Parameter> better = model_->polish(*best_.parameter, best_.inliers);
-      if (!better || !evaluate(*better)) return;
-      std::swap(best_, candidate_);
-      best_.draw = draws_;
-      best_.refined = true;
+    if (candidate_.score <= best_.score && 10 * inliersOfCandidateAlone() <= candidate_.inliers.size()) return;
+    for (int round = 0; round < options_.polish_rounds && candidate_.inliers.size() > sample_size; ++round) {
+      const std::optional<Parameter> better = model_->polish(*candidate_.parameter, candidate_.inliers);
+      if (!better || !evaluate(*better, candidate_.score, polished_)) return;
+      std::swap(candidate_, polished_);
+      candidate_.refined = true;
     }
+  }
+
+  std::size_t inliersOfCandidateAlone() const {
+    std::size_t alone = 0;
+    auto other = best_.inliers.begin();
+    for (const std::size_t i : candidate_.inliers) {
+      while (other != best_.inliers.end() && *other < i) ++other;
+      alone += other == best_.inliers.end() || *other != i;
+    }
+    return alone;
   }
 
   void listInliers(std::span<const double> errors, std::vector<std::size_t>& list) const {
@@ -263,7 +276,10 @@ class RobustSearch {
   const Model* model_;
   Rule rule_;
   RobustSearchOptions options_;
-  RobustEstimate<Parameter> best_, candidate_;
+  RobustEstimate<Parameter> best_, candidate_, polished_;
+  /// The best score of a hypothesis before it was polished. Hypotheses compete with each other: against a wrong one that
+  /// was polished a right one of a noisy sample would have no chance.
+  double unpolished_ = -std::numeric_limits<double>::infinity();
   BestHistory history_;
   std::array<std::size_t, sample_size> sample_{};
   std::vector<Parameter> solutions_;
