@@ -340,7 +340,10 @@ class ConstrainedEstimator {
       const Step gradient = detail::product(A_, delta) - b_;
       penalty_ = std::max(penalty_, 2 * largest);
       if (basis_.rank() > 0) {
-        constraint_penalty_ = std::max(constraint_penalty_, 2 * basis_.fixedLength(gradient));
+        // At least a millionth of what an error of one standard deviation would ask for: where the measurements are met as
+        // they stand, constraints that are not must have a price, or any step is as good as another.
+        const double least = 1e-6 * std::sqrt(A_.trace() / N);
+        constraint_penalty_ = std::max({constraint_penalty_, 2 * basis_.fixedLength(gradient), least});
         constraint_multipliers_ = basis_.multipliers(-gradient);
       }
       here = meritOf(sum, prior_cost_, constraint_values_);

@@ -17,7 +17,7 @@
 namespace liestat {
 
 /// Whether each match is contradicted by another: they have one point in common, and not the other. Points within `reach`
-/// standard deviations of a coordinate are one point, those beyond four times that are two; between them lie neighbours,
+/// standard deviations of a coordinate are one point, those beyond ten times that are two; between them lie neighbours,
 /// which right matches that stand close have in both images. Matches that are not numbers contradict none. Nothing depends
 /// on the order. O(n log n) where few points have the same abscissa.
 inline std::vector<bool> contradictedMatches(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
@@ -29,7 +29,7 @@ inline std::vector<bool> contradictedMatches(std::span<const Eigen::Vector4d> ma
   }
   for (const Eigen::Index image : {0, 2}) {
     const double here = reach * (image == 0 ? noise.first : noise.second);
-    const double apart = 4 * reach * (image == 0 ? noise.second : noise.first);
+    const double apart = 10 * reach * (image == 0 ? noise.second : noise.first);
     std::sort(order.begin(), order.end(),
               [&](std::size_t i, std::size_t j) { return matches[i][image] < matches[j][image]; });
     for (std::size_t a = 0; a < order.size(); ++a) {
