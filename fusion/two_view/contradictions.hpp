@@ -17,9 +17,9 @@
 namespace liestat {
 
 /// Whether each match is contradicted by another: they have one point in common, and not the other. Points within `reach`
-/// standard deviations of a coordinate are one point, those beyond ten times that are two; between them lie neighbours,
-/// which right matches that stand close have in both images. Matches that are not numbers contradict none. Nothing depends
-/// on the order. O(n log n) where few points have the same abscissa.
+/// standard deviations of a coordinate are one point; those beyond twice that are two, for noise takes one point that was
+/// found twice so far apart in two of a hundred cases (exp(-reach²)). Matches that are not numbers contradict none. Nothing
+/// depends on the order. O(n log n) where few points have the same abscissa.
 inline std::vector<bool> contradictedMatches(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
                                              double reach = 2) {
   std::vector<bool> contradicted(matches.size(), false);
@@ -29,7 +29,7 @@ inline std::vector<bool> contradictedMatches(std::span<const Eigen::Vector4d> ma
   }
   for (const Eigen::Index image : {0, 2}) {
     const double here = reach * (image == 0 ? noise.first : noise.second);
-    const double apart = 10 * reach * (image == 0 ? noise.second : noise.first);
+    const double apart = 2 * reach * (image == 0 ? noise.second : noise.first);
     std::sort(order.begin(), order.end(),
               [&](std::size_t i, std::size_t j) { return matches[i][image] < matches[j][image]; });
     for (std::size_t a = 0; a < order.size(); ++a) {
