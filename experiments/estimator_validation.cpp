@@ -48,7 +48,7 @@ struct RowPlan {
   std::optional<ValidationTolerance> promise;
   double note_index = nothing, note_coverage = nothing;
 };
-/// What is drawn for several rows at once.
+/// The trials of one scene, which several rows share.
 struct Plan {
   Experiment experiment;
   double sigma;
@@ -62,7 +62,7 @@ constexpr double prior_information = 1e4;
 std::vector<Plan> plansOf(Experiment experiment) {
   // First order: twice the departures that 40000 trials showed, 0.5 % of the index at most (docs/validation.md).
   const ValidationTolerance criterion{.index = 0.005, .ks = 0.005}, first_order{.index = 0.01, .ks = 0.01};
-  // Of a fundamental matrix now and then two cameras nearly leave a direction open: a tail, and 2 % of the index.
+  // Now and then the matches of a fundamental matrix nearly leave a direction open: a tail, and 2 % of the index.
   const ValidationTolerance open_direction{.index = 0.04, .ks = 0.02, .failure_fraction = 0.001, .tail = 0.003};
   const int pairs = static_cast<int>(few_pairs), more_pairs = static_cast<int>(many_pairs);
   const int matches = static_cast<int>(match_count);

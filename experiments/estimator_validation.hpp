@@ -14,7 +14,7 @@
 
 namespace liestat::experiments {
 
-/// What the constrained estimator (stats/constrained.hpp) estimates in `liestat validate estimator`.
+/// The problems that `liestat validate estimator` gives the constrained estimator (stats/constrained.hpp).
 enum class EstimatorExperiment {
   conic,             ///< six coefficients with ‖q‖ = 1 from 30 points on an ellipse
   corrected_points,  ///< the same from 12 points, which are what is looked at
@@ -32,7 +32,7 @@ inline constexpr std::array all_estimator_experiments = {
 /// The name in options, tables and JSON fields.
 std::string name(EstimatorExperiment experiment);
 
-/// What is compared with a law.
+/// The quantities that are compared with a law.
 enum class EstimatorQuantity {
   criterion,        ///< 2L²: χ² with r degrees of freedom
   parameter,        ///< squared distance of the true parameter under the estimate's covariance
@@ -55,10 +55,10 @@ struct EstimatorRow : JudgedReport {
   EstimatorQuantity quantity = EstimatorQuantity::criterion;
   double sigma = 0;  ///< that the estimator is told, in the unit of the scene; of matches px
   bool has_iterations = true;
-  /// What the design note gives for mean and 95 % coverage; NaN where it gives nothing.
+  /// The design note's figures for mean and 95 % coverage; NaN where it gives none.
   double note_index = std::numeric_limits<double>::quiet_NaN();
   double note_coverage = std::numeric_limits<double>::quiet_NaN();
-  /// Of corrected points: ‖mean of e eᵀ - mean of the covariances‖ over the norm of the latter; else NaN.
+  /// ‖mean of e eᵀ - mean of the covariances‖ over the norm of the latter, of corrected points; else NaN.
   double covariance_deviation = std::numeric_limits<double>::quiet_NaN();
 };
 

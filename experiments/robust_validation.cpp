@@ -143,7 +143,7 @@ double cutFactor(int equations) {
   return inlier_share / chiSquaredCdf(chiSquaredQuantile(inlier_share, equations), equations + 2);
 }
 
-/// What one search says.
+/// The outcome of one search.
 struct Search {
   bool found = false;
   double distance = nothing, right = 0, wrong = nothing;
@@ -271,7 +271,7 @@ ThresholdRow thresholdRow(const Case& one, const std::vector<Trial>& trials) {
   return row;
 }
 
-/// What docs/robust.md promises of the refined estimate's covariance.
+/// The promise of docs/robust.md about the refined estimate's covariance.
 std::optional<ValidationTolerance> promiseOf(const Case& one) {
   if (one.outliers > robust_promise) return {};
   // Outliers that fit by chance: 2 % of those of a conic, hardly one of a homography. Whether the structure was found is

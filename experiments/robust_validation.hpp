@@ -14,7 +14,7 @@
 
 namespace liestat::experiments {
 
-/// What is sought among outliers in `liestat validate robust`.
+/// The structures that `liestat validate robust` hides among outliers.
 enum class RobustStructure {
   conic,      ///< an ellipse, samples of five points, one equation each; 100 points with σ = 0.005
   homography  ///< a plane in two images, samples of four matches, two equations each; 100 matches with σ = 0.5 px

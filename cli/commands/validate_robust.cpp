@@ -27,7 +27,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
   const RobustValidationResult result =
       withProgressBar("validate robust", [&](const auto& progress) { return validateRobust(validation, progress); });
-  // Whether the structure was found is judged beside the distances.
+  // The share of structures that were found is judged beside the distances.
   FurtherRows thresholds{"thresholds", {}, result.tally()};
   for (const ThresholdRow& row : result.thresholds) thresholds.rows.push_back(toJson(row));
   return publish(

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// Whether the row's model was looked at and found anything.
+/// True if the row's model has an estimate.
 bool hasEstimate(const TwoViewModelRow& row) { return row.status != Status::too_few; }
 
 std::string verdictOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
@@ -110,7 +110,7 @@ std::string answer(const TwoViewMotionOutput& output) {
   if (!e.ok()) text += fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(e.status), e.reason);
   return text;
 }
-/// What a table of physical parameters is headed by where there are two.
+/// The line above a table of physical parameters where there are two tables.
 std::string headingOf(const TwoViewMotionResult& e, std::size_t i) {
   if (e.physical.size() < 2) return "";
   return i == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
