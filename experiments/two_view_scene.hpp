@@ -15,8 +15,9 @@
 // views turns by 8 to 20 degrees and translations of 1 to 2 m. Points are uniform in the first image, and seen in both; outliers are uniform
 // in both.
 //
-// Each scene is a function of its options and its seed alone: motion and points are drawn from stream 0, noise from
-// stream 1, outliers and the order of the matches from stream 2.
+// Each scene is a function of its options and its seed alone, with any compiler (no two draws stand in one expression,
+// whose order of evaluation is free): motion and points are drawn from stream 0, noise from stream 1, outliers and the
+// order of the matches from stream 2.
 #pragma once
 
 #include <lie/detail/trig.hpp>
@@ -181,8 +182,16 @@ class TwoViewScene {
     const Eigen::Vector3d axis = random.unitVector<3>();
     return SO3d::exp(Eigen::Vector3d(random.uniform(low, high) * degree * axis)).matrix();
   }
-  Eigen::Vector2d shift(CounterRng& random) const {
-    return random.uniform(8, 40) / options.focal_length * random.unitVector<2>();
+  /// A length between two numbers, in a uniform direction.
+  template <int N>
+  static Eigen::Vector<double, N> displacement(CounterRng& random, double low, double high) {
+    const Eigen::Vector<double, N> direction = random.unitVector<N>();
+    return random.uniform(low, high) * direction;
+  }
+  Eigen::Vector2d shift(CounterRng& random) const { return displacement<2>(random, 8, 40) / options.focal_length; }
+  static Eigen::Matrix2d zoomedTurn(CounterRng& random) {
+    const double angle = either(random, 3, 15) * degree;
+    return ratio(random, 1.08, 1.3) * turn(angle);
   }
   Eigen::Vector2d uniformInImage(CounterRng& random) const {
     const double x = random.uniform(-0.5, 0.5), y = random.uniform(-0.5, 0.5);
@@ -201,7 +210,7 @@ class TwoViewScene {
     F.setZero();
     const auto move = [&] {
       R = turnInSpace(random, 3, 12);
-      t = random.uniform(0.3, 0.7) * random.unitVector<3>();
+      t = displacement<3>(random, 0.3, 0.7);
     };
     switch (options.motion) {
       case TwoViewMotion::none:
@@ -222,14 +231,15 @@ class TwoViewScene {
         break;
       case TwoViewMotion::homography: {
         move();
-        plane_normal = Eigen::Vector3d(random.uniform(-0.6, 0.6), random.uniform(-0.6, 0.6), 1).normalized();
+        const double b = random.uniform(-0.6, 0.6), a = random.uniform(-0.6, 0.6);
+        plane_normal = Eigen::Vector3d(a, b, 1).normalized();
         plane_distance = random.uniform(options.min_depth, options.max_depth) * plane_normal.z();
         H = R + t * plane_normal.transpose() / plane_distance;
         H *= std::sqrt(3.) / H.norm();
         break;
       }
       case TwoViewMotion::translation:
-        t = random.uniform(0.3, 0.7) * random.unitVector<3>();
+        t = displacement<3>(random, 0.3, 0.7);
         break;
       case TwoViewMotion::essential:
         move();
@@ -245,14 +255,13 @@ class TwoViewScene {
         break;
       }
       case TwoViewMotion::similarity:
-        H.topLeftCorner<2, 2>() = ratio(random, 1.08, 1.3) * turn(either(random, 3, 15) * degree);
+        H.topLeftCorner<2, 2>() = zoomedTurn(random);
         H.topRightCorner<2, 1>() = shift(random);
         break;
       case TwoViewMotion::affine: {
         const Eigen::Matrix2d axes = turn(random.uniform(0, 180) * degree);
         const Eigen::Vector2d stretch(ratio(random, 1.1, 1.3), 1);
-        H.topLeftCorner<2, 2>() = ratio(random, 1.08, 1.3) * turn(either(random, 3, 15) * degree) * axes *
-                                  stretch.asDiagonal() * axes.transpose();
+        H.topLeftCorner<2, 2>() = zoomedTurn(random) * axes * stretch.asDiagonal() * axes.transpose();
         H.topRightCorner<2, 1>() = shift(random);
         break;
       }
