@@ -27,6 +27,7 @@
 // DAGM 2007 (iteration). docs/implicit_ekf.md has the mathematics.
 #pragma once
 
+#include <lie/rn.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/small_reduced.hpp>
