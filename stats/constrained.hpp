@@ -382,7 +382,10 @@ class ConstrainedEstimator {
   }
 
   bool search(const Step& delta, const Merit& here, double slope, double length, double parameter_step, bool met) {
-    const double value = phi(here), rounding = 1e-13 * (1 + std::abs(value));
+    // Rounding of the sum, and of equations that are met as well as rounding lets them be.
+    const double value = phi(here);
+    const double slack = 1e-13 * (1 + std::abs(value)) +
+                         4 * penalty_ * std::sqrt(static_cast<double>(result_.measurements)) * rounding();
     double alpha = 1;
     for (int halving = 0; halving < 30; ++halving, alpha *= 0.5) {
       const Q q = moved(result_.parameter, alpha * delta);
@@ -390,7 +393,7 @@ class ConstrainedEstimator {
       forAll([&](auto& state) { join(sum, state.tryStep(q, alpha)); });
       const double there = phi(meritOf(sum, priorCost(q), constraintValues(q)));
       cut_ = halving > 0;
-      if (there <= value + 1e-4 * alpha * slope + rounding) return accept(q);
+      if (there <= value + 1e-4 * alpha * slope + slack) return accept(q);
       if (halving > 6) continue;
       // Second-order correction: the equations at the trial point, linearised as here. Repeated, because one leaves what
       // is of third order, and that is much of a long step.
@@ -404,7 +407,7 @@ class ConstrainedEstimator {
         detail::ChannelMerit after;
         forAll([&](auto& state) { join(after, state.tryCorrected(corrected, further)); });
         const Merit merit = meritOf(after, priorCost(corrected), constraintValues(corrected));
-        if (phi(merit) <= value + 1e-4 * alpha * slope + rounding) return accept(corrected);
+        if (phi(merit) <= value + 1e-4 * alpha * slope + slack) return accept(corrected);
         const double left = phi(merit) - 0.5 * merit.cost;
         if (!(left < 0.5 * violation)) break;
         violation = left;
