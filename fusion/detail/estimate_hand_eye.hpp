@@ -288,15 +288,8 @@ class HandEyeRun {
       r.p = chiSquaredTail(strict.chi2, static_cast<std::size_t>(std::max(0, r.degrees_of_freedom)));
     r.excitations = excitation.values;
     const GripperMotion motion(pairs_, inliers_, world);
-    int void_directions = 0;
-    while (void_directions < open && excitation.values[void_directions] < options_.least_excitation) ++void_directions;
-    appendOpenDirections(r.directions, excitation, 0, void_directions, value, motion, world);
-    for (std::size_t k = r.directions.size(); k < static_cast<std::size_t>(open); ++k) {
-      if (k == static_cast<std::size_t>(void_directions)) {
-        appendOpenDirections(r.directions, excitation, void_directions, open, value, motion, world);
-      }
-      r.directions[k].weak = true;
-    }
+    appendOpenDirections(r.directions, excitation, open, value, motion, world);
+    for (OpenDirection& d : r.directions) d.weak = d.excitation >= options_.least_excitation;
 
     r.pairs.resize(pairs_.size());
     errors_ = errorsAt(value);

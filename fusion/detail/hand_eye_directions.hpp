@@ -50,18 +50,17 @@ struct GripperMotion {
   }
 };
 
-/// The directions k with begin <= k < end of an excitation as twists of the gripper, those that turn X first and apart
-/// from those that only move it: any basis of an open space is as good as another, but people think in these.
-inline void appendOpenDirections(std::vector<OpenDirection>& list, const HandEyeExcitation& excitation, int begin,
-                                 int end, const HandEyeValue& at, const GripperMotion& motion, bool world) {
-  const int n = end - begin;
+/// The first n directions of an excitation as twists of the gripper, those that turn X first and apart from those that
+/// only move it: any basis of an open space is as good as another, but people think in these.
+inline void appendOpenDirections(std::vector<OpenDirection>& list, const HandEyeExcitation& excitation, int n,
+                                 const HandEyeValue& at, const GripperMotion& motion, bool world) {
   const double length = motion.length > 0 ? motion.length : 1;
   const Matrix6 of_Y = world ? at.Y.Adj() : Matrix6(Matrix6::Zero());
   const Matrix6 of_X = product(at.X.Adj(), excitation.x_from_y);
   // Columns: twists of the gripper in units of the length, and what they are made of.
   Matrix6 twists = Matrix6::Zero(), made_of = Matrix6::Zero();
   for (int k = 0; k < n; ++k) {
-    Vector6 t = product(of_X, Vector6(excitation.vectors.col(begin + k)));
+    Vector6 t = product(of_X, Vector6(excitation.vectors.col(k)));
     t.head<3>() /= length;
     Vector6 c = Vector6::Unit(k);
     for (int repeat = 0; repeat < 2; ++repeat) {
@@ -87,8 +86,8 @@ inline void appendOpenDirections(std::vector<OpenDirection>& list, const HandEye
     double weighted = 0;
     Vector6 y = Vector6::Zero();
     for (int j = 0; j < n; ++j) {
-      weighted += c[j] * c[j] * excitation.values[begin + j];
-      y += c[j] * excitation.vectors.col(begin + j);
+      weighted += c[j] * c[j] * excitation.values[j];
+      y += c[j] * excitation.vectors.col(j);
     }
     direction.excitation = weighted / c.squaredNorm();
     twist.head<3>() *= length;

@@ -229,7 +229,7 @@ HandEyeExcitation handEyeExcitation(const HandEyeValue& at, const std::vector<Po
   }
   HandEyeExcitation result;
   // Where B is exact there is no such noise, and rounding decides.
-  N.diagonal() += 1e-9 * L.diagonal() + Vector6::Constant(std::numeric_limits<double>::min());
+  N.diagonal() += 1e-14 * L.diagonal() + Vector6::Constant(std::numeric_limits<double>::min());
   result.x_from_y = Matrix6::Identity();
   if (world) {
     N *= (n - 1) / n;

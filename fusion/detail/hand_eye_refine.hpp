@@ -3,10 +3,12 @@
 #pragma once
 
 #include <fusion/detail/hand_eye_problem.hpp>
+#include <fusion/detail/hand_eye_starts.hpp>
 #include <stats/constrained.hpp>
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -59,18 +61,29 @@ struct HandEyeFit {
   bool converged = false;
 };
 
-/// Gauss–Newton with halved steps; S follows the value, so it ends at a thousandth of a standard deviation, which is far
-/// inside of what the strict estimate starts from.
+/// How a descent went.
+struct HandEyeDescent {
+  int open = 6;        ///< directions below the trusted excitation where it ended
+  bool freed = false;  ///< there were fewer on the way: X moved along one that is open
+};
+
+/// Gauss–Newton with halved steps along the directions of at least an excitation. S follows the value, so it ends at a
+/// thousandth of a standard deviation, which is far inside of what the strict estimate starts from.
 template <class Indices>
-HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
-                         double trusted, int iterations = 30) {
+HandEyeDescent descendHandEye(HandEyeFit& fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
+                              double trusted, int iterations) {
+  HandEyeDescent descent;
+  int fewest = 6;
   for (int k = 0; k < iterations; ++k) {
     const HandEyeSums sums = handEyeSums(fit.value, pairs, indices, world);
     const HandEyeExcitation excitation = handEyeExcitation(fit.value, pairs, indices, world);
     fit.cost = sums.cost;
-    const std::pair<Vector6, Vector6> step = handEyeStep(sums, excitation, openDirections(excitation, trusted), world);
+    descent.open = openDirections(excitation, trusted);
+    fewest = std::min(fewest, descent.open);
+    descent.freed = fewest < descent.open;
+    const std::pair<Vector6, Vector6> step = handEyeStep(sums, excitation, descent.open, world);
     const double squared = -sums.y.dot(step.second) - (world ? sums.x.dot(step.first) : 0);
-    if (!std::isfinite(squared)) return fit;
+    if (!std::isfinite(squared)) return descent;
     std::pair<Vector6, Vector6> shortened = step;
     bool better = false;
     for (int halving = 0; halving < 8 && !better; ++halving) {
@@ -81,8 +94,28 @@ HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, con
       shortened.first *= 0.5, shortened.second *= 0.5;
     }
     fit.converged = squared < 1e-6 || !better;
-    if (fit.converged) return fit;
+    if (fit.converged) break;
   }
+  return descent;
+}
+
+/// The excitation below which a direction is looked at twice.
+inline constexpr double doubtful_excitation = 1000;
+
+/// The minimum of Σ eᵀ S⁻¹ e that a start leads to. Excitations mean something at the minimum alone: far from it, or where
+/// X has run metres along a direction that is open, residuals look like motion. So directions of little excitation wait
+/// until the others have settled, from translations that are short along them, and are judged there.
+template <class Indices>
+HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
+                         double trusted, int iterations = 30) {
+  const double doubtful = std::max(trusted, doubtful_excitation);
+  if (descendHandEye(fit, pairs, indices, world, doubtful, iterations).open == 0) return fit;
+  const HandEyeMoments moments(pairs, indices, world);
+  for (int round = 0; round < 5; ++round) {
+    fit.value = withTranslations(fit.value.X.so3(), fit.value.Y.so3(), moments, pairs, indices, world);
+    if (!descendHandEye(fit, pairs, indices, world, doubtful, iterations).freed) break;
+  }
+  descendHandEye(fit, pairs, indices, world, trusted, iterations);
   return fit;
 }
 
