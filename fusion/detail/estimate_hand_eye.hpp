@@ -48,8 +48,9 @@ class HandEyeRun {
     Indices all(pairs_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     fitAll(all);
-    const bool may_search = options_.find_outliers && pairs_.size() >= least_for_search;
-    if (may_search && *std::max_element(errors_.begin(), errors_.end()) > options_.gate) findOutliers();
+    // Where the noise is not known, wrong pairs may have been taken for noise.
+    const bool suspicious = !options_.known_noise || *std::max_element(errors_.begin(), errors_.end()) > options_.gate;
+    if (options_.find_outliers && pairs_.size() >= least_for_search && suspicious) findOutliers();
     estimate();
     return std::move(result_);
   }
@@ -116,11 +117,12 @@ class HandEyeRun {
     if (!(factor > 0 && std::isfinite(factor))) return;
     for (PosePair& pair : pairs_) pair.a.covariance *= factor, pair.b.covariance *= factor;
     for (double& error : errors_) error /= factor;
+    for (HandEyeFit& fit : candidates_) fit.cost /= factor;
     result_.variance_factor *= factor;
   }
 
-  HandEyeFit refined(const HandEyeFit& fit, const Indices& indices, int iterations = 30) const {
-    return refineHandEye(fit, pairs_, indices, world, options_.trusted_excitation, iterations);
+  HandEyeFit refined(const HandEyeFit& fit, const Indices& indices, int iterations = 30, double factor = 1) const {
+    return refineHandEye(fit, pairs_, indices, world, options_.trusted_excitation, iterations, factor);
   }
   std::vector<double> errorsAt(const HandEyeValue& value) const {
     std::vector<double> errors;
@@ -205,10 +207,13 @@ class HandEyeRun {
     keepBest(fits);
     for (HandEyeFit& fit : fits) {
       std::vector<double> errors = errorsAt(fit.value);
-      for (const double widening : {4.0, 2.0, 1.0}) {
-        const Indices inliers = below(errors, widening * gateFor(errors));
+      for (double widening : {4.0, 2.0, 1.0}) {
+        // A scale that was found in the errors has grown with them.
+        if (!known) widening = 1;
+        const double gate = gateFor(errors);
+        const Indices inliers = below(errors, widening * gate);
         if (inliers.size() < 3) break;
-        fit = refined(fit, inliers, 5);
+        fit = refined(fit, inliers, 5, gate / options_.gate);
         errors = errorsAt(fit.value);
       }
       fit.cost = known ? truncated(errors, options_.gate) : median(errors);
@@ -216,36 +221,38 @@ class HandEyeRun {
     keepBest(fits);
     HandEyeFit best = fits.front();
     std::vector<double> errors = errorsAt(best.value);
-    Indices inliers = below(errors, gateFor(errors));
+    double gate = gateFor(errors);
+    Indices inliers = below(errors, gate);
     for (int round = 0; round < 20 && inliers.size() >= 3; ++round) {
-      best = refined(best, inliers);
+      best = refined(best, inliers, 30, gate / options_.gate);
       errors = errorsAt(best.value);
-      Indices next = below(errors, gateFor(errors));
+      gate = gateFor(errors);
+      Indices next = below(errors, gate);
       const bool same = next == inliers;
       inliers = std::move(next);
       if (same) break;
     }
-    // Less than a majority is no consensus: the residuals are not those of the noise, whichever pairs are taken.
-    if (2 * inliers.size() <= pairs_.size()) return;
-    const double factor = gateFor(errors) / options_.gate;
+    // Less than half is no consensus: the residuals are not those of the noise, whichever pairs are taken.
+    if (2 * inliers.size() < pairs_.size() || inliers.size() < 4) return;
     fits.front() = best;
     // Candidates are compared on the pairs of the best.
     for (HandEyeFit& fit : fits) fit.cost = handEyeCost(fit.value, pairs_, inliers);
     take(fits, inliers);
-    if (!known) rescale(factor);
+    if (!known) rescale(gate / options_.gate);
   }
   /// The gate in units of the given covariances.
   double gateFor(const std::vector<double>& errors) const {
     if (options_.known_noise) return options_.gate;
-    // The median of all, which wrong pairs have moved up, then the mean of those within its gate.
-    double factor = median(errors) / median_error;
+    // The median of all, which wrong pairs can only have moved up, then the mean of those within its gate.
+    const double most = median(errors) / median_error;
+    double factor = most;
     for (int k = 0; k < 3; ++k) {
       const Indices inliers = below(errors, factor * options_.gate);
       double sum = 0;
       for (const std::size_t i : inliers) sum += errors[i];
       const double freedom = 6 * static_cast<double>(inliers.size()) - parameters;
       if (freedom <= 0) break;
-      factor = sum / freedom;
+      factor = std::min(most, sum / freedom);
     }
     return factor * options_.gate;
   }

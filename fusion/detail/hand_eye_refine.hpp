@@ -73,10 +73,12 @@ template <class Indices>
 HandEyeDescent descendHandEye(HandEyeFit& fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
                               double trusted, int iterations) {
   HandEyeDescent descent;
+  HandEyeExcitation excitation;
   int fewest = 6;
   for (int k = 0; k < iterations; ++k) {
     const HandEyeSums sums = handEyeSums(fit.value, pairs, indices, world);
-    const HandEyeExcitation excitation = handEyeExcitation(fit.value, pairs, indices, world);
+    // Where all directions are excited any basis serves.
+    if (k < 2 || descent.open > 0) excitation = handEyeExcitation(fit.value, pairs, indices, world);
     fit.cost = sums.cost;
     descent.open = openDirections(excitation, trusted);
     fewest = std::min(fewest, descent.open);
@@ -104,18 +106,19 @@ inline constexpr double doubtful_excitation = 1000;
 
 /// The minimum of Σ eᵀ S⁻¹ e that a start leads to. Excitations mean something at the minimum alone: far from it, or where
 /// X has run metres along a direction that is open, residuals look like motion. So directions of little excitation wait
-/// until the others have settled, from translations that are short along them, and are judged there.
+/// until the others have settled, from translations that are short along them, and are judged there. `factor` is that by
+/// which the variances of the poses are larger than given.
 template <class Indices>
 HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
-                         double trusted, int iterations = 30) {
-  const double doubtful = std::max(trusted, doubtful_excitation);
+                         double trusted, int iterations = 30, double factor = 1) {
+  const double doubtful = factor * std::max(trusted, doubtful_excitation);
   if (descendHandEye(fit, pairs, indices, world, doubtful, iterations).open == 0) return fit;
   const HandEyeMoments moments(pairs, indices, world);
   for (int round = 0; round < 5; ++round) {
     fit.value = withTranslations(fit.value.X.so3(), fit.value.Y.so3(), moments, pairs, indices, world);
     if (!descendHandEye(fit, pairs, indices, world, doubtful, iterations).freed) break;
   }
-  descendHandEye(fit, pairs, indices, world, trusted, iterations);
+  descendHandEye(fit, pairs, indices, world, factor * trusted, iterations);
   return fit;
 }
 
