@@ -13,6 +13,7 @@ void addTwoViewCommand(const CommandList& program);
 void addSimulateTwoViewCommand(const CommandList& simulate);
 void addSimulateViCommand(const CommandList& simulate);
 void addValidateEstimatorCommand(const CommandList& validate);
+void addValidateHandEyeCommand(const CommandList& validate);
 void addValidateMeansCommand(const CommandList& validate);
 void addValidatePreintegrationCommand(const CommandList& validate);
 void addValidatePropagationCommand(const CommandList& validate);
