@@ -99,6 +99,25 @@ inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel
   return row;
 }
 
+/// The least and the largest coordinate of all points along an axis. Those that lie ten times as far beyond the middle
+/// eight tenths as these are wide are in no image: one of them would take the centre and the scale of all others away.
+struct CoordinateRange {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+
+  CoordinateRange(std::span<const Eigen::Vector4d> matches, Eigen::Index axis) {
+    std::vector<double> all;
+    for (const Eigen::Vector4d& m : matches) {
+      if (m.allFinite()) all.push_back(m[axis]), all.push_back(m[2 + axis]);
+    }
+    if (all.empty()) return;
+    std::sort(all.begin(), all.end());
+    const double tenth = all[(all.size() - 1) / 10], last_tenth = all[all.size() - 1 - (all.size() - 1) / 10];
+    const double reach = last_tenth > tenth ? 10 * (last_tenth - tenth) : std::numeric_limits<double>::infinity();
+    low = *std::find_if(all.begin(), all.end(), [&](double x) { return x >= tenth - reach; });
+    high = *std::find_if(all.rbegin(), all.rend(), [&](double x) { return x <= last_tenth + reach; });
+  }
+};
+
 /// Matches as the models take them.
 struct TwoViewInput {
   TwoViewImageFrame frame;
@@ -109,21 +128,19 @@ struct TwoViewInput {
   TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
   TwoViewModels models;
   std::vector<Eigen::Vector4d> normalised;
-  std::vector<std::size_t> used;  ///< places of those that take part
+  std::vector<std::size_t> used;            ///< places of those that take part
+  std::vector<std::size_t> first_of_equal;  ///< for each match the place of the first one that is equal to it
 
   TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
     frame.calibrated = options.first.has_value();
     if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
     // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
-    const double infinity = std::numeric_limits<double>::infinity();
-    Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low, corner = Eigen::Vector2d::Zero();
     const Eigen::Vector4d* one = nullptr;
     for (const Eigen::Vector4d& m : matches) {
       if (!m.allFinite()) continue;
       if (one == nullptr) one = &m;
       first_differ = first_differ || m.head<2>() != one->head<2>();
       second_differ = second_differ || m.tail<2>() != one->tail<2>();
-      low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
     }
     Eigen::Vector2d& size = frame.image_size;
     if (options.image_size) {
@@ -132,12 +149,13 @@ struct TwoViewInput {
       size = {options.first->width, options.first->height};
     } else if (one != nullptr) {
       // One match alone, or several on a line, leave no area.
-      size = (high - low).cwiseMax(std::max(1.0, options.sigma));
+      const CoordinateRange x(matches, 0), y(matches, 1);
+      size = Eigen::Vector2d(x.high - x.low, y.high - y.low).cwiseMax(std::max(1.0, options.sigma));
       frame.size_from_matches = true;
-      corner = low;
+      frame.image_corner = {x.low, y.low};
     }
-    first = coordinatesOf(options.first, size, corner);
-    second = coordinatesOf(options.second ? options.second : options.first, size, corner);
+    first = coordinatesOf(options.first, size, frame.image_corner);
+    second = coordinatesOf(options.second ? options.second : options.first, size, frame.image_corner);
     const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
                                size.cwiseQuotient(second.focal)};
     const TwoViewModelOptions lattice{calibration, options.nodes, options.verticals};
@@ -183,6 +201,9 @@ struct TwoViewInput {
       u << first(m.head<2>()), second(m.tail<2>());
     }
     used = independentMatches(normalised, noise, options.keep_contradictions);
+    first_of_equal = firstOfEqualMatches(normalised);
+    for (std::size_t i = 0; i < matches.size(); ++i) frame.repeated += first_of_equal[i] != i ? 1 : 0;
+    frame.contradicted = matches.size() - frame.repeated - used.size();
     if (std::none_of(used.begin(), used.end(), [&](std::size_t i) { return normalised[i].allFinite(); })) {
       const bool none = std::none_of(normalised.begin(), normalised.end(), [](const auto& u) { return u.allFinite(); });
       refuse(none ? Status::too_few : Status::ill_defined,
@@ -279,8 +300,6 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
                                                                  {.hierarchy = options.search, .max_structures = most});
   while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
   }
-  // Equal matches belong together; of these the first takes part.
-  const std::vector<std::size_t> first_of_equal = firstOfEqualMatches(input.normalised);
   std::vector<char> taken(matches.size(), 0);
   for (const auto& found : search.structures()) {
     const TwoViewModel& model = *input.models[found.model];
@@ -292,7 +311,7 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
     }
     std::vector<std::size_t> places;
     for (std::size_t i = 0; i < matches.size(); ++i) {
-      if (is_own[first_of_equal[i]] != 0) places.push_back(i), taken[i] = 1;
+      if (is_own[input.first_of_equal[i]] != 0) places.push_back(i), taken[i] = 1;
     }
     std::vector<double> errors(own.size());
     model.errors(found.estimate.parameter, own, errors);

@@ -278,6 +278,8 @@ TEST(TwoViewMotion, equalMatchesCountOnce) {
   ASSERT_TRUE(once.ok() && found.ok());
   EXPECT_EQ(found.chosenModel().name, "essential");
   EXPECT_EQ(found.inliers, 3 * once.inliers) << "each has its verdict";
+  EXPECT_EQ(found.repeated, 2 * scene.pixels.size());
+  EXPECT_EQ(found.contradicted, once.contradicted);
   EXPECT_LE((found.matrix - once.matrix).norm(), 1e-12);
   EXPECT_LE((found.relative_pose->covariance - once.relative_pose->covariance).norm(),
             1e-12 * once.relative_pose->covariance.norm());
@@ -286,6 +288,25 @@ TEST(TwoViewMotion, equalMatchesCountOnce) {
     std::vector<Eigen::Vector4d> few;
     for (std::size_t i = 0; i < distinct; ++i) few.insert(few.end(), 50, scene.pixels[i]);
     EXPECT_EQ(estimateTwoViewMotion(few, options).status, Status::ill_defined) << distinct;
+  }
+}
+
+TEST(TwoViewMotion, aWildCoordinateDoesNotMoveTheImage) {
+  for (const TwoViewMotion motion : {TwoViewMotion::homography, TwoViewMotion::fundamental}) {
+    const TwoViewScene scene({.motion = motion}, 1);
+    const TwoViewMotionOptions options{.sigma = scene.options.sigma};
+    const TwoViewMotionEstimate expected = estimateTwoViewMotion(scene.pixels, options);
+    EXPECT_TRUE(expected.size_from_matches);
+    for (const double wild : {1e4, -1e6, 1e18, -1e150, 1e300}) {
+      std::vector<Eigen::Vector4d> matches = scene.pixels;
+      matches.emplace_back(wild, 100, 300, -wild);
+      const TwoViewMotionEstimate found = estimateTwoViewMotion(matches, options);
+      EXPECT_TRUE(found.ok()) << wild << found.reason;
+      EXPECT_EQ(found.image_size, expected.image_size) << wild;
+      EXPECT_EQ(found.chosenModel().name, nameOf(motion)) << wild;
+      EXPECT_FALSE(found.inlier.back());
+      EXPECT_NEAR(static_cast<double>(found.inliers), static_cast<double>(expected.inliers), 3);
+    }
   }
 }
 
@@ -310,6 +331,8 @@ TEST(TwoViewMotion, severalMotionsLeaveContradictionsOut) {
   const TwoViewMotions found = estimateTwoViewMotions(matches, optionsOf(plane));
   ASSERT_EQ(found.status, Status::ok) << found.reason;
   ASSERT_EQ(found.structures.size(), 2U);
+  EXPECT_GE(found.contradicted, 80U);
+  EXPECT_EQ(found.repeated, 10U);
   std::size_t right = 0, all = found.rest.size();
   std::vector<std::string> given(matches.size(), "none");
   for (const TwoViewStructure& s : found.structures) {
