@@ -361,6 +361,53 @@ TEST(Constrained, BadInputIsAStatus) {
   EXPECT_EQ(constrainedEstimate(ellipse.truth, wrong, unit_length).end, ConstrainedEnd::bad_input);
 }
 
+/// m = q, of two coordinates.
+struct IsTheParameter {
+  Eigen::Vector2d operator()(const Eigen::Vector2d& q, const Eigen::Vector2d& m) const { return m - q; }
+  EquationDerivatives<2, 2, 2> linearize(const Eigen::Vector2d& q, const Eigen::Vector2d& m) const {
+    return {(*this)(q, m), -Eigen::Matrix2d::Identity(), Eigen::Matrix2d::Identity()};
+  }
+};
+
+TEST(Constrained, APriorThatIsNoneIsBadInput) {
+  const std::vector<Eigen::Vector2d> points{{1, 1}, {2, 2}, {3, 3}};
+  const auto channel = measurements(points, IsotropicNoise<2>(1), IsTheParameter{});
+  const auto end = [&](const Eigen::Matrix2d& information) {
+    ConstrainedOptions<Eigen::Vector2d> options;
+    options.prior = ParameterPrior<Eigen::Vector2d>{{0, 0}, information};
+    return constrainedEstimate(Eigen::Vector2d(0, 0), channel, NoConstraint{}, options).end;
+  };
+  EXPECT_EQ(end(Eigen::Matrix2d::Constant(nan)), ConstrainedEnd::bad_input);
+  EXPECT_EQ(end(-Eigen::Matrix2d::Identity()), ConstrainedEnd::bad_input);
+  EXPECT_EQ(end(Eigen::Matrix2d{{1, 2}, {2, 1}}), ConstrainedEnd::bad_input) << "indefinite";
+  EXPECT_EQ(end(Eigen::Matrix2d{{1, 0.5}, {0.4, 1}}), ConstrainedEnd::bad_input) << "not symmetric";
+  EXPECT_FALSE(CovarianceNoise<2>(Eigen::Matrix2d{{1, 0.5}, {0.4, 1}}).valid());
+  EXPECT_EQ(end(Eigen::Matrix2d{{1, 2}, {2, 4}}), ConstrainedEnd::converged) << "of rank one";
+  EXPECT_EQ(end(Eigen::Matrix2d::Zero()), ConstrainedEnd::converged);
+}
+
+TEST(Constrained, ExactCoordinatesThatDoNotFitAreSaid) {
+  // The third point is exact in y: no correction of it meets m_y = q_y, unless the others agree.
+  const auto estimate = [&](double y) {
+    const Eigen::Matrix2d exact_in_y = Eigen::Vector2d(1, 0).asDiagonal();
+    const std::vector<Eigen::Vector2d> points{{1, 2}, {2, 2}, {3, y}};
+    const std::vector<CovarianceNoise<2>> noises{CovarianceNoise<2>(Eigen::Matrix2d::Identity()),
+                                                 CovarianceNoise<2>(Eigen::Matrix2d::Identity()),
+                                                 CovarianceNoise<2>(exact_in_y)};
+    return constrainedEstimate(Eigen::Vector2d(0, 0), measurements(points, noises, IsTheParameter{}));
+  };
+  EXPECT_EQ(estimate(3).end, ConstrainedEnd::contradictory);
+  EXPECT_EQ(estimate(3).dropped_equations, 1);
+  EXPECT_EQ(estimate(2).end, ConstrainedEnd::converged);
+  // The same of the error of a single measurement.
+  const CovarianceNoise<2> noise(Eigen::Matrix2d(Eigen::Vector2d(1, 0).asDiagonal()));
+  const Eigen::Vector2d q(1, 2);
+  EXPECT_NEAR(measurementError(q, Eigen::Vector2d(3, 2), noise, IsTheParameter{}).squared, 4, 1e-12);
+  EXPECT_TRUE(std::isinf(measurementError(q, Eigen::Vector2d(3, 3), noise, IsTheParameter{}).squared));
+  const CovarianceNoise<2> none(Eigen::Matrix2d::Zero());
+  EXPECT_TRUE(std::isnan(measurementError(q, Eigen::Vector2d(3, 3), none, IsTheParameter{}).squared));
+}
+
 TEST(Constrained, EveryEndHasAName) {
   for (const ConstrainedEnd e : {ConstrainedEnd::running, ConstrainedEnd::converged, ConstrainedEnd::capped,
                                  ConstrainedEnd::stalled, ConstrainedEnd::stopped, ConstrainedEnd::unobservable,
