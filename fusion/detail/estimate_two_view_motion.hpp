@@ -150,7 +150,7 @@ struct TwoViewInput {
     } else if (one != nullptr) {
       // One match alone, or several on a line, leave no area.
       const CoordinateRange x(matches, 0), y(matches, 1);
-      size = Eigen::Vector2d(x.high - x.low, y.high - y.low).cwiseMax(std::max(1.0, options.sigma));
+      size = Eigen::Vector2d(x.high - x.low, y.high - y.low).cwiseMax(options.sigma);
       frame.size_from_matches = true;
       frame.image_corner = {x.low, y.low};
     }

@@ -1,6 +1,7 @@
 // Constrained estimation: its statistics, its iteration, what it says of bad data.
 
 #include <support/constrained_models.hpp>
+#include <support/sanitized.hpp>
 #include <stats/measurement_error.hpp>
 
 #include <gtest/gtest.h>
@@ -48,7 +49,7 @@ TEST(Constrained, AConicIsAsUncertainAsItSays) {
   // Curvature, which first order does not see, counts from 0.02 on; the note's figures.
   for (const auto& [sigma, mean, coverage, iterations] :
        {Row{0.005, 5, 0.95, 8}, Row{0.02, 5.12, 0.94, 13}, Row{0.05, 5.28, 0.93, 20}}) {
-    const int trials = 1000;
+    const int trials = trialsOf(1000);
     double chi2 = 0, squares = 0, inside = 0, steps = 0;
     for (int t = 0; t < trials; ++t) {
       const Ellipse ellipse(30, sigma, static_cast<std::uint64_t>(t));
@@ -70,7 +71,7 @@ TEST(Constrained, AConicIsAsUncertainAsItSays) {
 }
 
 TEST(Constrained, ARotationIsTheSameAsNineNumbersAndAsAManifold) {
-  const int trials = 1000;
+  const int trials = trialsOf(1000);
   double chi2 = 0, squares = 0;
   for (int t = 0; t < trials; ++t) {
     const RotatedPairs data(5, static_cast<std::uint64_t>(t));
@@ -101,7 +102,7 @@ TEST(Constrained, ARotationIsTheSameAsNineNumbersAndAsAManifold) {
 }
 
 TEST(Constrained, APriorAddsItsRankToTheDegreesOfFreedom) {
-  const int trials = 400;
+  const int trials = trialsOf(400);
   double chi2 = 0;
   for (int t = 0; t < trials; ++t) {
     const RotatedPairs data(20, static_cast<std::uint64_t>(t));
@@ -121,7 +122,7 @@ TEST(Constrained, APriorAddsItsRankToTheDegreesOfFreedom) {
 }
 
 TEST(Constrained, CorrectedMeasurementsHaveCovariances) {
-  const int trials = 4000, n = 12;
+  const int trials = trialsOf(4000), n = 12;
   const double sigma = 0.005;
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero(), expected = Eigen::Matrix2d::Zero();
   double corrections = 0, expected_corrections = 0;
@@ -136,9 +137,10 @@ TEST(Constrained, CorrectedMeasurementsHaveCovariances) {
     expected_corrections += estimator.expectedCorrection(2);
     EXPECT_LE((estimator.corrected()[2] - ellipse.points[2] - estimator.correction(2)).norm(), 1e-15);
   }
-  // A variance from so many trials is known to 2.2 %; four of these, and what first order leaves.
-  EXPECT_LE((sum - expected).norm(), 0.1 * expected.norm());
-  EXPECT_NEAR(corrections, expected_corrections, 0.1 * expected_corrections);
+  // A variance from so many trials is known to √(2/trials); four of these, and what first order leaves.
+  const double bound = 4 * std::sqrt(2. / trials) + 0.01;
+  EXPECT_LE((sum - expected).norm(), bound * expected.norm());
+  EXPECT_NEAR(corrections, expected_corrections, bound * expected_corrections);
 }
 
 TEST(MeasurementError, IsTheDistanceToTheModelInUnitsOfTheNoise) {
