@@ -68,15 +68,25 @@ SE3d fromCv(const cv::Mat& R, const cv::Mat& t) {
   }
   return SE3d(SO3d::fitToSO3(matrix), translation);
 }
+/// An exception is a failure: some methods throw where a matrix turns out singular.
+SE3d failed() { return SE3d(SO3d(), Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())); }
 SE3d theirHandEye(const Problem& p, cv::HandEyeCalibrationMethod method) {
   cv::Mat R, t;
-  cv::calibrateHandEye(p.R_a, p.t_a, p.R_b_inverse, p.t_b_inverse, R, t, method);
+  try {
+    cv::calibrateHandEye(p.R_a, p.t_a, p.R_b_inverse, p.t_b_inverse, R, t, method);
+  } catch (const cv::Exception&) {
+    return failed();
+  }
   return fromCv(R, t);
 }
 SE3d theirRobotWorld(const Problem& p, cv::RobotWorldHandEyeCalibrationMethod method) {
   cv::Mat R_world, t_world, R, t;
-  cv::calibrateRobotWorldHandEye(p.R_b_inverse, p.t_b_inverse, p.R_a_inverse, p.t_a_inverse, R_world, t_world, R, t,
-                                 method);
+  try {
+    cv::calibrateRobotWorldHandEye(p.R_b_inverse, p.t_b_inverse, p.R_a_inverse, p.t_a_inverse, R_world, t_world, R, t,
+                                   method);
+  } catch (const cv::Exception&) {
+    return failed();
+  }
   return fromCv(R, t).inverse();
 }
 #endif
