@@ -70,7 +70,7 @@ inline std::string name(HandEyeNoise noise) {
 enum class HandEyeOutliers {
   gross,   ///< any pose near the target
   mild,    ///< 5 to 15 degrees and 2 to 8 cm off
-  flips,   ///< the second solution of a planar target's pose: mirrored at the line of sight
+  flips,   ///< the second solution of a planar target's pose, mirrored at the line of sight; by 10 degrees or more
   cluster  ///< all by the same motion: they agree with each other
 };
 inline constexpr std::array all_hand_eye_outliers = {HandEyeOutliers::gross, HandEyeOutliers::mild,
@@ -264,8 +264,12 @@ class HandEyeScene {
           const Eigen::Vector3d mirrored = 2 * sight.dot(normal) * sight - normal;
           const Eigen::Vector3d cross = normal.cross(mirrored);
           const double angle = std::atan2(cross.norm(), normal.dot(mirrored));
-          const SO3d flip = SO3d::exp(cross.norm() > 0 ? Eigen::Vector3d(angle * cross.normalized())
-                                                       : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+          // Of a target that is seen frontally both solutions are nearly one: no pair to be found.
+          if (angle < 10 * degree) {
+            inlier[i] = true;
+            break;
+          }
+          const SO3d flip = SO3d::exp(angle * cross.normalized());
           B = SE3d(flip * C.so3(), C.translation()).inverse();
           break;
         }
