@@ -147,7 +147,8 @@ template <class S, int D>
 struct FrameInformation {
   Eigen::Matrix<S, D, D> gauss_newton, corrected;
   Eigen::Matrix<S, D, 1> gradient;
-  S cost = S(0);  ///< at ξ = 0, minimised over what was eliminated
+  S cost = S(0);   ///< at ξ = 0, minimised over what was eliminated: the score of a hypothesis
+  S start = S(0);  ///< the same where all unknowns are as predicted; less updateCovariance()'s reduction it follows χ²
 };
 
 /// The direction alone, the rotation eliminated; Omega must minimise the cost of these sums with the prior.
@@ -161,7 +162,7 @@ FrameInformation<S, 2> eliminateRotation(const SubspaceSums<S>& sums, const Eige
   f.gauss_newton = sums.Hxx - H.transpose() * H;
   f.corrected = sums.Cxx - C.transpose() * C;
   f.gradient = sums.bx;
-  f.cost = sums.cost + from_prior.dot(prior.information * from_prior);
+  f.cost = f.start = sums.cost + from_prior.dot(prior.information * from_prior);
   return f;
 }
 
@@ -190,6 +191,7 @@ FrameInformation<S, 5> eliminateRotationWithBias(const SubspaceSums<S>& sums, co
   fill(f.corrected, sums.Cxx, C);
   f.gradient << sums.bx - H.transpose() * half, pull - K.transpose() * half;
   f.cost = sums.cost + from_prior.dot(marginal * from_prior);
+  f.start = sums.cost + from_prior.dot(pull) - half.squaredNorm();
   return f;
 }
 
@@ -203,7 +205,7 @@ FrameInformation<S, 5> keepRotation(const SubspaceSums<S>& sums, const Eigen::Ma
   f.gauss_newton << sums.Hxx, sums.Hox.transpose(), sums.Hox, sums.M + prior.information;
   f.corrected << sums.Cxx, sums.Cox.transpose(), sums.Cox, sums.M + prior.information;
   f.gradient << sums.bx, sums.bo + pull;
-  f.cost = sums.cost + from_prior.dot(pull);
+  f.cost = f.start = sums.cost + from_prior.dot(pull);
   return f;
 }
 

@@ -83,7 +83,7 @@ struct MotionEstimate {
 
   double mean_inverse_depth = 0;           ///< |V|/Z, weighted by information; its sign is that of the depths
   double mean_inverse_depth_variance = 0;  ///< of one frame
-  /// Evidence for positive depths: half the logarithm of the odds of V against -V, discounted over time. 2 is 98 %.
+  /// Evidence for positive depths, discounted over time, in its standard deviations: above 2 the sign is decided.
   double sign_evidence = 0;
 
   double signal = 0;  ///< χ² of the frame for a rotation alone over its degrees of freedom, 2N - 3: 1 at standstill
