@@ -74,6 +74,9 @@ class MotionEngine {
   bool readFrame(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
   void resize(std::size_t n);
   bool atStandstill();
+  double fitRotationAlone(double& statistic);
+  void updateRotationAlone();
+  void startAnew();
   void spreadStarts();
   void startLinearly();
   void predict(MotionCandidate& candidate) const;
@@ -99,6 +102,13 @@ class MotionEngine {
   std::vector<MotionCandidate> candidates_;
   std::size_t best_ = 0, updates_ = 0;
   double standstill_quantile_ = 0;
+  double usual_signal_ = 0;  ///< of the last ten or so frames that were not at standstill
+  std::size_t moving_frames_ = 0;
+  double still_sum_ = 0, still_dof_ = 0;  ///< of all frames before a clear motion
+  SO3d rotation_alone_;
+  Eigen::Matrix3d rotation_information_ = Eigen::Matrix3d::Identity();
+  std::size_t rotation_inliers_ = 0;
+  bool updated_ = false;       ///< by the last frame
   double innovation_sum_ = 0;  ///< discounted over lost_frames
   std::size_t innovation_count_ = 0;
 

@@ -20,10 +20,9 @@ LIESTAT_FUSION_INLINE MotionEngine::MotionEngine(const MotionFilterOptions& opti
 }
 
 LIESTAT_FUSION_INLINE void MotionEngine::reset() {
-  candidates_.clear();
-  best_ = updates_ = kept_ = innovation_count_ = 0;
-  innovation_sum_ = 0;
-  linear_moments_.setZero(), linear_noise_.setZero();
+  startAnew();
+  usual_signal_ = still_sum_ = still_dof_ = 0, moving_frames_ = 0;
+  updated_ = false;
   estimate_ = MotionEstimate{};
   estimate_.meaning = options_.flow == Flow::discrete ? DirectionMeaning::translation : DirectionMeaning::velocity;
 }
@@ -77,11 +76,11 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const
   estimate_.flags.bad_input = !readFrame(pairs, gyroscope);
   estimate_.pairs = pairs_.size(), estimate_.inliers = 0;
   for (MotionCandidate& c : candidates_) predict(c);
+  updated_ = false;
   if (pairs_.size() < leastPairs()) {
     estimate_.flags.too_few = true;
-  } else if (atStandstill()) {
-    estimate_.flags.standstill = true;
-  } else {
+  } else if (!atStandstill()) {
+    updated_ = true;
     const bool linear = state_ != MotionState::rotation && options_.linear_start && frame_.has_gyroscope &&
                         !options_.outliers && kept_ < options_.linear_frames && updates_ == kept_;
     if (linear) {
@@ -123,15 +122,48 @@ LIESTAT_FUSION_INLINE void MotionEngine::prepareSharedFlows() {
   }
 }
 
-/// Whether a rotation alone explains the frame: least Σ |ẋ - BΩ|²/variance against χ². With a rotation so found the
-/// points are turned and the rest is fitted again, so that large rotations are no signal.
+/// Whether the frame says nothing of the direction. Where noise drowns the motion of one frame, many frames together do
+/// say something, though each of them looks like standstill: a frame is left out only if others have shown a clear motion.
+/// If none has, hypotheses are updated, and start anew with the first clear motion after frames without any.
 LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
+  double statistic = 0;
+  const double dof = fitRotationAlone(statistic);
+  estimate_.signal = dof > 0 ? statistic / dof : std::numeric_limits<double>::quiet_NaN();
+  if (!(dof > 0)) return false;
+  const double bound = chiSquaredBound(dof, standstill_quantile_) / dof;
+  const bool still = estimate_.signal <= bound;
+  const bool clear_before = usual_signal_ > 1.5 * bound;
+  if (!clear_before) still_sum_ += statistic, still_dof_ += dof;
+  if (!still) {
+    ++moving_frames_;
+    usual_signal_ +=
+        (estimate_.signal - usual_signal_) / static_cast<double>(std::min<std::size_t>(moving_frames_, 10));
+    if (!clear_before && usual_signal_ > 1.5 * bound) {
+      const double rest = still_dof_ - dof;
+      if (rest > 0 && still_sum_ - statistic <= chiSquaredBound(rest, standstill_quantile_)) startAnew();
+    }
+    return false;
+  }
+  estimate_.flags.standstill = clear_before || still_sum_ <= chiSquaredBound(still_dof_, standstill_quantile_);
+  if (clear_before) updateRotationAlone();
+  return clear_before;
+}
+
+LIESTAT_FUSION_INLINE void MotionEngine::startAnew() {
+  candidates_.clear();
+  best_ = updates_ = kept_ = innovation_count_ = 0, innovation_sum_ = 0;
+  linear_moments_.setZero(), linear_noise_.setZero();
+}
+
+/// The least Σ |ẋ - BΩ|²/variance, and its degrees of freedom; none where it can't be had, or where it leaves a third of
+/// the points to outliers. With the rotation so found points are turned and the rest is fitted again, so that large
+/// rotations are no signal.
+LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
   Eigen::Vector3d Omega = frame_.has_gyroscope ? frame_.gyroscope : Eigen::Vector3d::Zero();
   const double limit = 11.8;  // χ² of two degrees of freedom, as likely as 3 standard deviations
   const bool robust = options_.outliers;
   const std::size_t n = pairs_.size();
   std::fill(weights_.begin(), weights_.end(), 1.0);
-  double statistic = 0;
   std::size_t used = n;
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
   const int passes = robust ? 8 : 2;
@@ -146,7 +178,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
         R = SO3d::exp(Eigen::Vector3d(frames * Omega)).matrix();
       }
       FlowPoint<double>& p = points_[i] = flowAfter(R, pairs_[i]);
-      if (!std::isfinite(p.x)) return false;
+      if (!std::isfinite(p.x)) return 0;
       const double k = 1 / frames;
       p.u *= k, p.v *= k, p.variance *= k * k;
       const Eigen::Matrix<double, 2, 3> B = flowByRotation(p.x, p.y);
@@ -155,7 +187,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
       b += w * B.transpose() * Eigen::Vector2d(p.u, p.v);
     }
     const Eigen::Vector3d d = Cholesky<double, 3>(M).solve<1>(b);
-    if (!d.allFinite()) return false;
+    if (!d.allFinite()) return 0;
     const Eigen::Vector3d from_gyroscope = Omega + d - frame_.gyroscope;
     statistic = from_gyroscope.dot(frame_.information * from_gyroscope), used = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -173,25 +205,32 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
     }
     Omega += d;
   }
+  rotation_alone_ = SO3d::exp(Omega), rotation_information_ = M, rotation_inliers_ = used;
   const double dof = 2 * static_cast<double>(used) - (frame_.has_gyroscope ? 0 : 3);
-  estimate_.signal = dof > 0 ? statistic / dof : 0;
-  if (used * 3 < n * 2 || !(dof > 0) || !(statistic <= chiSquaredBound(dof, standstill_quantile_))) return false;
-  estimate_.rotation.mean = SO3d::exp(Omega);
-  const Eigen::Matrix3d information = M, R = estimate_.rotation.mean.matrix();
-  estimate_.rotation.covariance = R.transpose() * Cholesky<double, 3>(information).inverse() * R;
-  estimate_.inliers = used;
-  if (state_ == MotionState::rotation) {
-    for (MotionCandidate& c : candidates_) {
-      FrameInformation<double, 5> frame;
-      frame.gauss_newton.setZero();
-      frame.gauss_newton.bottomRightCorner<3, 3>() = information;
-      frame.corrected = frame.gauss_newton;
-      frame.gradient << 0, 0, -(information * (estimate_.rotation.mean * c.rotation.inverse()).log());
-      const FilterStep<double, 5> s = updateCovariance(c.wide, frame, options_.max_step);
-      c.rotation = SO3d::exp(Eigen::Vector3d(s.step.tail<3>())) * c.rotation;
+  if (used * 3 >= n * 2) return dof;
+  statistic = std::numeric_limits<double>::infinity();
+  return dof;
+}
+
+/// At standstill the flow says the rotation, better than the filter does.
+LIESTAT_FUSION_INLINE void MotionEngine::updateRotationAlone() {
+  estimate_.rotation.mean = rotation_alone_;
+  const Eigen::Matrix3d R = rotation_alone_.matrix();
+  estimate_.rotation.covariance = R.transpose() * Cholesky<double, 3>(rotation_information_).inverse() * R;
+  estimate_.inliers = rotation_inliers_;
+  for (MotionCandidate& c : candidates_) {
+    if (state_ != MotionState::rotation) {
+      c.rotation = rotation_alone_;
+      continue;
     }
+    FrameInformation<double, 5> frame;
+    frame.gauss_newton.setZero();
+    frame.gauss_newton.bottomRightCorner<3, 3>() = rotation_information_;
+    frame.corrected = frame.gauss_newton;
+    frame.gradient << 0, 0, -(rotation_information_ * (rotation_alone_ * c.rotation.inverse()).log());
+    const FilterStep<double, 5> s = updateCovariance(c.wide, frame, options_.max_step);
+    c.rotation = SO3d::exp(Eigen::Vector3d(s.step.tail<3>())) * c.rotation;
   }
-  return true;
 }
 
 /// Directions of a spherical Fibonacci lattice on the hemisphere z > 0: costs do not tell V from -V.
@@ -453,6 +492,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
   for (MotionCandidate& c : candidates_) any = advance(c) || any;
   if (!any) {
     estimate_.flags.degenerate = true;
+    updated_ = false;
     return;
   }
   ++updates_;
@@ -510,6 +550,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::startLinearly() {
   const Cholesky<double, 3> factor(linear_noise_);
   if (!factor.ok()) {
     estimate_.flags.degenerate = true;
+    updated_ = false;
     return;
   }
   // L⁻¹ Σmmᵀ L⁻ᵀ, whose least eigenvector y gives V = L⁻ᵀ y.
@@ -521,6 +562,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::startLinearly() {
   const Eigen::Vector3d V = inverse_factor.transpose() * y;
   if (!(V.norm() > 0)) {
     estimate_.flags.degenerate = true;
+    updated_ = false;
     return;
   }
   MotionCandidate c;
@@ -545,8 +587,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   MotionEstimate& out = estimate_;
   out.hypotheses = candidates_.size();
   if (candidates_.empty()) {
-    out.flags.degenerate = out.flags.degenerate || out.frame > 0;
-    out.flags.undecided_sign = true;
+    out.direction.covariance.setIdentity();
+    out.flags.degenerate = out.flags.undecided_sign = true;
     return;
   }
   const MotionCandidate& c = candidates_[best_];
@@ -557,7 +599,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     out.gyroscope_bias.mean = c.bias;
     out.gyroscope_bias.covariance = c.wide.reported.bottomRightCorner<3, 3>();
   }
-  const bool used = !out.flags.too_few && !out.flags.standstill && !out.flags.degenerate;
+  const bool used = updated_;
   if (used) {
     out.rotation.mean = c.rotation;
     // From the left, or of a rotation vector, to the local frame.
@@ -599,17 +641,14 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
                      static_cast<double>(std::min(innovation_count_, std::max<std::size_t>(options_.lost_frames, 1)));
   if (innovation_count_ >= options_.lost_frames && innovation_sum_ > options_.lost_innovation) {
     out.flags.lost = true;
-    candidates_.clear();
-    best_ = updates_ = kept_ = innovation_count_ = 0, innovation_sum_ = 0;
-    linear_moments_.setZero(), linear_noise_.setZero();
+    startAnew();
   }
 }
 
 LIESTAT_FUSION_INLINE std::span<const InverseDepth> MotionEngine::inverseDepths() {
   depths_.assign(
       given_, InverseDepth{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN(), false});
-  const bool used = !estimate_.flags.too_few && !estimate_.flags.standstill && pairs_.size() >= leastPairs();
-  if (candidates_.empty() || !used) return depths_;
+  if (candidates_.empty() || !updated_) return depths_;
   prepareSharedFlows();
   Evaluation e;
   if (!evaluate(candidates_[best_], e)) return depths_;
