@@ -94,6 +94,7 @@ class MotionScene {
     bias = s * unit;
   }
 
+  const Eigen::Vector3d& truthAxis() const { return axis_; }
   bool hasGyroscope() const { return options.gyroscope_sigma > 0; }
   /// Standard deviation of a calibrated coordinate.
   double sigma() const { return options.sigma / options.focal_length; }

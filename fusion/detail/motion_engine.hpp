@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -27,6 +28,8 @@ struct MotionCandidate {
   FilterCovariance<double, 2> narrow;  ///< MotionState::direction
   FilterCovariance<double, 5> wide;    ///< the other two
   double score = 0;
+  static constexpr std::size_t remembered = 24;
+  std::array<double, remembered> costs{};  ///< of the last frames, a ring
   double evidence = 0, evidence_variance = 0;
 
   // Of the last frame that it was updated with.
@@ -92,6 +95,7 @@ class MotionEngine {
             const FrameInformation<double, D>& frame);
   void weighSign(MotionCandidate& candidate) const;
   void prune();
+  double gapOfChance(const MotionCandidate& candidate, const MotionCandidate& best) const;
   void advanceAll();
   void publish();
   std::size_t leastPairs() const;

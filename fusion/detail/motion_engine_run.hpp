@@ -418,7 +418,9 @@ bool MotionEngine::step(MotionCandidate& c, FilterCovariance<double, D>& P, cons
   c.innovation = (frame.start - s.reduction) / std::max(equations, 1);
   c.cost = frame.cost;
   c.inliers = e.inliers;
-  c.score += options_.outliers ? e.capped_cost : frame.cost;
+  const double cost = options_.outliers ? e.capped_cost : frame.cost;
+  c.score += cost;
+  c.costs[updates_ % MotionCandidate::remembered] = cost;
 
   const Cholesky<double, 3> ML(Eigen::Matrix3d(e.sums.M + e.marginal));
   const Eigen::Vector3d lever = e.sums.depth_lever / e.sums.depth_weight;
@@ -499,6 +501,22 @@ LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
   prune();
 }
 
+/// How far the scores of two equally good hypotheses may part: costs at different directions are χ² of different
+/// projections of the flow, so their differences are a random walk.
+LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const MotionCandidate& c, const MotionCandidate& best) const {
+  const std::size_t n = std::min(updates_, MotionCandidate::remembered);
+  if (n < 2) return std::numeric_limits<double>::infinity();
+  double sum = 0, squares = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double d = c.costs[k] - best.costs[k];
+    sum += d, squares += d * d;
+  }
+  const auto count = static_cast<double>(n);
+  // No more than that of independent χ²: costs that fall as a hypothesis converges are no chance.
+  const double variance = std::min((squares - sum * sum / count) / (count - 1), 4 * static_cast<double>(best.inliers));
+  return options_.rival_sigmas * std::sqrt(std::max(variance, 0.0) * static_cast<double>(updates_));
+}
+
 /// Drops hypotheses far worse than the best, and those that have come to the same place as a better one.
 LIESTAT_FUSION_INLINE void MotionEngine::prune() {
   best_ = 0;
@@ -512,7 +530,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::prune() {
   const double nearest = std::cos(options_.merge_angle);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    if (candidates_[i].score - candidates_[0].score > options_.prune_gap) break;
+    const double gap = candidates_[i].score - candidates_[0].score;
+    if (gap > options_.prune_gap && gap > gapOfChance(candidates_[i], candidates_[0])) continue;
     bool own = true;
     for (std::size_t k = 0; k < kept && own; ++k) {
       own = std::abs(candidates_[k].direction.unit_vector().dot(candidates_[i].direction.unit_vector())) < nearest;
@@ -618,6 +637,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
 
   // A rival is another place, not one within the noise of the best.
   out.rival_gap = std::numeric_limits<double>::infinity();
+  bool by_chance = false;
   const Eigen::Vector3d V = c.direction.unit_vector();
   for (const MotionCandidate& other : candidates_) {
     if (&other == &c) continue;
@@ -625,10 +645,12 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     if (direction.dot(V) < 0) direction = -direction;
     const Eigen::Vector2d z = log(c.direction, S2d(direction));
     if (z.norm() > options_.merge_angle && mahalanobisSquared<double, 2>(z, out.direction.covariance) > 9) {
-      out.rival_gap = std::min(out.rival_gap, other.score - c.score);
+      const double gap = other.score - c.score;
+      out.rival_gap = std::min(out.rival_gap, gap);
+      by_chance = by_chance || gap < std::max(options_.ambiguous_gap, gapOfChance(other, c));
     }
   }
-  out.flags.ambiguous = out.rival_gap < options_.ambiguous_gap;
+  out.flags.ambiguous = by_chance;
   const Eigen::Matrix2d& P = out.direction.covariance;
   const double larger = 0.5 * (P(0, 0) + P(1, 1)) + std::hypot(0.5 * (P(0, 0) - P(1, 1)), P(0, 1));
   out.flags.degenerate = out.flags.degenerate || !(larger < options_.degenerate_sigma * options_.degenerate_sigma);

@@ -136,7 +136,9 @@ struct MotionFilterOptions {
   double prune_gap = 40;          ///< hypotheses whose score is so much above the best are dropped
   double merge_angle = 0.0524;    ///< rad; of hypotheses so near to a better one, up to sign, too
   double ambiguous_gap = 10;      ///< a rival whose score is within this makes the estimate ambiguous
-  double max_step = 0.5;          ///< rad per update
+  /// Neither happens, or the latter does, for a gap within so many standard deviations of the difference of two scores.
+  double rival_sigmas = 2.5;
+  double max_step = 0.5;  ///< rad per update
 
   // Sign of the direction.
   bool positive_depth = true;      ///< false: V and -V are both accepted, and half of the starts end at the antipode
