@@ -405,13 +405,10 @@ bool MotionEngine::step(MotionCandidate& c, FilterCovariance<double, D>& P, cons
   FilterCovariance<double, D> next = P;
   const FilterStep<double, D> s = updateCovariance(next, frame, options_.max_step, options_.second_derivatives);
   if (!s.step.allFinite() || !next.reported.allFinite()) return false;
-  boundDirection(next.reported), boundDirection(next.gain);
+  boundDirection(next);
   const S2d moved = exp(c.direction, Eigen::Vector2d(s.step.template head<2>()));
   const Eigen::Matrix2d T = frameTransport(c.direction, moved);
-  for (Eigen::Matrix<double, D, D>* m : {&next.gain, &next.reported}) {
-    m->template topRows<2>() = (T * m->template topRows<2>()).eval();
-    m->template leftCols<2>() = (m->template leftCols<2>() * T.transpose()).eval();
-  }
+  turnDirection<D>(next.gain, T), turnDirection<D>(next.reported, T);
   P = next;
   c.direction = moved;
   const int equations = static_cast<int>(e.inliers) - (state_ == MotionState::rotation || frame_.has_gyroscope ? 0 : 3);
@@ -480,11 +477,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(MotionCandidate& c) const {
   const Eigen::Matrix<double, 3, 2> from = ManifoldTraits<S2d>::placement(c.direction).matrix().leftCols<2>();
   const Eigen::Matrix<double, 3, 2> to = ManifoldTraits<S2d>::placement(opposite).matrix().leftCols<2>();
   const Eigen::Matrix2d T = -(to.transpose() * from);
-  for (Eigen::Matrix2d* P : {&c.narrow.gain, &c.narrow.reported}) *P = (T * *P * T.transpose()).eval();
-  for (Eigen::Matrix<double, 5, 5>* P : {&c.wide.gain, &c.wide.reported}) {
-    P->topRows<2>() = (T * P->topRows<2>()).eval();
-    P->leftCols<2>() = (P->leftCols<2>() * T.transpose()).eval();
-  }
+  turnDirection<2>(c.narrow.gain, T), turnDirection<2>(c.narrow.reported, T);
+  turnDirection<5>(c.wide.gain, T), turnDirection<5>(c.wide.reported, T);
   c.direction = opposite;
   c.evidence = -c.evidence, c.depth = -c.depth;
 }

@@ -31,25 +31,41 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
     in_charge_ = false;
     ++fall_backs_;
     waiting_ = options_.lost_frames;
+    frames_.clear();
+    next_frame_ = 0;
     return own;
+  }
+  if (hand_over_.frames > 0) {
+    if (frames_.size() < hand_over_.frames) frames_.emplace_back();
+    Frame& frame = frames_[next_frame_++ % hand_over_.frames];
+    frame.pairs.assign(pairs.begin(), pairs.end());
+    frame.has_gyroscope = gyroscope != nullptr;
+    if (gyroscope != nullptr) frame.gyroscope = *gyroscope;
   }
   waiting_ -= waiting_ > 0 ? 1 : 0;
   if (waiting_ > 0 || !own.ok() || own.hypotheses != 1 || own.frame < options_.first_pruning ||
       !(own.direction.covariance.trace() < hand_over_.variance)) {
     return own;
   }
-  const Gaussian<S2d> direction = translationDirection(own);
   Gaussian<Essentiald> state;
-  state.mean = Essentiald(own.rotation.mean, direction.mean);
-  state.covariance.setZero();
-  state.covariance.topLeftCorner<2, 2>() = hand_over_.covariance_factor * direction.covariance;
-  state.covariance.bottomRightCorner<3, 3>().diagonal().array() = hand_over_.rotation_variance;
-  state.covariance.diagonal().array() += hand_over_.covariance_floor;
-  essential_.reset();
+  state.mean = Essentiald(own.rotation.mean, translationDirection(own).mean);
+  state.covariance = hand_over_.start_variance * Eigen::Matrix<double, 5, 5>::Identity();
   essential_.start(state);
-  in_charge_ = true;
+  for (std::size_t k = 0; k < frames_.size(); ++k) {
+    const Frame& frame = frames_[(next_frame_ + k) % frames_.size()];
+    if (frame.has_gyroscope) {
+      essential_.update(frame.pairs, frame.gyroscope);
+    } else {
+      essential_.update(frame.pairs);
+    }
+  }
+  in_charge_ = !essential_.estimate().flags.lost;
+  if (!in_charge_) {
+    waiting_ = options_.lost_frames;
+    return own;
+  }
   ++hand_overs_;
-  return own;
+  return essential_.estimate();
 }
 
 }  // namespace liestat

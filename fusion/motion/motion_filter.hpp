@@ -5,7 +5,8 @@
 //   for (…) if (filter.update(pairs).ok()) … filter.estimate()
 //
 // The essential filter is handed the direction and rotation when one hypothesis is left and its variance is below
-// `hand_over_variance`, not at a fixed frame (which costs right answers at large noise). The subspace filter goes on
+// `variance`, not at a fixed frame (which costs right answers at large noise), and runs
+// through the last frames again from there, with a wide prior: their information counts once. The subspace filter goes on
 // running, so that the fall-back loses nothing: it comes when the mean innovation of the last ten frames exceeds
 // MotionFilterOptions::lost_innovation, and the hand-over may come again after as many frames.
 #pragma once
@@ -15,15 +16,15 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 namespace liestat {
 
 struct MotionHandOver {
-  bool essential = true;            ///< false: the subspace filter alone
-  double variance = 0.01;           ///< rad²: trace of the direction's covariance below which it comes
-  double covariance_factor = 2;     ///< the essential filter starts with so many times the covariance,
-  double covariance_floor = 1e-4;   ///< rad², and this added to it,
-  double rotation_variance = 1e-2;  ///< rad², and a rotation about which little is taken over
+  bool essential = true;         ///< false: the subspace filter alone
+  double variance = 0.003;       ///< rad²: trace of the direction's covariance below which it comes
+  std::size_t frames = 20;       ///< the last frames, which the essential filter is run through from there,
+  double start_variance = 0.01;  ///< rad²: with this of the direction and of the rotation
   /// Mean normalised innovation of the last ten frames above which the essential filter is left. Its innovations follow
   /// χ²: with 20 points the mean of ten frames has a standard deviation of 0.1.
   double fall_back = 1.5;
@@ -56,6 +57,8 @@ class MotionFilter {
   const EssentialFilter& essential() const { return essential_; }
   void reset() {
     subspace_.reset(), essential_.reset();
+    frames_.clear();
+    next_frame_ = 0;
     in_charge_ = false, hand_overs_ = fall_backs_ = waiting_ = 0;
   }
 
@@ -70,6 +73,13 @@ class MotionFilter {
   MotionHandOver hand_over_;
   SubspaceFilter subspace_;
   EssentialFilter essential_;
+  struct Frame {
+    std::vector<PointPair> pairs;
+    GyroscopeRotation gyroscope;
+    bool has_gyroscope = false;
+  };
+  std::vector<Frame> frames_;  ///< a ring
+  std::size_t next_frame_ = 0;
   bool in_charge_ = false;
   std::size_t hand_overs_ = 0, fall_backs_ = 0, waiting_ = 0;
 };

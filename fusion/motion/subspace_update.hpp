@@ -249,22 +249,49 @@ FilterStep<S, D> updateCovariance(FilterCovariance<S, D>& P, const FrameInformat
   return result;
 }
 
-/// Bounds the covariance of a direction, its first two coordinates: eigenvalues at most `most` (rad²), by a congruence
-/// that keeps it positive semi-definite, and at least `least`.
+/// A symmetric 2×2 matrix as U diag(values) Uᵀ, the larger value first.
+struct SymmetricPair {
+  Eigen::Vector2d values;
+  Eigen::Matrix2d U;
+
+  explicit SymmetricPair(const Eigen::Matrix2d& A) {
+    const double mean = 0.5 * (A(0, 0) + A(1, 1)), difference = 0.5 * (A(0, 0) - A(1, 1));
+    const double radius = std::hypot(difference, A(0, 1)), angle = 0.5 * std::atan2(A(0, 1), difference);
+    const double c = std::cos(angle), s = std::sin(angle);
+    values << mean + radius, mean - radius;
+    U << c, -s, s, c;
+  }
+};
+
+/// P ← diag(T, I) P diag(T, I)ᵀ.
 template <int D>
-void boundDirection(Eigen::Matrix<double, D, D>& P, double most = 1, double least = 1e-12) {
-  P(0, 0) += least, P(1, 1) += least;
-  if (P(0, 0) + P(1, 1) <= most) return;
-  const double mean = 0.5 * (P(0, 0) + P(1, 1)), difference = 0.5 * (P(0, 0) - P(1, 1));
-  const double radius = std::hypot(difference, P(0, 1));
-  const double large = mean + radius, small = mean - radius;
-  if (!(large > most)) return;
-  const double angle = 0.5 * std::atan2(P(0, 1), difference), c = std::cos(angle), s = std::sin(angle);
-  const double f = std::sqrt(most / large), g = small > most ? std::sqrt(most / small) : 1;
-  Eigen::Matrix2d T;
-  T << f * c * c + g * s * s, (f - g) * c * s, (f - g) * c * s, f * s * s + g * c * c;
+void turnDirection(Eigen::Matrix<double, D, D>& P, const Eigen::Matrix2d& T) {
   P.template topRows<2>() = (T * P.template topRows<2>()).eval();
-  P.template leftCols<2>() = (P.template leftCols<2>() * T).eval();
+  P.template leftCols<2>() = (P.template leftCols<2>() * T.transpose()).eval();
+}
+
+/// Bounds the covariance of a direction, the first two coordinates, by congruences that keep the whole positive
+/// semi-definite: eigenvalues between `least` and `most` (rad²), and no less in any direction than that of Gauss-Newton,
+/// as a gain that happens to cancel the error of one frame tells nothing of those before.
+template <int D>
+void boundDirection(FilterCovariance<double, D>& P, double most = 1, double least = 1e-12) {
+  for (Eigen::Matrix<double, D, D>* m : {&P.gain, &P.reported}) {
+    (*m)(0, 0) += least, (*m)(1, 1) += least;
+    if (!((*m)(0, 0) + (*m)(1, 1) > most)) continue;
+    const SymmetricPair pair(m->template topLeftCorner<2, 2>());
+    const Eigen::Vector2d f = (most / pair.values.array().max(most)).sqrt();
+    turnDirection<D>(*m, pair.U * f.asDiagonal() * pair.U.transpose());
+  }
+  const double l00 = std::sqrt(P.gain(0, 0)), l10 = P.gain(1, 0) / l00;
+  const double l11 = std::sqrt(std::max(P.gain(1, 1) - l10 * l10, 1e-300));
+  Eigen::Matrix2d L, inverse;
+  L << l00, 0, l10, l11;
+  inverse << 1 / l00, 0, -l10 / (l00 * l11), 1 / l11;
+  const Eigen::Matrix2d own = P.reported.template topLeftCorner<2, 2>();
+  const SymmetricPair pair(Eigen::Matrix2d(inverse * own * inverse.transpose()));
+  if (pair.values[1] >= 1) return;
+  const Eigen::Vector2d f = pair.values.array().max(1e-12).inverse().max(1).sqrt();
+  turnDirection<D>(P.reported, L * (pair.U * f.asDiagonal() * pair.U.transpose()) * inverse);
 }
 
 }  // namespace liestat
