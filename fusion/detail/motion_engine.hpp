@@ -121,8 +121,8 @@ class MotionEngine {
   std::vector<std::size_t> index_;  ///< of each in the caller's list
   std::size_t given_ = 0;
   std::vector<FlowPoint<double>> points_;
-  std::vector<FlowRow<double>> rows_, trial_;
-  std::vector<double> weights_;
+  std::vector<FlowRow<double>> rows_;
+  std::vector<double> weights_, squared_;
   std::vector<InverseDepth> depths_;
 
   // Frames of a linear start.

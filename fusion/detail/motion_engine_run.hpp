@@ -66,7 +66,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::readFrame(std::span<const PointPair> pa
 }
 
 LIESTAT_FUSION_INLINE void MotionEngine::resize(std::size_t n) {
-  points_.resize(n), rows_.resize(n), weights_.resize(n);
+  points_.resize(n), rows_.resize(n), weights_.resize(n), squared_.resize(n);
 }
 
 LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const PointPair> pairs,
@@ -305,16 +305,29 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const MotionCandidate& c
     return weights_[i] * error * error;
   };
   Eigen::Vector3d Omega = rotationSums<double>(rows_).solve(prior);
+  // With a gyroscope the rotation cannot give way: far from the truth all errors are large, and the smaller ones among
+  // them still show where to go. Errors then count in units of their median, 0.455 for χ² of one degree of freedom. (A
+  // free rotation fits the inliers at any direction, and this would only let outliers in.)
+  double scale = 1;
+  const auto rescale = [&] {
+    if (!frame_.has_gyroscope) return;
+    for (std::size_t i = 0; i < n; ++i) squared_[i] = squared(i, Omega);
+    const auto middle = squared_.begin() + static_cast<std::ptrdiff_t>(n / 2);
+    std::nth_element(squared_.begin(), middle, squared_.end());
+    scale = std::max(1.0, *middle / 0.455);
+  };
   for (int pass = 0; pass < 12; ++pass) {
+    if (pass % 3 == 0) rescale();
     for (std::size_t i = 0; i < n; ++i) {
-      const double z2 = squared(i, Omega), f = 1 / (1 + z2 / 9);
+      const double z2 = squared(i, Omega) / scale, f = 1 / (1 + z2 / 9);
       rows_[i].weight = weights_[i] * (pass < 6 ? 1 / std::max(1.0, std::sqrt(z2)) : f * f);
     }
     Omega = rotationSums<double>(rows_).solve(prior);
   }
+  rescale();
   const bool gate = candidates_.size() == 1 && updates_ >= options_.first_pruning && c.narrow.reported.trace() < 0.01 &&
                     (state_ == MotionState::direction || c.wide.reported.topLeftCorner<2, 2>().trace() < 0.01);
-  const double limit = options_.outlier_threshold * options_.outlier_threshold;
+  const double limit = options_.outlier_threshold * options_.outlier_threshold * scale;
   for (std::size_t i = 0; i < n; ++i) rows_[i].weight = squared(i, Omega) <= limit ? weights_[i] : 0;
   if (gate) {
     // e² ≤ gate² (variance + G P Gᵀ + hᵀ M⁻¹ h), with M without the pair itself.
@@ -485,7 +498,14 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(MotionCandidate& c) const {
 
 LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
   bool any = false;
-  for (MotionCandidate& c : candidates_) any = advance(c) || any;
+  for (MotionCandidate& c : candidates_) {
+    if (advance(c)) {
+      any = true;
+    } else {
+      // One to which the frame says nothing must not gain by it.
+      c.score += options_.outliers ? 9 * static_cast<double>(pairs_.size()) : c.cost;
+    }
+  }
   if (!any) {
     estimate_.flags.degenerate = true;
     updated_ = false;
