@@ -3,13 +3,13 @@
 
 #include <fusion/detail/motion_engine.hpp>
 #include <fusion/detail/motion_statistics.hpp>
+#include <fusion/motion/search.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 #include <lie/manifold.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace liestat::detail {
 
@@ -236,13 +236,12 @@ LIESTAT_FUSION_INLINE void MotionEngine::updateRotationAlone() {
 /// Directions of a spherical Fibonacci lattice on the hemisphere z > 0: costs do not tell V from -V.
 LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   const std::size_t n = std::max<std::size_t>(options_.starts, 1);
+  const std::vector<Eigen::Vector3d> lattice = hemisphereLattice(n);
   candidates_.assign(n, MotionCandidate{});
   best_ = updates_ = innovation_count_ = 0, innovation_sum_ = 0;
   for (std::size_t i = 0; i < n; ++i) {
     MotionCandidate& c = candidates_[i];
-    const double z = (static_cast<double>(i) + 0.5) / static_cast<double>(n), r = std::sqrt(1 - z * z);
-    const double angle = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0));
-    c.direction = S2d(r * std::cos(angle), r * std::sin(angle), z);
+    c.direction = S2d(lattice[i]);
     if (state_ == MotionState::gyroscope_bias) {
       c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
     }
