@@ -30,7 +30,7 @@ struct MotionCandidate {
   double score = 0;
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
-  double evidence = 0, evidence_variance = 0;
+  double evidence = 0, evidence_variance = 0, evidence_weight = 0;
 
   // Of the last frame that it was updated with.
   Eigen::Vector3d Omega = Eigen::Vector3d::Zero();

@@ -482,6 +482,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(MotionCandidate& c) const {
   const double decay = options_.evidence_decay;
   c.evidence = decay * c.evidence + c.depth / c.depth_variance;
   c.evidence_variance = decay * decay * c.evidence_variance + 1 / c.depth_variance;
+  c.evidence_weight = decay * c.evidence_weight + 1 / c.depth_variance;
   if (!options_.positive_depth || !(c.evidence < 0)) return;
   const Eigen::Vector3d V = c.direction.unit_vector();
   const S2d opposite(Eigen::Vector3d(-V));
@@ -639,7 +640,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
                                   ? Eigen::Matrix3d(c.rotation.matrix().transpose())
                                   : Eigen::Matrix3d(SO3d::rightJacobian(c.Omega));
     out.rotation.covariance = J * c.rotation_covariance * J.transpose();
-    out.mean_inverse_depth = c.depth, out.mean_inverse_depth_variance = c.depth_variance;
+    out.mean_inverse_depth = c.evidence / c.evidence_weight;
+    out.mean_inverse_depth_variance = c.evidence_variance / (c.evidence_weight * c.evidence_weight);
     out.cost = c.cost, out.innovation = c.innovation, out.inliers = c.inliers;
     const bool free_rotation = state_ != MotionState::rotation && !frame_.has_gyroscope;
     out.degrees_of_freedom = static_cast<int>(c.inliers) - (free_rotation ? 3 : 0);

@@ -81,8 +81,9 @@ struct MotionEstimate {
   Gaussian<SO3d> rotation;
   Gaussian<Eigen::Vector3d> gyroscope_bias;  ///< rad per frame, signed like GyroscopeRotation; where it is a state
 
-  double mean_inverse_depth = 0;           ///< |V|/Z, weighted by information; its sign is that of the depths
-  double mean_inverse_depth_variance = 0;  ///< of one frame
+  /// |V|/Z, weighted by information over the points and discounted over some twenty frames; its sign is that of the
+  /// depths.
+  double mean_inverse_depth = 0, mean_inverse_depth_variance = 0;
   /// Evidence for positive depths, discounted over time, in its standard deviations: above 2 the sign is decided.
   double sign_evidence = 0;
 
