@@ -94,10 +94,19 @@ class MotionScene {
     bias = s * unit;
   }
 
-  const Eigen::Vector3d& truthAxis() const { return axis_; }
+  /// px: what the pairs say about their noise; 0: the truth.
+  double told_sigma = 0;
+
   bool hasGyroscope() const { return options.gyroscope_sigma > 0; }
   /// Standard deviation of a calibrated coordinate.
   double sigma() const { return options.sigma / options.focal_length; }
+  double toldSigma() const { return (told_sigma > 0 ? told_sigma : options.sigma) / options.focal_length; }
+  /// Ω of an interval, rad per frame; the first is 1.
+  Eigen::Vector3d rotationOf(std::size_t of_frame) const {
+    if (options.world != MotionWorld::turning) return options.rotation * degree * axis_;
+    const double angle = 2 * std::numbers::pi * static_cast<double>(of_frame) / 40;
+    return options.rotation * degree * (std::cos(angle) * axis_ + std::sin(angle) * second_axis_);
+  }
 
   /// The next frame. Every track of a frame is seen in the next one too: there are `points` pairs in each interval.
   void advance() {
@@ -111,7 +120,7 @@ class MotionScene {
       const MotionTrack before = track;
       track.position = now(track.position);
       track.at = measured(track.position);
-      PointPair pair{before.at, track.at, sigma()};
+      PointPair pair{before.at, track.at, toldSigma()};
       bool right = true;
       if (options.outliers > 0) {
         const double luck = wrong_.uniform(), dx = wrong_.uniform(-0.2, 0.2), dy = wrong_.uniform(-0.2, 0.2);
@@ -141,11 +150,6 @@ class MotionScene {
     Eigen::Vector3d T;
     Eigen::Vector3d operator()(const Eigen::Vector3d& X) const { return R * X + T; }
   };
-  Eigen::Vector3d rotationOf(std::size_t of_frame) const {
-    if (options.world != MotionWorld::turning) return options.rotation * degree * axis_;
-    const double angle = 2 * std::numbers::pi * static_cast<double>(of_frame) / 40;
-    return options.rotation * degree * (std::cos(angle) * axis_ + std::sin(angle) * second_axis_);
-  }
   Motion motionOf(std::size_t of_frame) const {
     const Eigen::Vector3d Omega = rotationOf(of_frame);
     return {SO3d::exp(Omega).matrix(), SO3d::leftJacobian(Omega) * velocity};
