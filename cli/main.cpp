@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
                           {addSimulateTwoViewCommand, addSimulateViCommand}},
                          {"validate",
                           validate_description,
-                          {addValidateEstimatorCommand, addValidateMeansCommand, addValidatePreintegrationCommand,
-                           addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand,
-                           addValidateTwoViewCommand, addValidateViInitCommand}}});
+                          {addValidateEstimatorCommand, addValidateMeansCommand, addValidateMotionCommand,
+                           addValidatePreintegrationCommand, addValidatePropagationCommand, addValidateRobustCommand,
+                           addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
 }

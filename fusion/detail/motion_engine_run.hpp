@@ -82,7 +82,8 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const
   } else if (!atStandstill()) {
     updated_ = true;
     const bool linear = state_ != MotionState::rotation && options_.linear_start && frame_.has_gyroscope &&
-                        !options_.outliers && kept_ < options_.linear_frames && updates_ == kept_;
+                        !options_.outliers && kept_ < options_.linear_frames && updates_ == kept_ &&
+                        (kept_ > 0 || pairs_.size() >= options_.min_pairs);
     if (linear) {
       startLinearly();
     } else {

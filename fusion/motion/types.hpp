@@ -162,7 +162,9 @@ struct MotionFilterOptions {
   bool estimate_bias = false;  ///< its bias is a state
   double bias_sigma = 2e-3;    ///< rad per frame, at the start
   double bias_noise = 0;       ///< rad² per frame
-  bool linear_start = true;    ///< with a gyroscope: one hypothesis from a linear solution over `linear_frames` frames
+  /// With a gyroscope and `min_pairs` pairs: one hypothesis, from a linear solution over `linear_frames` frames. (Fewer
+  /// pairs have more minima than one.)
+  bool linear_start = true;
   std::size_t linear_frames = 6;
 
   /// False: the covariance of plain Gauss-Newton, which counts noise as signal; for comparisons.
