@@ -64,14 +64,13 @@ std::string sceneOf(const MotionRow& row) {
   return text;
 }
 
-const Cells headers{"scene", "px", "20: %", "deg", "50: %", "deg", "100: %", "deg", "xPx/2", "95 %", "verdict"};
+const Cells headers{"scene", "px", "20: % deg", "50: % deg", "100: % deg", "xPx/2", "95 %", "verdict"};
 std::string degrees(double value) { return fmt::format("{:.{}f}", value, value < 9.995 ? 2 : 1); }
 Cells cellsOf(const MotionRow& row) {
   Cells cells{sceneOf(row), fmt::format("{:g}", row.scene.sigma)};
   for (std::size_t k = 0; k < motion_frames.size(); ++k) {
-    cells.push_back(
-        fmt::format("{:.0f}", 100. * static_cast<double>(row.successes[k]) / static_cast<double>(row.trials)));
-    cells.push_back(degrees(row.median[k]));
+    const double share = 100. * static_cast<double>(row.successes[k]) / static_cast<double>(row.trials);
+    cells.push_back(fmt::format("{:3.0f} {:>5}", share, degrees(row.median[k])));
   }
   const bool covariance = std::isfinite(row.consistency.back());
   cells.push_back(covariance ? fmt::format("{:.2f}", row.consistency.back()) : "");
