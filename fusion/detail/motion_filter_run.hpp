@@ -1,0 +1,71 @@
+// Definitions of fusion/motion/motion_filter.hpp.
+#pragma once
+
+#include <fusion/motion/motion_filter.hpp>
+
+#include <algorithm>
+
+namespace liestat {
+
+LIESTAT_FUSION_INLINE Gaussian<S2d> translationDirection(const MotionEstimate& estimate) {
+  if (estimate.meaning == DirectionMeaning::translation) return estimate.direction;
+  const Eigen::Matrix3d J = SO3d::leftJacobian(estimate.rotation.mean.log());
+  const Eigen::Vector3d V = estimate.direction.mean.unit_vector(), moved = J * V;
+  const S2d T(moved);
+  // d(J V/|J V|) along the tangent planes' axes.
+  const Eigen::Matrix<double, 3, 2> from =
+      ManifoldTraits<S2d>::placement(estimate.direction.mean).matrix().leftCols<2>();
+  const Eigen::Matrix<double, 3, 2> to = ManifoldTraits<S2d>::placement(T).matrix().leftCols<2>();
+  const Eigen::Matrix2d D = to.transpose() * (J * from) / moved.norm();
+  return {T, D * estimate.direction.covariance * D.transpose()};
+}
+
+LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const PointPair> pairs,
+                                                               const GyroscopeRotation* gyroscope) {
+  const MotionEstimate& own = gyroscope != nullptr ? subspace_.update(pairs, *gyroscope) : subspace_.update(pairs);
+  if (!hand_over_.essential) return own;
+  if (in_charge_) {
+    const MotionEstimate& other =
+        gyroscope != nullptr ? essential_.update(pairs, *gyroscope) : essential_.update(pairs);
+    if (!other.flags.lost && !own.flags.lost) return other;
+    in_charge_ = false;
+    ++fall_backs_;
+    waiting_ = options_.lost_frames;
+    frames_.clear();
+    next_frame_ = 0;
+    return own;
+  }
+  if (hand_over_.frames > 0) {
+    if (frames_.size() < hand_over_.frames) frames_.emplace_back();
+    Frame& frame = frames_[next_frame_++ % hand_over_.frames];
+    frame.pairs.assign(pairs.begin(), pairs.end());
+    frame.has_gyroscope = gyroscope != nullptr;
+    if (gyroscope != nullptr) frame.gyroscope = *gyroscope;
+  }
+  waiting_ -= waiting_ > 0 ? 1 : 0;
+  if (waiting_ > 0 || !own.ok() || own.hypotheses != 1 || own.frame < options_.first_pruning ||
+      !(own.direction.covariance.trace() < hand_over_.variance)) {
+    return own;
+  }
+  Gaussian<Essentiald> state;
+  state.mean = Essentiald(own.rotation.mean, translationDirection(own).mean);
+  state.covariance = hand_over_.start_variance * Eigen::Matrix<double, 5, 5>::Identity();
+  essential_.start(state);
+  for (std::size_t k = 0; k < frames_.size(); ++k) {
+    const Frame& frame = frames_[(next_frame_ + k) % frames_.size()];
+    if (frame.has_gyroscope) {
+      essential_.update(frame.pairs, frame.gyroscope);
+    } else {
+      essential_.update(frame.pairs);
+    }
+  }
+  in_charge_ = !essential_.estimate().flags.lost;
+  if (!in_charge_) {
+    waiting_ = options_.lost_frames;
+    return own;
+  }
+  ++hand_overs_;
+  return essential_.estimate();
+}
+
+}  // namespace liestat
