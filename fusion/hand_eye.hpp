@@ -37,8 +37,8 @@
 
 namespace liestat {
 
-/// Poses (or motions) of both sensors at one time. Covariances may be singular or zero (exact), but not both of them in
-/// the same direction.
+/// Poses (or motions) of both sensors at one time. Covariances may be singular, one of them zero (an exact pose), as long
+/// as both together have rank six.
 struct PosePair {
   Gaussian<SE3d> a, b;
 };

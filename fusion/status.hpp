@@ -73,7 +73,7 @@ enum class FaultKind {
   too_few_poses,    ///< index: how many there are
   pose_not_finite,  ///< index: pair
   bad_covariance  ///< index: pair with a covariance that is not finite, not symmetric or has a negative eigenvalue, or
-                  ///< with two that are zero in one direction
+                  ///< with two of less than rank six together
 };
 
 /// The first thing that is wrong with the input, and where; none where nothing is.
@@ -239,7 +239,8 @@ inline std::string describe(const Fault& fault) {
     case FaultKind::pose_not_finite:
       return "pair " + at + ": a pose is not finite";
     case FaultKind::bad_covariance:
-      return "pair " + at + ": a covariance is not symmetric and positive semi-definite, or both are singular together";
+      return "pair " + at +
+             ": a covariance is not symmetric and positive semi-definite, or both together have less than rank 6";
   }
   return "";
 }

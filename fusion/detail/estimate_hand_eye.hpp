@@ -72,25 +72,13 @@ class HandEyeRun {
       const PosePair& pair = pairs_[i];
       if (!pair.a.mean.params().allFinite() || !pair.b.mean.params().allFinite())
         return {FaultKind::pose_not_finite, i};
-      if (!PosePairNoise(pair.a.covariance, pair.b.covariance).valid() || !hasRegularSum(pair)) {
-        return {FaultKind::bad_covariance, i};
-      }
+      // Six equations need six errors; whether these are independent shows in the frames of the estimate.
+      const PosePairNoise noise(pair.a.covariance, pair.b.covariance);
+      if (!noise.valid() || noise.rank() < 6) return {FaultKind::bad_covariance, i};
     }
     if (pairs_.size() < (world ? 3 : 2)) return {FaultKind::too_few_poses, pairs_.size()};
     return {};
   }
-  /// Whether the errors of a pair move its equations in every direction, in the unit of their standard deviations.
-  static bool hasRegularSum(const PosePair& pair) {
-    Matrix6 sum = pair.a.covariance + pair.b.covariance;
-    const Vector6 scale = sum.diagonal();
-    if (!(scale.minCoeff() > 0)) return false;
-    for (int j = 0; j < 6; ++j) {
-      for (int i = 0; i < 6; ++i) sum(i, j) /= std::sqrt(scale[i] * scale[j]);
-    }
-    sum.diagonal().array() -= 1e-12;
-    return Cholesky<double, 6>(sum).ok();
-  }
-
   /// By the numbers in the pairs, so that sums and samples do not depend on the order of the input.
   void sortByContent() {
     using Key = std::array<double, 86>;

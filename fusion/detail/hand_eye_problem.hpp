@@ -105,12 +105,15 @@ class PosePairNoise {
       if (factor.ok()) return factor.inverse();
       const SemidefiniteParts<6> parts(V);
       valid_ = valid_ && parts.valid;
+      rank_ -= parts.null_dimension;
       return parts.inverse;
     };
     information_a_ = information(a), information_b_ = information(b);
   }
 
   bool valid() const { return valid_; }
+  /// Of both covariances together.
+  int rank() const { return rank_; }
   template <int P>
   Eigen::Matrix<double, 12, P> spread(const Eigen::Matrix<double, P, 12>& D) const {
     Eigen::Matrix<double, 12, P> result;
@@ -133,6 +136,7 @@ class PosePairNoise {
   }
   Matrix6 a_, b_, information_a_, information_b_;
   bool valid_ = true;
+  int rank_ = 12;
 };
 
 /// Sums over pairs at one value. Blocks y, y for both kinds of problem; of AX = XB `x` is not used.
