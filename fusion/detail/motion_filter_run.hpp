@@ -20,6 +20,14 @@ LIESTAT_FUSION_INLINE Gaussian<S2d> translationDirection(const MotionEstimate& e
   return {T, D * estimate.direction.covariance * D.transpose()};
 }
 
+LIESTAT_FUSION_INLINE void MotionFilter::fallBack() {
+  in_charge_ = false;
+  waiting_ = options_.lost_frames << std::min<std::size_t>(fall_backs_, 8);
+  ++fall_backs_;
+  frames_.clear();
+  next_frame_ = 0;
+}
+
 LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const PointPair> pairs,
                                                                const GyroscopeRotation* gyroscope) {
   const MotionEstimate& own = gyroscope != nullptr ? subspace_.update(pairs, *gyroscope) : subspace_.update(pairs);
@@ -27,12 +35,15 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
   if (in_charge_) {
     const MotionEstimate& other =
         gyroscope != nullptr ? essential_.update(pairs, *gyroscope) : essential_.update(pairs);
-    if (!other.flags.lost && !own.flags.lost) return other;
-    in_charge_ = false;
-    ++fall_backs_;
-    waiting_ = options_.lost_frames;
-    frames_.clear();
-    next_frame_ = 0;
+    if (other.cost > 0 && own.cost > 0 && !other.flags.standstill && !other.flags.too_few) {
+      const auto n = static_cast<double>(std::min<std::size_t>(++in_charge_for_, 10));
+      own_innovation_ += (own.innovation - own_innovation_) / n;
+      other_innovation_ += (other.innovation - other_innovation_) / n;
+    }
+    const bool changes = in_charge_for_ >= 10 && other_innovation_ > hand_over_.fall_back * own_innovation_;
+    const bool loses = other.flags.degenerate && !own.flags.degenerate;
+    if (!other.flags.lost && !own.flags.lost && !changes && !loses) return other;
+    fallBack();
     return own;
   }
   if (hand_over_.frames > 0) {
@@ -59,11 +70,12 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
       essential_.update(frame.pairs);
     }
   }
-  in_charge_ = !essential_.estimate().flags.lost;
-  if (!in_charge_) {
-    waiting_ = options_.lost_frames;
+  if (essential_.estimate().flags.lost || essential_.estimate().flags.degenerate) {
+    fallBack();
     return own;
   }
+  in_charge_ = true;
+  in_charge_for_ = 0, own_innovation_ = other_innovation_ = 0;
   ++hand_overs_;
   return essential_.estimate();
 }

@@ -7,8 +7,9 @@
 // The essential filter is handed the direction and rotation when one hypothesis is left and its variance is below
 // `variance`, not at a fixed frame (which costs right answers at large noise), and runs
 // through the last frames again from there, with a wide prior: their information counts once. The subspace filter goes on
-// running, so that the fall-back loses nothing: it comes when the mean innovation of the last ten frames exceeds
-// MotionFilterOptions::lost_innovation, and the hand-over may come again after as many frames.
+// running, so that the fall-back loses nothing: it comes when the innovations of the essential filter are larger than those
+// of the subspace filter, which needs no constant rotation, or its direction is no longer determined. The hand-over may
+// come again after ten frames, and after twice as many each time.
 #pragma once
 
 #include <fusion/motion/essential_filter.hpp>
@@ -25,18 +26,15 @@ struct MotionHandOver {
   double variance = 0.003;       ///< rad²: trace of the direction's covariance below which it comes
   std::size_t frames = 20;       ///< the last frames, which the essential filter is run through from there,
   double start_variance = 0.01;  ///< rad²: with this of the direction and of the rotation
-  /// Mean normalised innovation of the last ten frames above which the essential filter is left. Its innovations follow
-  /// χ²: with 20 points the mean of ten frames has a standard deviation of 0.1.
-  double fall_back = 1.5;
+  /// Mean normalised innovation of the essential filter over that of the subspace filter, in the last ten frames, above
+  /// which the rotation changes too much for the former. With 20 points the ratio has a standard deviation of 0.1.
+  double fall_back = 1.3;
 };
 
 class MotionFilter {
  public:
   explicit MotionFilter(const MotionFilterOptions& options = {}, const MotionHandOver& hand_over = {})
-      : options_(options),
-        hand_over_(hand_over),
-        subspace_(options),
-        essential_(essentialOptions(options, hand_over)) {}
+      : options_(options), hand_over_(hand_over), subspace_(options), essential_(options) {}
 
   /// The next frame.
   const MotionEstimate& update(std::span<const PointPair> pairs) { return next(pairs, nullptr); }
@@ -63,10 +61,7 @@ class MotionFilter {
   }
 
  private:
-  static MotionFilterOptions essentialOptions(MotionFilterOptions options, const MotionHandOver& hand_over) {
-    options.lost_innovation = hand_over.fall_back;
-    return options;
-  }
+  void fallBack();
   const MotionEstimate& next(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
 
   MotionFilterOptions options_;
@@ -82,6 +77,8 @@ class MotionFilter {
   std::size_t next_frame_ = 0;
   bool in_charge_ = false;
   std::size_t hand_overs_ = 0, fall_backs_ = 0, waiting_ = 0;
+  double own_innovation_ = 0, other_innovation_ = 0;  ///< means over the last ten frames in charge
+  std::size_t in_charge_for_ = 0;
 };
 
 /// T of X₂ = R X₁ + T from a velocity that is constant over the interval, T = J_l(Ω) V, or the direction itself where it
