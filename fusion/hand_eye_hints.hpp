@@ -28,13 +28,13 @@ namespace liestat {
 /// What a covariance beside a pose T may be of. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
 /// covariance of the inverse pose is one of `left`.
 enum class CovarianceReading {
-  right,           ///< T·Exp(e), translation before rotation: the library's own
-  left,            ///< Exp(e)·T, or T⁻¹·Exp(e)
-  rotation_first,  ///< T·Exp(e) with the rotation's block first
-  world_axes       ///< rotation and translation each along the axes of the world
+  right,                      ///< T·Exp(e), translation before rotation: the library's own
+  left,                       ///< Exp(e)·T, or T⁻¹·Exp(e)
+  rotation_then_translation,  ///< T·Exp(e) with the rotation's block first
+  world_axes                  ///< rotation and translation each along the axes of the world
 };
 inline constexpr std::array all_covariance_readings = {CovarianceReading::right, CovarianceReading::left,
-                                                       CovarianceReading::rotation_first,
+                                                       CovarianceReading::rotation_then_translation,
                                                        CovarianceReading::world_axes};
 
 /// How a file's poses and covariances are to be read.
@@ -57,7 +57,7 @@ inline Gaussian<SE3d> readPose(const Gaussian<SE3d>& given, const PoseReading& r
     case CovarianceReading::left:
       pose = fromLeftCovariance<SE3d>(given.mean, given.covariance);
       break;
-    case CovarianceReading::rotation_first:
+    case CovarianceReading::rotation_then_translation:
       pose.covariance = covarianceFromOrder<SE3d>(given.covariance, rotation_first);
       break;
     case CovarianceReading::world_axes:

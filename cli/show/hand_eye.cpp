@@ -233,7 +233,7 @@ std::string readingInWords(CovarianceReading reading, bool is_a, const HandEyeFi
     case CovarianceReading::left:
       return fmt::format("those of {}, or of left perturbations Exp(e) T, which is the same",
                          poseName(is_a, !file.inverted, world));
-    case CovarianceReading::rotation_first:
+    case CovarianceReading::rotation_then_translation:
       return "ones with the rotation's block first";
     case CovarianceReading::world_axes:
       return "ones along the axes of the world, rotation and translation apart";
