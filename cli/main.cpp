@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
         {addSimulateHandEyeCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
        {"validate",
         validate_description,
-        {addValidateEstimatorCommand, addValidateMeansCommand, addValidatePreintegrationCommand,
-         addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand, addValidateTwoViewCommand,
-         addValidateViInitCommand}}});
+        {addValidateEstimatorCommand, addValidateHandEyeCommand, addValidateMeansCommand,
+         addValidatePreintegrationCommand, addValidatePropagationCommand, addValidateRobustCommand,
+         addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
 }

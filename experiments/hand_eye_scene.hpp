@@ -137,8 +137,8 @@ class HandEyeScene {
   }
   /// About any axis.
   SO3d turn(double largest) {
-    const Eigen::Vector3d axis = draw_.unitVector<3>();
-    return SO3d::exp(draw_.uniform(0.0, largest) * axis);
+    const Eigen::Vector3d any = draw_.unitVector<3>();
+    return SO3d::exp(draw_.uniform(0.0, largest) * any);
   }
   /// target_T_camera: the camera looks at the target, turned by a rotation.
   SE3d camera() {
@@ -248,14 +248,14 @@ class HandEyeScene {
       const std::size_t i = order[k];
       inlier[i] = false;
       SE3d& B = pairs[i].b.mean;
-      const Eigen::Vector3d axis = rng.unitVector<3>(), direction = rng.unitVector<3>();
+      const Eigen::Vector3d turned = rng.unitVector<3>(), direction = rng.unitVector<3>();
       const double u = rng.uniform(), v = rng.uniform();
       switch (options_.outlier_kind) {
         case HandEyeOutliers::gross:
-          B = SE3d(SO3d::exp(u * std::numbers::pi * axis), (0.2 + v) * direction);
+          B = SE3d(SO3d::exp(u * std::numbers::pi * turned), (0.2 + v) * direction);
           break;
         case HandEyeOutliers::mild:
-          B = B * SE3d(SO3d::exp((5 + 10 * u) * degree * axis), (0.02 + 0.06 * v) * direction);
+          B = B * SE3d(SO3d::exp((5 + 10 * u) * degree * turned), (0.02 + 0.06 * v) * direction);
           break;
         case HandEyeOutliers::flips: {
           // Of C = camera_T_target: the normal of the target is mirrored at the line of sight.

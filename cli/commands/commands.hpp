@@ -15,6 +15,7 @@ void addSimulateHandEyeCommand(const CommandList& simulate);
 void addSimulateTwoViewCommand(const CommandList& simulate);
 void addSimulateViCommand(const CommandList& simulate);
 void addValidateEstimatorCommand(const CommandList& validate);
+void addValidateHandEyeCommand(const CommandList& validate);
 void addValidateMeansCommand(const CommandList& validate);
 void addValidatePreintegrationCommand(const CommandList& validate);
 void addValidatePropagationCommand(const CommandList& validate);
