@@ -86,7 +86,8 @@ std::string countOf(const FeatureFile& file, const std::string& name) {
 PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, const PosePairOptions& options) {
   const std::string name_a = sourceName(path_a), name_b = sourceName(path_b);
   if (path_a == "-" && path_b == "-") throw InputError(name_a, 0, "both files are standard input", "a file for one");
-  PosePairs pairs{.a = readPoses(path_a, options.reading), .b = readPoses(path_b, options.reading)};
+  PosePairs pairs;
+  pairs.a = readPoses(path_a, options.reading), pairs.b = readPoses(path_b, options.reading);
   pairs.by_time = !options.by_row && !pairs.a.times.empty() && !pairs.b.times.empty();
   const std::string at_least = fmt::format("at least {}", options.least);
   if (pairs.by_time) {
