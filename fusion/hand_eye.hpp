@@ -99,8 +99,9 @@ struct PairFit {
 struct HandEyeResult {
   FusionStatus status = FusionStatus::bad_input;
   Fault fault;
-  bool world = false;   ///< AX = YB
-  Gaussian<SE3d> X, Y;  ///< Y is X for AX = XB
+  bool world = false;  ///< AX = YB
+  /// Y is X for AX = XB. Their covariances are blocks of the joint one.
+  Gaussian<SE3d> X = {SE3d(), Eigen::Matrix<double, 6, 6>::Constant(std::numeric_limits<double>::quiet_NaN())}, Y = X;
   /// Joint covariance of the local errors of X and Y, X first (for AX = XB the block of X alone is used). Open directions
   /// count as known: it is singular where there are `directions`, and NaN where one of them rotates X, because a rotation
   /// that may be anything is no small error.

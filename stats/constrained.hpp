@@ -146,13 +146,15 @@ class ConstrainedEstimator {
                        const Channels&... channels)
       : constraint_(constraint), options_(options), states_(detail::ChannelState<Q, Channels>(channels)...) {
     result_.parameter = start;
-    if (options.prior && !hasPrior()) options_.prior.reset();
     bool valid = (channels.valid() && ...);
+    if (options.prior) {
+      // Positive semi-definite; zero is none.
+      valid = valid && detail::SemidefiniteParts<N>(options.prior->information.template cast<double>()).valid;
+      if (valid && !hasPrior()) options_.prior.reset();
+    }
     forAll([&](const auto& state) { valid = valid && state.valid(); });
     valid = valid && coordinates(start).allFinite();
-    if (options_.prior) {
-      valid = valid && options_.prior->information.allFinite() && coordinates(options_.prior->mean).allFinite();
-    }
+    if (options_.prior) valid = valid && coordinates(options_.prior->mean).allFinite();
     if (!valid) result_.end = ConstrainedEnd::bad_input;
     forAll([&](const auto& state) { result_.measurements += state.size(); });
   }
@@ -433,12 +435,13 @@ class ConstrainedEstimator {
     if (end == ConstrainedEnd::bad_input) return false;
     linearize();
     detail::ChannelMerit sum;
-    int dropped = 0, kept = 0;
+    int dropped = 0, kept = 0, unmet = 0;
     result_.uninformative = 0;
     forAll([&](const auto& state) {
       join(sum, state.merit());
       kept += state.keptEquations();
       dropped += state.droppedEquations();
+      unmet += state.unmetEquations(result_.parameter);
       result_.uninformative += state.uninformative();
     });
     result_.equations = kept;
@@ -454,7 +457,8 @@ class ConstrainedEstimator {
     result_.equation_error = equationError();
     result_.degrees_of_freedom = result_.constraints + kept + priorRank() - N + result_.unobservable;
     if (end != ConstrainedEnd::converged && end != ConstrainedEnd::stalled) return false;
-    if (basis_.largest(constraint_values_) > 1e-7 * parameterSize()) {
+    if (basis_.largest(constraint_values_) > 1e-7 * parameterSize() ||
+        (end == ConstrainedEnd::converged && unmet > 0)) {
       result_.end = ConstrainedEnd::contradictory;
     } else if (end == ConstrainedEnd::converged && kept == 0 && !options_.prior && result_.unobservable > 0) {
       result_.end = ConstrainedEnd::too_few;

@@ -289,10 +289,14 @@ class HandEyeRun {
   void report(const HandEyeValue& value, const Strict& strict, const HandEyeExcitation& excitation, int open) {
     HandEyeResult& r = result_;
     r.X.mean = value.X, r.Y.mean = value.Y;
-    r.chi2 = strict.chi2 * r.variance_factor;
-    r.degrees_of_freedom = strict.degrees_of_freedom;
-    if (options_.known_noise)
-      r.p = chiSquaredTail(strict.chi2, static_cast<std::size_t>(std::max(0, r.degrees_of_freedom)));
+    const bool converged = strict.end == ConstrainedEnd::converged;
+    // Corrections of thousands of standard deviations have no limit to converge to; the first estimate has their cost.
+    const double chi2 = converged ? strict.chi2 : candidates_.front().cost;
+    r.chi2 = chi2 * r.variance_factor;
+    r.degrees_of_freedom = 6 * static_cast<int>(inliers_.size()) - parameters + open;
+    if (options_.known_noise) {
+      r.p = chiSquaredTail(chi2, static_cast<std::size_t>(std::max(0, r.degrees_of_freedom)));
+    }
     r.excitations = excitation.values;
     const GripperMotion motion(pairs_, inliers_, world);
     appendOpenDirections(r.directions, excitation, open, value, motion, world);
@@ -310,7 +314,7 @@ class HandEyeRun {
       if (!r.pairs[i].inlier) r.outliers.push_back(i);
     }
 
-    if (!r.rotationIsOpen()) setCovariance(strict.covariance);
+    if (converged && !r.rotationIsOpen()) setCovariance(strict.covariance);
     r.status = statusOf(strict, value, open);
   }
   void setCovariance(const SquareOf<typename Equation::Parameter>& covariance) {
@@ -324,8 +328,8 @@ class HandEyeRun {
   }
   template <class Strict>
   FusionStatus statusOf(const Strict& strict, const HandEyeValue& value, int open) {
+    if (result_.p < options_.least_p && candidates_.front().converged) return FusionStatus::inconsistent;
     if (strict.end != ConstrainedEnd::converged) return FusionStatus::not_converged;
-    if (result_.p < options_.least_p) return FusionStatus::inconsistent;
     if (open > 0) return FusionStatus::undetermined;
     // A second minimum whose cost noise may have made larger, and which is another solution.
     for (std::size_t k = 1; k < candidates_.size(); ++k) {

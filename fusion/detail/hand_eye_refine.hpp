@@ -157,7 +157,10 @@ ConstrainedResult<typename Equation::Parameter> strictHandEye(const HandEyeValue
   HeldDirections<Equation> held{start.Y};
   for (int k = 0; k < open; ++k)
     held.rows.row(k) = product(excitation.metric, Vector6(excitation.vectors.col(k))).transpose();
-  return constrainedEstimate(Equation::parameter(start), channel, held);
+  // It starts within a fraction of a standard deviation of the end.
+  ConstrainedOptions<typename Equation::Parameter> options;
+  options.max_iterations = 30;
+  return constrainedEstimate(Equation::parameter(start), channel, held, options);
 }
 
 }  // namespace liestat::detail

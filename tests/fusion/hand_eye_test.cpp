@@ -407,10 +407,10 @@ TEST(HandEye, BadInput) {
 }
 
 TEST(HandEye, IdenticalPosesLeaveEverythingOpen) {
-  HandEyeScene scene({.pairs = 6}, 12);
-  for (PosePair& pair : scene.pairs) pair = scene.pairs.front();
   for (const bool motions : {false, true}) {
-    const HandEyeResult r = motions ? estimateHandEye(scene.pairs) : estimateRobotWorld(scene.pairs);
+    const HandEyeScene scene({.pairs = 6, .relative = motions}, 12);
+    const std::vector<PosePair> pairs(6, exactPairs(scene).front());
+    const HandEyeResult r = motions ? estimateHandEye(pairs) : estimateRobotWorld(pairs);
     EXPECT_EQ(r.status, FusionStatus::undetermined);
     EXPECT_EQ(r.directions.size(), motions ? 2U : 6U);
     EXPECT_FALSE(r.X.covariance.allFinite());
