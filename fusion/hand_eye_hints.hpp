@@ -122,7 +122,7 @@ class HandEyeExplanation {
   }
 
  private:
-  static constexpr std::size_t most_pairs = 200;
+  static constexpr std::size_t most_pairs = 40;
 
   /// Not more than are needed, spread over their contents, so that their order does not matter.
   static std::vector<PosePair> some(std::span<const PosePair> given) {
@@ -173,7 +173,7 @@ class HandEyeExplanation {
 
 /// The reading of the given poses, other than that which the result was made with, under which they agree best: χ²/dof
 /// nearest to one, with p ≥ 1e-3 and no more than a third of the pairs rejected. Where none does, inverse poses if they
-/// make χ²/dof at least ten times smaller. Of more than 200 pairs a part is fitted. Empty where nothing asks for an
+/// make χ²/dof at least ten times smaller. Of more than 40 pairs a part is fitted. Empty where nothing asks for an
 /// explanation, and where nothing explains it.
 inline std::optional<HandEyeHint> explainHandEye(std::span<const PosePair> given, const HandEyeResult& result,
                                                  const HandEyeHintOptions& options = {}) {

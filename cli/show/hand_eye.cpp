@@ -25,50 +25,57 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// One of the two unknown poses, with the directions in which it is open.
+/// One of the two unknown poses, with the directions of its parent's frame in which it may be moved without a rotation.
 struct Unknown {
   const char* symbol;
   const char *parent, *child;
   const Gaussian<SE3d>& pose;
-  std::vector<Vector6> open;  ///< local twists
+  bool rotation_is_open;
+  std::vector<Eigen::Vector3d> open;
 
   std::string name() const { return fmt::format("{}_T_{}", parent, child); }
   const SE3d& mean() const { return pose.mean; }
+  bool hasCovariance() const { return !rotation_is_open && pose.covariance.allFinite(); }
 
-  /// The covariance of translation (m, along the parent's axes) and rotation vector (rad), as they are printed, and what
-  /// moves them along with a local error.
+  /// From a local error to translation (m, along the parent's axes) and rotation vector (rad), as they are printed.
   Matrix6 toCoordinates() const {
     Matrix6 J = Matrix6::Zero();
     J.topLeftCorner<3, 3>() = mean().so3().matrix();
     J.bottomRightCorner<3, 3>() = SO3d::rightJacobianInverse(mean().so3().log());
     return J;
   }
-  /// Standard deviations after a linear map of the local error; NaN where an open direction has a component.
-  Vector6 sigmas(const Matrix6& map) const {
+  Matrix6 covarianceOfCoordinates() const {
+    const Matrix6 J = toCoordinates();
+    return J * pose.covariance * J.transpose();
+  }
+  /// Standard deviations; NaN where there is none, and along axes in which an open direction has a component.
+  Vector6 sigmasOfCoordinates() const {
+    return sigmas(covarianceOfCoordinates(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  }
+  Vector6 localSigmas() const { return sigmas(pose.covariance, mean().so3().inverse().matrix()); }
+
+ private:
+  Vector6 sigmas(const Matrix6& covariance, const Eigen::Matrix3d& from_parent) const {
+    if (!hasCovariance()) return Vector6::Constant(nan);
     constexpr double share = 1e-3;
-    Vector6 result = (map * pose.covariance * map.transpose()).diagonal().cwiseSqrt();
-    for (const Vector6& direction : open) {
-      const Vector6 moved = map * direction;
-      for (const int part : {0, 3}) {
-        const double bound = share * moved.segment<3>(part).norm();
-        for (int i = part; i < part + 3; ++i) {
-          // The scale of a direction is one of its rotation, or else of its translation.
-          if (std::abs(moved[i]) > std::max(bound, 1e-9)) result[i] = nan;
-        }
+    Vector6 result = covariance.diagonal().cwiseSqrt();
+    for (const Eigen::Vector3d& direction : open) {
+      const Eigen::Vector3d moved = from_parent * direction;
+      for (int i = 0; i < 3; ++i) {
+        if (std::abs(moved[i]) > share * moved.norm()) result[i] = nan;
       }
     }
     return result;
   }
-  Vector6 sigmasOfCoordinates() const { return sigmas(toCoordinates()); }
-  Vector6 localSigmas() const { return sigmas(Matrix6::Identity()); }
 };
 
 std::vector<Unknown> unknownsOf(const HandEyeResult& r) {
-  std::vector<Unknown> list = {{"X", "gripper", "camera", r.X, {}}};
-  for (const OpenDirection& d : r.directions) list[0].open.push_back(r.X.mean.inverse().Adj() * d.twist);
-  if (!r.world) return list;
-  list.push_back({"Y", "base", "target", r.Y, {}});
-  for (const OpenDirection& d : r.directions) list[1].open.push_back(r.Y.mean.inverse().Adj() * d.twist_of_Y);
+  std::vector<Unknown> list = {{"X", "gripper", "camera", r.X, r.rotationIsOpen(), {}}};
+  if (r.world) list.push_back({"Y", "base", "target", r.Y, r.rotationIsOpen(), {}});
+  for (const OpenDirection& d : r.directions) {
+    list[0].open.push_back(d.twist.head<3>());
+    if (r.world) list[1].open.push_back(d.twist_of_Y.head<3>());
+  }
   return list;
 }
 
@@ -93,8 +100,9 @@ std::string verdict(const HandEyeResult& r) {
                 : fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(r.status), verdictOf(r));
 }
 
-std::string fixed(double value, int digits) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "";
+std::string fixed(double value) {
+  const std::string text = std::isfinite(value) ? fmt::format("{:.5f}", value) : "n/a";
+  return text == "-0.00000" ? "0.00000" : text;
 }
 
 const std::vector<std::string> pose_headers{"", "x", "y", "z", "unit"};
@@ -104,10 +112,12 @@ std::vector<std::vector<std::string>> poseRows(const Unknown& unknown) {
   const auto row = [](const std::string& title, const auto& v, const char* unit, auto&& cell) {
     return std::vector<std::string>{title, cell(v[0]), cell(v[1]), cell(v[2]), unit};
   };
-  const auto values = [](double x) { return fixed(x, 5); };
-  const auto sigmas = [](double x) { return std::isfinite(x) ? fmt::format("{:.2g}", x) : "open"; };
-  return {row("translation", t, "m", values), row("  sd", Eigen::Vector3d(sigma.head<3>()), "m", sigmas),
-          row("rotation vector", r, "deg", values),
+  const bool none = !unknown.hasCovariance() && !unknown.rotation_is_open;
+  const auto sigmas = [none](double x) {
+    return std::isfinite(x) ? fmt::format("{:.2g}", x) : std::string(none ? "n/a" : "open");
+  };
+  return {row("translation", t, "m", fixed), row("  sd", Eigen::Vector3d(sigma.head<3>()), "m", sigmas),
+          row("rotation vector", r, "deg", fixed),
           row("  sd", Eigen::Vector3d(degrees * sigma.tail<3>()), "deg", sigmas)};
 }
 std::string quaternionOf(const SE3d& pose) {
@@ -291,22 +301,19 @@ JsonObject poseJson(const SE3d& pose) {
       .set("rotation_vector", Eigen::Vector3d(pose.so3().log()));
 }
 template <int N>
-void setCovariance(JsonObject& o, const char* field, const Eigen::Matrix<double, N, N>& covariance) {
-  if (covariance.allFinite()) {
+void setCovariance(JsonObject& o, const char* field, const Eigen::Matrix<double, N, N>& covariance, bool is_there) {
+  if (is_there) {
     o.set(field, covariance);
   } else {
     o.set(field, nullptr);
   }
 }
-JsonObject toJson(const Unknown& unknown, bool has_covariance) {
+JsonObject toJson(const Unknown& unknown) {
   JsonObject o = poseJson(unknown.mean());
-  setCovariance<6>(o, "covariance", has_covariance ? unknown.pose.covariance : Matrix6(Matrix6::Constant(nan)));
+  setCovariance<6>(o, "covariance", unknown.pose.covariance, unknown.hasCovariance());
   o.set("covariance_frame", fmt::format("the {}'s axes at its origin: {} Exp(e)", unknown.child, unknown.name()));
-  const Vector6 none = Vector6::Constant(nan);
-  o.set("standard_deviations",
-        sigmasJson(has_covariance ? unknown.sigmasOfCoordinates() : none, "rotation_vector_deg"));
-  o.set("standard_deviations_local", sigmasJson(has_covariance ? unknown.localSigmas() : none, "rotation_deg"));
-  return o;
+  o.set("standard_deviations", sigmasJson(unknown.sigmasOfCoordinates(), "rotation_vector_deg"));
+  return o.set("standard_deviations_local", sigmasJson(unknown.localSigmas(), "rotation_deg"));
 }
 JsonObject toJson(const HandEyeFile& file) {
   JsonObject o;
@@ -406,7 +413,7 @@ Plot excitationPlot(const HandEyeOutput& output) {
 /// The planes of X's covariance in which no open direction lies.
 Plot covariancePlot(const Unknown& X, bool rotation) {
   constexpr double chi2_95 = 5.991464547107979;  // two degrees of freedom
-  const Matrix6 map = X.toCoordinates(), covariance = map * X.pose.covariance * map.transpose();
+  const Matrix6 covariance = X.covarianceOfCoordinates();
   const Vector6 sigma = X.sigmasOfCoordinates();
   const double scale = rotation ? degrees : 1e3;
   const int first = rotation ? 3 : 0;
@@ -448,15 +455,14 @@ void setHandEye(JsonObject& object, const HandEyeOutput& output) {
   const HandEyeResult& r = output.result;
   object.set("status", liestat::name(r.status)).set("ok", r.ok()).set("in_words", verdictOf(r));
   object.set("problem", r.world ? "AX = YB" : "AX = XB");
-  const bool has_covariance = !r.rotationIsOpen() && r.covariance.allFinite();
   const std::vector<Unknown> unknowns = unknownsOf(r);
-  for (const Unknown& unknown : unknowns) object.set(unknown.symbol, toJson(unknown, has_covariance));
+  for (const Unknown& unknown : unknowns) object.set(unknown.symbol, toJson(unknown));
   if (!r.world) object.set("Y", nullptr);
   object.set("covariance_order", "translation rotation").set("covariance_side", "right");
   object.set("covariance_frame",
              "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known");
   if (r.world) {
-    setCovariance<12>(object, "joint_covariance", r.covariance);
+    setCovariance<12>(object, "joint_covariance", r.covariance, unknowns.front().hasCovariance());
     object.set("joint_covariance_order", "X translation, X rotation, Y translation, Y rotation");
   } else {
     object.set("joint_covariance", nullptr).set("joint_covariance_order", nullptr);
@@ -497,7 +503,7 @@ void writeHandEyeReport(const std::string& directory, const std::string& command
   report.plot(residualPlot(output));
   report.section("What the motions determine");
   report.plot(excitationPlot(output));
-  if (r.rotationIsOpen() || !r.X.covariance.allFinite()) {
+  if (!unknowns.front().hasCovariance()) {
     report.paragraph("X has no covariance.");
   } else {
     for (const bool rotation : {false, true}) {
