@@ -5,10 +5,10 @@ int main(int argc, char** argv) {
   // In the order in which the help lists them.
   return runCommandLine(
       argc, argv,
-      {{"", "", {addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
+      {{"", "", {addHandEyeCommand, addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",
-        {addSimulateTwoViewCommand, addSimulateViCommand}},
+        {addSimulateHandEyeCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
        {"validate",
         validate_description,
         {addValidateEstimatorCommand, addValidateHandEyeCommand, addValidateMeansCommand, addValidateMotionCommand,

@@ -10,6 +10,8 @@ void addMeanCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);
+void addHandEyeCommand(const CommandList& program);
+void addSimulateHandEyeCommand(const CommandList& simulate);
 void addSimulateTwoViewCommand(const CommandList& simulate);
 void addSimulateViCommand(const CommandList& simulate);
 void addValidateEstimatorCommand(const CommandList& validate);
