@@ -74,7 +74,7 @@ class HandEyeRun {
         return {FaultKind::pose_not_finite, i};
       // Six equations need six errors; whether these are independent shows in the frames of the estimate.
       const PosePairNoise noise(pair.a.covariance, pair.b.covariance);
-      if (!noise.valid() || noise.rank() < 6) return {FaultKind::bad_covariance, i};
+      if (!noise.valid() || !noise.coversAllDirections()) return {FaultKind::bad_covariance, i};
     }
     if (pairs_.size() < (world ? 3 : 2)) return {FaultKind::too_few_poses, pairs_.size()};
     return {};

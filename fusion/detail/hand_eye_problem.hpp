@@ -112,8 +112,14 @@ class PosePairNoise {
   }
 
   bool valid() const { return valid_; }
-  /// Of both covariances together.
-  int rank() const { return rank_; }
+  /// Whether both covariances together have the ranks that errors of a pose need: six, three of them of the rotation, which
+  /// translations do not move.
+  bool coversAllDirections() const {
+    const auto open = [](const Matrix6& V) {
+      return SemidefiniteParts<3>(Eigen::Matrix3d(V.bottomRightCorner<3, 3>())).null_dimension;
+    };
+    return rank_ >= 6 && (rank_ == 12 || open(a_) + open(b_) <= 3);
+  }
   template <int P>
   Eigen::Matrix<double, 12, P> spread(const Eigen::Matrix<double, P, 12>& D) const {
     Eigen::Matrix<double, 12, P> result;

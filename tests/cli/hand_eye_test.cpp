@@ -201,7 +201,8 @@ TEST(HandEyeCommand, wrongPairsAreFound) {
   for (std::size_t i = 0; i < 30; ++i) {
     if (scene.truth["inlier"][i] == 0) wrong.push_back(i);
   }
-  ASSERT_EQ(wrong.size(), 9U);
+  // Those that are flipped by a few degrees are no wrong pairs.
+  ASSERT_GE(wrong.size(), 6U);
   EXPECT_EQ(json["outliers"].get<std::vector<std::size_t>>(), wrong);
   EXPECT_FALSE(json["pairs"][wrong[0]]["inlier"]);
   expectTruth(json["X"], scene.truth["X"]);

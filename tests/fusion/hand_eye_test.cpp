@@ -395,6 +395,14 @@ TEST(HandEye, BadInput) {
   EXPECT_EQ(faultOf([](auto& p) { p[4].b.covariance(2, 1) = 1; }), (Fault{FaultKind::bad_covariance, 4}));
   EXPECT_EQ(faultOf([](auto& p) { p[1].a.covariance.setZero(), p[1].b.covariance.setZero(); }),
             (Fault{FaultKind::bad_covariance, 1}));
+  // Both rotations exact: errors of translation alone meet six equations.
+  EXPECT_EQ(faultOf([](auto& p) {
+              for (Gaussian<SE3d>* g : {&p[2].a, &p[2].b}) {
+                g->covariance.setZero();
+                g->covariance.diagonal().template head<3>().setConstant(1e-6);
+              }
+            }),
+            (Fault{FaultKind::bad_covariance, 2}));
   EXPECT_EQ(estimateRobotWorld(scene.pairs, {.gate = -1}).fault, FaultKind::bad_option);
   EXPECT_EQ(estimateHandEye(std::vector<PosePair>(1)).fault, FaultKind::too_few_poses);
 
