@@ -353,20 +353,23 @@ LIESTAT_FUSION_INLINE HandEyeResult estimateHandEye(std::span<const PosePair> mo
 
 LIESTAT_FUSION_INLINE std::string describe(const OpenDirection& direction, const std::string& frame) {
   const Eigen::Vector3d rho = direction.twist.head<3>(), phi = direction.twist.tail<3>();
-  char text[200];
   const char* which = direction.along_rotation_axis ? "the rotation axis "
                       : direction.along_translation ? "the direction of motion "
                                                     : "";
-  if (!direction.rotates) {
-    std::snprintf(text, sizeof text, "translation along %s(%.2g, %.2g, %.2g) of the ", which, rho[0] + 0.0,
-                  rho[1] + 0.0, rho[2] + 0.0);
-    return text + frame;
-  }
+  // Three decimals; no zero is negative.
+  const auto written = [](const Eigen::Vector3d& v) {
+    std::string text = "(";
+    for (int i = 0; i < 3; ++i) {
+      char number[32];
+      std::snprintf(number, sizeof number, "%s%.3g", i > 0 ? ", " : "", std::round(1000 * v[i]) / 1000 + 0.0);
+      text += number;
+    }
+    return text + ")";
+  };
+  if (!direction.rotates) return std::string("translation along ") + which + written(rho) + " of the " + frame;
   // The point of the screw's axis that is nearest to the origin.
-  const Eigen::Vector3d point = phi.cross(rho);
-  std::snprintf(text, sizeof text, "rotation about %s(%.2g, %.2g, %.2g) through (%.3g, %.3g, %.3g) m of the ", which,
-                phi[0], phi[1], phi[2], point[0], point[1], point[2]);
-  return text + frame;
+  return std::string("rotation about ") + which + written(phi) + " through " + written(phi.cross(rho)) + " m of the " +
+         frame;
 }
 
 }  // namespace liestat
