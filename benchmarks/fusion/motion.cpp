@@ -40,7 +40,7 @@ void compactUpdate(benchmark::State& state) {
     FilterCovariance<double, 2> P{1e-3 * Eigen::Matrix2d::Identity(), 1e-3 * Eigen::Matrix2d::Identity()};
     const Eigen::Matrix3d frame = ManifoldTraits<S2d>::placement(direction).matrix();
     flowRows<double>(points, direction.unit_vector(), rows);
-    const RotationSums<double> rotation = rotationSums<double>(rows);
+    const FlowRotationSums<double> rotation = rotationSums<double>(rows);
     const Eigen::Vector3d Omega = rotation.solve({});
     const SubspaceSums<double> sums = subspaceSums<double>(points, rows, frame.leftCols<2>(), Omega, rotation.M);
     auto step = updateCovariance(P, eliminateRotation(sums, Omega, {}), 0.5);

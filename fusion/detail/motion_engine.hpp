@@ -21,7 +21,7 @@ enum class MotionState { direction, gyroscope_bias, rotation };
 
 /// One hypothesis. Covariances are in the local frame of the direction (first two coordinates); the bias is in the
 /// camera's axes; the rotation's error δ is on the left, R ← Exp(δ) R, in the axes of the second frame.
-struct MotionCandidate {
+struct DirectionCandidate {
   S2d direction;
   SO3d rotation;  ///< state, or that of the last frame
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
@@ -46,12 +46,12 @@ class MotionEngine {
   const MotionEstimate& update(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
   const MotionEstimate& estimate() const { return estimate_; }
   const MotionFilterOptions& options() const { return options_; }
-  std::span<const MotionCandidate> candidates() const { return candidates_; }
-  const MotionCandidate* best() const { return candidates_.empty() ? nullptr : &candidates_[best_]; }
+  std::span<const DirectionCandidate> candidates() const { return candidates_; }
+  const DirectionCandidate* best() const { return candidates_.empty() ? nullptr : &candidates_[best_]; }
 
   void reset();
   /// One hypothesis in place of all others.
-  void start(const MotionCandidate& candidate);
+  void start(const DirectionCandidate& candidate);
   /// The depths of the last frame's pairs at the present estimate, in their order.
   std::span<const InverseDepth> inverseDepths();
 
@@ -82,20 +82,20 @@ class MotionEngine {
   void startAnew();
   void spreadStarts();
   void startLinearly();
-  void predict(MotionCandidate& candidate) const;
+  void predict(DirectionCandidate& candidate) const;
   bool turnedPerCandidate() const;
   void flowsAfter(const SO3d& R);
   void prepareSharedFlows();
-  bool evaluate(const MotionCandidate& candidate, Evaluation& out);
+  bool evaluate(const DirectionCandidate& candidate, Evaluation& out);
   void weighForward(const Eigen::Vector3d& V, Evaluation& e);
-  void rejectOutliers(const MotionCandidate& candidate, Evaluation& e);
-  bool advance(MotionCandidate& candidate);
+  void rejectOutliers(const DirectionCandidate& candidate, Evaluation& e);
+  bool advance(DirectionCandidate& candidate);
   template <int D>
-  bool step(MotionCandidate& candidate, FilterCovariance<double, D>& P, const Evaluation& e,
+  bool step(DirectionCandidate& candidate, FilterCovariance<double, D>& P, const Evaluation& e,
             const FrameInformation<double, D>& frame);
-  void weighSign(MotionCandidate& candidate) const;
+  void weighSign(DirectionCandidate& candidate) const;
   void prune();
-  double gapOfChance(const MotionCandidate& candidate, const MotionCandidate& best) const;
+  double gapOfChance(const DirectionCandidate& candidate, const DirectionCandidate& best) const;
   void advanceAll();
   void publish();
   std::size_t leastPairs() const;
@@ -103,7 +103,7 @@ class MotionEngine {
   MotionFilterOptions options_;
   MotionState state_;
   MotionEstimate estimate_;
-  std::vector<MotionCandidate> candidates_;
+  std::vector<DirectionCandidate> candidates_;
   std::size_t best_ = 0, updates_ = 0;
   double standstill_quantile_ = 0;
   double usual_signal_ = 0;  ///< of the last ten or so frames that were not at standstill

@@ -27,7 +27,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::reset() {
   estimate_.meaning = options_.flow == Flow::discrete ? DirectionMeaning::translation : DirectionMeaning::velocity;
 }
 
-LIESTAT_FUSION_INLINE void MotionEngine::start(const MotionCandidate& candidate) {
+LIESTAT_FUSION_INLINE void MotionEngine::start(const DirectionCandidate& candidate) {
   candidates_.assign(1, candidate);
   best_ = 0, kept_ = options_.linear_frames, innovation_count_ = 0, innovation_sum_ = 0;
   updates_ = 0;
@@ -75,7 +75,7 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const
   estimate_.flags = MotionFlags{};
   estimate_.flags.bad_input = !readFrame(pairs, gyroscope);
   estimate_.pairs = pairs_.size(), estimate_.inliers = 0;
-  for (MotionCandidate& c : candidates_) predict(c);
+  for (DirectionCandidate& c : candidates_) predict(c);
   updated_ = false;
   if (pairs_.size() < leastPairs()) {
     estimate_.flags.too_few = true;
@@ -219,7 +219,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::updateRotationAlone() {
   const Eigen::Matrix3d R = rotation_alone_.matrix();
   estimate_.rotation.covariance = R.transpose() * Cholesky<double, 3>(rotation_information_).inverse() * R;
   estimate_.inliers = rotation_inliers_;
-  for (MotionCandidate& c : candidates_) {
+  for (DirectionCandidate& c : candidates_) {
     if (state_ != MotionState::rotation) {
       c.rotation = rotation_alone_;
       continue;
@@ -238,10 +238,10 @@ LIESTAT_FUSION_INLINE void MotionEngine::updateRotationAlone() {
 LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   const std::size_t n = std::max<std::size_t>(options_.starts, 1);
   const std::vector<Eigen::Vector3d> lattice = hemisphereLattice(n);
-  candidates_.assign(n, MotionCandidate{});
+  candidates_.assign(n, DirectionCandidate{});
   best_ = updates_ = innovation_count_ = 0, innovation_sum_ = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    MotionCandidate& c = candidates_[i];
+    DirectionCandidate& c = candidates_[i];
     c.direction = S2d(lattice[i]);
     if (state_ == MotionState::gyroscope_bias) {
       c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
@@ -261,7 +261,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   }
 }
 
-LIESTAT_FUSION_INLINE void MotionEngine::predict(MotionCandidate& c) const {
+LIESTAT_FUSION_INLINE void MotionEngine::predict(DirectionCandidate& c) const {
   const double q = options_.process_noise;
   if (state_ == MotionState::direction) {
     for (Eigen::Matrix2d* P : {&c.narrow.gain, &c.narrow.reported}) P->diagonal().array() += q;
@@ -286,7 +286,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighForward(const Eigen::Vector3d& V, 
 
 /// Sets the weights of outliers to zero: first a robust rotation, by reweighting (Huber 1981, then Geman and McClure),
 /// then a threshold, or a gate where the direction is known well enough to predict the error.
-LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const MotionCandidate& c, Evaluation& e) {
+LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate& c, Evaluation& e) {
   const std::size_t n = points_.size();
   RotationPrior<double> prior = e.prior;
   if (state_ == MotionState::rotation) {
@@ -331,7 +331,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const MotionCandidate& c
   for (std::size_t i = 0; i < n; ++i) rows_[i].weight = squared(i, Omega) <= limit ? weights_[i] : 0;
   if (gate) {
     // e² ≤ gate² (variance + G P Gᵀ + hᵀ M⁻¹ h), with M without the pair itself.
-    const RotationSums<double> sums = rotationSums<double>(rows_);
+    const FlowRotationSums<double> sums = rotationSums<double>(rows_);
     const Cholesky<double, 3> ML(Eigen::Matrix3d(sums.M + prior.information));
     const bool turns = state_ == MotionState::rotation;
     if (!turns) Omega = sums.solve(prior);
@@ -368,7 +368,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const MotionCandidate& c
   }
 }
 
-LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const MotionCandidate& c, Evaluation& e) {
+LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, Evaluation& e) {
   const Eigen::Vector3d V = c.direction.unit_vector();
   e.basis = ManifoldTraits<S2d>::placement(c.direction).matrix().leftCols<2>();
   e.prior.information = e.marginal = frame_.information;
@@ -395,7 +395,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const MotionCandidate& c, Eval
     if (options_.flow == Flow::forward) weighForward(V, e);
     e.inliers = points_.size();
     if (options_.outliers) rejectOutliers(c, e);
-    const RotationSums<double> sums = rotationSums<double>(rows_);
+    const FlowRotationSums<double> sums = rotationSums<double>(rows_);
     if (state_ == MotionState::rotation) {
       e.Omega.setZero();
     } else {
@@ -413,7 +413,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const MotionCandidate& c, Eval
 
 /// Moves a hypothesis by what its frame says; false, and unchanged, where that is not finite.
 template <int D>
-bool MotionEngine::step(MotionCandidate& c, FilterCovariance<double, D>& P, const Evaluation& e,
+bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, const Evaluation& e,
                         const FrameInformation<double, D>& frame) {
   FilterCovariance<double, D> next = P;
   const FilterStep<double, D> s = updateCovariance(next, frame, options_.max_step, options_.second_derivatives);
@@ -430,7 +430,7 @@ bool MotionEngine::step(MotionCandidate& c, FilterCovariance<double, D>& P, cons
   c.inliers = e.inliers;
   const double cost = options_.outliers ? e.capped_cost : frame.cost;
   c.score += cost;
-  c.costs[updates_ % MotionCandidate::remembered] = cost;
+  c.costs[updates_ % DirectionCandidate::remembered] = cost;
 
   const Cholesky<double, 3> ML(Eigen::Matrix3d(e.sums.M + e.marginal));
   const Eigen::Vector3d lever = e.sums.depth_lever / e.sums.depth_weight;
@@ -462,7 +462,7 @@ bool MotionEngine::step(MotionCandidate& c, FilterCovariance<double, D>& P, cons
   return true;
 }
 
-LIESTAT_FUSION_INLINE bool MotionEngine::advance(MotionCandidate& c) {
+LIESTAT_FUSION_INLINE bool MotionEngine::advance(DirectionCandidate& c) {
   Evaluation e;
   if (!evaluate(c, e)) return false;
   bool moved = false;
@@ -478,7 +478,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::advance(MotionCandidate& c) {
 }
 
 /// V and -V have the same cost: the sign is a state of its own, told by the depths over several frames.
-LIESTAT_FUSION_INLINE void MotionEngine::weighSign(MotionCandidate& c) const {
+LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const {
   if (!(c.depth_variance > 0) || !std::isfinite(c.depth)) return;
   const double decay = options_.evidence_decay;
   c.evidence = decay * c.evidence + c.depth / c.depth_variance;
@@ -499,7 +499,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(MotionCandidate& c) const {
 
 LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
   bool any = false;
-  for (MotionCandidate& c : candidates_) {
+  for (DirectionCandidate& c : candidates_) {
     if (advance(c)) {
       any = true;
     } else {
@@ -518,8 +518,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
 
 /// How far the scores of two equally good hypotheses may part: costs at different directions are χ² of different
 /// projections of the flow, so their differences are a random walk.
-LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const MotionCandidate& c, const MotionCandidate& best) const {
-  const std::size_t n = std::min(updates_, MotionCandidate::remembered);
+LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const DirectionCandidate& c,
+                                                       const DirectionCandidate& best) const {
+  const std::size_t n = std::min(updates_, DirectionCandidate::remembered);
   if (n < 2) return std::numeric_limits<double>::infinity();
   double sum = 0, squares = 0;
   for (std::size_t k = 0; k < n; ++k) {
@@ -540,7 +541,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::prune() {
   }
   if (updates_ < options_.first_pruning || candidates_.size() == 1) return;
   std::sort(candidates_.begin(), candidates_.end(),
-            [](const MotionCandidate& a, const MotionCandidate& b) { return a.score < b.score; });
+            [](const DirectionCandidate& a, const DirectionCandidate& b) { return a.score < b.score; });
   best_ = 0;
   const double nearest = std::cos(options_.merge_angle);
   std::size_t kept = 0;
@@ -599,7 +600,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::startLinearly() {
     updated_ = false;
     return;
   }
-  MotionCandidate c;
+  DirectionCandidate c;
   c.direction = S2d(V);
   if (state_ == MotionState::gyroscope_bias) {
     c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
@@ -625,7 +626,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     out.flags.degenerate = out.flags.undecided_sign = true;
     return;
   }
-  const MotionCandidate& c = candidates_[best_];
+  const DirectionCandidate& c = candidates_[best_];
   const bool narrow = state_ == MotionState::direction;
   out.direction.mean = c.direction;
   out.direction.covariance = narrow ? c.narrow.reported : Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>());
@@ -655,7 +656,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   out.rival_gap = std::numeric_limits<double>::infinity();
   bool by_chance = false;
   const Eigen::Vector3d V = c.direction.unit_vector();
-  for (const MotionCandidate& other : candidates_) {
+  for (const DirectionCandidate& other : candidates_) {
     if (&other == &c) continue;
     Eigen::Vector3d direction = other.direction.unit_vector();
     if (direction.dot(V) < 0) direction = -direction;

@@ -34,7 +34,7 @@ class EssentialFilter {
   /// The same as one point with its joint covariance, second_T_first; 1 rad² each before the first frame.
   Gaussian<Essentiald> essential() const {
     Gaussian<Essentiald> g;
-    if (const detail::MotionCandidate* c = engine_.best()) {
+    if (const detail::DirectionCandidate* c = engine_.best()) {
       g.mean = Essentiald(c->rotation, c->direction);
       // The engine's rotation error is along the axes of the second frame, that of Essential along the direction's.
       g.covariance = turned(c->wide.reported, frameOf(c->direction).transpose());
@@ -45,7 +45,7 @@ class EssentialFilter {
   std::span<const InverseDepth> inverse_depths() { return engine_.inverseDepths(); }
   std::vector<MotionHypothesis> hypotheses() const {
     std::vector<MotionHypothesis> list;
-    for (const detail::MotionCandidate& c : engine_.candidates()) {
+    for (const detail::DirectionCandidate& c : engine_.candidates()) {
       list.push_back({c.direction, Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>()), c.rotation.log(), c.score});
     }
     return list;
@@ -53,7 +53,7 @@ class EssentialFilter {
 
   /// Starts from one state in place of many.
   void start(const Gaussian<Essentiald>& state) {
-    detail::MotionCandidate c;
+    detail::DirectionCandidate c;
     c.direction = S2d(Eigen::Vector3d(state.mean.direction().unit_vector()));
     c.rotation = SO3d(state.mean.so3());
     c.wide.gain = c.wide.reported = turned(state.covariance, frameOf(c.direction));

@@ -21,7 +21,7 @@ namespace liestat {
 inline double subspaceCost(std::span<const FlowPoint<double>> points, const Eigen::Vector3d& V,
                            std::span<FlowRow<double>> rows, const RotationPrior<double>& prior = {}) {
   flowRows<double>(points, V, rows);
-  const RotationSums<double> sums = rotationSums<double>(rows);
+  const FlowRotationSums<double> sums = rotationSums<double>(rows);
   const Eigen::Vector3d Omega = sums.solve(prior), d = Omega - prior.mean;
   double cost = d.dot(prior.information * d);
   for (const FlowRow<double>& row : rows) {

@@ -39,7 +39,7 @@ class SubspaceFilter {
   /// All that are left, the best among them.
   std::vector<MotionHypothesis> hypotheses() const {
     std::vector<MotionHypothesis> list;
-    for (const detail::MotionCandidate& c : engine_.candidates()) {
+    for (const detail::DirectionCandidate& c : engine_.candidates()) {
       const bool wide = engine_.options().estimate_bias;
       list.push_back({c.direction, wide ? Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>()) : c.narrow.reported,
                       c.Omega, c.score});
@@ -49,7 +49,7 @@ class SubspaceFilter {
 
   /// Starts from one direction with its covariance (and a rotation, for Flow::discrete) in place of many.
   void start(const Gaussian<S2d>& direction, const SO3d& rotation = {}) {
-    detail::MotionCandidate c;
+    detail::DirectionCandidate c;
     c.direction = direction.mean, c.rotation = rotation;
     c.narrow = {direction.covariance, direction.covariance};
     c.wide.gain.topLeftCorner<2, 2>() = direction.covariance;

@@ -36,7 +36,7 @@ struct RotationPrior {
 
 /// M = Σ w h hᵀ and Σ w q h.
 template <class S>
-struct RotationSums {
+struct FlowRotationSums {
   Eigen::Matrix<S, 3, 3> M = Eigen::Matrix<S, 3, 3>::Zero();
   Eigen::Matrix<S, 3, 1> right = Eigen::Matrix<S, 3, 1>::Zero();
 
@@ -55,7 +55,7 @@ void flowRows(std::span<const FlowPoint<S>> points, const Eigen::Matrix<S, 3, 1>
 }
 
 template <class S>
-RotationSums<S> rotationSums(std::span<const FlowRow<S>> rows) {
+FlowRotationSums<S> rotationSums(std::span<const FlowRow<S>> rows) {
   S m00(0), m01(0), m02(0), m11(0), m12(0), m22(0), r0(0), r1(0), r2(0);
   for (const FlowRow<S>& row : rows) {
     const S w0 = row.weight * row.h0, w1 = row.weight * row.h1, w2 = row.weight * row.h2;
@@ -63,7 +63,7 @@ RotationSums<S> rotationSums(std::span<const FlowRow<S>> rows) {
     m11 += w1 * row.h1, m12 += w1 * row.h2, m22 += w2 * row.h2;
     r0 += w0 * row.q, r1 += w1 * row.q, r2 += w2 * row.q;
   }
-  RotationSums<S> sums;
+  FlowRotationSums<S> sums;
   sums.M << m00, m01, m02, m01, m11, m12, m02, m12, m22;
   sums.right << r0, r1, r2;
   return sums;

@@ -29,7 +29,7 @@ struct Example {
   Eigen::Vector3d V;
   Eigen::Matrix<double, 3, 2> E;
   std::vector<FlowRow<double>> rows;
-  RotationSums<double> rotation;
+  FlowRotationSums<double> rotation;
   RotationPrior<double> prior;
   Eigen::Vector3d Omega;
   SubspaceSums<double> sums;
@@ -268,7 +268,7 @@ TEST(SubspaceUpdate, CostIsChiSquaredAtTheTruthAndTheGradientHasItsInformation) 
       std::vector<FlowRow<double>> rows(points.size());
       const S2d truth(scene.velocity);
       flowRows<double>(points, truth.unit_vector(), rows);
-      const RotationSums<double> rotation = rotationSums<double>(rows);
+      const FlowRotationSums<double> rotation = rotationSums<double>(rows);
       const Eigen::Vector3d Omega = rotation.solve({});
       const SubspaceSums<double> sums = subspaceSums<double>(
           points, rows, ManifoldTraits<S2d>::placement(truth).matrix().leftCols<2>(), Omega, rotation.M);
@@ -339,7 +339,7 @@ Identifiability identifiability(const std::vector<Eigen::Vector3d>& positions, c
   std::vector<FlowRow<double>> rows(points.size());
   const S2d direction(V);
   flowRows<double>(points, direction.unit_vector(), rows);
-  const RotationSums<double> rotation = rotationSums<double>(rows);
+  const FlowRotationSums<double> rotation = rotationSums<double>(rows);
   const Eigen::Vector3d at = rotation.solve({{}, 1e-9 * Eigen::Matrix3d::Identity()});
   const SubspaceSums<double> sums = subspaceSums<double>(
       points, rows, ManifoldTraits<S2d>::placement(direction).matrix().leftCols<2>(), at, rotation.M);
