@@ -264,7 +264,7 @@ class HandEyeScene {
           const Eigen::Vector3d mirrored = 2 * sight.dot(normal) * sight - normal;
           const Eigen::Vector3d cross = normal.cross(mirrored);
           const double angle = std::atan2(cross.norm(), normal.dot(mirrored));
-          // Of a target that is seen frontally both solutions are nearly one: no pair to be found.
+          // Both solutions of a target that is seen frontally are nearly one: no pair to be found.
           if (angle < 10 * degree) {
             inlier[i] = true;
             break;

@@ -33,7 +33,7 @@ struct Plan {
   HandEyeRow row;
   std::optional<ValidationTolerance> calibration, fit;
   bool judges_right = false;
-  /// Of a trial in units of one with twenty pairs.
+  /// Cost of a trial in units of one with twenty pairs.
   double cost() const { return static_cast<double>(row.pairs) / 20; }
 };
 
@@ -81,7 +81,7 @@ std::vector<Plan> plansOf(Experiment experiment, const HandEyeValidation& valida
         for (const HandEyeMotion motion : all_hand_eye_motions) {
           Plan& plan = add(formulation, motion, HandEyeNoise::isotropic, 20);
           plan.judges_right = true;
-          // What is held is where the truth is not: that is of second order, too, and there is no covariance where a
+          // A held coordinate is not where the truth is: that is of second order, too, and there is no covariance where a
           // rotation is open.
           if (openDimension(motion) != 2 && openDimension(motion) != 4) {
             plan.calibration = ValidationTolerance{.index = 0.12, .ks = 0.05, .failure_fraction = 0.001};

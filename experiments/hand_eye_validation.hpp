@@ -72,7 +72,7 @@ struct HandEyeRow : JudgedReport {
   double lost = 0;                   ///< share of the right pairs that were taken for wrong ones
 };
 
-/// Of what must be right in all trials.
+/// The tally of what must be right in all trials.
 Tally countedTally(const std::vector<HandEyeRow>& rows);
 
 /// Rows in the order of the experiments.

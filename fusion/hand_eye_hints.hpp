@@ -25,7 +25,7 @@
 
 namespace liestat {
 
-/// What a covariance beside a pose T may be of. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
+/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
 /// covariance of the inverse pose is one of `left`.
 enum class CovarianceReading {
   right,                      ///< T·Exp(e), translation before rotation: the library's own
@@ -72,7 +72,7 @@ inline PosePair readPair(const PosePair& given, const HandEyeReading& reading) {
 
 struct HandEyeHintOptions {
   HandEyeReading reading = {};  ///< the one that the result was made with
-  /// Whether the covariances may have been meant otherwise; false where they come from a model and not from a file.
+  /// True if the covariances may have been meant otherwise; false where they come from a model and not from a file.
   bool doubt_a = true, doubt_b = true;
   HandEyeOptions estimate = {};  ///< those that the result was made with
 };

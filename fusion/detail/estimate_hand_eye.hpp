@@ -254,7 +254,7 @@ class HandEyeRun {
     HandEyeExcitation excitation = handEyeExcitation(value, pairs_, inliers_, world);
     int open = openDirections(excitation, options_.trusted_excitation);
     ConstrainedResult<typename Equation::Parameter> strict;
-    // What is open is known at the estimate, and the estimate holds what is open: at most a few rounds.
+    // Open directions are known at the estimate, and the estimate holds open directions: at most a few rounds.
     for (int round = 0; round < 4; ++round) {
       strict = strictHandEye<Equation>(value, pairs_, inliers_, excitation, open);
       if (strict.end != ConstrainedEnd::converged) break;

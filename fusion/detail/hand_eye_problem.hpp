@@ -112,7 +112,7 @@ class PosePairNoise {
   }
 
   bool valid() const { return valid_; }
-  /// Whether both covariances together have the ranks that errors of a pose need: six, three of them of the rotation, which
+  /// True if both covariances together have the ranks that errors of a pose need: six, three of them of the rotation, which
   /// translations do not move.
   bool coversAllDirections() const {
     const auto open = [](const Matrix6& V) {
@@ -194,7 +194,7 @@ double handEyeCost(const HandEyeValue& at, const std::vector<PosePair>& pairs, c
   return cost;
 }
 
-/// What the motions say of Y (of X for AX = XB) once X is eliminated, against what the noise of B would say if there
+/// Information of the motions on Y (on X for AX = XB) once X is eliminated, against what the noise of B would say if there
 /// were no motion at all.
 struct HandEyeExcitation {
   Vector6 values;    ///< ascending, 1 is that of noise
