@@ -209,17 +209,17 @@ std::string outliersInWords(const HandEyeOutput& output) {
 std::string directionsInWords(const HandEyeOutput& output) {
   std::string text;
   for (const OpenDirection& d : output.result.directions) {
-    text += fmt::format("{}: {} (excitation {})\n", d.weak ? "weak" : "open", describe(d, "gripper"),
+    text += fmt::format("  {}: {} (excitation {})\n", d.weak ? "weak" : "open", describe(d, "gripper"),
                         number(d.excitation, 3));
   }
   if (text.empty()) return text;
-  text = "the motions do not determine\n" + text;
+  text = "directions that the motions do not determine:\n" + text;
   if (output.result.rotationIsOpen()) {
-    text += "X may turn, so that there is no covariance\n";
+    text += "X may turn by any angle, so that there is no covariance\n";
   } else {
-    text += "standard deviations and covariances take these directions for known\n";
+    text += "standard deviations and covariances hold with these directions fixed\n";
   }
-  return text + "X is one of those that fit; rotations about axes that differ would determine it\n";
+  return text + "X is one of those that fit; rotations about several axes would determine it\n";
 }
 std::string rivalInWords(const HandEyeResult& r) {
   if (!r.rival) return "";
