@@ -3,14 +3,15 @@
 int main(int argc, char** argv) {
   using namespace liestat::cli;
   // In the order in which the help lists them.
-  return runCommandLine(argc, argv,
-                        {{"", "", {addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
-                         {"simulate",
-                          "Files of simulated measurements with their truth",
-                          {addSimulateTwoViewCommand, addSimulateViCommand}},
-                         {"validate",
-                          validate_description,
-                          {addValidateEstimatorCommand, addValidateMeansCommand, addValidatePreintegrationCommand,
-                           addValidatePropagationCommand, addValidateRobustCommand, addValidateSplitCommand,
-                           addValidateTwoViewCommand, addValidateViInitCommand}}});
+  return runCommandLine(
+      argc, argv,
+      {{"", "", {addHandEyeCommand, addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
+       {"simulate",
+        "Files of simulated measurements with their truth",
+        {addSimulateHandEyeCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
+       {"validate",
+        validate_description,
+        {addValidateEstimatorCommand, addValidateHandEyeCommand, addValidateMeansCommand, addValidateMotionCommand,
+         addValidatePreintegrationCommand, addValidatePropagationCommand, addValidateRobustCommand,
+         addValidateSplitCommand, addValidateTwoViewCommand, addValidateViInitCommand}}});
 }

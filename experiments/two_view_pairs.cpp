@@ -49,11 +49,7 @@ struct Normalised {
     };
     normalise(of.matches, all), normalise(of.validation, validation);
     images = {{how.sigma / unit, how.sigma / unit}, of.size / unit};
-    if (how.contradicted) {
-      kept = all;
-    } else {
-      for (const std::size_t i : uncontradictedMatches(all, images.noise)) kept.push_back(all[i]);
-    }
+    for (const std::size_t i : independentMatches(all, images.noise, how.contradicted)) kept.push_back(all[i]);
   }
   double pixels(double squared_error) const { return std::sqrt(squared_error) * unit; }
   TwoViewModels models() const { return twoViewModels(images, TwoViewCalibration::uncalibrated); }

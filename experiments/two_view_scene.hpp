@@ -128,6 +128,8 @@ class TwoViewScene {
   std::vector<Eigen::Vector4d> pixels;              ///< the same in px, origin at a corner of the image
   std::vector<Eigen::Vector4d> exact;               ///< normalised, without noise; outliers as in matches
   std::vector<bool> inlier;
+  /// false: hardly a motion of this kind keeps points in images of that size at that focal length, and there are no matches.
+  bool possible = true;
 
   /// Draws the scene from CounterRng(seed).
   TwoViewScene(const TwoViewSceneOptions& scene_options, std::uint64_t seed) : options(scene_options) {
@@ -142,9 +144,15 @@ class TwoViewScene {
       inlier[i - 1] = inlier[j];
       inlier[j] = moved;
     }
-    do {
+    possible = false;
+    for (int motions = 0; motions < 200 && !possible; ++motions) {
       drawMotion(random);
-    } while (!drawPoints(random));
+      possible = drawPoints(random);
+    }
+    if (!possible) {
+      exact.clear(), inlier.clear();
+      return;
+    }
     for (std::size_t i = 0; i < n; ++i) {
       const Eigen::Vector4d error = noise.normalVector<4>();
       if (inlier[i]) {
@@ -309,7 +317,7 @@ class TwoViewScene {
     exact.clear();
     const double radius = 0.5 * options.width / options.focal_length;
     for (std::size_t tries = 0; exact.size() < options.matches; ++tries) {
-      if (tries > 1000 + 20 * options.matches) return false;
+      if (tries > 1000 + 20 * options.matches || (tries > 1000 && exact.empty())) return false;
       const Eigen::Vector2d u = uniformInImage(random);
       Eigen::Vector3d x;
       if (options.motion == TwoViewMotion::affine_epipolar) {

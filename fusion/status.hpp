@@ -68,7 +68,12 @@ enum class FaultKind {
   not_covered,    ///< index: the reading nearest to where there are none
   not_ascending,  ///< index: the reading whose time is not later than the one before
   not_finite,     ///< index: the reading with a time, rate or force that is NaN or infinite
-  gap             ///< index: the reading that is too long after the one before
+  gap,            ///< index: the reading that is too long after the one before
+  // Pairs of poses.
+  too_few_poses,    ///< index: how many there are
+  pose_not_finite,  ///< index: pair
+  bad_covariance  ///< index: pair with a covariance that is not finite, not symmetric or has a negative eigenvalue, or
+                  ///< with two of less than rank six together
 };
 
 /// The first thing that is wrong with the input, and where; none where nothing is.
@@ -229,6 +234,13 @@ inline std::string describe(const Fault& fault) {
       return "reading " + at + ": not finite";
     case FaultKind::gap:
       return "reading " + at + ": too long after the one before";
+    case FaultKind::too_few_poses:
+      return at + " pairs of poses are too few";
+    case FaultKind::pose_not_finite:
+      return "pair " + at + ": a pose is not finite";
+    case FaultKind::bad_covariance:
+      return "pair " + at +
+             ": a covariance is not symmetric and positive semi-definite, or both together have less than rank 6";
   }
   return "";
 }

@@ -146,13 +146,15 @@ class ConstrainedEstimator {
                        const Channels&... channels)
       : constraint_(constraint), options_(options), states_(detail::ChannelState<Q, Channels>(channels)...) {
     result_.parameter = start;
-    if (options.prior && !hasPrior()) options_.prior.reset();
     bool valid = (channels.valid() && ...);
+    if (options.prior) {
+      // Positive semi-definite; zero is none.
+      valid = valid && detail::SemidefiniteParts<N>(options.prior->information.template cast<double>()).valid;
+      if (valid && !hasPrior()) options_.prior.reset();
+    }
     forAll([&](const auto& state) { valid = valid && state.valid(); });
     valid = valid && coordinates(start).allFinite();
-    if (options_.prior) {
-      valid = valid && options_.prior->information.allFinite() && coordinates(options_.prior->mean).allFinite();
-    }
+    if (options_.prior) valid = valid && coordinates(options_.prior->mean).allFinite();
     if (!valid) result_.end = ConstrainedEnd::bad_input;
     forAll([&](const auto& state) { result_.measurements += state.size(); });
   }
@@ -382,7 +384,10 @@ class ConstrainedEstimator {
   }
 
   bool search(const Step& delta, const Merit& here, double slope, double length, double parameter_step, bool met) {
-    const double value = phi(here), rounding = 1e-13 * (1 + std::abs(value));
+    // Rounding of the sum, and of equations that are met as well as rounding lets them be.
+    const double value = phi(here);
+    const double slack = 1e-13 * (1 + std::abs(value)) +
+                         4 * penalty_ * std::sqrt(static_cast<double>(result_.measurements)) * rounding();
     double alpha = 1;
     for (int halving = 0; halving < 30; ++halving, alpha *= 0.5) {
       const Q q = moved(result_.parameter, alpha * delta);
@@ -390,7 +395,7 @@ class ConstrainedEstimator {
       forAll([&](auto& state) { join(sum, state.tryStep(q, alpha)); });
       const double there = phi(meritOf(sum, priorCost(q), constraintValues(q)));
       cut_ = halving > 0;
-      if (there <= value + 1e-4 * alpha * slope + rounding) return accept(q);
+      if (there <= value + 1e-4 * alpha * slope + slack) return accept(q);
       if (halving > 6) continue;
       // Second-order correction: the equations at the trial point, linearised as here. Repeated, because one leaves what
       // is of third order, and that is much of a long step.
@@ -404,7 +409,7 @@ class ConstrainedEstimator {
         detail::ChannelMerit after;
         forAll([&](auto& state) { join(after, state.tryCorrected(corrected, further)); });
         const Merit merit = meritOf(after, priorCost(corrected), constraintValues(corrected));
-        if (phi(merit) <= value + 1e-4 * alpha * slope + rounding) return accept(corrected);
+        if (phi(merit) <= value + 1e-4 * alpha * slope + slack) return accept(corrected);
         const double left = phi(merit) - 0.5 * merit.cost;
         if (!(left < 0.5 * violation)) break;
         violation = left;
@@ -430,12 +435,13 @@ class ConstrainedEstimator {
     if (end == ConstrainedEnd::bad_input) return false;
     linearize();
     detail::ChannelMerit sum;
-    int dropped = 0, kept = 0;
+    int dropped = 0, kept = 0, unmet = 0;
     result_.uninformative = 0;
     forAll([&](const auto& state) {
       join(sum, state.merit());
       kept += state.keptEquations();
       dropped += state.droppedEquations();
+      unmet += state.unmetEquations(result_.parameter);
       result_.uninformative += state.uninformative();
     });
     result_.equations = kept;
@@ -451,7 +457,8 @@ class ConstrainedEstimator {
     result_.equation_error = equationError();
     result_.degrees_of_freedom = result_.constraints + kept + priorRank() - N + result_.unobservable;
     if (end != ConstrainedEnd::converged && end != ConstrainedEnd::stalled) return false;
-    if (basis_.largest(constraint_values_) > 1e-7 * parameterSize()) {
+    if (basis_.largest(constraint_values_) > 1e-7 * parameterSize() ||
+        (end == ConstrainedEnd::converged && unmet > 0)) {
       result_.end = ConstrainedEnd::contradictory;
     } else if (end == ConstrainedEnd::converged && kept == 0 && !options_.prior && result_.unobservable > 0) {
       result_.end = ConstrainedEnd::too_few;

@@ -21,7 +21,7 @@ enum class ConstrainedEnd {
   stalled,        ///< no step along the direction that was found improves estimate or equations
   stopped,        ///< asked to
   unobservable,   ///< converged, but the measurements leave directions of the parameter open
-  contradictory,  ///< the constraints of the parameter cannot be met together, or not from here
+  contradictory,  ///< constraints that cannot be met together, or not from here, or an equation of exact coordinates
   too_few,        ///< no equation is left
   bad_input       ///< a number that is not finite, or a noise that is not positive
 };

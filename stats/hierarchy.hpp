@@ -43,6 +43,7 @@ class Hierarchy {
   explicit Hierarchy(Models models, HierarchyOptions options = {})
       : models_(std::move(models)), options_(std::move(options)) {
     link();
+    checkLimits();
     if (!valid()) return;
     thresholds_ = detail::errorThresholds(options_.outlier_share);
     for (const auto& model : models_) {
@@ -52,8 +53,8 @@ class Hierarchy {
     restart();
   }
 
-  /// Whether the models form a lattice: names that differ, parents that exist, no circle, one model without parents.
-  /// Otherwise nothing is ever estimated, and fault() says why.
+  /// Whether the models form a lattice (names that differ, parents that exist, no circle, one model without parents), and
+  /// numbers are within their limits. Otherwise nothing is ever estimated, and fault() says why.
   bool valid() const { return fault_.empty(); }
   const std::string& fault() const { return fault_; }
 
@@ -289,6 +290,21 @@ class Hierarchy {
       if (contains_[m][m]) fault_ = models_[m]->name() + " contains itself";
       rank_[m] = static_cast<std::size_t>(std::count(contains_[m].begin(), contains_[m].end(), 1));
     }
+  }
+
+  void checkLimits() {
+    for (const auto& model : models_) {
+      if (!fault_.empty()) return;
+      if (model->sampleSize() > detail::most_sampled) {
+        fault_ = model->name() + " has minimal samples of " + std::to_string(model->sampleSize()) + ", " +
+                 std::to_string(detail::most_sampled) + " at most are drawn";
+      } else if (model->equations() < 1 || model->equations() > detail::most_equations) {
+        fault_ = model->name() + " has " + std::to_string(model->equations()) + " equations, they are 1 to " +
+                 std::to_string(detail::most_equations);
+      }
+    }
+    const bool is_share = options_.outlier_share > 0 && options_.outlier_share < 1;
+    if (fault_.empty() && !is_share) fault_ = "the share of outliers is not between 0 and 1";
   }
 
   double knownThreshold(int equations) const {

@@ -31,6 +31,7 @@
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/small_reduced.hpp>
+#include <lie/rn.hpp>
 #include <stats/constrained_types.hpp>
 #include <stats/detail/measurement_block.hpp>
 #include <stats/gaussian.hpp>

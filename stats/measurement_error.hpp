@@ -27,7 +27,8 @@ struct MeasurementError {
 
 /// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which is what a search needs; two or three
 /// classify where equations are curved. A measurement without equations (gradients of zero, or free in all of them) has
-/// none and no error; numbers that are not finite give NaN.
+/// none and no error; numbers that are not finite and a noise that is not valid give NaN. Where an equation does not hold
+/// and all coordinates that it depends on are exact the error is infinite.
 template <Homogeneous Q, Homogeneous M, NoiseModel Noise, class Equation>
 MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise, const Equation& equation,
                                      int steps = 1) {
@@ -42,7 +43,7 @@ MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise,
     block.build(noise, J.value.template cast<double>(), J.by_parameter.template cast<double>(),
                 detail::inCoordinatesAt<M, P>(m, error.corrected, J.by_measurement.template cast<double>()), at,
                 detail::equationRank<Equation, P>());
-    if (!block.finite) {
+    if (!block.finite || !noise.valid()) {
       error.squared = error.remaining = std::numeric_limits<double>::quiet_NaN();
       return error;
     }
@@ -53,6 +54,13 @@ MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise,
   error.equations = block.root.rank();
   const typename Block::Values left = equation(q, error.corrected).template cast<double>();
   error.remaining = block.whitened(left).squaredNorm();
+  if (block.free.dimension == 0 && error.equations < detail::equationRank<Equation, P>()) {
+    const auto D = detail::inCoordinatesAt<M, P>(
+        m, error.corrected, equation.linearize(q, error.corrected).by_measurement.template cast<double>());
+    if (detail::unmetEquations<P, K>(block.root, left, D, detail::typicalDeviation(noise)) > 0) {
+      error.squared = std::numeric_limits<double>::infinity();
+    }
+  }
   return error;
 }
 

@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <limits>
@@ -78,16 +79,20 @@ struct SemidefiniteParts {
   Eigen::Matrix<double, N, N> inverse = Eigen::Matrix<double, N, N>::Zero();
   Eigen::Matrix<double, N, N> null_basis = Eigen::Matrix<double, N, N>::Zero();
   int null_dimension = 0;
-  bool valid = false;  ///< finite, no negative eigenvalue
+  bool valid = false;  ///< finite, symmetric but for rounding, no negative eigenvalue
 
   explicit SemidefiniteParts(const Eigen::Matrix<double, N, N>& A) {
     Eigen::Matrix<double, N, 1> scale;
     for (int i = 0; i < N; ++i) scale[i] = A(i, i) > 0 ? std::sqrt(A(i, i)) : 1;
     Eigen::Matrix<double, N, N> scaled;
+    double skewed = 0;
     for (int j = 0; j < N; ++j) {
-      for (int i = 0; i < N; ++i) scaled(i, j) = 0.5 * (A(i, j) + A(j, i)) / (scale[i] * scale[j]);
+      for (int i = 0; i < N; ++i) {
+        scaled(i, j) = 0.5 * (A(i, j) + A(j, i)) / (scale[i] * scale[j]);
+        skewed = std::max(skewed, std::abs(A(i, j) - A(j, i)) / (scale[i] * scale[j]));
+      }
     }
-    if (!scaled.allFinite()) return;
+    if (!scaled.allFinite() || skewed > 1e-6) return;
     // Of a symmetric matrix singular vectors are eigenvectors, u = -v where the eigenvalue is negative.
     const SmallSvd svd(BasicSmallMatrix<N>::template of<N, N>(scaled));
     const double least = 10 * N * std::numeric_limits<double>::epsilon() * svd.value(0);

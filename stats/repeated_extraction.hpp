@@ -11,6 +11,7 @@
 
 #include <stats/hierarchy.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -150,7 +151,9 @@ class RepeatedExtraction {
   double limitOf(const Structure& structure, std::size_t i) const {
     const auto& model = *models_[structure.model];
     const int usual = model.equations(), here = model.equationsOf(measurements_[i]);
-    const auto known = [&](int equations) { return thresholds_[static_cast<std::size_t>(equations)]; };
+    const auto known = [&](int equations) {
+      return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::most_equations))];
+    };
     return here == usual ? structure.state.threshold : structure.state.threshold * known(here) / known(usual);
   }
   std::vector<std::size_t> placesOf(std::size_t owner) const {

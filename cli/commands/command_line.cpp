@@ -53,6 +53,17 @@ Option Option::required() const {
   option_->required();
   return *this;
 }
+namespace {
+/// A check whose own message would name the largest double, with all of its digits.
+CLI::Validator inWords(const CLI::Validator& check, const char* fault) {
+  return CLI::Validator(
+      [check, fault](std::string text) {
+        return check(text).empty() ? std::string() : fmt::format("{} {}", printable(text), fault);
+      },
+      check.get_description());
+}
+}  // namespace
+
 template <class T>
 Option Option::range(T least, T most) const {
   const CLI::Validator range = CLI::Range(least, most);
@@ -65,11 +76,11 @@ Option Option::range(T least, T most) const {
   return *this;
 }
 Option Option::positive() const {
-  option_->check(CLI::PositiveNumber);
+  option_->check(inWords(CLI::PositiveNumber, "is not a finite positive number"));
   return *this;
 }
 Option Option::notNegative() const {
-  option_->check(CLI::NonNegativeNumber);
+  option_->check(inWords(CLI::NonNegativeNumber, "is negative or not finite"));
   return *this;
 }
 Option Option::oneOf(const std::vector<std::string>& values) const {

@@ -75,6 +75,14 @@ int runCommand(Options options, const Invocation& invocation) {
   }
   if (!options.overwrite) requireFree(options.output), requireFree(options.truth);
   const TwoViewScene scene(scene_options, options.seed);
+  if (!scene.possible) {
+    throw InputError(
+        command_name, 0,
+        fmt::format("the motion '{}' takes all points out of images of {:g} x {:g} px at a focal length of {:g} px",
+                    nameOf(scene_options.motion), scene_options.width, scene_options.height,
+                    scene_options.focal_length),
+        "larger images or a shorter focal length");
+  }
   writeOutput(options.output, matchesCsv(scene));
   if (!options.truth.empty()) writeJson(options.truth, truthOf(scene, invocation, options.seed));
   if (options.output != "-" && options.truth != "-") {

@@ -91,6 +91,10 @@ std::string summary(const std::string& file, std::size_t matches, double sigma, 
   std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n", matches, file,
                                  sigma, frame.image_size.x(), frame.image_size.y());
   if (frame.size_from_matches) text += "that size is the bounding box of the matches: --image-size says it better\n";
+  if (frame.repeated > 0) text += fmt::format("{} repeat another one, which counts for them\n", frame.repeated);
+  if (frame.contradicted > 0) {
+    text += fmt::format("{} contradict each other (one point matched with two) and take no part\n", frame.contradicted);
+  }
   if (!frame.calibrated) {
     text +=
         "without intrinsics: the principal point is taken to be the centre of the image,\n"
@@ -179,16 +183,7 @@ Panel matchPanel(const std::string& title, const std::vector<std::size_t>& chose
               .y = {.label = "y, px"},  // points down
               .series = {lines, ends},
               .equal_aspect = true};
-  if (!frame.size_from_matches) {
-    panel.x.low = 0, panel.x.high = frame.image_size.x();
-    panel.y.low = frame.image_size.y(), panel.y.high = 0;
-    return panel;
-  }
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d low(infinity, infinity), high = -low;
-  for (const Eigen::Vector4d& m : matches) {
-    low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
-  }
+  const Eigen::Vector2d low = frame.image_corner, high = low + frame.image_size;
   panel.x.low = low.x(), panel.x.high = high.x();
   panel.y.low = high.y(), panel.y.high = low.y();
   return panel;
@@ -298,7 +293,9 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
 void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
-  object.set("calibrated", e.calibrated).set("image_size", e.image_size).set("size_from_matches", e.size_from_matches);
+  object.set("calibrated", e.calibrated).set("image_corner", e.image_corner).set("image_size", e.image_size);
+  object.set("size_from_matches", e.size_from_matches);
+  object.set("repeated", e.repeated).set("contradicted", e.contradicted);
   object.set("status", name(e.status));
   if (e.reason.empty()) {
     object.set("reason", nullptr);
@@ -393,7 +390,9 @@ std::string formatTwoViewMotions(const TwoViewMotionsOutput& output) {
 void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output) {
   const TwoViewMotions& m = output.motions;
   object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
-  object.set("calibrated", m.calibrated).set("image_size", m.image_size).set("size_from_matches", m.size_from_matches);
+  object.set("calibrated", m.calibrated).set("image_corner", m.image_corner).set("image_size", m.image_size);
+  object.set("size_from_matches", m.size_from_matches);
+  object.set("repeated", m.repeated).set("contradicted", m.contradicted);
   object.set("status", name(m.status));
   if (m.reason.empty()) {
     object.set("reason", nullptr);

@@ -67,7 +67,8 @@ const char* titleOf(PairFamily family) {
                                       : "kusvod2: scenes in depth; right is a fundamental matrix";
 }
 constexpr const char* choice_notes =
-    "kept: tentative matches that no other one contradicts; chosen: models, and in how many runs. Medians over the "
+    "kept: different tentative matches that no other one contradicts; chosen: models, and in how many runs. Medians "
+    "over the "
     "runs: "
     "inliers of homography (H) and fundamental matrix (F); far: matches far from the homography; new: those of them "
     "that "

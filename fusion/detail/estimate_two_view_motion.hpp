@@ -99,30 +99,48 @@ inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel
   return row;
 }
 
+/// The least and the largest coordinate of all points along an axis. Those that lie ten times as far beyond the middle
+/// eight tenths as these are wide are in no image: one of them would take the centre and the scale of all others away.
+struct CoordinateRange {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+
+  CoordinateRange(std::span<const Eigen::Vector4d> matches, Eigen::Index axis) {
+    std::vector<double> all;
+    for (const Eigen::Vector4d& m : matches) {
+      if (m.allFinite()) all.push_back(m[axis]), all.push_back(m[2 + axis]);
+    }
+    if (all.empty()) return;
+    std::sort(all.begin(), all.end());
+    const double tenth = all[(all.size() - 1) / 10], last_tenth = all[all.size() - 1 - (all.size() - 1) / 10];
+    const double reach = last_tenth > tenth ? 10 * (last_tenth - tenth) : std::numeric_limits<double>::infinity();
+    low = *std::find_if(all.begin(), all.end(), [&](double x) { return x >= tenth - reach; });
+    high = *std::find_if(all.rbegin(), all.rend(), [&](double x) { return x <= last_tenth + reach; });
+  }
+};
+
 /// Matches as the models take them.
 struct TwoViewInput {
   TwoViewImageFrame frame;
   Status status = Status::ok;
-  std::string reason;   ///< why there is nothing to estimate
-  bool differ = false;  ///< not all matches are the same one
+  std::string reason;                                ///< why there is nothing to estimate
+  bool first_differ = false, second_differ = false;  ///< the points of the first image, and of the second
   TwoViewCoordinates first, second;
   TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
   TwoViewModels models;
   std::vector<Eigen::Vector4d> normalised;
-  std::vector<std::size_t> used;  ///< places of those that take part
+  std::vector<std::size_t> used;            ///< places of those that take part
+  std::vector<std::size_t> first_of_equal;  ///< for each match the place of the first one that is equal to it
 
   TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
     frame.calibrated = options.first.has_value();
     if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
     // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
-    const double infinity = std::numeric_limits<double>::infinity();
-    Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low, corner = Eigen::Vector2d::Zero();
     const Eigen::Vector4d* one = nullptr;
     for (const Eigen::Vector4d& m : matches) {
       if (!m.allFinite()) continue;
       if (one == nullptr) one = &m;
-      differ = differ || m != *one;
-      low = low.cwiseMin(m.head<2>()).cwiseMin(m.tail<2>()), high = high.cwiseMax(m.head<2>()).cwiseMax(m.tail<2>());
+      first_differ = first_differ || m.head<2>() != one->head<2>();
+      second_differ = second_differ || m.tail<2>() != one->tail<2>();
     }
     Eigen::Vector2d& size = frame.image_size;
     if (options.image_size) {
@@ -131,32 +149,25 @@ struct TwoViewInput {
       size = {options.first->width, options.first->height};
     } else if (one != nullptr) {
       // One match alone, or several on a line, leave no area.
-      size = (high - low).cwiseMax(std::max(1.0, options.sigma));
+      const CoordinateRange x(matches, 0), y(matches, 1);
+      size = Eigen::Vector2d(x.high - x.low, y.high - y.low).cwiseMax(options.sigma);
       frame.size_from_matches = true;
-      corner = low;
+      frame.image_corner = {x.low, y.low};
     }
-    first = coordinatesOf(options.first, size, corner);
-    second = coordinatesOf(options.second ? options.second : options.first, size, corner);
+    first = coordinatesOf(options.first, size, frame.image_corner);
+    second = coordinatesOf(options.second ? options.second : options.first, size, frame.image_corner);
     const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
                                size.cwiseQuotient(second.focal)};
     const TwoViewModelOptions lattice{calibration, options.nodes, options.verticals};
     models = options.planes_only ? homographyModels(images, lattice) : twoViewModels(images, lattice);
-    if (one == nullptr) {
-      status = Status::too_few, reason = "there is no finite match";
-    } else if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !size.allFinite() || !(size.minCoeff() > 0)) {
-      status = Status::not_applicable, reason = "noise and size of the images must be finite and positive";
-    } else {
-      for (const Eigen::Vector4d& m : matches) {
-        Eigen::Vector4d& u = normalised.emplace_back();
-        u << first(m.head<2>()), second(m.tail<2>());
-      }
-      if (options.keep_contradictions) {
-        used.resize(matches.size());
-        std::iota(used.begin(), used.end(), std::size_t{0});
-      } else {
-        used = uncontradictedMatches(normalised, images.noise);
-      }
-    }
+    take(matches, options, images.noise, one != nullptr);
+  }
+  bool ok() const { return status == Status::ok; }
+  /// Why no answer is to be trusted, whatever it is; empty: nothing of that kind.
+  std::string fault() const {
+    if (!first_differ && !second_differ) return "all matches are the same one";
+    if (!first_differ || !second_differ) return "all points of one image are the same one";
+    return {};
   }
   /// The matches that take part.
   std::vector<Eigen::Vector4d> usedMatches() const {
@@ -164,6 +175,47 @@ struct TwoViewInput {
     for (const std::size_t i : used) all.push_back(normalised[i]);
     return all;
   }
+
+  /// The matches in the models' coordinates, or why not.
+  void take(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options, const MatchNoise& noise,
+            bool any_finite) {
+    if (!any_finite) return refuse(Status::too_few, "there is no finite match");
+    if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !frame.image_size.allFinite() ||
+        !(frame.image_size.minCoeff() > 0)) {
+      return refuse(Status::not_applicable, "noise and size of the images must be finite and positive");
+    }
+    for (const std::optional<Camera>& camera : {options.first, options.second}) {
+      if (camera && !isPinhole(*camera)) {
+        return refuse(Status::not_applicable,
+                      "focal lengths of a camera must be finite and positive, its centre finite");
+      }
+    }
+    if (options.verticals && !(isDirection(options.verticals->first) && isDirection(options.verticals->second))) {
+      return refuse(Status::not_applicable, "verticals must be finite and not zero");
+    }
+    if (!(options.search.outlier_share > 0 && options.search.outlier_share < 1)) {
+      return refuse(Status::not_applicable, "the share of outliers beyond the threshold must be between 0 and 1");
+    }
+    for (const Eigen::Vector4d& m : matches) {
+      Eigen::Vector4d& u = normalised.emplace_back();
+      u << first(m.head<2>()), second(m.tail<2>());
+    }
+    used = independentMatches(normalised, noise, options.keep_contradictions);
+    first_of_equal = firstOfEqualMatches(normalised);
+    for (std::size_t i = 0; i < matches.size(); ++i) frame.repeated += first_of_equal[i] != i ? 1 : 0;
+    frame.contradicted = matches.size() - frame.repeated - used.size();
+    if (std::none_of(used.begin(), used.end(), [&](std::size_t i) { return normalised[i].allFinite(); })) {
+      const bool none = std::none_of(normalised.begin(), normalised.end(), [](const auto& u) { return u.allFinite(); });
+      refuse(none ? Status::too_few : Status::ill_defined,
+             none ? "the cameras see no match" : "all matches contradict each other");
+    }
+  }
+  void refuse(Status why, const char* in_words) { status = why, reason = in_words; }
+  static bool isPinhole(const Camera& camera) {
+    return camera.fu > 0 && camera.fv > 0 && std::isfinite(camera.fu) && std::isfinite(camera.fv) &&
+           std::isfinite(camera.cu) && std::isfinite(camera.cv);
+  }
+  static bool isDirection(const Eigen::Vector3d& v) { return v.allFinite() && !v.isZero(0); }
 
   /// What an estimate says of the motion, by the matches that agree with it.
   void describe(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
@@ -191,7 +243,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   result.status = input.status, result.reason = input.reason;
   result.errors.assign(matches.size(), std::numeric_limits<double>::quiet_NaN());
   result.inlier.assign(matches.size(), false);
-  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, options.search);
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.ok() ? options.search : HierarchyOptions{});
   if (result.ok()) {
     search.add(input.usedMatches());
     while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
@@ -224,8 +276,8 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!result.ok()) {
     result.reason = "the estimate of the chosen model did not converge";
-  } else if (!input.differ) {
-    result.status = Status::ill_defined, result.reason = "all matches are the same one";
+  } else if (!input.fault().empty()) {
+    result.status = Status::ill_defined, result.reason = input.fault();
   } else if (state.unsupported) {
     result.status = Status::ill_defined;
     result.reason = "no model is supported: the inliers of the chosen one could be chance";
@@ -239,7 +291,12 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
   TwoViewMotions result;
   static_cast<TwoViewImageFrame&>(result) = input.frame;
   result.status = input.status, result.reason = input.reason;
-  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.normalised,
+  if (!input.ok()) {
+    result.rest.resize(matches.size());
+    std::iota(result.rest.begin(), result.rest.end(), std::size_t{0});
+    return result;
+  }
+  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.usedMatches(),
                                                                  {.hierarchy = options.search, .max_structures = most});
   while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
   }
@@ -247,11 +304,14 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
   for (const auto& found : search.structures()) {
     const TwoViewModel& model = *input.models[found.model];
     std::vector<Eigen::Vector4d> own;
-    std::vector<std::size_t> places;
+    std::vector<char> is_own(matches.size(), 0);
     for (const std::size_t i : found.inliers) {
-      places.push_back(input.used[i]);
-      taken[places.back()] = 1;
-      own.push_back(input.normalised[places.back()]);
+      is_own[input.used[i]] = 1;
+      own.push_back(input.normalised[input.used[i]]);
+    }
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (is_own[input.first_of_equal[i]] != 0) places.push_back(i), taken[i] = 1;
     }
     std::vector<double> errors(own.size());
     model.errors(found.estimate.parameter, own, errors);
@@ -266,11 +326,10 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
   for (std::size_t i = 0; i < taken.size(); ++i) {
     if (taken[i] == 0) result.rest.push_back(i);
   }
-  if (result.status != Status::ok) return result;
   if (!search.terminated()) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
-  } else if (!input.differ) {
-    result.status = Status::ill_defined, result.reason = "all matches are the same one";
+  } else if (!input.fault().empty()) {
+    result.status = Status::ill_defined, result.reason = input.fault();
   }
   return result;
 }

@@ -9,7 +9,8 @@
 // all matches, each with the probability that it is right: normal errors among matches that lie anywhere in the image.
 //
 // A match is (x, y, x', y'), ũ = (x, y, 1); standard deviations are those of the coordinates in each image, in the unit
-// of the matches. docs/two_view.md has the figures.
+// of the matches. Each match counts as a measurement of its own: who has equal ones takes independentMatches()
+// (fusion/two_view/contradictions.hpp) before, or the covariance is too small. docs/two_view.md has the figures.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>

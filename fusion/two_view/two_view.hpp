@@ -36,8 +36,8 @@ struct TwoViewMotionOptions {
   std::optional<Camera> first = {};
   /// The camera of the second image, if it is another one.
   std::optional<Camera> second = {};
-  /// Width and height of both images, px. By default those of the cameras, else the bounding box of the matches. The
-  /// centre of an image of unknown camera is the middle of this.
+  /// Width and height of both images, px. By default those of the cameras, else the bounding box of the matches, without
+  /// coordinates that are far beyond all others. The centre of an image of unknown camera is the middle of this.
   std::optional<Eigen::Vector2d> image_size = {};
   std::vector<TwoViewNode> nodes = {};             ///< models beyond the default ones
   std::optional<TwoViewVerticals> verticals = {};  ///< in both cameras' frames; with them `upright` is a model
@@ -89,10 +89,13 @@ struct TwoViewMotionResult {
   std::optional<Gaussian<Essentiald>> relative_pose;
 };
 
-/// What is taken of the images.
+/// What is taken of the images, and of their matches.
 struct TwoViewImageFrame {
-  Eigen::Vector2d image_size = Eigen::Vector2d::Zero();  ///< px
+  Eigen::Vector2d image_corner = Eigen::Vector2d::Zero();  ///< the upper left one, px: zero where the size is known
+  Eigen::Vector2d image_size = Eigen::Vector2d::Zero();    ///< px
   bool calibrated = false, size_from_matches = false;
+  std::size_t repeated = 0;      ///< matches that are equal to another one, which counts for them
+  std::size_t contradicted = 0;  ///< different ones that take no part, because they contradict each other
 };
 
 /// The motion between two images.
@@ -130,9 +133,9 @@ struct TwoViewMotions : TwoViewImageFrame {
   std::vector<std::size_t> rest;  ///< matches that belong to none
 };
 
-/// The estimate from matches in pixels. Matches that contradict each other take no part in it, but may be inliers of what
-/// is found. Those that are not finite, or that no direction of a camera belongs to, are outliers of all models. Nothing is thrown: the status says what is wrong. The same matches in another order give the
-/// same answer.
+/// The estimate from matches in pixels. Equal matches count once. Matches that contradict each other take no part in it,
+/// but may be inliers of what is found. Those that are not finite, or that no direction of a camera belongs to, are outliers
+/// of all models. Nothing is thrown: the status says what is wrong. The same matches in another order give the same answer.
 TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
                                             const TwoViewMotionOptions& options);
 

@@ -227,6 +227,18 @@ class ChannelState {
     }
     return sum;
   }
+  /// Those among them that do not hold, because the coordinates that they depend on are exact.
+  int unmetEquations(const Q& q) const {
+    int sum = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      const Block& block = blocks_[i];
+      if (block.free.dimension > 0 || block.root.rank() >= rank) continue;
+      const Derivatives J = derivatives(q, i, at_[i]);
+      sum +=
+          detail::unmetEquations<P, K>(block.root, J.values, J.by_measurement, typicalDeviation(channel_->noiseOf(i)));
+    }
+    return sum;
+  }
   std::size_t uninformative() const {
     std::size_t sum = 0;
     for (const Block& block : blocks_) sum += block.free.dimension > 0 && selected(block) == 0;

@@ -125,6 +125,28 @@ struct MeasurementBlock {
   }
 };
 
+/// How many of the equations that the root left out do not hold, although they depend on the measurement: the coordinates
+/// that they depend on are exact, so that no correction takes them to zero. Redundant ones hold with the others.
+/// `deviation` is a standard deviation of the measurement's coordinates.
+template <int P, int K>
+int unmetEquations(const ReducedRoot<double, P>& root, const Eigen::Matrix<double, P, 1>& values,
+                   const Eigen::Matrix<double, P, K>& by_measurement, double deviation) {
+  int sum = 0;
+  for (int k = 0; k < P; ++k) {
+    bool kept = false;
+    for (int j = 0; j < root.rank(); ++j) kept = kept || root.row(j) == k;
+    if (kept) continue;
+    const double spread = by_measurement.row(k).norm() * deviation;
+    sum += spread > 0 && std::abs(values[k]) > 1e-3 * spread ? 1 : 0;
+  }
+  return sum;
+}
+/// A standard deviation of the coordinates.
+template <class Noise>
+double typicalDeviation(const Noise& noise) {
+  return std::sqrt(noise.covariance().trace() / Noise::dimension);
+}
+
 /// The same with the curvature of its equations: W = Q + Σ λ_k ∂²c_k/∂m², H_qm = Σ λ_k ∂²c_k/∂q∂m. The correction is
 /// base + slope δ, and the criterion gains ½ δᵀ A δ − bᵀ δ.
 template <int P, int N, int K>

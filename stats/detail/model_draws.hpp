@@ -166,7 +166,8 @@ class ModelDraws {
     std::vector<Hypothesis> hypotheses;
   };
   void count(Hypothesis& hypothesis, const Measurement& measurement, double error, int sign) const {
-    const double threshold = thresholds_[static_cast<std::size_t>(model_->equationsOf(measurement))];
+    const int equations = std::clamp(model_->equationsOf(measurement), 0, most_equations);
+    const double threshold = thresholds_[static_cast<std::size_t>(equations)];
     hypothesis.score += sign * scoreOf(score_, error, threshold);
     if (error < threshold) hypothesis.inliers += static_cast<std::size_t>(sign);
   }

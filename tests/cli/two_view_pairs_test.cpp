@@ -57,8 +57,10 @@ TEST(Contradictions, ArePointsWithTwoPartners) {
       {10, 90, 500, 500},   // 6 and 7 are near, but not one point in any image
       {13, 90, 505, 500},  {std::numeric_limits<double>::quiet_NaN(), 90, 100, 100},
   };
-  EXPECT_EQ(uncontradictedMatches(matches, noise), (std::vector<std::size_t>{2, 3, 6, 7, 8}));
-  EXPECT_EQ(uncontradictedMatches(matches, noise, 0.5), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(independentMatches(matches, noise), (std::vector<std::size_t>{2, 3, 6, 7, 8}));
+  EXPECT_EQ(independentMatches(matches, noise, true), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
+  const std::vector<bool> nearer = contradictedMatches(matches, noise, 0.5);
+  EXPECT_EQ(std::count(nearer.begin(), nearer.end(), true), 0);
   EXPECT_TRUE(contradictedMatches({}, noise).empty());
   // Points that were found twice: each pair within the reach in one image is beyond twice the reach in the other with the
   // probability exp(-4), 1.8 %.
@@ -69,8 +71,18 @@ TEST(Contradictions, ArePointsWithTwoPartners) {
     for (int k = 0; k < 2; ++k) twice.push_back(at + rng.normalVector<4>());
   }
   // P(one within 2, the other beyond 4) = 2 (1 - e⁻¹) e⁻⁴ = 2.3 % of the pairs; four standard errors are 1.9 %.
-  const std::size_t left = uncontradictedMatches(twice, {1, 1}).size();
+  const std::size_t left = independentMatches(twice, {1, 1}).size();
   EXPECT_NEAR(1 - static_cast<double>(left) / 2000, 0.0232, 0.019);
+}
+
+TEST(EqualMatches, CountOnce) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Vector4d a(1, 2, 3, 4), b(1, 2, 3, 4.5), broken(nan, 2, 3, 4);
+  const std::vector<Eigen::Vector4d> matches{b, a, broken, a, b, a, broken};
+  EXPECT_EQ(firstOfEqualMatches(matches), (std::vector<std::size_t>{0, 1, 2, 1, 0, 1, 6}));
+  EXPECT_EQ(independentMatches(matches, {0.01, 0.01}, true), (std::vector<std::size_t>{0, 1, 2, 6}));
+  // One first point and two second ones, each twice.
+  EXPECT_EQ(independentMatches(matches, {0.1, 0.1}), (std::vector<std::size_t>{2, 6}));
 }
 
 TEST(Contradictions, AreThoseOfAllPairsInAnyOrder) {

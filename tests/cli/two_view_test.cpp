@@ -134,6 +134,35 @@ TEST(TwoViewCommand, answersThatAreNotTrustedExitWith3) {
   EXPECT_NE(out.output.find("NOT TO BE TRUSTED"), std::string::npos) << out.output;
 }
 
+TEST(TwoViewCommand, aMotionThatLeavesTheImagesIsSaid) {
+  // Rotations by four degrees and more of an image that is a hundredth of a degree wide.
+  for (const char* matches : {"10", "100000"}) {
+    const ProgramOutput out = run({"simulate", "two-view", "--output", "-", "--motion", "rotation", "--focal-length",
+                                   "1e6", "--matches", matches});
+    EXPECT_EQ(out.exit_code, 2);
+    EXPECT_NE(out.error.find("takes all points out of images of 640 x 480 px"), std::string::npos) << out.error;
+  }
+}
+
+TEST(TwoViewCommand, repeatedAndContradictingMatchesAreCounted) {
+  const TemporaryDirectory directory;
+  std::string text = contentOf(simulate(directory, "homography", {"--outliers", "0"}));
+  text += text.substr(text.find('\n') + 1);  // each match twice
+  for (int i = 0; i < 20; ++i) text += "100,100," + std::to_string(20 * i) + ",50,0\n";
+  const std::string file = directory.write("twice.csv", text);
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--motions", "3"}}) {
+    std::vector<std::string> words = asked(file, more);
+    words.insert(words.end(), {"--json", directory / "out.json"});
+    const ProgramOutput out = run(words);
+    ASSERT_EQ(out.exit_code, 0) << out.error << out.output;
+    EXPECT_NE(out.output.find("100 repeat another one"), std::string::npos) << out.output;
+    EXPECT_NE(out.output.find("20 contradict each other"), std::string::npos) << out.output;
+    const Json json = Json::parse(contentOf(directory / "out.json"));
+    EXPECT_EQ(json["repeated"], 100);
+    EXPECT_EQ(json["contradicted"], 20);
+  }
+}
+
 TEST(TwoViewCommand, badInputIsNamed) {
   const TemporaryDirectory directory;
   const auto error = [&](const std::string& content, const std::vector<std::string>& more = {}) {
@@ -148,6 +177,8 @@ TEST(TwoViewCommand, badInputIsNamed) {
   EXPECT_NE(error(fine, {"--intrinsics", "0,600,320,240"}).find("intrinsics"), std::string::npos);
   EXPECT_NE(error(fine, {"--second-intrinsics", "600,600,320,240"}).find("--intrinsics"), std::string::npos);
   EXPECT_NE(error(fine, {"--sigma", "0"}).find("sigma"), std::string::npos);
+  EXPECT_NE(error(fine, {"--image-size=-640,480"}).find("-640 is not a finite positive number"), std::string::npos);
+  EXPECT_NE(error(fine, {"--image-size", "640,inf"}).find("inf is not a finite positive number"), std::string::npos);
   EXPECT_EQ(run(asked(directory / "none.csv", {})).exit_code, 2);
 }
 

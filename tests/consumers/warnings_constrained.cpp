@@ -2,6 +2,7 @@
 // kind of noise and with constraints.
 #include <lie/so3.hpp>
 #include <stats/constrained.hpp>
+#include <stats/implicit_ekf.hpp>
 #include <stats/measurement_error.hpp>
 #include <stats/measurement_noise.hpp>
 
@@ -52,5 +53,8 @@ int main() {
                     fits(CovarianceNoise<2>(Eigen::Matrix2d::Identity())) &&
                     fits(InformationNoise<2>(Eigen::Matrix2d::Identity()));
   const auto several = constrainedEstimate(SO3d(), std::tuple(turned, turned), NoConstraint{});
-  return fine && several.ok() && estimator.corrected().size() == 3 ? 0 : 1;
+  ImplicitEkf filter(Gaussian<SO3d>{});
+  const bool filtered = filter.update(SO3d(), IsotropicNoise<3>(1), Turned{}).ok() &&
+                        filter.updateAll([](auto& sums) { sums.add(SO3d(), IsotropicNoise<3>(1), Turned{}); }).ok();
+  return fine && filtered && several.ok() && estimator.corrected().size() == 3 ? 0 : 1;
 }

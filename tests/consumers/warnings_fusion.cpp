@@ -17,6 +17,11 @@
 #include <fusion/init/results.hpp>
 #include <fusion/init/sphere_least_squares.hpp>
 #include <fusion/init/window_fusion.hpp>
+#include <fusion/motion/gyroscope.hpp>
+#include <fusion/motion/motion_filter.hpp>
+#include <fusion/motion/search.hpp>
+#include <fusion/motion/structure.hpp>
+#include <fusion/motion/track_pairs.hpp>
 #include <fusion/status.hpp>
 #include <fusion/two_view/focal_lengths.hpp>
 #include <fusion/two_view/pose.hpp>
@@ -76,6 +81,22 @@ bool movesBetweenTwoViews() {
          !motionFromFundamental(fundamentalFromMotion({{}, chosen.pose}), m);
 }
 
+bool follows() {
+  TrackPairs tracks;
+  MotionFilter filter;
+  MotionStructure structure;
+  RigidityTest rigidity;
+  const std::vector<TrackObservation> seen(9);
+  tracks.add(seen);
+  const auto pairs = tracks.add(seen);
+  const MotionEstimate& motion = filter.update(pairs, gyroscopeRotation(Eigen::Vector3d::UnitX(), 0.1, 1e-3, {}));
+  structure.update(tracks.tracks(), pairs, filter.inverse_depths(), motion);
+  rigidity.add({});
+  return motion.ok() && SphereSearch().update(pairs).allFinite() && rigidity.spread() > 0 &&
+         structure.inFront().empty() && filter.essential().essential().covariance.allFinite() &&
+         filter.subspace().hypotheses().empty() && translationDirection(motion).covariance.allFinite();
+}
+
 bool sees() {
   const Camera camera{.fu = 450, .fv = 450, .cu = 320, .cv = 240, .distortion = Distortion::radtan};
   const auto bearing = camera.bearingWithSigma({100, 100});
@@ -85,5 +106,8 @@ bool sees() {
 }  // namespace
 
 int main() {
-  return preintegrates<double>() && preintegrates<float>() && initialises() && movesBetweenTwoViews() && sees() ? 0 : 1;
+  return preintegrates<double>() && preintegrates<float>() && initialises() && movesBetweenTwoViews() && follows() &&
+                 sees()
+             ? 0
+             : 1;
 }

@@ -1,4 +1,5 @@
 // The same as warnings_fusion.cpp for the headers of fusion/ that draw random numbers, with Random123.
+#include <fusion/hand_eye.hpp>
 #include <fusion/init/consensus.hpp>
 #include <fusion/init/robust_initialisation.hpp>
 #include <fusion/noise_calibration.hpp>
@@ -20,5 +21,6 @@ int main() {
   const VisualInertialResult result = initialiseRecording(recording, {.initialisation = options});
   const RobustInitialisation robust = initialiseRobustly(InertialWindow(), options);
   const ConsensusResult consensus = solveClosedFormRobustly(ClosedFormWindow(), options);
-  return result.fault && !robust.ok() && !consensus.ok() ? 0 : 1;
+  const HandEyeResult hand_eye = estimateRobotWorld(std::vector<PosePair>(3));
+  return result.fault && !robust.ok() && !consensus.ok() && !hand_eye.ok() ? 0 : 1;
 }

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -266,6 +267,85 @@ TEST(TwoViewMotion, severalPlanesAreFoundOneAfterTheOther) {
   EXPECT_TRUE(estimateTwoViewMotions(noise.pixels, options).structures.empty());
 }
 
+// Detectors find a point at several scales: equal matches have the same noise, and are one measurement.
+TEST(TwoViewMotion, equalMatchesCountOnce) {
+  const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0.1}, 1);
+  const TwoViewMotionOptions options = optionsOf(scene);
+  std::vector<Eigen::Vector4d> thrice;
+  for (const Eigen::Vector4d& m : scene.pixels) thrice.insert(thrice.end(), 3, m);
+  const TwoViewMotionEstimate once = estimateTwoViewMotion(scene.pixels, options);
+  const TwoViewMotionEstimate found = estimateTwoViewMotion(thrice, options);
+  ASSERT_TRUE(once.ok() && found.ok());
+  EXPECT_EQ(found.chosenModel().name, "essential");
+  EXPECT_EQ(found.inliers, 3 * once.inliers) << "each has its verdict";
+  EXPECT_EQ(found.repeated, 2 * scene.pixels.size());
+  EXPECT_EQ(found.contradicted, once.contradicted);
+  EXPECT_LE((found.matrix - once.matrix).norm(), 1e-12);
+  EXPECT_LE((found.relative_pose->covariance - once.relative_pose->covariance).norm(),
+            1e-12 * once.relative_pose->covariance.norm());
+  // A few matches are no more for being many times there.
+  for (std::size_t distinct : {2, 3, 4, 5}) {
+    std::vector<Eigen::Vector4d> few;
+    for (std::size_t i = 0; i < distinct; ++i) few.insert(few.end(), 50, scene.pixels[i]);
+    EXPECT_EQ(estimateTwoViewMotion(few, options).status, Status::ill_defined) << distinct;
+  }
+}
+
+TEST(TwoViewMotion, aWildCoordinateDoesNotMoveTheImage) {
+  for (const TwoViewMotion motion : {TwoViewMotion::homography, TwoViewMotion::fundamental}) {
+    const TwoViewScene scene({.motion = motion}, 1);
+    const TwoViewMotionOptions options{.sigma = scene.options.sigma};
+    const TwoViewMotionEstimate expected = estimateTwoViewMotion(scene.pixels, options);
+    EXPECT_TRUE(expected.size_from_matches);
+    for (const double wild : {1e4, -1e6, 1e18, -1e150, 1e300}) {
+      std::vector<Eigen::Vector4d> matches = scene.pixels;
+      matches.emplace_back(wild, 100, 300, -wild);
+      const TwoViewMotionEstimate found = estimateTwoViewMotion(matches, options);
+      EXPECT_TRUE(found.ok()) << wild << found.reason;
+      EXPECT_EQ(found.image_size, expected.image_size) << wild;
+      EXPECT_EQ(found.chosenModel().name, nameOf(motion)) << wild;
+      EXPECT_FALSE(found.inlier.back());
+      EXPECT_NEAR(static_cast<double>(found.inliers), static_cast<double>(expected.inliers), 3);
+    }
+  }
+}
+
+TEST(TwoViewMotion, severalMotionsLeaveContradictionsOut) {
+  const TwoViewScene plane({.motion = TwoViewMotion::homography, .outliers = 0}, 1);
+  const TwoViewScene zoom({.motion = TwoViewMotion::zoom, .matches = 60, .outliers = 0}, 1);
+  // Points with two partners each, before and between the others; then some of the others once more.
+  std::vector<Eigen::Vector4d> matches;
+  std::vector<std::string> owner;
+  const auto contradiction = [&](int i) {
+    for (const double x : {100.0, 400.0}) {
+      matches.emplace_back(20 + 15 * i, 300, x, 100 + 8 * i), owner.emplace_back("none");
+    }
+  };
+  for (int i = 0; i < 20; ++i) contradiction(i);
+  for (const Eigen::Vector4d& m : plane.pixels) matches.push_back(m), owner.emplace_back("homography");
+  for (int i = 20; i < 40; ++i) contradiction(i);
+  for (const Eigen::Vector4d& m : zoom.pixels) matches.push_back(m), owner.emplace_back("zoom");
+  for (int i = 0; i < 10; ++i)
+    matches.push_back(plane.pixels[3 * static_cast<std::size_t>(i)]), owner.emplace_back("homography");
+
+  const TwoViewMotions found = estimateTwoViewMotions(matches, optionsOf(plane));
+  ASSERT_EQ(found.status, Status::ok) << found.reason;
+  ASSERT_EQ(found.structures.size(), 2U);
+  EXPECT_GE(found.contradicted, 80U);
+  EXPECT_EQ(found.repeated, 10U);
+  std::size_t right = 0, all = found.rest.size();
+  std::vector<std::string> given(matches.size(), "none");
+  for (const TwoViewStructure& s : found.structures) {
+    EXPECT_TRUE(std::is_sorted(s.inliers.begin(), s.inliers.end()));
+    for (const std::size_t i : s.inliers) given[i] = s.model;
+    all += s.inliers.size();
+  }
+  EXPECT_EQ(all, matches.size()) << "each match has one place";
+  for (std::size_t i = 0; i < matches.size(); ++i) right += given[i] == owner[i] ? 1 : 0;
+  EXPECT_GE(right, matches.size() - 12);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(given[240 + i], given[40 + 3 * i]) << "equal matches belong together";
+}
+
 TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0}, 1);
@@ -316,6 +396,37 @@ TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {
   bad = options;
   bad.image_size = Eigen::Vector2d(640, nan);
   EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable);
+  for (const auto& [fu, cv] : {std::pair{0.0, 240.0}, {-600.0, 240.0}, {nan, 240.0}, {600.0, nan}}) {
+    bad = options;
+    bad.first->fu = fu, bad.first->cv = cv;
+    EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable) << fu << " " << cv;
+    EXPECT_EQ(estimateTwoViewMotions(scene.pixels, bad).rest.size(), scene.pixels.size());
+    bad = options;
+    bad.second = options.first;
+    bad.second->fu = fu, bad.second->cv = cv;
+    EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable) << fu << " " << cv;
+  }
+  for (const double y : {0.0, nan}) {
+    bad = options;
+    bad.verticals = TwoViewVerticals{.first = {0, y, 0}};
+    EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable) << y;
+  }
+  for (const double share : {0.0, 1.0, nan}) {
+    bad = options;
+    bad.search.outlier_share = share;
+    EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_applicable) << share;
+  }
+  // One point in the second image: the matches contradict each other, and every geometry with that epipole fits them.
+  std::vector<Eigen::Vector4d> one_point = scene.pixels;
+  for (Eigen::Vector4d& m : one_point) m.tail<2>() = Eigen::Vector2d(100, 100);
+  EXPECT_EQ(of(one_point).status, Status::ill_defined);
+  EXPECT_EQ(of(one_point).reason, "all matches contradict each other");
+  EXPECT_EQ(of(one_point).chosenModel().name, "none");
+  bad = options;
+  bad.keep_contradictions = true;
+  EXPECT_EQ(estimateTwoViewMotion(one_point, bad).status, Status::ill_defined);
+  EXPECT_EQ(estimateTwoViewMotion(one_point, bad).reason, "all points of one image are the same one");
+
   bad = options;
   bad.stop = [] { return true; };
   EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_converged);

@@ -81,6 +81,36 @@ TEST(VievilleAppendixB, KappaOf54HasItsLabelsExchangedAndIsNoFit) {
   EXPECT_LT(printedPhi(3, 5, 0.9), printedPhi(3, 5, 0.5));
 }
 
+TEST(VievilleAppendixB, P2KReturnsNeitherOfThePrintedKappas) {
+  // The code evaluates phi(i, j, 0.5) whatever P is, and searches κ in 0..10: 2.74 for both levels, which is far better
+  // there than either printed number. With P in its place the minimum for 0.9 is outside of that range.
+  for (const double printed : {8.8, 3.1}) {
+    EXPECT_GT(misfitOf(printed, 0.5).squares, 1.5 * misfitOf(bestKappa(0.5), 0.5).squares) << printed;
+  }
+  EXPECT_GT(bestKappa(0.9), 10);
+  // It divides the root of the sum by the number of cells, and counts 16 of 24: "about 5 %" is no error of a cell.
+  const Misfit best = misfitOf(bestKappa(0.5), 0.5);
+  EXPECT_LT(std::sqrt(best.squares) / 16, 0.5 * std::sqrt(best.squares / 24));
+}
+
+TEST(VievilleAppendixB, PsiOf50IsNotNegligible) {
+  // L²' + d' < L² + d as a comparison of L²/d has Ψ = (d' - d)/d', which is of the order of L²/d itself.
+  int printed_differs = 0, left_out_differs = 0;
+  constexpr int trials = 2000;
+  for (std::uint64_t t = 0; t < trials; ++t) {
+    CounterRng rng(t, 13);
+    const double d = 5 + std::floor(10 * rng.uniform()), more = 1 + std::floor(5 * rng.uniform()), general = d + more;
+    const double cost = 2 * d * rng.uniform(), cost_general = cost * rng.uniform();
+    const bool by_aic = cost_general + general < cost + d;
+    const auto by_50 = [&](double psi) { return cost_general / general < d / general * cost / d - psi; };
+    EXPECT_EQ(by_50(more / general), by_aic);
+    printed_differs += by_50(1 / d - 1 / general) != by_aic;
+    left_out_differs += by_50(0) != by_aic;
+  }
+  EXPECT_GT(printed_differs, trials / 10);
+  EXPECT_GT(left_out_differs, trials / 10);
+}
+
 TEST(VievilleAppendixB, FTestHasItsLevelWithResidualDegreesOfFreedomAlone) {
   // A specific model that is right: χ² of r' and of the extra δ are independent. With (53) as the code has it, and d of
   // (7), the level is another one.

@@ -328,6 +328,26 @@ TEST(Hierarchy, SaysWhatIsWrongWithALattice) {
   EXPECT_EQ(fault({root, std::make_shared<Curve>("a", 1, Names{"none"})}), "a has the parent none, which is no model");
   EXPECT_EQ(fault({root, std::make_shared<Curve>("a", 1, Names{"b"}), std::make_shared<Curve>("b", 1, Names{"a"})}),
             "a contains itself");
+
+  /// Numbers beyond what a search can hold.
+  struct Large : Curve {
+    std::size_t sample;
+    int values;
+    Large(std::size_t sample_size, int equations)
+        : Curve("large", 1, {"zero"}), sample(sample_size), values(equations) {}
+    std::size_t sampleSize() const override { return sample; }
+    int equations() const override { return values; }
+  };
+  EXPECT_EQ(fault({root, std::make_shared<Large>(17, 1)}), "large has minimal samples of 17, 16 at most are drawn");
+  EXPECT_EQ(fault({root, std::make_shared<Large>(1, 33)}), "large has 33 equations, they are 1 to 32");
+  EXPECT_EQ(fault({root, std::make_shared<Large>(1, 0)}), "large has 0 equations, they are 1 to 32");
+  EXPECT_TRUE(Curves({root, std::make_shared<Large>(16, 32)}).valid());
+  for (const double share : {0.0, 1.0, -0.1, std::numeric_limits<double>::quiet_NaN()}) {
+    Curves search({root}, {.outlier_share = share});
+    search.add(Eigen::Vector2d(0, 0));
+    EXPECT_FALSE(search.iterate());
+    EXPECT_EQ(search.fault(), "the share of outliers is not between 0 and 1") << share;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,224 @@
+#include <cli/commands/commands.hpp>
+#include <cli/io/feature_values.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/io/pose_pairs.hpp>
+#include <cli/io/text.hpp>
+#include <cli/show/hand_eye.hpp>
+#include <cli/show/json.hpp>
+#include <cli/show/units.hpp>
+#include <fusion/hand_eye.hpp>
+#include <fusion/hand_eye_hints.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* command_name = "liestat hand-eye";
+
+struct Options {
+  std::string file_a, file_b, json, report;
+  PosePairOptions pairs;
+  bool relative = false, invert_a = false, invert_b = false, keep_outliers = false;
+  bool in_degrees = false, in_radians = false;
+  std::vector<double> sigma_a, sigma_b;
+  HandEyeOptions estimate;
+};
+
+/// The sigmas of a file without covariances: 1 mm and 0.1 degrees, until the residuals tell.
+Eigen::Matrix<double, 6, 1> assumedSigma() {
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(1e-3), Eigen::Vector3d::Constant(0.1 / degrees);
+  return sigma;
+}
+
+/// ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees, m) in the library's order and units.
+Eigen::Matrix<double, 6, 1> sigmaFrom(const std::vector<double>& values, const char* option) {
+  if (values.size() != 2 && values.size() != 6) {
+    throw InputError(command_name, 0, fmt::format("{} has {} values", option, values.size()),
+                     "ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees and m)");
+  }
+  for (const double value : values) {
+    if (!std::isfinite(value))
+      throw InputError(command_name, 0, fmt::format("{} is not finite", option), "finite ones");
+  }
+  Eigen::Matrix<double, 6, 1> sigma;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double value = values.size() == 2 ? values[i / 3] : values[i];
+    sigma[static_cast<Eigen::Index>((i + 3) % 6)] = i < 3 ? value / degrees : value;
+  }
+  return sigma;
+}
+
+/// Decides on the noise of a file; its covariances are taken where it has them.
+HandEyeFile fileOf(const FeatureFile& file, const std::string& path, const std::vector<double>& sigma,
+                   const char* option, bool inverted, std::size_t unmatched) {
+  HandEyeFile result{.path = sourceName(path),
+                     .noise = PoseNoise::assumed,
+                     .sigma = assumedSigma(),
+                     .inverted = inverted,
+                     .rows = file.size(),
+                     .unmatched = unmatched};
+  if (!file.covariances.empty()) {
+    if (!sigma.empty()) {
+      throw InputError(result.path, 0, fmt::format("the file has covariances, and {} is given", option), "one of them");
+    }
+    result.noise = PoseNoise::columns;
+  } else if (!sigma.empty()) {
+    result.noise = PoseNoise::option;
+    result.sigma = sigmaFrom(sigma, option);
+  }
+  return result;
+}
+std::vector<Gaussian<SE3d>> posesOf(const FeatureFile& file, const HandEyeFile& how) {
+  if (how.noise == PoseNoise::columns) return gaussiansOf<SE3d>(file);
+  std::vector<Gaussian<SE3d>> poses;
+  for (const SE3d& pose : featuresOf<SE3d>(file)) poses.push_back({pose, how.sigma.cwiseAbs2().asDiagonal()});
+  return poses;
+}
+void addNotes(std::vector<std::string>& notes, const FeatureFile& file, const std::string& name) {
+  if (!file.weights.empty()) notes.push_back(fmt::format("the weights of {} are not used", name));
+  if (file.n_normalised > 0) {
+    notes.push_back(fmt::format("{}: {} {} normalised, off by {:.2g} at most", name, file.n_normalised,
+                                file.n_normalised == 1 ? "rotation was" : "rotations were", file.largest_norm_error));
+  }
+}
+
+/// The pairs as the files have them.
+std::vector<PosePair> givenPairs(const PosePairs& pairs, const HandEyeOutput& output) {
+  const std::vector<Gaussian<SE3d>> a = posesOf(pairs.a, output.a), b = posesOf(pairs.b, output.b);
+  std::vector<PosePair> given;
+  for (const PoseRows& rows : pairs.rows) given.push_back({a[rows.a], b[rows.b]});
+  return given;
+}
+void requireDifferentPoses(const std::vector<PosePair>& pairs, const HandEyeOutput& output) {
+  for (const bool is_a : {true, false}) {
+    const auto pose = [&](const PosePair& pair) { return (is_a ? pair.a : pair.b).mean.params(); };
+    const auto first = pose(pairs.front());
+    const bool same = std::all_of(pairs.begin(), pairs.end(), [&](const PosePair& pair) {
+      return (pose(pair) - first).cwiseAbs().maxCoeff() < 1e-12 * (1 + first.cwiseAbs().maxCoeff());
+    });
+    if (same) {
+      throw InputError((is_a ? output.a : output.b).path, 0, fmt::format("all {} poses are the same", pairs.size()),
+                       output.result.world ? "at least three different ones" : "motions that differ");
+    }
+  }
+}
+void requireNoise(const HandEyeOutput& output) {
+  const auto exact = [](const HandEyeFile& file) { return file.noise == PoseNoise::option && file.sigma.isZero(0); };
+  if (exact(output.a) && exact(output.b)) {
+    throw InputError(command_name, 0, "the poses of both files are exact (--sigma-a, --sigma-b)",
+                     "noise in one of them");
+  }
+}
+
+HandEyeOutput calibrate(Options options) {
+  options.pairs.reading.angles = options.in_degrees   ? AngleUnit::degrees
+                                 : options.in_radians ? AngleUnit::radians
+                                                      : AngleUnit::unsaid;
+  options.pairs.least = options.relative ? 2 : 3;
+  if (!std::isfinite(options.pairs.tolerance)) throw InputError(command_name, 0, "--tolerance is not finite", "s");
+  const PosePairs pairs = readPosePairs(options.file_a, options.file_b, options.pairs);
+  HandEyeOutput output;
+  output.a = fileOf(pairs.a, options.file_a, options.sigma_a, "--sigma-a", options.invert_a, pairs.unmatched_a);
+  output.b = fileOf(pairs.b, options.file_b, options.sigma_b, "--sigma-b", options.invert_b, pairs.unmatched_b);
+  output.rows = pairs.rows, output.by_time = pairs.by_time;
+  output.tolerance = options.pairs.tolerance, output.largest_gap = pairs.largest_gap;
+  addNotes(output.notes, pairs.a, output.a.path), addNotes(output.notes, pairs.b, output.b.path);
+  output.options = options.estimate;
+  output.options.find_outliers = !options.keep_outliers;
+  output.options.known_noise = output.a.noise != PoseNoise::assumed && output.b.noise != PoseNoise::assumed;
+  output.result.world = !options.relative;
+  requireNoise(output);
+
+  const std::vector<PosePair> given = givenPairs(pairs, output);
+  requireDifferentPoses(given, output);
+  HandEyeHintOptions hints;
+  hints.reading.a.inverted = options.invert_a, hints.reading.b.inverted = options.invert_b;
+  hints.doubt_a = output.a.noise == PoseNoise::columns, hints.doubt_b = output.b.noise == PoseNoise::columns;
+  hints.estimate = output.options;
+  std::vector<PosePair> meant;
+  for (const PosePair& pair : given) meant.push_back(readPair(pair, hints.reading));
+  output.result = options.relative ? estimateHandEye(meant, output.options) : estimateRobotWorld(meant, output.options);
+  if (output.result.fault.kind == FaultKind::bad_covariance) {
+    const PoseRows& rows = pairs.rows[output.result.fault.index];
+    throw InputError(
+        output.a.path, rows.line_a,
+        fmt::format("the covariances of this pose and of {}:{} are singular together", output.b.path, rows.line_b),
+        "noise in one of them in each direction");
+  }
+  if (output.result.fault) throw InputError(command_name, 0, describe(output.result.fault));
+  output.hint = explainHandEye(given, output.result, hints);
+  return output;
+}
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  const HandEyeOutput output = calibrate(options);
+  if (options.json != "-") printLines(formatHandEye(output));
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, output.options.seed);
+    setHandEye(object, output);
+    writeJson(options.json, object);
+  }
+  if (!options.report.empty()) writeHandEyeReport(options.report, invocation.command_line, output);
+  return output.result.ok() ? exit_fine : exit_not_trusted;
+}
+
+}  // namespace
+
+void addHandEyeCommand(const CommandList& program) {
+  auto options = std::make_shared<Options>();
+  const Command command =
+      program.add("hand-eye", "The pose of a camera on a gripper, and of its target, from pairs of poses (AX = YB)");
+  command.option("A", options->file_a, "Poses base_T_gripper: TUM, KITTI, EuRoC or CSV ('-': standard input)")
+      .required();
+  command.option("B", options->file_b, "Poses target_T_camera, likewise").required();
+  command.flag("--relative", options->relative,
+               "Rows are independent motions of gripper and camera, of two odometries (AX = XB)");
+  command.flag("--invert-a", options->invert_a, "A holds gripper_T_base; covariances go with the poses");
+  command.flag("--invert-b", options->invert_b, "B holds camera_T_target; likewise");
+  command
+      .option("--sigma-a", options->sigma_a,
+              "Standard deviations of A: ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees, m), in the axes of each pose of "
+              "the file; 0: exact")
+      .list(2, 6)
+      .notNegative();
+  command.option("--sigma-b", options->sigma_b, "The same of B").list(2, 6).notNegative();
+  command
+      .option("--tolerance", options->pairs.tolerance,
+              "Largest difference of times that belong together, s (default 0.01)")
+      .notNegative();
+  command.flag("--by-row", options->pairs.by_row, "Row i of A belongs to row i of B, whatever their times");
+  command.flag("--keep-outliers", options->keep_outliers, "Use all pairs; wrong ones are not looked for");
+  command.option("--samples", options->estimate.samples, "Samples of the search for wrong pairs (default 80)")
+      .range(0, 1000000);
+  command.option("--seed", options->estimate.seed, "Seed of starts and samples (default 1)");
+  command.option("--format", options->pairs.reading.format, "Format of both files (default auto: by their first lines)")
+      .oneOf(formatNames());
+  command
+      .option("--columns", options->pairs.reading.columns,
+              "Names of CSV columns that are not ours: tx=px,ty=py (ours=the files')")
+      .list();
+  command.flag("--ignore-unknown", options->pairs.reading.ignore_unknown, "Pass over CSV columns without a meaning");
+  const Option in_degrees = command.flag("--degrees", options->in_degrees, "Rotation vectors are in degrees");
+  command.flag("--radians", options->in_radians, "Rotation vectors are in radians, those beyond a turn too")
+      .excludes(in_degrees);
+  command
+      .option("--norm-tolerance", options->pairs.reading.norm_tolerance,
+              "Quaternions and matrices that are off by less are normalised (default 0.001)")
+      .range(0.0, 0.5);
+  command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Directory for a page with residuals, excitations and covariances");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+}
+
+}  // namespace liestat::cli

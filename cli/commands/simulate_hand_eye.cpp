@@ -1,0 +1,149 @@
+#include <cli/commands/commands.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/show/json.hpp>
+#include <experiments/hand_eye_scene.hpp>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+using namespace experiments;
+namespace {
+
+constexpr const char* command_name = "liestat simulate hand-eye";
+
+struct Options {
+  std::string output, format = "csv", motion = "general", noise = "isotropic", outlier_kind = "gross";
+  bool overwrite = false;
+  std::uint64_t seed = 1;
+  HandEyeSceneOptions scene;
+
+  std::string path(const char* name) const {
+    return fmt::format("{}/{}.{}", output, name, format == "tum" ? "txt" : "csv");
+  }
+  std::string truth() const { return output + "/truth.json"; }
+};
+
+template <class Enum, class List>
+Enum byName(const List& all, const std::string& wanted) {
+  for (const Enum value : all) {
+    if (name(value) == wanted) return value;
+  }
+  throw InputError(command_name, 0, "there is no " + wanted);
+}
+template <class List>
+std::vector<std::string> namesOf(const List& all) {
+  std::vector<std::string> names;
+  for (const auto value : all) names.push_back(name(value));
+  return names;
+}
+
+/// Row i at the time i (s), with covariances unless the format has no place for them.
+std::string posesText(const HandEyeScene& scene, bool is_a, bool tum) {
+  std::string text = tum ? "# t tx ty tz qx qy qz qw\n" : "t,tx,ty,tz,qx,qy,qz,qw";
+  if (!tum) {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = i; j < 6; ++j) text += fmt::format(",cov_{}{}", i, j);
+    }
+    text += "\n";
+  }
+  const char* separator = tum ? " " : ",";
+  for (std::size_t k = 0; k < scene.pairs.size(); ++k) {
+    const Gaussian<SE3d>& pose = is_a ? scene.pairs[k].a : scene.pairs[k].b;
+    text += fmt::format("{}", k);
+    const auto add = [&](double value) { text += fmt::format("{}{}", separator, value); };
+    for (int i = 0; i < 3; ++i) add(pose.mean.translation()[i]);
+    for (int i = 0; i < 4; ++i) add(pose.mean.so3().params()[i]);
+    if (!tum) {
+      for (int i = 0; i < 6; ++i) {
+        for (int j = i; j < 6; ++j) add(pose.covariance(i, j));
+      }
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+JsonObject poseObject(const SE3d& pose) {
+  JsonObject o;
+  return o.set("translation", Eigen::Vector3d(pose.translation()))
+      .set("quaternion_xyzw", Eigen::Vector4d(pose.so3().params()))
+      .set("rotation_vector", Eigen::Vector3d(pose.so3().log()));
+}
+JsonObject truthOf(const HandEyeScene& scene, const Options& options, const Invocation& invocation) {
+  const HandEyeSceneOptions& o = options.scene;
+  JsonObject object = jsonEnvelope(invocation.command_line, options.seed);
+  object.set("problem", o.relative ? "AX = XB" : "AX = YB").set("motion", name(o.motion)).set("noise", name(o.noise));
+  object.set("noise_factor", o.noise_factor).set("pairs", o.pairs).set("outlier_kind", name(o.outlier_kind));
+  object.set("open_dimension", openDimension(o.motion)).set("X", poseObject(scene.X));
+  object.set("Y", o.relative ? std::nullopt : std::optional(poseObject(scene.Y)));
+  std::vector<double> inlier;
+  for (const bool right : scene.inlier) inlier.push_back(right ? 1 : 0);
+  return object.set("inlier", inlier);
+}
+
+int runCommand(Options options, const Invocation& invocation) {
+  HandEyeSceneOptions& scene_options = options.scene;
+  scene_options.motion = byName<HandEyeMotion>(all_hand_eye_motions, options.motion);
+  scene_options.noise = byName<HandEyeNoise>(all_hand_eye_noises, options.noise);
+  scene_options.outlier_kind = byName<HandEyeOutliers>(all_hand_eye_outliers, options.outlier_kind);
+  for (const double value : {scene_options.noise_factor, scene_options.outliers}) {
+    if (!std::isfinite(value)) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+  }
+  const bool tum = options.format == "tum";
+  if (!options.overwrite) {
+    for (const std::string& path : {options.path("a"), options.path("b"), options.truth()}) {
+      if (std::filesystem::exists(path)) throw InputError(path, 0, "the file is there", "another name, or --overwrite");
+    }
+  }
+  const HandEyeScene scene(scene_options, options.seed);
+  createDirectory(options.output);
+  writeOutput(options.path("a"), posesText(scene, true, tum));
+  writeOutput(options.path("b"), posesText(scene, false, tum));
+  writeJson(options.truth(), truthOf(scene, options, invocation));
+  std::vector<std::string> words = {"liestat", "hand-eye", options.path("a"), options.path("b")};
+  if (scene_options.relative) words.emplace_back("--relative");
+  std::vector<const char*> pointers;
+  for (const std::string& word : words) pointers.push_back(word.c_str());
+  std::size_t wrong = 0;
+  for (const bool right : scene.inlier) wrong += right ? 0 : 1;
+  printLines(fmt::format("{} pairs of {}, {} of them wrong, motion '{}'\n\n{}\n", scene.pairs.size(),
+                         scene_options.relative ? "motions" : "poses", wrong, name(scene_options.motion),
+                         commandLine(static_cast<int>(pointers.size()), pointers.data())));
+  return exit_fine;
+}
+
+}  // namespace
+
+void addSimulateHandEyeCommand(const CommandList& simulate) {
+  auto options = std::make_shared<Options>();
+  const Command command =
+      simulate.add("hand-eye", "Poses of a gripper and of the camera on it, wrong ones among them, for hand-eye");
+  command.option("--output", options->output, "Directory for a.csv, b.csv (a.txt, b.txt) and truth.json").required();
+  command.flag("--overwrite", options->overwrite, "Replace files of these names");
+  command.option("--format", options->format, "csv with covariances (default), or tum without").oneOf({"csv", "tum"});
+  command.option("--motion", options->motion, "Default general; a list is in docs/program.md")
+      .oneOf(namesOf(all_hand_eye_motions));
+  command.option("--noise", options->noise, "isotropic (default), anisotropic or target")
+      .oneOf(namesOf(all_hand_eye_noises));
+  command.option("--noise-factor", options->scene.noise_factor, "Multiplies the standard deviations (default 1)")
+      .range(1e-6, 1e3);
+  command.option("--pairs", options->scene.pairs, "Default 20").range(std::size_t{1}, std::size_t{100000});
+  command.flag("--relative", options->scene.relative, "Independent motions, for AX = XB");
+  command.option("--outliers", options->scene.outliers, "Share of wrong pairs (default 0)").range(0.0, 1.0);
+  command.option("--outlier-kind", options->outlier_kind, "gross (default), mild, flips or cluster")
+      .oneOf(namesOf(all_hand_eye_outliers));
+  command.option("--seed", options->seed, "Seed; the same seed gives the same files (default 1)");
+  command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+}
+
+}  // namespace liestat::cli

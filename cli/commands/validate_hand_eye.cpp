@@ -1,0 +1,54 @@
+#include <cli/commands/commands.hpp>
+#include <cli/commands/validation_command.hpp>
+#include <cli/show/hand_eye_validation.hpp>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+using namespace experiments;
+namespace {
+
+struct Options {
+  HandEyeValidation validation;
+  std::vector<std::string> experiments;
+  std::size_t trials = 0;
+  bool full = false;
+  ValidationOutput output;
+};
+
+int runCommand(const Options& options, const Invocation& invocation) {
+  HandEyeValidation validation = options.validation;
+  validation.experiments = chosen(all_hand_eye_experiments, options.experiments);
+  validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
+  validation.many_pairs = options.full;
+  const std::vector<HandEyeRow> rows =
+      withProgressBar("validate hand-eye", [&](const auto& progress) { return validateHandEye(validation, progress); });
+  FurtherRows counted;
+  counted.tally = countedTally(rows);
+  return publish(
+      options.output, invocation, validation.seed, run_false_alarm, rows, formatHandEyeTables,
+      [](const HandEyeRow& row) { return toJson(row); }, writeHandEyeReport, counted);
+}
+
+}  // namespace
+
+void addValidateHandEyeCommand(const CommandList& validate) {
+  auto options = std::make_shared<Options>();
+  const Command app = validate.add(
+      "hand-eye", "Hand-eye calibration: errors, covariance, open directions of degenerate motions, wrong pairs");
+  app.option("--experiment", options->experiments,
+             "accuracy, motions, outliers, formulations: a comma list (default: all)")
+      .list()
+      .oneOf(names(all_hand_eye_experiments));
+  app.option("--noise-factor", options->validation.noise_factor,
+             "Standard deviation of the noise over what the estimator is told (default 1)")
+      .range(0.01, 100.0);
+  app.flag("--full", options->full, "2000 trials a row, and rows with 200 pairs");
+  addRunOptions(app, "100, with --full 2000", options->trials, options->validation.seed, options->validation.threads,
+                options->output);
+  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,528 @@
+#include <cli/show/hand_eye.hpp>
+
+#include <cli/io/output_file.hpp>
+#include <cli/io/text.hpp>
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// One of the two unknown poses, with the directions of its parent's frame in which it may be moved without a rotation.
+struct Unknown {
+  const char* symbol;
+  const char *parent, *child;
+  const Gaussian<SE3d>& pose;
+  bool rotation_is_open;
+  std::vector<Eigen::Vector3d> open;
+
+  std::string name() const { return fmt::format("{}_T_{}", parent, child); }
+  const SE3d& mean() const { return pose.mean; }
+  bool hasCovariance() const { return !rotation_is_open && pose.covariance.allFinite(); }
+
+  /// From a local error to translation (m, along the parent's axes) and rotation vector (rad), as they are printed.
+  Matrix6 toCoordinates() const {
+    Matrix6 J = Matrix6::Zero();
+    J.topLeftCorner<3, 3>() = mean().so3().matrix();
+    J.bottomRightCorner<3, 3>() = SO3d::rightJacobianInverse(mean().so3().log());
+    return J;
+  }
+  Matrix6 covarianceOfCoordinates() const {
+    const Matrix6 J = toCoordinates();
+    return J * pose.covariance * J.transpose();
+  }
+  /// Standard deviations; NaN where there is none, and along axes in which an open direction has a component.
+  Vector6 sigmasOfCoordinates() const {
+    return sigmas(covarianceOfCoordinates(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  }
+  Vector6 localSigmas() const { return sigmas(pose.covariance, mean().so3().inverse().matrix()); }
+
+ private:
+  Vector6 sigmas(const Matrix6& covariance, const Eigen::Matrix3d& from_parent) const {
+    if (!hasCovariance()) return Vector6::Constant(nan);
+    constexpr double share = 1e-3;
+    Vector6 result = covariance.diagonal().cwiseSqrt();
+    for (const Eigen::Vector3d& direction : open) {
+      const Eigen::Vector3d moved = from_parent * direction;
+      for (int i = 0; i < 3; ++i) {
+        if (std::abs(moved[i]) > share * moved.norm()) result[i] = nan;
+      }
+    }
+    return result;
+  }
+};
+
+std::vector<Unknown> unknownsOf(const HandEyeResult& r) {
+  std::vector<Unknown> list = {{"X", "gripper", "camera", r.X, r.rotationIsOpen(), {}}};
+  if (r.world) list.push_back({"Y", "base", "target", r.Y, r.rotationIsOpen(), {}});
+  for (const OpenDirection& d : r.directions) {
+    list[0].open.push_back(d.twist.head<3>());
+    if (r.world) list[1].open.push_back(d.twist_of_Y.head<3>());
+  }
+  return list;
+}
+
+const char* verdictOf(const HandEyeResult& r) {
+  switch (r.status) {
+    case FusionStatus::ok:
+      return r.world ? "X and Y are determined" : "X is determined";
+    case FusionStatus::undetermined:
+      return "the motions do not determine X";
+    case FusionStatus::ambiguous:
+      return "two solutions explain the pairs";
+    case FusionStatus::inconsistent:
+      return "the residuals are larger than the covariances of the poses say";
+    case FusionStatus::not_converged:
+      return "the iterations ended before the estimate stayed";
+    default:
+      return describe(r.status);
+  }
+}
+std::string verdict(const HandEyeResult& r) {
+  return r.ok() ? fmt::format("ok: {}\n", verdictOf(r))
+                : fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(r.status), verdictOf(r));
+}
+
+std::string fixed(double value) {
+  const std::string text = std::isfinite(value) ? fmt::format("{:.5f}", value) : "n/a";
+  return text == "-0.00000" ? "0.00000" : text;
+}
+
+const std::vector<std::string> pose_headers{"", "x", "y", "z", "unit"};
+std::vector<std::vector<std::string>> poseRows(const Unknown& unknown) {
+  const Vector6 sigma = unknown.sigmasOfCoordinates();
+  const Eigen::Vector3d t = unknown.mean().translation(), r = degrees * unknown.mean().so3().log();
+  const auto row = [](const std::string& title, const auto& v, const char* unit, auto&& cell) {
+    return std::vector<std::string>{title, cell(v[0]), cell(v[1]), cell(v[2]), unit};
+  };
+  const bool none = !unknown.hasCovariance() && !unknown.rotation_is_open;
+  const auto sigmas = [none](double x) {
+    return std::isfinite(x) ? fmt::format("{:.2g}", x) : std::string(none ? "n/a" : "open");
+  };
+  return {row("translation", t, "m", fixed), row("  sd", Eigen::Vector3d(sigma.head<3>()), "m", sigmas),
+          row("rotation vector", r, "deg", fixed),
+          row("  sd", Eigen::Vector3d(degrees * sigma.tail<3>()), "deg", sigmas)};
+}
+std::string quaternionOf(const SE3d& pose) {
+  Eigen::Vector4d q = pose.so3().params();
+  if (q[3] < 0) q = -q;
+  return fmt::format("quaternion x y z w: {:.8f} {:.8f} {:.8f} {:.8f}", q[0] + 0.0, q[1] + 0.0, q[2] + 0.0, q[3] + 0.0);
+}
+
+std::string noiseOf(const HandEyeFile& file) {
+  switch (file.noise) {
+    case PoseNoise::columns:
+      return "covariances of the file";
+    case PoseNoise::option:
+      if (file.sigma.isZero(0)) return "exact";
+      break;
+    case PoseNoise::assumed:
+      break;
+  }
+  const Eigen::Vector3d t = file.sigma.head<3>(), r = degrees * file.sigma.tail<3>();
+  const auto equal = [](const Eigen::Vector3d& v) { return v[0] == v[1] && v[1] == v[2]; };
+  const auto text = [&](const Eigen::Vector3d& v) {
+    return equal(v) ? fmt::format("{:g}", v[0]) : fmt::format("({:g}, {:g}, {:g})", v[0], v[1], v[2]);
+  };
+  return fmt::format("sigma {} deg, {} m{}", text(r), text(t), file.noise == PoseNoise::assumed ? " (assumed)" : "");
+}
+std::string fileInWords(const HandEyeOutput& output, bool is_a) {
+  const HandEyeFile& file = is_a ? output.a : output.b;
+  const bool world = output.result.world;
+  std::string pose = is_a ? "motions of the gripper" : "motions of the camera";
+  if (world) pose = is_a ? "base_T_gripper" : "target_T_camera";
+  return fmt::format("{}: {}{}, {}; {}", is_a ? "A" : "B", file.path, file.inverted ? " inverted" : "", pose,
+                     noiseOf(file));
+}
+std::string summary(const HandEyeOutput& output) {
+  std::string text = output.result.world ? "A X = Y B: absolute poses\n" : "A X = X B: independent motions\n";
+  text += fileInWords(output, true) + "\n" + fileInWords(output, false) + "\n";
+  if (output.by_time) {
+    text += fmt::format("{} pairs by time, at most {:.3g} s apart (tolerance {:g} s)", output.rows.size(),
+                        output.largest_gap, output.tolerance);
+    if (output.a.unmatched + output.b.unmatched > 0) {
+      text += fmt::format("; without a partner: {} of {} rows of A, {} of {} of B", output.a.unmatched, output.a.rows,
+                          output.b.unmatched, output.b.rows);
+    }
+    text += "\n";
+  } else {
+    text += fmt::format("{} pairs by row\n", output.rows.size());
+  }
+  for (const std::string& note : output.notes) text += note + "\n";
+  return text;
+}
+std::string fitInWords(const HandEyeOutput& output) {
+  const HandEyeResult& r = output.result;
+  std::string text = fmt::format("{} of {} pairs used", r.pairs.size() - r.outliers.size(), r.pairs.size());
+  text += fmt::format("; chi2/dof {} ({} degrees of freedom", number(r.chi2 / r.degrees_of_freedom, 3),
+                      r.degrees_of_freedom);
+  if (output.options.known_noise) text += fmt::format(", p {}", number(r.p, 2));
+  text += fmt::format("); {} starts\n", r.starts);
+  if (!output.options.known_noise) {
+    text += fmt::format(
+        "the noise is not known: the covariances are scaled by chi2/dof = {}, and the residuals are no\n"
+        "test of them (--sigma-a and --sigma-b, or columns cov_00 ... of both files, make them one)\n",
+        number(r.variance_factor, 3));
+  }
+  return text;
+}
+std::string rowInWords(const PoseRows& rows) {
+  std::string text =
+      rows.a == rows.b ? fmt::format("row {}", rows.a + 1) : fmt::format("rows {} and {}", rows.a + 1, rows.b + 1);
+  text += rows.line_a == rows.line_b ? fmt::format(" (line {}", rows.line_a)
+                                     : fmt::format(" (lines {} and {}", rows.line_a, rows.line_b);
+  if (rows.time) text += fmt::format(", {:.10g} s", *rows.time);
+  return text + ")";
+}
+std::string outliersInWords(const HandEyeOutput& output) {
+  constexpr std::size_t most = 20;
+  const HandEyeResult& r = output.result;
+  if (r.outliers.empty()) return "";
+  std::string text = fmt::format("{} wrong {}:\n", r.outliers.size(), r.outliers.size() == 1 ? "pair" : "pairs");
+  for (std::size_t k = 0; k < std::min(most, r.outliers.size()); ++k) {
+    const std::size_t i = r.outliers[k];
+    const Vector6& e = r.pairs[i].error;
+    text +=
+        fmt::format("  {}: {} deg, {} m off, chi2 {}\n", rowInWords(output.rows[i]),
+                    number(degrees * e.tail<3>().norm(), 3), number(e.head<3>().norm(), 3), number(r.pairs[i].chi2, 3));
+  }
+  if (r.outliers.size() > most) text += fmt::format("  and {} more (--json lists all)\n", r.outliers.size() - most);
+  return text;
+}
+std::string directionsInWords(const HandEyeOutput& output) {
+  std::string text;
+  for (const OpenDirection& d : output.result.directions) {
+    text += fmt::format("  {}: {} (excitation {})\n", d.weak ? "weak" : "open", describe(d, "gripper"),
+                        number(d.excitation, 3));
+  }
+  if (text.empty()) return text;
+  text = "directions that the motions do not determine:\n" + text;
+  if (output.result.rotationIsOpen()) {
+    text += "X may turn by any angle, so that there is no covariance\n";
+  } else {
+    text += "standard deviations and covariances hold with these directions fixed\n";
+  }
+  return text + "X is one of those that fit; rotations about several axes would determine it\n";
+}
+std::string rivalInWords(const HandEyeResult& r) {
+  if (!r.rival) return "";
+  const Eigen::Vector3d t = r.rival->translation(), v = degrees * r.rival->so3().log();
+  return fmt::format(
+      "X may as well be: translation ({:.4g}, {:.4g}, {:.4g}) m, rotation vector ({:.4g}, {:.4g}, "
+      "{:.4g}) deg\n",
+      t[0], t[1], t[2], v[0], v[1], v[2]);
+}
+
+/// A pose of one of the files, or its inverse.
+std::string poseName(bool is_a, bool inverse, bool world) {
+  if (!world) return inverse ? "the inverse motions" : "the motions";
+  if (is_a) return inverse ? "gripper_T_base" : "base_T_gripper";
+  return inverse ? "camera_T_target" : "target_T_camera";
+}
+std::string readingInWords(CovarianceReading reading, bool is_a, const HandEyeFile& file, bool world) {
+  switch (reading) {
+    case CovarianceReading::right:
+      return "right perturbations, translation first";
+    case CovarianceReading::left:
+      return fmt::format("those of {}, or of left perturbations Exp(e) T, which is the same",
+                         poseName(is_a, !file.inverted, world));
+    case CovarianceReading::rotation_then_translation:
+      return "ones with the rotation's block first";
+    case CovarianceReading::world_axes:
+      return "ones along the axes of the world, rotation and translation apart";
+  }
+  return "";
+}
+std::string hintInWords(const HandEyeOutput& output) {
+  if (!output.hint) return "";
+  const HandEyeHint& hint = *output.hint;
+  const bool world = output.result.world;
+  std::vector<std::string> parts;
+  if (hint.reading.b.inverted != output.b.inverted) {
+    const auto flag = [](const HandEyeFile& file, const char* name) {
+      return fmt::format("{} --invert-{}", file.inverted ? "without" : "with", name);
+    };
+    parts.push_back(fmt::format("the poses of one file inverted ({}, or {}; the pairs do not tell which{})",
+                                flag(output.a, "a"), flag(output.b, "b"), world ? ": X and Y change places" : ""));
+  }
+  const CovarianceReading a = hint.reading.a.covariance, b = hint.reading.b.covariance;
+  if (a != CovarianceReading::right && a == b && a != CovarianceReading::left) {
+    parts.push_back(fmt::format("the covariances of A and B read as {}", readingInWords(a, true, output.a, world)));
+  } else {
+    for (const bool is_a : {true, false}) {
+      const CovarianceReading reading = is_a ? a : b;
+      if (reading == CovarianceReading::right) continue;
+      parts.push_back(fmt::format("the covariances of {} read as {}", is_a ? "A" : "B",
+                                  readingInWords(reading, is_a, is_a ? output.a : output.b, world)));
+    }
+  }
+  std::string text = fmt::format("hint: with {} ", joined(parts, " and "));
+  const std::string figures = std::isfinite(hint.p)
+                                  ? fmt::format("chi2/dof {}, p {}", number(hint.chi2_per_degree, 3), number(hint.p, 2))
+                                  : fmt::format("chi2/dof {}", number(hint.chi2_per_degree, 3));
+  return text + (hint.agrees ? fmt::format("the residuals agree ({})\n", figures)
+                             : fmt::format("the residuals are far smaller ({})\n", figures));
+}
+std::string answer(const HandEyeOutput& output) { return verdict(output.result) + hintInWords(output); }
+std::string rest(const HandEyeOutput& output) {
+  return fitInWords(output) + directionsInWords(output) + rivalInWords(output.result) + outliersInWords(output);
+}
+
+// --- JSON -----------------------------------------------------------------------------------------------------------
+
+JsonObject sigmasJson(const Vector6& sigma, const char* rotation) {
+  JsonObject o;
+  return o.set("translation_m", Eigen::Vector3d(sigma.head<3>()))
+      .set(rotation, Eigen::Vector3d(degrees * sigma.tail<3>()));
+}
+JsonObject poseJson(const SE3d& pose) {
+  JsonObject o;
+  Eigen::Vector4d q = pose.so3().params();
+  if (q[3] < 0) q = -q;
+  return o.set("translation", Eigen::Vector3d(pose.translation()))
+      .set("quaternion_xyzw", q)
+      .set("rotation_vector", Eigen::Vector3d(pose.so3().log()));
+}
+template <int N>
+void setCovariance(JsonObject& o, const char* field, const Eigen::Matrix<double, N, N>& covariance, bool is_there) {
+  if (is_there) {
+    o.set(field, covariance);
+  } else {
+    o.set(field, nullptr);
+  }
+}
+JsonObject toJson(const Unknown& unknown) {
+  JsonObject o = poseJson(unknown.mean());
+  setCovariance<6>(o, "covariance", unknown.pose.covariance, unknown.hasCovariance());
+  o.set("covariance_frame", fmt::format("the {}'s axes at its origin: {} Exp(e)", unknown.child, unknown.name()));
+  o.set("standard_deviations", sigmasJson(unknown.sigmasOfCoordinates(), "rotation_vector_deg"));
+  return o.set("standard_deviations_local", sigmasJson(unknown.localSigmas(), "rotation_deg"));
+}
+JsonObject toJson(const HandEyeFile& file) {
+  JsonObject o;
+  o.set("file", file.path).set("rows", file.rows).set("unmatched", file.unmatched).set("inverted", file.inverted);
+  o.set("noise", file.noise == PoseNoise::columns ? "columns" : file.noise == PoseNoise::option ? "option" : "assumed");
+  if (file.noise == PoseNoise::columns) return o.set("sigma", nullptr);
+  return o.set("sigma", sigmasJson(file.sigma, "rotation_deg"));
+}
+JsonObject toJson(const OpenDirection& d, bool world) {
+  JsonObject o;
+  o.set("excitation", d.excitation).set("weak", d.weak).set("twist", d.twist).set("frame", "gripper");
+  if (world) o.set("twist_of_Y", d.twist_of_Y).set("frame_of_Y", "base");
+  return o.set("description", describe(d, "gripper")).set("rotates", d.rotates);
+}
+JsonObject toJson(const PoseRows& rows, const PairFit& fit) {
+  JsonObject o;
+  o.set("row_a", rows.a + 1).set("row_b", rows.b + 1).set("line_a", rows.line_a).set("line_b", rows.line_b);
+  o.set("time", rows.time);
+  o.set("error_translation", Eigen::Vector3d(fit.error.head<3>()));
+  o.set("error_rotation", Eigen::Vector3d(fit.error.tail<3>()));
+  return o.set("chi2", fit.chi2).set("inlier", fit.inlier);
+}
+const char* nameOf(CovarianceReading reading) {
+  constexpr const char* names[] = {"right", "left", "rotation_first", "world_axes"};
+  return names[static_cast<std::size_t>(reading)];
+}
+JsonObject toJson(const HandEyeHint& hint, const HandEyeOutput& output) {
+  std::string text = hintInWords(output);
+  text.erase(0, text.find(": ") + 2), text.pop_back();
+  JsonObject o;
+  o.set("text", text);
+  o.set("covariance_a", nameOf(hint.reading.a.covariance)).set("covariance_b", nameOf(hint.reading.b.covariance));
+  o.set("one_file_inverted", hint.reading.b.inverted != output.b.inverted);
+  return o.set("chi2_per_degree", hint.chi2_per_degree).set("p", hint.p).set("agrees", hint.agrees);
+}
+
+// --- Page -----------------------------------------------------------------------------------------------------------
+
+constexpr std::size_t inlier_colour = 0, outlier_colour = 1;
+
+template <class Value>
+Panel pairPanel(const HandEyeOutput& output, const std::string& label, Value&& value) {
+  Panel panel{.x = {.label = "pair"}, .y = {.label = label, .logarithmic = true}};
+  for (const bool inlier : {true, false}) {
+    Series series{
+        .name = inlier ? "used" : "wrong", .style = Style::points, .colour = inlier ? inlier_colour : outlier_colour};
+    for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
+      if (output.result.pairs[i].inlier != inlier) continue;
+      series.x.push_back(static_cast<double>(i + 1)), series.y.push_back(value(output.result.pairs[i]));
+    }
+    if (!series.x.empty()) panel.series.push_back(series);
+  }
+  return panel;
+}
+Plot residualPlot(const HandEyeOutput& output) {
+  Plot plot{.name = "residuals",
+            .caption = fmt::format("Residuals of the pairs in the order of the table: rotation, translation, and the "
+                                   "squared length in units of the noise. Dotted: the gate of wrong pairs, {:.4g}.",
+                                   output.options.gate),
+            .columns = 3};
+  plot.panels.push_back(
+      pairPanel(output, "rotation, deg", [](const PairFit& f) { return degrees * f.error.tail<3>().norm(); }));
+  plot.panels.push_back(
+      pairPanel(output, "translation, mm", [](const PairFit& f) { return 1e3 * f.error.head<3>().norm(); }));
+  plot.panels.push_back(pairPanel(output, "chi2 (6 degrees of freedom)", [](const PairFit& f) { return f.chi2; }));
+  plot.panels.back().references = {{ReferenceLine::Direction::horizontal, output.options.gate}};
+  return plot;
+}
+Plot excitationPlot(const HandEyeOutput& output) {
+  const HandEyeOptions& o = output.options;
+  constexpr double lowest = 0.1;
+  Series open{.name = "open", .style = Style::boxes, .colour = outlier_colour};
+  Series weak{.name = "weak", .style = Style::boxes, .colour = 3};
+  Series good{.name = "determined", .style = Style::boxes, .colour = inlier_colour};
+  double highest = o.trusted_excitation;
+  for (int k = 0; k < 6; ++k) {
+    const double value = output.result.excitations[k];
+    Series& series = value < o.least_excitation ? open : value < o.trusted_excitation ? weak : good;
+    series.x.push_back(k + 1), series.y.push_back(std::max(value, 1.02 * lowest)), series.width.push_back(0.6);
+    if (std::isfinite(value)) highest = std::max(highest, value);
+  }
+  Panel panel{.x = {.label = "direction", .low = 0.4, .high = 6.6},
+              .y = {.label = "excitation", .low = lowest, .high = 3 * highest, .logarithmic = true},
+              .references = {{ReferenceLine::Direction::horizontal, o.least_excitation},
+                             {ReferenceLine::Direction::horizontal, o.trusted_excitation}}};
+  for (const Series& series : {open, weak, good}) {
+    if (!series.x.empty()) panel.series.push_back(series);
+  }
+  return {.name = "excitation",
+          .caption = fmt::format(
+              "Information of the motions over that which noise alone would make up, in the six "
+              "directions of the unknown. Dotted: {:g}, below which a direction is open, and {:g}, from which "
+              "on it is determined.",
+              o.least_excitation, o.trusted_excitation),
+          .panels = {panel}};
+}
+/// The planes of X's covariance in which no open direction lies.
+Plot covariancePlot(const Unknown& X, bool rotation) {
+  constexpr double chi2_95 = 5.991464547107979;  // two degrees of freedom
+  const Matrix6 covariance = X.covarianceOfCoordinates();
+  const Vector6 sigma = X.sigmasOfCoordinates();
+  const double scale = rotation ? degrees : 1e3;
+  const int first = rotation ? 3 : 0;
+  const std::array axes{"x", "y", "z"};
+  Plot plot{.name = rotation ? "rotation_covariance" : "translation_covariance",
+            .caption = rotation ? "95 % ellipses of the error of X's rotation vector."
+                                : "95 % ellipses of the error of X's translation, along the gripper's axes.",
+            .columns = 3};
+  for (const auto& [i, j] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)}) {
+    if (!std::isfinite(sigma[first + i]) || !std::isfinite(sigma[first + j])) continue;
+    Eigen::Matrix2d block;
+    block << covariance(first + i, first + i), covariance(first + i, first + j), covariance(first + j, first + i),
+        covariance(first + j, first + j);
+    Panel panel{.x = {.label = fmt::format("{}, {}", axes[static_cast<std::size_t>(i)], rotation ? "deg" : "mm")},
+                .y = {.label = fmt::format("{}, {}", axes[static_cast<std::size_t>(j)], rotation ? "deg" : "mm")},
+                .equal_aspect = true};
+    panel.series.push_back(ellipse("", Eigen::Vector2d::Zero(), scale * scale * block, chi2_95));
+    const double reach = 1.1 * scale * std::sqrt(chi2_95 * block.diagonal().maxCoeff());
+    if (reach > 0) panel.x.low = panel.y.low = -reach, panel.x.high = panel.y.high = reach;
+    plot.panels.push_back(panel);
+  }
+  return plot;
+}
+
+}  // namespace
+
+std::string formatHandEye(const HandEyeOutput& output) {
+  const HandEyeResult& r = output.result;
+  std::string text = answer(output) + "\n";
+  for (const Unknown& unknown : unknownsOf(r)) {
+    Table table({fmt::format("{} = {}", unknown.symbol, unknown.name()), "x", "y", "z", "unit"});
+    for (const auto& row : poseRows(unknown)) table.row(row);
+    text += table.str() + quaternionOf(unknown.mean()) + "\n\n";
+  }
+  return text + summary(output) + rest(output);
+}
+
+void setHandEye(JsonObject& object, const HandEyeOutput& output) {
+  const HandEyeResult& r = output.result;
+  object.set("status", liestat::name(r.status)).set("ok", r.ok()).set("in_words", verdictOf(r));
+  object.set("problem", r.world ? "AX = YB" : "AX = XB");
+  const std::vector<Unknown> unknowns = unknownsOf(r);
+  for (const Unknown& unknown : unknowns) object.set(unknown.symbol, toJson(unknown));
+  if (!r.world) object.set("Y", nullptr);
+  object.set("covariance_order", "translation rotation").set("covariance_side", "right");
+  object.set("covariance_frame",
+             "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known");
+  if (r.world) {
+    setCovariance<12>(object, "joint_covariance", r.covariance, unknowns.front().hasCovariance());
+    object.set("joint_covariance_order", "X translation, X rotation, Y translation, Y rotation");
+  } else {
+    object.set("joint_covariance", nullptr).set("joint_covariance_order", nullptr);
+  }
+  object.set("chi2", r.chi2).set("degrees_of_freedom", r.degrees_of_freedom).set("p", r.p);
+  object.set("variance_factor", r.variance_factor).set("noise", output.options.known_noise ? "given" : "scaled");
+  object.set("excitations", r.excitations);
+  std::vector<JsonObject> directions, pairs;
+  for (const OpenDirection& d : r.directions) directions.push_back(toJson(d, r.world));
+  object.set("open_directions", directions);
+  object.set("rival", r.rival ? std::optional(poseJson(*r.rival)) : std::nullopt);
+  object.set("starts", static_cast<std::int64_t>(r.starts));
+  std::vector<JsonObject> hints;
+  if (output.hint) hints.push_back(toJson(*output.hint, output));
+  object.set("hints", hints).set("notes", output.notes);
+  object.set("A", toJson(output.a)).set("B", toJson(output.b));
+  object.set("association", output.by_time ? "time" : "row");
+  object.set("tolerance", output.by_time ? std::optional(output.tolerance) : std::nullopt);
+  object.set("largest_gap", output.by_time ? std::optional(output.largest_gap) : std::nullopt);
+  for (std::size_t i = 0; i < r.pairs.size(); ++i) pairs.push_back(toJson(output.rows[i], r.pairs[i]));
+  std::vector<double> outliers(r.outliers.begin(), r.outliers.end());
+  object.set("outliers", outliers).set("pairs", pairs);
+}
+
+void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {
+  const HandEyeResult& r = output.result;
+  Report report(directory, "Hand-eye calibration");
+  report.code(command_line);
+  report.paragraph(answer(output));
+  report.section("Result");
+  const std::vector<Unknown> unknowns = unknownsOf(r);
+  for (const Unknown& unknown : unknowns) {
+    report.table(pose_headers, poseRows(unknown),
+                 fmt::format("{} = {}; {}", unknown.symbol, unknown.name(), quaternionOf(unknown.mean())));
+  }
+  report.code(summary(output) + rest(output));
+  report.section("Residuals");
+  report.plot(residualPlot(output));
+  report.section("What the motions determine");
+  report.plot(excitationPlot(output));
+  if (!unknowns.front().hasCovariance()) {
+    report.paragraph("X has no covariance.");
+  } else {
+    for (const bool rotation : {false, true}) {
+      const Plot plot = covariancePlot(unknowns.front(), rotation);
+      if (!plot.panels.empty()) report.plot(plot);
+    }
+  }
+  report.section("Pairs");
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < r.pairs.size(); ++i) {
+    const PairFit& fit = r.pairs[i];
+    const PoseRows& from = output.rows[i];
+    rows.push_back({fmt::format("{}", i + 1), fmt::format("{}", from.a + 1), fmt::format("{}", from.b + 1),
+                    from.time ? fmt::format("{:.10g}", *from.time) : "",
+                    number(degrees * fit.error.tail<3>().norm(), 3), number(1e3 * fit.error.head<3>().norm(), 3),
+                    number(fit.chi2, 3), fit.inlier ? "used" : "wrong"});
+  }
+  report.table({"pair", "row of A", "row of B", "time s", "rotation deg", "translation mm", "chi2", ""}, rows);
+  printLines("\n" + report.write() + "\n");
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <experiments/hand_eye_scene.hpp>
+#include <experiments/judged_report.hpp>
+#include <stats/validation_report.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::experiments {
+
+/// The questions that `liestat validate hand-eye` asks.
+enum class HandEyeExperiment {
+  accuracy,     ///< well excited absolute poses: errors, covariance, χ² of the fit
+  motions,      ///< what a motion leaves open, and the covariance of the rest
+  outliers,     ///< three wrong pairs of ten: are they found?
+  formulations  ///< relative motions that were made of absolute poses, for comparison
+};
+inline constexpr std::array all_hand_eye_experiments = {HandEyeExperiment::accuracy, HandEyeExperiment::motions,
+                                                        HandEyeExperiment::outliers, HandEyeExperiment::formulations};
+std::string name(HandEyeExperiment experiment);
+
+/// Pairs for AX = XB from absolute poses. They share poses, which no χ² shows.
+enum class HandEyeFormulation {
+  poses,        ///< none: AX = YB from the poses
+  motions,      ///< none: independent motions
+  consecutive,  ///< each pose and the next
+  to_first,     ///< each pose and the first
+  all_pairs,
+  all_pairs_scaled  ///< all pairs, the covariance times n/2
+};
+std::string name(HandEyeFormulation formulation);
+
+struct HandEyeValidation {
+  std::vector<HandEyeExperiment> experiments{all_hand_eye_experiments.begin(), all_hand_eye_experiments.end()};
+  std::size_t trials = 100;  ///< a row
+  bool many_pairs = false;   ///< rows with 200 pairs, too
+  std::uint64_t seed = 1;
+  int threads = 0;
+  /// Standard deviation of the noise that is drawn over that which the estimator is told.
+  double noise_factor = 1;
+};
+
+/// One kind of scene and one estimate. The distances are the squared ones of the true X under the estimate's covariance,
+/// or, of `fit`, the χ² of the residuals.
+struct HandEyeRow : JudgedReport {
+  HandEyeExperiment experiment = HandEyeExperiment::accuracy;
+  HandEyeFormulation formulation = HandEyeFormulation::poses;
+  HandEyeMotion motion = HandEyeMotion::general;
+  HandEyeNoise noise = HandEyeNoise::isotropic;
+  double scale = 1;  ///< of the noise
+  std::size_t pairs = 0;
+  std::optional<HandEyeOutliers> outliers;
+  bool fit = false;
+  std::size_t trials = 0;
+  double rms_rotation = std::numeric_limits<double>::quiet_NaN();     ///< rad
+  double rms_translation = std::numeric_limits<double>::quiet_NaN();  ///< m
+  double rms_rotation_error = 0, rms_translation_error = 0;           ///< their standard errors
+  double chi2_per_dof = std::numeric_limits<double>::quiet_NaN();     ///< mean
+  /// The design note's RMS errors, rad and m; NaN where it has none.
+  double note_rotation = std::numeric_limits<double>::quiet_NaN();
+  double note_translation = std::numeric_limits<double>::quiet_NaN();
+  /// Trials with the right dimension of what is open (`motions`), or in which every wrong pair was found (`outliers`).
+  std::size_t right = 0;
+  std::optional<bool> right_passed;  ///< whether these are all; absent elsewhere
+  double lost = 0;                   ///< share of the right pairs that were taken for wrong ones
+};
+
+/// The tally of what must be right in all trials.
+Tally countedTally(const std::vector<HandEyeRow>& rows);
+
+/// Rows in the order of the experiments.
+std::vector<HandEyeRow> validateHandEye(
+    const HandEyeValidation& validation,
+    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+
+}  // namespace liestat::experiments

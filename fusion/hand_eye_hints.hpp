@@ -1,0 +1,184 @@
+// The convention that would explain the residuals of a hand-eye calibration: covariances that mean something else than
+// the library takes them for, and poses that are inverses of what they should be.
+//
+//   const auto result = liestat::estimateRobotWorld(poses);
+//   if (const auto hint = liestat::explainHandEye(poses, result)) use(hint->reading);
+//
+// Nothing is guessed: each reading is fitted. Wrong covariances show themselves by χ² per degree of freedom of 20 to 40;
+// the right reading has one. Not all errors show: where poses of both files are inverses, X and Y are exchanged and fit
+// as well.
+#pragma once
+
+#include <fusion/hand_eye.hpp>
+#include <stats/conventions.hpp>
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/propagation.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+
+/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
+/// covariance of the inverse pose is one of `left`.
+enum class CovarianceReading {
+  right,                      ///< T·Exp(e), translation before rotation: the library's own
+  left,                       ///< Exp(e)·T, or T⁻¹·Exp(e)
+  rotation_then_translation,  ///< T·Exp(e) with the rotation's block first
+  world_axes                  ///< rotation and translation each along the axes of the world
+};
+inline constexpr std::array all_covariance_readings = {CovarianceReading::right, CovarianceReading::left,
+                                                       CovarianceReading::rotation_then_translation,
+                                                       CovarianceReading::world_axes};
+
+/// How a file's poses and covariances are to be read.
+struct PoseReading {
+  CovarianceReading covariance = CovarianceReading::right;
+  bool inverted = false;  ///< the wanted pose is the inverse of the given one; the covariance goes with it
+  friend bool operator==(const PoseReading&, const PoseReading&) = default;
+};
+struct HandEyeReading {
+  PoseReading a, b;
+  friend bool operator==(const HandEyeReading&, const HandEyeReading&) = default;
+};
+
+/// The pose that is meant, with its covariance in the library's convention.
+inline Gaussian<SE3d> readPose(const Gaussian<SE3d>& given, const PoseReading& reading) {
+  Gaussian<SE3d> pose = given;
+  switch (reading.covariance) {
+    case CovarianceReading::right:
+      break;
+    case CovarianceReading::left:
+      pose = fromLeftCovariance<SE3d>(given.mean, given.covariance);
+      break;
+    case CovarianceReading::rotation_then_translation:
+      pose.covariance = covarianceFromOrder<SE3d>(given.covariance, rotation_first);
+      break;
+    case CovarianceReading::world_axes:
+      pose = fromWorldAxesCovariance<SE3d>(given.mean, given.covariance);
+      break;
+  }
+  return reading.inverted ? inverse(pose) : pose;
+}
+inline PosePair readPair(const PosePair& given, const HandEyeReading& reading) {
+  return {readPose(given.a, reading.a), readPose(given.b, reading.b)};
+}
+
+struct HandEyeHintOptions {
+  HandEyeReading reading = {};  ///< the one that the result was made with
+  /// True if the covariances may have been meant otherwise; false where they come from a model and not from a file.
+  bool doubt_a = true, doubt_b = true;
+  HandEyeOptions estimate = {};  ///< those that the result was made with
+};
+
+/// Another reading that fits.
+struct HandEyeHint {
+  HandEyeReading reading;
+  double chi2_per_degree = 0;  ///< with covariances as given
+  double p = 0;                ///< of a χ² as large; NaN where the noise is not known
+  std::size_t outliers = 0;
+  bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
+};
+
+/// True where the residuals ask for an explanation: `inconsistent`, not converged, χ²/dof of 5 or more, or more than a
+/// third of the pairs rejected.
+inline bool asksForExplanation(const HandEyeResult& result) {
+  if (result.status == FusionStatus::bad_input) return false;
+  return result.status == FusionStatus::inconsistent || result.status == FusionStatus::not_converged ||
+         !(result.chi2 < 5 * result.degrees_of_freedom) || 3 * result.outliers.size() > result.pairs.size();
+}
+
+namespace detail {
+
+/// The fits of other readings of some pairs.
+class HandEyeExplanation {
+ public:
+  HandEyeExplanation(std::span<const PosePair> given, bool world, const HandEyeHintOptions& options)
+      : given_(some(given)), world_(world), options_(options) {}
+
+  std::optional<HandEyeHint> best() {
+    const HandEyeHint found = fit(options_.reading);
+    // With the poses of A inverted instead, X and Y are exchanged and the fit is the same.
+    HandEyeReading inverted = options_.reading;
+    inverted.b.inverted = !inverted.b.inverted;
+    const HandEyeHint other = fit(inverted);
+    std::vector<HandEyeHint> hints = {other};
+    if (options_.estimate.known_noise) {
+      addReadings(hints, options_.reading);
+      if (!other.agrees && isMuchBetter(other, found)) addReadings(hints, inverted);
+    }
+    const HandEyeHint* nearest = nullptr;
+    for (const HandEyeHint& hint : hints) {
+      if (hint.agrees && (nearest == nullptr || off(hint) < off(*nearest))) nearest = &hint;
+    }
+    if (nearest != nullptr) return *nearest;
+    return isMuchBetter(other, found) ? std::optional(other) : std::nullopt;
+  }
+
+ private:
+  static constexpr std::size_t most_pairs = 40;
+
+  /// Not more than are needed, spread over their contents, so that their order does not matter.
+  static std::vector<PosePair> some(std::span<const PosePair> given) {
+    std::vector<PosePair> pairs(given.begin(), given.end());
+    const std::size_t step = (pairs.size() + most_pairs - 1) / most_pairs;
+    if (step < 2) return pairs;
+    std::sort(pairs.begin(), pairs.end(), [](const PosePair& x, const PosePair& y) {
+      const auto p = x.b.mean.params(), q = y.b.mean.params();
+      return std::lexicographical_compare(p.data(), p.data() + p.size(), q.data(), q.data() + q.size());
+    });
+    std::vector<PosePair> spread;
+    for (std::size_t i = 0; i < pairs.size(); i += step) spread.push_back(pairs[i]);
+    return spread;
+  }
+  HandEyeHint fit(const HandEyeReading& reading) const {
+    std::vector<PosePair> pairs;
+    for (const PosePair& pair : given_) pairs.push_back(readPair(pair, reading));
+    const HandEyeResult result =
+        world_ ? estimateRobotWorld(pairs, options_.estimate) : estimateHandEye(pairs, options_.estimate);
+    HandEyeHint hint{reading, result.chi2 / result.degrees_of_freedom, result.p, result.outliers.size()};
+    // Covariances that are much too large fit everything.
+    hint.agrees = asksForExplanation(result) ? false : result.p >= 1e-3 && hint.chi2_per_degree > 0.5;
+    return hint;
+  }
+  static double off(const HandEyeHint& hint) { return std::abs(std::log(hint.chi2_per_degree)); }
+  static bool isMuchBetter(const HandEyeHint& hint, const HandEyeHint& than) {
+    return hint.outliers <= than.outliers && 10 * hint.chi2_per_degree < than.chi2_per_degree;
+  }
+  /// Other covariances of A, of B, and of both where both may have been written by one program.
+  void addReadings(std::vector<HandEyeHint>& hints, const HandEyeReading& from) const {
+    for (const CovarianceReading covariance : all_covariance_readings) {
+      for (const auto& [a, b] : {std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
+        if ((a && !options_.doubt_a) || (b && !options_.doubt_b)) continue;
+        HandEyeReading reading = from;
+        if (a) reading.a.covariance = covariance;
+        if (b) reading.b.covariance = covariance;
+        if (!(reading == from)) hints.push_back(fit(reading));
+      }
+    }
+  }
+
+  std::vector<PosePair> given_;
+  bool world_;
+  HandEyeHintOptions options_;
+};
+
+}  // namespace detail
+
+/// The reading of the given poses, other than that which the result was made with, under which they agree best: χ²/dof
+/// nearest to one, with p ≥ 1e-3 and no more than a third of the pairs rejected. Where none does, inverse poses if they
+/// make χ²/dof at least ten times smaller. Of more than 40 pairs a part is fitted. Empty where nothing asks for an
+/// explanation, and where nothing explains it.
+inline std::optional<HandEyeHint> explainHandEye(std::span<const PosePair> given, const HandEyeResult& result,
+                                                 const HandEyeHintOptions& options = {}) {
+  if (!asksForExplanation(result)) return std::nullopt;
+  return detail::HandEyeExplanation(given, result.world, options).best();
+}
+
+}  // namespace liestat

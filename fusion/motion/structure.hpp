@@ -1,0 +1,181 @@
+// The points' depths over time, one small filter for each track, fed by the motion and its covariance: the "structure from
+// motion module" behind the filter of Soatto and Perona 1994, and the test that tells its rigid interpretation from the
+// "rubbery" one of a direction with the wrong sign (section 3.2, fig. 12).
+//
+//   liestat::MotionStructure structure;
+//   … filter.update(pairs);
+//   structure.update(tracks, pairs, filter.inverse_depths(), filter.estimate());
+//   … structure.points()
+//
+// Lengths are in units of the camera's way in one frame, which must be constant. Positions are in the camera's axes at the
+// middle of the last interval. With the direction turned round all depths are negative: the points are rigid, behind the
+// camera, and mirrored through it they would be the true ones. What is seen lies in front: brought there by mirroring the
+// depths about their mean, it is not rigid and turns the other way.
+#pragma once
+
+#include <fusion/motion/types.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace liestat {
+
+/// A point of the structure.
+struct StructurePoint {
+  std::uint64_t track = 0;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< in the image, at the middle of the last interval
+  double inverse_depth = 0;                      ///< |V|/Z; its sign is that of the direction's
+  double variance = 0;
+  std::size_t frames = 0;  ///< that it is made of
+
+  Eigen::Vector3d position() const { return at.homogeneous() / inverse_depth; }
+};
+
+struct MotionStructureOptions {
+  double process_noise = 1e-5;  ///< per frame, of the inverse depth, for a speed that is not quite constant
+  double gate = 4;              ///< standard deviations beyond which a depth is not taken over
+};
+
+/// Inverse depths by track, each a scalar filter: predicted by the motion, updated by the depth of the frame. Errors of the
+/// rotation are common to all points and count in each variance; those of the direction in the prediction.
+class MotionStructure {
+ public:
+  explicit MotionStructure(const MotionStructureOptions& options = {}) : options_(options) {}
+
+  /// The next frame: the track of each pair, the pairs, and what the motion filter says of them (Flow::midpoint). Tracks
+  /// that are missing are forgotten; a frame without a usable motion is only predicted.
+  void update(std::span<const std::uint64_t> tracks, std::span<const PointPair> pairs,
+              std::span<const InverseDepth> depths, const MotionEstimate& motion) {
+    const Eigen::Matrix3d R = motion.rotation.mean.matrix();
+    const Eigen::Vector3d V = motion.direction.mean.unit_vector();
+    const Eigen::Vector3d T = SO3d::leftJacobian(motion.rotation.mean.log()) * V;
+    next_.clear();
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      StructurePoint point;
+      point.track = tracks[i];
+      point.at = 0.5 * (pairs[i].first + pairs[i].second);
+      const auto known =
+          std::find_if(points_.begin(), points_.end(), [&](const StructurePoint& p) { return p.track == tracks[i]; });
+      // A motion that has changed its sign has changed that of all depths.
+      const bool same = known != points_.end() && known->inverse_depth != 0 && V.dot(last_) > 0;
+      if (same) predict(*known, R, T, motion, point);
+      const InverseDepth& z = depths[i];
+      if (z.inlier && std::isfinite(z.value) && z.variance > 0) {
+        if (point.frames == 0) {
+          point.inverse_depth = z.value, point.variance = z.variance, point.frames = 1;
+        } else {
+          const double innovation = z.value - point.inverse_depth, S = z.variance + point.variance;
+          if (innovation * innovation <= options_.gate * options_.gate * S) {
+            const double gain = point.variance / S;
+            point.inverse_depth += gain * innovation;
+            point.variance *= 1 - gain;
+            ++point.frames;
+          }
+        }
+      }
+      if (point.frames > 0) next_.push_back(point);
+    }
+    std::swap(points_, next_);
+    last_ = V;
+  }
+
+  std::span<const StructurePoint> points() const { return points_; }
+  /// The information-weighted mean of the inverse depths; NaN without points.
+  double meanInverseDepth() const {
+    double sum = 0, weight = 0;
+    for (const StructurePoint& p : points_) sum += p.inverse_depth / p.variance, weight += 1 / p.variance;
+    return weight > 0 ? sum / weight : std::numeric_limits<double>::quiet_NaN();
+  }
+  /// What is seen in front of the camera: the points, or, where their mean is behind it, points whose depths are mirrored
+  /// about the mean, ρ + 2|mean|.
+  std::vector<StructurePoint> inFront() const {
+    std::vector<StructurePoint> seen = points_;
+    const double mean = meanInverseDepth();
+    for (StructurePoint& p : seen) p.inverse_depth += mean < 0 ? -2 * mean : 0;
+    return seen;
+  }
+
+ private:
+  /// X ← R X + T, and the inverse depth's variance with that of the motion.
+  void predict(const StructurePoint& before, const Eigen::Matrix3d& R, const Eigen::Vector3d& T,
+               const MotionEstimate& motion, StructurePoint& to) const {
+    const double rho = before.inverse_depth;
+    const Eigen::Vector3d ray = R * before.at.homogeneous(), X = ray / rho + T;
+    const double next = 1 / X.z();
+    if (!(next * rho > 0)) return;  // through the camera's plane: it begins anew
+    // dρ' = ρ'²/ρ² (R x)_z dρ - ρ'² (e_zᵀ dT + (δ × R X)_z).
+    const double by_depth = next * next / (rho * rho) * ray.z();
+    const Eigen::Matrix<double, 3, 2> E = ManifoldTraits<S2d>::placement(motion.direction.mean).matrix().leftCols<2>();
+    const Eigen::RowVector2d by_direction = -next * next * E.row(2);
+    const Eigen::RowVector3d by_rotation = -next * next * Eigen::RowVector3d(ray.y(), -ray.x(), 0) / rho * R;
+    to.inverse_depth = next;
+    to.variance = by_depth * by_depth * before.variance + by_direction.dot(by_direction * motion.direction.covariance) +
+                  by_rotation.dot(by_rotation * motion.rotation.covariance) + options_.process_noise;
+    to.frames = before.frames;
+  }
+
+  MotionStructureOptions options_;
+  std::vector<StructurePoint> points_, next_;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
+};
+
+/// Whether points keep their distances: snapshots of the same points, in any axes.
+class RigidityTest {
+ public:
+  /// The positions of the same points in the same order each time; another number of them begins anew.
+  void add(std::span<const Eigen::Vector3d> positions) {
+    const std::size_t n = positions.size(), pairs = n * (n - 1) / 2;
+    if (snapshots_ == 0 || first_.size() != n) {
+      first_.assign(positions.begin(), positions.end());
+      sum_.assign(n > 0 ? pairs : 0, 0), squares_ = sum_;
+      snapshots_ = 0;
+    }
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < i; ++j, ++k) {
+        const double d = std::log((positions[i] - positions[j]).norm());
+        sum_[k] += d, squares_[k] += d * d;
+      }
+    }
+    last_.assign(positions.begin(), positions.end());
+    ++snapshots_;
+  }
+  std::size_t snapshots() const { return snapshots_; }
+  /// The median over all pairs of points of the relative standard deviation of their distance: small where the points are
+  /// rigid. NaN of fewer than two snapshots or points.
+  double spread() const {
+    if (snapshots_ < 2 || sum_.empty()) return std::numeric_limits<double>::quiet_NaN();
+    const auto n = static_cast<double>(snapshots_);
+    std::vector<double> deviations;
+    for (std::size_t k = 0; k < sum_.size(); ++k) {
+      deviations.push_back(std::sqrt(std::max(0.0, (squares_[k] - sum_[k] * sum_[k] / n) / (n - 1))));
+    }
+    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+    std::nth_element(deviations.begin(), middle, deviations.end());
+    return *middle;
+  }
+  /// The rotation vector (rad) that takes the first snapshot to the last one best, about their centroids, up to scale.
+  Eigen::Vector3d rotation() const {
+    Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = a;
+    const auto n = static_cast<double>(first_.size());
+    for (std::size_t i = 0; i < first_.size(); ++i) a += first_[i] / n, b += last_[i] / n;
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < first_.size(); ++i) moments += (last_[i] - b) * (first_[i] - a).transpose();
+    return SO3d::fitToSO3(moments).log();
+  }
+
+ private:
+  std::vector<Eigen::Vector3d> first_, last_;
+  std::vector<double> sum_, squares_;
+  std::size_t snapshots_ = 0;
+};
+
+}  // namespace liestat

@@ -1,0 +1,431 @@
+// Hand-eye calibration: equations and their derivatives, the estimate against the dense iteration, invariances, open
+// directions, wrong pairs, traps with covariances, bad input.
+
+#include <experiments/hand_eye_scene.hpp>
+#include <fusion/detail/hand_eye_problem.hpp>
+#include <fusion/hand_eye.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace liestat {
+namespace {
+
+using detail::Matrix6;
+using detail::Vector6;
+using experiments::HandEyeMotion;
+using experiments::HandEyeNoise;
+using experiments::HandEyeOutliers;
+using experiments::HandEyeScene;
+
+Vector6 errorOf(const SE3d& estimate, const SE3d& truth) { return (estimate.inverse() * truth).log(); }
+double squared(const Gaussian<SE3d>& estimate, const SE3d& truth) { return mahalanobisSquared(estimate, truth); }
+
+/// The pairs without noise, with the covariances of the noisy ones.
+std::vector<PosePair> exactPairs(const HandEyeScene& scene) {
+  std::vector<PosePair> pairs = scene.pairs;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    pairs[i].a.mean = scene.truth[i].a.mean, pairs[i].b.mean = scene.truth[i].b.mean;
+  }
+  return pairs;
+}
+
+TEST(HandEye, JacobiansAgreeWithDifferences) {
+  CounterRng rng(1);
+  for (const double size : {0.0, 1e-6, 0.3, 2.0}) {
+    const auto pose = [&] { return SE3d(SO3d(rng.unitQuaternion()), rng.normalVector<3>()); };
+    const SE3d X = pose(), Y = pose(), B = pose();
+    const SE3d A = Y * B * SE3d::exp(size * rng.unitVector<6>()) * X.inverse();
+    const detail::HandEyeJacobians J({X, Y}, A, B);
+    const double h = 1e-6;
+    Matrix6 by_x, by_y, by_a, by_b;
+    for (int k = 0; k < 6; ++k) {
+      const SE3d plus = SE3d::exp(h * Vector6::Unit(k)), minus = plus.inverse();
+      const auto difference = [&](const Vector6& there, const Vector6& back) -> Vector6 {
+        return (there - back) / (2 * h);
+      };
+      using detail::handEyeError;
+      by_x.col(k) = difference(handEyeError({X * plus, Y}, A, B), handEyeError({X * minus, Y}, A, B));
+      by_y.col(k) = difference(handEyeError({X, Y * plus}, A, B), handEyeError({X, Y * minus}, A, B));
+      by_a.col(k) = difference(handEyeError({X, Y}, A * plus, B), handEyeError({X, Y}, A * minus, B));
+      by_b.col(k) = difference(handEyeError({X, Y}, A, B * plus), handEyeError({X, Y}, A, B * minus));
+    }
+    // Second order in h, and rounding over h.
+    EXPECT_LT((J.X - by_x).norm(), 1e-8 * (1 + by_x.norm())) << size;
+    EXPECT_LT((J.Y - by_y).norm(), 1e-8 * (1 + by_y.norm())) << size;
+    EXPECT_LT((J.A - by_a).norm(), 1e-8 * (1 + by_a.norm())) << size;
+    EXPECT_LT((J.B - by_b).norm(), 1e-8 * (1 + by_b.norm())) << size;
+  }
+}
+
+TEST(HandEye, ExactPairsGiveTheTruth) {
+  for (const bool motions : {false, true}) {
+    for (const std::size_t n : {3, 10}) {
+      const HandEyeScene scene({.pairs = n, .relative = motions}, 1, n);
+      const auto pairs = exactPairs(scene);
+      const HandEyeResult result = motions ? estimateHandEye(pairs) : estimateRobotWorld(pairs);
+      ASSERT_TRUE(result.ok()) << name(result.status);
+      EXPECT_LT(errorOf(result.X.mean, scene.X).norm(), 1e-12);
+      if (!motions) {
+        EXPECT_LT(errorOf(result.Y.mean, scene.Y).norm(), 1e-12);
+      }
+      EXPECT_LT(result.chi2, 1e-18);
+      EXPECT_EQ(result.degrees_of_freedom, 6 * static_cast<int>(n) - (motions ? 6 : 12));
+      EXPECT_GT(result.excitations.minCoeff(), 100);
+      EXPECT_TRUE(result.outliers.empty());
+    }
+  }
+}
+
+/// The strict estimate by dense normal equations over total corrections of the poses, as a reference.
+struct DenseReference {
+  detail::HandEyeValue value;
+  Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
+  double chi2 = 0;
+
+  DenseReference(detail::HandEyeValue start, const std::vector<PosePair>& pairs, int steps) : value(start) {
+    std::vector<Vector6> a(pairs.size(), Vector6::Zero()), b = a;
+    for (int step = 0; step < steps; ++step) {
+      Eigen::Matrix<double, 12, 12> H = Eigen::Matrix<double, 12, 12>::Zero();
+      Eigen::Matrix<double, 12, 1> g = Eigen::Matrix<double, 12, 1>::Zero();
+      struct Block {
+        Eigen::Matrix<double, 6, 12> J;
+        Matrix6 A, B, S;
+        Vector6 w;
+      };
+      std::vector<Block> blocks;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        const detail::HandEyeJacobians at(value, pairs[i].a.mean * SE3d::exp(a[i]), pairs[i].b.mean * SE3d::exp(b[i]));
+        Block block;
+        block.J << at.X, at.Y;
+        block.A = at.A * SE3d::rightJacobian(a[i]), block.B = at.B * SE3d::rightJacobian(b[i]);
+        block.w = at.e - block.A * a[i] - block.B * b[i];
+        block.S = block.A * pairs[i].a.covariance * block.A.transpose() +
+                  block.B * pairs[i].b.covariance * block.B.transpose();
+        const detail::Cholesky<double, 6> factor(block.S);
+        H += block.J.transpose() * factor.solve<12>(block.J);
+        g += block.J.transpose() * factor.solve<1>(block.w);
+        blocks.push_back(block);
+      }
+      const detail::Cholesky<double, 12> normal(H);
+      covariance = normal.inverse();
+      const Eigen::Matrix<double, 12, 1> p = -normal.solve<1>(g);
+      chi2 = 0;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        const Vector6 r = blocks[i].w + blocks[i].J * p;
+        const Vector6 k = detail::Cholesky<double, 6>(blocks[i].S).solve<1>(r);
+        a[i] = -(pairs[i].a.covariance * blocks[i].A.transpose() * k);
+        b[i] = -(pairs[i].b.covariance * blocks[i].B.transpose() * k);
+        chi2 += r.dot(k);
+      }
+      value.X = value.X * SE3d::exp(p.head<6>()), value.Y = value.Y * SE3d::exp(p.tail<6>());
+    }
+  }
+};
+
+TEST(HandEye, EqualsTheDenseIteration) {
+  for (const HandEyeNoise noise : experiments::all_hand_eye_noises) {
+    const HandEyeScene scene({.noise = noise, .pairs = 12}, 2);
+    const HandEyeResult result = estimateRobotWorld(scene.pairs, {.find_outliers = false});
+    ASSERT_TRUE(result.ok()) << name(result.status);
+    const DenseReference dense({scene.X, scene.Y}, scene.pairs, 8);
+    // In standard deviations.
+    EXPECT_LT(std::sqrt(squared(result.X, dense.value.X)), 1e-6) << experiments::name(noise);
+    EXPECT_LT(std::sqrt(squared(result.Y, dense.value.Y)), 1e-6) << experiments::name(noise);
+    EXPECT_NEAR(result.chi2, dense.chi2, 1e-7 * dense.chi2);
+    EXPECT_LT((result.covariance - dense.covariance).norm(), 1e-6 * dense.covariance.norm());
+  }
+}
+
+TEST(HandEye, TheOrderOfThePairsChangesNoBit) {
+  for (const bool motions : {false, true}) {
+    const HandEyeScene scene({.pairs = 15, .relative = motions, .outliers = 0.2}, 3);
+    const auto estimate = [&](const std::vector<PosePair>& pairs) {
+      return motions ? estimateHandEye(pairs) : estimateRobotWorld(pairs);
+    };
+    const HandEyeResult first = estimate(scene.pairs);
+    std::vector<PosePair> reversed(scene.pairs.rbegin(), scene.pairs.rend());
+    std::swap(reversed[2], reversed[9]);
+    const HandEyeResult second = estimate(reversed);
+    EXPECT_EQ(first.X.mean.params(), second.X.mean.params());
+    EXPECT_EQ(first.Y.mean.params(), second.Y.mean.params());
+    EXPECT_EQ(first.covariance, second.covariance);
+    EXPECT_EQ(first.chi2, second.chi2);
+    EXPECT_EQ(first.outliers.size(), 3U);
+    EXPECT_EQ(first.outliers.size(), second.outliers.size());
+    EXPECT_EQ(first.pairs[0].chi2, second.pairs[14].chi2);
+  }
+}
+
+/// The error between estimates, in standard deviations.
+double apart(const Gaussian<SE3d>& x, const SE3d& y) { return std::sqrt(squared(x, y)); }
+Matrix6 carried(const SE3d& f, const Matrix6& covariance) { return f.Adj() * covariance * f.Adj().transpose(); }
+
+TEST(HandEye, InvariantUnderFramesUnitsAndExchange) {
+  CounterRng rng(4);
+  const SE3d F(SO3d(rng.unitQuaternion()), rng.normalVector<3>()), G(SO3d(rng.unitQuaternion()), rng.normalVector<3>());
+  for (const bool motions : {false, true}) {
+    const HandEyeScene scene({.noise = HandEyeNoise::anisotropic, .pairs = 15, .relative = motions}, 5);
+    const auto estimate = [&](const std::vector<PosePair>& pairs) {
+      return motions ? estimateHandEye(pairs) : estimateRobotWorld(pairs);
+    };
+    const auto transformed = [&](const std::function<void(PosePair&)>& change) {
+      std::vector<PosePair> pairs = scene.pairs;
+      for (PosePair& pair : pairs) change(pair);
+      return estimate(pairs);
+    };
+    const HandEyeResult r = estimate(scene.pairs);
+    ASSERT_TRUE(r.ok()) << name(r.status);
+
+    // Other frames of gripper and camera, and of base and target where there are any: A' = F A G, B' = F B G.
+    const HandEyeResult framed = transformed([&](PosePair& pair) {
+      pair.a.mean = (motions ? G.inverse() : F) * pair.a.mean * G;
+      pair.a.covariance = carried(G.inverse(), pair.a.covariance);
+      pair.b.mean = (motions ? F.inverse() : G) * pair.b.mean * F;
+      pair.b.covariance = carried(F.inverse(), pair.b.covariance);
+    });
+    EXPECT_LT(apart(framed.X, G.inverse() * r.X.mean * F), 1e-8);
+    EXPECT_NEAR(framed.chi2, r.chi2, 1e-8 * r.chi2);
+
+    // Millimetres.
+    const HandEyeResult scaled = transformed([&](PosePair& pair) {
+      Matrix6 D = Matrix6::Identity();
+      D.diagonal().head<3>().setConstant(1000);
+      for (Gaussian<SE3d>* g : {&pair.a, &pair.b}) {
+        g->mean.translation() *= 1000;
+        g->covariance = D * g->covariance * D;
+      }
+    });
+    SE3d in_mm = r.X.mean;
+    in_mm.translation() *= 1000;
+    EXPECT_LT(apart(scaled.X, in_mm), 1e-8);
+    EXPECT_LT((scaled.excitations - r.excitations).norm(), 1e-6 * r.excitations.norm());
+
+    // B X⁻¹ = Y⁻¹ A.
+    const HandEyeResult exchanged = transformed([&](PosePair& pair) { std::swap(pair.a, pair.b); });
+    EXPECT_LT(apart(exchanged.X, r.X.mean.inverse()), 1e-8);
+    EXPECT_LT((exchanged.X.covariance - carried(r.X.mean, r.X.covariance)).norm(),
+              1e-6 * exchanged.X.covariance.norm());
+  }
+}
+
+TEST(HandEye, DirectionsThatMotionsLeaveOpen) {
+  for (const bool motions : {false, true}) {
+    for (const HandEyeMotion motion : experiments::all_hand_eye_motions) {
+      const std::string what = experiments::name(motion) + (motions ? " AX = XB" : " AX = YB");
+      for (std::uint64_t trial = 0; trial < 5; ++trial) {
+        const HandEyeScene scene({.motion = motion, .pairs = 12, .relative = motions}, 6, trial);
+        const HandEyeResult r = motions ? estimateHandEye(scene.pairs) : estimateRobotWorld(scene.pairs);
+        const int open = experiments::openDimension(motion);
+        ASSERT_EQ(static_cast<int>(r.directions.size()), open) << what;
+        EXPECT_EQ(r.status, open == 0 ? FusionStatus::ok : FusionStatus::undetermined) << what;
+        EXPECT_EQ(r.degrees_of_freedom, 72 - (motions ? 6 : 12) + open) << what;
+        EXPECT_EQ(r.rotationIsOpen(), open == 2 || open == 4) << what;
+        EXPECT_EQ(r.X.covariance.allFinite(), !r.rotationIsOpen()) << what;
+        // X moved along what is open explains the poses as well: the residuals stay.
+        for (const OpenDirection& d : r.directions) {
+          const SE3d X = SE3d::exp(0.1 * d.twist) * r.X.mean;
+          const SE3d Y = motions ? X : SE3d::exp(0.1 * d.twist_of_Y) * r.Y.mean;
+          double before = 0, after = 0;
+          for (const PosePair& pair : scene.pairs) {
+            before += detail::handEyeSquaredError({r.X.mean, r.Y.mean}, pair);
+            after += detail::handEyeSquaredError({X, Y}, pair);
+          }
+          // The direction is as uncertain as the noise makes it.
+          EXPECT_LT(after, 2 * before + 30) << what << ": " << describe(d);
+        }
+        if (motion == HandEyeMotion::planar || motion == HandEyeMotion::parallel_axes) {
+          EXPECT_NE(describe(r.directions[0]).find("translation along the rotation axis ("), std::string::npos);
+          EXPECT_NE(describe(r.directions[0]).find("of the gripper"), std::string::npos);
+          EXPECT_GT(std::abs(scene.axis.dot(r.directions[0].twist.head<3>())), 0.999);
+        }
+        if (motion == HandEyeMotion::one_axis) {
+          EXPECT_NE(describe(r.directions[0]).find("rotation about the rotation axis ("), std::string::npos);
+          EXPECT_FALSE(r.directions[1].rotates);
+        }
+        if (motion == HandEyeMotion::collinear) {
+          EXPECT_NE(describe(r.directions[0]).find("rotation about the direction of motion ("), std::string::npos);
+        }
+      }
+    }
+  }
+}
+
+TEST(HandEye, LittleExcitationIsWeak) {
+  // Rotations about one axis, and others of a few tenths of a degree.
+  CounterRng rng(7);
+  HandEyeScene scene({.motion = HandEyeMotion::planar, .pairs = 20, .relative = true}, 7);
+  int weak = 0, trusted = 0, none = 0;
+  for (const double wobble : {0.0, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 3.0}) {
+    std::vector<PosePair> pairs = scene.pairs;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Vector6 z = rng.normalVector<6>();
+      const SE3d tilt = SE3d::exp((Vector6() << 0, 0, 0, wobble / 57.3 * z.head<3>()).finished());
+      const SE3d A = scene.truth[i].a.mean * tilt;
+      const SE3d noise_of_a = scene.truth[i].a.mean.inverse() * pairs[i].a.mean;
+      const SE3d noise_of_b = scene.truth[i].b.mean.inverse() * pairs[i].b.mean;
+      pairs[i].a.mean = A * noise_of_a;
+      pairs[i].b.mean = scene.X.inverse() * A * scene.X * noise_of_b;
+    }
+    const HandEyeResult r = estimateHandEye(pairs);
+    if (r.directions.empty()) {
+      ++trusted;
+    } else if (r.directions[0].weak) {
+      ++weak;
+      EXPECT_GE(r.directions[0].excitation, 3);
+      EXPECT_LT(r.directions[0].excitation, 10);
+    } else {
+      ++none;
+    }
+  }
+  EXPECT_GE(none, 1);
+  EXPECT_GE(weak, 1);
+  EXPECT_GE(trusted, 1);
+}
+
+TEST(HandEye, WrongPairsAreFound) {
+  for (const HandEyeOutliers kind : experiments::all_hand_eye_outliers) {
+    for (const double share : {0.3, 0.45}) {
+      const HandEyeScene scene({.pairs = 20, .outliers = share, .outlier_kind = kind}, 8);
+      const HandEyeResult r = estimateRobotWorld(scene.pairs);
+      for (std::size_t i = 0; i < scene.pairs.size(); ++i) EXPECT_EQ(r.pairs[i].inlier, scene.inlier[i]) << i;
+      if (kind != HandEyeOutliers::flips) {
+        EXPECT_EQ(r.outliers.size(), share == 0.3 ? 6U : 9U);
+      }
+      EXPECT_TRUE(r.ok()) << experiments::name(kind);
+      EXPECT_LT(squared(r.X, scene.X), 22.5);
+      // All of them together do not agree.
+      const HandEyeResult all = estimateRobotWorld(scene.pairs, {.find_outliers = false});
+      EXPECT_EQ(all.status, FusionStatus::inconsistent);
+    }
+  }
+}
+
+TEST(HandEye, NoiseUpToAFactor) {
+  const HandEyeScene scene({.pairs = 20, .outliers = 0.2}, 9);
+  const HandEyeResult known = estimateRobotWorld(scene.pairs);
+  std::vector<PosePair> pairs = scene.pairs;
+  for (PosePair& pair : pairs) pair.a.covariance *= 50, pair.b.covariance *= 50;
+  const HandEyeResult scaled = estimateRobotWorld(pairs, {.known_noise = false});
+  ASSERT_TRUE(scaled.ok()) << name(scaled.status);
+  EXPECT_EQ(scaled.outliers, known.outliers);
+  EXPECT_LT(apart(known.X, scaled.X.mean), 1e-6);
+  EXPECT_NEAR(scaled.variance_factor, known.chi2 / known.degrees_of_freedom / 50, 1e-8);
+  EXPECT_TRUE(std::isnan(scaled.p));
+  const Matrix6 expected = known.X.covariance * (known.chi2 / known.degrees_of_freedom);
+  EXPECT_LT((scaled.X.covariance - expected).norm(), 1e-6 * expected.norm());
+}
+
+/// What a wrong reading of the covariance of C = camera_T_target makes of twenty trials: mean squared distance of the
+/// truth and mean χ² per degree of freedom.
+struct Trap {
+  double nees = 0, chi2_per_dof = 0;
+  int inconsistent = 0;
+};
+Trap trapped(const std::function<Matrix6(const SE3d& C, const Matrix6& covariance)>& read) {
+  Trap trap;
+  const int trials = 20;
+  for (int t = 0; t < trials; ++t) {
+    const HandEyeScene scene({.noise = HandEyeNoise::target, .pairs = 20}, 10, static_cast<std::uint64_t>(t));
+    std::vector<PosePair> pairs = scene.pairs;
+    for (PosePair& pair : pairs) {
+      const SE3d C = pair.b.mean.inverse();
+      pair.b.covariance = read(C, carried(C.inverse(), pair.b.covariance));
+    }
+    const HandEyeResult r = estimateRobotWorld(pairs, {.find_outliers = false});
+    trap.nees += squared(r.X, scene.X) / trials;
+    trap.chi2_per_dof += r.chi2 / r.degrees_of_freedom / trials;
+    trap.inconsistent += r.status == FusionStatus::inconsistent;
+  }
+  return trap;
+}
+
+TEST(HandEyeTraps, CovarianceOfTheInverseMustBeTransported) {
+  const Trap right = trapped([](const SE3d& C, const Matrix6& V) { return carried(C, V); });
+  EXPECT_NEAR(right.chi2_per_dof, 1, 4 * std::sqrt(2. / 108 / 20));
+  EXPECT_NEAR(right.nees, 6, 4 * std::sqrt(12. / 20));
+  const Trap wrong = trapped([](const SE3d&, const Matrix6& V) { return V; });
+  EXPECT_GT(wrong.chi2_per_dof, 10);
+  EXPECT_GT(wrong.nees, 50);
+  EXPECT_EQ(wrong.inconsistent, 20);
+}
+
+TEST(HandEyeTraps, LeftIsNotRight) {
+  // A covariance of Exp(e)·B read as one of B·Exp(e).
+  const Trap wrong = trapped([](const SE3d& C, const Matrix6& V) { return carried(C.inverse(), carried(C, V)); });
+  EXPECT_GT(wrong.chi2_per_dof, 10);
+  EXPECT_EQ(wrong.inconsistent, 20);
+}
+
+TEST(HandEyeTraps, RotationFirstIsNotTranslationFirst) {
+  const Trap wrong = trapped([](const SE3d& C, const Matrix6& V) {
+    const Matrix6 right = carried(C, V);
+    Matrix6 exchanged;
+    exchanged << right.bottomRightCorner<3, 3>(), right.bottomLeftCorner<3, 3>(), right.topRightCorner<3, 3>(),
+        right.topLeftCorner<3, 3>();
+    return exchanged;
+  });
+  EXPECT_GT(wrong.chi2_per_dof, 10);
+  EXPECT_EQ(wrong.inconsistent, 20);
+}
+
+TEST(HandEye, BadInput) {
+  const HandEyeScene scene({.pairs = 6}, 11);
+  const auto faultOf = [&](const std::function<void(std::vector<PosePair>&)>& spoil) {
+    std::vector<PosePair> pairs = scene.pairs;
+    spoil(pairs);
+    const HandEyeResult r = estimateRobotWorld(pairs);
+    EXPECT_EQ(r.status, FusionStatus::bad_input);
+    EXPECT_FALSE(describe(r.fault).empty());
+    return r.fault;
+  };
+  EXPECT_EQ(faultOf([](auto& p) { p.clear(); }), FaultKind::too_few_poses);
+  EXPECT_EQ(faultOf([](auto& p) { p.resize(2); }), (Fault{FaultKind::too_few_poses, 2}));
+  EXPECT_EQ(faultOf([](auto& p) { p[3].a.mean.translation()[1] = std::numeric_limits<double>::quiet_NaN(); }),
+            (Fault{FaultKind::pose_not_finite, 3}));
+  EXPECT_EQ(faultOf([](auto& p) { p[4].b.covariance(2, 2) = -1; }), (Fault{FaultKind::bad_covariance, 4}));
+  EXPECT_EQ(faultOf([](auto& p) { p[4].b.covariance(2, 1) = 1; }), (Fault{FaultKind::bad_covariance, 4}));
+  EXPECT_EQ(faultOf([](auto& p) { p[1].a.covariance.setZero(), p[1].b.covariance.setZero(); }),
+            (Fault{FaultKind::bad_covariance, 1}));
+  // Both rotations exact: errors of translation alone meet six equations.
+  EXPECT_EQ(faultOf([](auto& p) {
+              for (Gaussian<SE3d>* g : {&p[2].a, &p[2].b}) {
+                g->covariance.setZero();
+                g->covariance.diagonal().template head<3>().setConstant(1e-6);
+              }
+            }),
+            (Fault{FaultKind::bad_covariance, 2}));
+  EXPECT_EQ(estimateRobotWorld(scene.pairs, {.gate = -1}).fault, FaultKind::bad_option);
+  EXPECT_EQ(estimateHandEye(std::vector<PosePair>(1)).fault, FaultKind::too_few_poses);
+
+  // A pose of the robot may be exact.
+  std::vector<PosePair> exact = scene.pairs;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    exact[i].a = {scene.truth[i].a.mean, Matrix6::Zero()};
+  }
+  const HandEyeResult r = estimateRobotWorld(exact);
+  EXPECT_TRUE(r.ok()) << name(r.status);
+  EXPECT_LT(squared(r.X, scene.X), 22.5);
+}
+
+TEST(HandEye, IdenticalPosesLeaveEverythingOpen) {
+  for (const bool motions : {false, true}) {
+    const HandEyeScene scene({.pairs = 6, .relative = motions}, 12);
+    const std::vector<PosePair> pairs(6, exactPairs(scene).front());
+    const HandEyeResult r = motions ? estimateHandEye(pairs) : estimateRobotWorld(pairs);
+    EXPECT_EQ(r.status, FusionStatus::undetermined);
+    EXPECT_EQ(r.directions.size(), motions ? 2U : 6U);
+    EXPECT_FALSE(r.X.covariance.allFinite());
+  }
+}
+
+}  // namespace
+}  // namespace liestat
