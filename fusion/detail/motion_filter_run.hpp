@@ -24,8 +24,7 @@ LIESTAT_FUSION_INLINE void MotionFilter::fallBack() {
   in_charge_ = false;
   waiting_ = options_.lost_frames << std::min<std::size_t>(fall_backs_, 8);
   ++fall_backs_;
-  frames_.clear();
-  next_frame_ = 0;
+  kept_frames_ = next_frame_ = 0;
 }
 
 LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const PointPair> pairs,
@@ -47,8 +46,10 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
     return own;
   }
   if (hand_over_.frames > 0) {
-    if (frames_.size() < hand_over_.frames) frames_.emplace_back();
-    Frame& frame = frames_[next_frame_++ % hand_over_.frames];
+    if (frames_.empty()) frames_.resize(hand_over_.frames);
+    for (Frame& kept : frames_) kept.pairs.reserve(pairs.size());
+    Frame& frame = frames_[next_frame_++ % frames_.size()];
+    kept_frames_ = std::min(kept_frames_ + 1, frames_.size());
     frame.pairs.assign(pairs.begin(), pairs.end());
     frame.has_gyroscope = gyroscope != nullptr;
     if (gyroscope != nullptr) frame.gyroscope = *gyroscope;
@@ -62,8 +63,8 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
   state.mean = Essentiald(own.rotation.mean, translationDirection(own).mean);
   state.covariance = hand_over_.start_variance * Eigen::Matrix<double, 5, 5>::Identity();
   essential_.start(state);
-  for (std::size_t k = 0; k < frames_.size(); ++k) {
-    const Frame& frame = frames_[(next_frame_ + k) % frames_.size()];
+  for (std::size_t k = kept_frames_; k > 0; --k) {
+    const Frame& frame = frames_[(next_frame_ - k) % frames_.size()];
     if (frame.has_gyroscope) {
       essential_.update(frame.pairs, frame.gyroscope);
     } else {

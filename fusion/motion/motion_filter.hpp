@@ -28,7 +28,7 @@ struct MotionHandOver {
   double start_variance = 0.01;  ///< rad²: with this of the direction and of the rotation
   /// Mean normalised innovation of the essential filter over that of the subspace filter, in the last ten frames, above
   /// which the rotation changes too much for the former. With 20 points the ratio has a standard deviation of 0.1.
-  double fall_back = 1.3;
+  double fall_back = 1.5;
 };
 
 class MotionFilter {
@@ -55,8 +55,7 @@ class MotionFilter {
   const EssentialFilter& essential() const { return essential_; }
   void reset() {
     subspace_.reset(), essential_.reset();
-    frames_.clear();
-    next_frame_ = 0;
+    kept_frames_ = next_frame_ = 0;
     in_charge_ = false, hand_overs_ = fall_backs_ = waiting_ = 0;
   }
 
@@ -74,7 +73,7 @@ class MotionFilter {
     bool has_gyroscope = false;
   };
   std::vector<Frame> frames_;  ///< a ring
-  std::size_t next_frame_ = 0;
+  std::size_t next_frame_ = 0, kept_frames_ = 0;
   bool in_charge_ = false;
   std::size_t hand_overs_ = 0, fall_backs_ = 0, waiting_ = 0;
   double own_innovation_ = 0, other_innovation_ = 0;  ///< means over the last ten frames in charge

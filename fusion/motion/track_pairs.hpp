@@ -47,15 +47,19 @@ class TrackPairs {
   /// frame the first counts; those that are not finite are left out, and end their track.
   std::span<const PointPair> add(std::span<const TrackObservation> observations) {
     const std::size_t slots = options_.frames + 1, slot = frame_ % slots;
-    sorted_.assign(observations.begin(), observations.end());
-    std::erase_if(sorted_, [](const TrackObservation& o) { return !o.at.allFinite() || !std::isfinite(o.sigma); });
-    std::stable_sort(sorted_.begin(), sorted_.end(),
-                     [](const TrackObservation& a, const TrackObservation& b) { return a.track < b.track; });
+    order_.clear();
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      if (observations[i].at.allFinite() && std::isfinite(observations[i].sigma)) order_.push_back(i);
+    }
+    std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
+      const std::uint64_t first = observations[a].track, second = observations[b].track;
+      return first < second || (first == second && a < b);
+    });
     next_.clear(), next_places_.clear(), pairs_.clear(), tracks_.clear();
     std::size_t old = 0;
-    for (std::size_t i = 0; i < sorted_.size(); ++i) {
-      const TrackObservation& seen = sorted_[i];
-      if (i > 0 && sorted_[i - 1].track == seen.track) continue;
+    for (std::size_t i = 0; i < order_.size(); ++i) {
+      const TrackObservation& seen = observations[order_[i]];
+      if (i > 0 && observations[order_[i - 1]].track == seen.track) continue;
       while (old < known_.size() && known_[old].track < seen.track) ++old;
       const bool continues = old < known_.size() && known_[old].track == seen.track;
       next_.push_back(continues ? known_[old] : Known{seen.track, 0});
@@ -100,7 +104,7 @@ class TrackPairs {
   std::size_t frame_ = 0;
   std::vector<Known> known_, next_;
   std::vector<Place> places_, next_places_;  ///< a ring of frames + 1 for each known track
-  std::vector<TrackObservation> sorted_;
+  std::vector<std::size_t> order_;           ///< of the observations, by track
   std::vector<PointPair> pairs_;
   std::vector<std::uint64_t> tracks_;
 };

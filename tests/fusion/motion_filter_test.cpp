@@ -10,8 +10,23 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <cstdlib>
+#include <new>
 #include <vector>
+
+// Allocations of this program, for the promise that an update makes none.
+namespace {
+std::atomic<std::size_t> allocations{0};
+}
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  std::abort();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 
@@ -217,6 +232,31 @@ TEST(MotionFilter, FallsBackWhereTheRotationChanges) {
   }
   EXPECT_GE(filter.fall_backs(), 1U);
   EXPECT_LT(errorOf(turning, filter.subspace().estimate()), 5);
+}
+
+TEST(MotionFilter, UpdatesAllocateNothing) {
+  MotionScene scene({.sigma = 1, .gyroscope_sigma = 0.1}, 39);
+  MotionFilterOptions robust;
+  robust.outliers = true;
+  MotionFilter filter;
+  SubspaceFilter outliers(robust), inertial(discrete());
+  TrackPairs tracks({.frames = 3});
+  std::vector<TrackObservation> seen;
+  std::size_t before = 0;
+  for (int k = 0; k < 60; ++k) {
+    scene.advance();
+    seen.clear();
+    for (const auto& track : scene.observed) seen.push_back({track.track, track.at, scene.sigma()});
+    if (k == 40) before = allocations;
+    const std::size_t now = allocations;
+    filter.update(scene.pairs), outliers.update(scene.pairs), inertial.update(scene.pairs, scene.gyroscope);
+    filter.inverse_depths();
+    tracks.add(seen);
+    if (k >= 40) {
+      EXPECT_EQ(allocations - now, 0U) << k;
+    }
+  }
+  EXPECT_GT(before, 0U);
 }
 
 TEST(MotionFilter, TranslationFromVelocity) {
