@@ -5,7 +5,10 @@ int main(int argc, char** argv) {
   // In the order in which the help lists them.
   return runCommandLine(
       argc, argv,
-      {{"", "", {addHandEyeCommand, addMeanCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
+      {{"",
+        "",
+        {addHandEyeCommand, addMeanCommand, addMotionCommand, addPreintegrateCommand, addTwoViewCommand,
+         addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",
         {addSimulateHandEyeCommand, addSimulateTwoViewCommand, addSimulateViCommand}},

@@ -7,6 +7,7 @@ namespace liestat::cli {
 // Each declares a command with its options and its work, in the source of its name.
 
 void addMeanCommand(const CommandList& program);
+void addMotionCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);

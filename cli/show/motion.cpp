@@ -1,0 +1,144 @@
+#include <cli/show/motion.hpp>
+
+#include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
+#include <experiments/summary.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace liestat::cli {
+namespace {
+
+const char* nameOf(DirectionMeaning meaning) {
+  return meaning == DirectionMeaning::velocity ? "velocity" : "translation";
+}
+
+std::vector<std::string> flagsOf(const MotionFlags& flags) {
+  std::vector<std::string> names;
+  if (flags.bad_input) names.emplace_back("bad_input");
+  if (flags.too_few) names.emplace_back("too_few");
+  if (flags.standstill) names.emplace_back("standstill");
+  if (flags.degenerate) names.emplace_back("degenerate");
+  if (flags.ambiguous) names.emplace_back("ambiguous");
+  if (flags.undecided_sign) names.emplace_back("undecided_sign");
+  if (flags.lost) names.emplace_back("lost");
+  if (flags.outliers) names.emplace_back("outliers");
+  return names;
+}
+
+/// The larger standard deviation of the direction, degrees.
+double directionSigma(const MotionEstimate& motion) {
+  const Eigen::Matrix2d& P = motion.direction.covariance;
+  const double half = 0.5 * (P(0, 0) + P(1, 1)), difference = 0.5 * (P(0, 0) - P(1, 1));
+  return degrees * std::sqrt(half + std::hypot(difference, P(0, 1)));
+}
+double rotationSigma(const MotionEstimate& motion) {
+  return degrees * std::sqrt(motion.rotation.covariance.diagonal().maxCoeff());
+}
+Eigen::Vector3d rotationVector(const MotionEstimate& motion) { return motion.rotation.mean.log(); }
+
+std::vector<double> errorsOf(const MotionResult& result, std::optional<double> MotionFrame::*error) {
+  std::vector<double> values;
+  for (const MotionFrame& frame : result.frames) {
+    if (frame.motion.ok() && frame.*error) values.push_back(*(frame.*error));
+  }
+  return values;
+}
+
+}  // namespace
+
+std::size_t MotionResult::usable() const {
+  return static_cast<std::size_t>(
+      std::count_if(frames.begin(), frames.end(), [](const MotionFrame& frame) { return frame.motion.ok(); }));
+}
+
+std::string formatMotion(const MotionResult& result) {
+  std::vector<std::string> headers = {"frame", "direction", "sd deg", "turn deg", "sd turn", "pairs", "flags"};
+  if (result.with_truth) headers.insert(headers.begin() + 6, {"error deg", "error turn"});
+  Table table(headers);
+  const std::size_t n = result.frames.size(), shown = std::min<std::size_t>(n, 20);
+  for (std::size_t i = 0; i < shown; ++i) {
+    const MotionFrame& frame = result.frames[shown < 2 ? 0 : i * (n - 1) / (shown - 1)];
+    const MotionEstimate& motion = frame.motion;
+    const auto d = motion.direction.mean.unit_vector();
+    std::vector<std::string> cells = {
+        fmt::format("{}", frame.frame),    fmt::format("{:.3f} {:.3f} {:.3f}", d.x(), d.y(), d.z()),
+        number(directionSigma(motion), 3), number(degrees * rotationVector(motion).norm(), 3),
+        number(rotationSigma(motion), 3),  fmt::format("{}/{}", motion.inliers, motion.pairs)};
+    if (result.with_truth) {
+      cells.push_back(frame.direction_error ? number(*frame.direction_error, 3) : "");
+      cells.push_back(frame.rotation_error ? number(*frame.rotation_error, 3) : "");
+    }
+    cells.push_back(fmt::format("{}", fmt::join(flagsOf(motion.flags), " ")));
+    table.row(cells);
+  }
+  std::string text = table.str();
+  if (result.with_truth) {
+    const auto direction = errorsOf(result, &MotionFrame::direction_error);
+    const auto rotation = errorsOf(result, &MotionFrame::rotation_error);
+    text += fmt::format("\nagainst the truth, {} frames: median direction {:.3g} deg, rotation {:.3g} deg per frame\n",
+                        direction.size(), experiments::quantile(direction, 0.5), experiments::quantile(rotation, 0.5));
+  }
+  const std::size_t usable = result.usable();
+  text += usable > 0
+              ? fmt::format("\n{} of {} frames have a direction of motion that may be used\n", usable, n)
+              : fmt::format("\nNOT TO BE TRUSTED: none of {} frames has a direction of motion that may be used\n", n);
+  return text;
+}
+
+std::string motionCsv(const MotionResult& result) {
+  std::string text =
+      "frame,usable,meaning,dx,dy,dz,direction_sigma_deg,wx,wy,wz,rotation_sigma_deg,mean_inverse_depth,pairs,inliers,"
+      "flags\n";
+  for (const MotionFrame& frame : result.frames) {
+    const MotionEstimate& m = frame.motion;
+    const auto d = m.direction.mean.unit_vector();
+    const Eigen::Vector3d w = rotationVector(m);
+    text +=
+        fmt::format("{},{},{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{},{},{}\n", frame.frame,
+                    m.ok() ? 1 : 0, nameOf(m.meaning), d.x(), d.y(), d.z(), directionSigma(m), w.x(), w.y(), w.z(),
+                    rotationSigma(m), m.mean_inverse_depth, m.pairs, m.inliers, fmt::join(flagsOf(m.flags), " "));
+  }
+  return text;
+}
+
+void setMotion(JsonObject& object, const MotionResult& result) {
+  const std::size_t usable = result.usable();
+  object.set("status", usable > 0 ? "ok" : "ill_defined");
+  object.set("frames_usable", usable).set("passes", result.passes).set("with_gyroscope", result.with_gyroscope);
+  object.set("hand_overs", result.hand_overs).set("fall_backs", result.fall_backs);
+  object.set("motion_of",
+             "the points in the camera's axes (x right, y down, z forward), X2 = R X1 + T; one frame is "
+             "the unit of time, the camera moves against it");
+  object.set("covariance_order", "direction: two coordinates; rotation: x y z").set("covariance_side", "right");
+  object.set("covariance_frame",
+             "direction: local frame of S2 at the estimate, rad; rotation: the first frame's camera axes, rad");
+  std::vector<JsonObject> list;
+  for (const MotionFrame& frame : result.frames) {
+    const MotionEstimate& m = frame.motion;
+    JsonObject o;
+    o.set("frame", frame.frame).set("usable", m.ok()).set("meaning", nameOf(m.meaning));
+    o.set("filter", frame.essential ? "essential" : "subspace");
+    o.set("direction", Eigen::Vector3d(m.direction.mean.unit_vector()));
+    o.set("direction_covariance", m.direction.covariance);
+    o.set("rotation_vector", rotationVector(m)).set("rotation_covariance", m.rotation.covariance);
+    o.set("mean_inverse_depth", m.mean_inverse_depth).set("sign_evidence", m.sign_evidence);
+    o.set("innovation", m.innovation).set("pairs", m.pairs).set("inliers", m.inliers);
+    o.set("covariance_judged", m.covariance_judged()).set("flags", flagsOf(m.flags));
+    if (result.with_truth) {
+      o.set("direction_error_deg", frame.direction_error).set("rotation_error_deg", frame.rotation_error);
+    }
+    list.push_back(o);
+  }
+  object.set("frames", list);
+  if (result.with_truth) {
+    object.set("median_direction_error_deg",
+               experiments::quantile(errorsOf(result, &MotionFrame::direction_error), 0.5));
+    object.set("median_rotation_error_deg", experiments::quantile(errorsOf(result, &MotionFrame::rotation_error), 0.5));
+  }
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,40 @@
+// The view of `liestat motion`: the motion of each frame, its standard deviations, flags, and errors against a truth.
+#pragma once
+
+#include <cli/show/json.hpp>
+#include <fusion/motion/types.hpp>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// The motion from the frame before to this one.
+struct MotionFrame {
+  std::size_t frame = 0;  ///< as in the file
+  MotionEstimate motion;
+  bool essential = false;  ///< the essential filter was in charge
+  /// Degrees: of the translation's direction and of the rotation, where the truth is known and moves enough.
+  std::optional<double> direction_error = {}, rotation_error = {};
+};
+
+struct MotionResult {
+  std::vector<MotionFrame> frames;
+  bool with_gyroscope = false, with_truth = false;
+  std::size_t passes = 1, hand_overs = 0, fall_backs = 0;
+  /// Frames whose direction may be used.
+  std::size_t usable() const;
+};
+
+/// Verdict, a table of at most twenty frames, and the medians of the errors where the truth is known.
+std::string formatMotion(const MotionResult& result);
+
+/// A line per frame.
+std::string motionCsv(const MotionResult& result);
+
+/// The fields of `--json`.
+void setMotion(JsonObject& object, const MotionResult& result);
+
+}  // namespace liestat::cli
