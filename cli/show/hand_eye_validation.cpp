@@ -49,7 +49,7 @@ const Part parts[] = {
     {HandEyeExperiment::accuracy,
      false,
      "AX = YB: errors of X and its covariance",
-     "RMS errors beside the design note's; the index is the mean squared distance, 6 expected.",
+     "RMS errors beside the design note's; mean squared distance, 6 expected.",
      {"noise", "n", "deg", "note", "mm", "note", "index", "95 %", "chi2/dof", "verdict"},
      [](const HandEyeRow& row) -> Cells {
        return {noiseName(row),
@@ -75,7 +75,7 @@ const Part parts[] = {
     {HandEyeExperiment::motions,
      false,
      "Motions: the directions that they leave open",
-     "Trials with the right number of them; index and coverage of the rest, k expected.",
+     "Trials with the right number; index and coverage of the rest, k expected.",
      {"problem", "motion", "open", "right", "k", "index", "95 %", "verdict"},
      [](const HandEyeRow& row) -> Cells {
        return {row.formulation == HandEyeFormulation::poses ? "AX = YB" : "AX = XB",
@@ -90,7 +90,7 @@ const Part parts[] = {
     {HandEyeExperiment::outliers,
      false,
      "Three wrong pairs of ten",
-     "Trials in which all were found; share of right pairs that were taken for wrong ones, 0.1 % expected.",
+     "Trials in which all were found; right pairs lost, 0.1 % expected.",
      {"noise", "wrong pairs", "found", "lost %", "index", "95 %", "verdict"},
      [](const HandEyeRow& row) -> Cells {
        return {noiseName(row), name(*row.outliers), rightCell(row), fmt::format("{:.2f}", 100 * row.lost),
@@ -99,7 +99,7 @@ const Part parts[] = {
     {HandEyeExperiment::formulations,
      false,
      "The same poses as relative motions, for comparison",
-     "Pairs that share a pose are correlated: the index is too large, chi2/dof does not show it.",
+     "Pairs that share a pose are correlated, and chi2/dof does not show it.",
      {"pairs of motions", "n", "deg", "mm", "index", "95 %", "chi2/dof"},
      [](const HandEyeRow& row) -> Cells {
        return {row.formulation == HandEyeFormulation::poses ? "none: AX = YB" : name(row.formulation),
@@ -147,7 +147,7 @@ std::string formatHandEyeTables(const Rows& rows) {
     }
   }
   return fmt::format("{}\n{}{}", text, reasons,
-                     verdictLines(tally(rows) + countedTally(rows), "of independent poses and motions"));
+                     verdictLines(tally(rows) + countedTally(rows), "where they are promised"));
 }
 
 JsonObject toJson(const HandEyeRow& row) {

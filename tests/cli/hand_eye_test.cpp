@@ -469,7 +469,7 @@ TEST(HandEyeCommand, badInputIsNamed) {
 TEST(ValidateHandEye, writesRowsAndAPage) {
   const TemporaryDirectory directory;
   const std::string json_file = directory / "rows.json", page = directory / "page";
-  const ProgramOutput out = run({"validate", "hand-eye", "--trials", "6", "--json", json_file, "--report", page});
+  const ProgramOutput out = run({"validate", "hand-eye", "--trials", "3", "--json", json_file, "--report", page});
   EXPECT_EQ(out.exit_code, 0) << out.output;
   EXPECT_TRUE(contains(out.output, "PASSED"));
   std::istringstream lines(out.output);
@@ -486,9 +486,9 @@ TEST(ValidateHandEye, writesRowsAndAPage) {
     EXPECT_EQ(row["passed"].is_null(), !row["in_domain"].get<bool>());
   }
   EXPECT_TRUE(contains(contentOf(page + "/index.html"), "</html>"));
-  // Noise that is a third larger than said.
+  // Noise that is half as large again as said.
   EXPECT_EQ(
-      run({"validate", "hand-eye", "--trials", "40", "--experiment", "accuracy", "--noise-factor", "1.3"}).exit_code,
+      run({"validate", "hand-eye", "--trials", "20", "--experiment", "accuracy", "--noise-factor", "1.5"}).exit_code,
       1);
   EXPECT_EQ(run({"validate", "hand-eye", "--experiment", "nothing"}).exit_code, 2);
 }
