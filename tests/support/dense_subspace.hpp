@@ -5,8 +5,8 @@
 #include <fusion/motion/flow_rows.hpp>
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 
 #include <cmath>
 #include <span>
@@ -30,10 +30,10 @@ struct DenseSubspace {
       C.block<2, 3>(2 * i, n) = w * flowByRotation(point.x, point.y);
       flow.segment<2>(2 * i) << w * point.u, w * point.v;
     }
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(C, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    const Eigen::MatrixXd U = svd.matrixU();
-    P = Eigen::MatrixXd::Identity(2 * n, 2 * n) - U * U.transpose();
-    p = svd.solve(flow);
+    // A decomposition that compiles in a third of the time of singular values.
+    const Eigen::MatrixXd inverse = C.completeOrthogonalDecomposition().pseudoInverse();
+    P = Eigen::MatrixXd::Identity(2 * n, 2 * n) - C * inverse;
+    p = inverse * flow;
   }
   Eigen::VectorXd constraint() const { return P * flow; }
   /// d(P ẋ)/dξ without the part that is orthogonal to the range of P: -P dC p.
@@ -57,14 +57,16 @@ struct DenseUpdate {
   DenseUpdate(const DenseSubspace& dense, const Eigen::MatrixXd& J, const Eigen::Matrix2d& P) {
     // D R Dᵀ: the errors of the flow have unit variance, the constraint takes P of them.
     const Eigen::MatrixXd Lambda = J * P * J.transpose() + dense.P * dense.P.transpose();
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(Lambda, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::VectorXd inverse = svd.singularValues();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Lambda);
+    Eigen::VectorXd inverse = eigen.eigenvalues();
+    const double largest = inverse.maxCoeff();
     for (double& value : inverse) {
-      const bool zero = value < 1e-9 * svd.singularValues()[0];
+      const bool zero = value < 1e-9 * largest;
       rank += zero ? 0 : 1;
       value = zero ? 0 : 1 / value;
     }
-    const Eigen::MatrixXd L = P * J.transpose() * svd.matrixV() * inverse.asDiagonal() * svd.matrixU().transpose();
+    const Eigen::MatrixXd& V = eigen.eigenvectors();
+    const Eigen::MatrixXd L = P * J.transpose() * V * inverse.asDiagonal() * V.transpose();
     step = -(L * dense.constraint());
     const Eigen::Matrix2d Gamma = Eigen::Matrix2d::Identity() - L * J;
     covariance = Gamma * P * Gamma.transpose() + L * dense.P * dense.P.transpose() * L.transpose();
