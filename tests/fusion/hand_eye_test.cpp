@@ -192,7 +192,7 @@ TEST(HandEye, InvariantUnderFramesUnitsAndExchange) {
       pair.b.mean = (motions ? F.inverse() : G) * pair.b.mean * F;
       pair.b.covariance = carried(F.inverse(), pair.b.covariance);
     });
-    EXPECT_LT(apart(framed.X, G.inverse() * r.X.mean * F), 1e-8);
+    EXPECT_LT(apart(framed.X, G.inverse() * r.X.mean * F), 1e-9);
     EXPECT_NEAR(framed.chi2, r.chi2, 1e-8 * r.chi2);
 
     // Millimetres.
@@ -206,12 +206,12 @@ TEST(HandEye, InvariantUnderFramesUnitsAndExchange) {
     });
     SE3d in_mm = r.X.mean;
     in_mm.translation() *= 1000;
-    EXPECT_LT(apart(scaled.X, in_mm), 1e-8);
+    EXPECT_LT(apart(scaled.X, in_mm), 1e-9);
     EXPECT_LT((scaled.excitations - r.excitations).norm(), 1e-6 * r.excitations.norm());
 
     // B X⁻¹ = Y⁻¹ A.
     const HandEyeResult exchanged = transformed([&](PosePair& pair) { std::swap(pair.a, pair.b); });
-    EXPECT_LT(apart(exchanged.X, r.X.mean.inverse()), 1e-8);
+    EXPECT_LT(apart(exchanged.X, r.X.mean.inverse()), 1e-9);
     EXPECT_LT((exchanged.X.covariance - carried(r.X.mean, r.X.covariance)).norm(),
               1e-6 * exchanged.X.covariance.norm());
   }
