@@ -29,7 +29,7 @@
 
 namespace liestat::experiments {
 
-/// What is in front of the camera, and how it moves.
+/// The world in front of the camera, and how it moves.
 enum class MotionWorld {
   orbit,  ///< a ball of radius 0.5 at depth 1.5 turns about its centre, axis near the image plane: points stay in view
   general,  ///< random directions of V (0.1 per frame) and Ω; depths of 1 to 2; points that leave are replaced

@@ -215,7 +215,7 @@ MotionRow summarised(MotionRow row, const std::vector<Trial>& trials) {
   return row;
 }
 
-/// What docs/motion.md promises of a cell: a little less than what 2000 trials showed.
+/// The promise of docs/motion.md on a cell: a little less than what 2000 trials showed.
 struct PromisedCell {
   MotionMethod method;
   MotionWorld world;

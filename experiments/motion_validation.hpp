@@ -14,7 +14,7 @@
 
 namespace liestat::experiments {
 
-/// What is run.
+/// The cells that are run.
 enum class MotionMethod {
   subspace,         ///< 32 starts
   single_start,     ///< one start in a direction that is uniform on the sphere
@@ -52,7 +52,7 @@ inline constexpr std::array<int, 3> motion_frames = {20, 50, 100};
 /// An error below this (degrees) is a success.
 inline constexpr double motion_success = 10;
 
-/// What the documentation promises of a row; nothing: shown for comparison.
+/// The documentation's promise on a row; none: shown for comparison.
 struct MotionPromise {
   std::array<double, 3> success{};  ///< probability of an error below 10°, at least; 0: nothing
   std::array<double, 3> median{};   ///< degrees, at most; 0: nothing

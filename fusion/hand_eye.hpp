@@ -63,7 +63,7 @@ struct HandEyeOptions {
 struct OpenDirection {
   /// Information over that which the noise of the poses alone would make up; 1 is none.
   double excitation = 0;
-  /// Above the least excitation: the estimate along it would have been poor, but not void.
+  /// Above the least excitation: held like the others, but the motions say something of it.
   bool weak = false;
   /// The twist, translation and rotation, of the gripper's frame in which X moves: Exp(s·twist) X. Of unit length in its
   /// rotation, where it has one, or else in its translation.

@@ -52,7 +52,7 @@ std::string titleOf(MotionMethod method) {
   return "";
 }
 
-/// What a scene is, in one cell: the world and what is not the default.
+/// A scene in one cell: the world and what is not the default.
 std::string sceneOf(const MotionRow& row) {
   const MotionSceneOptions normal;
   std::string text = nameOf(row.scene.world);

@@ -16,7 +16,7 @@
 
 namespace liestat::detail {
 
-/// What the state is besides the direction.
+/// The state besides the direction.
 enum class MotionState { direction, gyroscope_bias, rotation };
 
 /// One hypothesis. Covariances are in the local frame of the direction (first two coordinates); the bias is in the
@@ -32,7 +32,7 @@ struct DirectionCandidate {
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;
 
-  // Of the last frame that it was updated with.
+  // Values of the last frame that it was updated with.
   Eigen::Vector3d Omega = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Identity();
   double depth = 0, depth_variance = 0, cost = 0, innovation = 0;

@@ -123,7 +123,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::prepareSharedFlows() {
   }
 }
 
-/// Whether the frame says nothing of the direction. Where noise drowns the motion of one frame, many frames together do
+/// True if the frame says nothing of the direction. Where noise drowns the motion of one frame, many frames together do
 /// say something, though each of them looks like standstill: a frame is left out only if others have shown a clear motion.
 /// If none has, hypotheses are updated, and start anew with the first clear motion after frames without any.
 LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
@@ -290,7 +290,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
   const std::size_t n = points_.size();
   RotationPrior<double> prior = e.prior;
   if (state_ == MotionState::rotation) {
-    // What the state knows of the increment besides the gyroscope.
+    // Knowledge of the increment in the state, besides the gyroscope.
     const Eigen::Matrix3d own = Cholesky<double, 3>(Eigen::Matrix3d(c.wide.gain.bottomRightCorner<3, 3>())).inverse();
     const Eigen::Vector3d pull = prior.information * prior.mean;
     prior.information += own;

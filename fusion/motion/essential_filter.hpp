@@ -41,7 +41,7 @@ class EssentialFilter {
     }
     return g;
   }
-  /// Of the last update's pairs, in their order, at the present estimate; NaN for those that were not used.
+  /// Values of the last update's pairs, in their order, at the present estimate; NaN for those that were not used.
   std::span<const InverseDepth> inverse_depths() { return engine_.inverseDepths(); }
   std::vector<MotionHypothesis> hypotheses() const {
     std::vector<MotionHypothesis> list;

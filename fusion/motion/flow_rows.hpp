@@ -81,7 +81,7 @@ inline FlowPoint<double> flowAfter(const Eigen::Matrix3d& R, const PointPair& pa
   return p;
 }
 
-/// What a point's row is made of at a direction V, before the rotation is known.
+/// The parts of a point's row at a direction V, before the rotation is known.
 template <class S>
 struct FlowRow {
   S n0 = S(0), n1 = S(0);             ///< n, across the flow of the translation; t = (n₁, -n₀)

@@ -9,7 +9,8 @@
 
 namespace liestat {
 
-/// Of preintegrated readings from the time of the first frame to that of the second. `camera_R_imu` takes the sensor's
+/// The rotation of preintegrated readings from the time of the first frame to that of the second.
+/// `camera_R_imu` takes the sensor's
 /// axes to the camera's. The covariance is that of an error on the left, Exp(n) Exp(Ω_g), along the second frame's axes; it
 /// is only positive definite if the noise of the readings was given.
 inline GyroscopeRotation gyroscopeRotation(const Preintegration<double>& motion, const SO3d& camera_R_imu) {

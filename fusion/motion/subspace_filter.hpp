@@ -34,7 +34,7 @@ class SubspaceFilter {
   }
   /// After the last update.
   const MotionEstimate& estimate() const { return engine_.estimate(); }
-  /// Of the last update's pairs, in their order, at the present estimate; NaN for those that were not used.
+  /// Values of the last update's pairs, in their order, at the present estimate; NaN for those that were not used.
   std::span<const InverseDepth> inverse_depths() { return engine_.inverseDepths(); }
   /// All that are left, the best among them.
   std::vector<MotionHypothesis> hypotheses() const {
