@@ -10,9 +10,8 @@
 namespace liestat {
 
 /// The rotation of preintegrated readings from the time of the first frame to that of the second.
-/// `camera_R_imu` takes the sensor's
-/// axes to the camera's. The covariance is that of an error on the left, Exp(n) Exp(Ω_g), along the second frame's axes; it
-/// is only positive definite if the noise of the readings was given.
+/// `camera_R_imu` takes the sensor's axes to the camera's. The covariance is that of an error on the left, Exp(n) Exp(Ω_g),
+/// along the second frame's axes; it is only positive definite if the noise of the readings was given.
 inline GyroscopeRotation gyroscopeRotation(const Preintegration<double>& motion, const SO3d& camera_R_imu) {
   const Eigen::Matrix3d R = camera_R_imu.matrix();
   // ΔR takes the sensor's axes at the end to those at the start; ΔR Exp(e) makes R (ΔR Exp(e))⁻¹ Rᵀ = Exp(-R e) Exp(Ω_g).
