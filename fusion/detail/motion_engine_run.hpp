@@ -253,7 +253,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
       for (int k = 0; k < 3; ++k) {
         flowsAfter(c.rotation);
         flowRows<double>(points_, c.direction.unit_vector(), rows_);
-        const Eigen::Vector3d Omega = rotationSums<double>(rows_).solve({{}, frame_.information});
+        const Eigen::Vector3d Omega = rotationSums<double>(rows_).solve({Eigen::Vector3d::Zero(), frame_.information});
         if (Omega.allFinite()) c.rotation = SO3d::exp(Omega) * c.rotation;
       }
     }

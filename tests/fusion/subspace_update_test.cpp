@@ -340,7 +340,7 @@ Identifiability identifiability(const std::vector<Eigen::Vector3d>& positions, c
   const S2d direction(V);
   flowRows<double>(points, direction.unit_vector(), rows);
   const FlowRotationSums<double> rotation = rotationSums<double>(rows);
-  const Eigen::Vector3d at = rotation.solve({{}, 1e-9 * Eigen::Matrix3d::Identity()});
+  const Eigen::Vector3d at = rotation.solve({Eigen::Vector3d::Zero(), 1e-9 * Eigen::Matrix3d::Identity()});
   const SubspaceSums<double> sums = subspaceSums<double>(
       points, rows, ManifoldTraits<S2d>::placement(direction).matrix().leftCols<2>(), at, rotation.M);
   // A trace of a prior keeps M invertible where three points and fewer do not.
