@@ -2,11 +2,10 @@
 # and no more. A subject's sources are one translation unit each library, for most of what they cost a compiler is the
 # headers that they share; those listed as HEAVY hold templates of the estimators and are compiled by themselves.
 
-# liestat_part(TARGET SOURCES patterns… [HEAVY sources…] [USES targets…] [LONG])
+# liestat_part(TARGET SOURCES patterns… [HEAVY sources…] [USES targets…])
 # All at -O2, the level of the precompiled header: g++ 14 leaves one of another level aside.
-# LONG: runs for minutes where the sanitizers watch code that is not optimised.
 function(liestat_part target)
-  cmake_parse_arguments(PARSE_ARGV 1 ARG "LONG" "" "SOURCES;HEAVY;USES")
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" "" "SOURCES;HEAVY;USES")
   file(GLOB sources CONFIGURE_DEPENDS ${ARG_SOURCES})
   set(heavy)
   foreach(source IN LISTS ARG_HEAVY)
@@ -15,23 +14,13 @@ function(liestat_part target)
   list(REMOVE_ITEM sources ${heavy})
   add_library(${target} STATIC ${sources} ${heavy})
   target_link_libraries(${target} PUBLIC ${ARG_USES} PRIVATE liestat_strict)
-  # Whoever calls an estimator of fusion/ uses liestat_fusion; all others need its types only.
-  target_compile_definitions(${target} PRIVATE LIESTAT_COMPILED_FUSION)
+  # Whoever calls an estimator of fusion/ uses liestat_fusion, and who asks for a mean liestat_means; all others need
+  # their types only.
+  target_compile_definitions(${target} PRIVATE LIESTAT_COMPILED_FUSION LIESTAT_COMPILED_MEANS)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
   set_source_files_properties(${heavy} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-  set(precompiled TRUE)
-  if(LIESTAT_SANITIZED)
-    # The precompiled header is one without optimisation.
-    set_source_files_properties(${heavy} PROPERTIES COMPILE_OPTIONS -O1 SKIP_PRECOMPILE_HEADERS ON)
-    if(ARG_LONG)
-      target_compile_options(${target} PRIVATE -O1)
-      set(precompiled FALSE)
-    endif()
-  endif()
-  if(precompiled)
-    target_precompile_headers(${target} REUSE_FROM liestat_precompiled)
-  endif()
+  target_precompile_headers(${target} REUSE_FROM liestat_precompiled)
   set_property(DIRECTORY APPEND PROPERTY LIESTAT_PART_SOURCES ${sources} ${heavy})
   set_property(DIRECTORY APPEND PROPERTY LIESTAT_PARTS ${target})
 endfunction()

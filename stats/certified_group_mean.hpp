@@ -9,6 +9,7 @@
 
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/certified_mean.hpp>
@@ -114,7 +115,9 @@ template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples,
                                          const CertifiedGroupMeanOptions& options = {}) {
   if constexpr (detail::RequireGroupMean<R>::ok) {
-    return detail::findCertifiedGroupMean<G>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+    const auto elements = detail::asSamples(samples);
+    return detail::findCertifiedGroupMean<G>(detail::erased(executor), elements, detail::ones(elements.size()),
+                                             options);
   } else {
     return {};
   }
@@ -130,7 +133,7 @@ CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples, W&& wei
     return detail::withRelativeWeights<G>(
         detail::asSamples(samples), detail::asWeights(weights),
         [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
-          return detail::findCertifiedGroupMean<G>(executor, features, numbers, options);
+          return detail::findCertifiedGroupMean<G>(detail::erased(executor), features, numbers, options);
         },
         [] { return detail::without<CertifiedGroupMean<G>>(Status::not_applicable, detail::bad_weights_reason); });
   } else {
@@ -143,3 +146,7 @@ CertifiedGroupMean<G> certifiedGroupMean(R&& samples, W&& weights, const Certifi
 }
 
 }  // namespace liestat
+
+#ifdef LIESTAT_COMPILED_MEANS
+#include <stats/detail/compiled_certified_group_mean.hpp>
+#endif

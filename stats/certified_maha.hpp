@@ -9,6 +9,7 @@
 #include <lie/frame2.hpp>
 #include <lie/frame3.hpp>
 #include <stats/certified_mean.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/metric_twin.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/settled_maha.hpp>
@@ -165,7 +166,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   for (const std::optional<M>& start : starts) {
     MahaOptions<M> how = options.maha;
     how.start = start;
-    results.push_back(maha(executor, samples, at, how));
+    results.push_back(mahalanobisMean<M>(executor, samples, at, how));
   }
   result.starts = results.size();
   const auto better = [](const MahaResult<M>& a, const MahaResult<M>& b) {
@@ -228,7 +229,7 @@ template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
                                const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::findCertifiedMaha<M>(executor, detail::asValues<Gaussian<M>>(samples), at, options);
+    return detail::findCertifiedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
   } else {
     return {};
   }
@@ -240,3 +241,7 @@ CertifiedMaha<M> certifiedMaha(R&& samples, CovarianceAt at,
 }
 
 }  // namespace liestat
+
+#ifdef LIESTAT_COMPILED_MEANS
+#include <stats/detail/compiled_certified_maha.hpp>
+#endif

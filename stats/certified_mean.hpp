@@ -2,6 +2,7 @@
 // Needs Eigen alone.
 #pragma once
 
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/concentration.hpp>
@@ -181,7 +182,8 @@ template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
-    return detail::findCertifiedMean<M>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+    const auto features = detail::asSamples(samples);
+    return detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(features.size()), options);
   } else {
     return {};
   }
@@ -199,7 +201,7 @@ CertifiedMean<M> certifiedMean(const E& executor, R&& samples, W&& weights,
         [&](const auto& features, const auto& numbers, const detail::KeptRows& rows) {
           CertifiedMeanOptions<M> how = options;
           how.known_noise = rows.of(options.known_noise);
-          return detail::findCertifiedMean<M>(executor, features, numbers, how);
+          return detail::findCertifiedMean<M>(detail::erased(executor), features, numbers, how);
         },
         [] { return detail::without<CertifiedMean<M>>(Status::not_applicable, detail::bad_weights_reason); });
   } else {
@@ -213,3 +215,7 @@ CertifiedMean<M> certifiedMean(R&& samples, W&& weights,
 }
 
 }  // namespace liestat
+
+#ifdef LIESTAT_COMPILED_MEANS
+#include <stats/detail/compiled_certified_mean.hpp>
+#endif

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/mahalanobis_mean.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/settled_maha.hpp>
@@ -69,7 +70,7 @@ template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R
 MahaResult<M> maha(const E& executor, R&& samples, CovarianceAt at,
                    const MahaOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::mahalanobisMean<M>(executor, detail::asValues<Gaussian<M>>(samples), at, options);
+    return detail::mahalanobisMean<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
   } else {
     return {};
   }
@@ -92,7 +93,8 @@ namespace detail {
 
 template <Homogeneous M, class R>
 Gaussian<M> fused(const R& samples, CovarianceAt at) {
-  const SerialExecutor executor;
+  const SerialExecutor serial;
+  const AnyExecutor executor(serial);
   const MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, {});
   Gaussian<M> estimate = result.estimate();
   if (result.status != Status::ok) return estimate;
@@ -127,3 +129,7 @@ Gaussian<M> fuse(R&& samples) {
 }
 
 }  // namespace liestat
+
+#ifdef LIESTAT_COMPILED_MEANS
+#include <stats/detail/compiled_maha.hpp>
+#endif

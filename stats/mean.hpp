@@ -216,3 +216,7 @@ MeanResult<detail::SampleInSignature<R>> mean(R&& samples, W&& weights,
 }
 
 }  // namespace liestat
+
+#ifdef LIESTAT_COMPILED_MEANS
+#include <stats/detail/compiled_mean.hpp>
+#endif

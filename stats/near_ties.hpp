@@ -16,6 +16,7 @@
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/executor.hpp>
@@ -208,7 +209,8 @@ template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
 std::vector<NearTie<M>> nearTies(R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
                                  const SquareOf<M>& covariance, const NearTieOptions& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
-    return detail::findNearTies<M>(SerialExecutor{}, detail::asSamples(samples), detail::UnitWeights{}, mean,
+    const auto features = detail::asSamples(samples);
+    return detail::findNearTies<M>(detail::erased(SerialExecutor{}), features, detail::ones(features.size()), mean,
                                    covariance, true, detail::NoNoise{}, options);
   } else {
     return {};
@@ -221,8 +223,8 @@ std::vector<NearTie<M>> nearTies(R&& samples, W&& weights, const MeanResult<std:
     return detail::withRelativeWeights<M>(
         detail::asSamples(samples), detail::asWeights(weights),
         [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
-          return detail::findNearTies<M>(SerialExecutor{}, features, numbers, mean, covariance, true, detail::NoNoise{},
-                                         options);
+          return detail::findNearTies<M>(detail::erased(SerialExecutor{}), features, numbers, mean, covariance, true,
+                                         detail::NoNoise{}, options);
         },
         [] { return std::vector<NearTie<M>>(); });
   } else {

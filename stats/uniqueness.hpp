@@ -17,6 +17,7 @@
 
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/ranges.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/executor.hpp>
 #include <stats/mean.hpp>
@@ -57,7 +58,8 @@ template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>
 UniquenessResult<M> uniqueness(const E& executor, R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
                                const UniquenessOptions& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
-    return detail::findUniqueness(executor, detail::asSamples(samples), detail::UnitWeights{}, mean, options);
+    const auto features = detail::asSamples(samples);
+    return detail::findUniqueness(detail::erased(executor), features, detail::ones(features.size()), mean, options);
   } else {
     return {};
   }
@@ -74,7 +76,7 @@ UniquenessResult<M> uniqueness(const E& executor, R&& samples, W&& weights,
     return detail::withRelativeWeights<M>(
         detail::asSamples(samples), detail::asWeights(weights),
         [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
-          return detail::findUniqueness(executor, features, numbers, mean, options);
+          return detail::findUniqueness(detail::erased(executor), features, numbers, mean, options);
         },
         [&] {
           UniquenessResult<M> nothing;

@@ -131,6 +131,7 @@ inline std::string describe(const std::exception_ptr& error) {
 /// - If map or combine throws anywhere, every rank throws: the rank where it happened its own exception, the others
 ///   std::runtime_error with the same text. Chunks that have not begun then are not evaluated.
 struct MpiExecutor {
+  static constexpr bool distributed = true;  ///< results cross processes (stats/detail/any_executor.hpp)
   MPI_Comm communicator = MPI_COMM_WORLD;
 
   template <class Map, class Combine>

@@ -34,6 +34,10 @@ Result without(Status status, const char* reason) {
 inline constexpr const char* bad_weights_reason =
     "a weight is negative or not finite, or there is none above zero for every feature";
 
+/// As many ones. An estimator that is dear to compile and not to run takes these where it is given no weights, and so is
+/// instantiated once and not twice.
+inline Samples<double> ones(std::size_t n) { return Samples<double>(std::vector<double>(n, 1.0)); }
+
 /// How weights become relative ones. Those whose largest is within 2^±30 stay as they are; others are multiplied by a
 /// power of two, which rounds nothing, until the largest is in [1, 2). A weight so far below the largest that the square
 /// of their ratio is no number of the scalar counts as zero.

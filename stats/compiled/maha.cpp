@@ -1,0 +1,8 @@
+#include <stats/detail/compiled_maha.hpp>
+
+namespace liestat::detail {
+
+LIESTAT_FOR_EACH_MEAN(LIESTAT_INSTANTIATE_MAHA, template);
+LIESTAT_INSTANTIATE_MAHA(template, SE3d);
+
+}  // namespace liestat::detail
