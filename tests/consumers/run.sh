@@ -47,27 +47,30 @@ eigen=$(pkg-config --cflags eigen3 2>/dev/null || echo "-I${EIGEN_INCLUDE_DIR:-/
 quietly $CXX -std=c++20 -I"$root" $eigen "$here/main.cpp" -o in_place
 built_and_ran ./in_place "in place"
 
-# A mistake is answered by one error, and that is a sentence of ours. Program 0 has none and compiles. With g++ where it
-# is there: clang 14 cannot use the views of its standard library.
-first=$(command -v g++ || echo "$CXX")
-# The headers are read once for all of them.
-grep '^#include' "$here/sentences.cpp" >"$work/sentences.hpp"
-# shellcheck disable=SC2086
-quietly $first -std=c++20 -x c++-header -I"$root" $eigen "$work/sentences.hpp" -o "$work/sentences.hpp.gch"
-for mistake in $(seq 0 17); do
+# A mistake is answered by one error, and that is a sentence of ours. Program 0 has none and compiles. Not with clang:
+# clang 14 cannot use the views of g++'s standard library.
+if $CXX --version | grep -q clang; then
+  echo "consumers: mistakes: SKIPPED, g++ answers them"
+else
+  # The headers are read once for all of them.
+  grep '^#include' "$here/sentences.cpp" >"$work/sentences.hpp"
   # shellcheck disable=SC2086
-  errors=$($first -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen -include "$work/sentences.hpp" \
-    "$here/sentences.cpp" 2>&1 | grep -E '(^|[ :])error:' || true)
-  expected=1
-  [ "$mistake" != 0 ] || expected=0
-  [ "$(printf '%s' "$errors" | grep -c .)" = $expected ] &&
-    [ "$(printf '%s' "$errors" | grep -c 'liestat: \|Frechet mean needs\|groupMean needs')" = $expected ] || {
-    echo "$errors"
-    echo "consumers: failed: mistake $mistake of sentences.cpp is not answered by one sentence" >&2
-    exit 1
-  }
-done
-echo "consumers: mistakes are answered by one sentence each"
+  quietly $CXX -std=c++20 -x c++-header -I"$root" $eigen "$work/sentences.hpp" -o "$work/sentences.hpp.gch"
+  for mistake in $(seq 0 17); do
+    # shellcheck disable=SC2086
+    errors=$($CXX -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen -include "$work/sentences.hpp" \
+      "$here/sentences.cpp" 2>&1 | grep -E '(^|[ :])error:' || true)
+    expected=1
+    [ "$mistake" != 0 ] || expected=0
+    [ "$(printf '%s' "$errors" | grep -c .)" = $expected ] &&
+      [ "$(printf '%s' "$errors" | grep -c 'liestat: \|Frechet mean needs\|groupMean needs')" = $expected ] || {
+      echo "$errors"
+      echo "consumers: failed: mistake $mistake of sentences.cpp is not answered by one sentence" >&2
+      exit 1
+    }
+  done
+  echo "consumers: mistakes are answered by one sentence each"
+fi
 
 quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
 quietly "$CMAKE" --build add_subdirectory
@@ -78,9 +81,10 @@ quietly "$CMAKE" -S "$root" -B liestat -DCMAKE_INSTALL_PREFIX="$work/prefix" -DL
 quietly "$CMAKE" --install liestat
 # An installed tree that is moved must keep working: nothing in it may name the place it was installed to.
 mv "$work/prefix" "$work/moved"
-# The estimators for programs that compile them once (fusion/detail/compiled.hpp).
-for source in "$root"/fusion/compiled/*.cpp; do
-  quietly test -s "$work/moved/include/liestat/fusion/compiled/$(basename "$source")"
+# The estimators for programs that compile them once (fusion/detail/compiled.hpp,
+# stats/detail/compiled_mean.hpp).
+for source in "$root"/fusion/compiled/*.cpp "$root"/stats/compiled/*.cpp; do
+  quietly test -s "$work/moved/include/liestat/${source#"$root"/}"
 done
 
 quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved"

@@ -23,7 +23,7 @@ std::string label(const HandEyeRow& row) {
 }
 
 TEST(HandEyeValidation, ErrorsAreThoseOfTheNote) {
-  const std::size_t trials = 100;
+  const std::size_t trials = 50;
   const auto rows = validateHandEye(small(trials, {HandEyeExperiment::accuracy}));
   ASSERT_EQ(rows.size(), 24U);
   for (const HandEyeRow& row : rows) {
