@@ -16,7 +16,8 @@ const char* nameOf(DirectionMeaning meaning) {
   return meaning == DirectionMeaning::velocity ? "velocity" : "translation";
 }
 
-std::vector<std::string> flagsOf(const MotionFlags& flags) {
+std::vector<std::string> flagsOf(const MotionFrame& frame) {
+  const MotionFlags& flags = frame.motion.flags;
   std::vector<std::string> names;
   if (flags.bad_input) names.emplace_back("bad_input");
   if (flags.too_few) names.emplace_back("too_few");
@@ -26,6 +27,7 @@ std::vector<std::string> flagsOf(const MotionFlags& flags) {
   if (flags.undecided_sign) names.emplace_back("undecided_sign");
   if (flags.lost) names.emplace_back("lost");
   if (flags.outliers) names.emplace_back("outliers");
+  if (!frame.no_gyroscope.empty()) names.emplace_back("no_gyroscope");
   return names;
 }
 
@@ -38,6 +40,7 @@ double directionSigma(const MotionEstimate& motion) {
 double rotationSigma(const MotionEstimate& motion) {
   return degrees * std::sqrt(motion.rotation.covariance.diagonal().maxCoeff());
 }
+double biasSigma(const MotionFrame& frame) { return std::sqrt(frame.gyroscope_bias.covariance.diagonal().maxCoeff()); }
 Eigen::Vector3d rotationVector(const MotionEstimate& motion) { return motion.rotation.mean.log(); }
 
 std::vector<double> errorsOf(const MotionResult& result, std::optional<double> MotionFrame::*error) {
@@ -53,6 +56,11 @@ std::vector<double> errorsOf(const MotionResult& result, std::optional<double> M
 std::size_t MotionResult::usable() const {
   return static_cast<std::size_t>(
       std::count_if(frames.begin(), frames.end(), [](const MotionFrame& frame) { return frame.motion.ok(); }));
+}
+
+std::size_t MotionResult::withoutGyroscope() const {
+  return static_cast<std::size_t>(std::count_if(frames.begin(), frames.end(),
+                                                [](const MotionFrame& frame) { return !frame.no_gyroscope.empty(); }));
 }
 
 std::string formatMotion(const MotionResult& result) {
@@ -72,7 +80,7 @@ std::string formatMotion(const MotionResult& result) {
       cells.push_back(frame.direction_error ? number(*frame.direction_error, 3) : "");
       cells.push_back(frame.rotation_error ? number(*frame.rotation_error, 3) : "");
     }
-    cells.push_back(fmt::format("{}", fmt::join(flagsOf(motion.flags), " ")));
+    cells.push_back(fmt::format("{}", fmt::join(flagsOf(frame), " ")));
     table.row(cells);
   }
   std::string text = table.str();
@@ -82,6 +90,18 @@ std::string formatMotion(const MotionResult& result) {
     text += fmt::format("\nagainst the truth, {} frames: median direction {:.3g} deg, rotation {:.3g} deg per frame\n",
                         direction.size(), experiments::quantile(direction, 0.5), experiments::quantile(rotation, 0.5));
   }
+  if (result.with_bias && n > 0) {
+    const Gaussian<Eigen::Vector3d>& bias = result.frames.back().gyroscope_bias;
+    text += fmt::format("\ngyroscope's bias at the end {:.3g}, {:.3g}, {:.3g} rad/s, sd {:.2g}\n", bias.mean.x(),
+                        bias.mean.y(), bias.mean.z(), biasSigma(result.frames.back()));
+  }
+  if (const std::size_t without = result.withoutGyroscope(); without > 0) {
+    const auto first = std::find_if(result.frames.begin(), result.frames.end(),
+                                    [](const MotionFrame& frame) { return !frame.no_gyroscope.empty(); });
+    text += fmt::format("\n{} of {} frames without the gyroscope, the first of them {}: {}\n", without, n, first->frame,
+                        first->no_gyroscope);
+  }
+  if (result.outside > 0) text += fmt::format("\n{} observations lie where the camera sees nothing\n", result.outside);
   const std::size_t usable = result.usable();
   text += usable > 0
               ? fmt::format("\n{} of {} frames have a direction of motion that may be used\n", usable, n)
@@ -92,15 +112,20 @@ std::string formatMotion(const MotionResult& result) {
 std::string motionCsv(const MotionResult& result) {
   std::string text =
       "frame,usable,meaning,dx,dy,dz,direction_sigma_deg,wx,wy,wz,rotation_sigma_deg,mean_inverse_depth,pairs,inliers,"
-      "flags\n";
+      "flags";
+  text += result.with_bias ? ",bias_x,bias_y,bias_z,bias_sigma\n" : "\n";
   for (const MotionFrame& frame : result.frames) {
     const MotionEstimate& m = frame.motion;
     const auto d = m.direction.mean.unit_vector();
     const Eigen::Vector3d w = rotationVector(m);
-    text +=
-        fmt::format("{},{},{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{},{},{}\n", frame.frame,
-                    m.ok() ? 1 : 0, nameOf(m.meaning), d.x(), d.y(), d.z(), directionSigma(m), w.x(), w.y(), w.z(),
-                    rotationSigma(m), m.mean_inverse_depth, m.pairs, m.inliers, fmt::join(flagsOf(m.flags), " "));
+    text += fmt::format("{},{},{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{},{},{}", frame.frame,
+                        m.ok() ? 1 : 0, nameOf(m.meaning), d.x(), d.y(), d.z(), directionSigma(m), w.x(), w.y(), w.z(),
+                        rotationSigma(m), m.mean_inverse_depth, m.pairs, m.inliers, fmt::join(flagsOf(frame), " "));
+    if (result.with_bias) {
+      const Eigen::Vector3d& b = frame.gyroscope_bias.mean;
+      text += fmt::format(",{:.9g},{:.9g},{:.9g},{:.6g}", b.x(), b.y(), b.z(), biasSigma(frame));
+    }
+    text += "\n";
   }
   return text;
 }
@@ -109,6 +134,8 @@ void setMotion(JsonObject& object, const MotionResult& result) {
   const std::size_t usable = result.usable();
   object.set("status", usable > 0 ? "ok" : "ill_defined");
   object.set("frames_usable", usable).set("passes", result.passes).set("with_gyroscope", result.with_gyroscope);
+  object.set("frames_apart", result.frames_apart).set("observations_outside", result.outside);
+  if (result.with_gyroscope) object.set("frames_without_gyroscope", result.withoutGyroscope());
   object.set("hand_overs", result.hand_overs).set("fall_backs", result.fall_backs);
   object.set("motion_of",
              "the points in the camera's axes (x right, y down, z forward), X2 = R X1 + T; one frame is "
@@ -116,6 +143,8 @@ void setMotion(JsonObject& object, const MotionResult& result) {
   object.set("covariance_order", "direction: two coordinates; rotation: x y z").set("covariance_side", "right");
   object.set("covariance_frame",
              "direction: local frame of S2 at the estimate, rad; rotation: the first frame's camera axes, rad");
+  if (result.with_bias)
+    object.set("gyroscope_bias_of", "the readings, measured minus true, rad/s in the sensor's axes");
   std::vector<JsonObject> list;
   for (const MotionFrame& frame : result.frames) {
     const MotionEstimate& m = frame.motion;
@@ -127,7 +156,12 @@ void setMotion(JsonObject& object, const MotionResult& result) {
     o.set("rotation_vector", rotationVector(m)).set("rotation_covariance", m.rotation.covariance);
     o.set("mean_inverse_depth", m.mean_inverse_depth).set("sign_evidence", m.sign_evidence);
     o.set("innovation", m.innovation).set("pairs", m.pairs).set("inliers", m.inliers);
-    o.set("covariance_judged", m.covariance_judged()).set("flags", flagsOf(m.flags));
+    o.set("covariance_judged", m.covariance_judged()).set("flags", flagsOf(frame));
+    if (!frame.no_gyroscope.empty()) o.set("no_gyroscope", frame.no_gyroscope);
+    if (result.with_bias) {
+      o.set("gyroscope_bias", Eigen::Vector3d(frame.gyroscope_bias.mean));
+      o.set("gyroscope_bias_covariance", frame.gyroscope_bias.covariance);
+    }
     if (result.with_truth) {
       o.set("direction_error_deg", frame.direction_error).set("rotation_error_deg", frame.rotation_error);
     }
