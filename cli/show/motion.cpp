@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace liestat::cli {
 namespace {
@@ -43,6 +44,31 @@ double rotationSigma(const MotionEstimate& motion) {
 double biasSigma(const MotionFrame& frame) { return std::sqrt(frame.gyroscope_bias.covariance.diagonal().maxCoeff()); }
 Eigen::Vector3d rotationVector(const MotionEstimate& motion) { return motion.rotation.mean.log(); }
 
+/// Numbers in ascending order as ranges: 1-3, 7.
+std::string ranges(const std::vector<std::size_t>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t last = i;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    if (!text.empty()) text += ", ";
+    if (text.size() > 50) return text + "...";
+    text += last > i ? fmt::format("{}-{}", numbers[i], numbers[last]) : fmt::format("{}", numbers[i]);
+    i = last + 1;
+  }
+  return text;
+}
+
+/// Each flag that was raised, and at which frames.
+std::string flagLines(const MotionResult& result) {
+  std::map<std::string, std::vector<std::size_t>> frames;
+  for (const MotionFrame& frame : result.frames) {
+    for (const std::string& flag : flagsOf(frame)) frames[flag].push_back(frame.frame);
+  }
+  std::string text;
+  for (const auto& [flag, list] : frames) text += fmt::format("{:<15}{:>5}  {}\n", flag, list.size(), ranges(list));
+  return text.empty() ? text : fmt::format("\n{:<15}{:>5}  {}\n", "flag", "", "frames") + text;
+}
+
 std::vector<double> errorsOf(const MotionResult& result, std::optional<double> MotionFrame::*error) {
   std::vector<double> values;
   for (const MotionFrame& frame : result.frames) {
@@ -64,26 +90,31 @@ std::size_t MotionResult::withoutGyroscope() const {
 }
 
 std::string formatMotion(const MotionResult& result) {
-  std::vector<std::string> headers = {"frame", "direction", "sd deg", "turn deg", "sd turn", "pairs", "flags"};
-  if (result.with_truth) headers.insert(headers.begin() + 6, {"error deg", "error turn"});
+  std::vector<std::string> headers = {"frame", "x", "y", "z", "sd", "turn", "sd turn", "pairs", "use"};
+  if (result.with_truth) {
+    headers.insert(headers.begin() + 5, "error");
+    headers[7] = "error turn";
+  }
   Table table(headers);
   const std::size_t n = result.frames.size(), shown = std::min<std::size_t>(n, 20);
+  const auto error = [](const std::optional<double>& value) { return value ? number(*value, 3) : std::string(); };
   for (std::size_t i = 0; i < shown; ++i) {
     const MotionFrame& frame = result.frames[shown < 2 ? 0 : i * (n - 1) / (shown - 1)];
     const MotionEstimate& motion = frame.motion;
     const auto d = motion.direction.mean.unit_vector();
-    std::vector<std::string> cells = {
-        fmt::format("{}", frame.frame),    fmt::format("{:.3f} {:.3f} {:.3f}", d.x(), d.y(), d.z()),
-        number(directionSigma(motion), 3), number(degrees * rotationVector(motion).norm(), 3),
-        number(rotationSigma(motion), 3),  fmt::format("{}/{}", motion.inliers, motion.pairs)};
-    if (result.with_truth) {
-      cells.push_back(frame.direction_error ? number(*frame.direction_error, 3) : "");
-      cells.push_back(frame.rotation_error ? number(*frame.rotation_error, 3) : "");
-    }
-    cells.push_back(fmt::format("{}", fmt::join(flagsOf(frame), " ")));
+    std::vector<std::string> cells = {fmt::format("{}", frame.frame)};
+    for (int k = 0; k < 3; ++k) cells.push_back(fmt::format("{:.3f}", d[k]));
+    cells.push_back(number(directionSigma(motion), 3));
+    if (result.with_truth) cells.push_back(error(frame.direction_error));
+    cells.push_back(number(degrees * rotationVector(motion).norm(), 3));
+    cells.push_back(result.with_truth ? error(frame.rotation_error) : number(rotationSigma(motion), 3));
+    cells.push_back(fmt::format("{}/{}", motion.inliers, motion.pairs));
+    cells.emplace_back(motion.ok() ? "" : "no");
     table.row(cells);
   }
   std::string text = table.str();
+  text += "\ndirection of the points' motion (x right, y down, z forward); sd, turn and errors in deg, per frame\n";
+  text += flagLines(result);
   if (result.with_truth) {
     const auto direction = errorsOf(result, &MotionFrame::direction_error);
     const auto rotation = errorsOf(result, &MotionFrame::rotation_error);
