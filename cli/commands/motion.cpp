@@ -138,11 +138,14 @@ void compare(MotionFrame& frame, const std::map<std::size_t, CameraPose>& truth,
   const Eigen::Matrix3d& R_2 = second->second.R_camera_world;
   const SO3d R = SO3d::fitToSO3(Eigen::Matrix3d(R_2 * first->second.R_camera_world.transpose()));
   const Eigen::Vector3d T = R_2 * (first->second.c - second->second.c);
-  MotionEstimate over = frame.motion;
   const auto n = static_cast<double>(frames);
-  over.rotation.mean = SO3d::exp(Eigen::Vector3d(n * frame.motion.rotation.mean.log()));
-  frame.rotation_error = degrees * distance(over.rotation.mean, R) / n;
-  if (T.norm() > least) frame.direction_error = degrees * distance(translationDirection(over).mean, S2d(T));
+  const Eigen::Vector3d turn = n * frame.motion.rotation.mean.log();
+  frame.rotation_error = degrees * distance(SO3d::exp(turn), R) / n;
+  if (!(T.norm() > least)) return;
+  // The velocity that is constant over the interval, T = J_l(Ω) V, by the true rotation: that of a noisy frame says little.
+  const bool velocity = frame.motion.meaning == DirectionMeaning::velocity;
+  const Eigen::Vector3d truly = velocity ? Eigen::Vector3d(SO3d::leftJacobianInverse(R.log()) * T) : T;
+  frame.direction_error = degrees * distance(frame.motion.direction.mean, S2d(truly));
 }
 
 /// The gyroscope's bias in the sensor's axes, rad/s, with what was taken off the readings before.

@@ -118,8 +118,11 @@ std::string formatMotion(const MotionResult& result) {
   if (result.with_truth) {
     const auto direction = errorsOf(result, &MotionFrame::direction_error);
     const auto rotation = errorsOf(result, &MotionFrame::rotation_error);
-    text += fmt::format("\nagainst the truth, {} frames: median direction {:.3g} deg, rotation {:.3g} deg per frame\n",
-                        direction.size(), experiments::quantile(direction, 0.5), experiments::quantile(rotation, 0.5));
+    text += direction.empty()
+                ? "\nagainst the truth: no frame that may be used\n"
+                : fmt::format(
+                      "\nagainst the truth, {} frames: median direction {:.3g} deg, rotation {:.3g} deg per frame\n",
+                      direction.size(), experiments::quantile(direction, 0.5), experiments::quantile(rotation, 0.5));
   }
   if (result.with_bias && n > 0) {
     const Gaussian<Eigen::Vector3d>& bias = result.frames.back().gyroscope_bias;
@@ -187,7 +190,8 @@ void setMotion(JsonObject& object, const MotionResult& result) {
     o.set("rotation_vector", rotationVector(m)).set("rotation_covariance", m.rotation.covariance);
     o.set("mean_inverse_depth", m.mean_inverse_depth).set("sign_evidence", m.sign_evidence);
     o.set("innovation", m.innovation).set("pairs", m.pairs).set("inliers", m.inliers);
-    o.set("covariance_judged", m.covariance_judged()).set("flags", flagsOf(frame));
+    // The same data in several passes count each time.
+    o.set("covariance_judged", m.covariance_judged() && result.passes == 1).set("flags", flagsOf(frame));
     if (!frame.no_gyroscope.empty()) o.set("no_gyroscope", frame.no_gyroscope);
     if (result.with_bias) {
       o.set("gyroscope_bias", Eigen::Vector3d(frame.gyroscope_bias.mean));
