@@ -245,7 +245,7 @@ void addMotionCommand(const CommandList& app) {
   command.option("--imu", input.imu, "EuRoC's imu0/data.csv, or CSV t,wx,wy,wz,ax,ay,az: its gyroscope, as a prior")
       .excludes("--rates");
   command.option("--image-times", input.image_times, "EuRoC's cam0/data.csv, or CSV frame,t_s (default: a column t_s)");
-  command.option("--gyroscope-noise", input.gyroscope_noise, "rad/s/rtHz (default: the calibration's)");
+  command.option("--gyroscope-noise", input.gyroscope_noise, "rad/s/rtHz (default: the calibration's)").positive();
   command.option("--gyroscope-bias", input.gyroscope_bias, "rad/s, x,y,z in the sensor's axes (default 0)").list(3, 3);
   command.option("--largest-gap", input.largest_gap, "s between two readings (default 0.1)").positive();
   command.flag("--bias", options->bias, "The gyroscope's bias is a state of the filter");

@@ -291,6 +291,10 @@ MotionInput readMotionInput(const MotionInputOptions& options) {
   if (!options.rates.empty() && !options.imu.empty()) {
     throw InputError(motion_name, 0, "there are both --rates and --imu", "one gyroscope");
   }
+  for (const auto* list : {&options.camera_tilt, &options.gyroscope_bias}) {
+    if (std::all_of(list->begin(), list->end(), [](double x) { return std::isfinite(x); })) continue;
+    throw InputError(motion_name, 0, "--camera-tilt or --gyroscope-bias is not finite", "three numbers");
+  }
   const Calibration calibration = calibrationOf(options);
   const Camera camera = cameraOf(options, calibration);
   MotionInput input;
