@@ -69,6 +69,39 @@ TEST(MotionCommand, realTracksAndTheVehiclesRates) {
   }
 }
 
+/// Twenty landmarks, three of which two frames share in the median: too few for images alone, enough beside a gyroscope.
+TEST(MotionCommand, realGyroscopeWithFewTracks) {
+  const char* directory = std::getenv("LIESTAT_DATA");
+  if (directory == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
+  const TemporaryDirectory out;
+  const std::string stem = std::string(directory) + "/tracks/starry_night";
+  const ProgramResult result = run({stem + "_tracks.csv",
+                                    "--intrinsics",
+                                    "484.49985,484.49985,321.68048,247.48145",
+                                    "--truth",
+                                    stem + "_poses.csv",
+                                    "--least-motion",
+                                    "0.01",
+                                    "--rates",
+                                    stem + "_poses.csv",
+                                    "--rates-rotation=0.50420466,-0.49921739,-0.49953699,-0.49701353",
+                                    "--rates-sigma",
+                                    "0.1",
+                                    "--sigma",
+                                    "1.5",
+                                    "--process-noise",
+                                    "1e-2",
+                                    "--frames-apart",
+                                    "10",
+                                    "--json",
+                                    out / "out.json"});
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Json json = Json::parse(contentOf(out / "out.json"));
+  EXPECT_GT(json["frames_usable"].get<int>(), 800);
+  EXPECT_LE(json["median_direction_error_deg"].get<double>(), 6);
+  EXPECT_LE(json["median_rotation_error_deg"].get<double>(), 0.25);
+}
+
 /// Real frames in a second run from the end of the first: none is left without a direction (the report's fig. 14).
 TEST(MotionCommand, realTracksInTwoPasses) {
   const char* directory = std::getenv("LIESTAT_DATA");
