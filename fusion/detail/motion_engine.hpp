@@ -36,14 +36,6 @@ struct DirectionCandidate {
                                        ///< direction and the rotation in `whole`
   FilterCovariance<double, 8> whole;   ///< MotionState::rotation_and_bias: direction, rotation, bias
   double score = 0;
-  void copyFromWhole() {
-    wide.gain = whole.gain.topLeftCorner<5, 5>();
-    wide.reported = whole.reported.topLeftCorner<5, 5>();
-  }
-  Eigen::Matrix3d biasCovariance(MotionState state) const {
-    return state == MotionState::gyroscope_bias ? Eigen::Matrix3d(wide.gain.bottomRightCorner<3, 3>())
-                                                : Eigen::Matrix3d(whole.gain.bottomRightCorner<3, 3>());
-  }
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;
@@ -53,6 +45,15 @@ struct DirectionCandidate {
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Identity();
   double depth = 0, depth_variance = 0, cost = 0, innovation = 0;
   std::size_t inliers = 0;
+
+  void copyFromWhole() {
+    wide.gain = whole.gain.topLeftCorner<5, 5>();
+    wide.reported = whole.reported.topLeftCorner<5, 5>();
+  }
+  Eigen::Matrix3d biasCovariance(MotionState state) const {
+    return state == MotionState::gyroscope_bias ? Eigen::Matrix3d(wide.gain.bottomRightCorner<3, 3>())
+                                                : Eigen::Matrix3d(whole.gain.bottomRightCorner<3, 3>());
+  }
 };
 
 class MotionEngine {
