@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
          addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",
-        {addSimulateHandEyeCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
+        {addSimulateHandEyeCommand, addSimulateMotionCommand, addSimulateTwoViewCommand, addSimulateViCommand}},
        {"validate",
         validate_description,
         {addValidateEstimatorCommand, addValidateHandEyeCommand, addValidateMeansCommand, addValidateMotionCommand,

@@ -141,6 +141,9 @@ std::unique_ptr<Runner> runnerOf(const MotionRow& row, const MotionScene& scene,
       filter.start(start);
       return std::make_unique<FilterRunner<EssentialFilter>>(std::move(filter));
     }
+    case MotionMethod::essential_bias:
+      options.estimate_bias = true, options.bias_sigma = row.scene.gyroscope_bias * degree;
+      return std::make_unique<FilterRunner<EssentialFilter>>(EssentialFilter(options));
     case MotionMethod::composition:
       return std::make_unique<FilterRunner<MotionFilter>>(MotionFilter(options));
     case MotionMethod::intervals:
@@ -484,6 +487,60 @@ constexpr PromisedCell promised_cells[] = {
      0.15,
      20,
      {{0.98, 0.99, 0.99}, {2.54, 1.48, 1.09}, 0}},
+    {MotionMethod::essential_bias,
+     MotionWorld::orbit,
+     1,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.99, 0.99, 0.99}, {0.38, 0.31, 0.29}, 0.95}},
+    {MotionMethod::essential_bias,
+     MotionWorld::orbit,
+     4,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.98, 0.98, 0.99}, {1.4, 1.04, 0.8}, 0.95}},
+    {MotionMethod::essential_bias,
+     MotionWorld::orbit,
+     8,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.97, 0.98, 0.98}, {2.45, 1.84, 1.53}, 0.95}},
+    {MotionMethod::essential_bias,
+     MotionWorld::general,
+     1,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.56}, 0.95}},
+    {MotionMethod::essential_bias,
+     MotionWorld::general,
+     4,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.99, 0.99, 0.99}, {2.2, 1.84, 1.59}, 0.95}},
+    {MotionMethod::essential_bias,
+     MotionWorld::general,
+     8,
+     5,
+     0.1,
+     0.115,
+     0,
+     20,
+     {{0.97, 0.97, 0.97}, {3.73, 3.03, 2.65}, 0.95}},
 };
 std::optional<MotionPromise> promiseOf(MotionMethod method, const MotionSceneOptions& scene) {
   for (const PromisedCell& cell : promised_cells) {
@@ -562,6 +619,8 @@ std::string name(MotionMethod method) {
       return "gyroscope_bias";
     case MotionMethod::gyroscope_robust:
       return "gyroscope_robust";
+    case MotionMethod::essential_bias:
+      return "essential_bias";
   }
   return "unknown";
 }
@@ -645,6 +704,9 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
   add(M::gyroscope, inertial(orbit, 1, 0.1, 0.115));  // a bias that is not modelled
   for (const MotionWorld world : {orbit, general}) {
     for (const double sigma : {1., 4., 8.}) add(M::gyroscope_bias, inertial(world, sigma, 0.1, 0.115));
+  }
+  for (const MotionWorld world : {orbit, general}) {
+    for (const double sigma : {1., 4., 8.}) add(M::essential_bias, inertial(world, sigma, 0.1, 0.115));
   }
   for (const MotionWorld world : {orbit, general}) {
     for (const double sigma : {1., 4.}) add(M::gyroscope_robust, wrong(inertial(world, sigma)));

@@ -16,27 +16,30 @@ namespace liestat::experiments {
 
 /// The cells that are run.
 enum class MotionMethod {
-  subspace,         ///< 32 starts
-  single_start,     ///< one start in a direction that is uniform on the sphere
-  forward,          ///< 32 starts, the report's forward difference
-  discrete,         ///< 32 starts, the exact flow
-  gauss_newton,     ///< 32 starts, the covariance without second derivatives
-  released,         ///< 32 starts, positive depth not enforced
-  near_start,       ///< one start 10° off
-  search,           ///< the residuals of 300 directions, summed over the frames (Heeger and Jepson 1992)
-  essential,        ///< essential filter, 32 starts
-  essential_near,   ///< the same from a direction 0.3 rad off and a rotation 30 % off
-  composition,      ///< MotionFilter: subspace filter, then essential filter
-  intervals,        ///< subspace filter, pairs of up to six frames (orbit) or four
-  gyroscope,        ///< subspace filter with a gyroscope, discrete flow, linear start
-  gyroscope_bias,   ///< the same, the gyroscope's bias a state
-  gyroscope_robust  ///< the same without the bias, expecting outliers, 32 starts
+  subspace,          ///< 32 starts
+  single_start,      ///< one start in a direction that is uniform on the sphere
+  forward,           ///< 32 starts, the report's forward difference
+  discrete,          ///< 32 starts, the exact flow
+  gauss_newton,      ///< 32 starts, the covariance without second derivatives
+  released,          ///< 32 starts, positive depth not enforced
+  near_start,        ///< one start 10° off
+  search,            ///< the residuals of 300 directions, summed over the frames (Heeger and Jepson 1992)
+  essential,         ///< essential filter, 32 starts
+  essential_near,    ///< the same from a direction 0.3 rad off and a rotation 30 % off
+  composition,       ///< MotionFilter: subspace filter, then essential filter
+  intervals,         ///< subspace filter, pairs of up to six frames (orbit) or four
+  gyroscope,         ///< subspace filter with a gyroscope, discrete flow, linear start
+  gyroscope_bias,    ///< the same, the gyroscope's bias a state
+  gyroscope_robust,  ///< the same without the bias, expecting outliers, 32 starts
+  essential_bias     ///< essential filter with a gyroscope, its bias a state
 };
 inline constexpr std::array all_motion_methods = {
-    MotionMethod::subspace,     MotionMethod::single_start,   MotionMethod::forward,         MotionMethod::discrete,
-    MotionMethod::gauss_newton, MotionMethod::released,       MotionMethod::near_start,      MotionMethod::search,
-    MotionMethod::essential,    MotionMethod::essential_near, MotionMethod::composition,     MotionMethod::intervals,
-    MotionMethod::gyroscope,    MotionMethod::gyroscope_bias, MotionMethod::gyroscope_robust};
+    MotionMethod::subspace,       MotionMethod::single_start,   MotionMethod::forward,
+    MotionMethod::discrete,       MotionMethod::gauss_newton,   MotionMethod::released,
+    MotionMethod::near_start,     MotionMethod::search,         MotionMethod::essential,
+    MotionMethod::essential_near, MotionMethod::composition,    MotionMethod::intervals,
+    MotionMethod::gyroscope,      MotionMethod::gyroscope_bias, MotionMethod::gyroscope_robust,
+    MotionMethod::essential_bias};
 std::string name(MotionMethod method);
 
 struct MotionValidation {

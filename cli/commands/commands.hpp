@@ -13,6 +13,7 @@ void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);
 void addHandEyeCommand(const CommandList& program);
 void addSimulateHandEyeCommand(const CommandList& simulate);
+void addSimulateMotionCommand(const CommandList& simulate);
 void addSimulateTwoViewCommand(const CommandList& simulate);
 void addSimulateViCommand(const CommandList& simulate);
 void addValidateEstimatorCommand(const CommandList& validate);

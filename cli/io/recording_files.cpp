@@ -36,11 +36,12 @@ std::string listLine(std::string_view name, std::string_view text) {
   return fmt::format("{:016x} {}\n", checksum(text), name);
 }
 
-/// Kalibr's chain of one camera, and its sensor.
-std::string calibrationText(const SimulatedRecording& recording) {
-  const Camera& camera = recording.camera.camera;
+}  // namespace
+
+std::string calibrationText(const CameraCalibration& sensor, const std::optional<ImuNoise<double>>& noise) {
+  const Camera& camera = sensor.camera;
   std::string text = "%YAML:1.0\n\ncam0:\n  T_imu_cam: # takes the camera's coordinates to the IMU's\n";
-  const Eigen::Matrix4d T = recording.camera.imu_T_cam.matrix();
+  const Eigen::Matrix4d T = sensor.imu_T_cam.matrix();
   for (int i = 0; i < 4; ++i) text += fmt::format("    - [{}, {}, {}, {}]\n", T(i, 0), T(i, 1), T(i, 2), T(i, 3));
   const Eigen::Vector4d& c = camera.coefficients;
   const char* models[] = {"none", "radtan", "equidistant"};
@@ -49,17 +50,14 @@ std::string calibrationText(const SimulatedRecording& recording) {
   text += fmt::format("  distortion_coeffs: [{}, {}, {}, {}]\n", c[0], c[1], c[2], c[3]);
   text += fmt::format("  intrinsics: [{}, {}, {}, {}] # fu, fv, cu, cv\n", camera.fu, camera.fv, camera.cu, camera.cv);
   text += fmt::format("  resolution: [{}, {}]\n", camera.width, camera.height);
-  text += fmt::format("  timeshift_cam_imu: {} # t_imu = t_cam + this\n", recording.camera.timeshift_cam_imu);
-  if (!recording.noise) return text;
-  const ImuNoise<double>& noise = *recording.noise;
-  text += fmt::format("\nimu0:\n  gyroscope_noise_density: {}\n  gyroscope_random_walk: {}\n", noise.gyroscope,
-                      noise.gyroscope_walk);
-  text += fmt::format("  accelerometer_noise_density: {}\n  accelerometer_random_walk: {}\n", noise.accelerometer,
-                      noise.accelerometer_walk);
+  text += fmt::format("  timeshift_cam_imu: {} # t_imu = t_cam + this\n", sensor.timeshift_cam_imu);
+  if (!noise) return text;
+  text += fmt::format("\nimu0:\n  gyroscope_noise_density: {}\n  gyroscope_random_walk: {}\n", noise->gyroscope,
+                      noise->gyroscope_walk);
+  text += fmt::format("  accelerometer_noise_density: {}\n  accelerometer_random_walk: {}\n", noise->accelerometer,
+                      noise->accelerometer_walk);
   return text;
 }
-
-}  // namespace
 
 void writeRecording(const SimulatedRecording& recording, const std::string& directory) {
   createDirectory(directory);
@@ -117,7 +115,7 @@ void writeRecording(const SimulatedRecording& recording, const std::string& dire
     text += recording.tracks[i].outlier ? ",1\n" : ",0\n";
   }
   write("landmarks.csv", text);
-  write("calibration.yaml", calibrationText(recording));
+  write("calibration.yaml", calibrationText(recording.camera, recording.noise));
   writeOutput(directory + "/" + list_name, list);
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <experiments/recording.hpp>
 #include <experiments/simulate_vi.hpp>
 
+#include <optional>
 #include <string>
 
 namespace liestat::cli {
@@ -11,6 +13,9 @@ namespace liestat::cli {
 /// camera's clock. liestat.txt tells these files, as they were written, from others of the same names. Throws InputError
 /// where the directory cannot be written.
 void writeRecording(const experiments::SimulatedRecording& recording, const std::string& directory);
+
+/// A chain of one camera and its sensor in Kalibr's form.
+std::string calibrationText(const experiments::CameraCalibration& camera, const std::optional<ImuNoise<double>>& noise);
 
 /// Throws InputError where writeRecording() would replace a file that it has not written itself, or that was changed
 /// since.

@@ -15,17 +15,23 @@ namespace liestat::cli {
 struct MotionFrame {
   std::size_t frame = 0;  ///< as in the file
   MotionEstimate motion;
-  bool essential = false;  ///< the essential filter was in charge
+  bool essential = false;                    ///< the essential filter was in charge
+  std::string no_gyroscope;                  ///< why this frame has none, where there is one
+  Gaussian<Eigen::Vector3d> gyroscope_bias;  ///< rad/s, in the sensor's axes; where it is a state
   /// Degrees: of the translation's direction and of the rotation, where the truth is known and moves enough.
   std::optional<double> direction_error = {}, rotation_error = {};
 };
 
 struct MotionResult {
   std::vector<MotionFrame> frames;
-  bool with_gyroscope = false, with_truth = false;
+  bool with_gyroscope = false, with_bias = false, with_truth = false;
   std::size_t passes = 1, hand_overs = 0, fall_backs = 0;
+  std::size_t frames_apart = 1;  ///< longest interval of a pair
+  std::size_t outside = 0;       ///< observations without a ray ahead of the camera
   /// Frames whose direction may be used.
   std::size_t usable() const;
+  /// Frames without the gyroscope's rotation, where there is a gyroscope.
+  std::size_t withoutGyroscope() const;
 };
 
 /// Verdict, a table of at most twenty frames, and the medians of the errors where the truth is known.

@@ -48,6 +48,8 @@ std::string titleOf(MotionMethod method) {
       return "Subspace filter with a gyroscope, its bias a state";
     case MotionMethod::gyroscope_robust:
       return "Subspace filter with a gyroscope among outliers";
+    case MotionMethod::essential_bias:
+      return "Essential filter with a gyroscope, its bias a state";
   }
   return "";
 }

@@ -17,7 +17,13 @@
 namespace liestat::detail {
 
 /// The state besides the direction.
-enum class MotionState { direction, gyroscope_bias, rotation };
+enum class MotionState { direction, gyroscope_bias, rotation, rotation_and_bias };
+constexpr bool keepsTheRotation(MotionState state) {
+  return state == MotionState::rotation || state == MotionState::rotation_and_bias;
+}
+constexpr bool keepsTheBias(MotionState state) {
+  return state == MotionState::gyroscope_bias || state == MotionState::rotation_and_bias;
+}
 
 /// One hypothesis. Covariances are in the local frame of the direction (first two coordinates); the bias is in the
 /// camera's axes; the rotation's error δ is on the left, R ← Exp(δ) R, in the axes of the second frame.
@@ -26,7 +32,9 @@ struct DirectionCandidate {
   SO3d rotation;  ///< state, or that of the last frame
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
   FilterCovariance<double, 2> narrow;  ///< MotionState::direction
-  FilterCovariance<double, 5> wide;    ///< the other two
+  FilterCovariance<double, 5> wide;    ///< MotionState::gyroscope_bias, rotation; of rotation_and_bias a copy of the
+                                       ///< direction and the rotation in `whole`
+  FilterCovariance<double, 8> whole;   ///< MotionState::rotation_and_bias: direction, rotation, bias
   double score = 0;
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
@@ -37,6 +45,15 @@ struct DirectionCandidate {
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Identity();
   double depth = 0, depth_variance = 0, cost = 0, innovation = 0;
   std::size_t inliers = 0;
+
+  void copyFromWhole() {
+    wide.gain = whole.gain.topLeftCorner<5, 5>();
+    wide.reported = whole.reported.topLeftCorner<5, 5>();
+  }
+  Eigen::Matrix3d biasCovariance(MotionState state) const {
+    return state == MotionState::gyroscope_bias ? Eigen::Matrix3d(wide.gain.bottomRightCorner<3, 3>())
+                                                : Eigen::Matrix3d(whole.gain.bottomRightCorner<3, 3>());
+  }
 };
 
 class MotionEngine {
@@ -74,6 +91,9 @@ class MotionEngine {
     std::size_t inliers = 0;
   };
 
+  void spreadBias(DirectionCandidate& candidate) const;
+  RotationPrior<double> priorWithoutBias() const;
+  void updateRotationOf(DirectionCandidate& candidate);
   bool readFrame(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
   void resize(std::size_t n);
   bool atStandstill();
@@ -111,6 +131,7 @@ class MotionEngine {
   double still_sum_ = 0, still_dof_ = 0;  ///< of all frames before a clear motion
   SO3d rotation_alone_;
   Eigen::Matrix3d rotation_information_ = Eigen::Matrix3d::Identity();
+  RotationPrior<double> rotation_prior_;  ///< the share of the gyroscope in them
   std::size_t rotation_inliers_ = 0;
   bool updated_ = false;       ///< by the last frame
   double innovation_sum_ = 0;  ///< discounted over lost_frames

@@ -15,7 +15,7 @@ namespace liestat::detail {
 
 LIESTAT_FUSION_INLINE MotionEngine::MotionEngine(const MotionFilterOptions& options, MotionState state)
     : options_(options), state_(state), standstill_quantile_(normalThreshold(options.standstill_probability)) {
-  if (state == MotionState::rotation) options_.flow = Flow::discrete;
+  if (keepsTheRotation(state)) options_.flow = Flow::discrete;
   reset();
 }
 
@@ -81,7 +81,7 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const
     estimate_.flags.too_few = true;
   } else if (!atStandstill()) {
     updated_ = true;
-    const bool linear = state_ != MotionState::rotation && options_.linear_start && frame_.has_gyroscope &&
+    const bool linear = !keepsTheRotation(state_) && options_.linear_start && frame_.has_gyroscope &&
                         !options_.outliers && kept_ < options_.linear_frames && updates_ == kept_ &&
                         (kept_ > 0 || pairs_.size() >= options_.min_pairs);
     if (linear) {
@@ -160,7 +160,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::startAnew() {
 /// the points to outliers. With the rotation so found points are turned and the rest is fitted again, so that large
 /// rotations are no signal.
 LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
-  Eigen::Vector3d Omega = frame_.has_gyroscope ? frame_.gyroscope : Eigen::Vector3d::Zero();
+  rotation_prior_ = priorWithoutBias();
+  const RotationPrior<double>& prior = rotation_prior_;
+  Eigen::Vector3d Omega = prior.mean;
   const double limit = 11.8;  // χ² of two degrees of freedom, as likely as 3 standard deviations
   const bool robust = options_.outliers;
   const std::size_t n = pairs_.size();
@@ -171,8 +173,8 @@ LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
   for (int pass = 0; pass < passes; ++pass) {
     Eigen::Matrix3d R = SO3d::exp(Omega).matrix();
     double frames = 1;
-    M = frame_.information;
-    Eigen::Vector3d b = frame_.information * (frame_.gyroscope - Omega);
+    M = prior.information;
+    Eigen::Vector3d b = prior.information * (prior.mean - Omega);
     for (std::size_t i = 0; i < n; ++i) {
       if (pairs_[i].frames != frames) {
         frames = pairs_[i].frames;
@@ -189,8 +191,8 @@ LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
     }
     const Eigen::Vector3d d = Cholesky<double, 3>(M).solve<1>(b);
     if (!d.allFinite()) return 0;
-    const Eigen::Vector3d from_gyroscope = Omega + d - frame_.gyroscope;
-    statistic = from_gyroscope.dot(frame_.information * from_gyroscope), used = 0;
+    const Eigen::Vector3d from_gyroscope = Omega + d - prior.mean;
+    statistic = from_gyroscope.dot(prior.information * from_gyroscope), used = 0;
     for (std::size_t i = 0; i < n; ++i) {
       const FlowPoint<double>& p = points_[i];
       const Eigen::Vector2d rest = Eigen::Vector2d(p.u, p.v) - flowByRotation(p.x, p.y) * d;
@@ -213,25 +215,67 @@ LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
   return dof;
 }
 
+/// The gyroscope's rotation as far as its bias is known, without that.
+LIESTAT_FUSION_INLINE RotationPrior<double> MotionEngine::priorWithoutBias() const {
+  RotationPrior<double> prior{frame_.gyroscope, frame_.information};
+  if (!frame_.has_gyroscope || !keepsTheBias(state_)) return prior;
+  Eigen::Matrix3d covariance = Cholesky<double, 3>(frame_.information).inverse();
+  if (const DirectionCandidate* c = best()) {
+    prior.mean -= c->bias;
+    covariance += c->biasCovariance(state_);
+  } else {
+    covariance.diagonal().array() += options_.bias_sigma * options_.bias_sigma;
+  }
+  prior.information = Cholesky<double, 3>(covariance).inverse();
+  return prior;
+}
+
+/// A hypothesis at standstill: what the flow says of the rotation, and with it of the gyroscope's bias.
+LIESTAT_FUSION_INLINE void MotionEngine::updateRotationOf(DirectionCandidate& c) {
+  if (!keepsTheRotation(state_)) c.rotation = rotation_alone_;
+  if (state_ == MotionState::direction) return;
+  const auto fromState = [&](const SO3d& R) { return (R * c.rotation.inverse()).log(); };
+  const Eigen::Vector3d pull = rotation_information_ * fromState(rotation_alone_);
+  if (state_ == MotionState::rotation) {
+    FrameInformation<double, 5> frame;
+    frame.gauss_newton.setZero();
+    frame.gauss_newton.bottomRightCorner<3, 3>() = rotation_information_;
+    frame.corrected = frame.gauss_newton;
+    frame.gradient << 0, 0, -pull;
+    const FilterStep<double, 5> s = updateCovariance(c.wide, frame, options_.max_step);
+    c.rotation = SO3d::exp(Eigen::Vector3d(s.step.tail<3>())) * c.rotation;
+    return;
+  }
+  // The flow by itself, without the gyroscope's share, and the gyroscope as a measurement of rotation and bias.
+  SubspaceSums<double> flow;
+  flow.Hxx.setZero(), flow.Cxx.setZero(), flow.Hox.setZero(), flow.Cox.setZero(), flow.bx.setZero();
+  flow.M = rotation_information_ - rotation_prior_.information;
+  flow.bo = rotation_prior_.information * fromState(SO3d::exp(rotation_prior_.mean)) - pull;
+  const Eigen::Vector3d gyroscope = frame_.gyroscope - c.bias, here = Eigen::Vector3d::Zero();
+  RotationPrior<double> prior{Eigen::Vector3d::Zero(), frame_.information};
+  if (frame_.has_gyroscope) prior.mean = fromState(SO3d::exp(gyroscope));
+  if (state_ == MotionState::gyroscope_bias) {
+    if (!frame_.has_gyroscope) return;
+    const FilterStep<double, 5> s =
+        updateCovariance(c.wide, eliminateRotationWithBias(flow, here, prior, frame_.information), options_.max_step);
+    c.bias += s.step.tail<3>();
+    return;
+  }
+  const Eigen::Matrix3d turn = SO3d::leftJacobian(gyroscope);
+  const FilterStep<double, 8> s =
+      updateCovariance(c.whole, keepRotationAndBias(flow, here, prior, turn, frame_.information), options_.max_step);
+  c.rotation = SO3d::exp(Eigen::Vector3d(s.step.segment<3>(2))) * c.rotation;
+  c.bias += s.step.tail<3>();
+  c.copyFromWhole();
+}
+
 /// At standstill the flow says the rotation, better than the filter does.
 LIESTAT_FUSION_INLINE void MotionEngine::updateRotationAlone() {
   estimate_.rotation.mean = rotation_alone_;
   const Eigen::Matrix3d R = rotation_alone_.matrix();
   estimate_.rotation.covariance = R.transpose() * Cholesky<double, 3>(rotation_information_).inverse() * R;
   estimate_.inliers = rotation_inliers_;
-  for (DirectionCandidate& c : candidates_) {
-    if (state_ != MotionState::rotation) {
-      c.rotation = rotation_alone_;
-      continue;
-    }
-    FrameInformation<double, 5> frame;
-    frame.gauss_newton.setZero();
-    frame.gauss_newton.bottomRightCorner<3, 3>() = rotation_information_;
-    frame.corrected = frame.gauss_newton;
-    frame.gradient << 0, 0, -(rotation_information_ * (rotation_alone_ * c.rotation.inverse()).log());
-    const FilterStep<double, 5> s = updateCovariance(c.wide, frame, options_.max_step);
-    c.rotation = SO3d::exp(Eigen::Vector3d(s.step.tail<3>())) * c.rotation;
-  }
+  for (DirectionCandidate& c : candidates_) updateRotationOf(c);
 }
 
 /// Directions of a spherical Fibonacci lattice on the hemisphere z > 0: costs do not tell V from -V.
@@ -243,21 +287,35 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   for (std::size_t i = 0; i < n; ++i) {
     DirectionCandidate& c = candidates_[i];
     c.direction = S2d(lattice[i]);
-    if (state_ == MotionState::gyroscope_bias) {
-      c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
-    }
-    if (state_ == MotionState::rotation) {
+    if (keepsTheRotation(state_)) {
       // The rotation that the frame says at this direction, with little trust in it.
       c.wide.gain.bottomRightCorner<3, 3>() *= 0.09;
       c.rotation = SO3d::exp(frame_.gyroscope);
       for (int k = 0; k < 3; ++k) {
         flowsAfter(c.rotation);
         flowRows<double>(points_, c.direction.unit_vector(), rows_);
-        const Eigen::Vector3d Omega = rotationSums<double>(rows_).solve({Eigen::Vector3d::Zero(), frame_.information});
+        const Eigen::Vector3d Omega =
+            rotationSums<double>(rows_).solve({Eigen::Vector3d::Zero(), rotation_prior_.information});
         if (Omega.allFinite()) c.rotation = SO3d::exp(Omega) * c.rotation;
       }
     }
     c.wide.reported = c.wide.gain;
+    spreadBias(c);
+  }
+}
+
+/// The bias of a new hypothesis, as it is expected.
+LIESTAT_FUSION_INLINE void MotionEngine::spreadBias(DirectionCandidate& c) const {
+  const Eigen::Matrix3d bias = options_.bias_sigma * options_.bias_sigma * Eigen::Matrix3d::Identity();
+  if (state_ == MotionState::gyroscope_bias) {
+    c.wide.gain.bottomRightCorner<3, 3>() = bias;
+    c.wide.reported = c.wide.gain;
+  } else if (state_ == MotionState::rotation_and_bias) {
+    c.whole.gain.setZero();
+    c.whole.gain.topLeftCorner<5, 5>() = c.wide.gain;
+    c.whole.gain.bottomRightCorner<3, 3>() = bias;
+    c.whole.reported = c.whole.gain;
+    c.whole.reported.topLeftCorner<5, 5>() = c.wide.reported;
   }
 }
 
@@ -265,6 +323,15 @@ LIESTAT_FUSION_INLINE void MotionEngine::predict(DirectionCandidate& c) const {
   const double q = options_.process_noise;
   if (state_ == MotionState::direction) {
     for (Eigen::Matrix2d* P : {&c.narrow.gain, &c.narrow.reported}) P->diagonal().array() += q;
+    return;
+  }
+  if (state_ == MotionState::rotation_and_bias) {
+    for (Eigen::Matrix<double, 8, 8>* P : {&c.whole.gain, &c.whole.reported}) {
+      P->diagonal().head<2>().array() += q;
+      P->diagonal().segment<3>(2).array() += options_.rotation_noise;
+      P->diagonal().tail<3>().array() += options_.bias_noise;
+    }
+    c.copyFromWhole();
     return;
   }
   const double other = state_ == MotionState::rotation ? options_.rotation_noise : options_.bias_noise;
@@ -289,14 +356,13 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighForward(const Eigen::Vector3d& V, 
 LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate& c, Evaluation& e) {
   const std::size_t n = points_.size();
   RotationPrior<double> prior = e.prior;
-  if (state_ == MotionState::rotation) {
+  if (keepsTheBias(state_)) prior.information = e.marginal;
+  if (keepsTheRotation(state_)) {
     // Knowledge of the increment in the state, besides the gyroscope.
     const Eigen::Matrix3d own = Cholesky<double, 3>(Eigen::Matrix3d(c.wide.gain.bottomRightCorner<3, 3>())).inverse();
     const Eigen::Vector3d pull = prior.information * prior.mean;
     prior.information += own;
     prior.mean = Cholesky<double, 3>(prior.information).solve<1>(pull);
-  } else if (state_ == MotionState::gyroscope_bias) {
-    prior.information = e.marginal;
   }
   for (std::size_t i = 0; i < n; ++i) weights_[i] = rows_[i].weight;
   const auto squared = [&](std::size_t i, const Eigen::Vector3d& Omega) {
@@ -333,7 +399,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
     // e² ≤ gate² (variance + G P Gᵀ + hᵀ M⁻¹ h), with M without the pair itself.
     const FlowRotationSums<double> sums = rotationSums<double>(rows_);
     const Cholesky<double, 3> ML(Eigen::Matrix3d(sums.M + prior.information));
-    const bool turns = state_ == MotionState::rotation;
+    const bool turns = keepsTheRotation(state_);
     if (!turns) Omega = sums.solve(prior);
     for (std::size_t i = 0; i < n; ++i) {
       const Eigen::Vector3d h(rows_[i].h0, rows_[i].h1, rows_[i].h2);
@@ -356,7 +422,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
       rows_[i].weight = error * error <= options_.gate * options_.gate * predicted ? weights_[i] : 0;
     }
   }
-  if (state_ == MotionState::rotation) {
+  if (keepsTheRotation(state_)) {
     Omega.setZero();
   } else {
     Omega = rotationSums<double>(rows_).solve(prior);
@@ -376,18 +442,18 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, E
   e.base = SO3d();
   int passes = 1;
   const Eigen::Vector3d gyroscope = frame_.gyroscope - c.bias;
-  if (state_ == MotionState::rotation) {
+  if (keepsTheRotation(state_)) {
     e.base = c.rotation;
-    if (frame_.has_gyroscope) e.prior.mean = (SO3d::exp(frame_.gyroscope) * c.rotation.inverse()).log();
+    if (frame_.has_gyroscope) e.prior.mean = (SO3d::exp(gyroscope) * c.rotation.inverse()).log();
   } else if (options_.flow == Flow::discrete) {
     e.base = frame_.has_gyroscope ? SO3d::exp(gyroscope) : c.rotation;
     if (!frame_.has_gyroscope) passes = updates_ == 0 ? 4 : 2;
   } else if (frame_.has_gyroscope) {
     e.prior.mean = gyroscope;
   }
-  if (state_ == MotionState::gyroscope_bias && frame_.has_gyroscope) {
+  if (keepsTheBias(state_) && frame_.has_gyroscope) {
     const Eigen::Matrix3d covariance = Cholesky<double, 3>(frame_.information).inverse();
-    e.marginal = Cholesky<double, 3>(Eigen::Matrix3d(covariance + c.wide.gain.bottomRightCorner<3, 3>())).inverse();
+    e.marginal = Cholesky<double, 3>(Eigen::Matrix3d(covariance + c.biasCovariance(state_))).inverse();
   }
   for (int pass = 0; pass < passes; ++pass) {
     if (turnedPerCandidate()) flowsAfter(e.base);
@@ -396,7 +462,7 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, E
     e.inliers = points_.size();
     if (options_.outliers) rejectOutliers(c, e);
     const FlowRotationSums<double> sums = rotationSums<double>(rows_);
-    if (state_ == MotionState::rotation) {
+    if (keepsTheRotation(state_)) {
       e.Omega.setZero();
     } else {
       e.Omega = sums.solve({e.prior.mean, e.marginal});
@@ -424,7 +490,7 @@ bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, c
   turnDirection<D>(next.gain, T), turnDirection<D>(next.reported, T);
   P = next;
   c.direction = moved;
-  const int equations = static_cast<int>(e.inliers) - (state_ == MotionState::rotation || frame_.has_gyroscope ? 0 : 3);
+  const int equations = static_cast<int>(e.inliers) - (keepsTheRotation(state_) || frame_.has_gyroscope ? 0 : 3);
   c.innovation = (frame.start - s.reduction) / std::max(equations, 1);
   c.cost = frame.cost;
   c.inliers = e.inliers;
@@ -435,14 +501,18 @@ bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, c
   const Cholesky<double, 3> ML(Eigen::Matrix3d(e.sums.M + e.marginal));
   const Eigen::Vector3d lever = e.sums.depth_lever / e.sums.depth_weight;
   c.depth = e.sums.meanInverseDepth();
-  if constexpr (D == 5) {
-    if (state_ == MotionState::rotation) {
-      const Eigen::Vector3d turn = s.step.template tail<3>();
+  if constexpr (D > 2) {
+    if (keepsTheRotation(state_)) {
+      const Eigen::Vector3d turn = s.step.template segment<3>(2);
       c.rotation = SO3d::exp(turn) * c.rotation;
       c.Omega = c.rotation.log();
-      c.rotation_covariance = P.reported.template bottomRightCorner<3, 3>();
+      c.rotation_covariance = P.reported.template block<3, 3>(2, 2);
       c.depth -= lever.dot(turn);
-      c.depth_variance = 1 / e.sums.depth_weight + lever.dot(P.gain.template bottomRightCorner<3, 3>() * lever);
+      c.depth_variance = 1 / e.sums.depth_weight + lever.dot(P.gain.template block<3, 3>(2, 2) * lever);
+      if constexpr (D == 8) {
+        c.bias += s.step.template tail<3>();
+        c.copyFromWhole();
+      }
       return true;
     }
   }
@@ -470,6 +540,9 @@ LIESTAT_FUSION_INLINE bool MotionEngine::advance(DirectionCandidate& c) {
     moved = step<2>(c, c.narrow, e, eliminateRotation(e.sums, e.Omega, e.prior));
   } else if (state_ == MotionState::rotation) {
     moved = step<5>(c, c.wide, e, keepRotation(e.sums, e.Omega, e.prior));
+  } else if (state_ == MotionState::rotation_and_bias) {
+    const Eigen::Matrix3d turn = SO3d::leftJacobian(Eigen::Vector3d(frame_.gyroscope - c.bias));
+    moved = step<8>(c, c.whole, e, keepRotationAndBias(e.sums, e.Omega, e.prior, turn, e.marginal));
   } else {
     moved = step<5>(c, c.wide, e, eliminateRotationWithBias(e.sums, e.Omega, e.prior, e.marginal));
   }
@@ -493,6 +566,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const 
   const Eigen::Matrix2d T = -(to.transpose() * from);
   turnDirection<2>(c.narrow.gain, T), turnDirection<2>(c.narrow.reported, T);
   turnDirection<5>(c.wide.gain, T), turnDirection<5>(c.wide.reported, T);
+  turnDirection<8>(c.whole.gain, T), turnDirection<8>(c.whole.reported, T);
   c.direction = opposite;
   c.evidence = -c.evidence, c.depth = -c.depth;
 }
@@ -602,10 +676,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::startLinearly() {
   }
   DirectionCandidate c;
   c.direction = S2d(V);
-  if (state_ == MotionState::gyroscope_bias) {
-    c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
-    c.wide.reported = c.wide.gain;
-  }
+  spreadBias(c);
   candidates_.assign(1, c);
   best_ = updates_ = 0;
   for (std::size_t k = 0; k < kept_; ++k) {
@@ -630,9 +701,11 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   const bool narrow = state_ == MotionState::direction;
   out.direction.mean = c.direction;
   out.direction.covariance = narrow ? c.narrow.reported : Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>());
-  if (state_ == MotionState::gyroscope_bias) {
+  if (keepsTheBias(state_)) {
     out.gyroscope_bias.mean = c.bias;
-    out.gyroscope_bias.covariance = c.wide.reported.bottomRightCorner<3, 3>();
+    out.gyroscope_bias.covariance = state_ == MotionState::gyroscope_bias
+                                        ? Eigen::Matrix3d(c.wide.reported.bottomRightCorner<3, 3>())
+                                        : Eigen::Matrix3d(c.whole.reported.bottomRightCorner<3, 3>());
   }
   const bool used = updated_;
   if (used) {
@@ -645,7 +718,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     out.mean_inverse_depth = c.evidence / c.evidence_weight;
     out.mean_inverse_depth_variance = c.evidence_variance / (c.evidence_weight * c.evidence_weight);
     out.cost = c.cost, out.innovation = c.innovation, out.inliers = c.inliers;
-    const bool free_rotation = state_ != MotionState::rotation && !frame_.has_gyroscope;
+    const bool free_rotation = !keepsTheRotation(state_) && !frame_.has_gyroscope;
     out.degrees_of_freedom = static_cast<int>(c.inliers) - (free_rotation ? 3 : 0);
   }
   out.sign_evidence = c.evidence_variance > 0 ? c.evidence / std::sqrt(c.evidence_variance) : 0;
@@ -692,7 +765,7 @@ LIESTAT_FUSION_INLINE std::span<const InverseDepth> MotionEngine::inverseDepths(
   Evaluation e;
   if (!evaluate(candidates_[best_], e)) return depths_;
   Eigen::Matrix3d covariance;
-  if (state_ == MotionState::rotation) {
+  if (keepsTheRotation(state_)) {
     covariance = candidates_[best_].wide.reported.bottomRightCorner<3, 3>();
   } else {
     covariance = Cholesky<double, 3>(Eigen::Matrix3d(e.sums.M + e.marginal)).inverse();

@@ -20,6 +20,12 @@ LIESTAT_FUSION_INLINE Gaussian<S2d> translationDirection(const MotionEstimate& e
   return {T, D * estimate.direction.covariance * D.transpose()};
 }
 
+/// The gyroscope's bias before the next frame: as the options expect it until the filter has a hypothesis.
+LIESTAT_FUSION_INLINE Gaussian<Eigen::Vector3d> MotionFilter::presentBias() const {
+  if (subspace_.estimate().hypotheses > 0) return subspace_.estimate().gyroscope_bias;
+  return {Eigen::Vector3d::Zero(), options_.bias_sigma * options_.bias_sigma * Eigen::Matrix3d::Identity()};
+}
+
 LIESTAT_FUSION_INLINE void MotionFilter::fallBack() {
   in_charge_ = false;
   waiting_ = options_.lost_frames << std::min<std::size_t>(fall_backs_, 8);
@@ -29,6 +35,7 @@ LIESTAT_FUSION_INLINE void MotionFilter::fallBack() {
 
 LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const PointPair> pairs,
                                                                const GyroscopeRotation* gyroscope) {
+  const Gaussian<Eigen::Vector3d> bias_before = presentBias();
   const MotionEstimate& own = gyroscope != nullptr ? subspace_.update(pairs, *gyroscope) : subspace_.update(pairs);
   if (!hand_over_.essential) return own;
   if (in_charge_) {
@@ -53,6 +60,7 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
     frame.pairs.assign(pairs.begin(), pairs.end());
     frame.has_gyroscope = gyroscope != nullptr;
     if (gyroscope != nullptr) frame.gyroscope = *gyroscope;
+    frame.bias = bias_before;
   }
   waiting_ -= waiting_ > 0 ? 1 : 0;
   if (waiting_ > 0 || !own.ok() || own.hypotheses != 1 || own.frame < options_.first_pruning ||
@@ -62,7 +70,7 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
   Gaussian<Essentiald> state;
   state.mean = Essentiald(own.rotation.mean, translationDirection(own).mean);
   state.covariance = hand_over_.start_variance * Eigen::Matrix<double, 5, 5>::Identity();
-  essential_.start(state);
+  essential_.start(state, kept_frames_ > 0 ? frames_[(next_frame_ - kept_frames_) % frames_.size()].bias : bias_before);
   for (std::size_t k = kept_frames_; k > 0; --k) {
     const Frame& frame = frames_[(next_frame_ - k) % frames_.size()];
     if (frame.has_gyroscope) {

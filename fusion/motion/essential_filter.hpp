@@ -9,6 +9,7 @@
 // The rotation is assumed to change slowly, by MotionFilterOptions::rotation_noise per frame: it is then known from all
 // frames and not from one, which makes directions twice as accurate. Where it changes, the innovation rises and the
 // filter is lost; fusion/motion/motion_filter.hpp falls back to the subspace filter. Options as there; Flow::discrete always.
+// With MotionFilterOptions::estimate_bias a gyroscope's bias is a state too.
 #pragma once
 
 #include <fusion/detail/motion_engine.hpp>
@@ -22,7 +23,9 @@ namespace liestat {
 
 class EssentialFilter {
  public:
-  explicit EssentialFilter(const MotionFilterOptions& options = {}) : engine_(options, detail::MotionState::rotation) {}
+  explicit EssentialFilter(const MotionFilterOptions& options = {})
+      : engine_(options,
+                options.estimate_bias ? detail::MotionState::rotation_and_bias : detail::MotionState::rotation) {}
 
   /// The next frame.
   const MotionEstimate& update(std::span<const PointPair> pairs) { return engine_.update(pairs, nullptr); }
@@ -51,12 +54,22 @@ class EssentialFilter {
     return list;
   }
 
-  /// Starts from one state in place of many.
+  /// Starts from one state in place of many; a gyroscope's bias, where it is a state, is expected as in the options.
   void start(const Gaussian<Essentiald>& state) {
+    const double sigma = engine_.options().bias_sigma;
+    start(state, {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()});
+  }
+  /// The same with a bias that is known better (rad per frame, with the sign of GyroscopeRotation).
+  void start(const Gaussian<Essentiald>& state, const Gaussian<Eigen::Vector3d>& bias) {
     detail::DirectionCandidate c;
     c.direction = S2d(Eigen::Vector3d(state.mean.direction().unit_vector()));
     c.rotation = SO3d(state.mean.so3());
     c.wide.gain = c.wide.reported = turned(state.covariance, frameOf(c.direction));
+    c.bias = engine_.options().estimate_bias ? bias.mean : Eigen::Vector3d::Zero();
+    c.whole.gain.setZero();
+    c.whole.gain.topLeftCorner<5, 5>() = c.wide.gain;
+    c.whole.gain.bottomRightCorner<3, 3>() = bias.covariance;
+    c.whole.reported = c.whole.gain;
     engine_.start(c);
   }
   void reset() { engine_.reset(); }

@@ -5,11 +5,11 @@
 //   for (…) if (filter.update(pairs).ok()) … filter.estimate()
 //
 // The essential filter is handed the direction and rotation when one hypothesis is left and its variance is below
-// `variance`, not at a fixed frame (which costs right answers at large noise), and runs
-// through the last frames again from there, with a wide prior: their information counts once. The subspace filter goes on
-// running, so that the fall-back loses nothing: it comes when the innovations of the essential filter are larger than those
-// of the subspace filter, which needs no constant rotation, or its direction is no longer determined. The hand-over may
-// come again after ten frames, and after twice as many each time.
+// `variance`, not at a fixed frame (which costs right answers at large noise), and runs through the last frames again from
+// there, with a wide prior, and a gyroscope's bias as it was before them: their information counts once. The subspace
+// filter goes on running, so that the fall-back loses nothing: it comes when the innovations of the essential filter are
+// larger than those of the subspace filter, which needs no constant rotation, or its direction is no longer determined. The
+// hand-over may come again after ten frames, and after twice as many each time.
 #pragma once
 
 #include <fusion/motion/essential_filter.hpp>
@@ -60,6 +60,7 @@ class MotionFilter {
   }
 
  private:
+  Gaussian<Eigen::Vector3d> presentBias() const;
   void fallBack();
   const MotionEstimate& next(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
 
@@ -71,6 +72,7 @@ class MotionFilter {
     std::vector<PointPair> pairs;
     GyroscopeRotation gyroscope;
     bool has_gyroscope = false;
+    Gaussian<Eigen::Vector3d> bias;  ///< before this frame, where it is a state
   };
   std::vector<Frame> frames_;  ///< a ring
   std::size_t next_frame_ = 0, kept_frames_ = 0;

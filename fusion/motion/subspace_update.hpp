@@ -209,6 +209,35 @@ FrameInformation<S, 5> keepRotation(const SubspaceSums<S>& sums, const Eigen::Ma
   return f;
 }
 
+/// The direction, the rotation and the gyroscope's bias (essential filter): the same, Ω = Ω_g - b - n. `prior` is that of
+/// the increment Ω for the present bias, Ω = prior.mean - turn·b to first order; the cost, a hypothesis' score, has the
+/// gyroscope with the information `marginal` that it has while the bias is unknown.
+template <class S>
+FrameInformation<S, 8> keepRotationAndBias(const SubspaceSums<S>& sums, const Eigen::Matrix<S, 3, 1>& Omega,
+                                           const RotationPrior<S>& prior, const Eigen::Matrix<S, 3, 3>& turn,
+                                           const Eigen::Matrix<S, 3, 3>& marginal) {
+  const Eigen::Matrix<S, 3, 1> from_prior = Omega - prior.mean, pull = prior.information * from_prior;
+  const Eigen::Matrix<S, 3, 3> across = prior.information * turn;
+  FrameInformation<S, 8> f;
+  const auto fill = [&](Eigen::Matrix<S, 8, 8>& to, const Eigen::Matrix<S, 2, 2>& xx,
+                        const Eigen::Matrix<S, 3, 2>& ox) {
+    to.setZero();
+    to.template topLeftCorner<2, 2>() = xx;
+    to.template block<3, 2>(2, 0) = ox;
+    to.template block<2, 3>(0, 2) = ox.transpose();
+    to.template block<3, 3>(2, 2) = sums.M + prior.information;
+    to.template block<3, 3>(2, 5) = across;
+    to.template block<3, 3>(5, 2) = across.transpose();
+    to.template block<3, 3>(5, 5) = turn.transpose() * across;
+  };
+  fill(f.gauss_newton, sums.Hxx, sums.Hox);
+  fill(f.corrected, sums.Cxx, sums.Cox);
+  f.gradient << sums.bx, sums.bo + pull, turn.transpose() * pull;
+  f.cost = sums.cost + from_prior.dot(marginal * from_prior);
+  f.start = sums.cost + from_prior.dot(pull);
+  return f;
+}
+
 /// The covariance that steers the gain (that of Gauss-Newton), and the one that is reported.
 template <class S, int D>
 struct FilterCovariance {

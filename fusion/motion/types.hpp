@@ -159,7 +159,7 @@ struct MotionFilterOptions {
   double lost_innovation = 2;  ///< mean normalised innovation of these frames above which hypotheses start anew
 
   // Gyroscope.
-  bool estimate_bias = false;  ///< its bias is a state
+  bool estimate_bias = false;  ///< its bias is a state (of all filters)
   double bias_sigma = 2e-3;    ///< rad per frame, at the start
   double bias_noise = 0;       ///< rad² per frame
   /// With a gyroscope and `min_pairs` pairs: one hypothesis, from a linear solution over `linear_frames` frames. (Fewer

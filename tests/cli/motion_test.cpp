@@ -1,9 +1,19 @@
-// `liestat motion`: tracks in, directions and rotations out; real tracks; bad input.
+// `liestat motion` and `liestat simulate motion`: tracks in, directions and rotations out; simulated and real tracks;
+// gyroscopes; bad input.
+
+#include <experiments/motion_recording.hpp>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <fmt/format.h>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -59,6 +69,371 @@ TEST(MotionCommand, realTracksAndTheVehiclesRates) {
   }
 }
 
+/// Twenty landmarks, three of which two frames share in the median: too few for images alone, enough beside a gyroscope.
+TEST(MotionCommand, realGyroscopeWithFewTracks) {
+  const char* directory = std::getenv("LIESTAT_DATA");
+  if (directory == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
+  const TemporaryDirectory out;
+  const std::string stem = std::string(directory) + "/tracks/starry_night";
+  const ProgramResult result = run({stem + "_tracks.csv",
+                                    "--intrinsics",
+                                    "484.49985,484.49985,321.68048,247.48145",
+                                    "--truth",
+                                    stem + "_poses.csv",
+                                    "--least-motion",
+                                    "0.01",
+                                    "--rates",
+                                    stem + "_poses.csv",
+                                    "--rates-rotation=0.50420466,-0.49921739,-0.49953699,-0.49701353",
+                                    "--rates-sigma",
+                                    "0.1",
+                                    "--sigma",
+                                    "1.5",
+                                    "--process-noise",
+                                    "1e-2",
+                                    "--frames-apart",
+                                    "10",
+                                    "--json",
+                                    out / "out.json"});
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Json json = Json::parse(contentOf(out / "out.json"));
+  EXPECT_GT(json["frames_usable"].get<int>(), 800);
+  EXPECT_LE(json["median_direction_error_deg"].get<double>(), 6);
+  EXPECT_LE(json["median_rotation_error_deg"].get<double>(), 0.25);
+}
+
+/// Real frames in a second run from the end of the first: none is left without a direction (the report's fig. 14).
+TEST(MotionCommand, realTracksInTwoPasses) {
+  const char* directory = std::getenv("LIESTAT_DATA");
+  if (directory == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
+  const Json once = runOnKitti(directory, "0051", {}), twice = runOnKitti(directory, "0051", {"--passes", "2"});
+  EXPECT_EQ(twice["passes"], 2);
+  EXPECT_FALSE(once["frames"][0]["usable"].get<bool>());
+  EXPECT_TRUE(twice["frames"][0]["usable"].get<bool>());
+  EXPECT_GT(twice["frames_usable"].get<int>(), once["frames_usable"].get<int>());
+  EXPECT_LE(twice["median_direction_error_deg"].get<double>(), 1.1);
+  for (int k = 0; k < 10; ++k) {
+    const Json& error = twice["frames"][k]["direction_error_deg"];
+    if (error.is_null()) continue;
+    EXPECT_LE(error.get<double>(), 5) << k;
+  }
+}
+
+/// A simulated recording in a directory of its own.
+class Simulated {
+ public:
+  explicit Simulated(std::vector<std::string> options) {
+    options.insert(options.begin(), {"sh", "-c", "\"$0\" \"$@\" > /dev/null", LIESTAT_PROGRAM, "simulate", "motion",
+                                     "--output", directory_.path().string()});
+    const ProgramResult result = runProgram(options, ".");
+    EXPECT_EQ(result.status, 0) << result.errors;
+  }
+  std::string operator/(const std::string& name) const { return directory_ / name; }
+  std::string content(const std::string& name) const { return contentOf(directory_ / name); }
+  void write(const std::string& name, const std::string& text) const { directory_.write(name, text); }
+
+  ProgramResult motion(const std::vector<std::string>& more) const {
+    std::vector<std::string> words{*this / "tracks.csv",
+                                   "--calibration",
+                                   *this / "calibration.yaml",
+                                   "--truth",
+                                   *this / "truth.csv",
+                                   "--least-motion",
+                                   "0",
+                                   "--json",
+                                   *this / "out.json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  }
+  Json json(const std::vector<std::string>& more) const {
+    const ProgramResult result = motion(more);
+    EXPECT_EQ(result.status, 0) << result.errors;
+    return Json::parse(content("out.json"));
+  }
+  std::vector<std::string> imu(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"--imu", *this / "imu.csv"});
+    return more;
+  }
+  std::vector<std::string> rates(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"--rates", *this / "rates.csv", "--rates-axes", "vehicle"});
+    return more;
+  }
+
+ private:
+  TemporaryDirectory directory_;
+};
+
+double directionError(const Json& json) { return json["median_direction_error_deg"].get<double>(); }
+double rotationError(const Json& json) { return json["median_rotation_error_deg"].get<double>(); }
+std::vector<double> numbers(const Json& list) { return list.get<std::vector<double>>(); }
+std::vector<std::string> flags(const Json& frame) { return frame["flags"].get<std::vector<std::string>>(); }
+bool hasFlag(const Json& frame, const std::string& flag) {
+  const auto all = flags(frame);
+  return std::find(all.begin(), all.end(), flag) != all.end();
+}
+
+// Without noise only the filter's own noise model is left: axes, signs, times and units of all files agree.
+TEST(SimulateMotion, ExactFilesGiveTheExactMotion) {
+  for (const std::string scene : {"orbit", "general", "plane", "narrow", "turning"}) {
+    const Simulated files({"--scene", scene, "--sigma", "0", "--gyroscope-sigma", "1e-5", "--frames", "40"});
+    const std::vector<std::string> noise{"--sigma", "0.01", "--filter", "subspace"};
+    // The direction of the translation turns with the rotation, which the filter takes for noise.
+    const double bound = scene == "turning" ? 1.5 : 0.01;
+    const Json inertial = files.json(files.imu(noise));
+    EXPECT_LT(directionError(inertial), bound) << scene;
+    EXPECT_LT(rotationError(inertial), scene == "turning" ? 0.01 : 0.001) << scene;
+    std::vector<std::string> more = noise;
+    more.insert(more.end(), {"--rates-sigma", "0.02"});
+    const Json rates = files.json(files.rates(more));
+    EXPECT_LT(directionError(rates), bound) << scene;
+    EXPECT_LT(rotationError(rates), scene == "turning" ? 0.02 : 0.001) << scene;
+    EXPECT_EQ(inertial["frames"].size(), 39U);
+    EXPECT_EQ(inertial["frames_without_gyroscope"], 0);
+  }
+}
+
+// Errors of docs/motion.md (orbit, 1 px): 0.28° by frame 20 and 0.25° later with 0.1° per frame, 0.2 to 0.4° without.
+TEST(SimulateMotion, ErrorsHaveTheExpectedSize) {
+  const Simulated files({"--seed", "4"});
+  const std::vector<std::string> noise{"--sigma", "1"};
+  const Json images = files.json(noise), inertial = files.json(files.imu(noise)),
+             rates = files.json(files.rates(noise));
+  for (const Json* json : {&images, &inertial, &rates}) {
+    EXPECT_GT(directionError(*json), 0.05);
+    EXPECT_LT(directionError(*json), 0.8);
+  }
+  EXPECT_GT(images["frames_usable"].get<int>(), 50) << "the first frames alone say little";
+  EXPECT_GT(inertial["frames_usable"].get<int>(), 90);
+  EXPECT_GT(rates["frames_usable"].get<int>(), 90);
+  EXPECT_LT(rotationError(inertial), rotationError(images) + 0.05);
+  EXPECT_LT(rotationError(inertial), 0.15);
+  EXPECT_LT(rotationError(rates), 0.15);
+  // The standard deviations are those of the errors, or above: medians of errors of two coordinates.
+  const Json& last = inertial["frames"].back();
+  const double variance =
+      last["direction_covariance"][0][0].get<double>() + last["direction_covariance"][1][1].get<double>();
+  EXPECT_LT(last["direction_error_deg"].get<double>(), 4 * std::sqrt(variance) * 57.3);
+}
+
+TEST(SimulateMotion, NoiseHasTheSizeAskedFor) {
+  using namespace experiments;
+  MotionRecordingOptions how;
+  how.scene.world = MotionWorld::general;
+  how.scene.gyroscope_sigma = 0.2, how.scene.outliers = 0.1;
+  how.gyroscope_bias << 0.01, -0.02, 0.03;
+  how.frames = 400, how.seed = 6;
+  const MotionRecording r = recordMotion(how);
+  double wrong = 0, flows = 0, rates = 0, readings = 0;
+  std::map<std::size_t, std::size_t> lengths;
+  for (const auto& o : r.observations) {
+    wrong += o.inlier ? 0 : 1;
+    flows += lengths[o.track]++ > 0 ? 1 : 0;
+  }
+  EXPECT_EQ(flows, 20 * 399.) << "as many flows in each interval as there are points";
+  EXPECT_NEAR(wrong / flows, 0.1, 5 * std::sqrt(0.09 / flows));
+  for (const auto& frame : r.frames) rates += (frame.rate - frame.true_rate - how.gyroscope_bias).squaredNorm();
+  const double n = 3. * 400, sigma = 0.2 * std::numbers::pi / 180 / 0.1;
+  EXPECT_NEAR(rates / n / (2 * sigma * sigma), 1, 5 * std::sqrt(2 / n)) << "the mean of two has 0.2 degrees per frame";
+  for (const auto& reading : r.imu) {
+    readings += (reading.angular_rate - r.frames[0].true_rate - how.gyroscope_bias).squaredNorm();
+  }
+  const double m = 3. * static_cast<double>(r.imu.size());
+  EXPECT_NEAR(readings / m / (0.1 * sigma * sigma * 200), 1, 5 * std::sqrt(2 / m)) << "20 readings in a frame";
+  // A recording at rest on average feels gravity upwards.
+  EXPECT_NEAR(r.imu.front().specific_force.norm(), 9.81, 0.5);
+}
+
+TEST(SimulateMotion, FilesAreTheSameForASeedAndNotReplaced) {
+  const Simulated a({"--seed", "9", "--frames", "5"}), b({"--seed", "9", "--frames", "5"}), c({"--frames", "5"});
+  for (const std::string name : {"tracks.csv", "truth.csv", "rates.csv", "imu.csv", "calibration.yaml"}) {
+    EXPECT_EQ(a.content(name), b.content(name)) << name;
+    EXPECT_EQ(a.content(name) == c.content(name), name == "calibration.yaml") << name;
+  }
+  const auto again = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{LIESTAT_PROGRAM, "simulate", "motion", "--output", a / ""};
+    words.insert(words.end(), more.begin(), more.end());
+    return runProgram(words, ".");
+  };
+  EXPECT_EQ(again({}).status, 2);
+  EXPECT_NE(again({}).errors.find("tracks.csv: the file is there"), std::string::npos);
+  EXPECT_EQ(again({"--overwrite"}).status, 0);
+  EXPECT_EQ(again({"--overwrite", "--outliers", "2"}).status, 2);
+  EXPECT_NE(again({"--overwrite", "--frames", "1000000", "--points", "100000"}).errors.find("at most"),
+            std::string::npos);
+}
+
+TEST(MotionCommand, BiasOfTheGyroscopeIsFound) {
+  const std::vector<double> bias{0.02, -0.03, 0.01};
+  const Simulated files({"--seed", "3", "--frames", "120", "--gyroscope-bias", "0.02,-0.03,0.01"});
+  const std::vector<std::string> noise{"--sigma", "1"};
+  const Json ignored = files.json(files.imu(noise));
+  const Json given = files.json(files.imu({"--sigma", "1", "--gyroscope-bias", "0.02,-0.03,0.01"}));
+  EXPECT_GT(directionError(ignored), 2 * directionError(given));
+  for (const std::string filter : {"composition", "subspace", "essential"}) {
+    const Json found = files.json(files.imu({"--sigma", "1", "--bias", "--bias-sigma", "0.03", "--filter", filter}));
+    EXPECT_LT(directionError(found), 0.6) << filter;
+    const Json& last = found["frames"].back();
+    const std::vector<double> b = numbers(last["gyroscope_bias"]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double sigma = std::sqrt(last["gyroscope_bias_covariance"][k][k].get<double>());
+      EXPECT_LT(sigma, 0.025) << filter;
+      EXPECT_NEAR(b[k], bias[k], 3 * sigma) << filter << " " << k;
+    }
+  }
+  const Json rates = files.json(files.rates({"--sigma", "1", "--bias", "--bias-sigma", "0.03"}));
+  EXPECT_NEAR(numbers(rates["frames"].back()["gyroscope_bias"])[1], -0.03, 0.03);
+  const ProgramResult result = files.motion(files.imu({"--sigma", "1", "--bias", "--output", files / "out.csv"}));
+  EXPECT_EQ(result.status, 0);
+  EXPECT_NE(files.content("out.csv").find("flags,bias_x,bias_y,bias_z,bias_sigma\n"), std::string::npos);
+}
+
+TEST(MotionCommand, FiltersAndIntervals) {
+  const Simulated files({"--seed", "2", "--sigma", "8"});
+  const ProgramResult successive = files.motion({"--sigma", "8"});
+  EXPECT_EQ(successive.status, 3) << "8 px drown the motion of one frame";
+  const Json apart = files.json({"--sigma", "8", "--frames-apart", "6"});
+  EXPECT_EQ(apart["frames_apart"], 6);
+  EXPECT_EQ(apart["frames"].back()["filter"], "subspace");
+  EXPECT_EQ(apart["frames"].back()["meaning"], "velocity");
+  EXPECT_LT(directionError(apart), 2);
+  EXPECT_GT(apart["frames_usable"].get<int>(), 70);
+  const Json discrete = files.json({"--sigma", "8", "--frames-apart", "6", "--flow", "discrete"});
+  EXPECT_LT(directionError(discrete), 3);
+  const Json prior = files.json(files.imu({"--sigma", "8", "--frames-apart", "6"}));
+  EXPECT_LT(directionError(prior), 1.5);
+  EXPECT_LT(rotationError(prior), 0.3);
+
+  const Simulated quiet({"--seed", "2", "--scene", "general"});
+  const Json essential = quiet.json({"--sigma", "1", "--filter", "essential"});
+  EXPECT_EQ(essential["frames"][0]["filter"], "essential");
+  EXPECT_EQ(essential["frames"].back()["meaning"], "translation");
+  EXPECT_LT(directionError(essential), 1.5);
+  const Json longer = quiet.json({"--sigma", "1", "--filter", "essential", "--frames-apart", "3"});
+  EXPECT_LT(directionError(longer), 1.5);
+  EXPECT_LT(rotationError(longer), 0.3);
+  const ProgramResult refused = quiet.motion({"--filter", "composition", "--frames-apart", "3"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.errors.find("expected --filter subspace or essential"), std::string::npos);
+}
+
+/// The rates of a file turned by a rotation.
+std::string turnedRates(const std::string& text, const SO3d& R) {
+  std::istringstream lines(text);
+  std::string line, out;
+  std::getline(lines, line);
+  out = line + "\n";
+  while (std::getline(lines, line)) {
+    double frame = 0, t = 0, x = 0, y = 0, z = 0;
+    EXPECT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf,%lf", &frame, &t, &x, &y, &z), 5);
+    const Eigen::Vector3d w = R * Eigen::Vector3d(x, y, z);
+    out += fmt::format("{},{},{},{},{}\n", frame, t, w.x(), w.y(), w.z());
+  }
+  return out;
+}
+
+TEST(MotionCommand, AxesOfTheRates) {
+  const Simulated files({"--scene", "general", "--sigma", "0", "--gyroscope-sigma", "1e-5", "--frames", "30"});
+  const std::vector<std::string> noise{"--sigma", "0.01", "--rates-sigma", "0.02"};
+  // A camera that looks down by 10°, and is turned by 5° about its own axis, 3° to the left: the vehicle's rates are
+  // those of the sensor turned by the tilt, yaw · pitch · roll.
+  const double d = std::numbers::pi / 180;
+  const SO3d tilt = SO3d::exp(Eigen::Vector3d(0, 0, 3 * d)) * SO3d::exp(Eigen::Vector3d(0, 10 * d, 0)) *
+                    SO3d::exp(Eigen::Vector3d(5 * d, 0, 0));
+  files.write("tilted.csv", turnedRates(files.content("rates.csv"), tilt));
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"--rates", files / "tilted.csv"});
+    more.insert(more.end(), noise.begin(), noise.end());
+    return more;
+  };
+  EXPECT_LT(rotationError(files.json(with({"--rates-axes", "vehicle", "--camera-tilt", "5,10,3"}))), 0.001);
+  EXPECT_GT(rotationError(files.json(with({"--rates-axes", "vehicle"}))), 0.01);
+  Eigen::Matrix3d camera_R_ahead;
+  camera_R_ahead << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  const SO3d R = SO3d::fitToSO3(camera_R_ahead) * tilt.inverse();
+  const Eigen::Vector4d q = R.params();
+  const std::string xyzw = fmt::format("--rates-rotation={},{},{},{}", q[0], q[1], q[2], q[3]);
+  EXPECT_LT(rotationError(files.json(with({xyzw}))), 0.001);
+  EXPECT_NE(files.motion(with({"--rates-rotation", "1,1,0,0"})).errors.find("unit quaternion"), std::string::npos);
+  EXPECT_NE(files.motion(with({"--camera-tilt", "1,1,0"})).errors.find("--rates-axes vehicle"), std::string::npos);
+}
+
+/// The lines of a file without those that begin with a time in an interval.
+std::string without(const std::string& text, double begin, double end) {
+  std::istringstream lines(text);
+  std::string line, out;
+  while (std::getline(lines, line)) {
+    double t = 0;
+    if (std::sscanf(line.c_str(), "%lf", &t) == 1 && t > begin && t < end) continue;
+    out += line + "\n";
+  }
+  return out;
+}
+
+TEST(MotionCommand, ReadingsWithAGap) {
+  const Simulated files({"--frames", "60"});
+  files.write("gap.csv", without(files.content("imu.csv"), 3.02, 3.49));
+  const Json gap = files.json({"--imu", files / "gap.csv", "--sigma", "1"});
+  // From 3.02 to 3.49 s: the intervals that end in frames 31 to 35.
+  EXPECT_EQ(gap["frames_without_gyroscope"], 5);
+  for (std::size_t k = 28; k < 38; ++k) {
+    EXPECT_EQ(hasFlag(gap["frames"][k - 1], "no_gyroscope"), k > 30 && k < 36) << k;
+  }
+  EXPECT_NE(gap["frames"][30]["no_gyroscope"].get<std::string>().find("no reading from 3.020000 to 3.490000 s"),
+            std::string::npos);
+  EXPECT_LT(directionError(gap), 0.8);
+  EXPECT_EQ(
+      files.json({"--imu", files / "gap.csv", "--sigma", "1", "--largest-gap", "0.6"})["frames_without_gyroscope"], 0);
+  // An end before that of the images.
+  files.write("short.csv", without(files.content("imu.csv"), 4.01, 100));
+  const Json early = files.json({"--imu", files / "short.csv", "--sigma", "1"});
+  EXPECT_EQ(early["frames_without_gyroscope"], 19);
+  EXPECT_NE(early["frames"].back()["no_gyroscope"].get<std::string>().find("the readings from -0.005"),
+            std::string::npos);
+  // No interval at all.
+  std::string times = "frame,t_s\n";
+  for (int k = 0; k < 60; ++k) times += fmt::format("{},{}\n", k, 100 + 0.1 * k);
+  files.write("times.csv", times);
+  std::string tracks = files.content("tracks.csv");
+  tracks.replace(tracks.find("t_s"), 3, "old");
+  files.write("untimed.csv", tracks);
+  const auto errors = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), files / "untimed.csv");
+    const ProgramResult result = run(words);
+    EXPECT_EQ(result.status, 2);
+    return result.errors;
+  };
+  const std::string calibration = files / "calibration.yaml", imu = files / "imu.csv";
+  EXPECT_NE(errors({"--calibration", calibration, "--imu", imu, "--image-times", files / "times.csv"})
+                .find("the readings cover no interval between two frames; frame 1: it lasts from 100.000000"),
+            std::string::npos);
+  EXPECT_NE(errors({"--calibration", calibration, "--imu", imu}).find("no column 't_s'"), std::string::npos);
+  EXPECT_NE(errors({"--intrinsics", "500,500,256,256", "--imu", imu}).find("expected --calibration with T_cam_imu"),
+            std::string::npos);
+  EXPECT_NE(errors({"--calibration", calibration, "--imu", imu, "--rates", files / "rates.csv"}).find("--rates"),
+            std::string::npos);
+  EXPECT_NE(errors({"--calibration", calibration, "--bias"}).find("--rates or --imu"), std::string::npos);
+  std::string camera = files.content("calibration.yaml");
+  files.write("camera.yaml", camera.substr(0, camera.find("imu0:")));
+  EXPECT_NE(errors({"--calibration", files / "camera.yaml", "--imu", imu, "--image-times", files / "times.csv"})
+                .find("density of noise is not known"),
+            std::string::npos);
+}
+
+TEST(MotionCommand, SecondPassStartsFromTheEndOfTheFirst) {
+  const Simulated files({"--scene", "general", "--frames", "20", "--seed", "5", "--sigma", "0.5"});
+  const Json once = files.json({"--sigma", "0.5"}), twice = files.json({"--sigma", "0.5", "--passes", "2"});
+  EXPECT_EQ(twice["frames"].size(), once["frames"].size());
+  EXPECT_FALSE(once["frames"][0]["usable"].get<bool>());
+  EXPECT_GT(twice["frames_usable"].get<int>(), once["frames_usable"].get<int>());
+  EXPECT_TRUE(twice["frames"][0]["usable"].get<bool>());
+  EXPECT_LT(twice["frames"][0]["direction_error_deg"].get<double>(),
+            once["frames"][0]["direction_error_deg"].get<double>());
+  EXPECT_LT(directionError(twice), directionError(once));
+  EXPECT_LT(directionError(twice), 2);
+  EXPECT_TRUE(once["frames"].back()["covariance_judged"].get<bool>());
+  EXPECT_FALSE(twice["frames"].back()["covariance_judged"].get<bool>()) << "the same data count twice";
+}
+
 TEST(MotionCommand, badInputIsNamed) {
   const TemporaryDirectory directory;
   const auto error = [&](const std::string& content, const std::vector<std::string>& more) {
@@ -77,6 +452,112 @@ TEST(MotionCommand, badInputIsNamed) {
   EXPECT_NE(error("frame,track,u,v\n3,0,1,2\n", camera).find("there is one frame"), std::string::npos);
   EXPECT_NE(error(fine, {"--intrinsics", "-500,500,256,256"}).find("positive"), std::string::npos);
   EXPECT_NE(error(fine, {"--intrinsics", "500,500,256,256", "--sigma", "0"}).find("sigma"), std::string::npos);
+  // Truncated: in the middle of a row, after the header, at the beginning.
+  EXPECT_NE(error(fine + "2,0", camera).find("t.csv:4: 2 fields, expected 4"), std::string::npos);
+  EXPECT_NE(error("frame,track,u,v\n", camera).find("t.csv"), std::string::npos);
+  EXPECT_NE(error("", camera).find("t.csv: the file is empty"), std::string::npos);
+  EXPECT_NE(error("frame,track,u,v\n0,0,1,2\n3000000,0,1,2\n", camera).find("at most 1000000"), std::string::npos);
+}
+
+/// A square of tracks in pixels, 25 of them, which moves by (du, dv) in each frame.
+std::string grid(std::size_t frames, double focal, double du, double offset = 256) {
+  std::string text = "frame,track,u,v\n";
+  for (std::size_t k = 0; k < frames; ++k) {
+    for (int i = 0; i < 25; ++i) {
+      const double depth = 1 + 0.13 * (i % 7), x = (i % 5 - 2) * 0.2 * depth + du * static_cast<double>(k);
+      text += fmt::format("{},{},{},{}\n", k, i, offset + focal * x / depth, offset + focal * (i / 5 - 2) * 0.2);
+    }
+  }
+  return text;
+}
+
+TEST(MotionCommand, UnitsOfTheIntrinsics) {
+  const TemporaryDirectory directory;
+  const auto result = [&](const std::string& content, const std::string& intrinsics, const std::string& sigma) {
+    return run({directory.write("t.csv", content), "--intrinsics", intrinsics, "--sigma", sigma});
+  };
+  EXPECT_EQ(result(grid(20, 500, 0.05), "500,500,256,256", "0.5").status, 0);
+  EXPECT_EQ(result(grid(20, 1, 0.05, 0), "1,1,0,0", "0.001").status, 0) << "all normalised";
+  const ProgramResult normalised_focal = result(grid(20, 500, 0.05), "0.98,0.98,0.5,0.5", "0.01");
+  EXPECT_EQ(normalised_focal.status, 2);
+  EXPECT_NE(normalised_focal.errors.find("focal lengths from the principal point"), std::string::npos);
+  const ProgramResult normalised_points = result(grid(20, 1, 0.05, 0), "500,500,256,256", "0.5");
+  EXPECT_EQ(normalised_points.status, 2);
+  EXPECT_NE(normalised_points.errors.find("no image coordinate is larger than 1"), std::string::npos);
+  const ProgramResult sigma = result(grid(20, 1, 0.05, 0), "1,1,0,0", "0.5");
+  EXPECT_EQ(sigma.status, 2);
+  EXPECT_NE(sigma.errors.find("--sigma 0.5 is 0.5 of the focal length 1"), std::string::npos);
+}
+
+TEST(MotionCommand, IdenticalFramesAndTracksThatVanish) {
+  const TemporaryDirectory directory;
+  const auto json = [&](const std::string& content, int status, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{directory.write("t.csv", content), "--intrinsics", "500,500,256,256", "--json",
+                                   directory / "out.json"};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult result = run(words);
+    EXPECT_EQ(result.status, status) << result.errors;
+    return Json::parse(contentOf(directory / "out.json"));
+  };
+  const Json still = json(grid(10, 500, 0), 3);
+  EXPECT_EQ(still["status"], "ill_defined");
+  for (const Json& frame : still["frames"]) EXPECT_TRUE(hasFlag(frame, "standstill"));
+
+  // Frames 20 to 24 have no tracks, frame 30 one, and what comes after are other tracks: the state is kept.
+  const Simulated files({"--frames", "60"});
+  std::istringstream lines(files.content("tracks.csv"));
+  std::string line, gone;
+  std::getline(lines, line);
+  gone = line + "\n";
+  bool first_of_30 = true;
+  while (std::getline(lines, line)) {
+    int frame = 0, track = 0;
+    double t = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%d,%lf,%d", &frame, &t, &track), 3);
+    if (frame >= 20 && frame < 25) continue;
+    if (frame == 30 && !first_of_30) continue;
+    first_of_30 = first_of_30 && frame != 30;
+    gone += line + "\n";
+  }
+  files.write("tracks.csv", gone);
+  const Json kept = files.json({"--sigma", "1"});
+  ASSERT_EQ(kept["frames"].size(), 59U);
+  for (std::size_t k = 18; k < 34; ++k) {
+    // The frame after a gap has no pair either.
+    const bool missing = (k >= 20 && k <= 25) || k == 30 || k == 31;
+    const Json& frame = kept["frames"][k - 1];
+    EXPECT_EQ(hasFlag(frame, "too_few"), missing) << k;
+    EXPECT_TRUE(frame["usable"].get<bool>()) << k;
+    EXPECT_LT(frame["direction_error_deg"].get<double>(), 3) << k;
+  }
+  // A frame that is seen twice is no motion, and is told from the others.
+  std::istringstream again(files.content("tracks.csv"));
+  std::string repeated;
+  std::map<int, std::string> rows;
+  std::getline(again, repeated);
+  while (std::getline(again, line)) rows[std::atoi(line.c_str())] += line.substr(line.find(',')) + "\n";
+  repeated = "frame,t_s,track,u,v,inlier\n";
+  for (int k = 0; k < 19; ++k) {
+    std::istringstream of_frame(rows[k < 15 ? k : k - 1]);
+    while (std::getline(of_frame, line)) repeated += fmt::format("{}{}\n", k, line);
+  }
+  files.write("tracks.csv", repeated);
+  const Json twice = files.json({"--sigma", "1"});
+  for (std::size_t k = 8; k < 19; ++k) {
+    EXPECT_EQ(hasFlag(twice["frames"][k - 1], "standstill"), k == 15) << k;
+    EXPECT_TRUE(twice["frames"][k - 1]["usable"].get<bool>()) << k;
+  }
+}
+
+TEST(MotionCommand, TwoTracksWithAGyroscope) {
+  const Simulated files({"--points", "3", "--gyroscope-sigma", "0.05", "--seed", "8"});
+  const ProgramResult images = files.motion({"--sigma", "1"});
+  EXPECT_EQ(images.status, 3);
+  EXPECT_TRUE(hasFlag(Json::parse(files.content("out.json"))["frames"][50], "too_few"));
+  const Json with = files.json(files.imu({"--sigma", "1"}));
+  EXPECT_FALSE(hasFlag(with["frames"][50], "too_few"));
+  EXPECT_GT(with["frames_usable"].get<int>(), 70);
+  EXPECT_LT(directionError(with), 3);
 }
 
 TEST(MotionCommand, tooFewTracksAreNotTrusted) {

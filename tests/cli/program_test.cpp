@@ -132,6 +132,13 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
                                                     {"validate", "means", "--spread", "1,-nan"},
                                                     {"vi-init", "--imu", "i", "--tracks", "t", "--largest-gap", "nan"},
                                                     {"simulate", "vi", "--output", "d", "--box", "1,nan,1"},
+                                                    {"motion"},
+                                                    {"motion", "t.csv", "--sigma", "-1"},
+                                                    {"motion", "t.csv", "--passes", "0"},
+                                                    {"motion", "t.csv", "--imu", "i", "--rates", "r"},
+                                                    {"motion", "t.csv", "--gyroscope-bias", "1,inf,0"},
+                                                    {"simulate", "motion"},
+                                                    {"simulate", "motion", "--output", "d", "--frames", "1"},
                                                     {"validate", "split"},
                                                     {"validate", "split", "f.csv", "--blocks", "3"}}) {
     const ProgramRun r = run(arguments);

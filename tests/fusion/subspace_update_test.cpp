@@ -286,6 +286,20 @@ TEST(SubspaceUpdate, CostIsChiSquaredAtTheTruthAndTheGradientHasItsInformation) 
   }
 }
 
+TEST(SubspaceUpdate, BiasTurnsTheIncrementByTheJacobianOfTheRotation) {
+  // Exp(Ω_g - b) Rᵀ as an increment: its derivative by b is -J_l(Ω_g), to first order in the increment.
+  const Eigen::Vector3d gyroscope(0.1, -0.2, 0.15);
+  const Eigen::Matrix3d turn = SO3d::leftJacobian(gyroscope);
+  const SO3d R = SO3d::exp(gyroscope);
+  for (int k = 0; k < 3; ++k) {
+    const double h = 1e-5;
+    const Eigen::Vector3d b = h * Eigen::Vector3d::Unit(k);
+    const Eigen::Vector3d up = (SO3d::exp(Eigen::Vector3d(gyroscope - b)) * R.inverse()).log();
+    const Eigen::Vector3d down = (SO3d::exp(Eigen::Vector3d(gyroscope + b)) * R.inverse()).log();
+    EXPECT_LE(((up - down) / (2 * h) + turn.col(k)).norm(), 1e-9);
+  }
+}
+
 TEST(SubspaceUpdate, BiasOfTheGyroscopeMatchesTheJointProblem) {
   // (ξ, b) with n eliminated against the normal equations of (ξ, δ, b) written out.
   for (std::uint64_t seed = 0; seed < cases; ++seed) {
@@ -318,6 +332,14 @@ TEST(SubspaceUpdate, BiasOfTheGyroscopeMatchesTheJointProblem) {
     EXPECT_NEAR(f.start, start, 1e-10 * (1 + start));
     // The cost is the least over the bias and the rotation together.
     EXPECT_NEAR(f.cost, subspaceCost(x.points, x.V, x.rows, {x.prior.mean, marginal}), 1e-9 * f.cost);
+    // The essential filter keeps the rotation: the same problem in the order ξ, δ, b, before the elimination.
+    const FrameInformation<double, 8> kept =
+        keepRotationAndBias(x.sums, x.Omega, x.prior, Eigen::Matrix3d(Eigen::Matrix3d::Identity()), marginal);
+    Eigen::PermutationMatrix<8> order;
+    order.indices() << 0, 1, 5, 6, 7, 2, 3, 4;
+    EXPECT_LE((kept.gauss_newton - order * joint * order.transpose()).norm(), 1e-12 * joint.norm());
+    EXPECT_LE((kept.gradient - order * gradient).norm(), 1e-12 * (gradient.norm() + 1));
+    EXPECT_NEAR(kept.start, x.sums.cost + pull.dot(x.Omega - x.prior.mean), 1e-10 * (1 + kept.start));
   }
 }
 

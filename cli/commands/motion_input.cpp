@@ -1,0 +1,326 @@
+#include <cli/commands/motion_input.hpp>
+
+#include <cli/io/camera.hpp>
+#include <cli/io/image_tracks.hpp>
+#include <cli/io/imu_file.hpp>
+#include <cli/io/input_error.hpp>
+#include <cli/io/numeric_table.hpp>
+#include <cli/io/rotation_matrix.hpp>
+#include <cli/io/text.hpp>
+#include <cli/show/units.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <fusion/motion/gyroscope.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <utility>
+
+namespace liestat::cli {
+namespace {
+
+constexpr const char* motion_name = "liestat motion";
+constexpr std::size_t most_frames = 1000000;
+/// Fewer observations than the filter asks for in one frame tell nothing of their unit.
+constexpr std::size_t least_observations_of_a_unit = 8;
+
+Calibration calibrationOf(const MotionInputOptions& options) {
+  return options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
+}
+
+Camera cameraOf(const MotionInputOptions& options, const Calibration& calibration) {
+  if (!options.intrinsics.empty()) return cameraFromIntrinsics(options.intrinsics);
+  if (options.calibration.empty()) {
+    throw InputError(motion_name, 0, "the camera is not known", "--intrinsics fu,fv,cu,cv or --calibration FILE");
+  }
+  if (calibration.cameras.empty()) throw InputError(joined(options.calibration, ", "), 0, "there is no camera", "one");
+  return calibration.cameras.front().camera;
+}
+
+/// Collects the rays of image coordinates and sees whether these have the unit of the focal lengths.
+class TrackRays {
+ public:
+  TrackRays(const MotionInputOptions& options, const Camera& camera)
+      : options_(options), camera_(camera), sigma_(options.sigma / std::sqrt(camera.fu * camera.fv)) {
+    if (sigma_ > 0.1) {
+      throw InputError(motion_name, 0,
+                       fmt::format("--sigma {:g} is {:.3g} of the focal length {:g}", options.sigma, sigma_, camera.fu),
+                       "both in pixels");
+    }
+  }
+
+  void add(std::size_t frame, std::uint64_t track, double u, double v) {
+    std::vector<TrackObservation>& observations = tracks_.frames[frame];
+    largest_ = std::max({largest_, std::abs(u), std::abs(v)});
+    const auto bearing = camera_.bearing({u, v});
+    if (bearing && bearing->z() > 0) {
+      observations.push_back({track, bearing->head<2>() / bearing->z(), sigma_});
+      radii_.push_back(observations.back().at.norm());
+    } else {
+      ++tracks_.outside;
+    }
+  }
+  MotionTracks take() {
+    if (tracks_.frames.size() < 2) throw InputError(options_.tracks, 0, "there is one frame", "two frames or more");
+    const std::size_t first = tracks_.frames.begin()->first, last = tracks_.frames.rbegin()->first;
+    if (last - first > most_frames) {
+      throw InputError(options_.tracks, 0, fmt::format("frames from {} to {}", first, last),
+                       fmt::format("at most {} of them", most_frames));
+    }
+    requireUnit();
+    return std::move(tracks_);
+  }
+
+ private:
+  void requireUnit() {
+    const std::size_t n = radii_.size() + tracks_.outside;
+    if (n < least_observations_of_a_unit) return;
+    if (radii_.empty()) {
+      throw InputError(options_.tracks, 0, "no point lies where the camera sees",
+                       "pixels of the camera that was given");
+    }
+    if (largest_ <= 10 && camera_.fu > 50) {
+      throw InputError(
+          options_.tracks, 0,
+          fmt::format("no image coordinate is larger than {:.3g}, and the focal length is {:g}", largest_, camera_.fu),
+          "both in pixels, or both normalised (--intrinsics 1,1,0,0 and --sigma over the focal length)");
+    }
+    const auto middle = radii_.begin() + static_cast<std::ptrdiff_t>(radii_.size() / 2);
+    std::nth_element(radii_.begin(), middle, radii_.end());
+    if (*middle > 10) {
+      throw InputError(
+          options_.tracks, 0,
+          fmt::format("half of the points lie more than {:.3g} focal lengths from the principal point", *middle),
+          fmt::format("focal lengths ({:g}, {:g}) and image coordinates in pixels", camera_.fu, camera_.fv));
+    }
+  }
+
+  const MotionInputOptions& options_;
+  Camera camera_;
+  double sigma_, largest_ = 0;
+  MotionTracks tracks_;
+  std::vector<double> radii_;
+};
+
+MotionTracks readTracks(const MotionInputOptions& options, const Camera& camera) {
+  TrackRays rays(options, camera);
+  const NumericTable table = readTable(options.tracks, {"frame", "track"}, {"u", "v", "uL", "vL"});
+  const bool left = !table.has("u");
+  if (!(table.has(left ? "uL" : "u") && table.has(left ? "vL" : "v"))) {
+    throw InputError(table.file(), 0, "there are no image coordinates", "columns u and v, or uL and vL");
+  }
+  const std::size_t u = table.column(left ? "uL" : "u"), v = table.column(left ? "vL" : "v");
+  std::set<std::pair<std::size_t, std::size_t>> seen;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::size_t frame = table.index(row, 0), track = table.index(row, 1);
+    if (!seen.emplace(frame, track).second) {
+      throw InputError(table.file(), table.line(row), fmt::format("track {} again in frame {}", track, frame),
+                       "it once per frame");
+    }
+    rays.add(frame, track, table(row, u), table(row, v));
+  }
+  return rays.take();
+}
+
+/// Zero where none is given.
+Eigen::Vector3d vectorOf(const std::vector<double>& list) {
+  return list.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(list[0], list[1], list[2]);
+}
+
+double medianStep(const std::map<std::size_t, double>& times) {
+  std::vector<double> steps;
+  for (auto at = times.begin(), next = at; at != times.end() && ++next != times.end(); ++at) {
+    steps.push_back((next->second - at->second) / static_cast<double>(next->first - at->first));
+  }
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+SO3d cameraFromRates(const MotionInputOptions& options) {
+  if (!options.rates_rotation.empty()) {
+    const std::vector<double>& q = options.rates_rotation;
+    const Eigen::Vector4d xyzw(q[0], q[1], q[2], q[3]);
+    if (!(std::abs(xyzw.norm() - 1) < rotation_tolerance)) {
+      throw InputError(motion_name, 0, fmt::format("--rates-rotation has the norm {:g}", xyzw.norm()),
+                       "a unit quaternion x,y,z,w");
+    }
+    const Eigen::Vector4d unit = xyzw.normalized();
+    return SO3d(Eigen::Quaterniond(unit[3], unit[0], unit[1], unit[2]));
+  }
+  if (options.axes == RateAxes::camera) {
+    if (!options.camera_tilt.empty()) {
+      throw InputError(motion_name, 0, "--camera-tilt is that of a camera on a vehicle", "--rates-axes vehicle");
+    }
+    return {};
+  }
+  Eigen::Matrix3d camera_R_ahead;
+  camera_R_ahead << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  SO3d vehicle_R_ahead;
+  if (!options.camera_tilt.empty()) {
+    const Eigen::Vector3d tilt = vectorOf(options.camera_tilt) / degrees;
+    vehicle_R_ahead = SO3d::exp(Eigen::Vector3d(0, 0, tilt.z())) * SO3d::exp(Eigen::Vector3d(0, tilt.y(), 0)) *
+                      SO3d::exp(Eigen::Vector3d(tilt.x(), 0, 0));
+  }
+  return SO3d::fitToSO3(camera_R_ahead) * vehicle_R_ahead.inverse();
+}
+
+struct Rate {
+  double time = 0;
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+};
+
+/// Rates at the frames: between two of them holds the mean of both.
+MotionGyroscope gyroscopeOfRates(const MotionInputOptions& options) {
+  const auto rates = std::make_shared<std::map<std::size_t, Rate>>();
+  std::map<std::size_t, double> times;
+  const NumericTable table = readTable(options.rates, {"frame", "t_s", "wx", "wy", "wz"});
+  MotionGyroscope gyroscope;
+  gyroscope.file = table.file();
+  gyroscope.bias = vectorOf(options.gyroscope_bias);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const Rate rate{table(row, 1), {table(row, 2), table(row, 3), table(row, 4)}};
+    if (!rates->emplace(table.index(row, 0), rate).second) {
+      throw InputError(table.file(), table.line(row), fmt::format("frame {} again", table.index(row, 0)), "it once");
+    }
+    times.emplace(table.index(row, 0), rate.time);
+  }
+  gyroscope.camera_R_sensor = cameraFromRates(options);
+  gyroscope.seconds = medianStep(times);
+  gyroscope.between = [rates, camera_R_sensor = gyroscope.camera_R_sensor, bias = gyroscope.bias,
+                       sigma = options.rate_sigma / degrees](std::size_t first,
+                                                             std::size_t second) -> MotionGyroscope::Between {
+    SO3d turned;
+    GyroscopeRotation sum{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+    for (std::size_t k = first; k < second; ++k) {
+      const auto a = rates->find(k), b = rates->find(k + 1);
+      if (a == rates->end() || b == rates->end()) {
+        return {{}, fmt::format("no rate at frame {}", a == rates->end() ? k : k + 1)};
+      }
+      const double seconds = b->second.time - a->second.time;
+      if (!(seconds > 0)) return {{}, fmt::format("no time passes from frame {} to the next", k)};
+      const GyroscopeRotation one = gyroscopeRotation(Eigen::Vector3d(0.5 * (a->second.rate + b->second.rate) - bias),
+                                                      seconds, sigma / seconds, camera_R_sensor);
+      turned = SO3d::exp(one.rotation) * turned;
+      sum.covariance += one.covariance;
+    }
+    sum.rotation = turned.log();
+    return {sum, {}};
+  };
+  return gyroscope;
+}
+
+/// The readings of an inertial sensor with the times of the images on its clock.
+struct InertialRecording {
+  ImuFile imu;
+  std::map<std::size_t, double> times;
+  RecordingOptions<double> how;
+};
+
+std::string reasonOf(const Fault& fault, const InertialRecording& recording, const std::string& file, double begin,
+                     double end) {
+  const std::vector<ImuSample<double>>& samples = recording.imu.samples;
+  const auto line = [&](std::size_t i) { return fmt::format("{}:{}", file, recording.imu.lines[i]); };
+  switch (fault.kind) {
+    case FaultKind::gap:
+      return fmt::format("no reading from {:.6f} to {:.6f} s ({})", samples[fault.index - 1].time,
+                         samples[fault.index].time, line(fault.index));
+    case FaultKind::not_covered:
+      return fmt::format("it lasts from {:.6f} to {:.6f} s, the readings from {:.6f} to {:.6f} s", begin, end,
+                         samples.front().time, samples.back().time);
+    case FaultKind::bad_interval:
+      return fmt::format("no time passes from {:.6f} to {:.6f} s", begin, end);
+    default:
+      return "the reading in " + line(std::min(fault.index, samples.size() - 1)) + " is of no use";
+  }
+}
+
+MotionGyroscope gyroscopeOfImu(const MotionInputOptions& options, const Calibration& calibration,
+                               std::shared_ptr<InertialRecording> recording) {
+  MotionGyroscope gyroscope;
+  gyroscope.file = options.imu;
+  const CameraCalibration& camera = calibration.cameras.front();
+  gyroscope.camera_R_sensor = camera.imu_T_cam.so3().inverse();
+  ImuNoise<double> noise = calibration.imu.value_or(ImuNoise<double>{});
+  if (options.gyroscope_noise) noise.gyroscope = *options.gyroscope_noise;
+  if (!(noise.gyroscope > 0)) {
+    throw InputError(joined(options.calibration, ", "), 0, "the gyroscope's density of noise is not known",
+                     "an imu0 with gyroscope_noise_density, or --gyroscope-noise");
+  }
+  gyroscope.bias_walk = noise.gyroscope_walk;
+  gyroscope.bias = vectorOf(options.gyroscope_bias);
+  recording->how.preintegration.noise = noise;
+  recording->how.preintegration.bias.gyroscope = gyroscope.bias;
+  recording->how.max_gap = options.largest_gap;
+  gyroscope.seconds = medianStep(recording->times);
+  gyroscope.between = [recording, file = options.imu, camera_R_imu = gyroscope.camera_R_sensor](
+                          std::size_t first, std::size_t second) -> MotionGyroscope::Between {
+    const auto a = recording->times.find(first), b = recording->times.find(second);
+    if (a == recording->times.end() || b == recording->times.end()) {
+      return {{}, fmt::format("frame {} has no time", a == recording->times.end() ? first : second)};
+    }
+    const RecordingResult<double> result =
+        preintegrate<double>(recording->imu.samples, a->second, b->second, recording->how);
+    if (!result.ok()) return {{}, reasonOf(result.fault, *recording, file, a->second, b->second)};
+    return {gyroscopeRotation(result.motion, camera_R_imu), {}};
+  };
+  return gyroscope;
+}
+
+/// Throws where the readings cover no interval of two successive frames: another clock, or another recording.
+void requireCover(const MotionGyroscope& gyroscope, const InertialRecording& recording) {
+  std::string why;
+  for (auto at = recording.times.begin(), next = at; ++next != recording.times.end(); ++at) {
+    const MotionGyroscope::Between between = gyroscope.between(at->first, next->first);
+    if (between.rotation) return;
+    if (why.empty()) why = fmt::format("frame {}: {}", next->first, between.why);
+  }
+  throw InputError(gyroscope.file, 0,
+                   "the readings cover no interval between two frames; " + why +
+                       suspectedUnit(recording.imu.start_ns, recording.times.begin()->second),
+                   "readings over the images' times, on the same clock (timeshift_cam_imu is applied)");
+}
+
+}  // namespace
+
+MotionInput readMotionInput(const MotionInputOptions& options) {
+  if (!options.rates.empty() && !options.imu.empty()) {
+    throw InputError(motion_name, 0, "there are both --rates and --imu", "one gyroscope");
+  }
+  for (const auto* list : {&options.camera_tilt, &options.gyroscope_bias}) {
+    if (std::all_of(list->begin(), list->end(), [](double x) { return std::isfinite(x); })) continue;
+    throw InputError(motion_name, 0, "--camera-tilt or --gyroscope-bias is not finite", "three numbers");
+  }
+  const Calibration calibration = calibrationOf(options);
+  const Camera camera = cameraOf(options, calibration);
+  MotionInput input;
+  if (options.imu.empty()) {
+    input.tracks = readTracks(options, camera);
+    if (!options.rates.empty()) input.gyroscope = gyroscopeOfRates(options);
+    return input;
+  }
+  if (calibration.cameras.empty()) {
+    throw InputError(motion_name, 0, "where the camera sits on the inertial sensor is not known",
+                     "--calibration with T_cam_imu or T_imu_cam");
+  }
+  const auto recording = std::make_shared<InertialRecording>();
+  recording->imu = readImu(options.imu);
+  const ImageTracks images = readImageTracks(options.tracks, options.image_times, recording->imu.start_ns);
+  TrackRays rays(options, camera);
+  for (const PixelObservation& seen : images.observations) {
+    rays.add(images.frames[seen.image], images.track_ids[seen.track], seen.u, seen.v);
+  }
+  input.tracks = rays.take();
+  for (std::size_t i = 0; i < images.times.size(); ++i) {
+    recording->times.emplace(images.frames[i], images.times[i] + calibration.cameras.front().timeshift_cam_imu);
+  }
+  input.gyroscope = gyroscopeOfImu(options, calibration, recording);
+  requireCover(input.gyroscope, *recording);
+  return input;
+}
+
+}  // namespace liestat::cli

@@ -1,0 +1,72 @@
+#pragma once
+
+// The input of `liestat motion`: tracks in calibrated coordinates, and what a gyroscope says of the rotation between frames.
+
+#include <cli/io/calibration.hpp>
+#include <fusion/motion/track_pairs.hpp>
+#include <fusion/motion/types.hpp>
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+
+/// Names of the axes in which rotation rates are given.
+enum class RateAxes {
+  camera,  ///< x right, y down, z forward
+  vehicle  ///< x forward, y left, z up, over a camera that looks forward
+};
+
+struct MotionInputOptions {
+  std::string tracks, rates, imu, image_times;
+  std::vector<std::string> calibration;
+  std::vector<double> intrinsics;
+  std::vector<double> rates_rotation;          ///< x,y,z,w: takes the rates' axes to the camera's, in place of `axes`
+  std::vector<double> camera_tilt;             ///< deg: roll, pitch, yaw of the camera on the vehicle
+  std::vector<double> gyroscope_bias;          ///< rad/s, taken off the readings
+  std::optional<double> gyroscope_noise = {};  ///< rad/s/√Hz, goes before the calibration's
+  RateAxes axes = RateAxes::camera;
+  double sigma = 0.5;        ///< px
+  double rate_sigma = 0.1;   ///< deg per frame
+  double largest_gap = 0.1;  ///< s between two readings
+};
+
+/// Tracks frame by frame.
+struct MotionTracks {
+  std::map<std::size_t, std::vector<TrackObservation>> frames;  ///< by their numbers in the file
+  std::size_t outside = 0;  ///< observations for which the camera's model has no ray ahead; left out
+};
+
+/// A gyroscope between the frames of the tracks. `between` gives the rotation from one frame to a later one, rad over
+/// that interval, or an empty one with the reason in words.
+struct MotionGyroscope {
+  struct Between {
+    std::optional<GyroscopeRotation> rotation;
+    std::string why;  ///< there is none
+  };
+  std::function<Between(std::size_t first, std::size_t second)> between;  ///< empty: there is no gyroscope
+  SO3d camera_R_sensor;
+  double seconds = 0;                              ///< median time between two frames
+  double bias_walk = 0;                            ///< rad/s/√s
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< rad/s, sensor's axes: already taken off the readings
+  std::string file;
+
+  bool given() const { return static_cast<bool>(between); }
+};
+
+struct MotionInput {
+  MotionTracks tracks;
+  MotionGyroscope gyroscope;
+};
+
+/// Reads the files that the options name. Throws InputError, also where focal lengths and image coordinates are in
+/// different units, where there is one frame, and where an inertial sensor's readings cover none of the intervals.
+MotionInput readMotionInput(const MotionInputOptions& options);
+
+}  // namespace liestat::cli
