@@ -391,8 +391,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
     Omega = rotationSums<double>(rows_).solve(prior);
   }
   rescale();
-  const bool gate = candidates_.size() == 1 && updates_ >= options_.first_pruning && c.narrow.reported.trace() < 0.01 &&
-                    (state_ == MotionState::direction || c.wide.reported.topLeftCorner<2, 2>().trace() < 0.01);
+  const Eigen::Matrix2d known =
+      state_ == MotionState::direction ? c.narrow.reported : Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>());
+  const bool gate = candidates_.size() == 1 && updates_ >= options_.first_pruning && known.trace() < 0.01;
   const double limit = options_.outlier_threshold * options_.outlier_threshold * scale;
   for (std::size_t i = 0; i < n; ++i) rows_[i].weight = squared(i, Omega) <= limit ? weights_[i] : 0;
   if (gate) {
@@ -414,10 +415,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
       } else {
         const double rest = std::max(1e-9, 1 - leverage);
         error /= rest;
-        const Eigen::Matrix2d P = state_ == MotionState::direction
-                                      ? c.narrow.reported
-                                      : Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>());
-        predicted += G.dot(G * P) + (rows_[i].weight > 0 ? leverage / rest * variance : h.dot(ML.solve<1>(h)));
+        predicted += G.dot(G * known) + (rows_[i].weight > 0 ? leverage / rest * variance : h.dot(ML.solve<1>(h)));
       }
       rows_[i].weight = error * error <= options_.gate * options_.gate * predicted ? weights_[i] : 0;
     }

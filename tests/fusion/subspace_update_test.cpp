@@ -4,6 +4,8 @@
 #include <fusion/motion/search.hpp>
 #include <fusion/motion/subspace_update.hpp>
 #include <fusion/two_view/errors.hpp>
+#include <lie/product.hpp>
+#include <stats/implicit_ekf.hpp>
 #include <support/dense_subspace.hpp>
 
 #include <gtest/gtest.h>
@@ -140,6 +142,70 @@ TEST(SubspaceUpdate, CompactUpdateIsTheDenseOne) {
     FilterCovariance<double, 2> joseph{P, P};
     updateCovariance(joseph, plain, 100.);
     EXPECT_LE((joseph.reported - joseph.gain).norm(), 1e-12 * joseph.gain.norm());
+  }
+}
+
+using Motion = Product<S2d, Eigen::Vector3d>;
+
+/// e(V, Ω, ẋ) = nᵀ(ẋ - B Ω) = 0 at a fixed point, as the general filter wants it.
+struct FlowEquation {
+  FlowPoint<double> at;
+  EquationDerivatives<1, 5, 2> linearize(const Motion& motion, const Eigen::Vector2d& flow) const {
+    FlowPoint<double> p = at;
+    p.u = flow.x(), p.v = flow.y();
+    const S2d& direction = motion.get<0>();
+    const FlowRow<double> row = flowRow(p, Eigen::Vector3d(direction.unit_vector()));
+    const FlowResidual<double> r = flowResidual(p, row, motion.get<1>());
+    const Eigen::Matrix<double, 3, 2> E = ManifoldTraits<S2d>::placement(direction).matrix().leftCols<2>();
+    EquationDerivatives<1, 5, 2> J;
+    J.value << r.e;
+    J.by_parameter << -r.along * flowTurn(p, row, E), -row.h0, -row.h1, -row.h2;
+    J.by_measurement << row.n0, row.n1;
+    return J;
+  }
+};
+
+/// The general filter's update by the same flows, its covariance still in the frame at the prior's mean.
+struct GeneralUpdate {
+  FilterUpdate<Motion> result;
+  SquareOf<Motion> covariance;
+
+  GeneralUpdate(const Gaussian<Motion>& prior, const std::vector<FlowPoint<double>>& points) {
+    ImplicitEkf<Motion> filter(prior);
+    result = filter.updateAll([&](auto& sums) {
+      for (const FlowPoint<double>& p : points) {
+        sums.add(Eigen::Vector2d(p.u, p.v), IsotropicNoise<2>(std::sqrt(p.variance)), FlowEquation{p});
+      }
+    });
+    const SquareOf<Motion> back = detail::expJacobian(prior.mean, result.step).inverse();
+    covariance = back * filter.state().covariance * back.transpose();
+  }
+};
+
+TEST(SubspaceUpdate, BothFiltersAreTheImplicitFilter) {
+  for (std::uint64_t seed = 0; seed < cases; ++seed) {
+    const Example x(seed);
+    SquareOf<Motion> P = SquareOf<Motion>::Zero();
+    P.topLeftCorner<2, 2>() << 0.04, 0.01, 0.01, 0.02;
+    // Rotation as a state, as in the essential filter.
+    P.bottomRightCorner<3, 3>() = 1e-4 * Eigen::Matrix3d::Identity();
+    P(0, 3) = P(3, 0) = 5e-4;
+    const GeneralUpdate essential({Motion(x.direction, x.Omega), P}, x.points);
+    FilterCovariance<double, 5> wide{P, P};
+    const FilterStep<double, 5> step = updateCovariance(wide, keepRotation(x.sums, x.Omega, x.prior), 100.);
+    EXPECT_EQ(essential.result.status, FilterStatus::ok);
+    EXPECT_LE((step.step - essential.result.step).norm(), 1e-10 * (1 + step.step.norm()));
+    EXPECT_LE((wide.gain - essential.covariance).norm(), 1e-10 * wide.gain.norm());
+    EXPECT_NEAR(x.sums.cost - step.reduction, essential.result.nis, 1e-10 * x.sums.cost);
+    // Rotation eliminated, as in the subspace filter: one of which nothing is known, at the value that fits best.
+    P.topRightCorner<2, 3>().setZero(), P.bottomLeftCorner<3, 2>().setZero();
+    P.bottomRightCorner<3, 3>() = 1e4 * Eigen::Matrix3d::Identity();
+    const GeneralUpdate subspace({Motion(x.direction, x.Omega), P}, x.points);
+    FilterCovariance<double, 2> narrow{P.topLeftCorner<2, 2>(), P.topLeftCorner<2, 2>()};
+    const FilterStep<double, 2> turn = updateCovariance(narrow, x.information(), 100.);
+    EXPECT_LE((turn.step - subspace.result.step.head<2>()).norm(), 1e-6 * (1 + turn.step.norm()));
+    EXPECT_LE((narrow.gain - subspace.covariance.topLeftCorner<2, 2>()).norm(), 1e-6 * narrow.gain.norm());
+    EXPECT_NEAR(x.sums.cost - turn.reduction, subspace.result.nis, 1e-6 * x.sums.cost);
   }
 }
 
