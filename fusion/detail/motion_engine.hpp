@@ -28,6 +28,7 @@ struct DirectionCandidate {
   FilterCovariance<double, 2> narrow;  ///< MotionState::direction
   FilterCovariance<double, 5> wide;    ///< the other two
   double score = 0;
+  std::size_t start = 0;  ///< its number among the starts
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;

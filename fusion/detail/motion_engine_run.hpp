@@ -242,7 +242,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   best_ = updates_ = innovation_count_ = 0, innovation_sum_ = 0;
   for (std::size_t i = 0; i < n; ++i) {
     DirectionCandidate& c = candidates_[i];
-    c.direction = S2d(lattice[i]);
+    c.direction = S2d(lattice[i]), c.start = i;
     if (state_ == MotionState::gyroscope_bias) {
       c.wide.gain.bottomRightCorner<3, 3>() *= options_.bias_sigma * options_.bias_sigma;
     }
