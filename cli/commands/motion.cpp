@@ -7,6 +7,7 @@
 #include <cli/io/tracks.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/motion.hpp>
+#include <cli/show/motion_report.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/motion/gyroscope.hpp>
 #include <fusion/motion/motion_filter.hpp>
@@ -34,13 +35,13 @@ enum class FilterChoice { composition, subspace };
 enum class RateAxes { camera, vehicle };
 
 struct Options {
-  std::string tracks, calibration, rates, truth, json, output;
+  std::string tracks, calibration, rates, truth, json, output, report;
   std::vector<double> intrinsics;
   Flow flow = Flow::midpoint;
   FilterChoice filter = FilterChoice::composition;
   RateAxes axes = RateAxes::camera;
   double sigma = 0.5, rate_sigma = 0.1, process_noise = 1e-5, rotation_noise = 1e-6, least_motion = 0.1;
-  std::size_t starts = 32, passes = 1;
+  std::size_t starts = 32, passes = 1, report_frame = MotionWindow::last_frame;
   bool outliers = false;
 };
 
@@ -122,6 +123,7 @@ void compare(MotionFrame& frame, const std::map<std::size_t, CameraPose>& truth,
   const Eigen::Matrix3d& R_2 = second->second.R_camera_world;
   const SO3d R = SO3d::fitToSO3(Eigen::Matrix3d(R_2 * first->second.R_camera_world.transpose()));
   const Eigen::Vector3d T = R_2 * (first->second.c - second->second.c);
+  frame.truth = TrueMotion{R, T};
   frame.rotation_error = degrees * distance(frame.motion.rotation.mean, R);
   if (T.norm() > least) {
     frame.direction_error = degrees * distance(translationDirection(frame.motion).mean, S2d(T));
@@ -143,6 +145,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   MotionHandOver hand_over;
   hand_over.essential = options.filter == FilterChoice::composition;
   MotionFilter filter(how, hand_over);
+  MotionWindow window(options.report_frame);
   MotionResult result;
   result.passes = options.passes, result.with_gyroscope = !rates.empty(), result.with_truth = !truth.empty();
   for (std::size_t pass = 0; pass < options.passes; ++pass) {
@@ -159,6 +162,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
       frame.essential = filter.essential_in_charge();
       compare(frame, truth, options.least_motion);
       result.frames.push_back(frame);
+      if (!options.report.empty()) window.add(k, pairs, tracks.tracks());
     }
   }
   if (result.frames.empty()) throw InputError(options.tracks, 0, "there is one frame", "two frames or more");
@@ -172,6 +176,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     setMotion(object, result);
     writeJson(options.json, object);
   }
+  if (!options.report.empty()) writeMotionReport(options.report, invocation.command_line, result, window, how);
   return result.usable() > 0 ? exit_fine : exit_not_trusted;
 }
 
@@ -213,6 +218,8 @@ void addMotionCommand(const CommandList& app) {
       .range<std::size_t>(std::size_t{1}, std::size_t{100});
   command.option("--output", options->output, "Write a line per frame to a CSV file ('-': standard output)");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Directory for a page with estimates, residuals, traces and structure");
+  command.option("--report-frame", options->report_frame, "The frame whose residual is drawn (default: the last)");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

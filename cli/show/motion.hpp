@@ -11,6 +11,12 @@
 
 namespace liestat::cli {
 
+/// X₂ = R X₁ + T in the camera's axes, m.
+struct TrueMotion {
+  SO3d R;
+  Eigen::Vector3d T = Eigen::Vector3d::Zero();
+};
+
 /// The motion from the frame before to this one.
 struct MotionFrame {
   std::size_t frame = 0;  ///< as in the file
@@ -18,6 +24,7 @@ struct MotionFrame {
   bool essential = false;  ///< the essential filter was in charge
   /// Degrees: of the translation's direction and of the rotation, where the truth is known and moves enough.
   std::optional<double> direction_error = {}, rotation_error = {};
+  std::optional<TrueMotion> truth = {};  ///< where it is known
 };
 
 struct MotionResult {

@@ -145,6 +145,10 @@ std::string styleText(const Series& series, std::string_view colour) {
       return fmt::format("with boxes lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
     case Style::filled_curve:
       return fmt::format("with filledcurves fs transparent solid 0.18 noborder lc rgb '{}'", colour);
+    case Style::image:
+      return "with image";
+    case Style::contours:
+      return "with lines lw 1.6 lc palette";
     case Style::label:
       break;
   }
@@ -159,9 +163,20 @@ std::string usingText(const Series& series) {
       return series.width.empty() ? "3:4" : "3:4:7";
     case Style::filled_curve:
       return "3:5:6";
+    case Style::image:
+    case Style::contours:
+      return "3:4:8";
     default:
       return "3:4";
   }
+}
+
+bool isColoured(const Series& series) { return series.style == Style::image || series.style == Style::contours; }
+bool isColoured(const Panel& panel) {
+  return std::any_of(panel.series.begin(), panel.series.end(), [](const Series& series) { return isColoured(series); });
+}
+bool isColoured(const Plot& plot) {
+  return std::any_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return isColoured(panel); });
 }
 
 /// Every k-th point of a scatter that nobody could tell apart anyway, and that no browser could show.
@@ -187,6 +202,12 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   }
   script +=
       fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText('x', panel.x, x) + axisText('y', panel.y, y);
+  if (isColoured(panel)) {
+    script += fmt::format("set cblabel {}\n{} logscale cb\nset cbrange [{}:{}]\n", quotedText(panel.colour.label),
+                          panel.colour.logarithmic ? "set" : "unset",
+                          panel.colour.low ? fmt::format("{}", *panel.colour.low) : "*",
+                          panel.colour.high ? fmt::format("{}", *panel.colour.high) : "*");
+  }
   script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
   script += "unset arrow\nunset label\n";
   for (const ReferenceLine& line : panel.references) {
@@ -217,7 +238,7 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   std::size_t colour = 0;
   for (const Series& series : panel.series) {
     const bool is_label = series.style == Style::label;
-    const std::size_t own = series.colour || is_label ? series.colour.value_or(0) : colour++;
+    const std::size_t own = series.colour || is_label || isColoured(series) ? series.colour.value_or(0) : colour++;
     if (series.x.empty()) continue;
     if (!is_label && drawable(series, panel)) {
       const bool enlarged = named > 1 && series.style == Style::points && !series.name.empty();
@@ -249,7 +270,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
 }  // namespace
 
 std::string plotCsv(const Plot& plot) {
-  std::string text = "panel,series,x,y,low,high,width\n";
+  const bool coloured = isColoured(plot);
+  std::string text = fmt::format("panel,series,x,y,low,high,width{}\n", coloured ? ",value" : "");
   bool first = true;
   for (const Panel& panel : plot.panels) {
     for (const Series& series : panel.series) {
@@ -258,8 +280,9 @@ std::string plotCsv(const Plot& plot) {
       first = false;
       const std::string names = csvText(panel.title) + "," + csvText(series.name);
       for (std::size_t i = 0; i < series.x.size(); ++i) {
-        text += fmt::format("{},{},{},{},{},{}\n", names, cell(series.x, i), cell(series.y, i), cell(series.low, i),
+        text += fmt::format("{},{},{},{},{},{}", names, cell(series.x, i), cell(series.y, i), cell(series.low, i),
                             cell(series.high, i), cell(series.width, i));
+        text += coloured ? fmt::format(",{}\n", cell(series.value, i)) : "\n";
       }
     }
   }
@@ -295,6 +318,12 @@ std::string plotScript(const Plot& plot, const std::string& name) {
       "set pointintervalbox 0.01\n"
       "set errorbars 0.6\n",
       name, width, height);
+  if (isColoured(plot)) {
+    // Light is small; lightness rises steadily, also to eyes that miss red or green.
+    script +=
+        "set palette defined (0 '#fde725', 1 '#7ad151', 2 '#22a884', 3 '#2a788e', 4 '#414487', 5 '#440154')\n"
+        "set cbtics format '%.3g' font ',10'\n";
+  }
   if (n > 1) script += fmt::format("set multiplot layout {},{}\n", rows, columns);
   for (std::size_t i = 0; i < n; ++i) appendPanel(script, plot, i, name + ".csv");
   if (n > 1) script += "\nunset multiplot\n";
