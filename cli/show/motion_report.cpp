@@ -657,7 +657,7 @@ void writeMotionReport(const std::string& directory, const std::string& command_
   if (result.with_truth) report.plot(errorsPlot(result));
   report.code(formatMotion(result));
   reportFrame(report, result, window, options);
-  printLines("\n" + report.write() + "\n");
+  report.write();
 }
 
 }  // namespace liestat::cli

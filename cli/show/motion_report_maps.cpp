@@ -97,7 +97,7 @@ ResidualMap residualMap(const DirectionResidual& residual, const HemisphereChart
     }
   }
   for (std::size_t k = 0; k < map.grid.value.size(); ++k) {
-    if (Eigen::Vector2d(map.grid.x[k % n], map.grid.y[k / n]).norm() > 90) map.grid.value[k] = not_there;
+    if (Eigen::Vector2d(map.grid.x[k % n], map.grid.y[k / n]).norm() >= 90) map.grid.value[k] = not_there;
   }
   // Between the directions of the grid, by ever smaller steps along the axes and diagonals.
   for (double step = 0.5 * grid_step; step > 1e-3;) {

@@ -10,6 +10,8 @@
 namespace liestat::cli {
 namespace {
 
+/// A way that ends so near (5 degrees) has arrived.
+constexpr double arrived = 0.9962;
 /// Frames of the structure, at most; fewer where hardly any track is seen in all of them.
 constexpr std::size_t most_snapshots = 15, enough_tracks = 14, fewest_tracks = 4;
 
@@ -102,26 +104,33 @@ MotionWindowRuns runMotionWindow(std::span<const MotionPairs> frames, const Moti
   }
   for (const InverseDepth& depth : filter.inverse_depths()) runs.inliers.push_back(depth.inlier);
 
-  Eigen::Vector3d start = Eigen::Vector3d::UnitZ();
+  const std::vector<Eigen::Vector3d> lattice = hemisphereLattice(std::max<std::size_t>(options.starts, 1));
   const auto left = filter.hypotheses();
   if (!left.empty()) {
     const auto best =
         std::min_element(left.begin(), left.end(), [](const auto& a, const auto& b) { return a.score < b.score; });
-    start = hemisphereLattice(std::max<std::size_t>(options.starts, 1))[best->start];
-    runs.winner.start = start;
+    runs.winner.start = lattice[best->start];
     for (std::size_t k = 0; k < frames.size(); ++k) {
       const auto at = hypotheses[k].find(best->start);
       if (at == hypotheses[k].end()) continue;
       runs.winner.frames.push_back(frames[k].frame), runs.winner.directions.push_back(at->second);
     }
   }
-  // Costs do not tell a start from its antipode: from one of the two the released filter ends at the rubbery state.
-  runs.released = traceFrom(start, options, false, frames);
-  if (!runs.released.directions.empty() && runs.released.directions.back().dot(velocity) > 0) {
-    start = -start;
+  // Starts by their distance, up to sign, the farthest first.
+  std::vector<Eigen::Vector3d> starts = lattice;
+  const auto nearness = [&](const Eigen::Vector3d& start) { return std::abs(start.dot(velocity)); };
+  std::sort(starts.begin(), starts.end(),
+            [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return nearness(a) < nearness(b); });
+  for (const Eigen::Vector3d& start : starts) {
     runs.released = traceFrom(start, options, false, frames);
+    const Eigen::Vector3d& end = runs.released.directions.back();
+    if (nearness(end) < arrived && &start != &starts.back()) continue;
+    // Costs do not tell a start from its antipode: from one of the two the filter ends at the rubbery state.
+    const double side = end.dot(velocity) > 0 ? -1 : 1;
+    const Eigen::Vector3d from = side * start;
+    runs.released = traceFrom(from, options, false, frames), runs.held = traceFrom(from, options, true, frames);
+    break;
   }
-  runs.held = traceFrom(start, options, true, frames);
   runs.essential_held = essentialTrace(estimate, translation, options, true, frames);
   runs.essential_released = essentialTrace(estimate, translation, options, false, frames);
 

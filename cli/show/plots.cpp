@@ -90,7 +90,7 @@ struct Extent {
 
 /// gnuplot extends a logarithmic axis to whole decades, which leaves most of it empty when the data span one or two,
 /// and labels nothing between. Here the range follows the data, and short axes are labelled 1, 2, 5, 10.
-std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
+std::string logarithmicAxis(std::string_view letter, const Axis& axis, Extent data) {
   double low = data.low / 1.25;
   double high = data.high * 1.25;
   if (axis.low && drawable(*axis.low, axis)) low = *axis.low;
@@ -111,9 +111,9 @@ std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
          (tics.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, tics));
 }
 
-std::string axisText(char letter, const Axis& axis, const Extent& data) {
+std::string axisText(std::string_view letter, const Axis& axis, const Extent& data) {
   std::string script = fmt::format("set {0}label {1}{2}\nset format {0} '{3}'\n", letter, quotedText(axis.label),
-                                   letter == 'x' ? " offset 0,0.6" : "",
+                                   letter == "x" ? " offset 0,0.6" : "",
                                    !axis.numbers      ? ""
                                    : axis.logarithmic ? "%.6g"
                                                       : "% .6g");
@@ -179,6 +179,19 @@ bool isColoured(const Plot& plot) {
   return std::any_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return isColoured(panel); });
 }
 
+std::string colourText(const Panel& panel) {
+  const Axis& axis = panel.colour;
+  Extent data;
+  for (const Series& series : panel.series) data.add(series.value, axis);
+  const std::string label = fmt::format("set cblabel {}\n", quotedText(axis.label));
+  if (axis.logarithmic) return label + "set logscale cb\n" + logarithmicAxis("cb", axis, data);
+  const auto end = [](const std::optional<double>& value) {
+    return value ? fmt::format("{}", *value) : std::string("*");
+  };
+  return label +
+         fmt::format("unset logscale cb\nset cbtics auto\nset cbrange [{}:{}]\n", end(axis.low), end(axis.high));
+}
+
 /// Every k-th point of a scatter that nobody could tell apart anyway, and that no browser could show.
 std::size_t stride(const Series& series) {
   return series.style == Style::points ? (series.x.size() + most_points_drawn - 1) / most_points_drawn : 1;
@@ -201,13 +214,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     for (const auto* values : {&series.y, &series.low, &series.high}) y.add(*values, panel.y);
   }
   script +=
-      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText('x', panel.x, x) + axisText('y', panel.y, y);
-  if (isColoured(panel)) {
-    script += fmt::format("set cblabel {}\n{} logscale cb\nset cbrange [{}:{}]\n", quotedText(panel.colour.label),
-                          panel.colour.logarithmic ? "set" : "unset",
-                          panel.colour.low ? fmt::format("{}", *panel.colour.low) : "*",
-                          panel.colour.high ? fmt::format("{}", *panel.colour.high) : "*");
-  }
+      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText("x", panel.x, x) + axisText("y", panel.y, y);
+  if (isColoured(panel)) script += colourText(panel);
   script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
   script += "unset arrow\nunset label\n";
   for (const ReferenceLine& line : panel.references) {
@@ -224,7 +232,7 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     }
   }
   const auto named = std::count_if(panel.series.begin(), panel.series.end(), [&](const Series& series) {
-    return !series.name.empty() && series.style != Style::label && drawable(series, panel);
+    return !series.name.empty() && series.style != Style::label && !isColoured(series) && drawable(series, panel);
   });
   for (const Series& series : panel.series) {
     if (series.style != Style::label || series.x.empty() || series.y.empty()) continue;
@@ -242,7 +250,7 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     if (series.x.empty()) continue;
     if (!is_label && drawable(series, panel)) {
       const bool enlarged = named > 1 && series.style == Style::points && !series.name.empty();
-      const bool in_legend = named > 1 && !enlarged;
+      const bool in_legend = named > 1 && !enlarged && !isColoured(series);
       // The header is part of the first block.
       commands +=
           fmt::format("{}{} index {} every {}::{} using {} {} title {}", commands.empty() ? "plot " : ", \\\n     ",
