@@ -7,6 +7,7 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
+#include <experiments/summary.hpp>
 #include <fusion/motion/motion_filter.hpp>
 
 #include <fmt/format.h>
@@ -81,7 +82,8 @@ struct Extents {
 /// What is known of one quantity with three components over the frames.
 struct Component {
   std::array<Series, 3> lines, bands, truths;
-  Extents usable;  ///< of what is worth seeing
+  Extents usable;              ///< of what is worth seeing
+  std::vector<double> sigmas;  ///< the same of two standard deviations
 
   Component() {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -95,7 +97,7 @@ struct Component {
       const auto i = static_cast<Eigen::Index>(k);
       addPoint(lines[k], frame, value[i]);
       addBand(bands[k], frame, value[i], sigma[i]);
-      if (ok) usable.add(value[i] - 2 * sigma[i]), usable.add(value[i] + 2 * sigma[i]);
+      if (ok) usable.add(value[i]), sigmas.push_back(2 * sigma[i]);
     }
   }
   void addTruth(double frame, const Eigen::Vector3d& value) {
@@ -110,7 +112,13 @@ struct Component {
       if (!truths[k].x.empty()) panel.series.push_back(truths[k]);
     }
     for (std::size_t k = 0; k < components; ++k) panel.series.push_back(lines[k]);
-    usable.set(panel.y);
+    // A frame that hardly says anything would take the scale.
+    Extents seen = usable;
+    if (!sigmas.empty() && seen.low <= seen.high) {
+      const double most = experiments::quantile(sigmas, 0.95);
+      seen.low -= most, seen.high += most;
+    }
+    seen.set(panel.y);
   }
 };
 
@@ -169,8 +177,9 @@ Plot errorsPlot(const MotionResult& result) {
     const Eigen::Vector2d sigma = T.covariance.diagonal().cwiseMax(0).cwiseSqrt();
     direction.add(at, -degrees * error.homogeneous(), degrees * Eigen::Vector3d(sigma.x(), sigma.y(), 0), false);
     if (!motion.ok()) continue;
-    for (const double s : {-2.0, 2.0}) {
-      for (int k = 0; k < 2; ++k) direction.usable.add(degrees * (-error[k] + s * sigma[k]));
+    for (int k = 0; k < 2; ++k) {
+      direction.usable.add(-degrees * error[k]);
+      direction.sigmas.push_back(2 * degrees * sigma[k]);
     }
   }
   for (std::size_t k = 0; k < 2; ++k) direction.lines[k].name = k == 0 ? "first" : "second";
@@ -285,6 +294,7 @@ Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
     Series region = ellipse("", of.map.least, *of.map.covariance, region_95);
     region.colour = k + 1, region.dashed = true;
     near.series.push_back(region);
+    reach = std::max(reach, std::min(45.0, of.map.least.norm() + std::sqrt(region_95 * of.map.covariance->trace())));
   }
   near.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
   const Eigen::Matrix2d P = degrees * degrees * at.velocity.covariance;
@@ -327,7 +337,11 @@ void residualTable(Report& report, const LookedAt& at, const std::array<FlowMap,
 /// The part of a way that is on one side of the chart.
 Series onSide(std::string name, const MotionTrace& trace, const HemisphereChart& chart, bool far, std::size_t ink) {
   Series series = named(std::move(name), Style::linespoints, ink);
+  Eigen::Vector3d before = trace.start;
   const auto add = [&](const Eigen::Vector3d& direction) {
+    // The turn to the antipode is no way across the hemisphere.
+    if (direction.dot(before) < 0) addPoint(series, no_value, no_value);
+    before = direction;
     const bool here = chart.holds(direction) != far;
     const Eigen::Vector2d at = chart(direction);
     addPoint(series, here ? at.x() : no_value, here ? at.y() : no_value);
@@ -342,18 +356,20 @@ Plot convergencePlot(const LookedAt& at, const MotionWindowRuns& runs, const Res
       .name = "convergence",
       .caption = fmt::format(
           "The way of the filter over {} frames, on the residual of frame {} (figures 7 and 8): of the start that "
-          "wins among many, and of the same start with the sign of the depths released, on the side from "
-          "which it goes to the rubbery state. Left the hemisphere about the estimate, right that about its antipode "
-          "with the same residual, each direction at the coordinates of its antipode on the left.",
+          "wins among many, and from the farthest start that arrives, with the sign of the depths held and "
+          "released, on the side from which the latter goes to the rubbery state. Left the hemisphere about the "
+          "estimate, right that about its antipode with the same residual, each direction at the coordinates of its "
+          "antipode on the left.",
           runs.released.frames.size(), at.frame.frame)};
   const HemisphereChart chart(at.velocity.mean.unit_vector());
   const Axis colour = colourAxis({&map.grid});
   for (const bool far : {false, true}) {
     Panel panel = mapPanel(far ? "about the antipode: depths negative" : "about the estimate", map.grid, colour);
+    panel.series.push_back(onSide("sign released", runs.released, chart, far, second_ink));
+    panel.series.push_back(onSide("sign held", runs.held, chart, far, fourth_ink));
     if (!runs.winner.directions.empty()) {
       panel.series.push_back(onSide("winning start", runs.winner, chart, far, estimate_ink));
     }
-    panel.series.push_back(onSide("sign released", runs.released, chart, far, second_ink));
     panel.series.push_back(star(far ? "antipode" : "estimate", Eigen::Vector2d::Zero(), truth_ink));
     plot.panels.push_back(panel);
   }
@@ -364,11 +380,15 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return degrees * std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
+/// The start is shown one frame before the first.
+double beforeFirst(const MotionTrace& trace) { return static_cast<double>(trace.frames.front()) - 1; }
+
 Panel tracePanel(std::string title, const MotionTrace& trace, const Eigen::Vector3d& reference) {
   Panel panel{
       .title = std::move(title), .x = {.label = "frame"}, .y = {.label = "component", .low = -1.05, .high = 1.05}};
   for (std::size_t k = 0; k < 3; ++k) {
     Series line = named(axis_names[k], Style::lines, axis_inks[k]);
+    addPoint(line, beforeFirst(trace), trace.start[static_cast<Eigen::Index>(k)]);
     for (std::size_t i = 0; i < trace.frames.size(); ++i) {
       addPoint(line, static_cast<double>(trace.frames[i]), trace.directions[i][static_cast<Eigen::Index>(k)]);
     }
@@ -401,6 +421,7 @@ Plot signPlot(std::string name, std::string caption, const MotionTrace& held, co
     const MotionTrace& trace = free ? released : held;
     Series angle = named(free ? "released" : "held", Style::linespoints, free ? second_ink : estimate_ink);
     Series sign = angle;
+    addPoint(angle, beforeFirst(trace), angleBetween(trace.start, reference));
     for (std::size_t i = 0; i < trace.frames.size(); ++i) {
       const auto at = static_cast<double>(trace.frames[i]);
       addPoint(angle, at, angleBetween(trace.directions[i], reference));
@@ -481,8 +502,7 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
     const double sigma = 2 * std::sqrt(p.variance), nearest = 1 / (p.inverse_depth + sigma);
     addPoint(points, X[coordinate], X.z());
     points.low.push_back(nearest > 0 ? nearest : 0);
-    // A depth that is not told from infinity has a bar to the end of the panel.
-    points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : 1e9);
+    points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : no_value);
   }
   std::sort(depths.begin(), depths.end());
   // Points far behind the rest would leave it no room.
@@ -491,7 +511,11 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
   for (std::size_t k = 0; k < ways.x.size(); ++k) {
     if (ways.y[k] > 0 && ways.y[k] < most) across.add(ways.x[k]), along.add(ways.y[k]);
   }
-  for (const double high : points.high) along.add(std::min(high, most));
+  for (double& high : points.high) {
+    // The bar of a depth that is not told from infinity goes beyond the panel.
+    if (std::isnan(high)) high = 10 * most;
+    along.add(std::min(high, most));
+  }
   across.set(panel.x), along.set(panel.y);
   panel.y.low = 0;
   panel.series = {ways, points};
@@ -615,11 +639,11 @@ void reportFrame(Report& report, const MotionResult& result, const MotionWindow&
 
   report.section("Convergence");
   report.plot(convergencePlot(at, runs, maps[1].map));
-  report.plot(
-      signPlot("sign",
-               "The subspace filter from one start, with the sign of the depths held and released (figures 9 and "
-               "10); dashed the estimate of the last frame.",
-               runs.held, runs.released, V));
+  report.plot(signPlot("sign",
+                       "The subspace filter from the farthest start that arrives, with the sign of the depths held and "
+                       "released (figures 9 and "
+                       "10); dashed the estimate of the last frame.",
+                       runs.held, runs.released, V));
   report.plot(
       signPlot("essential",
                "The essential filter from the rubbery state, the estimate with its translation turned round, with "

@@ -100,12 +100,20 @@ std::string logarithmicAxis(std::string_view letter, const Axis& axis, Extent da
   std::string script = fmt::format("set {}range [{}:{}]\n", letter, low, high);
   if (high / low > 1e3) return script + fmt::format("set {}tics auto\n", letter);
   std::string tics;
-  for (int exponent = static_cast<int>(std::floor(std::log10(low)));
-       exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
-    for (const int digit : {1, 2, 5}) {
-      const double tic = digit * std::pow(10.0, exponent);
-      if (tic >= low && tic <= high) tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
+  // Fine steps only where coarse ones leave less than two marks.
+  for (const std::vector<double>& digits : {std::vector<double>{1, 2, 5}, {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}}) {
+    std::size_t marks = 0;
+    tics.clear();
+    for (int exponent = static_cast<int>(std::floor(std::log10(low)));
+         exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
+      for (const double digit : digits) {
+        const double tic = digit * std::pow(10.0, exponent);
+        if (tic < low || tic > high) continue;
+        tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
+        ++marks;
+      }
     }
+    if (marks > 1) break;
   }
   return script +
          (tics.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, tics));
