@@ -123,7 +123,7 @@ void compare(MotionFrame& frame, const std::map<std::size_t, CameraPose>& truth,
   const Eigen::Matrix3d& R_2 = second->second.R_camera_world;
   const SO3d R = SO3d::fitToSO3(Eigen::Matrix3d(R_2 * first->second.R_camera_world.transpose()));
   const Eigen::Vector3d T = R_2 * (first->second.c - second->second.c);
-  frame.truth = TrueMotion{R, T};
+  frame.truth = TrueMotion{R.log(), SO3d::leftJacobianInverse(R.log()) * T};
   frame.rotation_error = degrees * distance(frame.motion.rotation.mean, R);
   if (T.norm() > least) {
     frame.direction_error = degrees * distance(translationDirection(frame.motion).mean, S2d(T));
@@ -162,7 +162,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
       frame.essential = filter.essential_in_charge();
       compare(frame, truth, options.least_motion);
       result.frames.push_back(frame);
-      if (!options.report.empty()) window.add(k, pairs, tracks.tracks());
+      if (!options.report.empty()) window.add(k, pairs, tracks.tracks(), frame.motion);
     }
   }
   if (result.frames.empty()) throw InputError(options.tracks, 0, "there is one frame", "two frames or more");

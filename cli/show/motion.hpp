@@ -11,10 +11,12 @@
 
 namespace liestat::cli {
 
-/// X₂ = R X₁ + T in the camera's axes, m.
+/// The motion that is constant over an interval and makes its pose, per frame: dX/dt = Ω × X + V in the camera's axes.
 struct TrueMotion {
-  SO3d R;
-  Eigen::Vector3d T = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< Ω, rad
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< V, m
+  /// T of X₂ = R X₁ + T over one frame.
+  Eigen::Vector3d translation() const { return SO3d::leftJacobian(rotation) * velocity; }
 };
 
 /// The motion from the frame before to this one.

@@ -21,12 +21,13 @@
 
 namespace liestat::cli {
 
-void MotionWindow::add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks) {
+void MotionWindow::add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks,
+                       const MotionEstimate& motion) {
   if (frame <= newest_) frames_.clear();
   newest_ = frame;
   if (frame > looked_at_) return;
   if (frames_.size() == most_frames) frames_.erase(frames_.begin());
-  frames_.push_back({frame, {pairs.begin(), pairs.end()}, {tracks.begin(), tracks.end()}});
+  frames_.push_back({frame, motion, {pairs.begin(), pairs.end()}, {tracks.begin(), tracks.end()}});
 }
 
 namespace {
@@ -55,6 +56,11 @@ Series star(std::string name, const Eigen::Vector2d& at, std::size_t ink) {
 
 using Basis = Eigen::Matrix<double, 3, 2>;
 Basis basisOf(const S2d& direction) { return ManifoldTraits<S2d>::placement(direction).matrix().leftCols<2>(); }
+
+/// The true direction of what an estimate is that of.
+Eigen::Vector3d trueDirection(const TrueMotion& truth, DirectionMeaning meaning) {
+  return (meaning == DirectionMeaning::velocity ? truth.velocity : truth.translation()).normalized();
+}
 
 /// The velocity of a translation: V ∝ J_l(Ω)⁻¹ T, with the covariance of T.
 Gaussian<S2d> velocityDirection(const MotionEstimate& motion) {
@@ -135,23 +141,26 @@ Plot estimatesPlot(const MotionResult& result) {
   for (std::size_t i = 0; i < result.frames.size(); i += strideOf(result)) {
     const MotionFrame& frame = result.frames[i];
     const auto at = static_cast<double>(frame.frame);
-    const Gaussian<S2d> T = translationDirection(frame.motion);
-    const Eigen::Matrix3d P = basisOf(T.mean) * T.covariance * basisOf(T.mean).transpose();
-    direction.add(at, T.mean.unit_vector(), P.diagonal().cwiseMax(0).cwiseSqrt(), frame.motion.ok());
+    const Gaussian<S2d>& d = frame.motion.direction;
+    const Eigen::Matrix3d P = basisOf(d.mean) * d.covariance * basisOf(d.mean).transpose();
+    direction.add(at, d.mean.unit_vector(), P.diagonal().cwiseMax(0).cwiseSqrt(), frame.motion.ok());
     // From the local frame to the rotation vector.
     const Eigen::Vector3d Omega = frame.motion.rotation.mean.log();
     const Eigen::Matrix3d J = SO3d::rightJacobianInverse(Omega);
     const Eigen::Matrix3d Q = J * frame.motion.rotation.covariance * J.transpose();
     rotation.add(at, degrees * Omega, degrees * Q.diagonal().cwiseMax(0).cwiseSqrt(), frame.motion.ok());
     if (!frame.truth) continue;
-    rotation.addTruth(at, degrees * frame.truth->R.log());
-    if (frame.direction_error) direction.addTruth(at, frame.truth->T.normalized());
+    rotation.addTruth(at, degrees * frame.truth->rotation);
+    if (frame.direction_error) direction.addTruth(at, trueDirection(*frame.truth, frame.motion.meaning));
   }
-  Plot plot{.name = "estimates",
-            .caption =
-                "Direction of the translation and rotation over one frame, of the points in the camera's axes (x "
-                "right, y down, z forward), with bands of two standard deviations (figures 2 to 4)." +
-                thinned(result)};
+  Plot plot{
+      .name = "estimates",
+      .caption =
+          "Direction of motion and rotation over one frame, of the points in the camera's axes (x right, y down, z "
+          "forward), with bands of two standard deviations (figures 2 to 4). The direction is that of the "
+          "velocity, and of the translation from one frame to the next where the essential filter is in "
+          "charge." +
+          thinned(result)};
   Panel directions{.title = "direction", .x = {.label = "frame"}, .y = {.label = "component"}};
   direction.drawOn(directions);
   directions.y.low = -1.05, directions.y.high = 1.05;
@@ -168,13 +177,13 @@ Plot errorsPlot(const MotionResult& result) {
     if (!frame.truth) continue;
     const auto at = static_cast<double>(frame.frame);
     const MotionEstimate& motion = frame.motion;
-    const Eigen::Vector3d turn = (motion.rotation.mean.inverse() * frame.truth->R).log();
+    const Eigen::Vector3d turn = (motion.rotation.mean.inverse() * SO3d::exp(frame.truth->rotation)).log();
     rotation.add(at, -degrees * turn, degrees * motion.rotation.covariance.diagonal().cwiseMax(0).cwiseSqrt(),
                  motion.ok());
     if (!frame.direction_error) continue;
-    const Gaussian<S2d> T = translationDirection(motion);
-    const Eigen::Vector2d error = log(T.mean, S2d(frame.truth->T));
-    const Eigen::Vector2d sigma = T.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    const Gaussian<S2d>& d = motion.direction;
+    const Eigen::Vector2d error = log(d.mean, S2d(trueDirection(*frame.truth, motion.meaning)));
+    const Eigen::Vector2d sigma = d.covariance.diagonal().cwiseMax(0).cwiseSqrt();
     direction.add(at, -degrees * error.homogeneous(), degrees * Eigen::Vector3d(sigma.x(), sigma.y(), 0), false);
     if (!motion.ok()) continue;
     for (int k = 0; k < 2; ++k) {
@@ -205,16 +214,27 @@ Plot errorsPlot(const MotionResult& result) {
 
 /// What is drawn of one frame.
 struct LookedAt {
-  const MotionFrame& frame;
+  std::size_t frame = 0;
+  const MotionEstimate& motion;
+  double interval = 1;  ///< frames, the longest of the pairs'
+  SO3d rotation;        ///< over it, as the translations
   Gaussian<S2d> velocity, translation;
   std::optional<Eigen::Vector3d> true_velocity, true_translation;
-  std::vector<PointPair> pairs;  ///< without outliers
+  std::vector<PointPair> pairs, whole;  ///< without outliers; those over the interval, as one step
 
-  explicit LookedAt(const MotionFrame& at)
-      : frame(at), velocity(velocityDirection(at.motion)), translation(translationDirection(at.motion)) {
-    if (!at.truth || !at.direction_error) return;
-    true_translation = at.truth->T.normalized();
-    true_velocity = (SO3d::leftJacobianInverse(at.truth->R.log()) * at.truth->T).normalized();
+  LookedAt(const MotionPairs& at, const MotionFrame& result) : frame(at.frame), motion(at.motion) {
+    for (const PointPair& pair : at.pairs) interval = std::max(interval, pair.frames);
+    const Eigen::Vector3d Omega = interval * motion.rotation.mean.log();
+    MotionEstimate over = motion;
+    over.rotation.mean = rotation = SO3d::exp(Omega);
+    velocity = velocityDirection(motion), translation = translationDirection(over);
+    if (!result.truth || !result.direction_error) return;
+    true_velocity = result.truth->velocity.normalized();
+    const Eigen::Vector3d turn = interval * result.truth->rotation;
+    true_translation = (SO3d::leftJacobian(turn) * *true_velocity).normalized();
+  }
+  MotionReference reference() const {
+    return {velocity.mean.unit_vector(), translation.mean.unit_vector(), rotation, interval};
   }
   const Gaussian<S2d>& directionOf(Flow flow) const { return flow == Flow::discrete ? translation : velocity; }
   const std::optional<Eigen::Vector3d>& truthOf(Flow flow) const {
@@ -268,7 +288,7 @@ Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
           "The residual of frame {} over the hemisphere about the filter's estimate, which is at the origin (figures "
           "5 and 6), and below on the right its minima near the estimate with their 95 % regions: those of "
           "the minima by the curvature of one frame, that of the estimate by all frames.",
-          at.frame.frame)};
+          at.frame)};
   const Axis colour = colourAxis({&maps[0].map.grid, &maps[1].map.grid, &maps[2].map.grid});
   Panel near{.title = "near the estimate",
              .x = {.label = "first tangent coordinate, deg"},
@@ -360,7 +380,7 @@ Plot convergencePlot(const LookedAt& at, const MotionWindowRuns& runs, const Res
           "released, on the side from which the latter goes to the rubbery state. Left the hemisphere about the "
           "estimate, right that about its antipode with the same residual, each direction at the coordinates of its "
           "antipode on the left.",
-          runs.released.frames.size(), at.frame.frame)};
+          runs.released.frames.size(), at.frame)};
   const HemisphereChart chart(at.velocity.mean.unit_vector());
   const Axis colour = colourAxis({&map.grid});
   for (const bool far : {false, true}) {
@@ -457,7 +477,7 @@ Plot contourPlot(const LookedAt& at, const ResidualMap& subspace, const Residual
           "other local minima, and the essential filter's at the rotation of the estimate, with {}. The latter "
           "is a slice through a function of five unknowns; its least value over the rotations is the discrete flow's "
           "residual above.",
-          at.frame.frame, subspace.others.size(), essential.others.size())};
+          at.frame, subspace.others.size(), essential.others.size())};
   for (const bool second : {false, true}) {
     const ResidualMap& map = second ? essential : subspace;
     Axis colour = colourAxis({&map.grid});
@@ -607,35 +627,36 @@ void reportFrame(Report& report, const MotionResult& result, const MotionWindow&
   const MotionPairs& pairs = window.frames().back();
   const auto of = std::find_if(result.frames.begin(), result.frames.end(),
                                [&](const MotionFrame& frame) { return frame.frame == pairs.frame; });
-  LookedAt at(*of);
+  LookedAt at(pairs, *of);
   const Eigen::Vector3d V = at.velocity.mean.unit_vector(), T = at.translation.mean.unit_vector();
-  const MotionWindowRuns runs = runMotionWindow(window.frames(), options, at.frame.motion, V, T);
+  const MotionWindowRuns runs = runMotionWindow(window.frames(), options, at.reference());
   for (std::size_t i = 0; i < pairs.pairs.size(); ++i) {
     if (i < runs.inliers.size() && runs.inliers[i]) at.pairs.push_back(pairs.pairs[i]);
   }
+  at.whole = pairsOver(at.interval, at.pairs);
   report.section(fmt::format("The residual of frame {}", pairs.frame));
   report.paragraph(fmt::format(
       "Figures from here on are of images alone: frames {} to {}, and the residual of {} pairs of the last one. The "
       "motion turns by {:.3g} deg in this frame.",
-      window.frames().front().frame, pairs.frame, at.pairs.size(),
-      degrees * at.frame.motion.rotation.mean.log().norm()));
-  if (at.pairs.size() < options.min_pairs) {
-    report.paragraph(fmt::format("This frame has {} usable pairs of points, and its figures need {}.", at.pairs.size(),
-                                 options.min_pairs));
+      window.frames().front().frame, pairs.frame, at.pairs.size(), degrees * at.motion.rotation.mean.log().norm()));
+  const std::size_t enough = std::min(at.pairs.size(), at.whole.size());
+  if (enough < options.min_pairs) {
+    report.paragraph(
+        fmt::format("This frame has {} usable pairs of points, and its figures need {}.", enough, options.min_pairs));
     return;
   }
-  if (!at.frame.motion.ok()) {
+  if (!at.motion.ok()) {
     report.paragraph("The filter's estimate of this frame is not one that may be used: look at its flags.");
   }
-  const SO3d& R = at.frame.motion.rotation.mean;
   std::array<FlowMap, 3> maps{FlowMap{Flow::forward, "forward", {}}, FlowMap{Flow::midpoint, "midpoint", {}},
                               FlowMap{Flow::discrete, "discrete", {}}};
   for (FlowMap& m : maps) {
-    m.map = residualMap(residualOf(at.pairs, m.flow, R), HemisphereChart(at.directionOf(m.flow).mean.unit_vector()));
+    m.map = residualMap(residualOf(m.flow == Flow::discrete ? at.whole : at.pairs, m.flow, at.rotation),
+                        HemisphereChart(at.directionOf(m.flow).mean.unit_vector()));
   }
   report.plot(residualPlot(at, maps));
   residualTable(report, at, maps);
-  report.plot(contourPlot(at, maps[1].map, residualMap(residualAtRotation(at.pairs, R), HemisphereChart(T))));
+  report.plot(contourPlot(at, maps[1].map, residualMap(residualAtRotation(at.whole, at.rotation), HemisphereChart(T))));
 
   report.section("Convergence");
   report.plot(convergencePlot(at, runs, maps[1].map));
@@ -656,7 +677,7 @@ void reportFrame(Report& report, const MotionResult& result, const MotionWindow&
     return;
   }
   report.paragraph(rigidityVerdict(runs.comparison));
-  structureTable(report, runs, at.frame.motion.rotation.mean.log());
+  structureTable(report, runs, at.motion.rotation.mean.log());
   report.plot(structurePlot(runs));
   report.plot(distancesPlot(runs));
 }

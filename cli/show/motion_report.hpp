@@ -13,9 +13,10 @@
 
 namespace liestat::cli {
 
-/// The pairs of one frame, and the track of each.
+/// The pairs of one frame, the track of each, and what the filter made of them.
 struct MotionPairs {
   std::size_t frame = 0;
+  MotionEstimate motion;
   std::vector<PointPair> pairs;
   std::vector<std::uint64_t> tracks;
 };
@@ -29,7 +30,8 @@ class MotionWindow {
   explicit MotionWindow(std::size_t looked_at = last_frame) : looked_at_(looked_at) {}
 
   /// The next frame; one whose number is not larger begins anew.
-  void add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks);
+  void add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks,
+           const MotionEstimate& motion);
   std::span<const MotionPairs> frames() const { return frames_; }
   std::size_t looked_at() const { return looked_at_; }
   /// Whether the frame that is looked at has come.

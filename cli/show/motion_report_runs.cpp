@@ -15,12 +15,13 @@ constexpr double arrived = 0.9962;
 /// Frames of the structure, at most; fewer where hardly any track is seen in all of them.
 constexpr std::size_t most_snapshots = 15, enough_tracks = 14, fewest_tracks = 4;
 
-template <class Filter>
-MotionTrace traceOf(Filter& filter, std::span<const MotionPairs> frames, const Eigen::Vector3d& start) {
+template <class Filter, class Pairs>
+MotionTrace traceOf(Filter& filter, std::span<const MotionPairs> frames, const Eigen::Vector3d& start,
+                    const Pairs& of) {
   MotionTrace trace;
   trace.start = start;
   for (const MotionPairs& frame : frames) {
-    const MotionEstimate& e = filter.update(frame.pairs);
+    const MotionEstimate& e = filter.update(of(frame));
     trace.frames.push_back(frame.frame);
     trace.directions.emplace_back(e.direction.mean.unit_vector());
     trace.evidence.push_back(e.sign_evidence);
@@ -34,20 +35,21 @@ MotionTrace traceFrom(const Eigen::Vector3d& start, MotionFilterOptions options,
   options.positive_depth = positive_depth, options.lost_innovation = std::numeric_limits<double>::infinity();
   SubspaceFilter filter(options);
   filter.start({S2d(start), Eigen::Matrix2d::Identity()});
-  return traceOf(filter, frames, start);
+  return traceOf(filter, frames, start, [](const MotionPairs& frame) { return std::span(frame.pairs); });
 }
 
 /// From the rubbery state of the estimate.
-MotionTrace essentialTrace(const MotionEstimate& estimate, const Eigen::Vector3d& translation,
-                           MotionFilterOptions options, bool positive_depth, std::span<const MotionPairs> frames) {
+MotionTrace essentialTrace(const MotionReference& reference, MotionFilterOptions options, bool positive_depth,
+                           std::span<const MotionPairs> frames) {
   options.positive_depth = positive_depth, options.lost_innovation = std::numeric_limits<double>::infinity();
   EssentialFilter filter(options);
-  const Eigen::Vector3d opposite = -translation;
+  const Eigen::Vector3d opposite = -reference.translation;
   Gaussian<Essentiald> state;
-  state.mean = Essentiald(estimate.rotation.mean, S2d(opposite));
+  state.mean = Essentiald(reference.rotation, S2d(opposite));
   state.covariance = 0.01 * Eigen::Matrix<double, 5, 5>::Identity();
   filter.start(state);
-  return traceOf(filter, frames, opposite);
+  return traceOf(filter, frames, opposite,
+                 [&](const MotionPairs& frame) { return pairsOver(reference.interval, frame.pairs); });
 }
 
 /// The tracks that all of these frames have.
@@ -83,9 +85,19 @@ MotionInterpretation interpretation(std::span<const std::vector<StructurePoint>>
 
 }  // namespace
 
+std::vector<PointPair> pairsOver(double interval, std::span<const PointPair> pairs) {
+  std::vector<PointPair> whole;
+  for (const PointPair& pair : pairs) {
+    if (pair.frames != interval) continue;
+    whole.push_back(pair);
+    whole.back().frames = 1;
+  }
+  return whole;
+}
+
 MotionWindowRuns runMotionWindow(std::span<const MotionPairs> frames, const MotionFilterOptions& given,
-                                 const MotionEstimate& estimate, const Eigen::Vector3d& velocity,
-                                 const Eigen::Vector3d& translation) {
+                                 const MotionReference& reference) {
+  const Eigen::Vector3d& velocity = reference.velocity;
   MotionFilterOptions options = given;
   options.flow = Flow::midpoint, options.estimate_bias = false;
   MotionWindowRuns runs;
@@ -131,8 +143,8 @@ MotionWindowRuns runMotionWindow(std::span<const MotionPairs> frames, const Moti
     runs.released = traceFrom(from, options, false, frames), runs.held = traceFrom(from, options, true, frames);
     break;
   }
-  runs.essential_held = essentialTrace(estimate, translation, options, true, frames);
-  runs.essential_released = essentialTrace(estimate, translation, options, false, frames);
+  runs.essential_held = essentialTrace(reference, options, true, frames);
+  runs.essential_released = essentialTrace(reference, options, false, frames);
 
   // As many frames as have enough tracks in common.
   std::size_t n = std::min(most_snapshots, frames.size());

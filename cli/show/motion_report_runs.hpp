@@ -41,9 +41,18 @@ struct MotionWindowRuns {
   bool hasStructure() const { return rigid.rigidity.snapshots() > 1; }
 };
 
-/// `velocity` and `translation` are the directions that the estimate of the last frame comes to.
+/// Of the last frame: the direction of the velocity, and the rotation and the direction of the translation over the longest
+/// interval of its pairs.
+struct MotionReference {
+  Eigen::Vector3d velocity = Eigen::Vector3d::UnitZ(), translation = Eigen::Vector3d::UnitZ();
+  SO3d rotation;
+  double interval = 1;  ///< frames
+};
+
+/// Pairs of this interval, each as one step: those of an epipolar constraint.
+std::vector<PointPair> pairsOver(double interval, std::span<const PointPair> pairs);
+
 MotionWindowRuns runMotionWindow(std::span<const MotionPairs> frames, const MotionFilterOptions& options,
-                                 const MotionEstimate& estimate, const Eigen::Vector3d& velocity,
-                                 const Eigen::Vector3d& translation);
+                                 const MotionReference& reference);
 
 }  // namespace liestat::cli
