@@ -13,7 +13,7 @@ namespace {
 /// A way that ends so near (5 degrees) has arrived.
 constexpr double arrived = 0.9962;
 /// Frames of the structure, at most; fewer where hardly any track is seen in all of them.
-constexpr std::size_t most_snapshots = 15, enough_tracks = 14, fewest_tracks = 4;
+constexpr std::size_t most_snapshots = 25, enough_tracks = 14, fewest_tracks = 4;
 
 template <class Filter, class Pairs>
 MotionTrace traceOf(Filter& filter, std::span<const MotionPairs> frames, const Eigen::Vector3d& start,
