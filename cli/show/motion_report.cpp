@@ -377,8 +377,9 @@ Plot convergencePlot(const LookedAt& at, const MotionWindowRuns& runs, const Res
       .caption = fmt::format(
           "The way of the filter over {} frames, on the residual of frame {} (figures 7 and 8): of the start that "
           "wins among many, and from the farthest start that arrives, with the sign of the depths held and "
-          "released, on the side from which the latter goes to the rubbery state. Left the hemisphere about the "
-          "estimate, right that about its antipode with the same residual, each direction at the coordinates of its "
+          "released, on the side from which the latter goes to the rubbery state; until the depths turn the direction "
+          "round the two are the same. Left the hemisphere about the estimate, right that about its antipode with the "
+          "same residual, each direction at the coordinates of its "
           "antipode on the left.",
           runs.released.frames.size(), at.frame)};
   const HemisphereChart chart(at.velocity.mean.unit_vector());
