@@ -91,7 +91,8 @@ struct Component {
   Extents usable;              ///< of what is worth seeing
   std::vector<double> sigmas;  ///< the same of two standard deviations
 
-  Component() {
+  /// `frames_apart`: larger gaps between frames are left open.
+  explicit Component(std::size_t frames_apart) : step_(static_cast<double>(frames_apart)) {
     for (std::size_t k = 0; k < 3; ++k) {
       lines[k] = named(axis_names[k], Style::lines, axis_inks[k]);
       bands[k] = named("", Style::filled_curve, axis_inks[k]);
@@ -101,6 +102,10 @@ struct Component {
   void add(double frame, const Eigen::Vector3d& value, const Eigen::Vector3d& sigma, bool ok) {
     for (std::size_t k = 0; k < 3; ++k) {
       const auto i = static_cast<Eigen::Index>(k);
+      if (!lines[k].x.empty() && frame - lines[k].x.back() > step_) {
+        addPoint(lines[k], no_value, no_value);
+        addBand(bands[k], no_value, no_value, 0);
+      }
       addPoint(lines[k], frame, value[i]);
       addBand(bands[k], frame, value[i], sigma[i]);
       if (ok) usable.add(value[i]), sigmas.push_back(2 * sigma[i]);
@@ -108,6 +113,7 @@ struct Component {
   }
   void addTruth(double frame, const Eigen::Vector3d& value) {
     for (std::size_t k = 0; k < 3; ++k) {
+      if (!truths[k].x.empty() && frame - truths[k].x.back() > step_) addPoint(truths[k], no_value, no_value);
       addPoint(truths[k], frame, value[static_cast<Eigen::Index>(k)]);
       usable.add(truths[k].y.back());
     }
@@ -126,6 +132,9 @@ struct Component {
     }
     seen.set(panel.y);
   }
+
+ private:
+  double step_;
 };
 
 std::size_t strideOf(const MotionResult& result) {
@@ -137,7 +146,7 @@ std::string thinned(const MotionResult& result) {
 }
 
 Plot estimatesPlot(const MotionResult& result) {
-  Component direction, rotation;
+  Component direction(strideOf(result)), rotation(strideOf(result));
   for (std::size_t i = 0; i < result.frames.size(); i += strideOf(result)) {
     const MotionFrame& frame = result.frames[i];
     const auto at = static_cast<double>(frame.frame);
@@ -171,7 +180,7 @@ Plot estimatesPlot(const MotionResult& result) {
 }
 
 Plot errorsPlot(const MotionResult& result) {
-  Component direction, rotation;
+  Component direction(strideOf(result)), rotation(strideOf(result));
   for (std::size_t i = 0; i < result.frames.size(); i += strideOf(result)) {
     const MotionFrame& frame = result.frames[i];
     if (!frame.truth) continue;
@@ -265,7 +274,8 @@ Panel mapPanel(std::string title, const Grid& grid, const Axis& colour) {
           .equal_aspect = true};
 }
 
-/// From the least residual to what nine tenths of the directions are below, so that a few do not take all colours.
+/// From the least residual to what nearly all directions are below, three decades at most, so that a few do not take all
+/// colours.
 Axis colourAxis(std::initializer_list<const Grid*> grids) {
   std::vector<double> values;
   for (const Grid* grid : grids) {
@@ -276,8 +286,8 @@ Axis colourAxis(std::initializer_list<const Grid*> grids) {
   Axis axis{.label = "residual per degree of freedom", .logarithmic = true};
   if (values.empty()) return axis;
   std::sort(values.begin(), values.end());
-  axis.low = values.front();
   axis.high = std::max(values[values.size() * 98 / 100], 1.5 * values.front());
+  axis.low = std::max(values.front(), 1e-3 * *axis.high);
   return axis;
 }
 
@@ -515,7 +525,7 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
     for (const auto& frame : seen.points) {
       const Eigen::Vector3d X = frame[i].position();
       addPoint(ways, X[coordinate], X.z());
-      depths.push_back(X.z());
+      if (std::isfinite(X.z())) depths.push_back(X.z());
     }
     addPoint(ways, no_value, no_value);
     const StructurePoint& p = seen.points.back()[i];
@@ -525,9 +535,8 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
     points.low.push_back(nearest > 0 ? nearest : 0);
     points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : no_value);
   }
-  std::sort(depths.begin(), depths.end());
   // Points far behind the rest would leave it no room.
-  const double most = 1.6 * depths[depths.size() * 9 / 10];
+  const double most = depths.empty() ? 1 : 1.6 * experiments::quantile(depths, 0.9);
   along.add(0);
   for (std::size_t k = 0; k < ways.x.size(); ++k) {
     if (ways.y[k] > 0 && ways.y[k] < most) across.add(ways.x[k]), along.add(ways.y[k]);
@@ -574,17 +583,18 @@ Plot distancesPlot(const MotionWindowRuns& runs) {
         return (seen.points[k][i].position() - seen.points[k][i - 1].position()).norm();
       };
       for (std::size_t k = 0; k < seen.points.size(); ++k) {
-        changes.push_back(100 * (length(k) / length(0) - 1));
-        addPoint(lines, static_cast<double>(runs.frames[k]), changes.back());
+        const double change = 100 * (length(k) / length(0) - 1);
+        if (std::isfinite(change)) changes.push_back(std::abs(change));
+        addPoint(lines, static_cast<double>(runs.frames[k]), change);
       }
       addPoint(lines, no_value, no_value);
     }
     panel.series.push_back(lines);
     plot.panels.push_back(panel);
   }
-  for (double& change : changes) change = std::abs(change);
-  std::sort(changes.begin(), changes.end());
-  const double most = std::max(1.0, 1.3 * changes[changes.size() * 97 / 100]);
+  if (changes.empty()) return plot;
+  // Points near infinity would leave the rest no room.
+  const double most = std::max(1.0, 1.3 * experiments::quantile(changes, 0.97));
   for (Panel& panel : plot.panels) panel.y.low = -most, panel.y.high = most;
   return plot;
 }
