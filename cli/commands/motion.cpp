@@ -5,6 +5,7 @@
 #include <cli/io/tracks.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/motion.hpp>
+#include <cli/show/motion_report.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/motion/essential_filter.hpp>
 #include <fusion/motion/gyroscope.hpp>
@@ -30,11 +31,11 @@ enum class FlowChoice { automatic, forward, midpoint, discrete };
 
 struct Options {
   MotionInputOptions input;
-  std::string truth, json, output;
+  std::string truth, json, output, report;
   FlowChoice flow = FlowChoice::automatic;
   FilterChoice filter = FilterChoice::automatic;
   double process_noise = 1e-5, rotation_noise = 1e-6, least_motion = 0.1, bias_sigma = 0.02;
-  std::size_t starts = 32, passes = 1, frames_apart = 1;
+  std::size_t starts = 32, passes = 1, frames_apart = 1, report_frame = MotionWindow::last_frame;
   bool outliers = false, bias = false;
 };
 
@@ -141,11 +142,12 @@ void compare(MotionFrame& frame, const std::map<std::size_t, CameraPose>& truth,
   const auto n = static_cast<double>(frames);
   const Eigen::Vector3d turn = n * frame.motion.rotation.mean.log();
   frame.rotation_error = degrees * distance(SO3d::exp(turn), R) / n;
-  if (!(T.norm() > least)) return;
   // The velocity that is constant over the interval, T = J_l(Ω) V, by the true rotation: that of a noisy frame says little.
+  const Eigen::Vector3d V = SO3d::leftJacobianInverse(R.log()) * T;
+  frame.truth = TrueMotion{R.log() / n, V / n};
+  if (!(T.norm() > least)) return;
   const bool velocity = frame.motion.meaning == DirectionMeaning::velocity;
-  const Eigen::Vector3d truly = velocity ? Eigen::Vector3d(SO3d::leftJacobianInverse(R.log()) * T) : T;
-  frame.direction_error = degrees * distance(frame.motion.direction.mean, S2d(truly));
+  frame.direction_error = degrees * distance(frame.motion.direction.mean, S2d(velocity ? V : T));
 }
 
 /// The gyroscope's bias in the sensor's axes, rad/s, with what was taken off the readings before.
@@ -165,6 +167,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   const Plan plan = planOf(options, gyroscope);
   ChosenFilter filter(plan.filter, plan.how);
+  MotionWindow window(options.report_frame);
   MotionResult result;
   result.passes = options.passes, result.frames_apart = options.frames_apart;
   result.with_gyroscope = gyroscope.given(), result.with_bias = options.bias, result.with_truth = !truth.empty();
@@ -195,6 +198,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
       frame.motion = filter.update(pairs, prior);
       frame.essential = filter.essentialInCharge();
       if (options.bias) frame.gyroscope_bias = biasRate(frame.motion, gyroscope, plan.step_seconds);
+      // The figures of one moment are of the whole interval, as its pairs are.
+      if (!options.report.empty()) window.add(k, pairs, tracks.tracks(), frame.motion);
       if (plan.whole_intervals && options.frames_apart > 1) divideByFrames(frame.motion, options.frames_apart);
       compare(frame, truth, apart, options.least_motion);
       result.frames.push_back(frame);
@@ -210,6 +215,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     setMotion(object, result);
     writeJson(options.json, object);
   }
+  if (!options.report.empty()) writeMotionReport(options.report, invocation.command_line, result, window, plan.how);
   return result.usable() > 0 ? exit_fine : exit_not_trusted;
 }
 
@@ -279,6 +285,8 @@ void addMotionCommand(const CommandList& app) {
       .range<std::size_t>(std::size_t{1}, std::size_t{100});
   command.option("--output", options->output, "Write a line per frame to a CSV file ('-': standard output)");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Directory for a page with estimates, residuals, traces and structure");
+  command.option("--report-frame", options->report_frame, "The frame whose residual is drawn (default: the last)");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

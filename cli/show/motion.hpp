@@ -11,6 +11,14 @@
 
 namespace liestat::cli {
 
+/// The motion that is constant over an interval and makes its pose, per frame: dX/dt = Ω × X + V in the camera's axes.
+struct TrueMotion {
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< Ω, rad
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< V, m
+  /// T of X₂ = R X₁ + T over one frame.
+  Eigen::Vector3d translation() const { return SO3d::leftJacobian(rotation) * velocity; }
+};
+
 /// The motion from the frame before to this one.
 struct MotionFrame {
   std::size_t frame = 0;  ///< as in the file
@@ -20,6 +28,7 @@ struct MotionFrame {
   Gaussian<Eigen::Vector3d> gyroscope_bias;  ///< rad/s, in the sensor's axes; where it is a state
   /// Degrees: of the translation's direction and of the rotation, where the truth is known and moves enough.
   std::optional<double> direction_error = {}, rotation_error = {};
+  std::optional<TrueMotion> truth = {};  ///< where it is known
 };
 
 struct MotionResult {

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -156,6 +157,66 @@ Series histogram(std::string name, const std::vector<double>& values, double low
     series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
     series.y.push_back(scale * counts[i]);
     series.width.push_back(width);
+  }
+  return series;
+}
+
+Series contours(std::string name, const Grid& grid, const std::vector<double>& levels) {
+  Series series{.name = std::move(name), .style = Style::contours};
+  const std::size_t columns = grid.x.size(), rows = grid.y.size();
+  // An edge of the grid by the number of its first corner: even to the right, odd upwards. A line goes from edge to edge,
+  // and each edge has at most one neighbour in either of its two cells.
+  using Ends = std::pair<std::size_t, std::size_t>;
+  for (const double level : levels) {
+    std::map<std::size_t, std::vector<std::size_t>> neighbours;
+    const auto above = [&](std::size_t i, std::size_t j) { return grid.at(i, j) >= level; };
+    const auto join = [&](const Ends& ends) {
+      neighbours[ends.first].push_back(ends.second), neighbours[ends.second].push_back(ends.first);
+    };
+    for (std::size_t j = 0; j + 1 < rows; ++j) {
+      for (std::size_t i = 0; i + 1 < columns; ++i) {
+        const double sum = grid.at(i, j) + grid.at(i + 1, j) + grid.at(i, j + 1) + grid.at(i + 1, j + 1);
+        if (!std::isfinite(sum)) continue;
+        const std::size_t corner = j * columns + i;
+        const std::size_t bottom = 2 * corner, left = bottom + 1, top = 2 * (corner + columns), right = left + 2;
+        std::vector<std::size_t> crossed;
+        if (above(i, j) != above(i + 1, j)) crossed.push_back(bottom);
+        if (above(i + 1, j) != above(i + 1, j + 1)) crossed.push_back(right);
+        if (above(i, j + 1) != above(i + 1, j + 1)) crossed.push_back(top);
+        if (above(i, j) != above(i, j + 1)) crossed.push_back(left);
+        if (crossed.size() == 2) join({crossed[0], crossed[1]});
+        if (crossed.size() != 4) continue;
+        // A saddle: its centre says which corners belong together.
+        const bool with_first = (0.25 * sum >= level) == above(i, j);
+        join({bottom, with_first ? right : left}), join({top, with_first ? left : right});
+      }
+    }
+    const auto add = [&](std::size_t edge) {
+      const std::size_t corner = edge / 2, i = corner % columns, j = corner / columns;
+      const std::size_t i2 = edge % 2 == 0 ? i + 1 : i, j2 = edge % 2 == 0 ? j : j + 1;
+      const double a = grid.at(i, j), b = grid.at(i2, j2), t = (level - a) / (b - a);
+      series.x.push_back(grid.x[i] + t * (grid.x[i2] - grid.x[i]));
+      series.y.push_back(grid.y[j] + t * (grid.y[j2] - grid.y[j]));
+      series.value.push_back(level);
+    };
+    // Open lines first, from one of their ends; what is left is closed.
+    for (const bool open : {true, false}) {
+      for (auto& [start, ends] : neighbours) {
+        if (ends.empty() || (open && ends.size() != 1)) continue;
+        std::size_t edge = start;
+        add(edge);
+        while (!neighbours[edge].empty()) {
+          const std::size_t next = neighbours[edge].back();
+          neighbours[edge].pop_back();
+          std::vector<std::size_t>& back = neighbours[next];
+          back.erase(std::find(back.begin(), back.end(), edge));
+          edge = next;
+          add(edge);
+        }
+        for (auto* list : {&series.x, &series.y}) list->push_back(std::numeric_limits<double>::quiet_NaN());
+        series.value.push_back(level);
+      }
+    }
   }
   return series;
 }

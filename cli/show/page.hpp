@@ -18,6 +18,8 @@ enum class Style {
   errorbars,     ///< a point at x, y with a bar from low to high
   boxes,         ///< histogram bars at x of height y; `width` where they are not as wide as their distance
   filled_curve,  ///< the area between low and high over x
+  image,         ///< a coloured cell about each x, y of a grid, by its `value`; NaN is left white
+  contours,      ///< lines, coloured by their `value`
   label,         ///< the series' name as a text at its first point, not in the legend
 };
 
@@ -30,6 +32,7 @@ struct Series {
   std::vector<double> low = {};
   std::vector<double> high = {};
   std::vector<double> width = {};
+  std::vector<double> value = {};          ///< of images and contours
   std::optional<std::size_t> colour = {};  ///< the number of the palette's colour; series of one colour belong together
   bool dashed = false;
 };
@@ -55,6 +58,7 @@ struct Panel {
   std::string title = {};
   Axis x = {};
   Axis y = {};
+  Axis colour = {};  ///< the scale of images and contours
   std::vector<Series> series = {};
   std::vector<ReferenceLine> references = {};
   bool equal_aspect = false;  ///< a unit is as long on both axes
@@ -75,6 +79,16 @@ Series ellipse(std::string name, const Eigen::Vector2d& centre, const Eigen::Mat
 /// out, and counts in the total.
 Series histogram(std::string name, const std::vector<double>& values, double low, double high, std::size_t bins,
                  bool density);
+
+/// Values over a grid of x and y, row by row (all x at the first y, …); NaN where there is none.
+struct Grid {
+  std::vector<double> x = {}, y = {}, value = {};
+  double at(std::size_t column, std::size_t row) const { return value[row * x.size() + column]; }
+};
+
+/// Lines of equal value, joined across the cells and interpolated linearly within them. A cell without all of its four
+/// corners has none.
+Series contours(std::string name, const Grid& grid, const std::vector<double>& levels);
 
 /// A directory with an index.html that needs nothing else, and beside it for each plot the CSV with all of its data,
 /// the gnuplot script and the SVG. Without gnuplot the page says so and keeps tables and CSV.

@@ -90,7 +90,7 @@ struct Extent {
 
 /// gnuplot extends a logarithmic axis to whole decades, which leaves most of it empty when the data span one or two,
 /// and labels nothing between. Here the range follows the data, and short axes are labelled 1, 2, 5, 10.
-std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
+std::string logarithmicAxis(std::string_view letter, const Axis& axis, Extent data) {
   double low = data.low / 1.25;
   double high = data.high * 1.25;
   if (axis.low && drawable(*axis.low, axis)) low = *axis.low;
@@ -100,20 +100,28 @@ std::string logarithmicAxis(char letter, const Axis& axis, Extent data) {
   std::string script = fmt::format("set {}range [{}:{}]\n", letter, low, high);
   if (high / low > 1e3) return script + fmt::format("set {}tics auto\n", letter);
   std::string tics;
-  for (int exponent = static_cast<int>(std::floor(std::log10(low)));
-       exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
-    for (const int digit : {1, 2, 5}) {
-      const double tic = digit * std::pow(10.0, exponent);
-      if (tic >= low && tic <= high) tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
+  // Fine steps only where coarse ones leave less than two marks.
+  for (const std::vector<double>& digits : {std::vector<double>{1, 2, 5}, {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}}) {
+    std::size_t marks = 0;
+    tics.clear();
+    for (int exponent = static_cast<int>(std::floor(std::log10(low)));
+         exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
+      for (const double digit : digits) {
+        const double tic = digit * std::pow(10.0, exponent);
+        if (tic < low || tic > high) continue;
+        tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
+        ++marks;
+      }
     }
+    if (marks > 1) break;
   }
   return script +
          (tics.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, tics));
 }
 
-std::string axisText(char letter, const Axis& axis, const Extent& data) {
+std::string axisText(std::string_view letter, const Axis& axis, const Extent& data) {
   std::string script = fmt::format("set {0}label {1}{2}\nset format {0} '{3}'\n", letter, quotedText(axis.label),
-                                   letter == 'x' ? " offset 0,0.6" : "",
+                                   letter == "x" ? " offset 0,0.6" : "",
                                    !axis.numbers      ? ""
                                    : axis.logarithmic ? "%.6g"
                                                       : "% .6g");
@@ -145,6 +153,10 @@ std::string styleText(const Series& series, std::string_view colour) {
       return fmt::format("with boxes lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
     case Style::filled_curve:
       return fmt::format("with filledcurves fs transparent solid 0.18 noborder lc rgb '{}'", colour);
+    case Style::image:
+      return "with image";
+    case Style::contours:
+      return "with lines lw 1.6 lc palette";
     case Style::label:
       break;
   }
@@ -159,9 +171,33 @@ std::string usingText(const Series& series) {
       return series.width.empty() ? "3:4" : "3:4:7";
     case Style::filled_curve:
       return "3:5:6";
+    case Style::image:
+    case Style::contours:
+      return "3:4:8";
     default:
       return "3:4";
   }
+}
+
+bool isColoured(const Series& series) { return series.style == Style::image || series.style == Style::contours; }
+bool isColoured(const Panel& panel) {
+  return std::any_of(panel.series.begin(), panel.series.end(), [](const Series& series) { return isColoured(series); });
+}
+bool isColoured(const Plot& plot) {
+  return std::any_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return isColoured(panel); });
+}
+
+std::string colourText(const Panel& panel) {
+  const Axis& axis = panel.colour;
+  Extent data;
+  for (const Series& series : panel.series) data.add(series.value, axis);
+  const std::string label = fmt::format("set cblabel {}\n", quotedText(axis.label));
+  if (axis.logarithmic) return label + "set logscale cb\n" + logarithmicAxis("cb", axis, data);
+  const auto end = [](const std::optional<double>& value) {
+    return value ? fmt::format("{}", *value) : std::string("*");
+  };
+  return label +
+         fmt::format("unset logscale cb\nset cbtics auto\nset cbrange [{}:{}]\n", end(axis.low), end(axis.high));
 }
 
 /// Every k-th point of a scatter that nobody could tell apart anyway, and that no browser could show.
@@ -186,7 +222,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     for (const auto* values : {&series.y, &series.low, &series.high}) y.add(*values, panel.y);
   }
   script +=
-      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText('x', panel.x, x) + axisText('y', panel.y, y);
+      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText("x", panel.x, x) + axisText("y", panel.y, y);
+  if (isColoured(panel)) script += colourText(panel);
   script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
   script += "unset arrow\nunset label\n";
   for (const ReferenceLine& line : panel.references) {
@@ -203,7 +240,7 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
     }
   }
   const auto named = std::count_if(panel.series.begin(), panel.series.end(), [&](const Series& series) {
-    return !series.name.empty() && series.style != Style::label && drawable(series, panel);
+    return !series.name.empty() && series.style != Style::label && !isColoured(series) && drawable(series, panel);
   });
   for (const Series& series : panel.series) {
     if (series.style != Style::label || series.x.empty() || series.y.empty()) continue;
@@ -217,11 +254,11 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   std::size_t colour = 0;
   for (const Series& series : panel.series) {
     const bool is_label = series.style == Style::label;
-    const std::size_t own = series.colour || is_label ? series.colour.value_or(0) : colour++;
+    const std::size_t own = series.colour || is_label || isColoured(series) ? series.colour.value_or(0) : colour++;
     if (series.x.empty()) continue;
     if (!is_label && drawable(series, panel)) {
       const bool enlarged = named > 1 && series.style == Style::points && !series.name.empty();
-      const bool in_legend = named > 1 && !enlarged;
+      const bool in_legend = named > 1 && !enlarged && !isColoured(series);
       // The header is part of the first block.
       commands +=
           fmt::format("{}{} index {} every {}::{} using {} {} title {}", commands.empty() ? "plot " : ", \\\n     ",
@@ -249,7 +286,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
 }  // namespace
 
 std::string plotCsv(const Plot& plot) {
-  std::string text = "panel,series,x,y,low,high,width\n";
+  const bool coloured = isColoured(plot);
+  std::string text = fmt::format("panel,series,x,y,low,high,width{}\n", coloured ? ",value" : "");
   bool first = true;
   for (const Panel& panel : plot.panels) {
     for (const Series& series : panel.series) {
@@ -258,8 +296,9 @@ std::string plotCsv(const Plot& plot) {
       first = false;
       const std::string names = csvText(panel.title) + "," + csvText(series.name);
       for (std::size_t i = 0; i < series.x.size(); ++i) {
-        text += fmt::format("{},{},{},{},{},{}\n", names, cell(series.x, i), cell(series.y, i), cell(series.low, i),
+        text += fmt::format("{},{},{},{},{},{}", names, cell(series.x, i), cell(series.y, i), cell(series.low, i),
                             cell(series.high, i), cell(series.width, i));
+        text += coloured ? fmt::format(",{}\n", cell(series.value, i)) : "\n";
       }
     }
   }
@@ -295,6 +334,12 @@ std::string plotScript(const Plot& plot, const std::string& name) {
       "set pointintervalbox 0.01\n"
       "set errorbars 0.6\n",
       name, width, height);
+  if (isColoured(plot)) {
+    // Light is small; lightness rises steadily, also to eyes that miss red or green.
+    script +=
+        "set palette defined (0 '#fde725', 1 '#7ad151', 2 '#22a884', 3 '#2a788e', 4 '#414487', 5 '#440154')\n"
+        "set cbtics format '%.3g' font ',10'\n";
+  }
   if (n > 1) script += fmt::format("set multiplot layout {},{}\n", rows, columns);
   for (std::size_t i = 0; i < n; ++i) appendPanel(script, plot, i, name + ".csv");
   if (n > 1) script += "\nunset multiplot\n";

@@ -7,7 +7,7 @@
 
 namespace liestat::cli {
 
-/// The data of a plot as CSV: panel,series,x,y,low,high,width. Series are separated by two blank lines, by which
+/// The data of a plot as CSV: panel,series,x,y,low,high,width, and value in one with images or contours. Series are separated by two blank lines, by which
 /// gnuplot counts.
 std::string plotCsv(const Plot& plot);
 

@@ -36,6 +36,7 @@ struct DirectionCandidate {
                                        ///< direction and the rotation in `whole`
   FilterCovariance<double, 8> whole;   ///< MotionState::rotation_and_bias: direction, rotation, bias
   double score = 0;
+  std::size_t start = 0;  ///< its number among the starts
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< of the last frames, a ring
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;

@@ -286,7 +286,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadStarts() {
   best_ = updates_ = innovation_count_ = 0, innovation_sum_ = 0;
   for (std::size_t i = 0; i < n; ++i) {
     DirectionCandidate& c = candidates_[i];
-    c.direction = S2d(lattice[i]);
+    c.direction = S2d(lattice[i]), c.start = i;
     if (keepsTheRotation(state_)) {
       // The rotation that the frame says at this direction, with little trust in it.
       c.wide.gain.bottomRightCorner<3, 3>() *= 0.09;

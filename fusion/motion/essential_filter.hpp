@@ -49,7 +49,8 @@ class EssentialFilter {
   std::vector<MotionHypothesis> hypotheses() const {
     std::vector<MotionHypothesis> list;
     for (const detail::DirectionCandidate& c : engine_.candidates()) {
-      list.push_back({c.direction, Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>()), c.rotation.log(), c.score});
+      list.push_back(
+          {c.direction, Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>()), c.rotation.log(), c.score, c.start});
     }
     return list;
   }

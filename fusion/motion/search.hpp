@@ -31,6 +31,59 @@ inline double subspaceCost(std::span<const FlowPoint<double>> points, const Eige
   return cost;
 }
 
+/// The essential filter's residual: Σ w e² of the epipolar constraint for the motion X₂ = R X₁ + T, with Sampson's
+/// normalisation (Flow::discrete). Pairs that R turns out of sight are left out.
+inline double essentialCost(std::span<const PointPair> pairs, const SO3d& R, const Eigen::Vector3d& T) {
+  const Eigen::Matrix3d matrix = R.matrix();
+  double cost = 0;
+  for (const PointPair& pair : pairs) {
+    const FlowPoint<double> p = flowAfter(matrix, pair);
+    if (!std::isfinite(p.x)) continue;
+    const FlowRow<double> row = flowRow(p, T);
+    cost += row.weight * row.q * row.q;
+  }
+  return cost;
+}
+
+/// A rotation with the least essentialCost() at a direction, and that cost.
+struct EssentialMinimum {
+  SO3d rotation;
+  double cost = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// The same with the rotation eliminated, by Gauss-Newton from `start` with steps halved that do not lower the cost. NaN
+/// where the rotation is not determined.
+inline EssentialMinimum essentialCostOverRotations(std::span<const PointPair> pairs, const Eigen::Vector3d& T,
+                                                   const SO3d& start = {}) {
+  EssentialMinimum best{start, essentialCost(pairs, start, T)};
+  for (int step = 0; step < 20; ++step) {
+    const Eigen::Matrix3d matrix = best.rotation.matrix();
+    FlowRotationSums<double> sums;
+    for (const PointPair& pair : pairs) {
+      const FlowPoint<double> p = flowAfter(matrix, pair);
+      if (!std::isfinite(p.x)) continue;
+      const FlowRow<double> row = flowRow(p, T);
+      const Eigen::Vector3d h(row.h0, row.h1, row.h2);
+      sums.M += row.weight * h * h.transpose();
+      sums.right += row.weight * row.q * h;
+    }
+    const Eigen::Vector3d Omega = sums.solve({});
+    if (!Omega.allFinite()) return {start};
+    double scale = 1;
+    EssentialMinimum next;
+    for (int half = 0; half < 6; ++half, scale *= 0.5) {
+      next.rotation = SO3d::exp(Eigen::Vector3d(scale * Omega)) * best.rotation;
+      next.cost = essentialCost(pairs, next.rotation, T);
+      if (next.cost < best.cost) break;
+    }
+    if (!(next.cost < best.cost)) break;
+    const bool done = best.cost - next.cost <= 1e-6 * best.cost;
+    best = next;
+    if (done) break;
+  }
+  return best;
+}
+
 /// n directions of a hemisphere, z > 0, in equal areas: a spherical Fibonacci lattice.
 inline std::vector<Eigen::Vector3d> hemisphereLattice(std::size_t n) {
   std::vector<Eigen::Vector3d> directions;

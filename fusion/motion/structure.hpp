@@ -102,6 +102,14 @@ class MotionStructure {
     for (StructurePoint& p : seen) p.inverse_depth += mean < 0 ? -2 * mean : 0;
     return seen;
   }
+  /// The other interpretation of the same tracks, in front of the camera too: that of the direction turned round, whose
+  /// depths are -ρ. "Rubbery" if the mean of points() is in front of the camera, rigid if it is behind it.
+  std::vector<StructurePoint> turnedRound() const {
+    std::vector<StructurePoint> seen = points_;
+    const double mean = meanInverseDepth();
+    for (StructurePoint& p : seen) p.inverse_depth = (mean < 0 ? 0 : 2 * mean) - p.inverse_depth;
+    return seen;
+  }
 
  private:
   /// X ← R X + T, and the inverse depth's variance with that of the motion.
@@ -153,14 +161,18 @@ class RigidityTest {
   /// rigid. NaN of fewer than two snapshots or points.
   double spread() const {
     if (snapshots_ < 2 || sum_.empty()) return std::numeric_limits<double>::quiet_NaN();
-    const auto n = static_cast<double>(snapshots_);
     std::vector<double> deviations;
-    for (std::size_t k = 0; k < sum_.size(); ++k) {
-      deviations.push_back(std::sqrt(std::max(0.0, (squares_[k] - sum_[k] * sum_[k] / n) / (n - 1))));
-    }
+    for (std::size_t k = 0; k < sum_.size(); ++k) deviations.push_back(deviation(k));
     const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
     std::nth_element(deviations.begin(), middle, deviations.end());
     return *middle;
+  }
+  /// The relative standard deviation of the distance between points 2k and 2k + 1, for each k: no point is in two.
+  std::vector<double> separateSpreads() const {
+    std::vector<double> deviations;
+    if (snapshots_ < 2) return deviations;
+    for (std::size_t i = 1; i < first_.size(); i += 2) deviations.push_back(deviation(i * (i - 1) / 2 + i - 1));
+    return deviations;
   }
   /// The rotation vector (rad) that takes the first snapshot to the last one best, about their centroids, up to scale.
   Eigen::Vector3d rotation() const {
@@ -173,9 +185,65 @@ class RigidityTest {
   }
 
  private:
+  /// The standard deviation of the k-th distance's logarithm.
+  double deviation(std::size_t k) const {
+    const auto n = static_cast<double>(snapshots_);
+    return std::sqrt(std::max(0.0, (squares_[k] - sum_[k] * sum_[k] / n) / (n - 1)));
+  }
+
   std::vector<Eigen::Vector3d> first_, last_;
   std::vector<double> sum_, squares_;
   std::size_t snapshots_ = 0;
 };
+
+/// Which of two interpretations of the same points is the rigid one.
+struct RigidityComparison {
+  std::size_t distances = 0;  ///< that were compared, no point in two of them
+  std::size_t steadier = 0;   ///< those that vary less in the first interpretation
+  /// The probability that distances vary so much less in the first one if neither is more rigid than the other; 1 where
+  /// nothing could be compared.
+  double p_value = 1;
+
+  /// The first interpretation is the rigid one, at this false-alarm probability (which takes seven distances).
+  bool first_is_rigid(double level = 0.01) const { return p_value < level; }
+};
+
+/// Wilcoxon's signed-rank test (F. Wilcoxon, Biometrics Bulletin 1, 1945; its exact law up to fifty distances, the normal
+/// one above) of the spreads of separate distances: it needs no covariance, and errors of the motion, common to all points,
+/// are the same in both. Snapshots of the same points in the same order.
+inline RigidityComparison compareRigidity(const RigidityTest& first, const RigidityTest& second) {
+  const std::vector<double> a = first.separateSpreads(), b = second.separateSpreads();
+  RigidityComparison result;
+  std::vector<double> gains;  // positive where the first is steadier
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) {
+    const double gain = std::log(b[k] / a[k]);
+    if (std::isfinite(gain) && gain != 0) gains.push_back(gain);
+  }
+  const std::size_t n = gains.size();
+  if (n == 0 || a.size() != b.size()) return result;
+  std::sort(gains.begin(), gains.end(), [](double x, double y) { return std::abs(x) < std::abs(y); });
+  std::size_t sum = 0;  // of the ranks of the steadier ones
+  for (std::size_t k = 0; k < n; ++k) {
+    if (gains[k] > 0) sum += k + 1, ++result.steadier;
+  }
+  result.distances = n;
+  const std::size_t most = n * (n + 1) / 2;
+  if (n > 50) {
+    const auto count = static_cast<double>(n);
+    const double mean = 0.25 * count * (count + 1), variance = mean * (2 * count + 1) / 6;
+    result.p_value = 0.5 * std::erfc((static_cast<double>(sum) - 0.5 - mean) / std::sqrt(2 * variance));
+    return result;
+  }
+  // The number of subsets of the ranks with each sum.
+  std::vector<double> subsets(most + 1, 0);
+  subsets[0] = 1;
+  for (std::size_t rank = 1; rank <= n; ++rank) {
+    for (std::size_t s = most; s >= rank; --s) subsets[s] += subsets[s - rank];
+  }
+  double above = 0;
+  for (std::size_t s = sum; s <= most; ++s) above += subsets[s];
+  result.p_value = above * std::pow(0.5, static_cast<double>(n));
+  return result;
+}
 
 }  // namespace liestat

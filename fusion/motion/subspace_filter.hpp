@@ -42,7 +42,7 @@ class SubspaceFilter {
     for (const detail::DirectionCandidate& c : engine_.candidates()) {
       const bool wide = engine_.options().estimate_bias;
       list.push_back({c.direction, wide ? Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>()) : c.narrow.reported,
-                      c.Omega, c.score});
+                      c.Omega, c.score, c.start});
     }
     return list;
   }

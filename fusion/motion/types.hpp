@@ -123,6 +123,8 @@ struct MotionHypothesis {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  ///< local frame, rad²
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();        ///< Ω of the last frame, rad per frame
   double score = 0;                                          ///< sum of the frames' costs
+  /// The start that it came from, in the order of hemisphereLattice(starts); 0 of a start that was given, or linear.
+  std::size_t start = 0;
 };
 
 /// Options of the filters. The values are those of the validation (docs/motion.md).

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -102,6 +103,65 @@ TEST(Report, PageHoldsTextTablesAndPlots) {
   EXPECT_TRUE(contains(page, "no finite data"));
   EXPECT_EQ(count(page, "id='every_style_gpPt6'"), 1U) << "identifiers differ between the drawings";
   EXPECT_EQ(count(page, "id='gpPt6'"), 0U);
+}
+
+TEST(Report, ContoursAreTheLinesOfEqualValue) {
+  // x² + y² over ±2 in steps of 0.1 (linear interpolation: 0.0013 off), with a corner that has no values.
+  Grid grid;
+  for (int k = -20; k <= 20; ++k) grid.x.push_back(0.1 * k), grid.y.push_back(0.1 * k);
+  for (const double y : grid.y) {
+    for (const double x : grid.x) grid.value.push_back(x > 1.45 && y > 1.45 ? nan : x * x + y * y);
+  }
+  const Series lines = contours("circles", grid, {1, 5});
+  ASSERT_EQ(lines.x.size(), lines.y.size());
+  ASSERT_EQ(lines.x.size(), lines.value.size());
+  std::size_t breaks = 0;
+  double length = 0;
+  for (std::size_t i = 0; i < lines.x.size(); ++i) {
+    if (!std::isfinite(lines.x[i])) {
+      breaks += lines.value[i] == 1 ? 1U : 0U;
+      continue;
+    }
+    EXPECT_NEAR(std::hypot(lines.x[i], lines.y[i]), std::sqrt(lines.value[i]), 0.003);
+    if (lines.value[i] == 1 && i > 0 && std::isfinite(lines.x[i - 1])) {
+      length += std::hypot(lines.x[i] - lines.x[i - 1], lines.y[i] - lines.y[i - 1]);
+    }
+  }
+  // The inner circle is one closed line.
+  EXPECT_EQ(breaks, 1U);
+  EXPECT_NEAR(length, 2 * std::numbers::pi, 0.02);
+  EXPECT_TRUE(contours("none", grid, {-1, 100}).x.empty());
+  // A saddle keeps its lines apart.
+  const Grid saddle{.x = {0, 1}, .y = {0, 1}, .value = {1, 0, 0, 1}};
+  EXPECT_EQ(contours("saddle", saddle, {0.4}).x.size(), 6U);
+}
+
+TEST(Report, ImagesAndContoursHaveAScaleOfColours) {
+  const TemporaryDirectory directory;
+  Grid grid{.x = {0, 1, 2}, .y = {0, 1, 2}, .value = {1, 2, 3, 2, 5, 8, 3, 8, nan}};
+  Series image{.name = "cells", .style = Style::image, .value = grid.value};
+  for (const double y : grid.y) {
+    for (const double x : grid.x) image.x.push_back(x), image.y.push_back(y);
+  }
+  const Panel panel{
+      .title = "map",
+      .colour = {.label = "cost", .logarithmic = true},
+      .series = {image, contours("level", grid, {2.5}), {.name = "star", .style = Style::stars, .x = {1}, .y = {1}}}};
+  const Plot plot{.name = "map", .panels = {panel}};
+  const std::string csv = plotCsv(plot), script = plotScript(plot, "map");
+  EXPECT_EQ(csv.substr(0, 62), "panel,series,x,y,low,high,width,value\nmap,cells,0,0,,,,1\nmap,c");
+  EXPECT_TRUE(contains(script, "with image"));
+  EXPECT_TRUE(contains(script, "lc palette"));
+  EXPECT_TRUE(contains(script, "set logscale cb"));
+  EXPECT_TRUE(contains(script, "set cblabel 'cost'"));
+  EXPECT_FALSE(contains(plotScript(everyStyle(), "s"), "palette"));
+  if (!hasGnuplot()) GTEST_SKIP() << "skipped what follows: gnuplot is not installed";
+  Report report(directory / "report", "Colours");
+  report.plot(plot);
+  const std::string page = contentOf(report.write());
+  EXPECT_EQ(count(page, "<svg"), 1U);
+  EXPECT_TRUE(contains(page, "data:image/png;base64"));
+  EXPECT_FALSE(contains(page, "could not draw"));
 }
 
 TEST(Report, TextsAreNeverCommands) {

@@ -4,6 +4,7 @@
 #include <fusion/motion/essential_filter.hpp>
 #include <fusion/motion/gyroscope.hpp>
 #include <fusion/motion/motion_filter.hpp>
+#include <fusion/motion/search.hpp>
 #include <fusion/motion/subspace_filter.hpp>
 #include <fusion/motion/track_pairs.hpp>
 #include <support/motion_runs.hpp>
@@ -288,6 +289,55 @@ TEST(EssentialFilter, StateIsAPointOfTheEssentialManifold) {
   }
   EXPECT_GT(squared, 0.02);
   EXPECT_LT(squared, 1);
+}
+
+TEST(EssentialFilter, FromTheRubberyState) {
+  // The report's figure 13: from the antipode the sign of the depths turns the direction round; without it both filters stay
+  // there, with the right rotation.
+  std::size_t held_right = 0, free_turned = 0;
+  const std::size_t trials = 20;
+  for (std::uint64_t trial = 0; trial < trials; ++trial) {
+    MotionScene scene({.sigma = 1}, 31, trial);
+    scene.advance();
+    Gaussian<Essentiald> rubbery;
+    rubbery.mean = Essentiald(SO3d::exp(scene.rotation), S2d(Eigen::Vector3d(-scene.translation)));
+    rubbery.covariance *= 0.01;
+    EssentialFilter held, released({.positive_depth = false});
+    held.start(rubbery), released.start(rubbery);
+    for (int k = 0; k < 20; ++k) {
+      scene.advance();
+      held.update(scene.pairs), released.update(scene.pairs);
+    }
+    held_right += errorOf(scene, held.estimate()) < 5 ? 1U : 0U;
+    free_turned += errorOf(scene, released.estimate()) > 175 && released.estimate().flags.undecided_sign ? 1U : 0U;
+    // χ² of three degrees of freedom: 30 has a probability of 1e-6.
+    EXPECT_LT(mahalanobisSquared(released.estimate().rotation, SO3d::exp(scene.rotation)), 30) << trial;
+  }
+  EXPECT_EQ(held_right, trials);
+  EXPECT_EQ(free_turned, trials);
+}
+
+TEST(SubspaceFilter, HypothesesRememberTheirStart) {
+  MotionScene scene({.sigma = 1}, 32);
+  // A filter that is given its start predicts its first frame, with process noise; one that finds its starts does not.
+  const MotionFilterOptions options{.process_noise = 0};
+  SubspaceFilter filter(options);
+  const auto lattice = hemisphereLattice(32);
+  std::vector<SubspaceFilter> alone(32, SubspaceFilter(options));
+  for (std::size_t i = 0; i < alone.size(); ++i) alone[i].start({S2d(lattice[i]), Eigen::Matrix2d::Identity()});
+  for (int k = 0; k < 12; ++k) {
+    scene.advance();
+    filter.update(scene.pairs);
+    for (SubspaceFilter& single : alone) single.update(scene.pairs);
+    std::vector<bool> seen(32, false);
+    for (const MotionHypothesis& h : filter.hypotheses()) {
+      ASSERT_LT(h.start, 32U);
+      EXPECT_FALSE(seen[h.start]);
+      seen[h.start] = true;
+      EXPECT_LT(distance(h.direction, alone[h.start].estimate().direction.mean), 1e-9);
+    }
+  }
+  EXPECT_LT(filter.hypotheses().size(), 32U);
 }
 
 TEST(MotionFilter, HandsOverAndIsMoreAccurate) {

@@ -320,6 +320,31 @@ TEST(SubspaceUpdate, DiscreteFlowIsTheEpipolarConstraint) {
   }
 }
 
+TEST(SubspaceUpdate, EssentialCostIsTheLeastOverRotations) {
+  for (std::uint64_t trial = 0; trial < 10; ++trial) {
+    MotionScene scene({.sigma = 1, .rotation = 10}, 24, trial);
+    scene.advance();
+    const SO3d R = SO3d::exp(scene.rotation);
+    const Eigen::Vector3d T = scene.translation.normalized(), opposite = -T;
+    const EssentialMinimum least = essentialCostOverRotations(scene.pairs, T);
+    // The gain over the truth is χ² with three degrees of freedom, 35 at a probability of 1e-7.
+    const double gain = essentialCost(scene.pairs, R, T) - least.cost;
+    EXPECT_GE(gain, 0);
+    EXPECT_LT(gain, 35);
+    EXPECT_NEAR(essentialCost(scene.pairs, R, opposite), essentialCost(scene.pairs, R, T), 1e-9);
+    // χ² with N - 3 = 17 degrees of freedom: 60 has a probability of 1e-6.
+    EXPECT_LT(least.cost, 60);
+    for (int k = 0; k < 3; ++k) {
+      for (const double step : {-0.003, 0.003}) {
+        const SO3d moved = SO3d::exp(Eigen::Vector3d(step * Eigen::Vector3d::Unit(k))) * least.rotation;
+        EXPECT_GT(essentialCost(scene.pairs, moved, T), least.cost);
+      }
+    }
+  }
+  const EssentialMinimum none = essentialCostOverRotations({}, Eigen::Vector3d::UnitX());
+  EXPECT_TRUE(std::isnan(none.cost));
+}
+
 TEST(SubspaceUpdate, CostIsChiSquaredAtTheTruthAndTheGradientHasItsInformation) {
   // 3000 independent frames; standard errors 0.006 and 0.018; a bound of 5 of them fails once in 10⁶ runs. Second-order
   // terms of the noise add up to 3 % at 1 and 8 px.

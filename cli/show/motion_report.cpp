@@ -1,0 +1,719 @@
+#include <cli/show/motion_report.hpp>
+
+#include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
+#include <cli/show/motion_report_maps.hpp>
+#include <cli/show/motion_report_runs.hpp>
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
+#include <experiments/summary.hpp>
+#include <fusion/motion/motion_filter.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+namespace liestat::cli {
+
+void MotionWindow::add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks,
+                       const MotionEstimate& motion) {
+  if (frame <= newest_) frames_.clear();
+  newest_ = frame;
+  if (frame > looked_at_) return;
+  if (frames_.size() == most_frames) frames_.erase(frames_.begin());
+  frames_.push_back({frame, motion, {pairs.begin(), pairs.end()}, {tracks.begin(), tracks.end()}});
+}
+
+namespace {
+
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double region_95 = 5.991;  // χ² of two degrees of freedom
+constexpr std::size_t most_frames_drawn = 2000;
+// The palette's colours by what they stand for.
+constexpr std::size_t estimate_ink = 0, second_ink = 1, third_ink = 2, fourth_ink = 3, truth_ink = 6;
+constexpr std::array<const char*, 3> axis_names = {"x", "y", "z"};
+constexpr std::array<std::size_t, 3> axis_inks = {estimate_ink, second_ink, third_ink};
+
+void addPoint(Series& series, double x, double y) { series.x.push_back(x), series.y.push_back(y); }
+void addBand(Series& series, double x, double middle, double sigma) {
+  series.x.push_back(x);
+  series.low.push_back(middle - 2 * sigma), series.high.push_back(middle + 2 * sigma);
+}
+Series named(std::string name, Style style, std::size_t ink, bool dashed = false) {
+  return {.name = std::move(name), .style = style, .colour = ink, .dashed = dashed};
+}
+Series star(std::string name, const Eigen::Vector2d& at, std::size_t ink) {
+  Series series = named(std::move(name), Style::stars, ink);
+  addPoint(series, at.x(), at.y());
+  return series;
+}
+
+using Basis = Eigen::Matrix<double, 3, 2>;
+Basis basisOf(const S2d& direction) { return ManifoldTraits<S2d>::placement(direction).matrix().leftCols<2>(); }
+
+/// The true direction of what an estimate is that of.
+Eigen::Vector3d trueDirection(const TrueMotion& truth, DirectionMeaning meaning) {
+  return (meaning == DirectionMeaning::velocity ? truth.velocity : truth.translation()).normalized();
+}
+
+/// The velocity of a translation: V ∝ J_l(Ω)⁻¹ T, with the covariance of T.
+Gaussian<S2d> velocityDirection(const MotionEstimate& motion) {
+  if (motion.meaning == DirectionMeaning::velocity) return motion.direction;
+  const Eigen::Matrix3d J = SO3d::leftJacobianInverse(motion.rotation.mean.log());
+  const Eigen::Vector3d V = J * motion.direction.mean.unit_vector();
+  const S2d direction(V);
+  const Eigen::Matrix2d D = basisOf(direction).transpose() * (J * basisOf(motion.direction.mean)) / V.norm();
+  return {direction, D * motion.direction.covariance * D.transpose()};
+}
+
+/// The axis' ends from values that should be seen: a margin about all of them, none without any.
+struct Extents {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  void add(double value) {
+    if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+  }
+  void set(Axis& axis) const {
+    if (!(low <= high)) return;
+    const double margin = std::max(0.08 * (high - low), 1e-6 + 1e-3 * std::abs(high));
+    axis.low = low - margin, axis.high = high + margin;
+  }
+};
+
+/// What is known of one quantity with three components over the frames.
+struct Component {
+  std::array<Series, 3> lines, bands, truths;
+  Extents usable;              ///< of what is worth seeing
+  std::vector<double> sigmas;  ///< the same of two standard deviations
+
+  /// `frames_apart`: larger gaps between frames are left open.
+  explicit Component(std::size_t frames_apart) : step_(static_cast<double>(frames_apart)) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      lines[k] = named(axis_names[k], Style::lines, axis_inks[k]);
+      bands[k] = named("", Style::filled_curve, axis_inks[k]);
+      truths[k] = named(k == 0 ? "truth" : "", Style::lines, truth_ink, true);
+    }
+  }
+  void add(double frame, const Eigen::Vector3d& value, const Eigen::Vector3d& sigma, bool ok) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      if (!lines[k].x.empty() && frame - lines[k].x.back() > step_) {
+        addPoint(lines[k], no_value, no_value);
+        addBand(bands[k], no_value, no_value, 0);
+      }
+      addPoint(lines[k], frame, value[i]);
+      addBand(bands[k], frame, value[i], sigma[i]);
+      if (ok) usable.add(value[i]), sigmas.push_back(2 * sigma[i]);
+    }
+  }
+  void addTruth(double frame, const Eigen::Vector3d& value) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!truths[k].x.empty() && frame - truths[k].x.back() > step_) addPoint(truths[k], no_value, no_value);
+      addPoint(truths[k], frame, value[static_cast<Eigen::Index>(k)]);
+      usable.add(truths[k].y.back());
+    }
+  }
+  void drawOn(Panel& panel, std::size_t components = 3) const {
+    for (std::size_t k = 0; k < components; ++k) panel.series.push_back(bands[k]);
+    for (std::size_t k = 0; k < components; ++k) {
+      if (!truths[k].x.empty()) panel.series.push_back(truths[k]);
+    }
+    for (std::size_t k = 0; k < components; ++k) panel.series.push_back(lines[k]);
+    // A frame that hardly says anything would take the scale.
+    Extents seen = usable;
+    if (!sigmas.empty() && seen.low <= seen.high) {
+      const double most = experiments::quantile(sigmas, 0.95);
+      seen.low -= most, seen.high += most;
+    }
+    seen.set(panel.y);
+  }
+
+ private:
+  double step_;
+};
+
+std::size_t strideOf(const MotionResult& result) {
+  return (result.frames.size() + most_frames_drawn - 1) / most_frames_drawn;
+}
+std::string thinned(const MotionResult& result) {
+  const std::size_t step = strideOf(result);
+  return step > 1 ? fmt::format(" One frame in {} is drawn.", step) : std::string();
+}
+
+Plot estimatesPlot(const MotionResult& result) {
+  Component direction(strideOf(result)), rotation(strideOf(result));
+  for (std::size_t i = 0; i < result.frames.size(); i += strideOf(result)) {
+    const MotionFrame& frame = result.frames[i];
+    const auto at = static_cast<double>(frame.frame);
+    const Gaussian<S2d>& d = frame.motion.direction;
+    const Eigen::Matrix3d P = basisOf(d.mean) * d.covariance * basisOf(d.mean).transpose();
+    direction.add(at, d.mean.unit_vector(), P.diagonal().cwiseMax(0).cwiseSqrt(), frame.motion.ok());
+    // From the local frame to the rotation vector.
+    const Eigen::Vector3d Omega = frame.motion.rotation.mean.log();
+    const Eigen::Matrix3d J = SO3d::rightJacobianInverse(Omega);
+    const Eigen::Matrix3d Q = J * frame.motion.rotation.covariance * J.transpose();
+    rotation.add(at, degrees * Omega, degrees * Q.diagonal().cwiseMax(0).cwiseSqrt(), frame.motion.ok());
+    if (!frame.truth) continue;
+    rotation.addTruth(at, degrees * frame.truth->rotation);
+    if (frame.direction_error) direction.addTruth(at, trueDirection(*frame.truth, frame.motion.meaning));
+  }
+  Plot plot{
+      .name = "estimates",
+      .caption =
+          "Direction of motion and rotation over one frame, of the points in the camera's axes (x right, y down, z "
+          "forward), with bands of two standard deviations (figures 2 to 4). The direction is that of the "
+          "velocity, and of the translation from one frame to the next where the essential filter is in "
+          "charge." +
+          thinned(result)};
+  Panel directions{.title = "direction", .x = {.label = "frame"}, .y = {.label = "component"}};
+  direction.drawOn(directions);
+  directions.y.low = -1.05, directions.y.high = 1.05;
+  Panel rotations{.title = "rotation", .x = {.label = "frame"}, .y = {.label = "deg per frame"}};
+  rotation.drawOn(rotations);
+  plot.panels = {directions, rotations};
+  return plot;
+}
+
+Plot errorsPlot(const MotionResult& result) {
+  Component direction(strideOf(result)), rotation(strideOf(result));
+  for (std::size_t i = 0; i < result.frames.size(); i += strideOf(result)) {
+    const MotionFrame& frame = result.frames[i];
+    if (!frame.truth) continue;
+    const auto at = static_cast<double>(frame.frame);
+    const MotionEstimate& motion = frame.motion;
+    const Eigen::Vector3d turn = (motion.rotation.mean.inverse() * SO3d::exp(frame.truth->rotation)).log();
+    rotation.add(at, -degrees * turn, degrees * motion.rotation.covariance.diagonal().cwiseMax(0).cwiseSqrt(),
+                 motion.ok());
+    if (!frame.direction_error) continue;
+    const Gaussian<S2d>& d = motion.direction;
+    const Eigen::Vector2d error = log(d.mean, S2d(trueDirection(*frame.truth, motion.meaning)));
+    const Eigen::Vector2d sigma = d.covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    direction.add(at, -degrees * error.homogeneous(), degrees * Eigen::Vector3d(sigma.x(), sigma.y(), 0), false);
+    if (!motion.ok()) continue;
+    for (int k = 0; k < 2; ++k) {
+      direction.usable.add(-degrees * error[k]);
+      direction.sigmas.push_back(2 * degrees * sigma[k]);
+    }
+  }
+  for (std::size_t k = 0; k < 2; ++k) direction.lines[k].name = k == 0 ? "first" : "second";
+  Plot plot{.name = "errors",
+            .caption =
+                "Estimate minus truth with bands of two standard deviations (figures 2 and 3), in the coordinates of "
+                "the covariances: the direction's two tangent coordinates, the rotation's axes of the first "
+                "frame. The scales are those of the frames that may be used." +
+                thinned(result)};
+  Panel directions{.title = "error of the direction",
+                   .x = {.label = "frame"},
+                   .y = {.label = "tangent coordinate, deg"},
+                   .references = {{.at = 0}}};
+  direction.drawOn(directions, 2);
+  Panel rotations{.title = "error of the rotation",
+                  .x = {.label = "frame"},
+                  .y = {.label = "deg per frame"},
+                  .references = {{.at = 0}}};
+  rotation.drawOn(rotations);
+  plot.panels = {directions, rotations};
+  return plot;
+}
+
+/// What is drawn of one frame.
+struct LookedAt {
+  std::size_t frame = 0;
+  const MotionEstimate& motion;
+  double interval = 1;  ///< frames, the longest of the pairs'
+  SO3d rotation;        ///< over it, as the translations
+  Gaussian<S2d> velocity, translation;
+  std::optional<Eigen::Vector3d> true_velocity, true_translation;
+  std::vector<PointPair> pairs, whole;  ///< without outliers; those over the interval, as one step
+
+  LookedAt(const MotionPairs& at, const MotionFrame& result) : frame(at.frame), motion(at.motion) {
+    for (const PointPair& pair : at.pairs) interval = std::max(interval, pair.frames);
+    const Eigen::Vector3d Omega = interval * motion.rotation.mean.log();
+    MotionEstimate over = motion;
+    over.rotation.mean = rotation = SO3d::exp(Omega);
+    velocity = velocityDirection(motion), translation = translationDirection(over);
+    if (!result.truth || !result.direction_error) return;
+    true_velocity = result.truth->velocity.normalized();
+    const Eigen::Vector3d turn = interval * result.truth->rotation;
+    true_translation = (SO3d::leftJacobian(turn) * *true_velocity).normalized();
+  }
+  MotionReference reference() const {
+    return {velocity.mean.unit_vector(), translation.mean.unit_vector(), rotation, interval};
+  }
+  const Gaussian<S2d>& directionOf(Flow flow) const { return flow == Flow::discrete ? translation : velocity; }
+  const std::optional<Eigen::Vector3d>& truthOf(Flow flow) const {
+    return flow == Flow::discrete ? true_translation : true_velocity;
+  }
+};
+
+struct FlowMap {
+  Flow flow;
+  const char* name;
+  ResidualMap map;
+};
+
+Axis tangentAxis(int number) {
+  return {.label = fmt::format("{} tangent coordinate, deg", number == 0 ? "first" : "second"), .low = -93, .high = 93};
+}
+/// The image of a map.
+Panel mapPanel(std::string title, const Grid& grid, const Axis& colour) {
+  Series image{.name = "residual", .style = Style::image, .value = grid.value};
+  for (const double y : grid.y) {
+    for (const double x : grid.x) addPoint(image, x, y);
+  }
+  return {.title = std::move(title),
+          .x = tangentAxis(0),
+          .y = tangentAxis(1),
+          .colour = colour,
+          .series = {image},
+          .equal_aspect = true};
+}
+
+/// From the least residual to what nearly all directions are below, three decades at most, so that a few do not take all
+/// colours.
+Axis colourAxis(std::initializer_list<const Grid*> grids) {
+  std::vector<double> values;
+  for (const Grid* grid : grids) {
+    for (const double value : grid->value) {
+      if (std::isfinite(value) && value > 0) values.push_back(value);
+    }
+  }
+  Axis axis{.label = "residual per degree of freedom", .logarithmic = true};
+  if (values.empty()) return axis;
+  std::sort(values.begin(), values.end());
+  axis.high = std::max(values[values.size() * 98 / 100], 1.5 * values.front());
+  axis.low = std::max(values.front(), 1e-3 * *axis.high);
+  return axis;
+}
+
+Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
+  Plot plot{
+      .name = "residual",
+      .caption = fmt::format(
+          "The residual of frame {} over the hemisphere about the filter's estimate, which is at the origin (figures "
+          "5 and 6), and below on the right its minima near the estimate with their 95 % regions: those of "
+          "the minima by the curvature of one frame, that of the estimate by all frames.",
+          at.frame)};
+  const Axis colour = colourAxis({&maps[0].map.grid, &maps[1].map.grid, &maps[2].map.grid});
+  Panel near{.title = "near the estimate",
+             .x = {.label = "first tangent coordinate, deg"},
+             .y = {.label = "second tangent coordinate, deg"},
+             .equal_aspect = true};
+  double reach = 1;
+  for (std::size_t k = 0; k < maps.size(); ++k) {
+    const FlowMap& of = maps[k];
+    Panel panel = mapPanel(of.name, of.map.grid, colour);
+    if (!of.map.others.empty()) {
+      Series others = named("other local minima", Style::points, fourth_ink);
+      for (const Eigen::Vector2d& other : of.map.others) addPoint(others, other.x(), other.y());
+      panel.series.push_back(others);
+    }
+    panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
+    panel.series.push_back(star("minimum", of.map.least, second_ink));
+    const HemisphereChart chart(at.directionOf(of.flow).mean.unit_vector());
+    if (at.truthOf(of.flow)) panel.series.push_back(star("truth", chart(*at.truthOf(of.flow)), truth_ink));
+    plot.panels.push_back(panel);
+    near.series.push_back(star(of.name, of.map.least, k + 1));
+    if (of.map.least.norm() < 45) reach = std::max(reach, of.map.least.norm());
+    if (!of.map.covariance) continue;
+    Series region = ellipse("", of.map.least, *of.map.covariance, region_95);
+    region.colour = k + 1, region.dashed = true;
+    near.series.push_back(region);
+    reach = std::max(reach, std::min(45.0, of.map.least.norm() + std::sqrt(region_95 * of.map.covariance->trace())));
+  }
+  near.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
+  const Eigen::Matrix2d P = degrees * degrees * at.velocity.covariance;
+  Series region = ellipse("", Eigen::Vector2d::Zero(), P, region_95);
+  region.colour = estimate_ink;
+  near.series.push_back(region);
+  reach = std::max(reach, std::sqrt(region_95 * P.trace()));
+  if (at.true_velocity) {
+    const Eigen::Vector2d truth = HemisphereChart(at.velocity.mean.unit_vector())(*at.true_velocity);
+    near.series.push_back(star("truth", truth, truth_ink));
+    if (truth.norm() < 45) reach = std::max(reach, truth.norm());
+  }
+  reach = std::min(1.25 * reach, 90.0);
+  near.x.low = near.y.low = -reach, near.x.high = near.y.high = reach;
+  plot.panels.push_back(near);
+  return plot;
+}
+
+void residualTable(Report& report, const LookedAt& at, const std::array<FlowMap, 3>& maps) {
+  std::vector<std::vector<std::string>> rows;
+  for (const FlowMap& of : maps) {
+    const HemisphereChart chart(at.directionOf(of.flow).mean.unit_vector());
+    const Eigen::Vector3d V = chart.direction(of.map.least);
+    const auto& truth = at.truthOf(of.flow);
+    const Eigen::Matrix2d both = of.map.covariance.value_or(Eigen::Matrix2d::Constant(no_value)) +
+                                 degrees * degrees * at.directionOf(of.flow).covariance;
+    const double squared = of.map.least.dot(both.inverse() * of.map.least);
+    rows.push_back({of.name, fmt::format("{:.4f} {:.4f} {:.4f}", V.x(), V.y(), V.z()), number(of.map.least_residual, 3),
+                    number(of.map.least.norm(), 3), number(squared, 3),
+                    truth ? number(degrees * std::acos(std::min(1.0, std::abs(truth->dot(V)))), 3) : "n/a",
+                    fmt::format("{}", of.map.others.size())});
+  }
+  report.table(
+      {"flow", "minimum", "residual", "from the estimate deg", "chi2", "from the truth deg", "other minima"}, rows,
+      "The minimum of the residual for each flow: its residual per degree of freedom, its angle from the filter's "
+      "estimate with the squared Mahalanobis distance by the covariances of both (two degrees of freedom), its "
+      "angle from the truth, and the number of other local minima.");
+}
+
+/// The part of a way that is on one side of the chart.
+Series onSide(std::string name, const MotionTrace& trace, const HemisphereChart& chart, bool far, std::size_t ink) {
+  Series series = named(std::move(name), Style::linespoints, ink);
+  Eigen::Vector3d before = trace.start;
+  const auto add = [&](const Eigen::Vector3d& direction) {
+    // The turn to the antipode is no way across the hemisphere.
+    if (direction.dot(before) < 0) addPoint(series, no_value, no_value);
+    before = direction;
+    const bool here = chart.holds(direction) != far;
+    const Eigen::Vector2d at = chart(direction);
+    addPoint(series, here ? at.x() : no_value, here ? at.y() : no_value);
+  };
+  add(trace.start);
+  for (const Eigen::Vector3d& direction : trace.directions) add(direction);
+  return series;
+}
+
+Plot convergencePlot(const LookedAt& at, const MotionWindowRuns& runs, const ResidualMap& map) {
+  Plot plot{
+      .name = "convergence",
+      .caption = fmt::format(
+          "The way of the filter over {} frames, on the residual of frame {} (figures 7 and 8): of the start that "
+          "wins among many, and from the farthest start that arrives, with the sign of the depths held and "
+          "released, on the side from which the latter goes to the rubbery state; until the depths turn the direction "
+          "round the two are the same. Left the hemisphere about the estimate, right that about its antipode with the "
+          "same residual, each direction at the coordinates of its "
+          "antipode on the left.",
+          runs.released.frames.size(), at.frame)};
+  const HemisphereChart chart(at.velocity.mean.unit_vector());
+  const Axis colour = colourAxis({&map.grid});
+  for (const bool far : {false, true}) {
+    Panel panel = mapPanel(far ? "about the antipode: depths negative" : "about the estimate", map.grid, colour);
+    panel.series.push_back(onSide("sign released", runs.released, chart, far, second_ink));
+    panel.series.push_back(onSide("sign held", runs.held, chart, far, fourth_ink));
+    if (!runs.winner.directions.empty()) {
+      panel.series.push_back(onSide("winning start", runs.winner, chart, far, estimate_ink));
+    }
+    panel.series.push_back(star(far ? "antipode" : "estimate", Eigen::Vector2d::Zero(), truth_ink));
+    plot.panels.push_back(panel);
+  }
+  return plot;
+}
+
+double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return degrees * std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// The start is shown one frame before the first.
+double beforeFirst(const MotionTrace& trace) { return static_cast<double>(trace.frames.front()) - 1; }
+
+Panel tracePanel(std::string title, const MotionTrace& trace, const Eigen::Vector3d& reference) {
+  Panel panel{
+      .title = std::move(title), .x = {.label = "frame"}, .y = {.label = "component", .low = -1.05, .high = 1.05}};
+  for (std::size_t k = 0; k < 3; ++k) {
+    Series line = named(axis_names[k], Style::lines, axis_inks[k]);
+    addPoint(line, beforeFirst(trace), trace.start[static_cast<Eigen::Index>(k)]);
+    for (std::size_t i = 0; i < trace.frames.size(); ++i) {
+      addPoint(line, static_cast<double>(trace.frames[i]), trace.directions[i][static_cast<Eigen::Index>(k)]);
+    }
+    panel.series.push_back(line);
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    Series line = named(k == 0 ? "estimate" : "", Style::lines, axis_inks[k], true);
+    line.colour = truth_ink;
+    for (const std::size_t end : {trace.frames.front(), trace.frames.back()}) {
+      addPoint(line, static_cast<double>(end), reference[static_cast<Eigen::Index>(k)]);
+    }
+    panel.series.push_back(line);
+  }
+  return panel;
+}
+
+/// Traces with the sign of the depths held and released, their angle from the estimate, and the evidence for the sign.
+Plot signPlot(std::string name, std::string caption, const MotionTrace& held, const MotionTrace& released,
+              const Eigen::Vector3d& reference) {
+  Plot plot{.name = std::move(name), .caption = std::move(caption)};
+  plot.panels.push_back(tracePanel("sign of the depths held", held, reference));
+  plot.panels.push_back(tracePanel("sign released", released, reference));
+  Panel angles{
+      .title = "angle from the estimate", .x = {.label = "frame"}, .y = {.label = "deg", .low = -5, .high = 185}};
+  Panel evidence{.title = "evidence for positive depths",
+                 .x = {.label = "frame"},
+                 .y = {.label = "standard deviations"},
+                 .references = {{.at = 0}}};
+  for (const bool free : {false, true}) {
+    const MotionTrace& trace = free ? released : held;
+    Series angle = named(free ? "released" : "held", Style::linespoints, free ? second_ink : estimate_ink);
+    Series sign = angle;
+    addPoint(angle, beforeFirst(trace), angleBetween(trace.start, reference));
+    for (std::size_t i = 0; i < trace.frames.size(); ++i) {
+      const auto at = static_cast<double>(trace.frames[i]);
+      addPoint(angle, at, angleBetween(trace.directions[i], reference));
+      addPoint(sign, at, trace.evidence[i]);
+    }
+    angles.series.push_back(angle), evidence.series.push_back(sign);
+  }
+  plot.panels.push_back(angles), plot.panels.push_back(evidence);
+  return plot;
+}
+
+/// Round levels between the least and the greatest residual.
+std::vector<double> contourLevels(const Grid& grid) {
+  Extents range;
+  for (const double value : grid.value) {
+    if (value > 0) range.add(value);
+  }
+  std::vector<double> levels;
+  for (int exponent = -3; exponent <= 9; ++exponent) {
+    for (const double digit : {1.0, 1.5, 2.0, 3.0, 5.0, 7.0}) {
+      const double level = digit * std::pow(10.0, exponent);
+      if (level > range.low && level < range.high) levels.push_back(level);
+    }
+  }
+  return levels;
+}
+
+Plot contourPlot(const LookedAt& at, const ResidualMap& subspace, const ResidualMap& essential) {
+  Plot plot{
+      .name = "contours",
+      .caption = fmt::format(
+          "Contours of the residual of frame {} (figure 11): the subspace filter's, rotation eliminated, with {} "
+          "other local minima, and the essential filter's at the rotation of the estimate, with {}. The latter "
+          "is a slice through a function of five unknowns; its least value over the rotations is the discrete flow's "
+          "residual above.",
+          at.frame, subspace.others.size(), essential.others.size())};
+  for (const bool second : {false, true}) {
+    const ResidualMap& map = second ? essential : subspace;
+    Axis colour = colourAxis({&map.grid});
+    colour.high = std::nullopt;
+    Panel panel{.title = second ? "essential filter, rotation of the estimate" : "subspace filter",
+                .x = tangentAxis(0),
+                .y = tangentAxis(1),
+                .colour = colour,
+                .series = {contours("residual", map.grid, contourLevels(map.grid))},
+                .equal_aspect = true};
+    if (!map.others.empty()) {
+      Series others = named("other local minima", Style::points, fourth_ink);
+      for (const Eigen::Vector2d& other : map.others) addPoint(others, other.x(), other.y());
+      panel.series.push_back(others);
+    }
+    panel.series.push_back(star("minimum", map.least, second_ink));
+    panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
+    plot.panels.push_back(panel);
+  }
+  return plot;
+}
+
+/// Depth over one coordinate: the last positions with two standard deviations, and where they come from.
+Panel structurePanel(std::string title, const MotionInterpretation& seen, int coordinate) {
+  Panel panel{.title = std::move(title),
+              .x = {.label = coordinate == 0 ? "to the right, translations of one frame"
+                                             : "downwards, translations of one frame"},
+              .y = {.label = "depth, translations of one frame"}};
+  Series ways = named("last frames", Style::lines, 5), points = named("last position", Style::errorbars, estimate_ink);
+  std::vector<double> depths;
+  Extents across, along;
+  const std::size_t n = seen.points.back().size();
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const auto& frame : seen.points) {
+      const Eigen::Vector3d X = frame[i].position();
+      addPoint(ways, X[coordinate], X.z());
+      if (std::isfinite(X.z())) depths.push_back(X.z());
+    }
+    addPoint(ways, no_value, no_value);
+    const StructurePoint& p = seen.points.back()[i];
+    const Eigen::Vector3d X = p.position();
+    const double sigma = 2 * std::sqrt(p.variance), nearest = 1 / (p.inverse_depth + sigma);
+    addPoint(points, X[coordinate], X.z());
+    points.low.push_back(nearest > 0 ? nearest : 0);
+    points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : no_value);
+  }
+  // Points far behind the rest would leave it no room.
+  const double most = depths.empty() ? 1 : 1.6 * experiments::quantile(depths, 0.9);
+  along.add(0);
+  for (std::size_t k = 0; k < ways.x.size(); ++k) {
+    if (ways.y[k] > 0 && ways.y[k] < most) across.add(ways.x[k]), along.add(ways.y[k]);
+  }
+  for (double& high : points.high) {
+    // The bar of a depth that is not told from infinity goes beyond the panel.
+    if (std::isnan(high)) high = 10 * most;
+    along.add(std::min(high, most));
+  }
+  across.set(panel.x), along.set(panel.y);
+  panel.y.low = 0;
+  panel.series = {ways, points};
+  return panel;
+}
+
+Plot structurePlot(const MotionWindowRuns& runs) {
+  Plot plot{.name = "structure",
+            .caption = fmt::format(
+                "The points as seen from above and from the side, with two standard deviations of their depth, and "
+                "their ways over {} frames (figure 12): the rigid interpretation, and what is seen of the direction "
+                "turned round, depths brought in front of the camera.",
+                runs.frames.size())};
+  plot.panels = {
+      structurePanel("rigid, from above", runs.rigid, 0), structurePanel("rubbery, from above", runs.rubbery, 0),
+      structurePanel("rigid, from the side", runs.rigid, 1), structurePanel("rubbery, from the side", runs.rubbery, 1)};
+  return plot;
+}
+
+Plot distancesPlot(const MotionWindowRuns& runs) {
+  Plot plot{.name = "distances",
+            .caption =
+                "Distances between pairs of points, no point in two of them, over their first value: they stay in "
+                "the rigid interpretation and change in the rubbery one."};
+  std::vector<double> changes;
+  for (const bool rubbery : {false, true}) {
+    const MotionInterpretation& seen = rubbery ? runs.rubbery : runs.rigid;
+    Panel panel{.title = rubbery ? "rubbery" : "rigid",
+                .x = {.label = "frame"},
+                .y = {.label = "change of the distance, %"},
+                .references = {{.at = 0}}};
+    Series lines = named("distances", Style::lines, rubbery ? second_ink : estimate_ink);
+    for (std::size_t i = 1; i < seen.points.front().size(); i += 2) {
+      const auto length = [&](std::size_t k) {
+        return (seen.points[k][i].position() - seen.points[k][i - 1].position()).norm();
+      };
+      for (std::size_t k = 0; k < seen.points.size(); ++k) {
+        const double change = 100 * (length(k) / length(0) - 1);
+        if (std::isfinite(change)) changes.push_back(std::abs(change));
+        addPoint(lines, static_cast<double>(runs.frames[k]), change);
+      }
+      addPoint(lines, no_value, no_value);
+    }
+    panel.series.push_back(lines);
+    plot.panels.push_back(panel);
+  }
+  if (changes.empty()) return plot;
+  // Points near infinity would leave the rest no room.
+  const double most = std::max(1.0, 1.3 * experiments::quantile(changes, 0.97));
+  for (Panel& panel : plot.panels) panel.y.low = -most, panel.y.high = most;
+  return plot;
+}
+
+std::string rigidityVerdict(const RigidityComparison& c) {
+  if (c.first_is_rigid()) {
+    return fmt::format(
+        "Flag: RIGID. {} of {} separate distances vary less in the interpretation of the estimate; by "
+        "chance that has a probability of {:.2g} (Wilcoxon's signed-rank test).",
+        c.steadier, c.distances, c.p_value);
+  }
+  return fmt::format(
+      "Flag: UNDECIDED. {} of {} separate distances vary less in the interpretation of the estimate, which "
+      "by chance has a probability of {:.2g} (Wilcoxon's signed-rank test; 0.01 decides, which takes seven "
+      "distances).",
+      c.steadier, c.distances, c.p_value);
+}
+
+void structureTable(Report& report, const MotionWindowRuns& runs, const Eigen::Vector3d& Omega) {
+  std::vector<std::vector<std::string>> rows;
+  for (const bool rubbery : {false, true}) {
+    const RigidityTest& test = rubbery ? runs.rubbery.rigidity : runs.rigid.rigidity;
+    const Eigen::Vector3d turn = test.rotation();
+    rows.push_back(
+        {rubbery ? "rubbery" : "rigid", number(100 * test.spread(), 3),
+         fmt::format("{}/{}", rubbery ? runs.comparison.distances - runs.comparison.steadier : runs.comparison.steadier,
+                     runs.comparison.distances),
+         number(degrees * turn.norm(), 3), number(angleBetween(turn, Omega), 3)});
+  }
+  report.table({"interpretation", "spread of distances %", "steadier in", "turn deg", "from the rotation's axis deg"},
+               rows,
+               fmt::format("Over {} frames: the median relative standard deviation of all distances; how many separate "
+                           "distances vary less than in the other interpretation; the rotation of the points as a "
+                           "whole, and the angle of its axis from that of the estimated rotation (near 180: it turns "
+                           "the other way).",
+                           runs.frames.size()));
+}
+
+void reportFrame(Report& report, const MotionResult& result, const MotionWindow& window,
+                 const MotionFilterOptions& options) {
+  const MotionPairs& pairs = window.frames().back();
+  const auto of = std::find_if(result.frames.begin(), result.frames.end(),
+                               [&](const MotionFrame& frame) { return frame.frame == pairs.frame; });
+  LookedAt at(pairs, *of);
+  const Eigen::Vector3d V = at.velocity.mean.unit_vector(), T = at.translation.mean.unit_vector();
+  const MotionWindowRuns runs = runMotionWindow(window.frames(), options, at.reference());
+  for (std::size_t i = 0; i < pairs.pairs.size(); ++i) {
+    if (i < runs.inliers.size() && runs.inliers[i]) at.pairs.push_back(pairs.pairs[i]);
+  }
+  at.whole = pairsOver(at.interval, at.pairs);
+  report.section(fmt::format("The residual of frame {}", pairs.frame));
+  report.paragraph(fmt::format(
+      "Figures from here on are of images alone: frames {} to {}, and the residual of {} pairs of the last one. The "
+      "motion turns by {:.3g} deg in this frame.",
+      window.frames().front().frame, pairs.frame, at.pairs.size(), degrees * at.motion.rotation.mean.log().norm()));
+  const std::size_t enough = std::min(at.pairs.size(), at.whole.size());
+  if (enough < options.min_pairs) {
+    report.paragraph(
+        fmt::format("This frame has {} usable pairs of points, and its figures need {}.", enough, options.min_pairs));
+    return;
+  }
+  if (!at.motion.ok()) {
+    report.paragraph("The filter's estimate of this frame is not one that may be used: look at its flags.");
+  }
+  std::array<FlowMap, 3> maps{FlowMap{Flow::forward, "forward", {}}, FlowMap{Flow::midpoint, "midpoint", {}},
+                              FlowMap{Flow::discrete, "discrete", {}}};
+  for (FlowMap& m : maps) {
+    m.map = residualMap(residualOf(m.flow == Flow::discrete ? at.whole : at.pairs, m.flow, at.rotation),
+                        HemisphereChart(at.directionOf(m.flow).mean.unit_vector()));
+  }
+  report.plot(residualPlot(at, maps));
+  residualTable(report, at, maps);
+  report.plot(contourPlot(at, maps[1].map, residualMap(residualAtRotation(at.whole, at.rotation), HemisphereChart(T))));
+
+  report.section("Convergence");
+  report.plot(convergencePlot(at, runs, maps[1].map));
+  report.plot(signPlot("sign",
+                       "The subspace filter from the farthest start that arrives, with the sign of the depths held and "
+                       "released (figures 9 and "
+                       "10); dashed the estimate of the last frame.",
+                       runs.held, runs.released, V));
+  report.plot(
+      signPlot("essential",
+               "The essential filter from the rubbery state, the estimate with its translation turned round, with "
+               "the sign of the depths held and released (figure 13); dashed the estimate of the last frame.",
+               runs.essential_held, runs.essential_released, T));
+
+  report.section("Structure");
+  if (!runs.hasStructure()) {
+    report.paragraph("No four tracks have a depth in two successive frames up to this one.");
+    return;
+  }
+  report.paragraph(rigidityVerdict(runs.comparison));
+  structureTable(report, runs, at.motion.rotation.mean.log());
+  report.plot(structurePlot(runs));
+  report.plot(distancesPlot(runs));
+}
+
+}  // namespace
+
+void writeMotionReport(const std::string& directory, const std::string& command_line, const MotionResult& result,
+                       const MotionWindow& window, const MotionFilterOptions& options) {
+  if (!window.has_looked_at()) {
+    throw InputError(fmt::format("--report-frame {}", window.looked_at()), 0,
+                     "there is no such frame with one before it",
+                     fmt::format("one of {} to {}", result.frames.front().frame, result.frames.back().frame));
+  }
+  Report report(directory, "Motion from point tracks");
+  report.code(command_line);
+  const std::size_t usable = result.usable(), n = result.frames.size();
+  report.paragraph(
+      usable > 0 ? fmt::format("{} of {} frames have a direction of motion that may be used.", usable, n)
+                 : fmt::format("Not to be trusted: none of {} frames has a direction of motion that may be used.", n));
+  report.section("Estimates");
+  report.plot(estimatesPlot(result));
+  if (result.with_truth) report.plot(errorsPlot(result));
+  report.code(formatMotion(result));
+  reportFrame(report, result, window, options);
+  report.write();
+}
+
+}  // namespace liestat::cli
