@@ -1,4 +1,4 @@
-// What the filters do over the frames of a report's window, from starts of its choice: the figures 7 to 10, 12 and 13.
+// Runs of the filters over the frames of a report, from starts of its choice: the figures 7 to 10, 12 and 13.
 #pragma once
 
 #include <cli/show/motion_report.hpp>
@@ -41,7 +41,7 @@ struct MotionWindowRuns {
   bool hasStructure() const { return rigid.rigidity.snapshots() > 1; }
 };
 
-/// Of the last frame: the direction of the velocity, and the rotation and the direction of the translation over the longest
+/// The last frame: the direction of the velocity, and the rotation and the direction of the translation over the longest
 /// interval of its pairs.
 struct MotionReference {
   Eigen::Vector3d velocity = Eigen::Vector3d::UnitZ(), translation = Eigen::Vector3d::UnitZ();
