@@ -85,7 +85,7 @@ struct Extents {
   }
 };
 
-/// What is known of one quantity with three components over the frames.
+/// A quantity of three components over the frames: estimates, bands, truth.
 struct Component {
   std::array<Series, 3> lines, bands, truths;
   Extents usable;              ///< of what is worth seeing
@@ -221,7 +221,7 @@ Plot errorsPlot(const MotionResult& result) {
   return plot;
 }
 
-/// What is drawn of one frame.
+/// The frame that is looked at, with all that is drawn of it.
 struct LookedAt {
   std::size_t frame = 0;
   const MotionEstimate& motion;

@@ -1,4 +1,4 @@
-// What the filters do over the frames of a report's window, from starts of its choice: the figures 7 to 10, 12 and 13.
+// Runs of the filters over the frames of a report, from starts of its choice: the figures 7 to 10, 12 and 13.
 #pragma once
 
 #include <cli/show/motion_report.hpp>
@@ -30,8 +30,10 @@ struct MotionInterpretation {
 
 /// All runs are of images alone, with the midpoint flow; directions are velocities but for the essential filter.
 struct MotionWindowRuns {
-  MotionTrace winner;                              ///< of the hypotheses the one that is best in the end
-  MotionTrace held, released;                      ///< from one start, with and without the sign of the depths
+  MotionTrace winner;  ///< of the hypotheses the one that is best in the end
+  /// With and without the sign of the depths, from the start farthest from the estimate of those that get there (or to its
+  /// antipode).
+  MotionTrace held, released;
   MotionTrace essential_held, essential_released;  ///< from the antipode of the estimate, with its rotation
   std::vector<std::size_t> frames;                 ///< of the structure
   MotionInterpretation rigid, rubbery;
@@ -41,7 +43,7 @@ struct MotionWindowRuns {
   bool hasStructure() const { return rigid.rigidity.snapshots() > 1; }
 };
 
-/// Of the last frame: the direction of the velocity, and the rotation and the direction of the translation over the longest
+/// The last frame: the direction of the velocity, and the rotation and the direction of the translation over the longest
 /// interval of its pairs.
 struct MotionReference {
   Eigen::Vector3d velocity = Eigen::Vector3d::UnitZ(), translation = Eigen::Vector3d::UnitZ();
@@ -52,6 +54,7 @@ struct MotionReference {
 /// Pairs of this interval, each as one step: those of an epipolar constraint.
 std::vector<PointPair> pairsOver(double interval, std::span<const PointPair> pairs);
 
+/// The reference is what the starts are chosen by; the essential filter starts from its rotation and opposite translation.
 MotionWindowRuns runMotionWindow(std::span<const MotionPairs> frames, const MotionFilterOptions& options,
                                  const MotionReference& reference);
 
