@@ -59,7 +59,7 @@ class ChosenFilter {
   std::optional<EssentialFilter> essential_;
 };
 
-/// What the options come to for an input.
+/// The filter and its settings that the options come to for an input.
 struct Plan {
   FilterChoice filter = FilterChoice::composition;
   MotionFilterOptions how;

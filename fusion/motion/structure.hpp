@@ -135,7 +135,7 @@ class MotionStructure {
   Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
 };
 
-/// Whether points keep their distances: snapshots of the same points, in any axes.
+/// The test that points keep their distances: snapshots of the same points, in any axes.
 class RigidityTest {
  public:
   /// The positions of the same points in the same order each time; another number of them begins anew.
@@ -196,7 +196,7 @@ class RigidityTest {
   std::size_t snapshots_ = 0;
 };
 
-/// Which of two interpretations of the same points is the rigid one.
+/// The rigid one of two interpretations of the same points.
 struct RigidityComparison {
   std::size_t distances = 0;  ///< that were compared, no point in two of them
   std::size_t steadier = 0;   ///< those that vary less in the first interpretation

@@ -643,7 +643,7 @@ Rows rowsOf(const std::string& csv) {
   return rows;
 }
 
-/// Whether a point is inside of a closed line about a centre, by its angles.
+/// True for a point inside of a closed line about a centre, by its angles.
 bool isInside(const std::vector<std::array<double, 5>>& line, double x, double y) {
   double turns = 0;
   for (std::size_t i = 1; i < line.size(); ++i) {
@@ -661,7 +661,7 @@ TEST(MotionCommand, ReportShowsTheFiguresWithTheirData) {
   ASSERT_EQ(result.status, 0) << result.errors;
   const std::string html = contentOf(page + "/index.html");
   EXPECT_NE(html.find("</html>"), std::string::npos);
-  // What the page links to is there.
+  // The files that the page links to are there.
   const std::regex link("href=\"([A-Za-z_]+\\.[a-z]+)\"");
   std::set<std::string> linked;
   for (std::sregex_iterator at(html.begin(), html.end(), link), end; at != end; ++at) linked.insert((*at)[1]);
