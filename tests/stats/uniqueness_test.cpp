@@ -311,7 +311,7 @@ TEST(Uniqueness, quotientTies) {
 
 // -------------------------------------------------------------------------------------------------- the global search
 
-/// Certifies `trials` samples. `note_cells` is the median number of cells of a prototype that has the Lipschitz bound and
+/// Certifies `trials` samples. `note_cells` is the median number of cells of a prototype with the Lipschitz bound and
 /// the ball of radius r* alone (docs/theory/means.md, section 5.2); ours may need at most twice as many.
 template <class M>
 void certifies(const char* what, int n, double spread, std::uint64_t trials, std::size_t note_cells,
