@@ -41,7 +41,7 @@ Outcome outcome(bool ok, double squared, int iterations) {
   return one;
 }
 
-/// One row: the dimension of its law, what is promised, and what the design note has.
+/// One row: the dimension of its law, what is promised, and what an independent prototype has.
 struct RowPlan {
   Quantity quantity;
   int dof;
@@ -72,7 +72,7 @@ std::vector<Plan> plansOf(Experiment experiment) {
                0.005,
                1,
                {{Quantity::criterion, 25, criterion, 25}, {Quantity::parameter, 5, first_order, 5, 0.95}}},
-              // Curvature counts: shown beside the note's figures, not judged.
+              // Curvature counts: shown beside the prototype's figures, not judged.
               {experiment, 0.02, 1.5, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.12, 0.94}}},
               {experiment, 0.05, 2, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.28, 0.93}}}};
     case Experiment::corrected_points:

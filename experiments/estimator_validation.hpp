@@ -55,7 +55,7 @@ struct EstimatorRow : JudgedReport {
   EstimatorQuantity quantity = EstimatorQuantity::criterion;
   double sigma = 0;  ///< that the estimator is told, in the unit of the scene; of matches px
   bool has_iterations = true;
-  /// The design note's figures for mean and 95 % coverage; NaN where it gives none.
+  /// Mean and 95 % coverage of an independent prototype; NaN where it gives none.
   double note_index = std::numeric_limits<double>::quiet_NaN();
   double note_coverage = std::numeric_limits<double>::quiet_NaN();
   /// ‖mean of e eᵀ - mean of the covariances‖ over the norm of the latter, of corrected points; else NaN.

@@ -37,7 +37,7 @@ struct Plan {
   double cost() const { return static_cast<double>(row.pairs) / 20; }
 };
 
-/// RMS errors of X in degrees and millimetres at noise 1 (design note on hand-eye calibration, section 3).
+/// RMS errors of X in degrees and millimetres at noise 1, of an independent prototype.
 struct NoteCell {
   std::size_t pairs;
   HandEyeNoise noise;

@@ -63,7 +63,7 @@ struct HandEyeRow : JudgedReport {
   double rms_translation = std::numeric_limits<double>::quiet_NaN();  ///< m
   double rms_rotation_error = 0, rms_translation_error = 0;           ///< their standard errors
   double chi2_per_dof = std::numeric_limits<double>::quiet_NaN();     ///< mean
-  /// The design note's RMS errors, rad and m; NaN where it has none.
+  /// RMS errors of an independent prototype, rad and m; NaN where it has none.
   double note_rotation = std::numeric_limits<double>::quiet_NaN();
   double note_translation = std::numeric_limits<double>::quiet_NaN();
   /// Trials with the right dimension of what is open (`motions`), or in which every wrong pair was found (`outliers`).

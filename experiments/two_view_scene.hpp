@@ -54,7 +54,7 @@ enum class TwoViewMotion {
   upright,          ///< essential, of which the vertical is known in both views
   shared_focal      ///< essential, and both focal lengths are by the same factor not what they were taken for
 };
-/// The nine of the default lattice, in the order of the note's confusion matrix.
+/// The nine of the default lattice, in the order of the confusion matrix.
 inline constexpr std::array<TwoViewMotion, 9> default_two_view_motions = {
     TwoViewMotion::none,        TwoViewMotion::retinal_translation,
     TwoViewMotion::zoom,        TwoViewMotion::retinal_displacement,

@@ -32,7 +32,7 @@ Verdict judgeErrors(const std::vector<double>& sorted, const ViInitPromise& prom
   const double share = false_alarm / 4, n = static_cast<double>(promise.note_windows);
   if (exceeds(sorted, promise.median, 0.5, share)) return Verdict::median_too_large;
   if (exceeds(sorted, promise.p95, 0.05, share)) return Verdict::quantile_too_large;
-  // The note's figures are those of some windows themselves: four standard errors of their ranks.
+  // The prototype's figures are those of some windows themselves: four standard errors of their ranks.
   if (exceeds(sorted, promise.note_median, 0.5 + 4 * std::sqrt(0.25 / n), share)) {
     return Verdict::median_too_large;
   }

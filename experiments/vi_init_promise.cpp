@@ -20,7 +20,7 @@ struct Bound {
   double median = none, p95 = none;
 };
 
-/// Errors in one kind of window, as promised and as the design note has them.
+/// Errors in one kind of window, as promised and as an independent prototype has them.
 struct Errors {
   ViInitWindow window;
   Bound speed, gravity, scale, other;

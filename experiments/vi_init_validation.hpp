@@ -92,12 +92,13 @@ enum class ViInitStatistic {
 };
 ViInitStatistic statistic(ViInitQuantity quantity);
 
-/// The promise made about a row (docs/validation.md), and the figures of the design note. Infinite: none.
+/// The promise made about a row (docs/validation.md), and the figures of an independent prototype. Infinite:
+/// none.
 struct ViInitPromise {
   ValidationTolerance tolerance = {};  ///< of distances; `failure_fraction` also of all others
   double median = std::numeric_limits<double>::infinity();
   double p95 = std::numeric_limits<double>::infinity();
-  /// The note's figures, out of so many windows.
+  /// The prototype's figures, out of so many windows.
   double note_median = std::numeric_limits<double>::infinity();
   double note_p95 = std::numeric_limits<double>::infinity();
   std::size_t note_windows = 60;

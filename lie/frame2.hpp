@@ -48,7 +48,7 @@ class Frame2 : public Frame2Base<Frame2<Scalar_, Options_>> {
       : storage_(Shell::Math::join(rotation.params(), translation)) {}
 };
 
-/// The frame under the product metric of SO(2) × R^2 (means.md, section 1, further features).
+/// The frame under the product metric of SO(2) × R^2 (docs/theory/means.md, section 1.2).
 template <class S, int O>
 struct ManifoldTraits<Frame2<S, O>> : TrivialIsotropy<Frame2<S, O>, SE2<S>> {
   using M = Frame2<S, O>;

@@ -77,7 +77,7 @@ struct FrameMath {
     m << translation, Matrix3::Zero(), Matrix3::Zero(), rotation;
     return m;
   }
-  /// diag(R(z), J_r⁻¹(z)): D of means.md, section 2.
+  /// diag(R(z), J_r⁻¹(z)): D of docs/theory/means.md, section 2.
   static Square dlog(const Vector3& z_r) {
     return diagonal(Rotation::matrix(Rotation::exp(z_r)), Rotation::leftJacobianInverse(Vector3(-z_r)));
   }

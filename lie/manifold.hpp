@@ -150,7 +150,7 @@ auto actionTransformationJacobian(const typename ManifoldTraits<M>::Group& f, co
 }
 
 /// Error vector z = log(y, x) with its exact derivatives: ∂z/∂x for x ← exp(x, ξ), ∂z/∂y for y ← exp(y, ω) (frames
-/// carried in parallel), D and L of means.md, section 2.
+/// carried in parallel), D and L of docs/theory/means.md, section 2.
 template <Homogeneous M>
 struct ErrorVector {
   TangentOf<M> z;

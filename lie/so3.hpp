@@ -123,16 +123,16 @@ struct So3Math {
   static Params sampleUniform(Generator& generator) {
     return uniformQuaternion<S>(generator);
   }
-  /// log det of the exponential's Jacobian, 2 log(sin(θ/2)/(θ/2)), with its gradient and Hessian (means.md,
-  /// section 4.3).
+  /// log det of the exponential's Jacobian, 2 log(sin(θ/2)/(θ/2)), with its gradient and Hessian
+  /// (docs/theory/means.md, section 4.3).
   static VolumeElement<S, 3> logVolume(const Tangent& v) {
     using std::log;
     const S t = v.dot(v), c = S(-2) * cotangentExcess(t);
     return {S(2) * log(halfAngle(t).sinc), c * v,
             c * MatrixType::Identity() - S(2) * cotangentExcessSlope(t) * v * v.transpose()};
   }
-  /// Derivative of rightJacobianInverse(v)·a with respect to v, a constant (means.md 4.2, M(z, v)); a row of
-  /// leftJacobianInverse follows with the sign of the first-order term changed.
+  /// Derivative of rightJacobianInverse(v)·a with respect to v, a constant (docs/theory/means.md, section 4.2, M₊); a
+  /// row of leftJacobianInverse follows with the sign of the first-order term changed.
   static MatrixType inverseJacobianSlope(const Tangent& v, const Tangent& a, const S& sign) {
     const S t = v.dot(v);
     const S c = cotangentExcess(t);
@@ -266,7 +266,7 @@ struct ManifoldTraits<SO3<S, O>> : GroupManifold<SO3<S, O>> {
   static Tangent metricWeights() { return Tangent::Ones(); }
   static S injectivityRadius() { return S(EIGEN_PI); }
   static S maxSectionalCurvature() { return S(0.25); }
-  /// n nᵀ + (θ/2)cot(θ/2)(I - n nᵀ), exact (means.md, section 3).
+  /// n nᵀ + (θ/2)cot(θ/2)(I - n nᵀ), exact (docs/theory/means.md, section 3.2).
   static Square hessianHalfSquaredDistance(const Tangent& z) {
     return detail::rotationPolynomial(z, S(1), S(0), detail::cotangentExcess(S(z.dot(z))));
   }

@@ -2,11 +2,11 @@
 //
 // A covariance H⁻¹ S H⁻¹ takes the slope of the gradient at the mean for the slope across the whole region between mean
 // and truth. Among scattered data these differ. Where two geodesics to a datum are equally long the gradient jumps, and
-// no Hessian of a sample sees it (means.md, section 7.5); on the sphere the curvature diverges towards the antipode; and
-// of several places the minimum of a sample is found where the criterion happens to be steep. So the slope is measured:
-// with v ~ N(0, C), g(v) the gradient at exp(mean, v), E[g(v) vᵀ] C⁻¹ is the average of the Hessian over that normal law
-// (Stein's identity), kinks and all. It needs nothing but log, and weighs the effect of data near the cut locus on the
-// estimate, not their mass.
+// no Hessian of a sample sees it (docs/theory/means.md, section 7.5); on the sphere the curvature diverges towards the
+// antipode; and of several places the minimum of a sample is found where the criterion happens to be steep. So the
+// slope is measured: with v ~ N(0, C), g(v) the gradient at exp(mean, v), E[g(v) vᵀ] C⁻¹ is the average of the Hessian
+// over that normal law (Stein's identity; docs/theory/means.md, section 7.6), kinks and all. It needs nothing but log,
+// and weighs the effect of data near the cut locus on the estimate, not their mass.
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>

@@ -1,8 +1,8 @@
 // Covariances of a mean (LSQ, WLSQ), from known noise or from residuals, and of data about a feature.
 //
-// All of them are H⁻¹ (…) H⁻¹ with the exact Hessian: the central limit theorem for Fréchet means (means.md, section
-// 3). The report's printed formulas, for comparison, are in stats/printed.hpp. Matrices are in the local frame at the
-// mean.
+// All of them are H⁻¹ (…) H⁻¹ with the exact Hessian: the central limit theorem for Fréchet means
+// (docs/theory/means.md, section 3.4). The report's printed formulas, for comparison, are in stats/printed.hpp.
+// Matrices are in the local frame at the mean.
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>

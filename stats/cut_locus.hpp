@@ -143,10 +143,11 @@ CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanRe
 /// The cut locus near a mean (rotations, quotient frames, planar rotations; nothing elsewhere).
 ///
 /// ½d² = min(½θ², ½θ₂²) has a concave kink where both geodesics are equally long: its gradient jumps there by z - z₂.
-/// The Hessian of the expected criterion therefore has a negative term that no Hessian of a sample sees (means.md,
-/// section 7.5): minus |z - z₂| times the density of the data across the cut locus, in the direction of z - z₂. The
-/// signed distance s from it obeys |z - z₂| s = ½θ₂² - ½θ², so a gap θ₂ - θ below w means |s| < w (θ + θ₂)/(2|z - z₂|),
-/// on both sides; a fraction m of the data there is a density m |z - z₂|/(w (θ + θ₂)), and the term is
+/// The Hessian of the expected criterion therefore has a negative term that no Hessian of a sample sees
+/// (docs/theory/means.md, section 7.5): minus |z - z₂| times the density of the data across the cut locus, in the
+/// direction of z - z₂. The signed distance s from it obeys |z - z₂| s = ½θ₂² - ½θ², so a gap θ₂ - θ below w means |s|
+/// < w (θ + θ₂)/(2|z - z₂|), on both sides; a fraction m of the data there is a density m |z - z₂|/(w (θ + θ₂)), and
+/// the term is
 ///     - Σ_{gap < w} p (z - z₂)(z - z₂)ᵀ/((θ + θ₂) w).
 /// hessian_change is its largest eigenvalue relative to the sample's Hessian: about π m/w for quotient frames folded
 /// about one axis, 2π m/w for rotations.

@@ -1,6 +1,6 @@
 // groupMean: the exponential barycentre of a Lie group, Σ p_i Log(ȳ⁻¹ x_i) = 0. Equivariant under translations from
-// both sides and under inversion, which no Riemannian mean of poses is (means.md, section 5.5). It is not a Fréchet
-// mean.
+// both sides and under inversion, which no Riemannian mean of poses is (docs/theory/means.md, section 5.5). It is not a
+// Fréchet mean.
 #pragma once
 
 #include <lie/detail/small_products.hpp>

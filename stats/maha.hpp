@@ -1,6 +1,6 @@
 // maha: the feature of least sum of squared Mahalanobis distances to measurements that each have their covariance, and
-// fuse. Pennec 1998, section 4.2, with the exact gradient and Hessian (means.md, section 4; the report's printed ones
-// are in stats/printed.hpp).
+// fuse. Pennec 1998, section 4.2, with the exact gradient and Hessian (docs/theory/means.md, section 4; the report's
+// printed ones are in stats/printed.hpp).
 //
 // Two models that coincide on points, rotations and every group, and differ on frames:
 //   CovarianceAt::measured   S_i lives in the frame of measurement x_i (a sensor's): w = log(x_i, y), μ² = wᵀ S_i⁻¹ w

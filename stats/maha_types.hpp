@@ -47,7 +47,7 @@ struct MahaResult {
   ScalarOf<M> cost = 0;                            ///< ½ Σ μ_i², with the volume terms if likelihood was asked for
   SquareOf<M> hessian = SquareOf<M>::Zero();       ///< exact Hessian of the cost
   SquareOf<M> gauss_newton = SquareOf<M>::Zero();  ///< Σ Jᵀ S⁻¹ J
-  /// H⁻¹ H_GN H⁻¹, or H⁻¹ with likelihood (means.md, section 4.3); NaN where H is not positive definite.
+  /// H⁻¹ H_GN H⁻¹, or H⁻¹ with likelihood (docs/theory/means.md, section 4.3); NaN where H is not positive definite.
   SquareOf<M> covariance = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
 
   /// Mean and covariance together.

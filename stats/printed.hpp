@@ -1,5 +1,5 @@
 // The formulas of Pennec 1998 as printed, for comparison only. They neglect curvature, count residuals twice or use a
-// gradient that is not the criterion's (means.md, section 6, errata 2, 5, 10); the library's own are in
+// gradient that is not the criterion's (docs/theory/means.md, section 6, errata 2, 18, 10); the library's own are in
 // stats/covariance.hpp and stats/maha.hpp. Repaired only where they would not run: inverse covariances, transposes, the
 // update's H⁻¹.
 #pragma once

@@ -1,7 +1,7 @@
 // Where an iteration for a mean starts: the chordal mean where an embedding offers one, else the best of several data.
 //
 // Started at the first measurement the iteration ends in a wrong minimum for 1 to 3 % of widely spread rotations and for
-// a third of widely spread quotient frames (means.md, section 5.2).
+// a third of widely spread quotient frames (docs/theory/means.md, section 5.2).
 #pragma once
 
 #include <lie/detail/part_tuple.hpp>

@@ -2,7 +2,7 @@
 // with its covariance and all that is known about it is certifiedMean (stats/certified_mean.hpp).
 //
 // A Fréchet mean minimises C(y) = ½ Σ p_i d²(y, x_i), which may have several minima on a compact manifold. The
-// certificates (means.md, section 5.2; the criterion separates, so of a frame only the rotation matters):
+// certificates (docs/theory/means.md, section 5.2; the criterion separates, so of a frame only the rotation matters):
 //   a priori    the data lie in a ball of radius r < ½ min(injectivity radius, π/√Δ), Δ the largest sectional curvature:
 //               the mean is unique (Kendall 1990, Afsari 2011). Rotations, directions: π/2, quotient frames: π/4
 //   local       C is strictly convex along every geodesic of length r* from the mean; and every y with C(y) ≤ C(mean)

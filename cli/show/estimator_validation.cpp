@@ -120,7 +120,7 @@ void writeEstimatorReport(const std::string& directory, const std::string& comma
       "Each trial draws measurements with noise and estimates a parameter from them under implicit equations and "
       "constraints. To first order in the noise the minimum 2 L2 follows a chi-square law with the residual degrees of "
       "freedom, and the squared Mahalanobis distance of the truth one with as many as there are free parameters. Rows "
-      "without a verdict are of a noise at which curvature counts; the design note's figures stand beside them.");
+      "without a verdict are of a noise at which curvature counts; a prototype's figures stand beside them.");
   report.code(command_line);
   for (const Part& part : parts) {
     const std::vector<Cells> cells = cellsOf(part, rows);

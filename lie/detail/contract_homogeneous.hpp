@@ -195,8 +195,8 @@ inline void checkErrorVector(const ManifoldOperations& m, ContractReport& report
   });
 }
 
-/// Where the manifold provides them: derivatives of D(z)ᵀa and L(z)ᵀa with respect to z (means.md, section 4.2), D and
-/// L the derivatives of the error vector by the feature and by the base.
+/// Where the manifold provides them: derivatives of D(z)ᵀa and L(z)ᵀa with respect to z (docs/theory/means.md, section
+/// 4.2), D and L the derivatives of the error vector by the feature and by the base.
 inline void checkSecondDerivatives(const ManifoldOperations& m, ContractReport& report,
                                    const ContractOptions& options = {}) {
   using Vector = ManifoldOperations::Vector;

@@ -20,7 +20,8 @@ namespace detail {
 /// Traits of a frame modulo half-turns; Axes lists the axes of the group's half-turns (0, 1, 2 = x, y, z).
 ///
 /// Right multiplication of (x, y, z, w) by a half-turn permutes the absolute values of the components, so the
-/// representative of least rotation angle is the one with the largest |w| (means.md, section 1). Ties go to the first.
+/// representative of least rotation angle is the one with the largest |w| (docs/theory/means.md, section 1.3). Ties go
+/// to the first.
 template <class M, int... Axes>
 struct QuotientFrameManifold : FrameManifold<M> {
   using Base = FrameManifold<M>;

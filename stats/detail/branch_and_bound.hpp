@@ -1,5 +1,5 @@
 // The global search behind stats/uniqueness.hpp: branch and bound for the Fréchet mean on SO(3), on its quotients by
-// half-turns and on the sphere (means.md, section 5.2).
+// half-turns and on the sphere (docs/theory/means.md, section 5.2).
 //
 // Everything is in double and in the frame of a base point, the mean. A datum, or a bin of data, is a point with a
 // weight, the radius of the bin and its scatter. With θ the distance of a point y from a datum, f = ½θ², z the error

@@ -126,7 +126,8 @@ Profile profile(const PackedData<Space>& data, const typename Space::Point& y) {
   return p;
 }
 
-/// r* of means.md, section 5.2: the criterion is strictly convex along every geodesic of length r* from the point.
+/// r* of docs/theory/means.md, section 5.2: the criterion is strictly convex along every geodesic of length r* from the
+/// point.
 template <class Space>
 double convexityRadius(const Profile& p) {
   double low = 0, high = 0.5 * p.smallest_gap;

@@ -26,7 +26,7 @@ TEST(ValidateEstimator, tablesFitTheTerminalAndEndInTheVerdict) {
   std::vector<EstimatorRow> rows = validateEstimator(validation);
   std::string text = formatEstimatorTables(rows);
   EXPECT_NE(text.find("\nPASSED\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("5.28"), std::string::npos) << "the note's figure for a noise that is not judged";
+  EXPECT_NE(text.find("5.28"), std::string::npos) << "the prototype's figure for a noise that is not judged";
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   rows[0].passed = false;

@@ -25,7 +25,7 @@ TEST(EstimatorValidation, JudgesWhatIsPromised) {
     EXPECT_EQ(row.report.trials, 200U);
     EXPECT_EQ(row.report.failures, 0U) << name(row.experiment);
     const bool curved = row.experiment == EstimatorExperiment::conic && row.sigma > 0.005;
-    EXPECT_EQ(row.passed.has_value(), !curved) << "curvature counts: shown beside the note's figures";
+    EXPECT_EQ(row.passed.has_value(), !curved) << "curvature counts: shown beside the prototype's figures";
     EXPECT_TRUE(row.passed.value_or(true))
         << name(row.experiment) << " " << name(row.quantity) << ": " << name(row.verdict);
     judged += row.passed.has_value();

@@ -1,5 +1,5 @@
-// Closed forms: the point between two others (means.md, section 5.3), parallel transport on the sphere, the angular
-// accessors, and the counterexamples at the cut locus.
+// Closed forms: the point between two others (docs/theory/means.md, section 5.3), parallel transport on the sphere, the
+// angular accessors, and the counterexamples at the cut locus.
 
 #include <lie/lie.hpp>
 

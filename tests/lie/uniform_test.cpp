@@ -1,5 +1,5 @@
-// Distances of uniform random orientations from the origin against their known means (means.md, section 1): a density
-// on each quotient that every half-turn of the group shapes.
+// Distances of uniform random orientations from the origin against their known means (docs/theory/means.md, section
+// 1.5): a density on each quotient that every half-turn of the group shapes.
 
 #include <lie/frame3.hpp>
 #include <lie/non_oriented_frame3.hpp>

@@ -138,7 +138,7 @@ TEST(Hotelling, meanRatiosOfTheNotes) {
 }
 
 TEST(Hotelling, distanceToChiSquaredOfTheNotes) {
-  // means.md, section 5.1: the Kolmogorov-Smirnov distance between both laws, three digits.
+  // docs/theory/means.md, section 5.1: the Kolmogorov-Smirnov distance between both laws, three digits.
   const struct {
     int k, n;
     double distance, half_digit;

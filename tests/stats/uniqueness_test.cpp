@@ -311,7 +311,8 @@ TEST(Uniqueness, quotientTies) {
 
 // -------------------------------------------------------------------------------------------------- the global search
 
-/// Certifies `trials` samples; the note's cells are an upper bound within a factor of 2 (means.md, 7.6 (g)).
+/// Certifies `trials` samples. `note_cells` is the median number of cells of a prototype with the Lipschitz bound and
+/// the ball of radius r* alone (docs/theory/means.md, section 5.2); ours may need at most twice as many.
 template <class M>
 void certifies(const char* what, int n, double spread, std::uint64_t trials, std::size_t note_cells,
                bool brute = true) {
@@ -331,7 +332,7 @@ void certifies(const char* what, int n, double spread, std::uint64_t trials, std
     }
   }
   const std::size_t largest = *std::max_element(cells.begin(), cells.end());
-  std::printf("%-26s n = %3d, spread %.2f: %zu of %zu certified, %zu improved, cells median %zu (note %zu), max %zu\n",
+  std::printf("%-26s n = %3d, spread %.2f: %zu of %zu certified, %zu improved, cells median %zu (ref. %zu), max %zu\n",
               what, n, spread, certified, static_cast<std::size_t>(trials), improved, median(cells), note_cells,
               largest);
   EXPECT_GE(static_cast<double>(certified), 0.95 * static_cast<double>(trials)) << what;
