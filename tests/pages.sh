@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# pages.sh ROOT : each path and link in ROOT's README.md and docs/*.md leads somewhere.
+# pages.sh ROOT : each path and link in ROOT's README.md, docs/*.md and docs/theory/*.md leads somewhere.
 #
 # A path begins with a folder of the project (lie/so3.hpp, examples/fuse_poses, cli/io/); a program may be named without
 # .cpp, a pattern such as lie/*.hpp needs one match. A link is [text](page.md), with or without #heading. What leads
@@ -66,4 +66,4 @@ if [ "$(cut -d: -f2 <<< "$found" | sort -n | xargs)" != "4 5 6 7 8" ]; then
   exit 1
 fi
 
-check "$1" "$1"/README.md "$1"/docs/*.md
+check "$1" "$1"/README.md "$1"/docs/*.md "$1"/docs/theory/*.md
