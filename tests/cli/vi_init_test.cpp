@@ -198,7 +198,8 @@ TEST(ViInit, WhatCannotBeUsedIsSaid) {
 }
 
 // Medians over the windows of V1_02, real readings, landmarks on a box, one pixel (docs/vi_init.md). Each bound is that
-// of an independent prototype, and four standard errors of a median of so many windows whose spread is as large as itself.
+// of an independent prototype, and four standard errors of a median of so many windows whose spread is as large as
+// itself.
 TEST(ViInitData, RealReadings) {
   const char* data = std::getenv("LIESTAT_DATA");
   if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
