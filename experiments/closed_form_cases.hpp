@@ -1,5 +1,6 @@
-// The cases that the closed form of visual-inertial initialisation distinguishes (the design note's section 4): motions
-// and layouts, and what must be recognised, on exact data and with noise.
+// The cases that the closed form of visual-inertial initialisation distinguishes
+// (docs/theory/visual_inertial.md, section 4): motions and layouts, and what must be recognised, on exact data and with
+// noise.
 //
 //   for (const liestat::ClosedFormCase& c : liestat::closedFormCases()) {
 //     const liestat::InertialScene scene(c.scene, seed);
@@ -22,7 +23,8 @@ namespace liestat::experiments {
 /// is constant or seen by three images only: A the specific force (with three images its mean, meanSpecificForce), G
 /// gravity (m/s²). The second solution is (γ₂ P, γ₂ (V + L) - L, γ₂ (A + G) - A), L = S₂/dt₂ - A dt₂/2, which is 0 for
 /// a constant acceleration. γ₂ = 1: a double root; γ₂ ≤ 0 (|A| ≤ |G|): the second has its features behind the camera. A
-/// camera away from the body's origin (p_c) fixes the scale and voids it where the body rotates. Design note 3.3.
+/// camera away from the body's origin (p_c) fixes the scale and voids it where the body rotates
+/// (docs/theory/visual_inertial.md, section 3.3).
 inline double secondSolutionScale(const Eigen::Vector3d& specific_force, const Eigen::Vector3d& gravity) {
   return (specific_force.squaredNorm() - gravity.squaredNorm()) / (specific_force + gravity).squaredNorm();
 }
@@ -44,7 +46,7 @@ struct ClosedFormCase {
   bool solved = true;                         ///< the truth is among the solutions
 };
 
-/// All cases of the design note, and those that its rows stand for.
+/// All cases of docs/theory/visual_inertial.md, section 4, and those that its rows stand for.
 inline const std::vector<ClosedFormCase>& closedFormCases() {
   using S = FusionStatus;
   using Motion = SceneMotion;

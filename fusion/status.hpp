@@ -12,7 +12,7 @@ namespace liestat {
 enum class FusionStatus {
   ok,
 
-  // The cases of a window (fusion/init/closed_form.hpp), those of the design note's section 4.
+  // The cases of a window (fusion/init/closed_form.hpp), those of docs/theory/visual_inertial.md, section 4.
   ambiguous,             ///< two solutions explain the data, or two groups of tracks each agree on one
   double_root,           ///< two solutions meet: noise is amplified without bound (acceleration across gravity)
   scale_unobservable,    ///< constant velocity: gravity and the direction of V known, lengths free

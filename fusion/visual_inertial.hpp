@@ -13,7 +13,7 @@
 //
 // Windows slide over the recording. Each is initialised by itself (robust_initialisation.hpp), refined (refinement.hpp)
 // and, where windows are disjoint, fused with its neighbours (window_fusion.hpp). Nothing throws: what is wrong with
-// the input is a fault of the result or of a window. Source: the design note on visual-inertial initialisation.
+// the input is a fault of the result or of a window. Derivation: docs/theory/visual_inertial.md.
 #pragma once
 
 #include <fusion/visual_inertial_types.hpp>

@@ -80,7 +80,7 @@ struct VisualInertialOptions {
   std::function<std::optional<ImuBias<double>>(double time)> known_bias = {};
   /// Gravity, the priors of the biases, the seed, and all that the steps need. The noise of bearings is that of the
   /// observations; the accelerometer's bias is estimated in closed form in windows of two seconds and more, because it
-  /// is not told in less (design note, 3.5).
+  /// is not told in less (docs/theory/visual_inertial.md, section 3.5).
   InitialisationOptions initialisation = {};
 };
 

@@ -4,7 +4,7 @@
 //
 // Source: T. Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's estimation method", INRIA
 // RR-4050, 2000, section 5, (36), (37), appendix B, with the residual degrees of freedom in place of (7)
-// (docs/model_choice.md says what differs and why).
+// (docs/theory/constrained.md, section 9, says what differs and why).
 #pragma once
 
 #include <stats/detail/tail_probabilities.hpp>

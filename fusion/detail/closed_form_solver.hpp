@@ -65,7 +65,7 @@ class ClosedFormSolver {
   void resetWeights() {
     for (Ray& ray : table_.rays) ray.weight = ray.precision / sigma_;
   }
-  /// Weights of the depths in a solution, floored (design note, 3.4).
+  /// Weights of the depths in a solution, floored (docs/theory/visual_inertial.md, section 3.4).
   void setWeights(const MotionCandidate& solution) {
     std::vector<double> depths;
     depths.reserve(table_.rays.size());

@@ -1,4 +1,4 @@
-// Which case of the design note's section 4 a window is, from exact ranks or from noise.
+// Which case of docs/theory/visual_inertial.md, section 4, a window is, from exact ranks or from noise.
 #pragma once
 
 #include <fusion/detail/closed_form_solver.hpp>

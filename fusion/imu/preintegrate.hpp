@@ -1,5 +1,5 @@
 // Preintegration of a recording between any two times: readings with irregular time stamps, gaps, interpolation at both
-// ends, three schemes. Source: the design note on visual-inertial initialisation, sections 2.1 and 2.3.
+// ends, three schemes (docs/theory/visual_inertial.md, sections 2.1 and 2.3).
 #pragma once
 
 #include <fusion/imu/preintegration.hpp>

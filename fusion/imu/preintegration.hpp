@@ -16,8 +16,8 @@
 //   p̃ ← p̃ - [u] φ̃ + h ṽ,   φ̃ ← φ̃,   ṽ ← ṽ - [w] φ̃,   u = ΔR G2 f h²,   w = ΔR G1 f h,
 // and a covariance is carried over a step by a dozen cross products in place of products of 9×9 matrices.
 //
-// G1, G2 and their derivatives have no small-angle shortcuts. Source of the integrals: the design note on
-// visual-inertial initialisation, section 2; C. Forster et al., "On-manifold preintegration", IEEE T-RO 33, 2017.
+// G1, G2 and their derivatives have no small-angle shortcuts. Derivation of the integrals:
+// docs/theory/visual_inertial.md, section 2; C. Forster et al., "On-manifold preintegration", IEEE T-RO 33, 2017.
 #pragma once
 
 #include <fusion/detail/increment_covariance.hpp>

@@ -8,7 +8,7 @@
 //
 // The closed form needs C_j and S_j from the first image on. Put together from motions between neighbours they may be
 // moved to other biases without integrating anew: a first-order update over a tenth of a second is good to 3e-7 rad for
-// 0.01 rad/s, over two seconds it is not (design note on visual-inertial initialisation, 2.2 and 3.6).
+// 0.01 rad/s, over two seconds it is not (docs/theory/visual_inertial.md, sections 2.2 and 3.6).
 #pragma once
 
 #include <fusion/imu/preintegrate.hpp>

@@ -8,7 +8,7 @@
 // For a feature P seen along u from image j at dt, in the body's axes at the first image,
 //   P - V dt - G dt²/2 - S_j - C_j p_c  is a multiple of u,
 // which is linear in P, V and G (A. Martinelli, "Closed-form solution to the structure from motion problem by fusing
-// visual and inertial sensing", 2012; the design note on visual-inertial initialisation, section 3). Two equations an
+// visual and inertial sensing", 2012; docs/theory/visual_inertial.md, section 3). Two equations an
 // observation, across the bearing; features are eliminated one by one; gravity's length makes the rest a least-squares
 // problem on a sphere, which has up to two minima. Both are returned, with a status that says whether the data decide.
 //

@@ -4,8 +4,8 @@
 //   if (robust.ok()) … robust.result.solutions[0], robust.outliers
 //
 // A feature enters the problem of the motion as a 7×7 block (10×10 with the accelerometer's bias), and blocks add up:
-// a hypothesis is the sum of those of a few features drawn at random, and costs no elimination. Source: the design note
-// on visual-inertial initialisation, section 3.8; M. Fischler and R. Bolles, "Random sample consensus", 1981; the
+// a hypothesis is the sum of those of a few features drawn at random, and costs no elimination. Derivation:
+// docs/theory/visual_inertial.md, section 3.8; M. Fischler and R. Bolles, "Random sample consensus", 1981; the
 // truncated cost and the local optimisation of hypotheses are P. Torr and A. Zisserman's (MLESAC, 2000) and O. Chum, J.
 // Matas and J. Kittler's (LO-RANSAC, 2003).
 #pragma once

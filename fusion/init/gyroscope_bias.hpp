@@ -4,10 +4,11 @@
 //   const auto found = liestat::estimateGyroscopeBias(window, {.bearing_noise = 1. / 450});
 //   if (found.ok()) … found.bias, found.covariance, found.result.solutions[0]
 //
-// The outer problem over the bias of the design note, section 3.6: the bearings' angles as a function of the bias, with
-// velocity, gravity and features the best for each, by damped Gauss–Newton with these eliminated. Angles of predicted
-// directions are minimised, not the linear system's residuals: those shrink with the scene, and a large bias that lets
-// depths collapse makes them small. Each round begins at the closed form for the bias that the last one found.
+// The outer problem over the bias (docs/theory/visual_inertial.md, section 3.6): the bearings' angles as a function of
+// the bias, with velocity, gravity and features the best for each, by damped Gauss–Newton with these eliminated. Angles
+// of predicted directions are minimised, not the linear system's residuals: those shrink with the scene, and a large
+// bias that lets depths collapse makes them small. Each round begins at the closed form for the bias that the last one
+// found.
 #pragma once
 
 #include <fusion/imu/window.hpp>

@@ -5,7 +5,7 @@
 //   if (refined.ok()) … refined.velocity(), refined.gravity, refined.covariance.atLast(), refined.states.back()
 //
 // Unlike the closed form's, its covariance contains all that is modelled: image noise, the inertial sensor's noise and
-// its biases. Source: the design note on visual-inertial initialisation, section 3.7; C. Forster et al., "On-manifold
+// its biases. Derivation: docs/theory/visual_inertial.md, section 3.7; C. Forster et al., "On-manifold
 // preintegration", IEEE T-RO 33, 2017; features are eliminated one by one (B. Triggs et al., "Bundle adjustment - a
 // modern synthesis", 2000, section 6.1), and what remains is minimised by Levenberg's and Marquardt's method: plain
 // Gauss–Newton fails from short windows.

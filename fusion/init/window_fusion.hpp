@@ -11,7 +11,7 @@
 // Nothing counts twice. A reading serves one window or one gap between two: from the first image of a window to its
 // last, what came from before is carried by the window's own estimate (its joint covariance of both ends), not by the
 // readings that this was made of. And the prior of the biases, which is the same for all windows, is divided among
-// them. Source: the design note on visual-inertial initialisation; X. Pennec, "Computing the mean of geometric
+// them. Derivation: docs/theory/visual_inertial.md, section 5; X. Pennec, "Computing the mean of geometric
 // features", 1998, section 4.2 (the mean) and 5.2 (the test).
 #pragma once
 

@@ -197,8 +197,9 @@ TEST(ViInit, WhatCannotBeUsedIsSaid) {
             std::string::npos);
 }
 
-// Section 5 of the design note: medians over the windows of V1_02, real readings, landmarks on a box, one pixel. Each
-// bound is the note's, and four standard errors of a median of so many windows whose spread is as large as itself.
+// Medians over the windows of V1_02, real readings, landmarks on a box, one pixel (docs/vi_init.md). Each bound is that
+// of an independent prototype, and four standard errors of a median of so many windows whose spread is as large as
+// itself.
 TEST(ViInitData, RealReadings) {
   const char* data = std::getenv("LIESTAT_DATA");
   if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";

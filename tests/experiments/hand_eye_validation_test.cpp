@@ -1,4 +1,5 @@
-// The validation of hand-eye calibration: what is judged, the figures of the design note, and that a wrong noise fails.
+// The validation of hand-eye calibration: what is judged, the figures of an independent prototype, and that a wrong
+// noise fails.
 
 #include <experiments/hand_eye_validation.hpp>
 
@@ -31,7 +32,7 @@ TEST(HandEyeValidation, ErrorsAreThoseOfTheNote) {
     EXPECT_TRUE(*row.passed) << label(row) << ": " << name(row.verdict);
     EXPECT_EQ(row.report.failures, 0U);
     if (row.fit) continue;
-    // Four standard errors of both runs together, 300 trials in the note.
+    // Four standard errors of both runs together, 300 trials of the prototype.
     const double both = std::sqrt(1 + static_cast<double>(trials) / 300);
     if (std::isfinite(row.note_rotation)) {
       EXPECT_NEAR(row.rms_rotation, row.note_rotation, 4 * both * row.rms_rotation_error) << label(row);
@@ -57,7 +58,8 @@ TEST(HandEyeValidation, MotionsAndWrongPairs) {
 TEST(HandEyeValidation, RelativeMotionsOfAbsolutePosesHaveTooSmallACovariance) {
   const auto rows = validateHandEye(small(60, {HandEyeExperiment::formulations}));
   ASSERT_EQ(rows.size(), 10U);
-  // NEES of the note with 8 and 20 poses: consecutive 8.2, 9.5; to the first 12.5, 25.6; all 24.7, 60.2; scaled 6.2, 6.0.
+  // NEES of the prototype with 8 and 20 poses (docs/theory/hand_eye.md, section 2): consecutive 8.2, 9.5; to the first
+  // 12.5, 25.6; all 24.7, 60.2; scaled 6.2, 6.0.
   const double note[] = {6, 8.2, 12.5, 24.7, 6.2, 6, 9.5, 25.6, 60.2, 6.0};
   for (std::size_t i = 0; i < rows.size(); ++i) {
     EXPECT_FALSE(rows[i].passed.has_value());

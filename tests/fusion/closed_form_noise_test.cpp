@@ -1,5 +1,5 @@
-// The closed form on noisy data: accuracy against the design note's table of windows, the status of each case that
-// noise can decide, and what the covariance is worth.
+// The closed form on noisy data: accuracy against the table of an independent prototype, the status of each case
+// (docs/theory/visual_inertial.md, section 4) that noise can decide, and what the covariance is worth.
 
 #include <fusion/init/closed_form.hpp>
 #include <experiments/closed_form_cases.hpp>

@@ -1,4 +1,5 @@
-// The closed form on exact data: every case that the design note distinguishes, the second solution, bad input.
+// The closed form on exact data: every case of docs/theory/visual_inertial.md, section 4, the second solution, bad
+// input.
 
 #include <fusion/init/closed_form.hpp>
 #include <experiments/closed_form_cases.hpp>
@@ -196,7 +197,7 @@ TEST(SecondSolution, IsAScaledCopyForConstantAccelerationAndForThreeImages) {
       const std::size_t last = images.size() - 1;
       const Vector3 A = meanSpecificForce(images[last / 2], images[last]);
       const double gamma = secondSolutionScale(A, scene.gravity), G = scene.gravity.dot(A + scene.gravity);
-      // The two forms of the design note.
+      // The two forms of docs/theory/visual_inertial.md, (3.5).
       EXPECT_NEAR(gamma, 1 - 2 * G / (A + scene.gravity).squaredNorm(), 1e-9 * std::max(1., std::abs(gamma)));
       const auto result = solveClosedForm(scene.window);
       SCOPED_TRACE(seed);

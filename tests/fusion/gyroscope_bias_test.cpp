@@ -1,4 +1,5 @@
-// The outer problem over the gyroscope's bias, against the design note's target, and what it refuses.
+// The outer problem over the gyroscope's bias (docs/theory/visual_inertial.md, section 3.6), against the figures of an
+// independent prototype, and what it refuses.
 
 #include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -98,7 +99,8 @@ TEST(GyroscopeBias, IsFoundWithoutNoise) {
     const auto found = estimateGyroscopeBias(recorded.window, options);
     EXPECT_EQ(found.status, Status::ok) << seed;
     // The prior pulls by covariance · bias / 0.1²; averaged readings are wrong by 1e-5 rad in a second; an update of
-    // first order by 0.05 rad/s, just below what is integrated anew, by 8e-6 rad in 0.2 s (design note, 2.2).
+    // first order by 0.05 rad/s, just below what is integrated anew, by 8e-6 rad in 0.2 s
+    // (docs/theory/visual_inertial.md, section 2.2).
     EXPECT_LE((found.bias - recorded.bias).norm(), 2e-5 + 4e-5 + found.covariance.trace() * 0.05 / 0.01) << seed;
   }
 }

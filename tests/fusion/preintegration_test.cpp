@@ -198,7 +198,8 @@ TEST(Preintegration, AdditiveCovarianceIsANamedConversion) {
   EXPECT_LE((additive.block<3, 3>(0, 6) - library.block<3, 3>(3, 0) * R.transpose()).norm(), 1e-16);
 }
 
-// The design note's numbers: 0.2 s at 1.5 rad/s and 3 m/s².
+// The update of docs/theory/visual_inertial.md, section 2.2, over 0.2 s at 1.5 rad/s and 3 m/s²: errors of an
+// independent prototype.
 TEST(Preintegration, BiasUpdateWithoutReintegration) {
   Steps steps;
   for (int i = 0; i < 40; ++i) {
@@ -217,7 +218,7 @@ TEST(Preintegration, BiasUpdateWithoutReintegration) {
     PreintegrationOptions<double> other = options;
     other.bias.gyroscope = change * Vector3(1, 1, 1).normalized();
     const Vector9 error = difference(steps.run(other).increment(), motion.increment(other.bias));
-    // Another motion than the note's: within a factor of four, and quadratic in the change.
+    // Another motion than the prototype's: within a factor of four, and quadratic in the change.
     EXPECT_LE(error.segment<3>(3).norm(), 4 * rotation) << change;
     EXPECT_LE(error.tail<3>().norm(), 4 * velocity) << change;
     EXPECT_GE(error.segment<3>(3).norm(), rotation / 20) << "the update is an approximation";

@@ -1,4 +1,5 @@
-// The refinement against the design note's tables of accuracy and consistency.
+// The refinement (docs/theory/visual_inertial.md, section 3.7) against an independent prototype's tables of accuracy
+// and consistency.
 
 #include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -392,7 +393,7 @@ TEST(Refinement, MeetsTheTables) {
     double window;
     std::size_t images, features;
     int trials;
-    double speed[2], degrees[2], scale[2];  ///< targets of section 5: median, 95 %
+    double speed[2], degrees[2], scale[2];  ///< of an independent prototype: median, 95 %
   };
   const double none = std::numeric_limits<double>::infinity();
   const Row rows[] = {

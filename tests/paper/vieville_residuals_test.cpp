@@ -127,8 +127,8 @@ TEST(Figure16, NormalisedResidualsAgreeWhereTheSpecificModelIsTrue) {
     if (pair.general == TwoViewMotion::fundamental) {
       // What a homography moves obeys [e']× H for any epipole e', so two of the seven parameters change nothing to first
       // order: each e' has a minimum that is χ² with r + 2 degrees of freedom, and the lowest of all is taken. It lies
-      // some 1.6 standard deviations below the mean of one (0.85 of these 60 matches; the note, from one start and with
-      // 80 matches, has 0.92).
+      // some 1.6 standard deviations below the mean of one (0.85 of these 60 matches; from one start and with 80
+      // matches an independent prototype has 0.92).
       const double r = sum.general_freedom / static_cast<double>(trials);
       EXPECT_LT(sum.generalSigma(), 1);
       EXPECT_GT(sum.generalSigma(), std::sqrt((r + 2 - 2.5 * std::sqrt(2 * (r + 2))) / r));

@@ -148,8 +148,9 @@ struct Cell {
 TEST(Fig8, BiasOfTheScores) {
   const Stewart columns[] = {{.1, 1, 0},   {.2, 1, 0},   {.5, 1, 0},   {.8, 1, 0},   {.2, .8, 50},
                              {.2, .6, 50}, {.2, .8, 20}, {.2, .6, 20}, {.2, .8, 10}, {.2, .6, 10}};
-  // The design note's corrected table, means and standard deviations of 1000 repetitions; the printed row of R is
-  // within two standard deviations of it, the printed 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
+  // The corrected table (docs/theory/constrained.md, section 11, fig. 8), means and standard deviations of 1000
+  // repetitions of an independent prototype; the printed row of R is within two standard deviations of it, the printed
+  // 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
   const Cell R_e[] = {{-0.0, .5}, {-0.1, .6}, {-0.3, .9},  {-1.2, 1.5}, {-0.1, .6},
                       {0.0, 2.3}, {-0.1, .6}, {-0.3, 1.5}, {0.1, .8},   {0.9, 1.6}};
   const Cell R_e2[] = {{0.0, .9},  {0.0, 1.0}, {0.0, 1.2}, {0.1, 1.7}, {0.0, 1.0},
@@ -210,7 +211,8 @@ TEST(Fig8, BiasOfTheScores) {
 }
 
 TEST(Threshold, OfTheHistogramIsThatOfTheNote) {
-  // Half-normal inliers, outliers uniform on [0, 50], √T = 4; the last three without a standard deviation in the note.
+  // Half-normal inliers, outliers uniform on [0, 50], √T = 4 (docs/theory/constrained.md, section 14). Figures of an
+  // independent prototype, the last three without a standard deviation.
   struct {
     int n;
     double outliers, mean, deviation;

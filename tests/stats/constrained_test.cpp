@@ -46,7 +46,8 @@ TEST(Constrained, AConicIsAsUncertainAsItSays) {
     double sigma, mean, coverage;
     int iterations;
   };
-  // Curvature, which first order does not see, counts from 0.02 on; the note's figures.
+  // Curvature, which first order does not see, counts from 0.02 on (docs/theory/constrained.md, section 6); figures of
+  // an independent prototype.
   for (const auto& [sigma, mean, coverage, iterations] :
        {Row{0.005, 5, 0.95, 8}, Row{0.02, 5.12, 0.94, 13}, Row{0.05, 5.28, 0.93, 20}}) {
     const int trials = trialsOf(1000);
