@@ -80,7 +80,7 @@ Table errorsTable(const std::vector<Group>& list) {
       return std::isfinite(row->promise->note_p95) ? both(row->promise->note_median, row->promise->note_p95)
                                                    : number(row->promise->note_median, 2);
     };
-    const std::vector<std::string> note{"  (the note)", "", noted(leading), noted(Quantity::gravity),
+    const std::vector<std::string> note{"  (prototype)", "", noted(leading), noted(Quantity::gravity),
                                         noted(Quantity::scale)};
     if (std::any_of(note.begin() + 2, note.end(), [](const std::string& s) { return !s.empty(); })) table.row(note);
   }
