@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# pages.sh ROOT : each path and link in ROOT's README.md, docs/*.md and docs/theory/*.md leads somewhere, and so does each
+# pages.sh ROOT : each path and link in ROOT's *.md, docs/*.md and docs/theory/*.md leads somewhere, and so does each
 # citation of a page's section in ROOT's *.hpp, *.cpp and *.md.
 #
 # A path begins with a folder of the project (lie/so3.hpp, examples/fuse_poses, cli/io/); a program may be named without
@@ -147,6 +147,6 @@ if [ "$(cut -d: -f2 <<< "$found" | xargs)" != "3 4 4 6 6 7 8" ]; then
 fi
 
 wrong=0
-check "$1" "$1"/README.md "$1"/docs/*.md "$1"/docs/theory/*.md || wrong=1
+check "$1" "$1"/*.md "$1"/docs/*.md "$1"/docs/theory/*.md || wrong=1
 checkCitations "$1" || wrong=1
 exit $wrong
