@@ -204,7 +204,7 @@ TEST(ImplicitEkf, MovesByAModelWithAnUncertainInput) {
 // --- Two forms ----------------------------------------------------------------------------------------------------
 
 TEST(ImplicitEkf, DenseAndInformationFormAgree) {
-  constexpr int n = 5;
+  constexpr int n = 2;
   for (int iterations : {1, 20}) {
     for (std::uint64_t trial = 0; trial < 20; ++trial) {
       CounterRng rng(2, trial);
