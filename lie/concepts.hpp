@@ -1,4 +1,4 @@
-// The contracts that the library is written against: LieGroup, Homogeneous, Metric.
+// The contracts on which the library is built: LieGroup, Homogeneous, Metric.
 //
 // Pennec 1998, section 2.2: the action of a transformation group with its Jacobians and the placement function with its
 // Jacobian are the only atomic operations; everything else follows from them once, for every type of feature.
@@ -7,19 +7,19 @@
 //   1. act(placement(x), origin()) == x, and placement(origin()) is the identity
 //   2. act(f, act(g, x)) == act(f * g, x), act(identity, x) == x
 //   3. logOrigin(expOrigin(v)) == v inside the injectivity domain; expOrigin(logOrigin(x)) == x everywhere
-//   4. isotropy(f, x) is how placement(f x)⁻¹ f placement(x) acts on the tangent space of the origin
+//   4. isotropy(f, x) is the action of placement(f x)⁻¹ f placement(x) on the tangent space of the origin
 //   5. placement(x·exp(v)) == placement(x)·Exp(placementJacobian(x) v + O(v²)) wherever isPlacementSmooth(x)
 //   6. logOrigin(p·exp(v)) == logOrigin(p) + dlogOrigin(p) v + O(v²); dexpOrigin is its inverse
 //   7. Exp(d) acts on the origin as exp(originProjection() d + O(d²))
-// and of a Metric manifold, besides:
+// and of a Metric manifold, in addition:
 //   8. the distance is invariant: distance(f x, f y) == distance(x, y), symmetric, and satisfies the triangle
 //   inequality
 //   9. hessianHalfSquaredDistance(z) is the Hessian of ½ d²(·, x) at y, z = log(y, x), along geodesics
 // and of a Quotient:
 //  10. nothing depends on the representative: representative(x, i), i in representatives, is the same feature, tangent
-//      vectors v at x are representativeJacobian(i) v there; logOrigin takes the nearest representative
-// Tangent vectors at x live in the frame that placement(x) carries there.
-// Where the isotropy is not trivial and placement(expOrigin(v)) does not carry the origin's frame in parallel, the
+//      vectors v at x are representativeJacobian(i) v there; logOrigin uses the nearest representative
+// Tangent vectors at x are expressed in the image of the origin's frame under placement(x).
+// If the isotropy group is not trivial and placement(expOrigin(v)) does not parallel-transport the origin's frame, the
 // traits provide transvection(p), which does, and transvectionJacobian(), its derivative at the origin.
 #pragma once
 
@@ -31,7 +31,8 @@
 namespace liestat {
 
 /// The operations that make M a manifold, as static members. Types of the library specialise it in their own header; a
-/// user's type becomes a manifold by a specialisation of his own, without touching the type. Undefined in general.
+/// user's type becomes a manifold by a specialisation of ManifoldTraits, without changes to the type. Undefined in
+/// general.
 template <class M>
 struct ManifoldTraits;
 
@@ -80,7 +81,7 @@ concept Metric = Homogeneous<M> && requires(const typename ManifoldTraits<M>::Ta
   ManifoldTraits<M>::maxSectionalCurvature();
 };
 
-/// A Metric manifold made of a finite quotient: several representatives, of which logOrigin takes the nearest.
+/// A Metric manifold that is a finite quotient: several representatives, of which logOrigin uses the nearest.
 template <class M>
 concept Quotient = Homogeneous<M> && requires(const M& x) {
   ManifoldTraits<M>::nearestRepresentative(x);
@@ -89,18 +90,18 @@ concept Quotient = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::representativeJacobian(0) } -> std::convertible_to<typename ManifoldTraits<M>::Square>;
 };
 
-/// A manifold whose traits take it apart: factors(x) is a std::tuple of features of other manifolds, fromFactors(tuple)
-/// goes back, and where there is a metric the squared distance is the sum of the factors', whose tangent coordinates
-/// stand one after the other in the order of the tuple. Means, their starts and their certificates of uniqueness are
+/// A manifold whose traits decompose it: factors(x) is a std::tuple of features of other manifolds, fromFactors(tuple)
+/// is its inverse, and if there is a metric the squared distance is the sum of those of the factors, whose tangent
+/// coordinates are concatenated in the order of the tuple. Means, their starts and their certificates of uniqueness are
 /// then those of the factors.
 template <class M>
 concept Factored = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::fromFactors(ManifoldTraits<M>::factors(x)) } -> std::convertible_to<M>;
 };
 
-// What statistics may be told about a manifold besides. All of it is optional: without it means start at the best of
-// several data, and the certificates of uniqueness are those that need distances alone. Statistics ask for these traits
-// and never for members of a type or for its layout in memory.
+// Further properties of a manifold that statistics use. All of them are optional: without them means start at the best
+// of several measurements, and the certificates of uniqueness are those that need distances alone. Statistics use these
+// traits and never the members of a type or its layout in memory.
 
 /// The compact space on which means of a manifold can fail to be unique.
 enum class CompactFactor {
@@ -112,7 +113,7 @@ enum class CompactFactor {
 };
 
 /// A Metric manifold that is the product of one such space and a flat one: d² is the angle between compact parts,
-/// squared, plus a squared Euclidean distance. It says compact_factor, and unless that is none
+/// squared, plus a squared Euclidean distance. Its traits define compact_factor, and unless that is none
 ///   compact_begin          where its coordinates (rad; 1 of the circle, 2 of the sphere, 3 of SO(3)) begin in the
 ///                          tangent vector; exp along them moves nothing else
 ///   compactCoordinates(x)  the compact part as a unit vector: (cos, sin); a point of the sphere, the origin being
@@ -125,7 +126,7 @@ concept HasCompactFactor = Homogeneous<M> && requires {
 
 namespace detail {
 
-/// compact_factor, or unknown where the traits do not say it.
+/// compact_factor, or unknown if the traits do not define it.
 template <Homogeneous M>
 constexpr CompactFactor compactFactor() {
   if constexpr (HasCompactFactor<M>) {
@@ -158,7 +159,7 @@ concept HasChordalMoments = Homogeneous<M> && requires(typename ManifoldTraits<M
 
 /// SO(3), SO(3) × R³ under the product metric with the tangent order (translation, rotation), and their Quotients, in
 /// memory: parameters(x) points to the quaternion of compactCoordinates(x), followed by the position of x in the axes
-/// of the world. Sums over many features are then made several at a time.
+/// of the world. Sums over many features are then vectorised, several features at a time.
 template <class M>
 concept HasRotationParameters = HasCompactFactor<M> && requires(const M& x) {
   { ManifoldTraits<M>::parameters(x) } -> std::convertible_to<const typename ManifoldTraits<M>::Scalar*>;
@@ -167,7 +168,7 @@ concept HasRotationParameters = HasCompactFactor<M> && requires(const M& x) {
       (ManifoldTraits<M>::DoF == 6 && ManifoldTraits<M>::compact_begin == 3);
 };
 
-/// What a part of a tangent vector measures.
+/// The quantity that a part of a tangent vector measures.
 enum class TangentPart {
   translation,  ///< m
   rotation,     ///< rad
@@ -196,25 +197,25 @@ constexpr const char* name(TangentPart part) {
   return "unknown";
 }
 
-/// True of rotations and directions, whose coordinates are in rad.
+/// True for rotations and directions, whose coordinates are in rad.
 constexpr bool isAngular(TangentPart part) { return part == TangentPart::rotation || part == TangentPart::direction; }
 
-/// Some successive coordinates of a tangent vector and what they measure.
+/// Consecutive coordinates of a tangent vector and the quantity that they measure.
 struct TangentBlock {
   TangentPart part = TangentPart::point;
   int begin = 0, size = 0;
 };
 
-/// A manifold whose traits say what its tangent vectors are made of: tangent_parts is an array of TangentBlock, each
-/// beginning where the one before ends, that covers all coordinates.
+/// A manifold whose traits describe the parts of its tangent vectors: tangent_parts is an array of TangentBlock, each
+/// beginning where the previous one ends, that covers all coordinates.
 template <class M>
 concept HasTangentParts = Homogeneous<M> && requires {
   { ManifoldTraits<M>::tangent_parts[0] } -> std::convertible_to<TangentBlock>;
 };
 
 /// A manifold without a metric that has a Metric twin of the same dimension: metricTwin(x) and fromMetricTwin(y) are
-/// inverses of each other and keep the rotation. Where the rotation of a mean is the twin's (the barycentre of SE(3)),
-/// the certificates of the twin's mean are its own. Metric manifolds are their own twins.
+/// inverses of each other and preserve the rotation. If the rotation of a mean is that of the twin's mean (the
+/// barycentre of SE(3)), the certificates of the twin's mean apply to it. Metric manifolds are their own twins.
 template <class M>
 concept HasMetricTwin = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::fromMetricTwin(ManifoldTraits<M>::metricTwin(x)) } -> std::convertible_to<M>;

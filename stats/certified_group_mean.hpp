@@ -1,10 +1,10 @@
-// certifiedGroupMean: the exponential barycentre of a Lie group with what is known about its uniqueness, and its
-// covariance where that can be trusted. Needs Eigen alone.
+// certifiedGroupMean: the exponential barycentre of a Lie group with the certificates of its uniqueness, and its
+// covariance if that can be trusted. Needs Eigen alone.
 //
 // The rotation of a barycentre of rigid motions is the Riemannian mean of the rotations, and the translation follows
 // from that by linear equations: it is unique if the mean of the metric twin is (Frame3 for SE3, Frame2 for SE2;
-// HasMetricTwin in lie/concepts.hpp). A group with a metric of its own (SO3) is its own twin. Nothing is certified of
-// the others (SE23, Sim3).
+// HasMetricTwin in lie/concepts.hpp). A group with an invariant metric (SO3) is its own twin. Other groups (SE23, Sim3)
+// are not certified.
 #pragma once
 
 #include <lie/frame2.hpp>
@@ -26,12 +26,12 @@ namespace liestat {
 /// Options of certifiedGroupMean().
 struct CertifiedGroupMeanOptions {
   UniquenessOptions uniqueness = {};
-  /// The covariance is withdrawn when the Hessian of the twin's mean, or without a twin the barycentre's equations,
-  /// averaged over the covariance's region are flatter than those at the mean by more than this, relative.
+  /// The covariance is withheld if the Hessian of the twin's mean, or without a twin the equations of the barycentre,
+  /// averaged over the confidence region, are flatter than those at the mean by more than this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
 };
 
-/// A barycentre with all that is known about it.
+/// A barycentre with its certificates and its covariance.
 template <LieGroup G>
 struct CertifiedGroupMean {
   GroupMeanResult<G> mean;
@@ -110,7 +110,8 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
 }  // namespace detail
 
 /// The exponential barycentre of a range of group elements, weighted or not, certified by the mean of its metric twin,
-/// with its covariance from the residuals where that can be trusted: status ok. The same bits on any executor.
+/// with its covariance from the residuals if that can be trusted: status ok. The result has the same bits on any
+/// executor.
 template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples,
                                          const CertifiedGroupMeanOptions& options = {}) {

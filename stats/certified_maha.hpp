@@ -1,9 +1,9 @@
-// certifiedMaha: the Mahalanobis mean (stats/maha.hpp) from several starts, with the rivals that they lead to, and its
-// covariance where that can be trusted. Needs Eigen alone.
+// certifiedMaha: the Mahalanobis mean (stats/maha.hpp) from several starts, with the rivals found from them, and its
+// covariance if that can be trusted. Needs Eigen alone.
 //
-// No certificate is known for the minimum of this criterion. The weighted least-squares mean of the same data (of their
-// metric twins: Frame3 for SE3; lie/concepts.hpp) with its certified search is the first start, its rivals are others,
-// and so are some of the data; the mean also says where the cut locus would spoil a covariance.
+// No certificate is known for the minimum of this criterion. The starts are the weighted least-squares mean of the same
+// measurements (of their metric twins: Frame3 for SE3; lie/concepts.hpp) with its certified search, its rivals and some
+// of the measurements; that mean also determines whether the cut locus invalidates the covariance.
 #pragma once
 
 #include <lie/frame2.hpp>
@@ -32,28 +32,28 @@ struct CertifiedMahaOptions {
   MahaOptions<M> maha = {};         ///< its start, if there is one, is tried first
   UniquenessOptions uniqueness = {  ///< of the least-squares mean that gives the starts
       .budget = 10'000'000};
-  std::size_t starts_from_data = 6;  ///< features, spread over the data, that are starts too
+  std::size_t starts_from_data = 6;  ///< number of measurements, spread over the range, that are starts too
   double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
   double distinct = 1e-4;            ///< and they are this far apart, rad and m
-  NearTieOptions near_ties = {};     ///< which minima are rivals although they are higher; costs are log-likelihoods
-  /// The covariance is withdrawn when a Hessian averaged over its region is lower than that at the mean by more than
-  /// this, relative: that of MAHA, or of the least-squares mean.
+  NearTieOptions near_ties = {};     ///< the criterion by which higher minima are rivals; costs are log-likelihoods
+  /// The covariance is withheld if a Hessian averaged over its region is lower than that at the mean by more than this
+  /// fraction: that of MAHA, or of the least-squares mean.
   double largest_hessian_change = liestat::largest_hessian_change;
 };
 
-/// A Mahalanobis mean with all that is known about it.
+/// A Mahalanobis mean with its rivals and its covariance.
 template <Homogeneous M>
 struct CertifiedMaha {
-  MahaResult<M> maha;                 ///< the best of all starts; of equals the first
+  MahaResult<M> maha;                 ///< the best of all starts; among equal ones the first
   UniquenessResult<M> uniqueness;     ///< unique on flat manifolds only; ambiguous if there are rivals
-  std::vector<NearTie<M>> near_ties;  ///< other minima that the data do not exclude, the nearest tie first
-  std::size_t starts = 0;             ///< iterations that were made
+  std::vector<NearTie<M>> near_ties;  ///< other minima that the measurements do not exclude, the nearest tie first
+  std::size_t starts = 0;             ///< number of starts from which the iteration was run
   Concentration concentration;        ///< of the weighted least-squares mean
   CutLocusMass cut_locus;             ///< of the weighted least-squares mean
-  double hessian_change = 0;          ///< as of CertifiedMean, of MAHA's Hessian
+  double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
-  double fit = 0;  ///< Σ μ_i² at the mean, which follows χ² of `fit_dof` degrees of freedom if the covariances are true
+  double fit = 0;      ///< Σ μ_i² at the mean, χ² with `fit_dof` degrees of freedom if the covariances are right
   double fit_dof = 0;  ///< k (n - 1)
   Status status = Status::too_few;
   const char* reason = "";  ///< why there is no estimate, in words
@@ -61,7 +61,7 @@ struct CertifiedMaha {
 
 namespace detail {
 
-/// Manifolds on which every criterion of a mean has one minimum.
+/// True for manifolds on which every criterion of a mean has one minimum.
 template <Homogeneous M>
 constexpr bool isFlat() {
   if constexpr (Factored<M>) {
@@ -76,7 +76,7 @@ constexpr bool isFlat() {
 
 }  // namespace detail
 
-/// Squared Mahalanobis distance of a measurement from a mean, its covariance attached as `at` says.
+/// Squared Mahalanobis distance of a measurement from a mean; `at` is the frame of its covariance.
 template <Homogeneous M>
 ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
   const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
@@ -85,7 +85,8 @@ ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, Co
 
 namespace detail {
 
-/// The minima of other starts that are higher by less than the noise explains, outside of the mean's region.
+/// Sets the near ties: the minima of other starts that are higher by less than the noise explains, outside the
+/// confidence region of the mean.
 template <Homogeneous M>
 void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& others, const SquareOf<M>& region,
                  const CertifiedMahaOptions<M>& options) {
@@ -99,7 +100,7 @@ void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& oth
     const bool known = std::any_of(result.near_ties.begin(), result.near_ties.end(), [&](const NearTie<M>& tie) {
       return static_cast<double>(log(tie.feature, other.mean).norm()) < options.distinct;
     });
-    // Half the square of as many standard deviations.
+    // The ratio is half the square of z standard deviations.
     if (!known && static_cast<double>(error.norm()) >= options.distinct) {
       result.near_ties.push_back({other.mean, std::sqrt(2 * std::max(0.0, ratio)), ratio});
     }
@@ -138,8 +139,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     CertifiedMeanOptions<Twin> how;
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
-    how.known_noise = std::move(noise);  // the twin keeps the rotation, and with it the noise that is looked at
-    // Of the types that the front door of certifiedMean has, so that both share what they compile.
+    how.known_noise = std::move(noise);  // the twin preserves the rotation, and with it the noise that is tested
+    // These are the types that certifiedMean uses, so that both share their instantiations.
     const Samples<Twin> twins(metricTwins<M>(features));
     const Samples<double> numbers(std::move(weights));
     const auto twin = findCertifiedMean<Twin>(executor, twins, numbers, how);
@@ -147,7 +148,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     result.concentration = twin.concentration;
     twin_status = twin.status;
     twin_reason = twin.reason;
-    // Exact to rounding and not only to its tolerance, or the number of steps from there would hang on the last digits.
+    // The start must be exact to rounding and not only to the tolerance, or the number of steps from it would depend on
+    // the last digits.
     MeanOptions<Twin> once_more;
     once_more.start = twin.mean.mean;
     starts.push_back(fromTwin<M>(frechetMean<Twin>(executor, twins, numbers, once_more).mean));
@@ -157,7 +159,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     starts.push_back(std::nullopt);  // the one that maha() chooses
   }
   if constexpr (!isFlat<M>()) {
-    constexpr std::size_t many = 20000;  // whose criterion is smooth, and dear
+    constexpr std::size_t many = 20000;  // samples of this size have a smooth and expensive criterion
     const std::size_t several = n > many ? 1 : std::min(options.starts_from_data, n);
     for (std::size_t i = 0; i < several; ++i) starts.push_back(features[i * n / several]);
   }
@@ -173,7 +175,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     if (converged(a.status) != converged(b.status)) return converged(a.status);
     return a.cost < b.cost;
   };
-  // The first of equals is the one from the weighted mean.
+  // Among equal minima the first is the one from the weighted mean.
   result.maha = *std::min_element(results.begin(), results.end(), better);
   const MahaResult<M>& best = result.maha;
   using std::abs;
@@ -220,11 +222,11 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
 
 }  // namespace detail
 
-/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance where that can be trusted:
-/// status ok. It is withheld, with the reason in words, when the iteration did not converge, when several minima are
-/// equally low or higher by less than their noise explains (ambiguous), and when the Hessian is singular or, averaged
-/// over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined).
-/// Statuses of maha() besides. The same bits on any executor.
+/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance if that can be trusted:
+/// status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if several
+/// minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is singular or,
+/// averaged over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined). The
+/// statuses of maha() occur as well. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
                                const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {

@@ -1,4 +1,4 @@
-// certifiedMean: a Fréchet mean with what is known about its uniqueness, and its covariance where that can be trusted.
+// certifiedMean: a Fréchet mean with the certificates of its uniqueness, and its covariance if that can be trusted.
 // Needs Eigen alone.
 #pragma once
 
@@ -29,25 +29,26 @@ template <Metric M>
 struct CertifiedMeanOptions {
   MeanOptions<M> mean = {};
   UniquenessOptions uniqueness = {};
-  ResidualNoise noise = ResidualNoise::scaled;  ///< of a covariance from residuals
-  /// Covariances of the features' errors where they are known: one for each feature, in its frame (it is carried to the
-  /// mean along the geodesic, which changes nothing but on directions and the like), or a single one, in the frame of
-  /// the mean, that all of them have. Empty: the covariance comes from the residuals.
+  ResidualNoise noise = ResidualNoise::scaled;  ///< noise model for a covariance from residuals
+  /// Covariances of the features' errors if they are known: one for each feature, in its frame (it is transported to
+  /// the mean along the geodesic, which has an effect only if the isotropy group is not trivial, as for directions), or
+  /// a single one for all features, in the frame of the mean. Empty: the covariance is computed from the residuals.
   std::vector<SquareOf<M>> known_noise = {};
-  /// The covariance is withdrawn when the Hessian averaged over its region is lower than that by more, relative.
+  /// The covariance is withheld if the Hessian averaged over its region is lower than that at the mean by more than
+  /// this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
-  NearTieOptions near_ties = {};  ///< which other minima are rivals although they are higher
+  NearTieOptions near_ties = {};  ///< the criterion by which higher minima are rivals
 };
 
-/// A mean with all that is known about it.
+/// A mean with its certificates and its covariance.
 template <Metric M>
 struct CertifiedMean {
   MeanResult<M> mean;  ///< the improved one if the search found a lower minimum
   UniquenessResult<M> uniqueness;
   Concentration concentration;
-  std::vector<NearTie<M>> near_ties;  ///< other minima that the data do not exclude, the nearest tie first
+  std::vector<NearTie<M>> near_ties;  ///< other minima that the measurements do not exclude, the nearest tie first
   CutLocusMass cut_locus;
-  /// By how much the Hessian averaged over the confidence region (averagedHessian) is lower than at the mean, relative;
+  /// The relative decrease of the Hessian averaged over the confidence region (averagedHessian) from that at the mean;
   /// the covariance is that of the averaged one.
   double hessian_change = 0;
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
@@ -58,7 +59,7 @@ struct CertifiedMean {
 
 namespace detail {
 
-/// The search for ties gets this part of its budget where the data are as scattered as uniform ones.
+/// Divisor of the budget of the search for ties if the features are as scattered as uniform ones.
 inline constexpr std::size_t scattered_budget_part = 50;
 
 inline constexpr const char* not_converged_reason = "the iteration for the mean did not converge";
@@ -72,7 +73,7 @@ inline constexpr const char* cut_locus_reason =
     "the criterion is flat within the confidence region of the mean, because features lie near the cut locus: no "
     "first-order covariance is right";
 
-/// The covariance of a mean from the noise that the options know.
+/// The covariance of a mean from the known noise in the options.
 template <Metric M, class R, class W>
 SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const MeanResult<M>& mean,
                                      const std::vector<SquareOf<M>>& noise) {
@@ -100,7 +101,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.mean = frechetMean<M>(executor, samples, weights, options.mean);
   if (result.mean.n == 0) return without(Status::too_few, "there are no features");
   const bool known = !options.known_noise.empty();
-  // Of few data whose noise is known it is not asked to show that there is a mean.
+  // If the noise is known and both noise and scatter are small, the test for the existence of a mean is skipped.
   const auto isScattered = [&](const Concentration& concentration) {
     const bool modest =
         known && (result.mean.n == 1 || (concentration.isModest() && isModestNoise<M>(options.known_noise)));
@@ -115,7 +116,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     from_there.start = result.uniqueness.minimiser;
     result.mean = frechetMean<M>(executor, samples, weights, from_there);
   };
-  // What has no covariance anyway is searched for ties of the sample only as far as they are cheap.
+  // Samples that have no covariance anyway are searched for ties only with a small budget.
   const bool seems_scattered = isScattered(findConcentration(samples, weights, result.mean.mean));
   search(seems_scattered ? scattered_budget_part : 1);
   if (seems_scattered && result.uniqueness.improved &&
@@ -125,8 +126,8 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
   if (result.uniqueness.unique == Uniqueness::ambiguous) return without(Status::ambiguous, rival_reason);
 
-  // The region is the one that the residuals show, whatever the noise is said to be; that of the known noise where
-  // there are too few residuals.
+  // The region is that of the residuals, regardless of the stated noise; that of the known noise if there are too few
+  // residuals.
   const bool have_residuals = result.mean.n > static_cast<std::size_t>(ManifoldTraits<M>::DoF);
   if (!have_residuals && !known) return without(Status::too_few, too_few_reason);
   result.concentration = findConcentration(samples, weights, result.mean.mean);
@@ -141,7 +142,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.hessian_change = settled.change;
   if (!settled.first.allFinite()) return without(Status::ill_defined, hessian_reason);
   result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
-  // Of very many data near ties cost seconds, and here nothing depends on them.
+  // For very large samples near ties cost seconds, and here nothing depends on them.
   const bool scattered = isScattered(result.concentration);
   if (scattered && result.mean.n > most_averaged) return without(Status::ill_defined, scattered_reason);
   const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
@@ -172,12 +173,12 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 
 }  // namespace detail
 
-/// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, where that
-/// can be trusted: status ok. It is withheld, with the reason in words, when another feature explains the data as well,
-/// exactly or up to the noise of the data (ambiguous), when the features are as scattered as uniform ones or the
-/// criterion is flat within the confidence region (ill_defined), when there are no more features than dimensions and the
-/// noise is not known (too_few), or when the weights are none (not_applicable). A mean that is merely not certified to be
-/// unique keeps its covariance. The same bits on any executor.
+/// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, if that can
+/// be trusted: status ok. The covariance is withheld, with the reason in words, if another feature explains the
+/// measurements as well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or
+/// the criterion is flat within the confidence region (ill_defined), if there are no more features than dimensions and
+/// the noise is not known (too_few), or if the weights are invalid (not_applicable). A mean that is merely not
+/// certified to be unique keeps its covariance. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {

@@ -25,7 +25,7 @@
 namespace liestat {
 
 enum class MeanMethod {
-  newton,      ///< exact Hessian; falls back on a step of eq. (4) that decreases the criterion where Newton's does not
+  newton,      ///< exact Hessian; takes a step of eq. (4) if Newton's step does not decrease the criterion enough
   fixed_point  ///< eq. (4) of the report: monotone from any start, linear convergence
 };
 
@@ -33,24 +33,24 @@ enum class MeanMethod {
 template <Homogeneous M>
 struct MeanOptions {
   MeanMethod method = MeanMethod::newton;
-  /// Stop when a step's intrinsic norm (rad, m) falls below; unset: max(1e-12, 4 eps (scale of the data)), where the
-  /// scale counts the coordinates' size too, so that float and map coordinates converge.
+  /// The iteration stops when the intrinsic norm of a step (rad, m) falls below this; unset: max(1e-12, 4 eps (scale of
+  /// the data)), where the scale includes the magnitude of the coordinates, so that float and map coordinates converge.
   std::optional<double> tolerance = {};
   int max_iterations = 100;
-  /// Where to start; unset: the chordal mean, or for quotients the best of several data. Never simply the first
-  /// measurement.
+  /// The initial value; unset: the chordal mean, or for quotients the best of several measurements. It is never simply
+  /// the first measurement.
   std::optional<M> start = {};
 };
 
-/// What mean() returns. Matrices are in the local frame at the mean; the sums are those of the last pass over the data,
-/// at a point within the tolerance of the mean.
+/// Result of mean(). Matrices are in the local frame at the mean; the sums are those of the last pass over the data, at
+/// a point within the tolerance of the mean.
 template <Homogeneous M>
 struct MeanResult {
   M mean = ManifoldTraits<M>::origin();
   Status status = Status::too_few;
   int iterations = 0;    ///< steps taken, the last one below the tolerance
   double residual = 0;   ///< intrinsic norm of the last step
-  double tolerance = 0;  ///< the one that was used
+  double tolerance = 0;  ///< the tolerance used
   std::size_t n = 0;
   double sum_of_weights = 0;
   ScalarOf<M> cost = 0;                                      ///< C = ½ Σ p_i d²
@@ -58,16 +58,16 @@ struct MeanResult {
   SquareOf<M> scatter = SquareOf<M>::Zero();                 ///< Σ p_i z_i z_iᵀ
   SquareOf<M> squared_weight_scatter = SquareOf<M>::Zero();  ///< Σ p_i² z_i z_iᵀ
   ScalarOf<M> largest_distance = 0;                          ///< max d(mean, x_i)
-  ScalarOf<M> smallest_gap =  ///< of a quotient: least distance in angle to the cut locus
+  ScalarOf<M> smallest_gap =  ///< for a quotient: smallest angular distance to the cut locus
       std::numeric_limits<ScalarOf<M>>::infinity();
 
-  /// Σ p_i z_i z_iᵀ / Σ p_i: how the data spread about their mean.
+  /// Σ p_i z_i z_iᵀ / Σ p_i: the dispersion of the features about their mean.
   SquareOf<M> dispersion() const { return scatter / ScalarOf<M>(sum_of_weights); }
 };
 
 namespace detail {
 
-/// Size of the features' coordinates at y and of the spread: what rounding scales with.
+/// Magnitude of the features' coordinates at y and of the spread, to which rounding errors are proportional.
 template <Metric M>
 double dataScale(const M& y, const MeanSums<M>& sums) {
   const double spread = sums.weight > 0 ? std::sqrt(2 * static_cast<double>(sums.cost) / sums.weight) : 0;
@@ -154,7 +154,7 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
   return result;
 }
 
-/// States in one sentence why a range of features has no Fréchet mean; `ok` where it has one.
+/// States in one sentence why a range of features has no Fréchet mean; `ok` if it has one.
 template <AnyRange R>
 struct RequireMean : RequireSamples<R> {
   static constexpr bool ok = RequireSamples<R>::ok && Metric<SampleInSignature<R>>;
@@ -168,12 +168,13 @@ using MetricInSignature = std::conditional_t<Metric<SampleInSignature<R>>, Sampl
 
 }  // namespace detail
 
-/// Fréchet mean of a range of features (LSQ). No features: status too_few. Not finite: not_converged. For manifolds
-/// with an invariant metric; SE3 and its like have groupMean and maha.
+/// Fréchet mean of a range of features (LSQ), for manifolds with an invariant metric; for groups without one, such as
+/// SE3, there are groupMean and maha. Without features the status is too_few, with features that are not finite
+/// not_converged.
 ///
-/// The features are any range that can be gone through more than once, of points or of what stands for them: views
+/// The features are any range that can be traversed more than once, of points or of types that represent them: views
 /// (Eigen::Map<const SO3d>), columns (Matrix3Xd::colwise()), unit quaternions. The result is of the owning type. Values
-/// in random-access memory are used where they are, others are copied once.
+/// in random-access memory are used in place, others are copied once.
 template <Executor E, detail::AnyRange R>
 MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples,
                                               const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
@@ -190,10 +191,10 @@ MeanResult<detail::SampleInSignature<R>> mean(R&& samples,
 }
 
 /// Weighted Fréchet mean (WLSQ): minimises ½ Σ p_i d²(y, x_i). Weights are relative, one for each feature, in any range
-/// of numbers (std::vector, Eigen::VectorXd …); what they mean for the covariance is said in stats/covariance.hpp. A
-/// feature of weight zero is left out, and n counts the others. A weight that is negative or not finite, or none that is
-/// positive: status not_applicable. Where the largest is beyond 2^±30 all are multiplied by a power of two first, which
-/// the sums of the result show.
+/// of numbers (std::vector, Eigen::VectorXd …); stats/covariance.hpp describes their meaning for the covariance. A
+/// feature of weight zero is omitted, and n counts the others. The status is not_applicable if a weight is negative or
+/// not finite, or none is positive. If the largest is beyond 2^±30 all are first multiplied by a power of two, which
+/// the sums of the result include.
 template <Executor E, detail::AnyRange R, detail::AnyRange W>
 MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples, W&& weights,
                                               const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
