@@ -26,6 +26,7 @@ ViInitValidation small(std::vector<ViInitCheck> checks, std::size_t trials) {
   ViInitValidation validation;
   validation.checks = std::move(checks);
   validation.trials = trials;
+  validation.recordings = 1;  // a second each
   return validation;
 }
 
