@@ -34,7 +34,7 @@ class MotionWindow {
            const MotionEstimate& motion);
   std::span<const MotionPairs> frames() const { return frames_; }
   std::size_t looked_at() const { return looked_at_; }
-  /// Whether the frame that is looked at has come.
+  /// True once the frame that is looked at has come.
   bool has_looked_at() const {
     return !frames_.empty() && (looked_at_ == last_frame || frames_.back().frame == looked_at_);
   }
