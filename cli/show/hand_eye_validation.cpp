@@ -49,7 +49,7 @@ const Part parts[] = {
     {HandEyeExperiment::accuracy,
      false,
      "AX = YB: errors of X and its covariance",
-     "RMS errors beside those of a prototype (note); mean squared distance, 6 expected.",
+     "RMS errors beside a prototype's (note); mean squared distance, 6 expected.",
      {"noise", "n", "deg", "note", "mm", "note", "index", "95 %", "chi2/dof", "verdict"},
      [](const HandEyeRow& row) -> Cells {
        return {noiseName(row),
