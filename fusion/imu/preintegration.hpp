@@ -132,7 +132,7 @@ class Preintegration {
 
   /// The increment's covariance with that of the biases at the end, 15×15, order (position, rotation, velocity,
   /// gyroscope, accelerometer): what their random walk since the start adds. A tangent of
-  /// Product<SE23<S>, Vector3, Vector3>.
+  /// `Product<SE23<S>, Vector3, Vector3>`.
   Matrix15 covarianceWithBias() const {
     const Matrix3 T = increment_.so3().matrix().transpose();
     Matrix15 m = Matrix15::Zero();

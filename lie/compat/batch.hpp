@@ -32,6 +32,8 @@ using Batch = xsimd::batch<S>;
 
 }  // namespace liestat
 
+// Doxygen knows no templates of other namespaces.
+/// @cond
 /// A batch is a real number to Eigen.
 template <class T, class A>
 struct Eigen::NumTraits<xsimd::batch<T, A>> : Eigen::GenericNumTraits<T> {
@@ -49,12 +51,15 @@ struct Eigen::NumTraits<xsimd::batch<T, A>> : Eigen::GenericNumTraits<T> {
     MulCost = 1
   };
 };
+/// @endcond
 
 namespace liestat {
 namespace detail {
 
+/// @cond
 template <class A>
 inline constexpr bool is_single_precision<xsimd::batch<float, A>> = true;
+/// @endcond
 
 /// Lane by lane, a where the mask holds, else b: of batches, of Eigen's matrices of them, and of structures that hold
 /// nothing else.

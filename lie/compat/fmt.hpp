@@ -9,6 +9,8 @@
 
 #include <concepts>
 
+// Doxygen knows no templates of other namespaces.
+/// @cond
 /// Owned values and views alike.
 template <class T>
   requires std::derived_from<T, liestat::detail::Shell<T>>
@@ -26,3 +28,4 @@ struct fmt::formatter<T, char> : fmt::formatter<typename liestat::detail::ShellT
     return out;
   }
 };
+/// @endcond
