@@ -1,5 +1,6 @@
-# Installs the headers as <prefix>/include/liestat/<room>/…, a CMake package and a pkg-config file. Nothing in them
-# depends on the architecture, so both live under share/ and the installed tree may be moved.
+# Installs the headers as <prefix>/include/liestat/<room>/…, a CMake package and a pkg-config file, and the program where it
+# was built (its component is program; the rest works without it). Nothing in the package files depends on the
+# architecture, so they live under share/ and the installed tree may be moved.
 include(CMakePackageConfigHelpers)
 
 foreach(room lie stats fusion)
@@ -36,5 +37,5 @@ install(FILES ${PROJECT_BINARY_DIR}/liestat.pc DESTINATION ${liestat_pc_dir})
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET liestat_program)
-  install(TARGETS liestat_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS liestat_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program OPTIONAL)
 endif()
