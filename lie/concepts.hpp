@@ -23,6 +23,8 @@
 // traits provide transvection(p), which does, and transvectionJacobian(), its derivative at the origin.
 #pragma once
 
+#include <lie/detail/finite_math.hpp>
+
 #include <Eigen/Core>
 
 #include <concepts>

@@ -6,6 +6,8 @@
 // from the scalar's precision.
 #pragma once
 
+#include <lie/detail/finite_math.hpp>
+
 #include <Eigen/Core>
 
 #include <array>

@@ -69,6 +69,15 @@ else
       exit 1
     }
   done
+  # shellcheck disable=SC2086
+  fast() { $CXX -std=c++20 -fsyntax-only -DMISTAKE=0 -ffast-math "$@" -I"$root" $eigen "$here/sentences.cpp" 2>&1; }
+  errors=$(fast | grep -E '(^|[ :])error:' || true)
+  if [ "$(grep -c . <<<"$errors")" != 1 ] || ! grep -q 'liestat: .*-fno-finite-math-only' <<<"$errors" ||
+    ! fast -fno-finite-math-only; then
+    echo "$errors"
+    echo "consumers: failed: -ffast-math is not answered by one sentence, or not accepted with -fno-finite-math-only" >&2
+    exit 1
+  fi
   echo "consumers: mistakes are answered by one sentence each"
 fi
 
