@@ -8,6 +8,7 @@
 #include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstddef>
@@ -16,6 +17,7 @@
 #include <exception>
 #include <new>
 #include <optional>
+#include <string_view>
 #include <type_traits>
 
 namespace liestat::cli {
@@ -46,6 +48,41 @@ template <class T>
 struct NumberOf<std::vector<T>> : NumberOf<T> {};
 template <class T>
 struct NumberOf<std::optional<T>> : NumberOf<T> {};
+
+/// How many letters have to be inserted, removed, replaced or exchanged with their neighbour to make one word the other.
+std::size_t editDistance(std::string_view a, std::string_view b) {
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0U : 1U)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+/// ", did you mean …?" with the word that is nearest to what was typed, or nothing where none is near.
+std::string nearest(std::string_view typed, const std::vector<std::string>& words) {
+  // What is longer than any word is near none, and the distance takes the product of the lengths.
+  if (typed.size() > 40) return {};
+  const std::string* best = nullptr;
+  std::size_t least = typed.size() / 3 + 2;
+  for (const std::string& word : words) {
+    const std::size_t distance = editDistance(typed, word);
+    const bool begins = typed.size() > 1 && word.starts_with(typed);
+    if (begins || distance < least) {
+      best = &word;
+      if (begins) break;
+      least = distance;
+    }
+  }
+  return best == nullptr ? std::string() : fmt::format(", did you mean {}?", *best);
+}
 
 }  // namespace
 
@@ -118,6 +155,14 @@ Option Command::option(const std::string& name, T& value, const std::string& des
   CLI::Option* option = app_->add_option(name, value, description);
   using Number = typename NumberOf<T>::type;
   if constexpr (!std::is_void_v<Number>) option->check(meantAsNumber<Number>());
+  // A page is several files, so it cannot be standard output, which is what - means to the options of files.
+  if (name == "--report") {
+    option->check(CLI::Validator(
+        [](const std::string& text) {
+          return text == "-" ? std::string("- is standard output; a directory is expected") : std::string();
+        },
+        std::string()));
+  }
   return Option(option);
 }
 template Option Command::option(const std::string&, int&, const std::string&) const;
@@ -152,6 +197,44 @@ int complain(const std::string& message) {
   return exit_bad_input;
 }
 
+/// What is wrong where the first words of the command line are no command: the word, the nearest command and all of them.
+std::string faultOfCommand(int argc, char** argv, const CLI::App& app) {
+  const CLI::App* parent = &app;
+  std::string before;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    std::vector<std::string> names;
+    for (const CLI::App* command : parent->get_subcommands([](const CLI::App*) { return true; })) {
+      names.push_back(command->get_name());
+    }
+    // A command's own arguments, and options such as --help, are the parser's.
+    if (names.empty() || word.starts_with('-')) return {};
+    if (std::find(names.begin(), names.end(), word) == names.end()) {
+      const std::string near = nearest(word, names);
+      return fmt::format("{} is no {}command{} Commands: {}", printable(word), before, near.empty() ? "." : near,
+                         fmt::join(names, ", "));
+    }
+    parent = parent->get_subcommand(word);
+    before += word + " ";
+  }
+  return {};
+}
+
+/// The option that an unknown one may have been meant to be, for the command that was given.
+std::string nearestOption(const CLI::ExtrasError& error, const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  const std::string_view message = error.what();
+  const std::size_t begin = message.find("--");
+  if (begin == std::string_view::npos) return {};
+  const std::string typed(message.substr(begin, message.find_first_of("= ,]", begin) - begin));
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command->get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return nearest(typed, names);
+}
+
 int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) {
   CLI::App app("Statistics of rotations, poses and other geometric features, with their uncertainty.", "liestat");
   app.set_version_flag("--version", "liestat " + std::string(programVersion()));
@@ -165,8 +248,13 @@ int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) 
     }
     for (const auto add : group.commands) add(CommandList(parent, chosen));
   }
+  const std::string fault = faultOfCommand(argc, argv, app);
+  if (!fault.empty()) return complain("liestat: " + fault + " (liestat --help explains the usage)");
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& error) {
+    return complain("liestat: " + printable(error.what(), 1000) + nearestOption(error, app) +
+                    " (liestat --help explains the usage)");
   } catch (const CLI::ParseError& error) {
     // Help and version end the parsing too.
     if (error.get_exit_code() == 0) return app.exit(error);

@@ -147,6 +147,32 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
   }
 }
 
+TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
+  const auto complaint = [this](const std::vector<std::string>& arguments) {
+    const ProgramRun r = run(arguments);
+    EXPECT_EQ(r.status, 2) << ::testing::PrintToString(arguments);
+    return r.errors;
+  };
+  const std::string commands =
+      "Commands: hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, validate (liestat --help explains "
+      "the usage)\n";
+  EXPECT_EQ(complaint({"bogus"}), "liestat: bogus is no command. " + commands);
+  EXPECT_EQ(complaint({"maen", "f.csv"}), "liestat: maen is no command, did you mean mean? " + commands);
+  EXPECT_EQ(complaint({"viinit"}), "liestat: viinit is no command, did you mean vi-init? " + commands);
+  EXPECT_EQ(complaint({std::string(10000, 'x')}).rfind(commands),
+            complaint({std::string(10000, 'x')}).size() - commands.size());
+  EXPECT_EQ(complaint({"validate", "men"}).substr(0, 62),
+            "liestat: men is no validate command, did you mean means? Comma");
+  EXPECT_EQ(complaint({"mean", "f.csv", "--theads", "2"}),
+            "liestat: The following arguments were not expected: 2 --theads, did you mean --threads? (liestat --help "
+            "explains the usage)\n");
+  // A page is several files.
+  for (const std::string command : {"mean", "motion"}) {
+    EXPECT_EQ(complaint({command, "f.csv", "--report", "-"}),
+              "liestat: --report: - is standard output; a directory is expected (liestat --help explains the usage)\n");
+  }
+}
+
 TEST_F(Program, BoundsOfAnOptionAreSaid) {
   EXPECT_EQ(run({"validate", "means", "--spread", "0"}).errors,
             "liestat: --spread: 0 is not between 1e-09 and 10 (liestat --help explains the usage)\n");
