@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -37,7 +38,9 @@ int runPairs(const Options& options, const Invocation& invocation) {
       "validate two-view", [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
   if (options.output.json != "-") printLines(formatTwoViewPairs(result));
   if (!options.output.json.empty()) {
-    writeJson(options.output.json, toJson(result, jsonEnvelope(invocation.command_line, validation.seed)));
+    JsonObject object = jsonEnvelope(invocation.command_line, validation.seed);
+    object.set("passed", result.tally().failed == 0);
+    writeJson(options.output.json, toJson(result, std::move(object)));
   }
   if (!options.output.report.empty()) {
     writeTwoViewPairsReport(options.output.report, invocation.command_line, result);

@@ -79,18 +79,19 @@ template <class Row, class Format, class ToJson, class WriteReport>
 int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
             const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport,
             const FurtherRows& further = {}) {
+  const bool passed = (experiments::tally(rows) + further.tally).passed();
   // Whoever asks for JSON on standard output wants nothing else there.
   if (output.json != "-") printLines(format(rows));
   if (!output.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line, seed);
     std::vector<JsonObject> list;
     for (const Row& row : rows) list.push_back(toJson(row));
-    object.set("false_alarm", false_alarm).set("rows", list);
+    object.set("false_alarm", false_alarm).set("passed", passed).set("rows", list);
     if (!further.key.empty()) object.set(further.key, further.rows);
     writeJson(output.json, object);
   }
   if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
-  return (experiments::tally(rows) + further.tally).passed() ? exit_fine : exit_validation_failed;
+  return passed ? exit_fine : exit_validation_failed;
 }
 
 }  // namespace liestat::cli

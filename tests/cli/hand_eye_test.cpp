@@ -487,9 +487,11 @@ TEST(ValidateHandEye, writesRowsAndAPage) {
   }
   EXPECT_TRUE(contains(contentOf(page + "/index.html"), "</html>"));
   // Noise that is half as large again as said.
-  EXPECT_EQ(
-      run({"validate", "hand-eye", "--trials", "20", "--experiment", "accuracy", "--noise-factor", "1.5"}).exit_code,
-      1);
+  EXPECT_EQ(run({"validate", "hand-eye", "--trials", "20", "--experiment", "accuracy", "--noise-factor", "1.5",
+                 "--json", json_file})
+                .exit_code,
+            1);
+  EXPECT_EQ(Json::parse(contentOf(json_file))["passed"], false);
   EXPECT_EQ(run({"validate", "hand-eye", "--experiment", "nothing"}).exit_code, 2);
 }
 

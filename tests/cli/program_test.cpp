@@ -405,7 +405,9 @@ TEST_F(Program, ValidationsWriteNothingButJsonWhereItGoesToStandardOutput) {
     const std::string command = std::string("\"$0\" validate ") + what + " --trials 20 --json - > out.json";
     const ProgramResult result = runProgram({"sh", "-c", command, LIESTAT_PROGRAM}, directory_.path().string());
     EXPECT_EQ(result.status, 0) << result.errors;
-    EXPECT_FALSE(Json::parse(contentOf(directory_ / "out.json"))["rows"].empty()) << what;
+    const Json json = Json::parse(contentOf(directory_ / "out.json"));
+    EXPECT_FALSE(json["rows"].empty()) << what;
+    EXPECT_EQ(json["passed"], true) << what;
   }
 }
 
