@@ -1,6 +1,8 @@
 #include <cli/commands/command_line.hpp>
 
+#include <cli/commands/self_description.hpp>
 #include <cli/io/input_error.hpp>
+#include <cli/io/output_file.hpp>
 #include <cli/show/json.hpp>
 
 #include <CLI/App.hpp>
@@ -238,6 +240,10 @@ std::string nearestOption(const CLI::ExtrasError& error, const CLI::App& app) {
 int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) {
   CLI::App app("Statistics of rotations, poses and other geometric features, with their uncertainty.", "liestat");
   app.set_version_flag("--version", "liestat " + std::string(programVersion()));
+  // Declared for the help; they are looked at before the parser, which would miss a command.
+  bool alone = false;
+  app.add_flag("--man", alone, "Write the manual page (liestat --man | man -l -)");
+  app.add_flag("--completion", alone, "Write the completion for bash (source <(liestat --completion))");
   app.require_subcommand(1);
   const auto chosen = std::make_shared<Command::Run>();
   for (const CommandGroup& group : groups) {
@@ -247,6 +253,11 @@ int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) 
       parent->require_subcommand(1);
     }
     for (const auto add : group.commands) add(CommandList(parent, chosen));
+  }
+  if (argc == 2 && (std::string_view(argv[1]) == "--man" || std::string_view(argv[1]) == "--completion")) {
+    const bool manual = std::string_view(argv[1]) == "--man";
+    writeOutput("-", manual ? manualPage(app, std::string(programVersion())) : bashCompletion(app));
+    return exit_fine;
   }
   const std::string fault = faultOfCommand(argc, argv, app);
   if (!fault.empty()) return complain("liestat: " + fault + " (liestat --help explains the usage)");

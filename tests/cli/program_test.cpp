@@ -173,6 +173,32 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
   }
 }
 
+TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
+  const auto output = [this](const std::string& command) {
+    const ProgramResult result =
+        runProgram({"bash", "-c", command + " > out.txt", LIESTAT_PROGRAM}, directory_.path().string());
+    EXPECT_EQ(result.status, 0) << command << ": " << result.errors;
+    return contentOf(directory_ / "out.txt");
+  };
+  const std::string manual = output("\"$0\" --man"), completion = output("\"$0\" --completion");
+  for (const std::string command : {"hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
+                                    "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
+    EXPECT_NE(manual.find(".SS \"liestat " + command), std::string::npos) << command;
+    EXPECT_NE(completion.find('"' + command + "\")\n"), std::string::npos) << command;
+  }
+  EXPECT_NE(manual.find("\\fB\\-\\-json\\fR"), std::string::npos);
+  directory_.write("completion.bash", completion);
+  const auto completed = [&](const std::string& words) {
+    return output("source ./completion.bash; COMP_WORDS=(liestat " + words +
+                  "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _liestat; echo \"${COMPREPLY[*]}\"");
+  };
+  EXPECT_EQ(completed("me"), "mean\n");
+  EXPECT_EQ(completed("validate spl"), "split\n");
+  EXPECT_EQ(completed("mean poses.txt --crit"), "--criterion\n");
+  EXPECT_EQ(completed("mean poses.txt --criterion ''"), "lsq wlsq maha\n");
+  EXPECT_EQ(completed("mean ''"), "\n") << "file names are bash's own business";
+}
+
 TEST_F(Program, BoundsOfAnOptionAreSaid) {
   EXPECT_EQ(run({"validate", "means", "--spread", "0"}).errors,
             "liestat: --spread: 0 is not between 1e-09 and 10 (liestat --help explains the usage)\n");
