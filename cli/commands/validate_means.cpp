@@ -62,7 +62,11 @@ int runCommand(const Options& options, const Invocation& invocation) {
   return publish(
       options.output, invocation, options.seed, run_false_alarm, rows,
       [&](const std::vector<MeansRow>& list) { return formatMeansTables(list, verdicts); },
-      [](const MeansRow& row) { return toJson(row); }, writeMeansReport, further);
+      [](const MeansRow& row) { return toJson(row); },
+      [&](const std::string& directory, const std::string& command_line, const std::vector<MeansRow>& list) {
+        writeMeansReport(directory, command_line, list, verdicts);
+      },
+      further);
 }
 
 }  // namespace

@@ -116,6 +116,7 @@ JsonObject toJson(const EstimatorRow& row) {
 
 void writeEstimatorReport(const std::string& directory, const std::string& command_line, const Rows& rows) {
   Report report(directory, "Constrained estimation: do minimum, covariance and corrections follow their laws?");
+  showVerdict(report, formatEstimatorTables(rows));
   report.paragraph(
       "Each trial draws measurements with noise and estimates a parameter from them under implicit equations and "
       "constraints. To first order in the noise the minimum 2 L2 follows a chi-square law with the residual degrees of "

@@ -170,6 +170,7 @@ JsonObject toJson(const HandEyeRow& row) {
 
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const Rows& rows) {
   Report report(directory, "Hand-eye calibration: do errors, residuals and open directions follow their laws?");
+  showVerdict(report, formatHandEyeTables(rows));
   report.paragraph(
       "Each trial draws the poses of a camera on a gripper that looks at a target, with noise in both poses, and "
       "estimates gripper_T_camera from them. The squared Mahalanobis distance of the truth follows a chi-square law "

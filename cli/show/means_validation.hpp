@@ -19,6 +19,7 @@ JsonObject toJson(const experiments::VerdictRow& row);
 
 /// The page with its plots.
 void writeMeansReport(const std::string& directory, const std::string& command_line,
-                      const std::vector<experiments::MeansRow>& rows);
+                      const std::vector<experiments::MeansRow>& rows,
+                      const std::vector<experiments::VerdictRow>& verdicts = {});
 
 }  // namespace liestat::cli

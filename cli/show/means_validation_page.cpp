@@ -48,9 +48,10 @@ void addIfAny(std::vector<Series>& list, Series series) {
 
 }  // namespace
 
-void writeMeansReport(const std::string& directory, const std::string& command_line,
-                      const std::vector<MeansRow>& rows) {
+void writeMeansReport(const std::string& directory, const std::string& command_line, const std::vector<MeansRow>& rows,
+                      const std::vector<VerdictRow>& verdicts) {
   Report report(directory, "Means of geometric features: are their covariances true?");
+  showVerdict(report, formatMeansTables(rows, verdicts));
   report.paragraph(
       "Each trial draws a feature, measures it n times with noise, estimates the mean and its covariance, and takes "
       "the "

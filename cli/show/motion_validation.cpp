@@ -139,6 +139,7 @@ JsonObject toJson(const MotionRow& row) {
 void writeMotionReport(const std::string& directory, const std::string& command_line,
                        const std::vector<MotionRow>& rows) {
   Report report(directory, "Recursive motion: is the direction found, how well, and is its covariance true?");
+  showVerdict(report, formatMotionTables(rows));
   report.paragraph(
       "Each trial moves a camera among points for 100 frames and runs a filter over their tracks. A run is a success "
       "where "

@@ -43,10 +43,18 @@ td { border-bottom: 1px solid var(--rule); }
 tbody tr:nth-child(even) { background: var(--stripe); }
 .number { text-align: right; }
 figure { margin: 1.5rem 0 2rem; }
-.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem; }
+.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem; overflow-x: auto; }
 .plot svg { display: block; width: 100%; height: auto; margin: 0 auto; }
+@media (prefers-color-scheme: dark) {
+  .plot { background: #161616; }
+  .plot svg { filter: invert(.914) hue-rotate(180deg); }
+}
 .plot text { font-family: Helvetica, Arial, sans-serif; }
 figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
+.verdict { border: 2px solid; border-radius: 6px; padding: .6rem .9rem; max-width: none; font-weight: 600; }
+.good { border-color: #2e8b57; }
+.bad { border-color: #c8452f; }
+.contents { columns: 2; padding-left: 1.2rem; max-width: 46rem; }
 .notice { border-left: 4px solid #d99a00; background: var(--stripe); padding: .6rem .9rem; max-width: none; }
 footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85rem; }
 )css";
@@ -108,6 +116,32 @@ std::string withOwnIdentifiers(std::string_view svg, const std::string& name) {
     result.append(svg.substr(0, next)).append(name).append("_");
     svg.remove_prefix(next);
   }
+}
+
+/// What a drawing shows, for whoever cannot see it: the titles of its panels, or its caption.
+std::string titleOf(const Plot& plot) {
+  std::string title;
+  for (const Panel& panel : plot.panels) {
+    if (panel.title.empty() || title.find(panel.title) != std::string::npos) continue;
+    title += (title.empty() ? "" : "; ") + panel.title;
+  }
+  if (!title.empty()) return title;
+  return plot.caption.empty() ? plot.name : plot.caption;
+}
+
+/// The drawing as one image with a title, in place of gnuplot's own, which is the same for all.
+std::string named(std::string svg, const std::string& name, const std::string& title) {
+  const std::string element = fmt::format("<title id=\"{}_title\">{}</title>", name, escaped(title));
+  const std::size_t begin = svg.find("<title>"), end = svg.find("</title>");
+  const std::size_t first_end = svg.find('>');
+  if (first_end == std::string::npos) return svg;
+  if (begin != std::string::npos && end != std::string::npos && begin < end) {
+    svg.replace(begin, end + 8 - begin, element);
+  } else {
+    svg.insert(first_end + 1, element);
+  }
+  svg.insert(4, fmt::format(" role=\"img\" aria-labelledby=\"{}_title\"", name));
+  return svg;
 }
 
 /// The width that the drawing was made for, from its viewBox: wider would blow up its letters.
@@ -225,6 +259,12 @@ Report::Report(std::string directory, std::string title) : directory_(std::move(
   createDirectory(directory_);
 }
 
+void Report::writeOwn(const std::string& file, std::string_view content) const {
+  std::error_code ignored;
+  if (std::filesystem::is_symlink(path(file), ignored)) std::filesystem::remove(path(file), ignored);
+  writeOutput(path(file), content);
+}
+
 std::string Report::path(const std::string& file) const { return (std::filesystem::path(directory_) / file).string(); }
 
 std::string Report::uniqueName(std::string_view name) {
@@ -240,7 +280,14 @@ std::string Report::uniqueName(std::string_view name) {
   return candidate;
 }
 
-void Report::section(std::string_view title) { body_ += fmt::format("<h2>{}</h2>\n", escaped(title)); }
+void Report::verdict(bool good, std::string_view text) {
+  verdict_ = fmt::format("<p class=\"verdict {}\">{} {}</p>\n", good ? "good" : "bad", good ? "✓" : "✗", escaped(text));
+}
+
+void Report::section(std::string_view title) {
+  sections_.emplace_back(title);
+  body_ += fmt::format("<h2 id=\"section-{}\">{}</h2>\n", sections_.size(), escaped(title));
+}
 
 void Report::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", escaped(text)); }
 
@@ -254,7 +301,7 @@ void Report::table(const std::vector<std::string>& headers, const std::vector<st
   if (!caption.empty()) body_ += fmt::format("<caption>{}</caption>\n", escaped(caption));
   body_ += "<thead><tr>";
   for (std::size_t i = 0; i < headers.size(); ++i)
-    body_ += fmt::format("<th{}>{}</th>", classes[i], escaped(headers[i]));
+    body_ += fmt::format("<th scope=\"col\"{}>{}</th>", classes[i], escaped(headers[i]));
   body_ += "</tr></thead>\n<tbody>\n";
   for (const auto& row : rows) {
     body_ += "<tr>";
@@ -268,7 +315,7 @@ void Report::table(const std::vector<std::string>& headers, const std::vector<st
 
 void Report::plot(const Plot& plot) {
   const std::string name = uniqueName(plot.name);
-  writeOutput(path(name + ".csv"), plotCsv(plot));
+  writeOwn(name + ".csv", plotCsv(plot));
   // A drawing of an earlier run would pass for one of this.
   std::error_code ignored;
   std::filesystem::remove(path(name + ".svg"), ignored);
@@ -279,7 +326,7 @@ void Report::plot(const Plot& plot) {
   if (script.empty()) {
     notice = "There is nothing finite to draw.";
   } else {
-    writeOutput(path(name + ".gp"), script);
+    writeOwn(name + ".gp", script);
     const ProgramResult run = runProgram({"gnuplot", "-d", name + ".gp"}, directory_);
     if (!run.found) {
       has_gnuplot_ = false;
@@ -293,8 +340,10 @@ void Report::plot(const Plot& plot) {
 
   body_ += "<figure>\n";
   if (!svg.empty()) {
-    const std::string drawing = withOwnIdentifiers(svgElement(svg), name);
-    body_ += fmt::format("<div class=\"plot\" style=\"max-width:{}px\">{}</div>\n", svgWidth(drawing) + 18, drawing);
+    const std::string drawing = named(withOwnIdentifiers(svgElement(svg), name), name, titleOf(plot));
+    const int width = svgWidth(drawing);
+    body_ += fmt::format("<div class=\"plot\" style=\"max-width:{}px\">{}</div>\n", width + 18,
+                         "<div style=\"min-width:" + std::to_string(width * 10 / 12) + "px\">" + drawing + "</div>");
   } else {
     body_ += fmt::format("<p class=\"notice\">{}</p>\n", escaped(notice));
   }
@@ -315,15 +364,22 @@ void Report::plot(const Plot& plot) {
 }
 
 std::string Report::write() {
+  std::string contents;
+  if (sections_.size() > 4) {
+    contents = "<nav aria-label=\"Contents\"><ol class=\"contents\">\n";
+    for (std::size_t i = 0; i < sections_.size(); ++i) {
+      contents += fmt::format("<li><a href=\"#section-{}\">{}</a></li>\n", i + 1, escaped(sections_[i]));
+    }
+    contents += "</ol></nav>\n";
+  }
   const std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n{2}"
-      "<footer>liestat {3}</footer>\n</body>\n</html>\n",
-      escaped(title_), style_sheet, body_, programVersion());
-  const std::string file = path("index.html");
-  writeOutput(file, page);
-  return file;
+      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n{2}{3}{4}"
+      "<footer>liestat {5}</footer>\n</body>\n</html>\n",
+      escaped(title_), style_sheet, verdict_, contents, body_, programVersion());
+  writeOwn("index.html", page);
+  return path("index.html");
 }
 
 }  // namespace liestat::cli

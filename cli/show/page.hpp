@@ -97,7 +97,9 @@ class Report {
   /// Makes the directory; throws InputError where that is not possible.
   Report(std::string directory, std::string title);
 
-  /// A heading.
+  /// The answer in one sentence, in a box below the title whenever it is given. A sign says the same as its colour.
+  void verdict(bool good, std::string_view text);
+  /// A heading. Pages with many of them begin with a list of contents.
   void section(std::string_view title);
   /// Plain text.
   void paragraph(std::string_view text);
@@ -118,11 +120,15 @@ class Report {
  private:
   std::string path(const std::string& file) const;
   std::string uniqueName(std::string_view name);
+  /// Writes a file of the directory. A link under its name is replaced, not followed out of the directory.
+  void writeOwn(const std::string& file, std::string_view content) const;
 
   std::string directory_;
   std::string title_;
+  std::string verdict_;
   std::string body_;
   std::vector<std::string> names_;
+  std::vector<std::string> sections_;
   bool has_gnuplot_ = true;
 };
 

@@ -42,6 +42,7 @@ JsonObject toJson(const PreintegrationRow& row) {
 void writePreintegrationReport(const std::string& directory, const std::string& command_line,
                                const std::vector<PreintegrationRow>& rows) {
   Report report(directory, "Preintegration: is the covariance true?");
+  showVerdict(report, formatPreintegrationTable(rows));
   report.paragraph(
       "Each trial makes a motion, readings of it with noise and walking biases, and takes the squared Mahalanobis "
       "distance of the true increment under the covariance. If that is true, the distances follow a chi-square law.");

@@ -32,6 +32,7 @@ Series curve(const std::vector<const PropagationRow*>& rows, const PropagationMe
 void writePropagationReport(const std::string& directory, const std::string& command_line,
                             const std::vector<PropagationRow>& rows) {
   Report report(directory, "Propagation of covariances: up to which noise is it right?");
+  showVerdict(report, formatPropagationTables(rows));
   report.paragraph(
       "Each trial draws features with their noise, composes, inverts or compares them or moves a point, and takes the "
       "squared Mahalanobis distance of the true result under the propagated covariance. If that is true these "

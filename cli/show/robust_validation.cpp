@@ -142,6 +142,7 @@ JsonObject toJson(const ThresholdRow& row) {
 void writeRobustReport(const std::string& directory, const std::string& command_line,
                        const RobustValidationResult& result) {
   Report report(directory, "Robust search: is the structure found, and is the covariance of what is found true?");
+  showVerdict(report, formatRobustTables(result));
   report.paragraph(
       "Each trial draws measurements of a structure among outliers and searches until, with the confidence that was "
       "asked for, one of the draws was of inliers alone. The structure counts as found where nine tenths of its "

@@ -129,6 +129,7 @@ JsonObject toJson(const TwoViewChoice& choice) {
 void writeTwoViewReport(const std::string& directory, const std::string& command_line,
                         const TwoViewValidationResult& result) {
   Report report(directory, "Two-view motion: is the right model chosen, and is its covariance true?");
+  showVerdict(report, formatTwoViewTables(result));
   report.paragraph(
       "Each trial moves a camera by one motion, takes matches with noise and outliers, and runs the hierarchy of "
       "models over them. The table has the models that were chosen. For the true model's estimate the squared "

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <vector>
+
 namespace liestat::cli {
 
 using namespace experiments;
@@ -21,6 +24,17 @@ std::string verdictLines(const Tally& tally, const std::string& where) {
   if (tally.judged == 0) return fmt::format("no row is {}: nothing was judged\nFAILED\n", where);
   return fmt::format("{} of {} rows {} pass; false alarms: one in {:g} runs\n{}\n", tally.judged - tally.failed,
                      tally.judged, where, 1 / run_false_alarm, tally.passed() ? "PASSED" : "FAILED");
+}
+
+void showVerdict(Report& report, std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    if (end > 0) lines.push_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  if (lines.size() < 2) return;
+  report.verdict(lines.back() == "PASSED", fmt::format("{}: {}", lines.back(), lines[lines.size() - 2]));
 }
 
 Panel histogramPanel(const JudgedReport& row, const std::string& title) {

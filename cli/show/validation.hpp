@@ -8,6 +8,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace liestat::cli {
 
@@ -20,6 +21,9 @@ std::string verdictCell(const std::optional<bool>& passed);
 /// The last lines on the terminal: how many of the judged rows pass, where they are (`in the promised domain`), and
 /// PASSED or FAILED, which a run without a judged row has too.
 std::string verdictLines(const experiments::Tally& tally, const std::string& where);
+
+/// The same verdict on the page: `text` is what the terminal shows, which ends with verdictLines().
+void showVerdict(Report& report, std::string_view text);
 
 /// Histogram of the squared distances with the density that they should have.
 Panel histogramPanel(const experiments::JudgedReport& row, const std::string& title);

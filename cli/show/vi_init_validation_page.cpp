@@ -96,6 +96,7 @@ Panel coveragePanel(const std::vector<ViInitRow>& rows, Check check) {
 void writeViInitReport(const std::string& directory, const std::string& command_line,
                        const std::vector<ViInitRow>& rows) {
   Report report(directory, "Visual-inertial initialisation: are its covariances true, and how good is it?");
+  showVerdict(report, formatViInitTables(rows));
   report.paragraph(
       "Each trial draws a scene, what a camera and an inertial sensor measure of it, and solves the window. If a "
       "covariance is true, the squared Mahalanobis distances of the truth under it follow a chi-square law with k "

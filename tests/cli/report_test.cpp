@@ -103,6 +103,44 @@ TEST(Report, PageHoldsTextTablesAndPlots) {
   EXPECT_TRUE(contains(page, "no finite data"));
   EXPECT_EQ(count(page, "id='every_style_gpPt6'"), 1U) << "identifiers differ between the drawings";
   EXPECT_EQ(count(page, "id='gpPt6'"), 0U);
+  // Whoever cannot see a drawing is told what it shows.
+  EXPECT_TRUE(contains(page, "<svg role=\"img\" aria-labelledby=\"every_style_title\""));
+  EXPECT_TRUE(contains(page, "<title id=\"every_style_title\">Index; Histogram; Chart; Empty</title>"));
+  EXPECT_FALSE(contains(page, "<title>Gnuplot</title>"));
+  // Letters of 12 px stay at 10 px on a narrow screen, where the drawing scrolls.
+  EXPECT_TRUE(contains(page, "min-width:766px"));
+}
+
+TEST(Report, TheVerdictIsFirstAndManySectionsHaveContents) {
+  const TemporaryDirectory directory;
+  Report report(directory / "report", "A page");
+  for (const char* title : {"One", "Two", "Three", "Four"}) report.section(title);
+  EXPECT_FALSE(contains(contentOf(report.write()), "class=\"contents\"")) << "a short page needs none";
+  report.section("Five & more");
+  report.table({"a", "b"}, {{"1", "x"}});
+  report.verdict(false, "FAILED: 1 of 2 rows");
+  const std::string page = contentOf(report.write());
+  EXPECT_TRUE(contains(page, "</h1>\n<p class=\"verdict bad\">✗ FAILED: 1 of 2 rows</p>\n<nav"));
+  EXPECT_TRUE(contains(page, "<li><a href=\"#section-5\">Five &amp; more</a></li>"));
+  EXPECT_TRUE(contains(page, "<h2 id=\"section-5\">Five &amp; more</h2>"));
+  EXPECT_TRUE(contains(page, "<th scope=\"col\" class=\"number\">a</th><th scope=\"col\">b</th>"));
+  report.verdict(true, "PASSED");
+  EXPECT_TRUE(contains(contentOf(report.write()), "<p class=\"verdict good\">✓ PASSED</p>"));
+}
+
+TEST(Report, LinksInItsDirectoryAreReplaced) {
+  const TemporaryDirectory directory;
+  directory.write("outside.txt", "precious");
+  std::filesystem::create_directory(directory.path() / "report");
+  for (const char* file : {"index.html", "every_style.csv", "every_style.gp", "every_style.svg"}) {
+    std::filesystem::create_symlink(directory.path() / "outside.txt", directory.path() / "report" / file);
+  }
+  Report report(directory / "report", "Links");
+  report.plot(everyStyle());
+  report.write();
+  EXPECT_EQ(contentOf(directory / "outside.txt"), "precious");
+  EXPECT_TRUE(contains(contentOf(directory / "report/index.html"), "</html>"));
+  EXPECT_FALSE(std::filesystem::is_symlink(directory.path() / "report/index.html"));
 }
 
 TEST(Report, ContoursAreTheLinesOfEqualValue) {

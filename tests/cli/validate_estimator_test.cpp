@@ -56,7 +56,9 @@ TEST(ValidateEstimatorProgram, writesRowsAndAReport) {
   EXPECT_EQ(json["rows"][3]["note_index"], 5.12);
   EXPECT_TRUE(json["rows"][3]["passed"].is_null());
   EXPECT_EQ(json["rows"][6]["experiment"], "rotation");
-  EXPECT_NE(contentOf(directory / "report/index.html").find("</html>"), std::string::npos);
+  const std::string page = contentOf(directory / "report/index.html");
+  EXPECT_NE(page.find("</html>"), std::string::npos);
+  EXPECT_NE(page.find("</h1>\n<p class=\"verdict good\">✓ PASSED: "), std::string::npos) << "the verdict comes first";
 }
 
 TEST(ValidateEstimatorProgram, failsWhereTheNoiseIsWrong) {
