@@ -3,6 +3,7 @@
 #include <cli/commands/self_description.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/io/output_file.hpp>
+#include <cli/io/text.hpp>
 #include <cli/show/json.hpp>
 
 #include <CLI/App.hpp>
@@ -51,39 +52,15 @@ struct NumberOf<std::vector<T>> : NumberOf<T> {};
 template <class T>
 struct NumberOf<std::optional<T>> : NumberOf<T> {};
 
-/// How many letters have to be inserted, removed, replaced or exchanged with their neighbour to make one word the other.
-std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i) {
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
-        continue;
-      }
-      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0U : 1U)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-    }
-  }
-  return d[a.size()][b.size()];
-}
-
 /// ", did you mean …?" with the word that is nearest to what was typed, or nothing where none is near.
 std::string nearest(std::string_view typed, const std::vector<std::string>& words) {
   // What is longer than any word is near none, and the distance takes the product of the lengths.
   if (typed.size() > 40) return {};
-  const std::string* best = nullptr;
-  std::size_t least = typed.size() / 3 + 2;
-  for (const std::string& word : words) {
-    const std::size_t distance = editDistance(typed, word);
-    const bool begins = typed.size() > 1 && word.starts_with(typed);
-    if (begins || distance < least) {
-      best = &word;
-      if (begins) break;
-      least = distance;
-    }
-  }
-  return best == nullptr ? std::string() : fmt::format(", did you mean {}?", *best);
+  const auto begun = std::find_if(words.begin(), words.end(), [&](const std::string& word) {
+    return typed.find_first_not_of('-') != std::string_view::npos && word.starts_with(typed);
+  });
+  const std::string best = begun != words.end() ? *begun : nearestName(typed, words);
+  return best.empty() ? best : fmt::format(", did you mean {}?", best);
 }
 
 }  // namespace
