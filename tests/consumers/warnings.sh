@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # No warning from the headers in a user's own unit, with the compiler that CXX names, else with g++ and clang++ where they
-# are installed; Boost's and Random123's own headers are the system's. Usage: warnings.sh; CMAKE_BUILD_PARALLEL_LEVEL is
-# how many compilers run at once.
+# are installed; Boost's and Random123's own headers are the system's. Usage: warnings.sh [UNIT…], without arguments all of
+# them; CMAKE_BUILD_PARALLEL_LEVEL is how many compilers run at once.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -33,9 +33,10 @@ check() {
 }
 export -f check
 
+[ $# -gt 0 ] || set -- "$here"/warnings_*.cpp
 for compiler in ${CXX:-g++ clang++}; do
   if command -v "$compiler" >/dev/null; then
-    printf '%s\n' "$here"/warnings_*.cpp | xargs -P "${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}" -I{} bash -c 'check "$1" {}' warnings "$compiler"
+    printf '%s\n' "$@" | xargs -P "${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}" -I{} bash -c 'check "$1" {}' warnings "$compiler"
   else
     echo "warnings: $compiler: SKIPPED, it is not installed"
   fi
