@@ -54,7 +54,7 @@ struct NumberOf<std::optional<T>> : NumberOf<T> {};
 
 /// ", did you mean …?" with the word that is nearest to what was typed, or nothing where none is near.
 std::string nearest(std::string_view typed, const std::vector<std::string>& words) {
-  // What is longer than any word is near none, and the distance takes the product of the lengths.
+  // A text longer than any word is near none, and the distance takes the product of the lengths.
   if (typed.size() > 40) return {};
   const auto begun = std::find_if(words.begin(), words.end(), [&](const std::string& word) {
     return typed.find_first_not_of('-') != std::string_view::npos && word.starts_with(typed);
@@ -176,7 +176,7 @@ int complain(const std::string& message) {
   return exit_bad_input;
 }
 
-/// What is wrong where the first words of the command line are no command: the word, the nearest command and all of them.
+/// The complaint where the first words of the command line are no command: the word, the nearest command and all of them.
 std::string faultOfCommand(int argc, char** argv, const CLI::App& app) {
   const CLI::App* parent = &app;
   std::string before;

@@ -118,7 +118,7 @@ std::string withOwnIdentifiers(std::string_view svg, const std::string& name) {
   }
 }
 
-/// What a drawing shows, for whoever cannot see it: the titles of its panels, or its caption.
+/// The title of a drawing, for whoever cannot see it: the titles of its panels, or its caption.
 std::string titleOf(const Plot& plot) {
   std::string title;
   for (const Panel& panel : plot.panels) {
