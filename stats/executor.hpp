@@ -7,6 +7,8 @@
 // never on the machine, and the chunks' results are combined one after the other in the order 0, 1, 2, …: the same bits
 // come out on one thread, eight threads or four ranks (of one binary with one libm).
 
+#include <lie/instruction_set.hpp>
+
 #include <algorithm>
 #include <concepts>
 #include <cstddef>
@@ -108,5 +110,16 @@ struct SerialExecutor {
 };
 
 static_assert(Executor<SerialExecutor>);
+
+/// The instructions of the kernels that run under an executor: those that it has agreed on, where processes on several
+/// machines work together (executor.instructionSet()), else those of the process.
+template <Executor E>
+InstructionSet instructionSetOf(const E& executor) {
+  if constexpr (requires { executor.instructionSet(); }) {
+    return executor.instructionSet();
+  } else {
+    return instructionSet();
+  }
+}
 
 }  // namespace liestat

@@ -39,7 +39,7 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
   const auto cost_at = [&](const M& y) {
     if constexpr (HasRotationSums<M>) {
       RotationSums<M> sums;
-      if (sums.template add<true, false>(judging, weight, 0, judges, y)) return sums.cost;
+      if (sums.template add<true, false>(instructionSet(), judging, weight, 0, judges, y)) return sums.cost;
     }
     const typename T::Group to_y = T::placement(y).inverse();
     S cost(0);

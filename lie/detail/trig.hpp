@@ -6,6 +6,7 @@
 // from the scalar's precision.
 #pragma once
 
+#include <lie/detail/always_inline.hpp>
 #include <lie/detail/finite_math.hpp>
 
 #include <Eigen/Core>
@@ -47,19 +48,19 @@ constexpr std::array<double, static_cast<std::size_t>(N)> factorialSeries(int of
   return coefficients;
 }
 
-/// A number of the type S: of scalars by conversion, of the compilers' vectors in every lane.
+/// A number of the type S: scalars, and batches of them in every lane.
 template <class S>
-inline S constant(double c) {
-  if constexpr (std::is_constructible_v<S, double>) {
-    return S(c);
+LIESTAT_ALWAYS_INLINE S constant(double c) {
+  if constexpr (requires { typename S::Mask; }) {
+    return S(static_cast<typename S::Scalar>(c));
   } else {
-    return S{} + c;
+    return S(c);
   }
 }
 
 /// c[first] + c[first + 4] x4 + c[first + 8] x4² + … up to the last index below `terms`.
 template <std::size_t first, std::size_t terms, class S, std::size_t N>
-inline S everyFourth(const std::array<double, N>& c, const S& x4) {
+LIESTAT_ALWAYS_INLINE S everyFourth(const std::array<double, N>& c, const S& x4) {
   constexpr std::size_t last = first + (terms - 1 - first) / 4 * 4;
   S sum = constant<S>(c[last]);
   for (std::size_t k = last; k > first; k -= 4) sum = sum * x4 + constant<S>(c[k - 4]);
@@ -69,7 +70,7 @@ inline S everyFourth(const std::array<double, N>& c, const S& x4) {
 /// Σ c_k x^k over the first `terms` coefficients, in four chains of operations that don't wait for one another:
 /// Horner's single chain takes four times as long as its multiplications.
 template <std::size_t terms, class S, std::size_t N>
-inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
+LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
   static_assert(terms >= 4 && terms <= N);
   const S x2 = x * x, x4 = x2 * x2;
   const S low = everyFourth<0, terms>(c, x4) + everyFourth<1, terms>(c, x4) * x;
@@ -77,13 +78,13 @@ inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
   return low + high * x2;
 }
 template <class S, std::size_t N>
-inline S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
+LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
   return evaluatePolynomial<N>(c, x);
 }
 
 /// Of a power series as many terms as the scalar's precision can see.
 template <class S, std::size_t SingleTerms, std::size_t N>
-inline S series(const std::array<double, N>& c, const S& x) {
+LIESTAT_ALWAYS_INLINE S series(const std::array<double, N>& c, const S& x) {
   return evaluatePolynomial < is_single_precision<S> ? SingleTerms : N > (c, x);
 }
 

@@ -134,11 +134,12 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
 
 /// The same several features at a time, for the manifolds that have it; false where that does not apply to the data.
 template <bool Scatter, Metric M, class R, class W>
-bool addTermsByPacks(const R& samples, const W& weights, const M& y, const ChunkRange& range, MeanPass<M>& pass) {
+bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
+                     MeanPass<M>& pass) {
   if constexpr (HasRotationSums<M>) {
     RotationSums<M> sums;
     constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
-    if (!sums.template add<weighted, Scatter>(samples, weights, range.begin, range.end, y)) return false;
+    if (!sums.template add<weighted, Scatter>(set, samples, weights, range.begin, range.end, y)) return false;
     pass.sums = {sums.cost, sums.gradient, sums.hessian, sums.weight};
     if constexpr (Scatter) pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap};
     return true;
@@ -150,12 +151,13 @@ bool addTermsByPacks(const R& samples, const W& weights, const M& y, const Chunk
 template <bool Scatter, Metric M, Executor E, class R, class W>
 MeanPass<M> meanPass(const E& executor, const R& samples, const W& weights, const M& y) {
   const std::size_t n = std::ranges::size(samples), chunks = chunkCount(n);
+  const InstructionSet set = instructionSetOf(executor);
   MeanPass<M> pass = executor.reduce(
       chunks,
       [&](std::size_t chunk) {
         MeanPass<M> part;
         const ChunkRange range = chunkRange(n, chunks, chunk);
-        if (!addTermsByPacks<Scatter>(samples, weights, y, range, part)) {
+        if (!addTermsByPacks<Scatter>(set, samples, weights, y, range, part)) {
           addTerms<Scatter>(samples, weights, y, range, part);
         }
         return part;

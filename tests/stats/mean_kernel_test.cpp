@@ -17,6 +17,15 @@ using namespace liestat;
 
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
+/// Those of this processor.
+std::vector<InstructionSet> instructionSets() {
+  std::vector<InstructionSet> sets;
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (set <= supportedInstructionSet()) sets.push_back(set);
+  }
+  return sets;
+}
+
 template <class M>
 class MeanKernel : public testing::Test {
  protected:
@@ -50,14 +59,23 @@ class MeanKernel : public testing::Test {
     return p;
   }
 
-  /// Both ways of the same range of features; the packs must have taken it if by_packs.
+  /// Both ways of the same range of features, which the packs must take, with each set of instructions.
   template <class W>
   void compare(const std::vector<M>& features, const W& p, const M& y, double tolerance) {
+    detail::MeanPass<M> general;
+    detail::addTerms<true>(features, p, y, {0, features.size()}, general);
+    for (const InstructionSet set : instructionSets()) {
+      SCOPED_TRACE(name(set));
+      compare(set, features, p, y, tolerance, general);
+    }
+  }
+  template <class W>
+  void compare(InstructionSet set, const std::vector<M>& features, const W& p, const M& y, double tolerance,
+               const detail::MeanPass<M>& general) {
     const ChunkRange all{0, features.size()};
-    detail::MeanPass<M> general, packs, packs_alone;
-    detail::addTerms<true>(features, p, y, all, general);
-    ASSERT_TRUE(detail::addTermsByPacks<true>(features, p, y, all, packs));
-    ASSERT_TRUE(detail::addTermsByPacks<false>(features, p, y, all, packs_alone));
+    detail::MeanPass<M> packs, packs_alone;
+    ASSERT_TRUE(detail::addTermsByPacks<true>(set, features, p, y, all, packs));
+    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, p, y, all, packs_alone));
     // Vectors of length one and shorter, n of them: rounding grows with the sum of the weights, and tiny residuals
     // have the rounding of the quaternions that they come from. The scale of a square is the largest residual's.
     const double weight = general.sums.weight, length = general.scatter.largest, near = tolerance * weight;
@@ -127,9 +145,12 @@ TYPED_TEST(MeanKernel, leaves_quaternions_far_from_unit_to_the_general_formulas)
   const TypeParam y = T::expOrigin(this->normal(0.7));
   auto features = this->ring(y, 0.7, 100);
   for (int c = 0; c < 4; ++c) features[50].data()[c] *= 1.001;
-  detail::MeanPass<TypeParam> pass;
-  EXPECT_FALSE(detail::addTermsByPacks<true>(features, detail::UnitWeights{}, y, {0, features.size()}, pass));
-  EXPECT_TRUE(detail::addTermsByPacks<true>(features, detail::UnitWeights{}, y, {0, 50}, pass));
+  const detail::UnitWeights p;
+  for (const InstructionSet set : instructionSets()) {
+    detail::MeanPass<TypeParam> pass;
+    EXPECT_FALSE(detail::addTermsByPacks<true>(set, features, p, y, {0, features.size()}, pass)) << name(set);
+    EXPECT_TRUE(detail::addTermsByPacks<true>(set, features, p, y, {0, 50}, pass)) << name(set);
+  }
 }
 
 TYPED_TEST(MeanKernel, not_a_number_in_not_a_number_out) {
@@ -174,11 +195,7 @@ TYPED_TEST(MeanKernel, the_mean_is_a_zero_of_the_general_gradient) {
 
 template <class Polynomials>
 void comparePolynomials(const Polynomials& polynomials, int steps) {
-  double lanes[detail::pack_size];
-  const auto at = [&](const auto& coefficients, double x) {
-    detail::storePack(lanes, detail::evaluatePolynomial(coefficients, detail::Pack{} + x));
-    return lanes[0];
-  };
+  const auto at = [&](const auto& coefficients, double x) { return detail::evaluatePolynomial(coefficients, x); };
   for (int i = 0; i <= steps; ++i) {
     const long double phi = std::numbers::pi_v<long double> / 2 * i / 1000, s = std::sin(phi), w = std::cos(phi);
     // By the half angle, 1 - cos φ keeps its digits.
@@ -194,12 +211,58 @@ void comparePolynomials(const Polynomials& polynomials, int steps) {
   }
 }
 TEST(RotationPolynomials, agree_with_long_double_closed_forms) {
-  comparePolynomials(detail::any_rotation, 1000);
-  comparePolynomials(detail::small_rotation, 500);
+  comparePolynomials(detail::any_rotation<double>, 1000);
+  comparePolynomials(detail::small_rotation<double>, 500);
 }
 
-static_assert(detail::HasRotationSums<SO3d> && detail::HasRotationSums<NonOrientedFrame3d>);
-static_assert(!detail::HasRotationSums<SO3f> && !detail::HasRotationSums<S2d> && !detail::HasRotationSums<SE3d> &&
+// float against the general sums in double of the same features.
+template <class M, class F>
+void compareFloat(double sigma) {
+  using T = ManifoldTraits<M>;
+  constexpr double eps_f = std::numeric_limits<float>::epsilon();
+  std::mt19937_64 engine(11);
+  std::normal_distribution<double> gauss;
+  const auto normal = [&](double s) { return TangentOf<M>(TangentOf<M>::NullaryExpr([&] { return s * gauss(engine); })); };
+  const M centre = T::expOrigin(normal(0.7));
+  std::vector<F> features;
+  std::vector<M> exact;
+  for (int i = 0; i < 2500; ++i) {
+    features.push_back(exp(centre, normal(sigma)).template cast<float>());
+    exact.push_back(features.back().template cast<double>());
+    Eigen::Map<Eigen::Vector4d>(exact.back().data()).normalize();
+  }
+  const F y = centre.template cast<float>();
+  M y_exact = y.template cast<double>();
+  Eigen::Map<Eigen::Vector4d>(y_exact.data()).normalize();
+  detail::MeanPass<M> general;
+  detail::addTerms<true>(exact, detail::UnitWeights{}, y_exact, {0, exact.size()}, general);
+  const double n = 2500, length = general.scatter.largest;
+  for (const InstructionSet set : instructionSets()) {
+    SCOPED_TRACE(name(set));
+    detail::MeanPass<F> packs;
+    ASSERT_TRUE(detail::addTermsByPacks<true>(set, features, detail::UnitWeights{}, y, {0, features.size()}, packs));
+    EXPECT_NEAR(static_cast<double>(packs.sums.cost), general.sums.cost, 40 * eps_f * n * (length + eps_f) * (1 + length));
+    EXPECT_LE((packs.sums.gradient.template cast<double>() - general.sums.gradient).norm(), 40 * eps_f * n * (1 + length));
+    EXPECT_LE((packs.sums.hessian.template cast<double>() - general.sums.hessian).norm(), 40 * eps_f * n);
+    EXPECT_LE((packs.scatter.scatter.template cast<double>() - general.scatter.scatter).norm(),
+              40 * eps_f * n * (length + eps_f) * (1 + length));
+    if (Quotient<M>) {
+      EXPECT_NEAR(static_cast<double>(packs.scatter.smallest_gap), general.scatter.smallest_gap, 40 * eps_f);
+    }
+  }
+}
+TEST(MeanKernelFloat, agrees_with_double) {
+  for (const double sigma : {1e-6, 1e-3, 0.1, 0.5, 1.0}) {
+    SCOPED_TRACE(sigma);
+    compareFloat<SO3d, SO3f>(sigma);
+    compareFloat<Frame3d, Frame3f>(sigma);
+    compareFloat<NonOrientedFrame3d, NonOrientedFrame3<float>>(sigma);
+  }
+}
+
+static_assert(detail::HasRotationSums<SO3d> && detail::HasRotationSums<SO3f> &&
+              detail::HasRotationSums<NonOrientedFrame3d>);
+static_assert(!detail::HasRotationSums<S2d> && !detail::HasRotationSums<SE3d> &&
               !detail::HasRotationSums<Eigen::Vector3d>);
 
 }  // namespace

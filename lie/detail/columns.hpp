@@ -1,0 +1,104 @@
+// Arrays of elements in memory, and their way to columns and back, a block at a time, inside kernels.
+#pragma once
+
+#include <lie/detail/always_inline.hpp>
+#include <lie/instruction_set.hpp>
+
+#include <cstddef>
+#include <cstring>
+
+namespace liestat::detail {
+
+/// Number c of element i is data[i element + c component]: component is 1 in an array of elements, element is 1 in a
+/// structure of arrays. T is S to write to, const S to read.
+template <class T>
+struct Layout {
+  T* data = nullptr;
+  std::ptrdiff_t element = 0, component = 1;
+
+  LIESTAT_ALWAYS_INLINE T* at(std::size_t i, std::size_t c) const {
+    return data + static_cast<std::ptrdiff_t>(i) * element + static_cast<std::ptrdiff_t>(c) * component;
+  }
+};
+
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define LIESTAT_HAS_SHUFFLES 1
+#endif
+#endif
+#ifndef LIESTAT_HAS_SHUFFLES
+#define LIESTAT_HAS_SHUFFLES 0
+#endif
+
+#if LIESTAT_HAS_SHUFFLES
+template <class S>
+struct FourNumbers {
+  typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
+  Vector v;
+};
+/// Transposes four rows of four numbers.
+template <class S>
+LIESTAT_ALWAYS_INLINE void transpose(FourNumbers<S> (&r)[4]) {
+  using V = typename FourNumbers<S>::Vector;
+  const V a = __builtin_shufflevector(r[0].v, r[1].v, 0, 4, 2, 6), b = __builtin_shufflevector(r[0].v, r[1].v, 1, 5, 3, 7),
+          c = __builtin_shufflevector(r[2].v, r[3].v, 0, 4, 2, 6), d = __builtin_shufflevector(r[2].v, r[3].v, 1, 5, 3, 7);
+  r[0].v = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  r[1].v = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  r[2].v = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  r[3].v = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+#endif
+
+/// Components first … first + N - 1 of the elements begin … begin + count - 1 into N columns of B numbers.
+template <InstructionSet Set, std::size_t N, class S, std::size_t B>
+LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t first, std::size_t begin,
+                                       std::size_t count, S (*columns)[B]) {
+  if (from.element == 1) {
+    for (std::size_t c = 0; c < N; ++c) std::memcpy(columns[c], from.at(begin, first + c), count * sizeof(S));
+    return;
+  }
+  std::size_t j = 0;
+#if LIESTAT_HAS_SHUFFLES
+  if constexpr (N == 4 && Set != InstructionSet::baseline) {
+    if (from.component == 1) {
+      for (; j + 4 <= count; j += 4) {
+        FourNumbers<S> rows[4];
+        for (std::size_t k = 0; k < 4; ++k) std::memcpy(&rows[k].v, from.at(begin + j + k, first), sizeof rows[k].v);
+        transpose(rows);
+        for (std::size_t c = 0; c < 4; ++c) std::memcpy(columns[c] + j, &rows[c].v, sizeof rows[c].v);
+      }
+    }
+  }
+#endif
+  for (; j < count; ++j) {
+    for (std::size_t c = 0; c < N; ++c) columns[c][j] = *from.at(begin + j, first + c);
+  }
+}
+
+/// The way back.
+template <InstructionSet Set, std::size_t N, class S, std::size_t B>
+LIESTAT_ALWAYS_INLINE void storeColumns(const S (*columns)[B], const Layout<S>& to, std::size_t first, std::size_t begin,
+                                        std::size_t count) {
+  if (to.element == 1) {
+    for (std::size_t c = 0; c < N; ++c) std::memcpy(to.at(begin, first + c), columns[c], count * sizeof(S));
+    return;
+  }
+  std::size_t j = 0;
+#if LIESTAT_HAS_SHUFFLES
+  if constexpr (N == 4 && Set != InstructionSet::baseline) {
+    if (to.component == 1) {
+      for (; j + 4 <= count; j += 4) {
+        FourNumbers<S> rows[4];
+        for (std::size_t c = 0; c < 4; ++c) std::memcpy(&rows[c].v, columns[c] + j, sizeof rows[c].v);
+        transpose(rows);
+        for (std::size_t k = 0; k < 4; ++k) std::memcpy(to.at(begin + j + k, first), &rows[k].v, sizeof rows[k].v);
+      }
+    }
+  }
+#endif
+  for (; j < count; ++j) {
+    for (std::size_t c = 0; c < N; ++c) *to.at(begin + j, first + c) = columns[c][j];
+  }
+}
+
+}  // namespace liestat::detail

@@ -1,0 +1,70 @@
+// Features and weights as the kernels read them: where they are if memory holds them at equal distances, else copied a
+// block at a time.
+#pragma once
+
+#include <lie/detail/columns.hpp>
+#include <lie/manifold.hpp>
+
+#include <cstddef>
+#include <memory>
+#include <ranges>
+#include <type_traits>
+
+namespace liestat::detail {
+
+/// A range of M in one piece of memory.
+template <class R, class M>
+concept ContiguousFeatures = std::ranges::contiguous_range<const R> &&
+    std::is_same_v<std::remove_cvref_t<std::ranges::range_reference_t<const R>>, M>;
+
+/// Parameters of at most `size` features, `numbers` each.
+template <class M, std::size_t numbers, std::size_t size>
+class FeatureBlock {
+  using T = ManifoldTraits<M>;
+  using S = typename T::Scalar;
+
+ public:
+  /// The features begin … begin + count - 1; valid until the next call.
+  template <class R>
+  Layout<const S> layout(const R& samples, std::size_t begin, std::size_t count) {
+    if constexpr (requires { samples.layout(); }) {
+      Layout<const S> features = samples.layout();
+      features.data = features.at(begin, 0);
+      return features;
+    } else if constexpr (ContiguousFeatures<R, M> && sizeof(M) % sizeof(S) == 0) {
+      const M* const first = std::to_address(std::ranges::begin(samples)) + begin;
+      return {T::parameters(*first), sizeof(M) / sizeof(S), 1};
+    } else {
+      for (std::size_t i = 0; i < count; ++i) {
+        const M& x = samples[begin + i];
+        const S* const p = T::parameters(x);
+        for (std::size_t c = 0; c < numbers; ++c) copies_[i * numbers + c] = p[c];
+      }
+      return {copies_, numbers, 1};
+    }
+  }
+
+ private:
+  S copies_[numbers * size];
+};
+
+/// At most `size` weights.
+template <class S, std::size_t size>
+class WeightBlock {
+ public:
+  /// The weights begin … begin + count - 1; valid until the next call.
+  template <class W>
+  const S* weights(const W& weights, std::size_t begin, std::size_t count) {
+    if constexpr (ContiguousFeatures<W, S>) {
+      return std::to_address(std::ranges::begin(weights)) + begin;
+    } else {
+      for (std::size_t i = 0; i < count; ++i) copies_[i] = static_cast<S>(weights[begin + i]);
+      return copies_;
+    }
+  }
+
+ private:
+  S copies_[size];
+};
+
+}  // namespace liestat::detail

@@ -1,0 +1,254 @@
+// The sums of a mean over rotations, frames and their quotients, a register of features at a time.
+//
+// With w = |<y, q>| of unit quaternions and u the vector part of y⁻¹q, log(y, q) = ±f(w) u with
+// f(w) = 2 acos(w)/√(1-w²), and the Hessian of ½ d² is I + g(w) (u uᵀ - |u|² I) with g(w) = (1 - w f/2)/(1-w²), which
+// is -f'(w)/2. Both are analytic on [0, 1], their nearest singularity lies at -1: one polynomial each, without
+// atan2, square root, division or branch.
+#pragma once
+
+#include <lie/detail/arccosine.hpp>
+#include <lie/detail/columns.hpp>
+#include <lie/detail/kernel.hpp>
+#include <lie/detail/pack.hpp>
+
+#include <array>
+#include <cstddef>
+#include <utility>
+
+namespace liestat::detail {
+
+/// f and g on w >= 1 - 2 range: log and exact_hessian reach the rounding of their scalar; newton_hessian, good to eight
+/// digits, is for steps whose Hessian nobody sees.
+template <std::size_t Log, std::size_t Exact, std::size_t Newton>
+struct RotationPolynomials {
+  double range;
+  std::array<double, Log> log = arccosinePolynomial<Log>(false, 2, range);
+  std::array<double, Exact> exact_hessian = arccosinePolynomial<Exact>(true, 1, range);
+  std::array<double, Newton> newton_hessian = arccosinePolynomial<Newton>(true, 1, range);
+};
+/// For all rotations.
+template <class S>
+inline constexpr RotationPolynomials<21, 22, 11> any_rotation{0.5};
+template <>
+inline constexpr RotationPolynomials<11, 12, 8> any_rotation<float>{0.5};
+/// For angles up to a right angle, cos(π/4) = 0.7071…
+template <class S>
+inline constexpr RotationPolynomials<13, 13, 7> small_rotation{0.1465};
+template <>
+inline constexpr RotationPolynomials<7, 8, 6> small_rotation<float>{0.1465};
+inline constexpr double small_rotation_cosine = 0.7072;
+
+/// Row and column of an entry of a lower triangle, row by row.
+constexpr std::size_t triangleRow(std::size_t entry) {
+  std::size_t i = 0;
+  while ((i + 1) * (i + 2) / 2 <= entry) ++i;
+  return i;
+}
+constexpr std::size_t triangleColumn(std::size_t entry) {
+  return entry - triangleRow(entry) * (triangleRow(entry) + 1) / 2;
+}
+/// sums += the lower triangle of a bᵀ.
+template <class P, std::size_t N, std::size_t K, std::size_t... Entry>
+LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[K], std::index_sequence<Entry...>) {
+  ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
+}
+
+/// Features modulo half-turns about the axes whose bits are set, 1 for x, 2 for y, 4 for z.
+template <class S, bool Frame, unsigned HalfTurns, bool Weighted, bool Scatter>
+struct RotationKernel {
+  static constexpr std::size_t k = Frame ? 6 : 3, entries = k * (k + 1) / 2;
+  /// Features per call, at most.
+  static constexpr std::size_t max_count = 1024;
+
+  struct Arguments {
+    Layout<const S> features;  ///< quaternion x y z w, and for frames the translation
+    const S* weights = nullptr;
+    std::size_t count = 0;
+    S reference[7] = {};  ///< y, laid out like a feature
+    /// Σ in the axes of y for rotations, in those of the world for translations.
+    S cost, largest, defect, weight, gradient[k], hessian[6], scatter[entries], squared[entries];
+    /// For quotients, roughly: the cosine of half the distance to the cut locus of each feature, and the largest.
+    S gap_cosines[HalfTurns != 0 && Scatter ? max_count : 1], largest_gap_cosine;
+  };
+
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
+    Run<Pack<Set, S>>::all(arguments);
+  }
+
+ private:
+  /// Columns of a block: x y z w of the quaternion, the weight, the translation less that of y.
+  static constexpr std::size_t columns = Frame ? 9 : 5, block = 64;
+
+  template <class P>
+  struct Run {
+    P cost = P::zero(), largest = P::zero(), defect = P::zero(), gradient[k], hessian[6], scatter[entries],
+      squared[entries];
+    P largest_gap_cosine = P(S(-1));
+
+    LIESTAT_ALWAYS_INLINE Run() {
+      LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
+      LIESTAT_UNROLL for (P& x : hessian) x = P::zero();
+      LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
+      LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    }
+
+    LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
+      alignas(64) S data[columns][block];
+      Run sums;
+      S weight = 0;
+      for (std::size_t i = 0; i < arguments.count; i += block) {
+        const std::size_t count = arguments.count - i < block ? arguments.count - i : block;
+        load(arguments, i, count, data);
+        if constexpr (Weighted) {
+          for (std::size_t j = 0; j < count; ++j) weight += data[4][j];
+        }
+        P cosine(S(1));
+        for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, arguments, i, cosine);
+        if (-largestOf(-cosine) > static_cast<S>(small_rotation_cosine)) {
+          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, small_rotation<S>);
+        } else {
+          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, any_rotation<S>);
+        }
+      }
+      arguments.weight = Weighted ? weight : static_cast<S>(arguments.count);
+      arguments.cost = S(0.5) * sumOf(sums.cost);
+      arguments.largest = largestOf(sums.largest), arguments.defect = largestOf(sums.defect);
+      for (std::size_t a = 0; a < k; ++a) arguments.gradient[a] = sumOf(sums.gradient[a]);
+      for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
+      if constexpr (Scatter) {
+        for (std::size_t a = 0; a < entries; ++a) arguments.scatter[a] = sumOf(sums.scatter[a]);
+        for (std::size_t a = 0; a < entries; ++a) {
+          arguments.squared[a] = Weighted ? sumOf(sums.squared[a]) : arguments.scatter[a];
+        }
+      }
+      if constexpr (HalfTurns != 0 && Scatter) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
+    }
+
+    LIESTAT_ALWAYS_INLINE static void load(const Arguments& arguments, std::size_t i, std::size_t count,
+                                           S (&data)[columns][block]) {
+      constexpr InstructionSet set = P::set;
+      loadColumns<set, 4>(arguments.features, 0, i, count, data);
+      if constexpr (Frame) {
+        if (arguments.features.component == 1) {
+          // Four numbers at a time: w again, and the translation.
+          loadColumns<set, 4>(arguments.features, 3, i, count, data + 5);
+        } else {
+          loadColumns<set, 3>(arguments.features, 4, i, count, data + 6);
+        }
+        for (std::size_t c = 0; c < 3; ++c) {
+          for (std::size_t j = 0; j < count; ++j) data[6 + c][j] -= arguments.reference[4 + c];
+        }
+      }
+      if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
+      // What is missing in the last pack is filled with y itself, which adds nothing.
+      for (std::size_t j = count; j % P::size != 0; ++j) {
+        for (std::size_t c = 0; c < 4; ++c) data[c][j] = arguments.reference[c];
+        for (std::size_t c = 4; c < columns; ++c) data[c][j] = 0;
+      }
+    }
+
+    /// Replaces quaternions q by y⁻¹q, of quotients the nearest representative; cosine becomes the least |w|.
+    LIESTAT_ALWAYS_INLINE void turn(S (&data)[columns][block], std::size_t j, Arguments& arguments, std::size_t i,
+                                    P& cosine) {
+      const P x = P::load(data[0] + j), y = P::load(data[1] + j), z = P::load(data[2] + j), s = P::load(data[3] + j);
+      const S a = arguments.reference[0], b = arguments.reference[1], c = arguments.reference[2],
+              d = arguments.reference[3];
+      P q[4] = {d * x - a * s + (c * y - b * z), d * y - b * s + (a * z - c * x), d * z - c * s + (b * x - a * y),
+                a * x + b * y + (c * z + d * s)};
+      if constexpr (HalfTurns != 0) {
+        const P gap_cosine = nearest(q);
+        if constexpr (Scatter) {
+          // The lanes beyond the last feature hold y, and store nothing.
+          const std::size_t rest = arguments.count - i - j;
+          if (rest >= P::size) {
+            gap_cosine.store(arguments.gap_cosines + i + j);
+          } else {
+            S lanes[P::size];
+            gap_cosine.store(lanes);
+            for (std::size_t l = 0; l < rest; ++l) arguments.gap_cosines[i + j + l] = lanes[l];
+          }
+          largest_gap_cosine = larger(gap_cosine, largest_gap_cosine);
+        }
+      }
+      cosine = smaller(absolute(q[3]), cosine);
+      LIESTAT_UNROLL for (std::size_t l = 0; l < 4; ++l) q[l].store(data[l] + j);
+    }
+
+    /// The half-turn that brings the largest component b to w. The second largest, s, belongs to the representative
+    /// that comes next: half the angle between the two is acos(s) - acos(b), whose cosine comes back.
+    LIESTAT_ALWAYS_INLINE static P nearest(P (&q)[4]) {
+      const P x = q[0], y = q[1], z = q[2], w = q[3];
+      P best = absolute(w), second = P(S(-1));
+      if constexpr ((HalfTurns & 1) != 0) take(absolute(x), best, second, q, w, z, -y, -x);
+      if constexpr ((HalfTurns & 2) != 0) take(absolute(y), best, second, q, -z, w, x, -y);
+      if constexpr ((HalfTurns & 4) != 0) take(absolute(z), best, second, q, y, -x, w, -z);
+      if constexpr (Scatter) {
+        const P sines = absolute((S(1) - best * best) * (S(1) - second * second));
+        return best * second + sines * inverseSquareRoot(sines);
+      }
+      return best;
+    }
+    LIESTAT_ALWAYS_INLINE static void take(const P& c, P& best, P& second, P (&q)[4], const P& x, const P& y,
+                                           const P& z, const P& w) {
+      const auto better = c > best;
+      second = larger(select(better, best, c), second);
+      best = select(better, c, best);
+      q[0] = select(better, x, q[0]), q[1] = select(better, y, q[1]);
+      q[2] = select(better, z, q[2]), q[3] = select(better, w, q[3]);
+    }
+
+    template <class Polynomials>
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Polynomials& polynomials) {
+      const P q[4] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j), P::load(data[3] + j)};
+      const P xx = q[0] * q[0], yy = q[1] * q[1], zz = q[2] * q[2], u2 = xx + yy + zz;
+      // 1/|q| to second order.
+      const P excess = u2 + q[3] * q[3] - S(1);
+      const P scale = S(1) - excess * (S(0.5) - S(0.375) * excess);
+      defect = larger(absolute(excess), defect);
+      const P variable = (S(1) - scale * absolute(q[3])) * static_cast<S>(1 / polynomials.range) - S(1);
+      const P f = scale * evaluatePolynomial(polynomials.log, variable);
+      const P sign_f = select(q[3] < S(0), -f, f);
+      P p(S(1));
+      if constexpr (Weighted) p = P::load(data[4] + j);
+      P g = scale * scale;
+      if constexpr (Scatter) {
+        g *= evaluatePolynomial(polynomials.exact_hessian, variable);
+      } else {
+        g *= evaluatePolynomial(polynomials.newton_hessian, variable);
+      }
+      if constexpr (Weighted) g *= p;
+      const P gx = g * q[0], gy = g * q[1];
+      hessian[0] += g * xx, hessian[1] += gx * q[1], hessian[2] += gx * q[2];
+      hessian[3] += g * yy, hessian[4] += gy * q[2], hessian[5] += g * zz;
+
+      constexpr std::size_t r0 = Frame ? 3 : 0;
+      P v[k], weighted[k];
+      P length2 = f * f * u2;
+      LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) v[r0 + i] = sign_f * q[i];
+      if constexpr (Frame) {
+        LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {
+          v[i] = P::load(data[6 + i] + j);
+          length2 += v[i] * v[i];
+        }
+      }
+      LIESTAT_UNROLL for (std::size_t i = 0; i < k; ++i) {
+        weighted[i] = v[i];
+        if constexpr (Weighted) weighted[i] *= p;
+        gradient[i] += weighted[i];
+      }
+      if constexpr (Weighted) {
+        cost += p * length2;
+      } else {
+        cost += length2;
+      }
+      if constexpr (Scatter) {
+        largest = larger(length2, largest);
+        addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
+        if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
+      }
+    }
+  };
+};
+
+}  // namespace liestat::detail
