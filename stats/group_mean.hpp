@@ -66,7 +66,7 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
   result.n = std::ranges::size(samples);
   if (result.n == 0) return result;
   result.status = Status::not_converged;
-  G y = start ? *start : startOfMean<G>(samples, weights);
+  G y = start ? *start : startOfMean<G>(executor, samples, weights);
   result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
   for (int i = 0; i < 100 && result.status != Status::ok; ++i) {
     const G to_mean = y.inverse();

@@ -88,7 +88,7 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
   if (result.n == 0) return result;
 
   const TangentOf<M> metric = T::metricWeights();
-  M y = options.start ? *options.start : startOfMean<M>(samples, weights);
+  M y = options.start ? *options.start : startOfMean<M>(executor, samples, weights);
   // In a flat space the start is the mean already.
   MeanPass<M> pass = meanPass(executor, samples, weights, y, !options.start && starts_at_mean<M>);
   result.tolerance = options.tolerance.value_or(automaticTolerance<S>(dataScale(y, pass.sums)));

@@ -6,7 +6,10 @@
 
 #include <lie/detail/part_tuple.hpp>
 #include <lie/manifold.hpp>
+#include <stats/detail/moment_kernel.hpp>
 #include <stats/detail/rotation_sums.hpp>
+#include <stats/detail/weights_of_one.hpp>
+#include <stats/executor.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -79,24 +82,37 @@ inline constexpr bool starts_at_mean = HasChordalMoments<M>&& compactFactor<M>()
 
 /// A start for the mean of a non-empty range of features. One pass over the data where the manifold sits in a linear
 /// space (HasChordalMoments: vectors, rotations, directions, frames); the others, and features that cancel, take the
-/// best of eight data; products start by factors.
-template <Homogeneous M, class R, class W>
-M startOfMean(const R& samples, const W& weights) {
+/// best of eight data; products start by factors. The same bits on any executor.
+template <Homogeneous M, Executor E, class R, class W>
+M startOfMean(const E& executor, const R& samples, const W& weights) {
   using S = ScalarOf<M>;
   if constexpr (Factored<M>) {
     using Factors = detail::FactorsOf<M>;
     return [&]<std::size_t... I>(std::index_sequence<I...>) {
-      return M(ManifoldTraits<M>::fromFactors(
-          Factors(startOfMean<std::tuple_element_t<I, Factors>>(detail::FactorRange<I, M, R>{samples}, weights)...)));
+      return M(ManifoldTraits<M>::fromFactors(Factors(
+          startOfMean<std::tuple_element_t<I, Factors>>(executor, detail::FactorRange<I, M, R>{samples}, weights)...)));
     }
     (std::make_index_sequence<std::tuple_size_v<Factors>>{});
   } else {
     if constexpr (HasChordalMoments<M>) {
-      typename ManifoldTraits<M>::ChordalMoments sums;
-      for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-        sums.add(samples[i], S(weights[i]));
+      typename ManifoldTraits<M>::ChordalMoments moments;
+      const std::size_t n = std::ranges::size(samples);
+      if constexpr (detail::HasParameterSums<M>) {
+        const std::size_t chunks = chunkCount(n);
+        const InstructionSet set = instructionSetOf(executor);
+        const auto sums = executor.reduce(
+            chunks,
+            [&](std::size_t chunk) {
+              const ChunkRange range = chunkRange(n, chunks, chunk);
+              return detail::parameterSums<M, !std::is_same_v<W, detail::UnitWeights>>(set, samples, weights,
+                                                                                       range.begin, range.end);
+            },
+            [](auto& a, const auto& b) { a += b; });
+        moments.add(sums);
+      } else {
+        for (std::size_t i = 0; i < n; ++i) moments.add(samples[i], S(weights[i]));
       }
-      const std::optional<M> average = sums.mean();
+      const std::optional<M> average = moments.mean();
       if (average) return *average;
     }
     return detail::bestOfSeveral<M>(samples, weights);

@@ -3,7 +3,8 @@
 #pragma once
 
 #include <fusion/two_view/errors.hpp>
-#include <stats/detail/pack.hpp>
+#include <lie/detail/kernel.hpp>
+#include <lie/detail/pack.hpp>
 
 #include <Eigen/Core>
 
@@ -15,8 +16,10 @@
 
 namespace liestat::detail {
 
-/// Four columns x, y, x', y' and one of weights, each as long as a whole number of packs.
+/// Four columns x, y, x', y' and one of weights, each as long as a whole number of the largest packs.
 class MatchColumns {
+  static constexpr std::size_t pack_size = Pack<InstructionSet::avx512>::size;
+
  public:
   explicit MatchColumns(std::size_t capacity = 0)
       : stride_((capacity + pack_size - 1) / pack_size * pack_size), values_(5 * stride_) {}
@@ -73,10 +76,21 @@ struct EntrySums {
 };
 
 /// What a match adds to the normal equations: factors of its rows, and its point in the first image, corrected.
+template <class P>
 struct MatchTerms {
-  Pack rows[6];      ///< of a pair of rows
-  Pack gradient[3];  ///< of a row
-  Pack x, y;
+  P rows[6];      ///< of a pair of rows
+  P gradient[3];  ///< of a row
+  P x, y;
+};
+
+/// A 3×3 matrix for kernels, row by row.
+struct KernelMatrix3 {
+  double m[3][3];
+  explicit KernelMatrix3(const Eigen::Matrix3d& M) {
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) m[i][j] = M(i, j);
+    }
+  }
 };
 
 /// fusion/two_view/errors.hpp, of a pack of matches.
@@ -85,37 +99,45 @@ class EpipolarColumns {
   EpipolarColumns(const Eigen::Matrix3d& F, const MatchNoise& noise)
       : F_(F), v1_(noise.first * noise.first), v2_(noise.second * noise.second) {}
 
-  Pack error(const Pack& x, const Pack& y, const Pack& u, const Pack& v) const {
-    const Form f(F_, x, y, u, v);
-    return f.c * f.c / (v1_ * (f.d * f.d + f.e * f.e) + v2_ * (f.a * f.a + f.b * f.b));
+  template <class P>
+  LIESTAT_ALWAYS_INLINE P error(const P& x, const P& y, const P& u, const P& v) const {
+    const Form<P> f(F_.m, x, y, u, v);
+    return f.c * f.c / variance(f);
   }
-  /// Of ũ'ᵀ F ũ.
-  Pack variance(const Pack& x, const Pack& y, const Pack& u, const Pack& v) const {
-    const Form f(F_, x, y, u, v);
-    return v1_ * (f.d * f.d + f.e * f.e) + v2_ * (f.a * f.a + f.b * f.b);
+  /// That of ũ'ᵀ F ũ.
+  template <class P>
+  LIESTAT_ALWAYS_INLINE P variance(const P& x, const P& y, const P& u, const P& v) const {
+    return variance(Form<P>(F_.m, x, y, u, v));
   }
   /// The equation is linearised at the match corrected to meet it, so that the derivative of the error's variance counts.
-  void terms(const Pack& x, const Pack& y, const Pack& u, const Pack& v, const Pack& weight, MatchTerms& t) const {
-    const Form f(F_, x, y, u, v);
-    const Pack inverse = 1.0 / (v1_ * (f.d * f.d + f.e * f.e) + v2_ * (f.a * f.a + f.b * f.b));
-    const Pack lambda = f.c * inverse, one = lambda * v1_, two = lambda * v2_;
+  template <class P>
+  LIESTAT_ALWAYS_INLINE void terms(const P& x, const P& y, const P& u, const P& v, const P& weight,
+                                   MatchTerms<P>& t) const {
+    const Form<P> f(F_.m, x, y, u, v);
+    const P inverse = 1.0 / variance(f);
+    const P lambda = f.c * inverse, one = lambda * v1_, two = lambda * v2_;
     t.x = x - one * f.d, t.y = y - one * f.e;
-    const Pack p = u - two * f.a, q = v - two * f.b, k = weight * inverse, g = weight * lambda;
+    const P p = u - two * f.a, q = v - two * f.b, k = weight * inverse, g = weight * lambda;
     t.rows[0] = k * p * p, t.rows[1] = k * p * q, t.rows[2] = k * p;
     t.rows[3] = k * q * q, t.rows[4] = k * q, t.rows[5] = k;
     t.gradient[0] = g * p, t.gradient[1] = g * q, t.gradient[2] = g;
   }
 
  private:
+  template <class P>
   struct Form {
-    Pack a, b, c, d, e;
-    Form(const Eigen::Matrix3d& F, const Pack& x, const Pack& y, const Pack& u, const Pack& v) {
-      a = F(0, 0) * x + F(0, 1) * y + F(0, 2), b = F(1, 0) * x + F(1, 1) * y + F(1, 2);
-      c = u * a + v * b + (F(2, 0) * x + F(2, 1) * y + F(2, 2));
-      d = F(0, 0) * u + F(1, 0) * v + F(2, 0), e = F(0, 1) * u + F(1, 1) * v + F(2, 1);
+    P a, b, c, d, e;
+    LIESTAT_ALWAYS_INLINE Form(const double (&F)[3][3], const P& x, const P& y, const P& u, const P& v) {
+      a = F[0][0] * x + F[0][1] * y + F[0][2], b = F[1][0] * x + F[1][1] * y + F[1][2];
+      c = u * a + v * b + (F[2][0] * x + F[2][1] * y + F[2][2]);
+      d = F[0][0] * u + F[1][0] * v + F[2][0], e = F[0][1] * u + F[1][1] * v + F[2][1];
     }
   };
-  Eigen::Matrix3d F_;
+  template <class P>
+  LIESTAT_ALWAYS_INLINE P variance(const Form<P>& f) const {
+    return v1_ * (f.d * f.d + f.e * f.e) + v2_ * (f.a * f.a + f.b * f.b);
+  }
+  KernelMatrix3 F_;
   double v1_, v2_;
 };
 
@@ -125,20 +147,22 @@ class HomographyColumns {
   HomographyColumns(const Eigen::Matrix3d& H, const MatchNoise& noise)
       : H_(H), v1_(noise.first * noise.first), v2_(noise.second * noise.second) {}
 
-  Pack error(const Pack& x, const Pack& y, const Pack& u, const Pack& v) const {
-    const Form f(H_, v1_, v2_, x, y, u, v);
-    const Pack squared =
+  template <class P>
+  LIESTAT_ALWAYS_INLINE P error(const P& x, const P& y, const P& u, const P& v) const {
+    const Form<P> f(H_.m, v1_, v2_, x, y, u, v);
+    const P squared =
         (f.s11 * f.c0 * f.c0 - 2.0 * f.s01 * f.c0 * f.c1 + f.s00 * f.c1 * f.c1) / (f.s00 * f.s11 - f.s01 * f.s01);
-    const Pack infinite = squared * 0.0 + std::numeric_limits<double>::infinity();
-    return f.w <= 0.0 ? infinite : squared;
+    return select(f.w > 0.0, squared, squared * 0.0 + std::numeric_limits<double>::infinity());
   }
-  void terms(const Pack& x, const Pack& y, const Pack& u, const Pack& v, const Pack& weight, MatchTerms& t) const {
-    const Form f(H_, v1_, v2_, x, y, u, v);
-    const Pack inverse = 1.0 / (f.s00 * f.s11 - f.s01 * f.s01);
-    const Pack p00 = f.s11 * inverse, p01 = -f.s01 * inverse, p11 = f.s00 * inverse;
-    const Pack l0 = p00 * f.c0 + p01 * f.c1, l1 = p01 * f.c0 + p11 * f.c1, back = v2_ * f.w;
+  template <class P>
+  LIESTAT_ALWAYS_INLINE void terms(const P& x, const P& y, const P& u, const P& v, const P& weight,
+                                   MatchTerms<P>& t) const {
+    const Form<P> f(H_.m, v1_, v2_, x, y, u, v);
+    const P inverse = 1.0 / (f.s00 * f.s11 - f.s01 * f.s01);
+    const P p00 = f.s11 * inverse, p01 = -f.s01 * inverse, p11 = f.s00 * inverse;
+    const P l0 = p00 * f.c0 + p01 * f.c1, l1 = p01 * f.c0 + p11 * f.c1, back = v2_ * f.w;
     t.x = x - v1_ * (f.d00 * l0 + f.d10 * l1), t.y = y - v1_ * (f.d01 * l0 + f.d11 * l1);
-    const Pack p = u - back * l0, q = v - back * l1;
+    const P p = u - back * l0, q = v - back * l1;
     t.rows[0] = weight * p00, t.rows[1] = weight * p01, t.rows[3] = weight * p11;
     t.rows[2] = -(t.rows[0] * p + t.rows[1] * q), t.rows[4] = -(t.rows[1] * p + t.rows[3] * q);
     t.rows[5] = -(t.rows[2] * p + t.rows[4] * q);
@@ -147,110 +171,158 @@ class HomographyColumns {
   }
 
  private:
+  template <class P>
   struct Form {
-    Pack w, c0, c1, d00, d01, d10, d11, s00, s01, s11;
-    Form(const Eigen::Matrix3d& H, double v1, double v2, const Pack& x, const Pack& y, const Pack& u, const Pack& v) {
-      w = H(2, 0) * x + H(2, 1) * y + H(2, 2);
-      c0 = w * u - (H(0, 0) * x + H(0, 1) * y + H(0, 2)), c1 = w * v - (H(1, 0) * x + H(1, 1) * y + H(1, 2));
-      d00 = u * H(2, 0) - H(0, 0), d01 = u * H(2, 1) - H(0, 1);
-      d10 = v * H(2, 0) - H(1, 0), d11 = v * H(2, 1) - H(1, 1);
-      const Pack second = v2 * w * w;
+    P w, c0, c1, d00, d01, d10, d11, s00, s01, s11;
+    LIESTAT_ALWAYS_INLINE Form(const double (&H)[3][3], double v1, double v2, const P& x, const P& y, const P& u,
+                               const P& v) {
+      w = H[2][0] * x + H[2][1] * y + H[2][2];
+      c0 = w * u - (H[0][0] * x + H[0][1] * y + H[0][2]), c1 = w * v - (H[1][0] * x + H[1][1] * y + H[1][2]);
+      d00 = u * H[2][0] - H[0][0], d01 = u * H[2][1] - H[0][1];
+      d10 = v * H[2][0] - H[1][0], d11 = v * H[2][1] - H[1][1];
+      const P second = v2 * w * w;
       s00 = v1 * (d00 * d00 + d01 * d01) + second, s11 = v1 * (d10 * d10 + d11 * d11) + second;
       s01 = v1 * (d00 * d10 + d01 * d11);
     }
   };
-  Eigen::Matrix3d H_;
+  KernelMatrix3 H_;
   double v1_, v2_;
 };
 
+/// What the kernels below read and write; all columns hold a whole number of packs.
+template <class Equation>
+struct MatchArguments {
+  const Equation& equation;
+  std::size_t size;
+  const double* columns[5];
+  double* values = nullptr;  ///< one number for each match
+  double form[6][6] = {};
+  EntrySums sums = {};
+
+  template <class P>
+  LIESTAT_ALWAYS_INLINE P load(std::size_t column, std::size_t i) const {
+    return P::load(columns[column] + i);
+  }
+  template <class P>
+  LIESTAT_ALWAYS_INLINE void store(const P& value, std::size_t i) const {
+    if (i + P::size <= size) {
+      value.store(values + i);
+    } else {
+      double last[P::size];
+      value.store(last);
+      for (std::size_t k = 0; i + k < size; ++k) values[i + k] = last[k];
+    }
+  }
+};
+
+template <class Equation>
+struct MatchErrorKernel {
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(MatchArguments<Equation>& a) {
+    using P = Pack<Set>;
+    for (std::size_t i = 0; i < a.size; i += P::size) {
+      a.store(a.equation.error(a.template load<P>(0, i), a.template load<P>(1, i), a.template load<P>(2, i),
+                               a.template load<P>(3, i)),
+              i);
+    }
+  }
+};
 /// Squared errors of all matches of the columns.
 template <class Equation>
 void columnErrors(const Equation& equation, const MatchColumns& m, std::span<double> squared) {
-  const double *x = m.column(0), *y = m.column(1), *u = m.column(2), *v = m.column(3);
-  std::size_t i = 0;
-  for (; i + pack_size <= m.size(); i += pack_size) {
-    storePack(squared.data() + i, equation.error(loadPack(x + i), loadPack(y + i), loadPack(u + i), loadPack(v + i)));
-  }
-  if (i < m.size()) {
-    double last[pack_size];
-    storePack(last, equation.error(loadPack(x + i), loadPack(y + i), loadPack(u + i), loadPack(v + i)));
-    for (std::size_t k = 0; i + k < m.size(); ++k) squared[i + k] = last[k];
-  }
+  MatchArguments<Equation> a{equation, m.size(), {m.column(0), m.column(1), m.column(2), m.column(3)}, squared.data()};
+  runKernel<MatchErrorKernel<Equation>>(instructionSet(), a);
 }
 
+struct MatchLeverageKernel {
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(MatchArguments<EpipolarColumns>& arguments) {
+    using P = Pack<Set>;
+    const double(&form)[6][6] = arguments.form;
+    for (std::size_t i = 0; i < arguments.size; i += P::size) {
+      const P a = arguments.load<P>(0, i), b = arguments.load<P>(1, i), p = arguments.load<P>(2, i),
+              q = arguments.load<P>(3, i);
+      const P rows[5] = {p * p, p * q, p, q * q, q};
+      P sum[6];
+      LIESTAT_UNROLL for (int k = 0; k < 6; ++k) {
+        sum[k] = form[k][0] * rows[0] + form[k][1] * rows[1] + form[k][2] * rows[2] + form[k][3] * rows[3] +
+                 form[k][4] * rows[4] + form[k][5];
+      }
+      const P value = sum[0] * a * a + sum[1] * a * b + sum[2] * a + sum[3] * b * b + sum[4] * b + sum[5];
+      arguments.store(value / arguments.equation.variance(a, b, p, q), i);
+    }
+  }
+};
 /// What a covariance of F's entries leaves open of the equations of all matches, in units of their noise.
 inline void columnLeverages(const EpipolarColumns& equation, const Eigen::Matrix<double, 9, 9>& covariance,
                             const MatchColumns& m, std::span<double> leverage) {
+  MatchArguments<EpipolarColumns> a{
+      equation, m.size(), {m.column(0), m.column(1), m.column(2), m.column(3)}, leverage.data()};
   // The quadratic form of the products of two points: by pairs of columns, each by pairs of rows.
-  double form[6][6];
   for (int j = 0; j < 3; ++j) {
     for (int l = j; l < 3; ++l) {
       for (int i = 0; i < 3; ++i) {
         for (int k = i; k < 3; ++k) {
           const double both = covariance(3 * j + i, 3 * l + k) + covariance(3 * j + k, 3 * l + i);
-          form[EntrySums::pair(static_cast<std::size_t>(j), static_cast<std::size_t>(l))][EntrySums::pair(
+          a.form[EntrySums::pair(static_cast<std::size_t>(j), static_cast<std::size_t>(l))][EntrySums::pair(
               static_cast<std::size_t>(i), static_cast<std::size_t>(k))] = both * (i == k ? 0.5 : 1) * (j == l ? 1 : 2);
         }
       }
     }
   }
-  const double *x = m.column(0), *y = m.column(1), *u = m.column(2), *v = m.column(3);
-  for (std::size_t i = 0; i < m.size(); i += pack_size) {
-    const Pack a = loadPack(x + i), b = loadPack(y + i), p = loadPack(u + i), q = loadPack(v + i);
-    const Pack rows[5] = {p * p, p * q, p, q * q, q};
-    Pack sum[6];
-    for (int k = 0; k < 6; ++k) {
-      sum[k] = form[k][0] * rows[0] + form[k][1] * rows[1] + form[k][2] * rows[2] + form[k][3] * rows[3] +
-               form[k][4] * rows[4] + form[k][5];
-    }
-    const Pack value = sum[0] * a * a + sum[1] * a * b + sum[2] * a + sum[3] * b * b + sum[4] * b + sum[5];
-    double last[pack_size];
-    storePack(last, value / equation.variance(a, b, p, q));
-    for (std::size_t k = 0; k < pack_size && i + k < m.size(); ++k) leverage[i + k] = last[k];
-  }
+  runKernel<MatchLeverageKernel>(instructionSet(), a);
 }
 
 /// Squared errors of some of the matches.
 template <class Equation>
 void someErrors(const Equation& equation, std::span<const Eigen::Vector4d> matches,
                 std::span<const std::size_t> measurements, std::span<double> squared) {
-  for (std::size_t i = 0; i < measurements.size(); i += pack_size) {
-    const std::size_t count = measurements.size() - i < pack_size ? measurements.size() - i : pack_size;
-    double c[4][pack_size], e[pack_size];
-    for (std::size_t k = 0; k < pack_size; ++k) {
+  constexpr std::size_t block = 64, largest_pack = Pack<InstructionSet::avx512>::size;
+  double columns[4][block];
+  for (std::size_t i = 0; i < measurements.size(); i += block) {
+    const std::size_t count = measurements.size() - i < block ? measurements.size() - i : block;
+    for (std::size_t k = 0; k < count || k % largest_pack != 0; ++k) {
       const Eigen::Vector4d& m = matches[measurements[i + (k < count ? k : 0)]];
-      c[0][k] = m[0], c[1][k] = m[1], c[2][k] = m[2], c[3][k] = m[3];
+      for (std::size_t c = 0; c < 4; ++c) columns[c][k] = m[static_cast<Eigen::Index>(c)];
     }
-    storePack(e, equation.error(loadPack(c[0]), loadPack(c[1]), loadPack(c[2]), loadPack(c[3])));
-    for (std::size_t k = 0; k < count; ++k) squared[i + k] = e[k];
+    MatchArguments<Equation> a{equation, count, {columns[0], columns[1], columns[2], columns[3]}, squared.data() + i};
+    runKernel<MatchErrorKernel<Equation>>(instructionSet(), a);
   }
 }
 
+template <class Equation>
+struct EntrySumsKernel {
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(MatchArguments<Equation>& a) {
+    using P = Pack<Set>;
+    P products[36], gradient[9];
+    for (P& p : products) p = P::zero();
+    for (P& p : gradient) p = P::zero();
+    for (std::size_t i = 0; i < a.size; i += P::size) {
+      MatchTerms<P> t;
+      a.equation.terms(a.template load<P>(0, i), a.template load<P>(1, i), a.template load<P>(2, i),
+                       a.template load<P>(3, i), a.template load<P>(4, i), t);
+      const P xx = t.x * t.x, xy = t.x * t.y, yy = t.y * t.y;
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 6; ++k) {
+        P* p = products + 6 * k;
+        p[0] += t.rows[k] * xx, p[1] += t.rows[k] * xy, p[2] += t.rows[k] * t.x;
+        p[3] += t.rows[k] * yy, p[4] += t.rows[k] * t.y, p[5] += t.rows[k];
+      }
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 3; ++k) {
+        gradient[k] += t.gradient[k] * t.x, gradient[3 + k] += t.gradient[k] * t.y, gradient[6 + k] += t.gradient[k];
+      }
+    }
+    for (std::size_t k = 0; k < 36; ++k) a.sums.products[k] = sumOf(products[k]);
+    for (std::size_t k = 0; k < 9; ++k) a.sums.gradient[k] = sumOf(gradient[k]);
+  }
+};
 /// The normal equations of the columns' matches with their weights.
 template <class Equation>
 EntrySums entrySums(const Equation& equation, const MatchColumns& m) {
-  Pack products[36], gradient[9];
-  const Pack zero = Pack{};
-  for (Pack& p : products) p = zero;
-  for (Pack& p : gradient) p = zero;
-  const double *x = m.column(0), *y = m.column(1), *u = m.column(2), *v = m.column(3), *w = m.column(4);
-  for (std::size_t i = 0; i < m.size(); i += pack_size) {
-    MatchTerms t;
-    equation.terms(loadPack(x + i), loadPack(y + i), loadPack(u + i), loadPack(v + i), loadPack(w + i), t);
-    const Pack xx = t.x * t.x, xy = t.x * t.y, yy = t.y * t.y;
-    for (std::size_t k = 0; k < 6; ++k) {
-      Pack* p = products + 6 * k;
-      p[0] += t.rows[k] * xx, p[1] += t.rows[k] * xy, p[2] += t.rows[k] * t.x;
-      p[3] += t.rows[k] * yy, p[4] += t.rows[k] * t.y, p[5] += t.rows[k];
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      gradient[k] += t.gradient[k] * t.x, gradient[3 + k] += t.gradient[k] * t.y, gradient[6 + k] += t.gradient[k];
-    }
-  }
-  EntrySums sums;
-  for (std::size_t k = 0; k < 36; ++k) sums.products[k] = sumOf(products[k]);
-  for (std::size_t k = 0; k < 9; ++k) sums.gradient[k] = sumOf(gradient[k]);
-  return sums;
+  MatchArguments<Equation> a{
+      equation, m.size(), {m.column(0), m.column(1), m.column(2), m.column(3), m.column(4)}, nullptr};
+  runKernel<EntrySumsKernel<Equation>>(instructionSet(), a);
+  return a.sums;
 }
 
 }  // namespace liestat::detail

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <optional>
 
 namespace liestat::detail {
@@ -25,15 +26,31 @@ Eigen::Matrix<S, 4, 1> dominantEigenvector(Eigen::Matrix<S, 4, 4> A) {
   return A.col(column).normalized();
 }
 
+/// Sums over many features that kernels make of their parameters c: Σ p c cᵀ of the first `outer` of them, as a lower
+/// triangle row by row, and Σ p c of the `linear` next.
+template <class S, std::size_t Outer, std::size_t Linear>
+struct ParameterSums {
+  static constexpr std::size_t outer = Outer, linear = Linear, entries = Outer * (Outer + 1) / 2;
+  S product[entries > 0 ? entries : 1] = {}, sum[Linear > 0 ? Linear : 1] = {}, weight = 0, count = 0;
+
+  void operator+=(const ParameterSums& other) {
+    for (std::size_t i = 0; i < entries; ++i) product[i] += other.product[i];
+    for (std::size_t i = 0; i < Linear; ++i) sum[i] += other.sum[i];
+    weight += other.weight, count += other.count;
+  }
+};
+
 /// R^n: the mean itself.
 template <class M>
 struct FlatMoments {
   using T = ManifoldTraits<M>;
   using S = typename T::Scalar;
+  using Sums = ParameterSums<S, 0, static_cast<std::size_t>(T::DoF)>;
   typename T::Tangent sum = T::Tangent::Zero();
   S weight = S(0);
 
   void add(const M& x, const S& p) { sum += p * T::logOrigin(x), weight += p; }
+  void add(const Sums& s) { sum += Eigen::Map<const typename T::Tangent>(s.sum), weight += s.weight; }
   M mean() const { return T::expOrigin(typename T::Tangent(sum / weight)); }
 };
 
@@ -43,6 +60,7 @@ template <class M>
 struct QuaternionMoments {
   using S = typename M::Scalar;
   static constexpr int vectors = M::num_parameters - 4;
+  using Sums = ParameterSums<S, 4, static_cast<std::size_t>(vectors)>;
   Eigen::Matrix<S, 4, 4> rotation = Eigen::Matrix<S, 4, 4>::Zero();
   Eigen::Matrix<S, vectors, 1> vector = Eigen::Matrix<S, vectors, 1>::Zero();
   S weight = S(0);
@@ -52,6 +70,16 @@ struct QuaternionMoments {
     rotation.noalias() += p * q * q.transpose();
     weight += p;
     vector += p * x.params().template tail<vectors>();
+  }
+  void add(const Sums& s) {
+    for (int i = 0, e = 0; i < 4; ++i) {
+      for (int j = 0; j <= i; ++j, ++e) {
+        rotation(i, j) += s.product[e];
+        if (j < i) rotation(j, i) += s.product[e];
+      }
+    }
+    for (int i = 0; i < vectors; ++i) vector[i] += s.sum[i];
+    weight += s.weight;
   }
   M mean() const {
     typename M::Params params;
@@ -65,10 +93,12 @@ struct QuaternionMoments {
 template <class M>
 struct ComplexMoments {
   using S = typename M::Scalar;
+  using Sums = ParameterSums<S, 0, static_cast<std::size_t>(M::num_parameters)>;
   typename M::Params sum = M::Params::Zero();
   S weight = S(0);
 
   void add(const M& x, const S& p) { sum += p * x.params(), weight += p; }
+  void add(const Sums& s) { sum += Eigen::Map<const typename M::Params>(s.sum), weight += s.weight; }
   std::optional<M> mean() const {
     if (!(sum.template head<2>().norm() > S(0))) return std::nullopt;
     typename M::Params params = sum / weight;
@@ -81,10 +111,12 @@ struct ComplexMoments {
 template <class M>
 struct DirectionMoments {
   using S = typename M::Scalar;
+  using Sums = ParameterSums<S, 0, 3>;
   Eigen::Matrix<S, 3, 1> sum = Eigen::Matrix<S, 3, 1>::Zero();
   S count = S(0);
 
   void add(const M& x, const S& p) { sum += p * x.params(), count += S(1); }
+  void add(const Sums& s) { sum += Eigen::Map<const Eigen::Matrix<S, 3, 1>>(s.sum), count += s.count; }
   std::optional<M> mean() const {
     if (!(sum.norm() > S(1e-6) * count)) return std::nullopt;
     return M(sum);

@@ -34,14 +34,20 @@ struct Layout {
 template <class S>
 struct FourNumbers {
   typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
+  typedef S InMemory __attribute__((vector_size(4 * sizeof(S)), aligned(sizeof(S)), may_alias));
   Vector v;
+
+  LIESTAT_ALWAYS_INLINE void load(const S* p) { v = *reinterpret_cast<const InMemory*>(p); }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<InMemory*>(p) = v; }
 };
 /// Transposes four rows of four numbers.
 template <class S>
 LIESTAT_ALWAYS_INLINE void transpose(FourNumbers<S> (&r)[4]) {
   using V = typename FourNumbers<S>::Vector;
-  const V a = __builtin_shufflevector(r[0].v, r[1].v, 0, 4, 2, 6), b = __builtin_shufflevector(r[0].v, r[1].v, 1, 5, 3, 7),
-          c = __builtin_shufflevector(r[2].v, r[3].v, 0, 4, 2, 6), d = __builtin_shufflevector(r[2].v, r[3].v, 1, 5, 3, 7);
+  const V a = __builtin_shufflevector(r[0].v, r[1].v, 0, 4, 2, 6),
+          b = __builtin_shufflevector(r[0].v, r[1].v, 1, 5, 3, 7),
+          c = __builtin_shufflevector(r[2].v, r[3].v, 0, 4, 2, 6),
+          d = __builtin_shufflevector(r[2].v, r[3].v, 1, 5, 3, 7);
   r[0].v = __builtin_shufflevector(a, c, 0, 1, 4, 5);
   r[1].v = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   r[2].v = __builtin_shufflevector(a, c, 2, 3, 6, 7);
@@ -63,9 +69,9 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
     if (from.component == 1) {
       for (; j + 4 <= count; j += 4) {
         FourNumbers<S> rows[4];
-        for (std::size_t k = 0; k < 4; ++k) std::memcpy(&rows[k].v, from.at(begin + j + k, first), sizeof rows[k].v);
+        LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[k].load(from.at(begin + j + k, first));
         transpose(rows);
-        for (std::size_t c = 0; c < 4; ++c) std::memcpy(columns[c] + j, &rows[c].v, sizeof rows[c].v);
+        LIESTAT_UNROLL for (std::size_t c = 0; c < 4; ++c) rows[c].store(columns[c] + j);
       }
     }
   }
@@ -77,8 +83,8 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
 
 /// The way back.
 template <InstructionSet Set, std::size_t N, class S, std::size_t B>
-LIESTAT_ALWAYS_INLINE void storeColumns(const S (*columns)[B], const Layout<S>& to, std::size_t first, std::size_t begin,
-                                        std::size_t count) {
+LIESTAT_ALWAYS_INLINE void storeColumns(const S (*columns)[B], const Layout<S>& to, std::size_t first,
+                                        std::size_t begin, std::size_t count) {
   if (to.element == 1) {
     for (std::size_t c = 0; c < N; ++c) std::memcpy(to.at(begin, first + c), columns[c], count * sizeof(S));
     return;
@@ -89,9 +95,9 @@ LIESTAT_ALWAYS_INLINE void storeColumns(const S (*columns)[B], const Layout<S>& 
     if (to.component == 1) {
       for (; j + 4 <= count; j += 4) {
         FourNumbers<S> rows[4];
-        for (std::size_t c = 0; c < 4; ++c) std::memcpy(&rows[c].v, columns[c] + j, sizeof rows[c].v);
+        LIESTAT_UNROLL for (std::size_t c = 0; c < 4; ++c) rows[c].load(columns[c] + j);
         transpose(rows);
-        for (std::size_t k = 0; k < 4; ++k) std::memcpy(to.at(begin + j + k, first), &rows[k].v, sizeof rows[k].v);
+        LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[k].store(to.at(begin + j + k, first));
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <lie/detail/always_inline.hpp>
 #include <lie/instruction_set.hpp>
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -33,15 +34,20 @@ template <InstructionSet Set, class S>
 struct PackStorage {
 #if defined(__GNUC__)
   typedef S Type __attribute__((vector_size(registerBytes(Set))));
+  /// The same anywhere in memory. Copies through memcpy are made of smaller pieces, which then are read back whole.
+  typedef S InMemory __attribute__((vector_size(registerBytes(Set)), aligned(sizeof(S)), may_alias));
   static constexpr std::size_t size = registerBytes(Set) / sizeof(S);
 #else
   using Type = S;
+  using InMemory = S;
   static constexpr std::size_t size = 1;
 #endif
 };
 
-/// S is double or float.
-template <InstructionSet Set, class S = double>
+template <class S>
+concept PackScalar = std::same_as<S, double> || std::same_as<S, float>;
+
+template <InstructionSet Set, PackScalar S = double>
 struct Pack {
   using Scalar = S;
   using Vector = typename PackStorage<Set, S>::Type;
@@ -62,10 +68,10 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE static Pack zero() { return Pack(Vector{}); }
   LIESTAT_ALWAYS_INLINE static Pack load(const S* p) {
     Pack x;
-    std::memcpy(&x.v, p, sizeof x.v);
+    x.v = *reinterpret_cast<const typename PackStorage<Set, S>::InMemory*>(p);
     return x;
   }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { std::memcpy(p, &v, sizeof v); }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<typename PackStorage<Set, S>::InMemory*>(p) = v; }
 
   LIESTAT_ALWAYS_INLINE Pack operator-() const { return Pack(-v); }
   LIESTAT_ALWAYS_INLINE friend Pack operator+(const Pack& a, const Pack& b) {

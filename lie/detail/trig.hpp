@@ -58,24 +58,30 @@ LIESTAT_ALWAYS_INLINE S constant(double c) {
   }
 }
 
-/// c[first] + c[first + 4] x4 + c[first + 8] x4² + … up to the last index below `terms`.
-template <std::size_t first, std::size_t terms, class S, std::size_t N>
-LIESTAT_ALWAYS_INLINE S everyFourth(const std::array<double, N>& c, const S& x4) {
-  constexpr std::size_t last = first + (terms - 1 - first) / 4 * 4;
+/// c[first] + c[first + stride] y + c[first + 2 stride] y² + … up to the last index below `terms`.
+template <std::size_t first, std::size_t stride, std::size_t terms, class S, std::size_t N>
+LIESTAT_ALWAYS_INLINE S everyNth(const std::array<double, N>& c, const S& y) {
+  constexpr std::size_t last = first + (terms - 1 - first) / stride * stride;
   S sum = constant<S>(c[last]);
-  for (std::size_t k = last; k > first; k -= 4) sum = sum * x4 + constant<S>(c[k - 4]);
+  LIESTAT_UNROLL for (std::size_t k = last; k > first; k -= stride) sum = sum * y + constant<S>(c[k - stride]);
   return sum;
 }
 
-/// Σ c_k x^k over the first `terms` coefficients, in four chains of operations that don't wait for one another:
-/// Horner's single chain takes four times as long as its multiplications.
+/// Σ c_k x^k over the first `terms` coefficients, in chains of operations that don't wait for one another: Horner's
+/// single chain takes four times as long as its multiplications. Four chains for one number; two for a register of
+/// them, several of which are under way at a time.
 template <std::size_t terms, class S, std::size_t N>
 LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
   static_assert(terms >= 4 && terms <= N);
-  const S x2 = x * x, x4 = x2 * x2;
-  const S low = everyFourth<0, terms>(c, x4) + everyFourth<1, terms>(c, x4) * x;
-  const S high = everyFourth<2, terms>(c, x4) + everyFourth<3, terms>(c, x4) * x;
-  return low + high * x2;
+  const S x2 = x * x;
+  if constexpr (requires { typename S::Mask; }) {
+    return everyNth<0, 2, terms>(c, x2) + everyNth<1, 2, terms>(c, x2) * x;
+  } else {
+    const S x4 = x2 * x2;
+    const S low = everyNth<0, 4, terms>(c, x4) + everyNth<1, 4, terms>(c, x4) * x;
+    const S high = everyNth<2, 4, terms>(c, x4) + everyNth<3, 4, terms>(c, x4) * x;
+    return low + high * x2;
+  }
 }
 template <class S, std::size_t N>
 LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const S& x) {

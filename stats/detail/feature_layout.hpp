@@ -3,14 +3,31 @@
 #pragma once
 
 #include <lie/detail/columns.hpp>
+#include <lie/detail/pack.hpp>
 #include <lie/manifold.hpp>
 
+#include <concepts>
 #include <cstddef>
 #include <memory>
 #include <ranges>
 #include <type_traits>
 
 namespace liestat::detail {
+
+/// The numbers of a feature in memory, one after the other.
+template <class M>
+const auto* parametersOf(const M& x) {
+  if constexpr (requires { ManifoldTraits<M>::parameters(x); }) {
+    return ManifoldTraits<M>::parameters(x);
+  } else {
+    return x.data();
+  }
+}
+/// Features of double or float that have them.
+template <class M>
+concept HasParameterMemory = PackScalar<typename ManifoldTraits<M>::Scalar> && requires(const M& x) {
+  { parametersOf(x) } -> std::convertible_to<const typename ManifoldTraits<M>::Scalar*>;
+};
 
 /// A range of M in one piece of memory.
 template <class R, class M>
@@ -33,11 +50,11 @@ class FeatureBlock {
       return features;
     } else if constexpr (ContiguousFeatures<R, M> && sizeof(M) % sizeof(S) == 0) {
       const M* const first = std::to_address(std::ranges::begin(samples)) + begin;
-      return {T::parameters(*first), sizeof(M) / sizeof(S), 1};
+      return {parametersOf(*first), sizeof(M) / sizeof(S), 1};
     } else {
       for (std::size_t i = 0; i < count; ++i) {
         const M& x = samples[begin + i];
-        const S* const p = T::parameters(x);
+        const S* const p = parametersOf(x);
         for (std::size_t c = 0; c < numbers; ++c) copies_[i * numbers + c] = p[c];
       }
       return {copies_, numbers, 1};

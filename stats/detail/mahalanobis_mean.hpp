@@ -155,8 +155,8 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     if (!options.start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
   }
 
-  M y =
-      options.start ? *options.start : startOfMean<M>(Samples<M>(std::move(features)), Samples<S>(std::move(weights)));
+  M y = options.start ? *options.start
+                      : startOfMean<M>(executor, Samples<M>(std::move(features)), Samples<S>(std::move(weights)));
   MahaSums<M> sums = problem.evaluate(executor, y);
   {
     double scale = 1 + static_cast<double>(T::logOrigin(y).norm());

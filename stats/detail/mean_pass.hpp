@@ -4,6 +4,7 @@
 #include <lie/manifold.hpp>
 #include <stats/detail/packing.hpp>
 #include <stats/detail/rotation_sums.hpp>
+#include <stats/detail/weights_of_one.hpp>
 #include <stats/executor.hpp>
 
 #include <algorithm>
@@ -16,11 +17,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// Stands for weights that are all one.
-struct UnitWeights {
-  double operator[](std::size_t) const { return 1; }
-};
 
 /// Whether there is a weight for every datum.
 template <class R, class W>

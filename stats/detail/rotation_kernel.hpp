@@ -10,6 +10,7 @@
 #include <lie/detail/columns.hpp>
 #include <lie/detail/kernel.hpp>
 #include <lie/detail/pack.hpp>
+#include <stats/detail/moment_kernel.hpp>
 
 #include <array>
 #include <cstddef>
@@ -37,21 +38,6 @@ inline constexpr RotationPolynomials<13, 13, 7> small_rotation{0.1465};
 template <>
 inline constexpr RotationPolynomials<7, 8, 6> small_rotation<float>{0.1465};
 inline constexpr double small_rotation_cosine = 0.7072;
-
-/// Row and column of an entry of a lower triangle, row by row.
-constexpr std::size_t triangleRow(std::size_t entry) {
-  std::size_t i = 0;
-  while ((i + 1) * (i + 2) / 2 <= entry) ++i;
-  return i;
-}
-constexpr std::size_t triangleColumn(std::size_t entry) {
-  return entry - triangleRow(entry) * (triangleRow(entry) + 1) / 2;
-}
-/// sums += the lower triangle of a bᵀ.
-template <class P, std::size_t N, std::size_t K, std::size_t... Entry>
-LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[K], std::index_sequence<Entry...>) {
-  ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
-}
 
 /// Features modulo half-turns about the axes whose bits are set, 1 for x, 2 for y, 4 for z.
 template <class S, bool Frame, unsigned HalfTurns, bool Weighted, bool Scatter>

@@ -17,8 +17,7 @@ namespace liestat::detail {
 /// Manifolds whose sums are made here: SO3, Frame3, the quotients of Frame3 and whatever else shows its parameters, in
 /// double and float.
 template <class M>
-concept HasRotationSums = HasRotationParameters<M> &&
-    (std::same_as<typename ManifoldTraits<M>::Scalar, double> || std::same_as<typename ManifoldTraits<M>::Scalar, float>);
+concept HasRotationSums = HasRotationParameters<M> && PackScalar<typename ManifoldTraits<M>::Scalar>;
 
 /// The half-turns that a quotient's features are equal under, as bits: x, y, z.
 template <class M>

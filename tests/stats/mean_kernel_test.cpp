@@ -222,7 +222,9 @@ void compareFloat(double sigma) {
   constexpr double eps_f = std::numeric_limits<float>::epsilon();
   std::mt19937_64 engine(11);
   std::normal_distribution<double> gauss;
-  const auto normal = [&](double s) { return TangentOf<M>(TangentOf<M>::NullaryExpr([&] { return s * gauss(engine); })); };
+  const auto normal = [&](double s) {
+    return TangentOf<M>(TangentOf<M>::NullaryExpr([&] { return s * gauss(engine); }));
+  };
   const M centre = T::expOrigin(normal(0.7));
   std::vector<F> features;
   std::vector<M> exact;
@@ -241,8 +243,10 @@ void compareFloat(double sigma) {
     SCOPED_TRACE(name(set));
     detail::MeanPass<F> packs;
     ASSERT_TRUE(detail::addTermsByPacks<true>(set, features, detail::UnitWeights{}, y, {0, features.size()}, packs));
-    EXPECT_NEAR(static_cast<double>(packs.sums.cost), general.sums.cost, 40 * eps_f * n * (length + eps_f) * (1 + length));
-    EXPECT_LE((packs.sums.gradient.template cast<double>() - general.sums.gradient).norm(), 40 * eps_f * n * (1 + length));
+    EXPECT_NEAR(static_cast<double>(packs.sums.cost), general.sums.cost,
+                40 * eps_f * n * (length + eps_f) * (1 + length));
+    EXPECT_LE((packs.sums.gradient.template cast<double>() - general.sums.gradient).norm(),
+              40 * eps_f * n * (1 + length));
     EXPECT_LE((packs.sums.hessian.template cast<double>() - general.sums.hessian).norm(), 40 * eps_f * n);
     EXPECT_LE((packs.scatter.scatter.template cast<double>() - general.scatter.scatter).norm(),
               40 * eps_f * n * (length + eps_f) * (1 + length));

@@ -1,0 +1,123 @@
+// Averages in an embedding space, a register of features at a time: Σ p c cᵀ and Σ p c of their parameters c.
+#pragma once
+
+#include <lie/detail/chordal.hpp>
+#include <lie/detail/columns.hpp>
+#include <lie/detail/kernel.hpp>
+#include <lie/detail/pack.hpp>
+#include <stats/detail/feature_layout.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <utility>
+
+namespace liestat::detail {
+
+/// Row and column of an entry of a lower triangle, row by row.
+constexpr std::size_t triangleRow(std::size_t entry) {
+  std::size_t i = 0;
+  while ((i + 1) * (i + 2) / 2 <= entry) ++i;
+  return i;
+}
+constexpr std::size_t triangleColumn(std::size_t entry) {
+  return entry - triangleRow(entry) * (triangleRow(entry) + 1) / 2;
+}
+/// sums += the lower triangle of a bᵀ.
+template <class P, std::size_t N, std::size_t K, std::size_t... Entry>
+LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[K], std::index_sequence<Entry...>) {
+  ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
+}
+
+/// Σ p c cᵀ and Σ p c; Sums a ParameterSums.
+template <class S, class Sums, bool Weighted>
+struct MomentKernel {
+  static constexpr std::size_t max_count = 1024;
+  struct Arguments {
+    Layout<const S> features;
+    const S* weights = nullptr;
+    std::size_t count = 0;
+    Sums sums;
+  };
+
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
+    using P = Pack<Set, S>;
+    constexpr std::size_t outer = Sums::outer, linear = Sums::linear, entries = Sums::entries, block = 64;
+    constexpr std::size_t columns = (outer + linear + 3) / 4 * 4 + 1;
+    alignas(64) S data[columns][block];
+    P product[entries > 0 ? entries : 1], sum[linear > 0 ? linear : 1];
+    LIESTAT_UNROLL for (P& x : product) x = P::zero();
+    LIESTAT_UNROLL for (P& x : sum) x = P::zero();
+    S weight = 0;
+    for (std::size_t i = 0; i < arguments.count; i += block) {
+      const std::size_t count = std::min(arguments.count - i, block);
+      loadAll<Set, 0>(arguments.features, i, count, data);
+      if constexpr (Weighted) {
+        std::memcpy(data[columns - 1], arguments.weights + i, count * sizeof(S));
+        for (std::size_t j = 0; j < count; ++j) weight += data[columns - 1][j];
+      }
+      for (std::size_t j = count; j % P::size != 0; ++j) {
+        for (std::size_t c = 0; c < columns; ++c) data[c][j] = 0;
+      }
+      for (std::size_t j = 0; j < count; j += P::size) {
+        P c[outer + linear], weighted[outer + linear];
+        LIESTAT_UNROLL for (std::size_t a = 0; a < outer + linear; ++a) {
+          c[a] = P::load(data[a] + j);
+          weighted[a] = c[a];
+          if constexpr (Weighted) weighted[a] *= P::load(data[columns - 1] + j);
+        }
+        addOuter(product, c, weighted, std::make_index_sequence<entries>());
+        LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) sum[a] += weighted[outer + a];
+      }
+    }
+    for (std::size_t a = 0; a < entries; ++a) arguments.sums.product[a] = sumOf(product[a]);
+    for (std::size_t a = 0; a < linear; ++a) arguments.sums.sum[a] = sumOf(sum[a]);
+    arguments.sums.count = static_cast<S>(arguments.count);
+    arguments.sums.weight = Weighted ? weight : arguments.sums.count;
+  }
+
+ private:
+  /// Four columns at a time while there are four, then the rest.
+  template <InstructionSet Set, std::size_t first, std::size_t columns, std::size_t block>
+  LIESTAT_ALWAYS_INLINE static void loadAll(const Layout<const S>& from, std::size_t begin, std::size_t count,
+                                            S (&data)[columns][block]) {
+    constexpr std::size_t left = Sums::outer + Sums::linear - first;
+    if constexpr (left >= 4) {
+      loadColumns<Set, 4>(from, first, begin, count, data + first);
+      loadAll<Set, first + 4>(from, begin, count, data);
+    } else if constexpr (left > 0) {
+      loadColumns<Set, left>(from, first, begin, count, data + first);
+    }
+  }
+};
+
+/// Chordal moments that kernels can make.
+template <class M>
+concept HasParameterSums = HasChordalMoments<M> && HasParameterMemory<M> &&
+    requires(typename ManifoldTraits<M>::ChordalMoments moments,
+             const typename ManifoldTraits<M>::ChordalMoments::Sums& sums) {
+  moments.add(sums);
+};
+
+/// The parameters' sums over the features begin … end-1; Weighted false takes all weights as one.
+template <HasParameterSums M, bool Weighted, class R, class W>
+auto parameterSums(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end) {
+  using S = typename ManifoldTraits<M>::Scalar;
+  using Sums = typename ManifoldTraits<M>::ChordalMoments::Sums;
+  using Kernel = MomentKernel<S, Sums, Weighted>;
+  Sums sums;
+  typename Kernel::Arguments arguments;
+  FeatureBlock<M, Sums::outer + Sums::linear, Kernel::max_count> features;
+  WeightBlock<S, Weighted ? Kernel::max_count : 1> numbers;
+  for (std::size_t i = begin; i < end; i += Kernel::max_count) {
+    arguments.count = std::min(end - i, Kernel::max_count);
+    arguments.features = features.layout(samples, i, arguments.count);
+    if constexpr (Weighted) arguments.weights = numbers.weights(weights, i, arguments.count);
+    runKernel<Kernel>(set, arguments);
+    sums += arguments.sums;
+  }
+  return sums;
+}
+
+}  // namespace liestat::detail
