@@ -114,7 +114,7 @@ MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
       }
     }
     result.residual = norm(step);
-    if (!std::isfinite(result.residual)) break;
+    if (!std::isfinite(result.residual) || !std::isfinite(static_cast<double>(sums.cost))) break;
     ++result.iterations;
     const M next = exp(y, step);
     if (result.residual <= result.tolerance) {

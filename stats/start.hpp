@@ -6,8 +6,8 @@
 
 #include <lie/detail/part_tuple.hpp>
 #include <lie/manifold.hpp>
+#include <stats/detail/kernel_sums.hpp>
 #include <stats/detail/moment_kernel.hpp>
-#include <stats/detail/rotation_sums.hpp>
 #include <stats/detail/weights_of_one.hpp>
 #include <stats/executor.hpp>
 
@@ -40,8 +40,8 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
     weight.push_back(S(weights[at(j, judges)]));
   }
   const auto cost_at = [&](const M& y) {
-    if constexpr (HasRotationSums<M>) {
-      RotationSums<M> sums;
+    if constexpr (HasKernelSums<M>) {
+      typename KernelSumsOf<M>::type sums;
       if (sums.template add<true, false>(instructionSet(), judging, weight, 0, judges, y)) return sums.cost;
     }
     const typename T::Group to_y = T::placement(y).inverse();

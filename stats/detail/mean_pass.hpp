@@ -3,7 +3,7 @@
 
 #include <lie/manifold.hpp>
 #include <stats/detail/packing.hpp>
-#include <stats/detail/rotation_sums.hpp>
+#include <stats/detail/kernel_sums.hpp>
 #include <stats/detail/weights_of_one.hpp>
 #include <stats/executor.hpp>
 
@@ -112,6 +112,10 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
     const TangentOf<M> wz = metric.cwiseProduct(z);
     const S squared_distance = z.dot(wz);
     pass.sums.cost += S(0.5) * p * squared_distance;
+    // An inverse tangent makes a finite angle of infinite numbers.
+    if constexpr (requires { at_mean.params().allFinite(); }) {
+      if (!at_mean.params().allFinite()) pass.sums.cost = std::numeric_limits<S>::quiet_NaN();
+    }
     pass.sums.gradient += p * wz;
     pass.sums.hessian += p * T::hessianHalfSquaredDistance(z);
     pass.sums.weight += weights[i];
@@ -132,8 +136,8 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
 template <bool Scatter, Metric M, class R, class W>
 bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
                      MeanPass<M>& pass) {
-  if constexpr (HasRotationSums<M>) {
-    RotationSums<M> sums;
+  if constexpr (HasKernelSums<M>) {
+    typename KernelSumsOf<M>::type sums;
     constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
     if (!sums.template add<weighted, Scatter>(set, samples, weights, range.begin, range.end, y)) return false;
     pass.sums = {sums.cost, sums.gradient, sums.hessian, sums.weight};

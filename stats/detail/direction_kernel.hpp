@@ -1,0 +1,319 @@
+// The sums of a mean over directions, plane rotations and frames, and points, a register of features at a time.
+//
+// With c = <y, x> of unit vectors and u = x - c y, log(y, x) = h(c) u with h(c) = θ/sin θ, cos θ = c, and the Hessian of
+// ½ d² is h c I + g(c) u uᵀ with g(c) = (1 - h c)/(1 - c²) = -h'(c). On c >= 0 both are the polynomials of rotations by
+// twice the angle (stats/detail/rotation_kernel.hpp); beyond, h is that of half the angle divided by its cosine.
+#pragma once
+
+#include <lie/detail/arccosine.hpp>
+#include <stats/detail/rotation_kernel.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <utility>
+
+namespace liestat::detail {
+
+/// h and g of the angle whose cosine is c and whose squared sine is s2 = 1 - c², which is more exact near 0 and π.
+template <class P>
+struct AngleOverSine {
+  using S = typename P::Scalar;
+  P h, g;
+  P antipode = P::zero();  ///< 1 where the angle is so near π that h is lost
+
+  /// Wide for all angles, else for c > -0.01 in every lane; g where Slope says so, and to eight digits only if not Exact.
+  template <bool Wide, bool Slope, bool Exact, class Polynomials>
+  LIESTAT_ALWAYS_INLINE void evaluate(const P& c, const P& s2, const Polynomials& polynomials) {
+    const S factor = static_cast<S>(1 / polynomials.range);
+    if constexpr (!Wide) {
+      const P variable = (S(1) - c) * factor - S(1);
+      h = S(0.5) * evaluatePolynomial(polynomials.log, variable);
+      if constexpr (Slope) g = slope<Exact>(variable, polynomials);
+    } else {
+      const P variable = (S(1) - larger(c, P::zero())) * factor - S(1);
+      // The cosine w of half the angle, from the sine where 1 + c would cancel.
+      const P w2 = s2 / (S(2) - S(2) * smaller(c, P::zero()));
+      const P inverse_w = inverseSquareRoot(w2);
+      const P half_variable = (S(1) - w2 * inverse_w) * factor - S(1);
+      const auto near = c > S(0);
+      h = S(0.5) * select(near, evaluatePolynomial(polynomials.log, variable),
+                          evaluatePolynomial(polynomials.log, half_variable) * inverse_w);
+      if constexpr (Slope) {
+        g = select(near, slope<Exact>(variable, polynomials), (S(1) - h * c) / s2);
+      }
+      constexpr S tiny = sizeof(S) == 8 ? S(1e-280) : S(1e-34);
+      antipode = select(near, P::zero(), select(w2 > tiny, P::zero(), P(S(1))));
+    }
+  }
+
+ private:
+  template <bool Exact, class Polynomials>
+  LIESTAT_ALWAYS_INLINE static P slope(const P& variable, const Polynomials& polynomials) {
+    if constexpr (Exact) {
+      return evaluatePolynomial(polynomials.exact_hessian, variable);
+    } else {
+      return evaluatePolynomial(polynomials.newton_hessian, variable);
+    }
+  }
+};
+
+/// 1/√(1 + excess), to second order.
+template <class P>
+LIESTAT_ALWAYS_INLINE P unitScale(const P& excess) {
+  using S = typename P::Scalar;
+  return S(1) - excess * (S(0.5) - S(0.375) * excess);
+}
+
+/// Unit vectors x about the reference y. All sums are in the axes of the space.
+template <class S, bool Weighted, bool Scatter>
+struct DirectionKernel {
+  static constexpr std::size_t max_count = 1024;
+  struct Arguments {
+    Layout<const S> features;
+    const S* weights = nullptr;
+    std::size_t count = 0;
+    S reference[3] = {};
+    S cost, largest, defect, weight;
+    S gradient[3];                       ///< Σ p h u
+    S across;                            ///< Σ p h c
+    S along[6], scatter[6], squared[6];  ///< Σ p g u uᵀ, Σ p h² u uᵀ, Σ p² h² u uᵀ
+  };
+
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
+    Run<Pack<Set, S>>::all(arguments);
+  }
+
+ private:
+  /// x - c y, c, the weight.
+  static constexpr std::size_t columns = 5, block = 64;
+
+  template <class P>
+  struct Run {
+    P cost = P::zero(), largest = P::zero(), defect = P::zero(), weight = P::zero(), across = P::zero(), gradient[3],
+      along[6], scatter[6], squared[6];
+
+    LIESTAT_ALWAYS_INLINE Run() {
+      LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
+      LIESTAT_UNROLL for (P& x : along) x = P::zero();
+      LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
+      LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    }
+    LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
+      alignas(64) S data[columns][block];
+      Run sums;
+      for (std::size_t i = 0; i < arguments.count; i += block) {
+        const std::size_t count = std::min(arguments.count - i, block);
+        loadColumns<P::set, 3>(arguments.features, 0, i, count, data);
+        // What fills the last register is y, with weight 0; without weights it counts once in Σ h c.
+        for (std::size_t j = count; j % P::size != 0; ++j) {
+          for (std::size_t c = 0; c < 3; ++c) data[c][j] = arguments.reference[c];
+          data[4][j] = 0;
+        }
+        if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
+        P least(S(1));
+        for (std::size_t j = 0; j < count; j += P::size) sums.project(data, j, arguments.reference, least);
+        const S least_cosine = -largestOf(-least);
+        if (least_cosine > static_cast<S>(small_rotation_cosine)) {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, small_rotation<S>);
+        } else if (least_cosine > S(0)) {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, any_rotation<S>);
+        } else {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<true>(data, j, any_rotation<S>);
+        }
+      }
+      const std::size_t surplus = (P::size - arguments.count % P::size) % P::size;
+      arguments.weight = Weighted ? sumOf(sums.weight) : static_cast<S>(arguments.count);
+      arguments.across = sumOf(sums.across) - (Weighted ? S(0) : static_cast<S>(surplus));
+      arguments.cost = S(0.5) * sumOf(sums.cost);
+      arguments.largest = largestOf(sums.largest), arguments.defect = largestOf(sums.defect);
+      for (std::size_t a = 0; a < 3; ++a) arguments.gradient[a] = sumOf(sums.gradient[a]);
+      for (std::size_t a = 0; a < 6; ++a) {
+        arguments.along[a] = sumOf(sums.along[a]);
+        arguments.scatter[a] = sumOf(sums.scatter[a]);
+        arguments.squared[a] = Weighted ? sumOf(sums.squared[a]) : arguments.scatter[a];
+      }
+    }
+    /// Replaces unit vectors x by x - c y and c.
+    LIESTAT_ALWAYS_INLINE void project(S (&data)[columns][block], std::size_t j, const S (&y)[3], P& least) {
+      const P x0 = P::load(data[0] + j), x1 = P::load(data[1] + j), x2 = P::load(data[2] + j);
+      const P excess = x0 * x0 + x1 * x1 + x2 * x2 - S(1), scale = unitScale(excess);
+      defect = larger(absolute(excess), defect);
+      const P c = (x0 * y[0] + x1 * y[1] + x2 * y[2]) * scale;
+      least = smaller(c, least);
+      (x0 * scale - c * y[0]).store(data[0] + j);
+      (x1 * scale - c * y[1]).store(data[1] + j);
+      (x2 * scale - c * y[2]).store(data[2] + j);
+      c.store(data[3] + j);
+    }
+    template <bool Wide, class Polynomials>
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Polynomials& polynomials) {
+      const P u[3] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j)}, c = P::load(data[3] + j);
+      const P s2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+      AngleOverSine<P> angle;
+      angle.template evaluate<Wide, true, Scatter>(c, s2, polynomials);
+      defect = larger(angle.antipode, defect);
+      P v[3], weighted[3], gu[3];
+      P length2 = angle.h * angle.h * s2, weighted_length2 = length2, hc = angle.h * c;
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) {
+        weighted[a] = v[a] = angle.h * u[a];
+        gu[a] = angle.g * u[a];
+      }
+      if constexpr (Weighted) {
+        const P p = P::load(data[4] + j);
+        weight += p;
+        weighted_length2 *= p, hc *= p;
+        LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) weighted[a] *= p, gu[a] *= p;
+      }
+      cost += weighted_length2, across += hc;
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) gradient[a] += weighted[a];
+      addOuter(along, u, gu, std::make_index_sequence<6>());
+      if constexpr (Scatter) {
+        largest = larger(length2, largest);
+        addOuter(scatter, v, weighted, std::make_index_sequence<6>());
+        if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<6>());
+      }
+    }
+  };
+};
+
+/// Plane rotations (cos, sin) about the reference, and with Frame their translations less that of the reference, in
+/// the axes of the plane.
+template <class S, bool Frame, bool Weighted, bool Scatter>
+struct PlanarKernel {
+  static constexpr std::size_t max_count = 1024, k = Frame ? 3 : 1, entries = k * (k + 1) / 2, numbers = Frame ? 4 : 2;
+  struct Arguments {
+    Layout<const S> features;
+    const S* weights = nullptr;
+    std::size_t count = 0;
+    S reference[4] = {};
+    S cost, largest, defect, weight, gradient[k], scatter[entries], squared[entries];
+  };
+
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
+    using P = Pack<Set, S>;
+    constexpr std::size_t block = 64;
+    alignas(64) S data[numbers + 1][block];
+    P cost = P::zero(), largest = P::zero(), defect = P::zero(), weight = P::zero(), gradient[k], scatter[entries],
+      squared[entries];
+    LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
+    LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
+    LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    const S(&y)[4] = arguments.reference;
+    for (std::size_t i = 0; i < arguments.count; i += block) {
+      const std::size_t count = std::min(arguments.count - i, block);
+      loadColumns<Set, numbers>(arguments.features, 0, i, count, data);
+      if constexpr (Weighted) std::memcpy(data[numbers], arguments.weights + i, count * sizeof(S));
+      for (std::size_t j = count; j % P::size != 0; ++j) {
+        for (std::size_t c = 0; c < numbers; ++c) data[c][j] = y[c];
+        data[numbers][j] = 0;
+      }
+      for (std::size_t j = 0; j < count; j += P::size) {
+        const P a = P::load(data[0] + j), b = P::load(data[1] + j);
+        const P excess = a * a + b * b - S(1), scale = unitScale(excess);
+        defect = larger(absolute(excess), defect);
+        const P c = scale * (a * y[0] + b * y[1]), s = scale * (b * y[0] - a * y[1]);
+        AngleOverSine<P> angle;
+        angle.template evaluate<true, false, false>(c, s * s, any_rotation<S>);
+        defect = larger(angle.antipode, defect);
+        P v[k], weighted[k];
+        v[k - 1] = angle.h * s;
+        if constexpr (Frame) {
+          v[0] = P::load(data[2] + j) - y[2];
+          v[1] = P::load(data[3] + j) - y[3];
+        }
+        P length2 = v[0] * v[0];
+        if constexpr (Frame) length2 += v[1] * v[1] + v[2] * v[2];
+        P weighted_length2 = length2;
+        LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) weighted[l] = v[l];
+        if constexpr (Weighted) {
+          const P p = P::load(data[numbers] + j);
+          weight += p;
+          weighted_length2 *= p;
+          LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) weighted[l] *= p;
+        }
+        cost += weighted_length2;
+        LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) gradient[l] += weighted[l];
+        if constexpr (Scatter) {
+          largest = larger(length2, largest);
+          addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
+          if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
+        }
+      }
+    }
+    arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
+    arguments.cost = S(0.5) * sumOf(cost);
+    arguments.largest = largestOf(largest), arguments.defect = largestOf(defect);
+    for (std::size_t l = 0; l < k; ++l) arguments.gradient[l] = sumOf(gradient[l]);
+    for (std::size_t l = 0; l < entries; ++l) {
+      arguments.scatter[l] = sumOf(scatter[l]);
+      arguments.squared[l] = Weighted ? sumOf(squared[l]) : arguments.scatter[l];
+    }
+  }
+};
+
+/// Points of N coordinates less those of the reference.
+template <class S, std::size_t N, bool Weighted, bool Scatter>
+struct PointKernel {
+  static constexpr std::size_t max_count = 1024, entries = N * (N + 1) / 2;
+  struct Arguments {
+    Layout<const S> features;
+    const S* weights = nullptr;
+    std::size_t count = 0;
+    S reference[N] = {};
+    S cost, largest, defect = 0, weight, gradient[N], scatter[entries], squared[entries];
+  };
+
+  template <InstructionSet Set>
+  LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
+    using P = Pack<Set, S>;
+    constexpr std::size_t block = 64;
+    alignas(64) S data[N + 1][block];
+    P cost = P::zero(), largest = P::zero(), weight = P::zero(), gradient[N], scatter[entries], squared[entries];
+    LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
+    LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
+    LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    for (std::size_t i = 0; i < arguments.count; i += block) {
+      const std::size_t count = std::min(arguments.count - i, block);
+      loadColumns<Set, N>(arguments.features, 0, i, count, data);
+      if constexpr (Weighted) std::memcpy(data[N], arguments.weights + i, count * sizeof(S));
+      for (std::size_t j = count; j % P::size != 0; ++j) {
+        for (std::size_t c = 0; c < N; ++c) data[c][j] = arguments.reference[c];
+        data[N][j] = 0;
+      }
+      for (std::size_t j = 0; j < count; j += P::size) {
+        P v[N], weighted[N], length2 = P::zero();
+        LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) {
+          weighted[c] = v[c] = P::load(data[c] + j) - arguments.reference[c];
+          length2 += v[c] * v[c];
+        }
+        P weighted_length2 = length2;
+        if constexpr (Weighted) {
+          const P p = P::load(data[N] + j);
+          weight += p;
+          weighted_length2 *= p;
+          LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) weighted[c] *= p;
+        }
+        cost += weighted_length2;
+        LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) gradient[c] += weighted[c];
+        if constexpr (Scatter) {
+          largest = larger(length2, largest);
+          addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
+          if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
+        }
+      }
+    }
+    arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
+    arguments.cost = S(0.5) * sumOf(cost);
+    arguments.largest = largestOf(largest);
+    for (std::size_t c = 0; c < N; ++c) arguments.gradient[c] = sumOf(gradient[c]);
+    for (std::size_t e = 0; e < entries; ++e) {
+      arguments.scatter[e] = sumOf(scatter[e]);
+      arguments.squared[e] = Weighted ? sumOf(squared[e]) : arguments.scatter[e];
+    }
+  }
+};
+
+}  // namespace liestat::detail

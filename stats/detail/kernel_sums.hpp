@@ -1,0 +1,127 @@
+// The sums of a mean over directions, plane rotations and frames, and points, from the kernels of
+// stats/detail/direction_kernel.hpp; and those of any manifold that has a kernel.
+#pragma once
+
+#include <lie/detail/chordal.hpp>
+#include <stats/detail/direction_kernel.hpp>
+#include <stats/detail/rotation_sums.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <type_traits>
+
+namespace liestat::detail {
+
+template <class M, template <class> class Moments>
+concept HasMomentsLike = HasParameterSums<M> && std::same_as<typename ManifoldTraits<M>::ChordalMoments, Moments<M>>;
+/// S², SO(2), Frame2 and R^n up to six dimensions as the library keeps them in memory, in double and float.
+template <class M>
+concept HasDirectionSums = HasMomentsLike<M, DirectionMoments>;
+template <class M>
+concept HasPlanarSums = HasMomentsLike<M, ComplexMoments> && Metric<M> &&
+    (ManifoldTraits<M>::DoF == 1 || ManifoldTraits<M>::DoF == 3);
+template <class M>
+concept HasPointSums = HasMomentsLike<M, FlatMoments> && Metric<M> &&(ManifoldTraits<M>::DoF <= 6);
+
+/// Σ over some features about a reference y, in the frame of y, like RotationSums.
+template <class M>
+  requires(HasDirectionSums<M> || HasPlanarSums<M> || HasPointSums<M>)
+class SimpleSums {
+  using T = ManifoldTraits<M>;
+  using S = typename T::Scalar;
+  static constexpr int k = T::DoF;
+  static constexpr std::size_t numbers = T::ChordalMoments::Sums::linear;
+
+  template <bool Weighted, bool Scatter>
+  static auto kernel() {
+    if constexpr (HasDirectionSums<M>) {
+      return std::type_identity<DirectionKernel<S, Weighted, Scatter>>();
+    } else if constexpr (HasPlanarSums<M>) {
+      return std::type_identity<PlanarKernel<S, k == 3, Weighted, Scatter>>();
+    } else {
+      return std::type_identity<PointKernel<S, numbers, Weighted, Scatter>>();
+    }
+  }
+
+ public:
+  using Tangent = typename T::Tangent;
+  using Square = typename T::Square;
+
+  S cost = 0;
+  double weight = 0;
+  Tangent gradient = Tangent::Zero();
+  Square hessian = Square::Zero(), scatter = Square::Zero(), squared = Square::Zero();
+  S largest = 0, smallest_gap = std::numeric_limits<S>::infinity();
+
+  /// As RotationSums::add; false also for directions and plane rotations opposite to y.
+  template <bool Weighted, bool Scatter, class R, class W>
+  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y) {
+    using Kernel = typename decltype(kernel<Weighted, Scatter>())::type;
+    typename Kernel::Arguments arguments;
+    for (std::size_t c = 0; c < numbers; ++c) arguments.reference[c] = parametersOf(y)[c];
+    FeatureBlock<M, numbers, Kernel::max_count> features;
+    WeightBlock<S, Weighted ? Kernel::max_count : 1> values;
+    const S limit = std::same_as<S, float> ? S(1e-3) : S(1e-5);
+    for (std::size_t i = begin; i < end; i += Kernel::max_count) {
+      arguments.count = std::min(end - i, Kernel::max_count);
+      arguments.features = features.layout(samples, i, arguments.count);
+      if constexpr (Weighted) arguments.weights = values.weights(weights, i, arguments.count);
+      runKernel<Kernel>(set, arguments);
+      if (!(arguments.defect < limit)) return false;
+      addSums<Scatter>(arguments, y);
+    }
+    return std::isfinite(cost) && gradient.allFinite() && hessian.allFinite();
+  }
+
+ private:
+  template <bool Scatter, class Arguments>
+  void addSums(const Arguments& a, const M& y) {
+    cost += a.cost, weight += static_cast<double>(a.weight);
+    if constexpr (Scatter) largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
+    if constexpr (HasDirectionSums<M>) {
+      using Matrix3 = Eigen::Matrix<S, 3, 3>;
+      const Eigen::Matrix<S, 3, 2> axes = T::placement(y).matrix().template leftCols<2>();
+      const auto inPlane = [&](const S* triangle) -> Square {
+        return axes.transpose() * (symmetricFromTriangle<Matrix3>(triangle) * axes).eval();
+      };
+      gradient += axes.transpose() * Eigen::Map<const Eigen::Matrix<S, 3, 1>>(a.gradient);
+      hessian += inPlane(a.along) + a.across * Square::Identity();
+      if constexpr (Scatter) scatter += inPlane(a.scatter), squared += inPlane(a.squared);
+    } else {
+      // Translations are in the axes of the world.
+      Square axes = Square::Identity();
+      if constexpr (HasPlanarSums<M> && k == 3) {
+        const S c = parametersOf(y)[0], s = parametersOf(y)[1];
+        axes(0, 0) = axes(1, 1) = c, axes(0, 1) = -s, axes(1, 0) = s;
+      }
+      const auto inFrame = [&](const S* triangle) -> Square {
+        return axes.transpose() * (symmetricFromTriangle<Square>(triangle) * axes).eval();
+      };
+      gradient += axes.transpose() * Eigen::Map<const Tangent>(a.gradient);
+      hessian.diagonal().array() += a.weight;
+      if constexpr (Scatter) scatter += inFrame(a.scatter), squared += inFrame(a.squared);
+    }
+  }
+};
+
+/// The class that makes the sums of M by kernels.
+template <class M>
+struct KernelSumsOf {};
+template <HasRotationSums M>
+struct KernelSumsOf<M> {
+  using type = RotationSums<M>;
+};
+template <class M>
+  requires(HasDirectionSums<M> || HasPlanarSums<M> || HasPointSums<M>)
+struct KernelSumsOf<M> {
+  using type = SimpleSums<M>;
+};
+template <class M>
+concept HasKernelSums = requires {
+  typename KernelSumsOf<M>::type;
+};
+
+}  // namespace liestat::detail
