@@ -6,6 +6,7 @@
 #include <lie/detail/small_products.hpp>
 #include <stats/concentration.hpp>
 #include <stats/detail/angular_part.hpp>
+#include <stats/detail/pose_sums.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 
@@ -59,25 +60,25 @@ struct GroupMeanSums {
 };
 
 template <LieGroup G, Executor E, class R, class W>
-GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W& weights,
-                                   const std::optional<G>& start) {
+GroupMeanSums<G> groupMeanSums(const E& executor, const R& samples, const W& weights, const G& y) {
   using S = ScalarOf<G>;
-  GroupMeanResult<G> result;
-  result.n = std::ranges::size(samples);
-  if (result.n == 0) return result;
-  result.status = Status::not_converged;
-  G y = start ? *start : startOfMean<G>(executor, samples, weights);
-  result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
-  for (int i = 0; i < 100 && result.status != Status::ok; ++i) {
-    const G to_mean = y.inverse();
-    const auto sums = sumOverData<GroupMeanSums<G>>(executor, result.n, [&](std::size_t k, GroupMeanSums<G>& s) {
-      const S p = S(weights[k]);
-      const TangentOf<G> z = (to_mean * samples[k]).log();
-      s.sum += p * z;
-      s.jacobian += p * G::leftJacobianInverse(z);
-      s.scatter += p * z * z.transpose();
-      s.weight += weights[k];
-    });
+  const G to_mean = y.inverse();
+  return sumOverData<GroupMeanSums<G>>(executor, std::ranges::size(samples), [&](std::size_t k, GroupMeanSums<G>& s) {
+    const S p = S(weights[k]);
+    const TangentOf<G> z = (to_mean * samples[k]).log();
+    s.sum += p * z;
+    s.jacobian += p * G::leftJacobianInverse(z);
+    s.scatter += p * z * z.transpose();
+    s.weight += weights[k];
+  });
+}
+
+/// Newton's method from y on sums(y), which the result keeps; returns the sums of the last pass.
+template <LieGroup G, class MakeSums>
+auto iterateBarycentre(G y, GroupMeanResult<G>& result, const MakeSums& sums_at) {
+  using S = ScalarOf<G>;
+  auto sums = sums_at(y);
+  for (int i = 0; i < 100; ++i) {
     result.scatter = sums.scatter;
     result.jacobian = sums.jacobian;
     result.sum_of_weights = sums.weight;
@@ -86,10 +87,62 @@ GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W&
     if (!std::isfinite(result.residual)) break;
     ++result.iterations;
     y = y * G::exp(step);
-    if (result.residual <= result.tolerance) result.status = Status::ok;
+    if (result.residual <= result.tolerance) {
+      result.status = Status::ok;
+      break;
+    }
+    if (i < 99) sums = sums_at(y);
   }
   result.mean = y;
-  result.concentration = angularConcentration<G>(samples, weights, y);
+  return sums;
+}
+
+/// The barycentre of poses by their kernels: its rotation is the rotations' mean, and then its translation solves a
+/// linear system. False, with a result that says nothing, where the kernels don't apply or the rotations have no mean.
+template <HasPoseSums G, Executor E, class R, class W>
+bool poseBarycentre(const E& executor, const R& samples, const W& weights, const std::optional<G>& start,
+                    GroupMeanResult<G>& result) {
+  using S = ScalarOf<G>;
+  using Rotation = SO3<S>;
+  MeanOptions<Rotation> options;
+  if (start) options.start = start->so3();
+  const auto rotation = frechetMean<Rotation>(executor, RotationPart<G, R>{samples}, weights, options);
+  if (rotation.status != Status::ok) return false;
+  // A system about any of the translations; one of them, so that nothing cancels far from the origin.
+  G y(rotation.mean, G(samples[0]).translation());
+  const PoseSums<G> first = poseSums<false>(executor, samples, weights, y);
+  if (first.refused > 0) return false;
+  y = y * G(Rotation(),
+            detail::inverse<S, 3>(first.jacobian.template topLeftCorner<3, 3>()) * first.sum.template head<3>());
+  result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
+  result.iterations = rotation.iterations;
+  const PoseSums<G> sums =
+      iterateBarycentre(y, result, [&](const G& at) { return poseSums<true>(executor, samples, weights, at); });
+  if (sums.refused > 0 || result.status != Status::ok) return false;
+  ScatterOfAngles angles;
+  angles.weight = sums.weight, angles.squared_weight = sums.squared_weight;
+  angles.sum = static_cast<double>(sums.scatter.template bottomRightCorner<3, 3>().trace());
+  angles.plain = sums.squared_angle, angles.n = static_cast<double>(result.n);
+  result.concentration.worsen(angles.judge(rotationLaw(0)));
+  return true;
+}
+
+template <LieGroup G, Executor E, class R, class W>
+GroupMeanResult<G> groupBarycentre(const E& executor, const R& samples, const W& weights,
+                                   const std::optional<G>& start) {
+  using S = ScalarOf<G>;
+  GroupMeanResult<G> result;
+  result.n = std::ranges::size(samples);
+  if (result.n == 0) return result;
+  result.status = Status::not_converged;
+  if constexpr (HasPoseSums<G>) {
+    GroupMeanResult<G> by_kernels = result;
+    if (poseBarycentre(executor, samples, weights, start, by_kernels)) return by_kernels;
+  }
+  const G y = start ? *start : startOfMean<G>(executor, samples, weights);
+  result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
+  iterateBarycentre(y, result, [&](const G& at) { return groupMeanSums(executor, samples, weights, at); });
+  result.concentration = angularConcentration<G>(samples, weights, result.mean);
   return result;
 }
 

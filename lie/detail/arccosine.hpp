@@ -10,15 +10,16 @@
 
 namespace liestat::detail {
 
-/// Half of f, or g, from σ = (1-w)/2 in [0, ½]: φ/sin φ = Σ c_n σⁿ for w = cos φ, c_{n+1}/c_n = (2n+2)/(2n+3), and
-/// minus the derivative of that with respect to w.
-constexpr long double arccosineSeries(long double sigma, bool slope) {
-  long double c = 1, power = 1, sum = slope ? 0 : 1;
-  for (int n = 0; n < 72; ++n) {
-    c *= static_cast<long double>(2 * n + 2) / static_cast<long double>(2 * n + 3);
-    if (slope) sum += static_cast<long double>(n + 1) / 2 * c * power;
-    power *= sigma;
-    if (!slope) sum += c * power;
+/// Half of f from σ = (1-w)/2 in [0, ½], φ/sin φ = Σ c_n σⁿ for w = cos φ, c_{n+1}/c_n = (2n+2)/(2n+3); and its
+/// derivatives with respect to -w: the first is g.
+constexpr long double arccosineSeries(long double sigma, int derivative) {
+  long double c = 1, power = 1, sum = derivative == 0 ? 1 : 0;
+  for (int n = 1; n < 80; ++n) {
+    c *= static_cast<long double>(2 * n) / static_cast<long double>(2 * n + 1);
+    long double factor = 1;
+    for (int d = 0; d < derivative; ++d) factor *= static_cast<long double>(n - d) / 2;
+    if (n > derivative) power *= sigma;
+    if (n >= derivative) sum += factor * c * power;
   }
   return sum;
 }
@@ -26,7 +27,7 @@ constexpr long double arccosineSeries(long double sigma, bool slope) {
 /// The polynomial that interpolates the series at Chebyshev's points of 0 <= σ <= range, in x = 2σ/range - 1; lowest
 /// power first.
 template <std::size_t N>
-constexpr std::array<double, N> arccosinePolynomial(bool slope, long double factor, long double range) {
+constexpr std::array<double, N> arccosinePolynomial(int derivative, long double factor, long double range) {
   std::array<long double, N> value{}, node{};
   for (std::size_t i = 0; i < N; ++i) {
     const long double angle = 3.141592653589793238462643383279502884L * static_cast<long double>(2 * i + 1) / (2 * N);
@@ -36,7 +37,7 @@ constexpr std::array<double, N> arccosinePolynomial(bool slope, long double fact
       cosine += term;
     }
     node[i] = cosine;
-    value[i] = factor * arccosineSeries(range * (1 + cosine) / 2, slope);
+    value[i] = factor * arccosineSeries(range * (1 + cosine) / 2, derivative);
   }
   std::array<long double, N> sum{}, T{}, T_next{}, t{}, t_next{};
   T[0] = 1;                                                           // T_j by its powers of x
@@ -67,7 +68,7 @@ inline constexpr std::size_t arccosine_terms = is_single_precision<S>      ? 11
 /// f(w) for w in [0, 1], and a little beyond.
 template <class S>
 inline S arccosineRatio(const S& w) {
-  static constexpr auto coefficients = arccosinePolynomial<arccosine_terms<S>>(false, 2, 0.5L);
+  static constexpr auto coefficients = arccosinePolynomial<arccosine_terms<S>>(0, 2, 0.5L);
   return evaluatePolynomial(coefficients, S(S(1) - S(2) * w));
 }
 

@@ -23,9 +23,11 @@ namespace liestat::detail {
 template <std::size_t Log, std::size_t Exact, std::size_t Newton>
 struct RotationPolynomials {
   double range;
-  std::array<double, Log> log = arccosinePolynomial<Log>(false, 2, range);
-  std::array<double, Exact> exact_hessian = arccosinePolynomial<Exact>(true, 1, range);
-  std::array<double, Newton> newton_hessian = arccosinePolynomial<Newton>(true, 1, range);
+  std::array<double, Log> log = arccosinePolynomial<Log>(0, 2, range);
+  std::array<double, Exact> exact_hessian = arccosinePolynomial<Exact>(1, 1, range);
+  /// -g', as exact as the latter.
+  std::array<double, Exact + 1> hessian_slope = arccosinePolynomial<Exact + 1>(2, 1, range);
+  std::array<double, Newton> newton_hessian = arccosinePolynomial<Newton>(1, 1, range);
 };
 /// For all rotations.
 template <class S>

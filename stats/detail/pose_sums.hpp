@@ -1,0 +1,131 @@
+// The sums of the exponential barycentre of SE(3) from the kernels of stats/detail/group_kernel.hpp.
+#pragma once
+
+#include <lie/se3.hpp>
+#include <stats/concentration.hpp>
+#include <stats/detail/feature_layout.hpp>
+#include <stats/detail/group_kernel.hpp>
+#include <stats/detail/packing.hpp>
+#include <stats/detail/rotation_sums.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace liestat::detail {
+
+/// SE(3) as the library keeps it, in double and float.
+template <class G>
+concept HasPoseSums = std::same_as<G, SE3<double>> || std::same_as<G, SE3<float>>;
+
+/// The rotations of poses, as features of their own.
+template <HasPoseSums G, class R>
+struct RotationPart {
+  using S = typename G::Scalar;
+  const R& samples;
+
+  std::size_t size() const { return std::ranges::size(samples); }
+  SO3<S> operator[](std::size_t i) const { return G(samples[i]).so3(); }
+  Layout<const S> layout() const requires ContiguousFeatures<R, G> {
+    return FeatureBlock<G, 7, 1>().layout(samples, 0, size());
+  }
+};
+
+/// Σ over some poses about a reference, in its body axes. Full false leaves out the scatter and what lies off the
+/// jacobian's diagonal.
+template <HasPoseSums G>
+struct PoseSums {
+  using S = typename G::Scalar;
+  using Tangent = Eigen::Matrix<S, 6, 1>;
+  using Square = Eigen::Matrix<S, 6, 6>;
+  Tangent sum = Tangent::Zero();  ///< Σ p z
+  Square jacobian = Square::Zero(), scatter = Square::Zero();
+  double weight = 0, squared_weight = 0, squared_angle = 0;
+  double refused = 0;  ///< 1 where a quaternion is not a unit one
+
+  void operator+=(const PoseSums& other) {
+    sum += other.sum, jacobian += other.jacobian, scatter += other.scatter;
+    weight += other.weight, squared_weight += other.squared_weight, squared_angle += other.squared_angle;
+    refused = std::max(refused, other.refused);
+  }
+  std::vector<double> pack() const {
+    return packed(sum, jacobian, scatter, weight, squared_weight, squared_angle, refused);
+  }
+  static PoseSums unpack(std::span<const double> list) {
+    PoseSums s;
+    unpackInto(list, s.sum, s.jacobian, s.scatter, s.weight, s.squared_weight, s.squared_angle, s.refused);
+    return s;
+  }
+
+  template <bool Weighted, bool Full, class R, class W>
+  void add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const G& y) {
+    using Kernel = PoseKernel<S, Weighted, Full>;
+    typename Kernel::Arguments arguments;
+    for (std::size_t c = 0; c < 7; ++c) arguments.reference[c] = y.data()[c];
+    FeatureBlock<G, 7, Kernel::max_count> features;
+    WeightBlock<S, Weighted ? Kernel::max_count : 1> numbers;
+    for (std::size_t i = begin; i < end; i += Kernel::max_count) {
+      arguments.count = std::min(end - i, Kernel::max_count);
+      arguments.features = features.layout(samples, i, arguments.count);
+      if constexpr (Weighted) arguments.weights = numbers.weights(weights, i, arguments.count);
+      runKernel<Kernel>(set, arguments);
+      if (!(arguments.defect < (std::same_as<S, float> ? S(1e-3) : S(1e-5)))) refused = 1;
+      addSums<Full>(arguments, y);
+    }
+  }
+
+ private:
+  /// From the axes of the world to those of the body.
+  template <bool Full, class Arguments>
+  void addSums(const Arguments& a, const G& y) {
+    using Vector3 = Eigen::Matrix<S, 3, 1>;
+    using Matrix3 = Eigen::Matrix<S, 3, 3>;
+    const Matrix3 to_body = y.so3().inverse().matrix();
+    const auto turned = [&](const Matrix3& m) -> Matrix3 { return (to_body * m).eval() * to_body.transpose(); };
+    const Vector3 rho(a.rho[0], a.rho[1], a.rho[2]), phi(a.phi[0], a.phi[1], a.phi[2]);
+    sum.template head<3>() += to_body * rho;
+    sum.template tail<3>() += to_body * phi;
+    // Σ p V⁻¹ = Σ p (I - ½ [φ] + g (u uᵀ - |u|² I)).
+    Matrix3 diagonal = symmetricFromTriangle<Matrix3>(a.outer);
+    diagonal.diagonal().array() += a.weight - diagonal.trace();
+    diagonal -= S(0.5) * SO3<S>::hat(phi);
+    diagonal = turned(diagonal);
+    jacobian.template topLeftCorner<3, 3>() += diagonal;
+    jacobian.template bottomRightCorner<3, 3>() += diagonal;
+    weight += static_cast<double>(a.weight), squared_weight += static_cast<double>(a.squared_weight);
+    if constexpr (Full) {
+      squared_angle += static_cast<double>(a.squared_angle);
+      jacobian.template topRightCorner<3, 3>() +=
+          turned(symmetricFromTriangle<Matrix3>(a.mixed) - S(0.5) * SO3<S>::hat(rho));
+      Square outer = symmetricFromTriangle<Square>(a.scatter);
+      for (int i = 0; i < 6; i += 3) {
+        outer.template middleRows<3>(i) = (to_body * outer.template middleRows<3>(i)).eval();
+      }
+      for (int i = 0; i < 6; i += 3) {
+        outer.template middleCols<3>(i) = (outer.template middleCols<3>(i) * to_body.transpose()).eval();
+      }
+      scatter += outer;
+    }
+  }
+};
+
+/// One pass over the poses.
+template <bool Full, HasPoseSums G, Executor E, class R, class W>
+PoseSums<G> poseSums(const E& executor, const R& samples, const W& weights, const G& y) {
+  const std::size_t n = std::ranges::size(samples), chunks = chunkCount(n);
+  const InstructionSet set = instructionSetOf(executor);
+  return executor.reduce(
+      chunks,
+      [&](std::size_t chunk) {
+        PoseSums<G> sums;
+        const ChunkRange range = chunkRange(n, chunks, chunk);
+        sums.template add<!std::same_as<W, UnitWeights>, Full>(set, samples, weights, range.begin, range.end, y);
+        return sums;
+      },
+      [](PoseSums<G>& a, const PoseSums<G>& b) { a += b; });
+}
+
+}  // namespace liestat::detail
