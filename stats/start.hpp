@@ -26,7 +26,8 @@ namespace detail {
 
 /// The datum with the least cost among a few, spread over the data; the cost is taken on a subset.
 template <class M, class R, class W>
-M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, std::size_t judges = 64) {
+M bestOfSeveral(InstructionSet set, const R& samples, const W& weights, std::size_t candidates = 8,
+                std::size_t judges = 64) {
   using S = ScalarOf<M>;
   const std::size_t n = std::ranges::size(samples);
   const auto at = [&](std::size_t k, std::size_t of) { return k * n / of; };
@@ -42,7 +43,7 @@ M bestOfSeveral(const R& samples, const W& weights, std::size_t candidates = 8, 
   const auto cost_at = [&](const M& y) {
     if constexpr (HasKernelSums<M>) {
       typename KernelSumsOf<M>::type sums;
-      if (sums.template add<true, false>(instructionSet(), judging, weight, 0, judges, y)) return sums.cost;
+      if (sums.template add<true, false>(set, judging, weight, 0, judges, y)) return sums.cost;
     }
     const typename T::Group to_y = T::placement(y).inverse();
     S cost(0);
@@ -94,12 +95,12 @@ M startOfMean(const E& executor, const R& samples, const W& weights) {
     }
     (std::make_index_sequence<std::tuple_size_v<Factors>>{});
   } else {
+    const InstructionSet set = instructionSetOf(executor);
     if constexpr (HasChordalMoments<M>) {
       typename ManifoldTraits<M>::ChordalMoments moments;
       const std::size_t n = std::ranges::size(samples);
       if constexpr (detail::HasParameterSums<M>) {
         const std::size_t chunks = chunkCount(n);
-        const InstructionSet set = instructionSetOf(executor);
         const auto sums = executor.reduce(
             chunks,
             [&](std::size_t chunk) {
@@ -115,7 +116,7 @@ M startOfMean(const E& executor, const R& samples, const W& weights) {
       const std::optional<M> average = moments.mean();
       if (average) return *average;
     }
-    return detail::bestOfSeveral<M>(samples, weights);
+    return detail::bestOfSeveral<M>(set, samples, weights);
   }
 }
 

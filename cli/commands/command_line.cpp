@@ -5,6 +5,7 @@
 #include <cli/io/output_file.hpp>
 #include <cli/io/text.hpp>
 #include <cli/show/json.hpp>
+#include <lie/instruction_set.hpp>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -20,6 +21,7 @@
 #include <exception>
 #include <new>
 #include <optional>
+#include <stdexcept>
 #include <string_view>
 #include <type_traits>
 
@@ -259,6 +261,11 @@ int parseAndRun(int argc, char** argv, const std::vector<CommandGroup>& groups) 
 }  // namespace
 
 int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& groups) {
+  try {
+    instructionSet();
+  } catch (const std::invalid_argument& error) {
+    return complain(std::string("liestat: ") + error.what());
+  }
   try {
     return parseAndRun(argc, argv, groups);
   } catch (const InputError& error) {

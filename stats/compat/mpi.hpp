@@ -3,6 +3,7 @@
 // Processes on one or many machines (needs any MPI 3, Debian: libopenmpi-dev; compile with mpicxx or link
 // MPI::MPI_CXX).
 
+#include <lie/instruction_set.hpp>
 #include <stats/detail/chunk_codec.hpp>
 #include <stats/executor.hpp>
 
@@ -133,6 +134,15 @@ inline std::string describe(const std::exception_ptr& error) {
 struct MpiExecutor {
   static constexpr bool distributed = true;  ///< results cross processes (stats/detail/any_executor.hpp)
   MPI_Comm communicator = MPI_COMM_WORLD;
+
+  /// The largest set of instructions that all ranks use (lie/instruction_set.hpp): kernels that run under this executor
+  /// take it, so that machines with different processors make the same bits. Collective. For estimators that run inside
+  /// a map, each on one rank, call useInstructionSet(executor.instructionSet()) once.
+  InstructionSet instructionSet() const {
+    int mine = static_cast<int>(liestat::instructionSet()), least = mine;
+    MPI_Allreduce(&mine, &least, 1, MPI_INT, MPI_MIN, communicator);
+    return static_cast<InstructionSet>(least);
+  }
 
   template <class Map, class Combine>
   detail::ChunkResult<Map> reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {

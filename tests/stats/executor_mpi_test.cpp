@@ -1,13 +1,17 @@
 // Run under mpirun with any number of ranks: every rank makes every comparison, and every rank must agree.
 
+#include <lie/so3.hpp>
 #include <stats/compat/mpi.hpp>
+#include <stats/mean.hpp>
 
 #include <gtest/gtest.h>
 #include <mpi.h>
 
 #include <chrono>
+#include <cmath>
 #include <numeric>
 #include <thread>
+#include <vector>
 
 #include "executor_test_data.hpp"
 #include "front_doors.hpp"
@@ -39,6 +43,25 @@ TEST(MpiExecutor, givesTheBitsOfTheSerialExecutor) {
           << n << " terms in chunks of " << chunk_size;
     }
   }
+}
+
+TEST(MpiExecutor, ranksAgreeOnTheSmallestInstructionSet) {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  const liestat::InstructionSet all = liestat::supportedInstructionSet();
+  EXPECT_EQ(MpiExecutor{}.instructionSet(), all);
+  // One rank on a machine with less.
+  if (rank == 0) liestat::useInstructionSet(liestat::InstructionSet::baseline);
+  EXPECT_EQ(MpiExecutor{}.instructionSet(), liestat::InstructionSet::baseline);
+  std::vector<liestat::SO3d> rotations;
+  for (int i = 0; i < 5000; ++i)
+    rotations.push_back(liestat::SO3d::exp({0.3 * std::sin(i), 0.2 * std::cos(3 * i), 0.1}));
+  const auto shared = liestat::mean(MpiExecutor{}, rotations);
+  liestat::useInstructionSet(liestat::InstructionSet::baseline);
+  const auto alone = liestat::mean(rotations);
+  EXPECT_EQ(shared.mean.params(), alone.mean.params());
+  EXPECT_EQ(shared.scatter, alone.scatter);
+  liestat::useInstructionSet(all);
 }
 
 TEST(MpiExecutor, combinesInOrderThoughChunksEndOutOfOrder) {
