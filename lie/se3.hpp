@@ -41,14 +41,14 @@ struct Se3Math {
   static Params identity() { return join(Rotation::identity(), Vector3::Zero()); }
   static Params product(const Params& a, const Params& b) {
     return join(Rotation::product(quaternion(a), quaternion(b)),
-                Rotation::act(quaternion(a), translation(b)) + translation(a));
+                Rotation::act(quaternion(a), translation(b), translation(a)));
   }
   static Params inverse(const Params& p) {
     const Vector4 q = Rotation::inverse(quaternion(p));
-    return join(q, -Rotation::act(q, translation(p)));
+    return join(q, Rotation::act(q, Vector3(-p[4], -p[5], -p[6])));
   }
   static Params normalized(const Params& p) { return join(Rotation::normalized(quaternion(p)), translation(p)); }
-  static Point act(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x) + translation(p); }
+  static Point act(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x, translation(p)); }
   static Point linear(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x); }
   static Point rotate(const Params& p, const Point& x) { return Rotation::act(quaternion(p), x); }
 
@@ -57,10 +57,14 @@ struct Se3Math {
     return join(Rotation::exp(omega), Rotation::leftJacobianTimes(omega, upsilon));
   }
   static Tangent log(const Params& p) {
-    const Vector3 omega = Rotation::log(quaternion(p));
+    const typename Rotation::Logarithm l = Rotation::logarithm(quaternion(p));
+    const Vector3 omega(l.scale * p[0], l.scale * p[1], l.scale * p[2]);
+    const Vector3 upsilon = crossPolynomialTimes(omega, S(-0.5), arccosineExcess(l.w), translation(p));
     Tangent v;
-    v.template head<3>() = Rotation::leftJacobianInverseTimes(omega, translation(p));
-    v.template tail<3>() = omega;
+    for (int i = 0; i < 3; ++i) {
+      v[i] = upsilon[i];
+      v[i + 3] = omega[i];
+    }
     return v;
   }
 
@@ -82,7 +86,7 @@ struct Se3Math {
     v << m.template topRightCorner<3, 1>(), Rotation::vee(m.template topLeftCorner<3, 3>());
     return v;
   }
-  static Square blocks(const Matrix3& diagonal, const Matrix3& coupling) {
+  static EIGEN_ALWAYS_INLINE Square blocks(const Matrix3& diagonal, const Matrix3& coupling) {
     // Entry by entry: Eigen's copies in packets wait for the entries that were stored one by one.
     Square m;
     for (int j = 0; j < 3; ++j) {
@@ -96,7 +100,19 @@ struct Se3Math {
   }
   static Square Adj(const Params& p) {
     const Matrix3 R = Rotation::matrix(quaternion(p));
-    return blocks(R, skewTimes(translation(p), R));
+    const S x = p[4], y = p[5], z = p[6];
+    Square m;
+    for (int j = 0; j < 3; ++j) {
+      const S a = R(0, j), b = R(1, j), c = R(2, j);
+      m(0, j) = m(3, j + 3) = a;
+      m(1, j) = m(4, j + 3) = b;
+      m(2, j) = m(5, j + 3) = c;
+      m(3, j) = m(4, j) = m(5, j) = S(0);
+      m(0, j + 3) = y * c - z * b;
+      m(1, j + 3) = z * a - x * c;
+      m(2, j + 3) = x * b - y * a;
+    }
+    return m;
   }
   static Square ad(const Tangent& v) { return blocks(skew(three<3>(v)), skew(three<0>(v))); }
 
@@ -105,28 +121,34 @@ struct Se3Math {
   static Matrix3 coupling(const Vector3& rho, const Vector3& phi) {
     return coupling(rho, phi, jacobianCoefficients(S(phi.dot(phi))));
   }
-  static Matrix3 coupling(const Vector3& rho, const Vector3& phi, const JacobianCoefficients<S>& c) {
-    const S t = phi.dot(phi), d = phi.dot(rho), s = c.half_sinc, b5 = S(-2) * d * c.beta5;
-    const Vector3 axial = (S(0.5) * s * s) * rho + (d * (S(2) * c.beta4 - c.beta3)) * phi;
-    const Vector3 b = c.beta3 * rho + (S(0.5) * b5) * phi;
+  static EIGEN_ALWAYS_INLINE Matrix3 coupling(const Vector3& rho, const Vector3& phi,
+                                              const JacobianCoefficients<S>& c) {
+    const S t = squaredNorm(phi), d = dot(phi, rho), s = c.half_sinc, b5 = S(-2) * d * c.beta5;
+    const Vector3 axial = combination(S(S(0.5) * s * s), rho, S(d * (S(2) * c.beta4 - c.beta3)), phi);
+    const Vector3 b = combination(c.beta3, rho, S(S(0.5) * b5), phi);
     return symmetricPlusSkew(b, phi, S(-S(2) * d * c.beta3 - b5 * t), axial);
   }
-  static Square leftJacobian(const Tangent& v) {
+  static EIGEN_ALWAYS_INLINE Square leftJacobian(const Tangent& v) {
     const Vector3 rho = three<0>(v), phi = three<3>(v);
-    const JacobianCoefficients<S> c = jacobianCoefficients(S(phi.dot(phi)));
+    const JacobianCoefficients<S> c = jacobianCoefficients(squaredNorm(phi));
     return blocks(rotationPolynomial(phi, S(1), S(S(0.5) * c.half_sinc * c.half_sinc), c.beta3), coupling(rho, phi, c));
   }
   /// Off-diagonal block of the inverse: ad(υ, ω) acts as the dual number [ω] + ε[υ], so it is the derivative of
   /// So3Math::leftJacobianInverse at φ in the direction ρ.
   static Matrix3 inverseCoupling(const Vector3& rho, const Vector3& phi) {
-    const S t = phi.dot(phi), d = phi.dot(rho);
-    const S c = cotangentExcess(t), slope = d * cotangentExcessSlope(t);
-    const Vector3 b = c * rho + (S(0.5) * slope) * phi;
-    return symmetricPlusSkew(b, phi, S(-S(2) * c * d - slope * t), Vector3(S(-0.5) * rho));
+    return inverseCoupling(rho, phi, inverseJacobianCoefficients(squaredNorm(phi)));
   }
-  static Square leftJacobianInverse(const Tangent& v) {
+  static EIGEN_ALWAYS_INLINE Matrix3 inverseCoupling(const Vector3& rho, const Vector3& phi,
+                                                     const InverseJacobianCoefficients<S>& c) {
+    const S t = squaredNorm(phi), d = dot(phi, rho), slope = d * c.slope;
+    const Vector3 b = combination(c.excess, rho, S(S(0.5) * slope), phi);
+    return symmetricPlusSkew(b, phi, S(-S(2) * c.excess * d - slope * t),
+                             Vector3(S(-0.5) * rho[0], S(-0.5) * rho[1], S(-0.5) * rho[2]));
+  }
+  static EIGEN_ALWAYS_INLINE Square leftJacobianInverse(const Tangent& v) {
     const Vector3 rho = three<0>(v), phi = three<3>(v);
-    return blocks(Rotation::leftJacobianInverse(phi), inverseCoupling(rho, phi));
+    const InverseJacobianCoefficients<S> c = inverseJacobianCoefficients(squaredNorm(phi));
+    return blocks(rotationPolynomial(phi, S(1), S(-0.5), c.excess), inverseCoupling(rho, phi, c));
   }
   static Eigen::Matrix<S, 7, 6> productJacobian(const Params& p) {
     Eigen::Matrix<S, 7, 6> J;

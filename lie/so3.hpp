@@ -35,16 +35,20 @@ struct So3Math {
 
   /// The quaternions' product, not renormalised.
   static Params quaternionProduct(const Params& a, const Params& b) {
-#if defined(EIGEN_VECTORIZE_SSE) && !defined(EIGEN_VECTORIZE_AVX)
-    // Eigen's own kernel is the faster one with two lanes; with four its result has to be copied, which costs more.
+#if defined(__GNUC__) && defined(__AVX__)
+    if constexpr (std::is_same_v<S, double>) {
+      Params q;
+      quaternionProductInLanes(a.data(), b.data(), q.data());
+      return q;
+    }
+#elif defined(EIGEN_VECTORIZE_SSE)
     return (Eigen::Map<const Eigen::Quaternion<S>>(a.data()) * Eigen::Map<const Eigen::Quaternion<S>>(b.data()))
         .coeffs();
-#else
+#endif
     return Params(a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],  //
                   a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2],  //
                   a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0],  //
                   a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]);
-#endif
   }
   static Params product(const Params& a, const Params& b) {
     const Params q = quaternionProduct(a, b);
@@ -61,10 +65,17 @@ struct So3Math {
     return q / sqrt(q.dot(q));
   }
 
+  // Coordinate by coordinate, here and below: Eigen's expressions read pairs of numbers that have just been stored one by
+  // one, for which the processor waits longer than the arithmetic takes.
   static Point act(const Params& q, const Point& p) {
-    const Eigen::Matrix<S, 3, 1> u = q.template head<3>();
-    const Eigen::Matrix<S, 3, 1> t = S(2) * u.cross(p);
-    return p + q[3] * t + u.cross(t);
+    const S x = q[0], y = q[1], z = q[2], w = q[3], a = p[0], b = p[1], c = p[2];
+    const S u = S(2) * (y * c - z * b), v = S(2) * (z * a - x * c), n = S(2) * (x * b - y * a);
+    return Point(a + w * u + (y * n - z * v), b + w * v + (z * u - x * n), c + w * n + (x * v - y * u));
+  }
+  /// The rotated point plus t.
+  static Point act(const Params& q, const Point& p, const Point& t) {
+    const Point r = act(q, p);
+    return Point(r[0] + t[0], r[1] + t[1], r[2] + t[2]);
   }
   static Point linear(const Params& q, const Point& p) { return act(q, p); }
   static Point rotate(const Params& q, const Point& p) { return act(q, p); }
@@ -73,16 +84,24 @@ struct So3Math {
   }
 
   static Params exp(const Tangent& v) {
-    const HalfAngle<S> h = halfAngle(S(v.dot(v)));
+    const HalfAngle<S> h = halfAngle(squaredNorm(v));
     const S s = S(0.5) * h.sinc;
     return Params(s * v[0], s * v[1], s * v[2], h.cos);
   }
   static Tangent log(const Params& q) {
-    using std::sqrt;
+    const Logarithm l = logarithm(q);
+    return Tangent(l.scale * q[0], l.scale * q[1], l.scale * q[2]);
+  }
+  /// log(q) is `scale` times the first three coordinates of q; w is the half-angle's cosine, not negative.
+  struct Logarithm {
+    S scale, w;
+  };
+  static EIGEN_ALWAYS_INLINE Logarithm logarithm(const Params& q) {
     // Of any norm: products leave it a little off one.
-    const S inverse_norm = S(1) / sqrt(q.dot(q));
+    const S inverse_norm = inverseNorm(S(q[0] * q[0] + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3])));
     const S signed_inverse = select(q[3] < S(0), S(-inverse_norm), inverse_norm);
-    return (arccosineRatio(S(q[3] * signed_inverse)) * signed_inverse) * q.template head<3>();
+    const S w = q[3] * signed_inverse;
+    return {S(arccosineRatio(w) * signed_inverse), w};
   }
 
   static MatrixType hat(const Tangent& v) { return skew(v); }
@@ -92,21 +111,19 @@ struct So3Math {
 
   /// leftJacobian(v)·a and leftJacobianInverse(v)·a, without the matrices.
   static Tangent leftJacobianTimes(const Tangent& v, const Tangent& a) {
-    const S t = v.dot(v), s = halfAngle(t).sinc;
-    const Tangent va = v.cross(a);
-    return a + (S(0.5) * s * s) * va + beta3(t) * v.cross(va);
+    const S t = squaredNorm(v), s = halfAngle(t).sinc;
+    return crossPolynomialTimes(v, S(S(0.5) * s * s), beta3(t), a);
   }
   static Tangent leftJacobianInverseTimes(const Tangent& v, const Tangent& a) {
-    const Tangent va = v.cross(a);
-    return a - S(0.5) * va + cotangentExcess(S(v.dot(v))) * v.cross(va);
+    return crossPolynomialTimes(v, S(-0.5), cotangentExcess(squaredNorm(v)), a);
   }
   static MatrixType leftJacobian(const Tangent& v) {
-    const S t = v.dot(v);
+    const S t = squaredNorm(v);
     const S s = halfAngle(t).sinc;
     return rotationPolynomial(v, S(1), S(S(0.5) * s * s), beta3(t));
   }
   static MatrixType leftJacobianInverse(const Tangent& v) {
-    return rotationPolynomial(v, S(1), S(-0.5), cotangentExcess(S(v.dot(v))));
+    return rotationPolynomial(v, S(1), S(-0.5), cotangentExcess(squaredNorm(v)));
   }
   /// ∂(q·exp(d))/∂d on parameters: half of d's product with q.
   static Eigen::Matrix<S, 4, 3> productJacobian(const Params& q) {

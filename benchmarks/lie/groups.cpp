@@ -29,6 +29,14 @@ void eigenSuite() {
   const auto placed = draw(
       [&] { return std::pair(Isometry3d(SE3d::exp(random.tangent<6>()).matrix()), Vector3d(random.normal<3>())); });
 
+  using Points = Eigen::Matrix<double, 3, 100>;
+  const auto clouds = draw([&] {
+    std::pair<Isometry3d, Points> cloud(SE3d::exp(random.tangent<6>()).matrix(), Points());
+    for (int j = 0; j < 100; ++j) cloud.second.col(j) = random.normal<3>();
+    return cloud;
+  });
+  operation("Eigen/isometry_act_on_100", clouds,
+            [](const auto& p) { return Points((p.first.linear() * p.second).colwise() + p.first.translation()); });
   operation("Eigen/quaternion_exp", vectors, [](const Vector3d& v) {
     const double angle = v.norm();
     return angle > 0 ? Quaterniond(AngleAxisd(angle, v / angle)) : Quaterniond::Identity();

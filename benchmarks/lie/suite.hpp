@@ -54,6 +54,13 @@ void groupSuite(const std::string& name) {
   operation(name + "/product", pairs, [](const auto& p) { return p.first * p.second; });
   operation(name + "/inverse", elements, [](const G& x) { return x.inverse(); });
   operation(name + "/act", points, [](const auto& p) { return p.first * p.second; });
+  using Points = Eigen::Matrix<double, G::Dim, 100>;
+  const auto clouds = draw([&] {
+    std::pair<G, Points> cloud(G::exp(random.tangent<G::DoF>()), Points());
+    for (int j = 0; j < Points::ColsAtCompileTime; ++j) cloud.second.col(j) = random.normal<G::Dim>();
+    return cloud;
+  });
+  operation(name + "/act_on_100", clouds, [](const auto& p) { return p.first * p.second; });
   operation(name + "/matrix", elements, [](const G& x) { return x.matrix(); });
   operation(name + "/Adj", elements, [](const G& x) { return x.Adj(); });
   operation(name + "/leftJacobian", tangents, [](const Tangent& v) { return G::leftJacobian(v); });

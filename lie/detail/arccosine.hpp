@@ -24,10 +24,10 @@ constexpr long double arccosineSeries(long double sigma, int derivative) {
   return sum;
 }
 
-/// The polynomial that interpolates the series at Chebyshev's points of 0 <= σ <= range, in x = 2σ/range - 1; lowest
-/// power first.
-template <std::size_t N>
-constexpr std::array<double, N> arccosinePolynomial(int derivative, long double factor, long double range) {
+/// The polynomial that interpolates a function of σ at Chebyshev's points of 0 <= σ <= range, in x = 2σ/range - 1;
+/// lowest power first.
+template <std::size_t N, class Function>
+constexpr std::array<double, N> interpolatingPolynomial(Function function, long double range) {
   std::array<long double, N> value{}, node{};
   for (std::size_t i = 0; i < N; ++i) {
     const long double angle = 3.141592653589793238462643383279502884L * static_cast<long double>(2 * i + 1) / (2 * N);
@@ -37,7 +37,7 @@ constexpr std::array<double, N> arccosinePolynomial(int derivative, long double 
       cosine += term;
     }
     node[i] = cosine;
-    value[i] = factor * arccosineSeries(range * (1 + cosine) / 2, derivative);
+    value[i] = function(range * (1 + cosine) / 2);
   }
   std::array<long double, N> sum{}, T{}, T_next{}, t{}, t_next{};
   T[0] = 1;                                                           // T_j by its powers of x
@@ -57,6 +57,13 @@ constexpr std::array<double, N> arccosinePolynomial(int derivative, long double 
   return c;
 }
 
+/// The polynomial of `factor` times the series or one of its derivatives.
+template <std::size_t N>
+constexpr std::array<double, N> arccosinePolynomial(int derivative, long double factor, long double range) {
+  return interpolatingPolynomial<N>([=](long double sigma) { return factor * arccosineSeries(sigma, derivative); },
+                                    range);
+}
+
 /// Terms that reach the rounding of S: the series converge with the distance from -1, by a factor of 5.8 for each term.
 /// Scalars that carry derivatives take a few more, for at the ends of its range the derivative of a polynomial is in
 /// error by as much as the square of its degree.
@@ -70,6 +77,33 @@ template <class S>
 inline S arccosineRatio(const S& w) {
   static constexpr auto coefficients = arccosinePolynomial<arccosine_terms<S>>(0, 2, 0.5L);
   return evaluatePolynomial(coefficients, S(S(1) - S(2) * w));
+}
+
+/// cotangentExcess of the angle 2 acos(w), w in [0, 1]: (1 - w f/2)/(f² (1-w²)), of which arccosineSeries has numerator
+/// over 1-w². For logarithms, which need not wait for the angle.
+template <class S>
+inline S arccosineExcess(const S& w) {
+  static constexpr auto coefficients = interpolatingPolynomial<arccosine_terms<S>>(
+      [](long double sigma) {
+        const long double half_ratio = arccosineSeries(sigma, 0);
+        return arccosineSeries(sigma, 1) / (4 * half_ratio * half_ratio);
+      },
+      0.5L);
+  return evaluatePolynomial(coefficients, S(S(1) - S(2) * w));
+}
+
+/// 1/√n of the squared norm n of a quaternion that is nearly always close to one, where a series is faster than a root
+/// and a division.
+template <class S>
+inline S inverseNorm(const S& n) {
+  using std::abs;
+  const S e = S(1) - n;
+  return branch(
+      abs(e) < S(1e-5), [&] { return S(S(1) + e * (S(0.5) + e * (S(0.375) + e * S(0.3125)))); },
+      [&] {
+        using std::sqrt;
+        return S(S(1) / sqrt(n));
+      });
 }
 
 }  // namespace liestat::detail

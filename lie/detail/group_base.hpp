@@ -4,8 +4,10 @@
 #include <lie/detail/shell.hpp>
 #include <lie/detail/uniform.hpp>
 
+#include <cstddef>
 #include <ostream>
 #include <type_traits>
+#include <vector>
 
 namespace liestat::detail {
 
@@ -81,6 +83,38 @@ class GroupBase : public Shell<Derived> {
     using S = CommonScalar<Scalar, typename D::Scalar>;
     return Eigen::Matrix<S, Dim, 1>(MathOf<S>::act(promoted<S>(params()), promoted<S>(point)));
   }
+  /// Action on each column of a Dim×N matrix, through matrix(): for more than a few points cheaper than one by one.
+  template <class D>
+    requires(D::RowsAtCompileTime == Dim && D::ColsAtCompileTime != 1)
+  auto operator*(const Eigen::MatrixBase<D>& points) const {
+    using S = CommonScalar<Scalar, typename D::Scalar>;
+    using Points = Eigen::Matrix<S, Dim, D::ColsAtCompileTime>;
+    const auto& promoted_points = promoted<S>(points);
+    const Eigen::Ref<const Points, 0, Eigen::OuterStride<>> in(promoted_points);
+    const AffineMap<S> map(promoted<S>(params()));
+    Points out(Dim, in.cols());
+    for (Eigen::Index j = 0; j < in.cols(); ++j) map.apply(in.data() + j * in.outerStride(), out.data() + j * Dim);
+    return out;
+  }
+  /// Action on each point of a container or span, through matrix(); the results come as a vector of points.
+  template <class Range>
+    requires requires(const Range& r) {
+      r.begin();
+      r.size();
+      requires Range::value_type::RowsAtCompileTime == Dim&& Range::value_type::ColsAtCompileTime == 1;
+    }
+  auto operator*(const Range& points) const {
+    using S = CommonScalar<Scalar, typename Range::value_type::Scalar>;
+    using ImageOfPoint = Eigen::Matrix<S, Dim, 1>;
+    const AffineMap<S> map(promoted<S>(params()));
+    std::vector<ImageOfPoint> out(points.size());
+    auto image = out.begin();
+    for (const auto& point : points) {
+      const ImageOfPoint p = promoted<S>(point);
+      map.apply(p.data(), (image++)->data());
+    }
+    return out;
+  }
   /// Action on a homogeneous point (w p, w): the last coordinate stays.
   template <class D>
     requires(D::RowsAtCompileTime == Dim + 1 && D::ColsAtCompileTime == 1)
@@ -125,9 +159,9 @@ class GroupBase : public Shell<Derived> {
   /// Inverse of leftJacobian, regular at rotation angle pi, singular at 2 pi.
   static Adjoint leftJacobianInverse(const Tangent& v) { return Math::leftJacobianInverse(v); }
   /// Exp(v + d) = Exp(v)·Exp(rightJacobian(v) d + O(d²)).
-  static Adjoint rightJacobian(const Tangent& v) { return Math::leftJacobian(Tangent(-v)); }
+  static Adjoint rightJacobian(const Tangent& v) { return Math::leftJacobian(negative(v)); }
   /// Inverse of rightJacobian: Log(Exp(v)·Exp(d)) = v + rightJacobianInverse(v) d + O(d²).
-  static Adjoint rightJacobianInverse(const Tangent& v) { return Math::leftJacobianInverse(Tangent(-v)); }
+  static Adjoint rightJacobianInverse(const Tangent& v) { return Math::leftJacobianInverse(negative(v)); }
   /// Projects the parameters back on their constraint (unit quaternion or complex number).
   void normalize() { this->derived().mutableStorage() = Math::normalized(params()); }
 
@@ -162,9 +196,36 @@ class GroupBase : public Shell<Derived> {
   }
 
  private:
+  /// p ↦ L p + t of an element.
+  template <class S>
+  struct AffineMap {
+    Eigen::Matrix<S, Dim, Dim> linear;
+    Eigen::Matrix<S, Dim, 1> translation = Eigen::Matrix<S, Dim, 1>::Zero();
+
+    explicit AffineMap(const typename MathOf<S>::Params& params) {
+      const typename MathOf<S>::MatrixType m = MathOf<S>::matrix(params);
+      linear = m.template topLeftCorner<Dim, Dim>();
+      if constexpr (N > Dim) translation = m.template block<Dim, 1>(0, translation_column);
+    }
+    EIGEN_ALWAYS_INLINE void apply(const S* p, S* image) const {
+      S result[static_cast<std::size_t>(Dim)];
+      for (int i = 0; i < Dim; ++i) {
+        result[i] = translation[i];
+        for (int k = 0; k < Dim; ++k) result[i] += linear(i, k) * p[k];
+      }
+      for (int i = 0; i < Dim; ++i) image[i] = result[i];
+    }
+  };
+
   /// Column of matrix() that moves points; the last but for groups that carry more than one vector.
   static constexpr int translation_column = Dim;
 
+  /// -v, coordinate by coordinate: the Jacobians read it so, and would wait for numbers stored in packets.
+  static EIGEN_ALWAYS_INLINE Tangent negative(const Tangent& v) {
+    Tangent result;
+    for (int i = 0; i < DoF; ++i) result[i] = -v[i];
+    return result;
+  }
   Scalar scaleOf() const {
     if constexpr (requires { Math::scale(params()); }) {
       return Math::scale(params());

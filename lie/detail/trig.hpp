@@ -8,6 +8,7 @@
 
 #include <lie/detail/always_inline.hpp>
 #include <lie/detail/finite_math.hpp>
+#include <lie/detail/lanes.hpp>
 
 #include <Eigen/Core>
 
@@ -77,6 +78,9 @@ LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const
   if constexpr (requires { typename S::Mask; }) {
     return everyNth<0, 2, terms>(c, x2) + everyNth<1, 2, terms>(c, x2) * x;
   } else {
+#if defined(__GNUC__)
+    if constexpr (has_lanes<S>) return polynomialInLanes<terms>(c, x);
+#endif
     const S x4 = x2 * x2;
     const S low = everyNth<0, 4, terms>(c, x4) + everyNth<1, 4, terms>(c, x4) * x;
     const S high = everyNth<2, 4, terms>(c, x4) + everyNth<3, 4, terms>(c, x4) * x;
@@ -111,6 +115,47 @@ struct HalfAngle {
   S sinc, cos;
 };
 
+/// Closed forms beyond the range of the polynomials. Apart and rarely called: a call of libm in the middle of a formula
+/// would make the compiler keep everything around it in memory.
+#if defined(__GNUC__)
+#define LIESTAT_BEYOND_RANGE [[gnu::cold, gnu::noinline]]
+#else
+#define LIESTAT_BEYOND_RANGE
+#endif
+
+template <class S>
+LIESTAT_BEYOND_RANGE HalfAngle<S> wideHalfAngle(S t) {
+  using std::cos, std::sin, std::sqrt;
+  const S h = S(0.5) * sqrt(t);
+  return HalfAngle<S>{sin(h) / h, cos(h)};
+}
+template <class S>
+LIESTAT_BEYOND_RANGE S wideHalfExcess(S t) {
+  const HalfAngle<S> a = wideHalfAngle(t);
+  return S((a.sinc - a.cos) / (t * S(0.25)));
+}
+template <class S>
+LIESTAT_BEYOND_RANGE S wideHalfExcessSlope(S t) {
+  return S((wideHalfAngle(t).sinc - S(3) * wideHalfExcess(t)) / (t * S(0.5)));
+}
+template <class S>
+LIESTAT_BEYOND_RANGE S wideBeta3(S t) {
+  const HalfAngle<S> a = wideHalfAngle(t);
+  return S((S(1) - a.sinc * a.cos) / t);
+}
+template <class S>
+LIESTAT_BEYOND_RANGE S wideBeta4(S t) {
+  const HalfAngle<S> a = wideHalfAngle(t);
+  return S((S(1) - a.sinc * a.sinc) / (S(2) * t));
+}
+template <class S>
+LIESTAT_BEYOND_RANGE S wideBeta5(S t) {
+  const HalfAngle<S> a = wideHalfAngle(t);
+  const S cos_theta = S(2) * a.cos * a.cos - S(1);
+  return S((S(2) - S(3) * a.sinc * a.cos + cos_theta) / (S(2) * t * t));
+}
+#undef LIESTAT_BEYOND_RANGE
+
 /// Half-angle functions from the squared angle t = theta^2 >= 0; relative error of some eps up to pi, libm's above.
 template <class S>
 inline HalfAngle<S> halfAngle(const S& t) {
@@ -120,32 +165,43 @@ inline HalfAngle<S> halfAngle(const S& t) {
         const S x = t * S(0.25);
         return HalfAngle<S>{series<S, 8>(sine_series, x), series<S, 8>(cosine_series, x)};
       },
+      [&] { return wideHalfAngle<S>(t); });
+}
+
+/// sin(h)/h and the excess (sin h - h cos h)/h^3 with h = theta/2, from t = theta^2: 1 and 1/3 at zero.
+template <class S>
+struct HalfExcess {
+  S sinc, excess;
+};
+template <class S>
+inline HalfExcess<S> halfExcess(const S& t) {
+  return branch(
+      t < S(polynomial_range),
       [&] {
-        using std::cos, std::sin, std::sqrt;
-        const S h = S(0.5) * sqrt(t);
-        return HalfAngle<S>{sin(h) / h, cos(h)};
+        const S x = t * S(0.25);
+        return HalfExcess<S>{series<S, 8>(sine_series, x), series<S, 7>(half_excess_series, x)};
+      },
+      [&] {
+        return HalfExcess<S>{wideHalfAngle<S>(t).sinc, wideHalfExcess<S>(t)};
       });
 }
 
-/// (sin h - h cos h)/h^3 with h = theta/2, from t = theta^2: 1/3 at zero.
+/// The same with the excess' derivative with respect to h^2: -1/30 at zero.
 template <class S>
-inline S halfExcess(const S& t) {
-  return branch(
-      t < S(polynomial_range), [&] { return series<S, 7>(half_excess_series, S(t * S(0.25))); },
-      [&] {
-        const HalfAngle<S> a = halfAngle(t);
-        return S((a.sinc - a.cos) / (t * S(0.25)));
-      });
-}
-
-/// Derivative of halfExcess with respect to h^2, from t = theta^2 = 4 h^2: -1/30 at zero.
+struct HalfExcessSlope {
+  S sinc, excess, slope;
+};
 template <class S>
-inline S halfExcessSlope(const S& t) {
+inline HalfExcessSlope<S> halfExcessSlope(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return series<S, 7>(half_excess_slope_series, S(t * S(0.25))); },
+      t < S(polynomial_range),
       [&] {
-        const HalfAngle<S> a = halfAngle(t);
-        return S((a.sinc - S(3) * halfExcess(t)) / (t * S(0.5)));
+        const S x = t * S(0.25);
+        return HalfExcessSlope<S>{series<S, 8>(sine_series, x), series<S, 7>(half_excess_series, x),
+                                  series<S, 7>(half_excess_slope_series, x)};
+      },
+      [&] {
+        return HalfExcessSlope<S>{wideHalfAngle<S>(t).sinc, wideHalfExcess<S>(t), wideHalfExcessSlope<S>(t)};
       });
 }
 
@@ -153,37 +209,25 @@ inline S halfExcessSlope(const S& t) {
 template <class S>
 inline S beta3(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return series<S, 9>(beta3_series, t); },
-      [&] {
-        const HalfAngle<S> a = halfAngle(t);
-        return S((S(1) - a.sinc * a.cos) / t);
-      });
+      t < S(polynomial_range), [&] { return series<S, 9>(beta3_series, t); }, [&] { return wideBeta3<S>(t); });
 }
 
 /// (theta^2 + 2 cos theta - 2)/(2 theta^4), from t = theta^2: 1/24 at zero.
 template <class S>
 inline S beta4(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return series<S, 9>(beta4_series, t); },
-      [&] {
-        const HalfAngle<S> a = halfAngle(t);
-        return S((S(1) - a.sinc * a.sinc) / (S(2) * t));
-      });
+      t < S(polynomial_range), [&] { return series<S, 9>(beta4_series, t); }, [&] { return wideBeta4<S>(t); });
 }
 
 /// (2 theta - 3 sin theta + theta cos theta)/(2 theta^5), from t = theta^2: 1/120 at zero.
 template <class S>
 inline S beta5(const S& t) {
   return branch(
-      t < S(polynomial_range), [&] { return series<S, 9>(beta5_series, t); },
-      [&] {
-        const HalfAngle<S> a = halfAngle(t);
-        const S cos_theta = S(2) * a.cos * a.cos - S(1);
-        return S((S(2) - S(3) * a.sinc * a.cos + cos_theta) / (S(2) * t * t));
-      });
+      t < S(polynomial_range), [&] { return series<S, 9>(beta5_series, t); }, [&] { return wideBeta5<S>(t); });
 }
 
-/// The coefficients of the left Jacobian and of its derivative, from t = theta^2, behind one branch.
+/// The coefficients of SE(3)'s left Jacobian and its derivative, from t = theta^2, behind one branch: sin(h)/h of the
+/// half angle and beta3 … beta5.
 template <class S>
 struct JacobianCoefficients {
   S half_sinc, beta3, beta4, beta5;
@@ -197,21 +241,31 @@ inline JacobianCoefficients<S> jacobianCoefficients(const S& t) {
                                        series<S, 9>(beta4_series, t), series<S, 9>(beta5_series, t)};
       },
       [&] {
-        return JacobianCoefficients<S>{halfAngle(t).sinc, beta3(t), beta4(t), beta5(t)};
+        return JacobianCoefficients<S>{wideHalfAngle<S>(t).sinc, wideBeta3<S>(t), wideBeta4<S>(t), wideBeta5<S>(t)};
       });
 }
 
 /// (1 - (theta/2) cot(theta/2))/theta^2, from t = theta^2: 1/12 at zero, 1/pi^2 at pi, a pole at 2 pi.
 template <class S>
 inline S cotangentExcess(const S& t) {
-  return halfExcess(t) / (S(4) * halfAngle(t).sinc);
+  const HalfExcess<S> h = halfExcess(t);
+  return h.excess / (S(4) * h.sinc);
 }
 
-/// Twice the derivative of cotangentExcess with respect to t, which is its derivative in theta over theta: 1/360 at 0.
+/// cotangentExcess and twice its derivative with respect to t, which is its derivative in theta over theta: 1/360 at 0.
+template <class S>
+struct InverseJacobianCoefficients {
+  S excess, slope;
+};
+template <class S>
+inline InverseJacobianCoefficients<S> inverseJacobianCoefficients(const S& t) {
+  const HalfExcessSlope<S> h = halfExcessSlope(t);
+  const S inverse = S(0.25) / h.sinc, c = h.excess * inverse;
+  return {c, S(S(0.5) * h.slope * inverse + c * c)};
+}
 template <class S>
 inline S cotangentExcessSlope(const S& t) {
-  const S s = halfAngle(t).sinc, e = halfExcess(t);
-  return (halfExcessSlope(t) * s + S(0.5) * e * e) / (S(8) * s * s);
+  return inverseJacobianCoefficients(t).slope;
 }
 
 inline constexpr std::array<double, 9> arctangent_series{1.0,       -1.0 / 3, 1.0 / 5,   -1.0 / 7, 1.0 / 9,
@@ -251,6 +305,35 @@ inline Eigen::Matrix<typename Derived::Scalar, 3, 1> three(const Eigen::MatrixBa
   return Eigen::Matrix<typename Derived::Scalar, 3, 1>(v[first], v[first + 1], v[first + 2]);
 }
 
+/// v·v.
+template <class S>
+EIGEN_ALWAYS_INLINE S squaredNorm(const Eigen::Matrix<S, 3, 1>& v) {
+  return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+/// a·b.
+template <class S>
+EIGEN_ALWAYS_INLINE S dot(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// s a + t b, coordinate by coordinate.
+template <class S>
+EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 1> combination(const S& s, const Eigen::Matrix<S, 3, 1>& a, const S& t,
+                                                       const Eigen::Matrix<S, 3, 1>& b) {
+  return Eigen::Matrix<S, 3, 1>(s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]);
+}
+
+/// a + b v×a + c v×(v×a), coordinate by coordinate.
+template <class S>
+EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 1> crossPolynomialTimes(const Eigen::Matrix<S, 3, 1>& v, const S& b, const S& c,
+                                                                const Eigen::Matrix<S, 3, 1>& a) {
+  const S x = v[0], y = v[1], z = v[2], p = a[0], q = a[1], r = a[2];
+  const S i = y * r - z * q, j = z * p - x * r, k = x * q - y * p;
+  return Eigen::Matrix<S, 3, 1>(p + b * i + c * (y * k - z * j), q + b * j + c * (z * i - x * k),
+                                r + b * k + c * (x * j - y * i));
+}
+
 /// The cross-product matrix [v]: [v] w = v × w.
 template <class Derived>
 inline Eigen::Matrix<typename Derived::Scalar, 3, 3> skew(const Eigen::MatrixBase<Derived>& v) {
@@ -274,26 +357,28 @@ inline Eigen::Matrix<S, 3, 3> skewTimes(const Eigen::Matrix<S, 3, 1>& v, const E
 
 /// a bᵀ + b aᵀ + s I + [v]
 template <class S>
-inline Eigen::Matrix<S, 3, 3> symmetricPlusSkew(const Eigen::Matrix<S, 3, 1>& a, const Eigen::Matrix<S, 3, 1>& b,
-                                                const S& s, const Eigen::Matrix<S, 3, 1>& v) {
+EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 3> symmetricPlusSkew(const Eigen::Matrix<S, 3, 1>& a,
+                                                             const Eigen::Matrix<S, 3, 1>& b, const S& s,
+                                                             const Eigen::Matrix<S, 3, 1>& v) {
   const S xy = a[0] * b[1] + a[1] * b[0], xz = a[0] * b[2] + a[2] * b[0], yz = a[1] * b[2] + a[2] * b[1];
   Eigen::Matrix<S, 3, 3> m;
-  m << S(2) * a[0] * b[0] + s, xy - v[2], xz + v[1],  //
-      xy + v[2], S(2) * a[1] * b[1] + s, yz - v[0],   //
-      xz - v[1], yz + v[0], S(2) * a[2] * b[2] + s;
+  m(0, 0) = S(2) * a[0] * b[0] + s, m(1, 0) = xy + v[2], m(2, 0) = xz - v[1];
+  m(0, 1) = xy - v[2], m(1, 1) = S(2) * a[1] * b[1] + s, m(2, 1) = yz + v[0];
+  m(0, 2) = xz + v[1], m(1, 2) = yz - v[0], m(2, 2) = S(2) * a[2] * b[2] + s;
   return m;
 }
 
 /// a I + b [v] + c [v]^2, the form of every SO(3) Jacobian, without forming products of matrices.
 template <class S>
-inline Eigen::Matrix<S, 3, 3> rotationPolynomial(const Eigen::Matrix<S, 3, 1>& v, const S& a, const S& b, const S& c) {
-  const S xx = c * v[0] * v[0], yy = c * v[1] * v[1], zz = c * v[2] * v[2];
-  const S xy = c * v[0] * v[1], xz = c * v[0] * v[2], yz = c * v[1] * v[2];
-  const Eigen::Matrix<S, 3, 1> w = b * v;
+EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 3> rotationPolynomial(const Eigen::Matrix<S, 3, 1>& v, const S& a, const S& b,
+                                                              const S& c) {
+  const S x = v[0], y = v[1], z = v[2], cx = c * x, cy = c * y, cz = c * z;
+  const S xx = cx * x, yy = cy * y, zz = cz * z, xy = cx * y, xz = cx * z, yz = cy * z;
+  const S p = b * x, q = b * y, r = b * z;
   Eigen::Matrix<S, 3, 3> m;
-  m << a - yy - zz, xy - w[2], xz + w[1],  //
-      xy + w[2], a - xx - zz, yz - w[0],   //
-      xz - w[1], yz + w[0], a - xx - yy;
+  m(0, 0) = a - yy - zz, m(1, 0) = xy + r, m(2, 0) = xz - q;
+  m(0, 1) = xy - r, m(1, 1) = a - xx - zz, m(2, 1) = yz + p;
+  m(0, 2) = xz + q, m(1, 2) = yz - p, m(2, 2) = a - xx - yy;
   return m;
 }
 

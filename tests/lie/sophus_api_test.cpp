@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 #include <type_traits>
+#include <vector>
 
 namespace {
 
@@ -67,6 +68,23 @@ TYPED_TEST(SophusApi, PointsLinesAndHyperplanes) {
       EXPECT_LE((moved.template head<G::Dim>() - M * p).norm(), 8 * eps * M.norm() * h.norm()) << w;
     }
   }
+  // Many points at once, as columns, as an expression and in a container, move as each of them does.
+  std::vector<typename G::Point> points;
+  Eigen::Matrix<double, G::Dim, Eigen::Dynamic> columns(G::Dim, 5);
+  for (int j = 0; j < 5; ++j) points.push_back(columns.col(j) = p + j * d);
+  const Eigen::Matrix<double, G::Dim, Eigen::Dynamic> moved_columns = x * columns, doubled = x * (2 * columns);
+  const Eigen::Matrix<double, G::Dim, 3> some = x * columns.template middleCols<3>(1);
+  const std::vector<typename G::Point> moved_points = x * points;
+  ASSERT_EQ(moved_points.size(), 5);
+  for (int j = 0; j < 5; ++j) {
+    const typename G::Point q = columns.col(j);
+    const double tolerance = 16 * eps * M.norm() * (1 + 2 * q.norm());
+    EXPECT_LE((moved_columns.col(j) - x * q).norm(), tolerance);
+    EXPECT_LE((doubled.col(j) - x * typename G::Point(2 * q)).norm(), tolerance);
+    EXPECT_EQ(moved_points[static_cast<std::size_t>(j)], moved_columns.col(j));
+  }
+  EXPECT_EQ(some, (moved_columns.template middleCols<3>(1)));
+  EXPECT_EQ((x * columns.leftCols(0)).cols(), 0);
   // Points of a line are points of the moved line, and its direction keeps its norm.
   const typename G::Line line(p, d), moved_line = x * line;
   EXPECT_LE((moved_line.origin() - x * p).norm(), 8 * eps);
