@@ -2,6 +2,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/maha_groups.hpp>
 #include <stats/detail/packing.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/executor.hpp>
@@ -54,9 +55,33 @@ struct MahaProblem {
   static constexpr bool second_order = HasSecondOrder<M>;
 
   const R& samples;
-  std::vector<SquareOf<M>> information;
   CovarianceAt at;
   bool likelihood;
+  std::vector<SquareOf<M>> information = {};
+  /// The measurements for kernels, where there are such for these; then there is no information above.
+  MahaGroups<M> groups = {};
+  bool by_kernels = HasMahaGroups<M> && at == CovarianceAt::measured && !likelihood;
+
+  void reserve(std::size_t n) {
+    if constexpr (HasMahaGroups<M>) {
+      if (by_kernels) return groups.reserve(n);
+    }
+    information.reserve(n);
+  }
+  /// The next measurement, whose covariance has this factor.
+  void append(const M& x, const Cholesky<S, T::DoF>& factor) {
+    if constexpr (HasMahaGroups<M>) {
+      if (by_kernels) {
+        if (groups.add(x, factor.inverse())) return;
+        // The general formulas say what comes out of quaternions that are not unit ones.
+        by_kernels = false;
+        for (std::size_t i = 0; i < groups.size(); ++i) {
+          information.push_back(Cholesky<S, T::DoF>(samples[i].covariance).inverse());
+        }
+      }
+    }
+    information.push_back(factor.inverse());
+  }
 
   /// One measurement's part of the sums at y.
   void add(std::size_t i, const M& y, MahaSums<M>& sums) const {
@@ -91,8 +116,13 @@ struct MahaProblem {
 
   template <Executor E>
   MahaSums<M> evaluate(const E& executor, const M& y) const {
-    MahaSums<M> sums =
-        sumOverData<MahaSums<M>>(executor, information.size(), [&](std::size_t i, MahaSums<M>& s) { add(i, y, s); });
+    MahaSums<M> sums;
+    if (by_kernels) {
+      if constexpr (HasMahaGroups<M>) sums = groups.template evaluate<MahaSums<M>>(executor, y);
+    } else {
+      sums =
+          sumOverData<MahaSums<M>>(executor, information.size(), [&](std::size_t i, MahaSums<M>& s) { add(i, y, s); });
+    }
     sums.hessian = S(0.5) * (sums.hessian + sums.hessian.transpose()).eval();
     return sums;
   }
@@ -132,8 +162,8 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     }
   }
 
-  MahaProblem<M, R> problem{samples, {}, at, options.likelihood};
-  problem.information.reserve(result.n);
+  MahaProblem<M, R> problem{samples, at, options.likelihood};
+  problem.reserve(result.n);
   std::vector<S> weights;
   std::vector<M> features;
   if (!options.start) weights.reserve(result.n), features.reserve(result.n);
@@ -151,7 +181,7 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
         return result;
       }
     }
-    problem.information.push_back(factor.inverse());
+    problem.append(g.mean, factor);
     if (!options.start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
   }
 

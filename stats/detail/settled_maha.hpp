@@ -43,8 +43,8 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
       if (i % stride == 0) some.push_back(samples[i]);
       features.push_back(Gaussian<M>(samples[i]).mean);
     }
-    MahaProblem<M, std::vector<Gaussian<M>>> problem{some, {}, at, likelihood};
-    for (const Gaussian<M>& g : some) problem.information.push_back(Cholesky<S, D>(g.covariance).inverse());
+    MahaProblem<M, std::vector<Gaussian<M>>> problem{some, at, likelihood};
+    for (const Gaussian<M>& g : some) problem.append(g.mean, Cholesky<S, D>(g.covariance));
     const double scale = static_cast<double>(n) / static_cast<double>(some.size());
     const double clearance = angleToCutLocus(features, result.mean);
     Matrix at_mean = result.hessian.template cast<double>();

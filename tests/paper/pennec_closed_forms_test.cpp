@@ -118,8 +118,11 @@ TYPED_TEST(PennecClosedForms, derivativesOfTheMahalanobisCriterion) {
       }
       const MahaResult<TypeParam> result = maha(g, at, {.likelihood = likelihood});
       ASSERT_EQ(result.status, Status::ok);
-      detail::MahaProblem<TypeParam, decltype(g)> problem{g, {}, at, likelihood};
-      for (const auto& measurement : g) problem.information.push_back(measurement.covariance.inverse());
+      detail::MahaProblem<TypeParam, decltype(g)> problem{g, at, likelihood};
+      for (const auto& measurement : g) {
+        problem.append(measurement.mean,
+                       detail::Cholesky<double, ManifoldTraits<TypeParam>::DoF>(measurement.covariance));
+      }
       const auto cost = [&](const TypeParam& y, const Tangent& v) {
         return problem.evaluate(SerialExecutor{}, exp(y, v)).cost;
       };
