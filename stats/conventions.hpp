@@ -407,4 +407,22 @@ inline Gaussian<SE3d> fromConvention(const Convention& convention, const SE3d& T
                                            covarianceFromContent(convention.content, matrix))};
 }
 
+/// The matrix of one convention in another, at the pose as it is written beside it. With the same content there is no
+/// inversion, so that singular matrices pass, and with the same coordinates every digit stays.
+inline Eigen::Matrix<double, 6, 6> convertConvention(const Convention& from, const Convention& to, const SE3d& T_hat,
+                                                     const Eigen::Matrix<double, 6, 6>& matrix) {
+  if (from.content == to.content && from.order == to.order && from.perturbation == to.perturbation &&
+      from.unit == to.unit) {
+    return matrix;
+  }
+  if (from.content != to.content || from.content == CovarianceContent::sigmas) {
+    return toConvention(to, fromConvention(from, T_hat, matrix));
+  }
+  const bool information = from.content == CovarianceContent::information;
+  const Convention& a = information ? to : from;
+  const Convention& b = information ? from : to;
+  const detail::Matrix6d J = detail::product(conventionJacobian(b, T_hat), conventionJacobianInverse(a, T_hat));
+  return detail::congruenceOfKnown(information ? detail::Matrix6d(J.transpose()) : J, matrix);
+}
+
 }  // namespace liestat

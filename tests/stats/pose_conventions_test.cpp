@@ -139,6 +139,12 @@ TEST(PoseConventions, roundTripsOfAllOrderedPairs) {
                              conversionLoss({}, to.convention, g).round_trip;
         EXPECT_LE(scaledGap(back.covariance, g.covariance), bound)
             << from.name << " to " << to.name << " at " << distance << " m";
+        // Directly, from one to the other: the same, and nothing at all where nothing is to be done.
+        const Matrix6 direct = convertConvention(from.convention, to.convention, g.mean, C);
+        EXPECT_LE(scaledGap(direct, D), bound) << from.name << " to " << to.name << " at " << distance << " m";
+        if (from.convention == to.convention) {
+          EXPECT_EQ(direct, C) << from.name;
+        }
       }
     }
   }
