@@ -10,6 +10,8 @@
 #include <stats/propagation.hpp>
 #include <stats/random.hpp>
 
+#include <support/full_pose.hpp>
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,8 +28,7 @@
 namespace liestat {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using liestat_test::fullGaussian, liestat_test::scaledGap, liestat_test::Matrix6, liestat_test::Vector6;
 constexpr double pi = 3.14159265358979323846;
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
@@ -50,17 +51,6 @@ std::vector<NamedConvention> allNamed() {
   return all;
 }
 
-/// A rotation of 1 rad or so, a position 2 m away, a full covariance of condition 14/0.8 or less, scaled.
-Gaussian<SE3d> fullGaussian(CounterRng& rng, double scale = 1) {
-  const SE3d T(SO3d::exp(rng.unitVector<3>() * rng.uniform(0.7, 1.3)), 2 * rng.unitVector<3>());
-  Matrix6 V = 0.8 * Matrix6::Identity();
-  for (const double eigenvalue : {2.0, 4.0, 7.2}) {
-    const Vector6 u = rng.unitVector<6>();
-    V += eigenvalue * u * u.transpose();
-  }
-  return {T, scale * V};
-}
-
 /// The Jacobian of a function of six numbers at zero, by central differences of sixth order: with h = 2e-3 rounding
 /// is some 1e-13, and what the order leaves out h⁶ = 6e-17 of the seventh derivative.
 template <class F>
@@ -75,18 +65,6 @@ Matrix6 jacobianAtZero(F&& f) {
     J.col(i) = (45 * odd(1) - 9 * odd(2) + odd(3)) / (60 * h);
   }
   return J;
-}
-
-/// The largest |A - B| of an entry (i, j) in units of σ_i σ_j of B.
-double scaledGap(const Matrix6& A, const Matrix6& B) {
-  double largest = 0;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
-      const double gap = std::abs(A(i, j) - B(i, j)) / std::sqrt(B(i, i) * B(j, j));
-      if (!(gap <= largest)) largest = gap;  // NaN stays
-    }
-  }
-  return largest;
 }
 
 TEST(PoseConventions, jacobiansAreTheDerivativesOfTheCharts) {
