@@ -237,7 +237,7 @@ inline PoseBlocks perturbationBlocks(Perturbation perturbation, const SE3d& T) {
       J.rotation = -R;
       break;
     case Perturbation::transposed_axes:
-      J.translation = J.rotation = R.transpose();
+      J.translation = J.rotation = T.so3().inverse().matrix();
       break;
   }
   return J;
@@ -245,14 +245,16 @@ inline PoseBlocks perturbationBlocks(Perturbation perturbation, const SE3d& T) {
 /// ξ = J⁻¹ x, in closed form.
 inline PoseBlocks perturbationBlocksInverse(Perturbation perturbation, const SE3d& T) {
   using Matrix = Eigen::Matrix3d;
-  const Matrix Rt = T.rotationMatrix().transpose();
+  // Not R.transpose(): Eigen's check for aliasing makes g++ warn.
+  const Matrix R = T.rotationMatrix(), Rt = T.so3().inverse().matrix();
   PoseBlocks J{Rt, Matrix::Zero(), Rt};
   switch (perturbation) {
     case Perturbation::right:
     case Perturbation::body_axes:
       return {Matrix::Identity(), Matrix::Zero(), Matrix::Identity()};
     case Perturbation::left:
-      J.coupling = skewTimes(Eigen::Vector3d(T.translation()), T.rotationMatrix()).transpose();
+      // -Rᵀ [p]
+      J.coupling = product(Rt, skew(Eigen::Vector3d(-T.translation())));
       break;
     case Perturbation::world_axes:
       break;
@@ -272,7 +274,7 @@ inline PoseBlocks perturbationBlocksInverse(Perturbation perturbation, const SE3
       J.rotation = -Rt;
       break;
     case Perturbation::transposed_axes:
-      J.translation = J.rotation = T.rotationMatrix();
+      J.translation = J.rotation = R;
       break;
   }
   return J;
