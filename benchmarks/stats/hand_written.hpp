@@ -123,6 +123,45 @@ HandWrittenMean<HandWrittenFrame, 6> handWrittenMean(const std::vector<HandWritt
   return result;
 }
 
+/// Inverse of the left Jacobian of SO(3) by the textbook's formula.
+inline Eigen::Matrix3d handWrittenLeftJacobianInverse(const Eigen::Vector3d& v) {
+  const double t = v.norm();
+  Eigen::Matrix3d K;
+  K << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  const double c = t < 1e-4 ? 1.0 / 12 : 1 / (t * t) - (1 + std::cos(t)) / (2 * t * std::sin(t));
+  return Eigen::Matrix3d::Identity() - 0.5 * K + c * K * K;
+}
+
+/// The exponential barycentre of rigid motions, by the fixed point m ← m Exp(Σ Log(m⁻¹x)/n), and the scatter of the
+/// logarithms.
+inline HandWrittenMean<HandWrittenFrame, 6> handWrittenBarycentre(const std::vector<HandWrittenFrame>& poses) {
+  const auto residual = [](const HandWrittenFrame& m, const HandWrittenFrame& x) {
+    const Eigen::Quaterniond back = m.rotation.conjugate();
+    const Eigen::Vector3d phi = handWrittenLog(back * x.rotation);
+    Eigen::Matrix<double, 6, 1> z;
+    z << handWrittenLeftJacobianInverse(phi) * (back * (x.translation - m.translation)), phi;
+    return z;
+  };
+  HandWrittenMean<HandWrittenFrame, 6> result;
+  result.mean = poses.front();
+  for (double step = 1; step > HandWritten::tolerance && result.iterations < HandWritten::max_iterations;) {
+    Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+    for (const HandWrittenFrame& x : poses) sum += residual(result.mean, x);
+    sum /= static_cast<double>(poses.size());
+    // The left Jacobian is the inverse of its inverse, once a step.
+    const Eigen::Vector3d phi = sum.tail<3>(), t = handWrittenLeftJacobianInverse(phi).inverse() * sum.head<3>();
+    result.mean.translation += result.mean.rotation * t;
+    result.mean.rotation = (result.mean.rotation * handWrittenExp(phi)).normalized();
+    step = sum.norm();
+    ++result.iterations;
+  }
+  for (const HandWrittenFrame& x : poses) {
+    const Eigen::Matrix<double, 6, 1> z = residual(result.mean, x);
+    result.covariance += z * z.transpose();
+  }
+  return result;
+}
+
 /// Unit vectors; the residuals are those in space, tangent to the sphere at the mean.
 inline HandWrittenMean<Eigen::Vector3d, 3> handWrittenMeanDirection(const std::vector<Eigen::Vector3d>& directions) {
   const auto residual = [](const Eigen::Vector3d& y, const Eigen::Vector3d& x) -> Eigen::Vector3d {
