@@ -43,7 +43,8 @@ M bestOfSeveral(InstructionSet set, const R& samples, const W& weights, std::siz
   const auto cost_at = [&](const M& y) {
     if constexpr (HasKernelSums<M>) {
       typename KernelSumsOf<M>::type sums;
-      if (sums.template add<true, false>(set, judging, weight, 0, judges, y)) return sums.cost;
+      constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
+      if (sums.template add<weighted, false>(set, judging, weight, 0, judges, y)) return sums.cost;
     }
     const typename T::Group to_y = T::placement(y).inverse();
     S cost(0);
@@ -113,10 +114,15 @@ M startOfMean(const E& executor, const R& samples, const W& weights) {
       } else {
         for (std::size_t i = 0; i < n; ++i) moments.add(samples[i], S(weights[i]));
       }
-      const std::optional<M> average = moments.mean();
-      if (average) return *average;
+      if constexpr (std::is_same_v<decltype(moments.mean()), M>) {
+        return moments.mean();
+      } else {
+        const std::optional<M> average = moments.mean();
+        return average ? *average : detail::bestOfSeveral<M>(set, samples, weights);
+      }
+    } else {
+      return detail::bestOfSeveral<M>(set, samples, weights);
     }
-    return detail::bestOfSeveral<M>(set, samples, weights);
   }
 }
 
