@@ -70,7 +70,8 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
       result.change = std::numeric_limits<double>::quiet_NaN();
       return result;
     }
-    if (distanceToCutLocus(samples, mean.mean) > 1.5 * reachOf<K>(L)) {
+    if (leastDistanceToCutLocus(mean) > 1.5 * longestReach<K>(L) ||
+        distanceToCutLocus(samples, mean.mean) > 1.5 * reachOf<K>(L)) {
       result.averaged = false;
       return result;
     }

@@ -117,10 +117,10 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     result.mean = frechetMean<M>(executor, samples, weights, from_there);
   };
   // Samples that have no covariance anyway are searched for ties only with a small budget.
-  const bool seems_scattered = isScattered(findConcentration(samples, weights, result.mean.mean));
+  const bool seems_scattered = isScattered(findConcentration<M>(samples, weights, result.mean));
   search(seems_scattered ? scattered_budget_part : 1);
   if (seems_scattered && result.uniqueness.improved &&
-      !isScattered(findConcentration(samples, weights, result.mean.mean))) {
+      !isScattered(findConcentration<M>(samples, weights, result.mean))) {
     search(1);
   }
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
@@ -130,7 +130,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   // residuals.
   const bool have_residuals = result.mean.n > static_cast<std::size_t>(ManifoldTraits<M>::DoF);
   if (!have_residuals && !known) return without(Status::too_few, too_few_reason);
-  result.concentration = findConcentration(samples, weights, result.mean.mean);
+  result.concentration = findConcentration<M>(samples, weights, result.mean);
   const auto known_covariance = [&](const MeanResult<M>& mean) {
     return covarianceFromKnownNoise(samples, weights, mean, options.known_noise);
   };

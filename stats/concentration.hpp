@@ -127,6 +127,29 @@ Concentration findConcentration(const R& samples, const W& weights, const M& mea
   return result;
 }
 
+/// The same from the sums of a mean's last pass, so that no logarithm is taken again, where they decide.
+template <Metric M, class R, class W>
+Concentration findConcentration(const R& samples, const W& weights, const MeanResult<M>& mean) {
+  if constexpr (!Factored<M> && has_compact_factor<M>) {
+    if (converged(mean.status)) {
+      constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
+      ScatterOfAngles angles;
+      angles.sum = static_cast<double>(mean.scatter.template block<K, K>(begin, begin).trace());
+      bool equal = true;
+      for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
+        const double p = static_cast<double>(weights[i]);
+        angles.weight += p, angles.squared_weight += p * p, angles.n += p != 0;
+        equal = equal && p == 1;
+      }
+      // The plain sum is not among those of the mean; it matters only where the weighted one is too large.
+      angles.plain = equal ? angles.sum : std::numeric_limits<double>::infinity();
+      const Concentration result = angles.judge(uniformLaw<M>());
+      if (equal || result.concentrated) return result;
+    }
+  }
+  return findConcentration(samples, weights, mean.mean);
+}
+
 /// Whether noise of this covariance scatters less than a quarter as much as uniform features; of products each factor.
 template <Metric M>
 bool isModestNoise(const SquareOf<M>& noise) {

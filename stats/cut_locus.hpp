@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/averaged_slope.hpp>
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/find_uniqueness.hpp>
 #include <stats/detail/search_space.hpp>
@@ -113,6 +114,18 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
   return result;
 }
 
+/// In closed form where there is one.
+template <int K>
+double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>> solver;
+  if constexpr (K == 3) {
+    solver.computeDirect(A, Eigen::EigenvaluesOnly);
+  } else {
+    solver.compute(A, Eigen::EigenvaluesOnly);
+  }
+  return solver.eigenvalues()[K - 1];
+}
+
 template <Metric M, class R, class W>
 CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
                                 const SquareOf<M>& covariance) {
@@ -132,8 +145,13 @@ CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanRe
     const Matrix block = covariance.template block<K, K>(begin, begin).template cast<double>();
     // The mean may be anywhere in its confidence region, three standard deviations wide; gaps change at most twice as
     // fast as it moves. No less than 0.2 rad, or there is nothing to estimate a density from.
-    const double sd = std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix>(block).eigenvalues()[K - 1]));
-    result = findCutLocusMass(samples, weights, mean, std::max(6 * sd, 0.2));
+    const double sd = std::sqrt(std::max(0.0, largestEigenvalue<K>(block)));
+    const double window = std::max(6 * sd, 0.2);
+    if (2 * leastDistanceToCutLocus(mean) >= window && mean.hessian.allFinite()) {
+      result.window = window;
+      return result;
+    }
+    result = findCutLocusMass(samples, weights, mean, window);
   }
   return result;
 }

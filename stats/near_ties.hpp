@@ -147,6 +147,7 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
     using Vector = Eigen::Matrix<double, K, 1>;
     const Eigen::Matrix<double, K, K> region = covariance.template block<K, K>(begin, begin).template cast<double>();
     const double radius = static_cast<double>(T::injectivityRadius());
+    if (leastDistanceToCutLocus(mean) >= 2.0 / 3 * radius) return ties;
     if (!(distanceToCutLocus(samples, mean.mean) < 2.0 / 3 * radius)) return ties;
     const auto squaredAngle = [](const typename T::Group& to_y, const M& x) {
       const TangentOf<M> z = T::logOrigin(T::act(to_y, x));

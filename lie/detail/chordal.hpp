@@ -6,7 +6,9 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 
 namespace liestat::detail {
@@ -15,14 +17,21 @@ namespace liestat::detail {
 /// the normalised matrix: its powers tend to the projector on the dominant eigenvectors. Ties give one of them.
 template <class S>
 Eigen::Matrix<S, 4, 1> dominantEigenvector(Eigen::Matrix<S, 4, 4> A) {
+  using std::sqrt;
+  const auto trace = [&] { return A(0, 0) + A(1, 1) + (A(2, 2) + A(3, 3)); };
   for (int i = 0; i < 24; ++i) {
-    const S trace = A.trace();
-    if (!(trace > S(0))) break;
-    A /= trace;
-    A = (A * A).eval();
+    const S sum = trace();
+    if (!(sum > S(0))) break;
+    const S scale = S(1) / sum;
+    A = (A * (A * (scale * scale)).eval()).eval();
+    // The trace of the square of a matrix of trace one is one minus twice the share of the other eigenvalues, which the
+    // square has squared: nothing is left to do.
+    if (S(1) - trace() < S(0.1) * sqrt(std::numeric_limits<S>::epsilon())) break;
   }
-  Eigen::Index column = 0;
-  A.diagonal().maxCoeff(&column);
+  int column = 0;
+  for (int i = 1; i < 4; ++i) {
+    if (A(i, i) > A(column, column)) column = i;
+  }
   return A.col(column).normalized();
 }
 

@@ -4,6 +4,7 @@
 #include <lie/detail/small_matrix.hpp>
 #include <lie/manifold.hpp>
 #include <stats/detail/compact_part.hpp>
+#include <stats/mean.hpp>
 #include <stats/detail/search_space.hpp>
 
 #include <algorithm>
@@ -59,12 +60,16 @@ class NormalNodes {
         if (j + 1 < K) point[j + 1] = radius * std::sin(angle);
       }
       moments_ += point * point.transpose();
+      longest_ = std::max(longest_, point.norm() * (1 + 1e-12));
     }
   }
   /// One of each pair.
   const std::array<Eigen::Matrix<double, K, 1>, pairs>& points() const { return points_; }
   /// Σ ξ ξᵀ over those.
   const Eigen::Matrix<double, K, K>& moments() const { return moments_; }
+
+  /// The norm of the longest.
+  double longest() const { return longest_; }
 
   static const NormalNodes& instance() {
     static const NormalNodes nodes;
@@ -74,6 +79,7 @@ class NormalNodes {
  private:
   std::array<Eigen::Matrix<double, K, 1>, pairs> points_;
   Eigen::Matrix<double, K, K> moments_ = Eigen::Matrix<double, K, K>::Zero();
+  double longest_ = 0;
 };
 
 /// The lower Cholesky factor, NaN where there is none.
@@ -121,6 +127,24 @@ double reachOf(const Eigen::Matrix<double, K, K>& L) {
     reach = std::max(reach, (L * xi).norm());
   }
   return reach;
+}
+
+/// No less than reachOf(L).
+template <int K>
+double longestReach(const Eigen::Matrix<double, K, K>& L) {
+  return L.norm() * NormalNodes<K>::instance().longest();
+}
+
+/// No more than distanceToCutLocus, from what the passes for a mean have seen: exact for quotients, for others at most
+/// that of the farthest datum in the whole distance. Minus infinity if nothing is known.
+template <Metric M>
+double leastDistanceToCutLocus(const MeanResult<M>& mean) {
+  if (Factored<M> || !converged(mean.status)) return -std::numeric_limits<double>::infinity();
+  if constexpr (Quotient<M>) {
+    return 0.5 * static_cast<double>(mean.smallest_gap);
+  } else {
+    return static_cast<double>(ManifoldTraits<M>::injectivityRadius()) - static_cast<double>(mean.largest_distance);
+  }
 }
 
 /// How far the mean may move before it meets the cut locus of a datum, rad.

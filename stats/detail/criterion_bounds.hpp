@@ -138,7 +138,10 @@ double convexityRadius(const Profile& p) {
     }
     return sum > 0;
   };
-  if (!(high > 0) || !convex(0)) return 0;
+  if (!(high > 0)) return 0;
+  // No datum's term is concave before its cut locus.
+  if constexpr (Space::convex_to_cut_locus) return high;
+  if (!convex(0)) return 0;
   if (convex(high)) return high;
   for (int i = 0; i < 40; ++i) {
     const double r = 0.5 * (low + high);

@@ -12,6 +12,7 @@
 #include <limits>
 #include <ranges>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -113,6 +114,17 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
     return result;
   } else {
     using Space = decltype(searchSpace<M>());
+    // The first certificate of the search, where the passes for the mean have seen all that it asks for: the largest
+    // angle, and the radius up to which no datum's term is concave, which ends at the nearest cut locus.
+    if constexpr (Space::convex_to_cut_locus && std::is_same_v<ScalarOf<M>, double> &&
+                  (Quotient<M> || ManifoldTraits<M>::DoF == compact_dimension<M>)) {
+      if (converged(mean.status) && mean.largest_distance < aPrioriRadius<M>() * (1 - 1e-9)) {
+        result.r_star = Quotient<M> ? 0.5 * mean.smallest_gap : pi - mean.largest_distance;
+        result.unique = Uniqueness::unique;
+        result.proof = "the data lie in a ball about the mean that is small enough";
+        return result;
+      }
+    }
     return SearchedManifold<M, Space, E, R, W>(executor, samples, weights, mean).certify(options);
   }
 }

@@ -2,6 +2,7 @@
 // unit vectors in double, and how a manifold whose traits say its compact factor is mapped to them.
 #pragma once
 
+#include <lie/detail/arccosine.hpp>
 #include <lie/manifold.hpp>
 
 #include <Eigen/Core>
@@ -89,10 +90,10 @@ struct RotationSpace {
     }
     // The scalar part of the representative is r[3], or minus the component that became it.
     const bool negative = best == 3 ? r[3] < 0 : r[best] > 0;
-    const double sine = s.z.norm();
-    s.angle = 2 * std::atan2(sine, c);
+    const double ratio = arccosineRatio(c);
+    s.angle = ratio * s.z.norm();
     s.second = c2 >= 0 ? 2 * std::acos(std::min(c2, 1.0)) : 2 * pi - s.angle;
-    s.z *= (negative ? -1 : 1) * (sine > 1e-9 ? s.angle / sine : 2);
+    s.z *= negative ? -ratio : ratio;
     return s;
   }
   /// Whether every point within ρ of p is nearer to the base by another representative.
