@@ -32,6 +32,18 @@ from ._gaussians import (
     validate,
 )
 from ._results import ConfidenceRegion, Law, MeanResult
+from ._sensors import (
+    VI_BLOCKS,
+    Camera,
+    InitialisedWindow,
+    Result,
+    hand_eye,
+    motion,
+    preintegrate,
+    robust_two_view,
+    two_view,
+    vi_init,
+)
 from ._statistics import group_mean, mahalanobis, mean
 
 __version__ = _core.__version__

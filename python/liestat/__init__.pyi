@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 __version__: str
 
 _Array = NDArray[np.float64]
+_T = TypeVar("_T")
 _M = TypeVar("_M", bound="Manifold")
 _G = TypeVar("_G", bound="Group")
 _Shape = int | Sequence[int]
@@ -59,7 +60,7 @@ class Manifold:
     def moved(self: _M, by: Any, threads: int = 1) -> _M: ...
 
 class _Metric:
-    def distance(self: _M, other: _M, threads: int = 1) -> Any: ...
+    def distance(self: _T, other: _T, threads: int = 1) -> Any: ...
 
 class Group(Manifold):
     dimension: ClassVar[int]
@@ -106,19 +107,19 @@ class SO3(_Metric, Group):
 
 class _Pose:
     @classmethod
-    def from_components(cls: type[_M], translation: ArrayLike, rotation: Any) -> _M: ...
+    def from_components(cls: type[_T], translation: ArrayLike, rotation: Any) -> _T: ...
     @classmethod
-    def from_matrix(cls: type[_M], matrix: ArrayLike) -> _M: ...
-    def as_matrix(self) -> _Array: ...
+    def from_matrix(cls: type[_T], matrix: ArrayLike) -> _T: ...
+    def as_matrix(self, threads: int = 1) -> _Array: ...
     @property
     def rotation(self) -> SO3: ...
     @property
     def translation(self) -> _Array: ...
     @classmethod
-    def from_scipy(cls: type[_M], transform: Any) -> _M: ...
+    def from_scipy(cls: type[_T], transform: Any) -> _T: ...
     def to_scipy(self) -> Any: ...
 
-class SE3(_Pose, Group):  # type: ignore[misc]
+class SE3(_Pose, Group):
     @property
     def frame(self) -> Frame3: ...
 
@@ -328,3 +329,119 @@ def validate(
     ks_tolerance: float = 0.0,
     tail: float = 0.0,
 ) -> ValidationReport: ...
+
+class Result:
+    def __init__(self, title: str, **parts: Any) -> None: ...
+    def keys(self) -> list[str]: ...
+    def __getitem__(self, name: str) -> Any: ...
+    def __getattr__(self, name: str) -> Any: ...
+
+class InitialisedWindow(Result):
+    def block(self, row: str, column: str | None = None) -> _Array: ...
+
+VI_BLOCKS: dict[str, int]
+
+class Camera:
+    fu: float
+    fv: float
+    cu: float
+    cv: float
+    distortion: str
+    coefficients: tuple[float, ...]
+    width: int
+    height: int
+    def __init__(
+        self,
+        fu: float,
+        fv: float,
+        cu: float,
+        cv: float,
+        distortion: Literal["none", "radtan", "equidistant"] = "none",
+        coefficients: Sequence[float] = (0, 0, 0, 0),
+        width: int = 0,
+        height: int = 0,
+    ) -> None: ...
+    def bearings(self, pixels: ArrayLike, sigma: float = 1.0) -> tuple[_Array, _Array]: ...
+
+def preintegrate(
+    times: ArrayLike,
+    rates: ArrayLike,
+    forces: ArrayLike,
+    begin: ArrayLike,
+    end: ArrayLike,
+    *,
+    noise: ArrayLike = (0.0, 0.0),
+    bias: ArrayLike | None = None,
+    scheme: Literal["averaged", "held", "cubic"] = "averaged",
+    max_gap: float = 0.1,
+    threads: int = 0,
+) -> Result: ...
+def hand_eye(
+    a: SE3,
+    b: SE3,
+    a_covariance: ArrayLike,
+    b_covariance: ArrayLike,
+    *,
+    relative: bool = False,
+    known_noise: bool = True,
+    find_outliers: bool = True,
+    gate: float = 22.457744484825327,
+    samples: int = 80,
+    seed: int = 1,
+) -> Result: ...
+def two_view(
+    matches: ArrayLike,
+    sigma: float = 1.0,
+    camera: Camera | None = None,
+    second_camera: Camera | None = None,
+    *,
+    image_size: Sequence[float] | None = None,
+    seed: int = 1,
+) -> Result: ...
+def robust_two_view(
+    model: Literal["homography", "fundamental", "pose"],
+    matches: ArrayLike,
+    sigma: float | tuple[float, float],
+    *,
+    confidence: float = 0.9999,
+    threshold: float = 0.0,
+    max_draws: int = 100000,
+    seed: int = 1,
+) -> Result: ...
+def motion(
+    frames: ArrayLike,
+    tracks: ArrayLike,
+    points: ArrayLike,
+    sigma: float,
+    *,
+    span: int = 4,
+    outliers: bool = False,
+    essential: bool = True,
+    process_noise: float = 1e-5,
+    gyroscope: ArrayLike | None = None,
+    gyroscope_covariance: ArrayLike | None = None,
+) -> Result: ...
+def vi_init(
+    times: ArrayLike,
+    rates: ArrayLike,
+    forces: ArrayLike,
+    noise: ArrayLike,
+    image_times: ArrayLike,
+    images: ArrayLike,
+    tracks: ArrayLike,
+    bearings: ArrayLike,
+    sigmas: ArrayLike,
+    *,
+    body_T_camera: SE3 | None = None,
+    cameras: ArrayLike | None = None,
+    window: float = 2.0,
+    stride: float = 0.0,
+    image_rate: float = 10.0,
+    consensus: bool = True,
+    refinement: bool = True,
+    stretch: float = 12.0,
+    gravity: float | None = 9.81,
+    gyroscope_sigma: float = 0.1,
+    accelerometer_sigma: float = 0.15,
+    seed: int = 1,
+) -> Result: ...

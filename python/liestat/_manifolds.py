@@ -472,7 +472,7 @@ class SO3(_Metric, Group, core="SO3"):
     >>> x.shape, len(x)
     ((2,), 2)
     >>> np.round((x[0].inv() * x[1]).log(), 4)
-    array([-0.0304,  0.0316, -0.0145])
+    array([-0.0312,  0.0247, -0.0245])
     """
 
     __slots__ = ()
@@ -660,7 +660,7 @@ class _Pose:
         _require_rotations(m[..., :3, :3], name)
         return cls.from_components(m[..., :3, 3], SO3.from_matrix(m[..., :3, :3]))
 
-    def as_matrix(self):
+    def as_matrix(self, threads=1):
         """Homogeneous matrices.
 
         Returns
@@ -668,7 +668,7 @@ class _Pose:
         ndarray, shape (..., 4, 4)
         """
         m = np.zeros((*self.shape, 4, 4))
-        m[..., :3, :3] = self.rotation.as_matrix()
+        m[..., :3, :3] = self.rotation.as_matrix(threads)
         m[..., :3, 3] = self._data[..., 4:]
         m[..., 3, 3] = 1.0
         return m

@@ -13,7 +13,7 @@ from ._results import MeanResult
 
 #: Types with an invariant metric, whose default criterion is least squares.
 _METRIC = ("R3", "S2", "SO3", "Frame3", "SemiOrientedFrame3", "NonOrientedFrame3")
-_FRAMES = (Frame3, SemiOrientedFrame3, NonOrientedFrame3)
+_FRAMES: tuple = (Frame3, SemiOrientedFrame3, NonOrientedFrame3)
 
 
 def require_manifold(x, caller):

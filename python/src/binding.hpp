@@ -36,6 +36,11 @@ void bindArrays(py::module_& module);
 void bindLaws(py::module_& module);
 void bindSampling(py::module_& module);
 void bindValidation(py::module_& module);
+void bindPreintegration(py::module_& module);
+void bindHandEye(py::module_& module);
+void bindMotion(py::module_& module);
+void bindTwoView(py::module_& module);
+void bindViInit(py::module_& module);
 void bindMeans(py::module_& module);
 
 }  // namespace liestat::python

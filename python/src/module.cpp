@@ -23,4 +23,9 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindLaws(module);
   liestat::python::bindSampling(module);
   liestat::python::bindValidation(module);
+  liestat::python::bindPreintegration(module);
+  liestat::python::bindHandEye(module);
+  liestat::python::bindMotion(module);
+  liestat::python::bindTwoView(module);
+  liestat::python::bindViInit(module);
 }
