@@ -18,6 +18,7 @@ from ._manifolds import (
     NonOrientedFrame3,
     SemiOrientedFrame3,
 )
+from ._columns import columns, from_columns
 from ._gaussians import (
     CONVENTIONS,
     CounterRng,
