@@ -1,8 +1,8 @@
 """PEP 517 backend that builds the module with CMake; nothing but the standard library, CMake and a compiler.
 
-Environment: CMAKE_GENERATOR, CMAKE_CXX_COMPILER_LAUNCHER and the like are CMake's own; CMAKE_BUILD_PARALLEL_LEVEL sets how
-many compilers run at once (default: one for each processor and gigabyte of free memory); LIESTAT_BUILD_DIRECTORY is where
-the build is kept (default: build/python-<version>), so that the next one is quick.
+Environment: CMAKE_GENERATOR, CMAKE_CXX_COMPILER_LAUNCHER and the like are CMake's own; CMAKE_BUILD_PARALLEL_LEVEL sets
+how many compilers run at once (default: one for each processor and gigabyte of free memory); LIESTAT_BUILD_DIRECTORY is
+where the build is kept (default: build/python-<version>), so that the next one is quick.
 """
 
 import base64
@@ -140,7 +140,8 @@ def build_sdist(sdist_directory, config_settings=None):
     project = _project()
     base = f"liestat-{project['version']}"
     path = Path(sdist_directory) / f"{base}.tar.gz"
-    names = ["CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md", "cmake", "lie", "stats", "fusion", "python"]
+    names = ["CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md", "cmake"]
+    names += ["lie", "stats", "fusion", "experiments", "cli", "python"]
 
     def clean(info):
         return None if "__pycache__" in info.name else info

@@ -1,4 +1,6 @@
-"""Operations on arrays beside scipy.spatial.transform.Rotation, in one run: PYTHONPATH=build/release/python python3 python/benchmarks/rotations.py.
+"""Operations on arrays beside scipy.spatial.transform.Rotation, in one run.
+
+PYTHONPATH=build/release/python python3 python/benchmarks/rotations.py
 
 Times are the least of several runs, ms for a million elements on one thread.
 """

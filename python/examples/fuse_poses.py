@@ -17,7 +17,8 @@ def main() -> None:
     print("sigma      ", fused.sigma.round(4), "m, rad")
 
     # A chain of motions, and the distance of its end from a landmark.
-    step = liestat.Gaussian(liestat.SE3.exp([1.0, 0, 0, 0, 0, 0.1]), np.diag([0.01, 0.01, 0.01, 0.002, 0.002, 0.01]) ** 2)
+    noise = np.diag([0.01, 0.01, 0.01, 0.002, 0.002, 0.01]) ** 2
+    step = liestat.Gaussian(liestat.SE3.exp([1.0, 0, 0, 0, 0, 0.1]), noise)
     end = step
     for _ in range(9):
         end = end * step

@@ -22,7 +22,8 @@ def main() -> None:
     print("status     ", result.status)
     print("X          ", result.X.mean)
     print("sigma      ", result.X.sigma, "m, rad")
-    print("error      ", result.X.mean.local(gripper_T_camera), "distance", float(result.X.mahalanobis(gripper_T_camera)))
+    distance = float(result.X.mahalanobis(gripper_T_camera))
+    print("error      ", result.X.mean.local(gripper_T_camera), "Mahalanobis distance", round(distance, 2))
 
 
 if __name__ == "__main__":

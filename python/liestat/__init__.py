@@ -19,6 +19,7 @@ from ._manifolds import (
     SemiOrientedFrame3,
 )
 from ._columns import columns, from_columns
+from ._files import read_features, read_imu, read_tracks
 from ._gaussians import (
     CONVENTIONS,
     CounterRng,

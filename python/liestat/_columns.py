@@ -66,7 +66,8 @@ def from_columns(kind, table):
         try:
             part = np.asarray(table[name], dtype=np.float64)
         except Exception as error:
-            raise ValueError(f"from_columns: {kind.__name__} needs the columns {' '.join(names)}; {name}: {error}") from None
+            needs = f"{kind.__name__} needs the columns {' '.join(names)}"
+            raise ValueError(f"from_columns: {needs}; {name}: {error}") from None
         if part.ndim != 1:
             raise ValueError(f"from_columns: {name}: expected shape (n,), got {part.shape}")
         require_finite(part, f"from_columns: {name}")

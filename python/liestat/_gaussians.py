@@ -343,7 +343,9 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
     if covariances is None:
         raise TypeError("fuse: covariances are missing")
     if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
-        raise ValueError("fuse: covariance_at: say 'measured' (covariances in the axes of each measurement) or 'estimated'")
+        raise ValueError(
+            "fuse: covariance_at: say 'measured' (covariances in the axes of each measurement) or 'estimated'"
+        )
     kind = type(x)
     if x.ndim == 0:
         x = x.reshape(1)
@@ -415,16 +417,16 @@ def propagate(function, *inputs, jacobian=None, joint_covariance=None, step=6e-6
         else:
             mean = require_finite(as_numbers(mean, f"propagate: input {i}", ()), f"propagate: input {i}")
             dof = mean.size
-        c = require_finite(
-            as_numbers(np.reshape(covariance, (1, 1)) if dof == 1 else covariance, f"propagate: covariance {i}", (dof, dof)),
-            f"propagate: covariance {i}",
-        )
+        name = f"propagate: covariance {i}"
+        square = np.reshape(covariance, (1, 1)) if dof == 1 else covariance
+        c = require_finite(as_numbers(square, name, (dof, dof)), name)
         means.append(mean)
         blocks.append(c)
     sizes = [len(b) for b in blocks]
     total = sum(sizes)
     if joint_covariance is not None:
-        sigma = require_finite(as_numbers(joint_covariance, "propagate: joint_covariance", (total, total)), "joint_covariance")
+        name = "propagate: joint_covariance"
+        sigma = require_finite(as_numbers(joint_covariance, name, (total, total)), name)
     else:
         sigma = np.zeros((total, total))
         at = 0
@@ -435,8 +437,9 @@ def propagate(function, *inputs, jacobian=None, joint_covariance=None, step=6e-6
     rows, difference = _tangent_of(value)
     if jacobian is not None:
         J = jacobian(*means) if callable(jacobian) else jacobian
-        J = require_finite(as_numbers(np.reshape(J, (rows, total)) if np.ndim(J) < 2 else J, "propagate: jacobian", (rows, total)),
-                           "propagate: jacobian")
+        if np.ndim(J) < 2:
+            J = np.reshape(J, (rows, total))
+        J = require_finite(as_numbers(J, "propagate: jacobian", (rows, total)), "propagate: jacobian")
     else:
         J = np.empty((rows, total))
         column = 0
@@ -485,7 +488,8 @@ class ValidationReport:
         return self._table
 
     def __repr__(self):
-        return f"<ValidationReport: {self.verdict}, index {self.index:.3g} of {self.expected_index:.3g}, {self.trials} trials>"
+        index = f"index {self.index:.3g} of {self.expected_index:.3g}"
+        return f"<ValidationReport: {self.verdict}, {index}, {self.trials} trials>"
 
 
 def validate(

@@ -234,9 +234,8 @@ class Manifold:
             Threads for large arrays; 0 for as many as the machine has. The result does not depend on it.
         """
         k = (self.dof,)
-        return type(self)._of(
-            self._call("retract", [("v", as_numbers(v, f"{type(self).__name__}.retract: v", k), k)], (self.parameters,), threads)
-        )
+        v = as_numbers(v, f"{type(self).__name__}.retract: v", k)
+        return type(self)._of(self._call("retract", [("v", v, k)], (self.parameters,), threads))
 
     def local(self, other, threads=1):
         """The tangent vector at `self` that leads to `other`; for a group ``(self.inv() * other).log()``.
@@ -339,9 +338,8 @@ class Group(Manifold):
     @classmethod
     def _exp_call(cls, name, v, tail, threads):
         k = (cls.dof,)
-        return operate(
-            cls._operations[name], f"{cls.__name__}.{name}", [("v", as_numbers(v, f"{cls.__name__}.{name}: v", k), k)], tail, threads
-        )
+        caller = f"{cls.__name__}.{name}"
+        return operate(cls._operations[name], caller, [("v", as_numbers(v, f"{caller}: v", k), k)], tail, threads)
 
     @classmethod
     def exp(cls, v, threads=1):
@@ -396,7 +394,8 @@ class Group(Manifold):
         ndarray, shape (..., dimension)
         """
         d = (self.dimension,)
-        return self._call("act", [("points", as_numbers(points, f"{type(self).__name__}.act: points", d), d)], d, threads)
+        points = as_numbers(points, f"{type(self).__name__}.act: points", d)
+        return self._call("act", [("points", points, d)], d, threads)
 
     def as_matrix(self, threads=1):
         """Rotation or homogeneous matrices.

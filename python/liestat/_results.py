@@ -132,7 +132,8 @@ class MeanResult:
         the covariances are right.
     """
 
-    _scalars = ("status", "reason", "uniqueness", "proof", "n", "iterations", "cost", "residual", "tolerance", "r_star", "cells")
+    _scalars: tuple = ("status", "reason", "uniqueness", "proof", "n", "iterations", "cost", "residual", "tolerance")
+    _scalars += ("r_star", "cells")
 
     def __init__(self, kind, criterion, answers, shape):
         self._kind, self.criterion, self.shape = kind, criterion, shape
@@ -186,7 +187,7 @@ class MeanResult:
 
     @property
     def sigma(self):
-        """ndarray, shape (..., k): standard deviations of the mean in its own axes; None if the covariance is withheld."""
+        """ndarray, shape (..., k): standard deviations of the mean in its own axes; None where withheld."""
         if self.covariance is None:
             return None
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
@@ -251,9 +252,9 @@ class MeanResult:
     def _repr_html_(self):
         if self.shape:
             return f"<code>{html.escape(repr(self))}</code>"
+        left = "style='text-align:left'"
         rows = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(k)}</th><td style='text-align:left'>{html.escape(v)}</td></tr>"
-            for k, v in self._rows()
+            f"<tr><th {left}>{html.escape(k)}</th><td {left}>{html.escape(v)}</td></tr>" for k, v in self._rows()
         )
         title = f"Mean of {self.n} {self._kind.__name__} ({self.criterion})"
         return f"<table><caption>{html.escape(title)}</caption>{rows}</table>"

@@ -70,12 +70,15 @@ def _noise(caller, noise):
     array = _vector(noise, f"{caller}: noise")
     if len(array) not in (2, 4) or (array < 0).any():
         raise ValueError(
-            f"{caller}: noise: expected (gyroscope, accelerometer) or these with their walks, none negative, got {array}"
+            f"{caller}: noise: expected (gyroscope, accelerometer), or these with their walks, none negative, "
+            f"got {array}"
         )
     return np.concatenate([array, np.zeros(4 - len(array))])
 
 
-def preintegrate(times, rates, forces, begin, end, *, noise=(0.0, 0.0), bias=None, scheme="averaged", max_gap=0.1, threads=0):
+def preintegrate(
+    times, rates, forces, begin, end, *, noise=(0.0, 0.0), bias=None, scheme="averaged", max_gap=0.1, threads=0
+):
     """Preintegrated motions of many intervals of one inertial recording.
 
     Parameters
@@ -420,7 +423,8 @@ def motion(
     p = _rows(points, "motion: points", 2)
     for name, value in (("frames", f), ("tracks", t)):
         if value.ndim != 1 or not np.issubdtype(value.dtype, np.integer) or (value < 0).any():
-            raise ValueError(f"motion: {name}: expected integers of shape (n,), none negative, got {value.dtype} {value.shape}")
+            found = f"{value.dtype} {value.shape}"
+            raise ValueError(f"motion: {name}: expected integers of shape (n,), none negative, got {found}")
     _same_length("motion", frames=f, tracks=t, points=p)
     if not sigma > 0:
         raise ValueError(f"motion: sigma: expected a positive number, got {sigma}")
@@ -562,7 +566,8 @@ def vi_init(
             continue
         array = np.asarray(value)
         if array.shape != (n,) or not np.issubdtype(array.dtype, np.integer) or (array < 0).any():
-            raise ValueError(f"vi_init: {name}: expected integers of shape ({n},), none negative, got {array.dtype} {array.shape}")
+            found = f"{array.dtype} {array.shape}"
+            raise ValueError(f"vi_init: {name}: expected integers of shape ({n},), none negative, got {found}")
         indices[:, column] = array
     rows = np.empty((n, 4))
     rows[:, :3] = rays
@@ -594,4 +599,6 @@ def vi_init(
         one["states"] = SE23._of(one["states"])
         windows.append(InitialisedWindow("window", **one))
     stretches = [Result("stretch", **one) for one in d["stretches"]]
-    return Result("visual-inertial initialisation", windows=windows, stretches=stretches, images_outside=d["images_outside"])
+    return Result(
+        "visual-inertial initialisation", windows=windows, stretches=stretches, images_outside=d["images_outside"]
+    )

@@ -128,7 +128,9 @@ def mean(
     >>> result.mean.log().round(4)
     array([ 0.305,  0.03 , -0.11 ])
     """
-    result = _mean("mean", x, weights, covariances, axis, criterion, certify, covariance_at, likelihood, budget, threads)
+    result = _mean(
+        "mean", x, weights, covariances, axis, criterion, certify, covariance_at, likelihood, budget, threads
+    )
     withheld = [a for a in result._answers if a["covariance"] is None]
     if withheld:
         which = "" if result.shape == () else f" for {len(withheld)} of {len(result._answers)} means"

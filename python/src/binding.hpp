@@ -41,6 +41,7 @@ void bindHandEye(py::module_& module);
 void bindMotion(py::module_& module);
 void bindTwoView(py::module_& module);
 void bindViInit(py::module_& module);
+void bindReaders(py::module_& module);
 void bindMeans(py::module_& module);
 
 }  // namespace liestat::python

@@ -28,4 +28,7 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindMotion(module);
   liestat::python::bindTwoView(module);
   liestat::python::bindViInit(module);
+#ifdef LIESTAT_PYTHON_READERS
+  liestat::python::bindReaders(module);
+#endif
 }

@@ -30,5 +30,6 @@ def reference(operation, values, tail):
     if not program:
         return None
     values = np.ascontiguousarray(values)
-    run = subprocess.run([program, operation, str(len(values))], input=values.tobytes(), capture_output=True, check=True)
+    command = [program, operation, str(len(values))]
+    run = subprocess.run(command, input=values.tobytes(), capture_output=True, check=True)
     return np.frombuffer(run.stdout).reshape(-1, *tail)

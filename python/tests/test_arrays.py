@@ -51,7 +51,8 @@ class AgainstSciPy(unittest.TestCase):
                     SO3.from_euler(sequence, self.x.as_euler(sequence)).as_matrix(), self.x.as_matrix(), atol=4e-15
                 )
         degrees = self.x.as_euler("ZYX", degrees=True)
-        np.testing.assert_allclose(SO3.from_euler("ZYX", degrees, degrees=True).as_matrix(), self.x.as_matrix(), atol=1e-14)
+        back = SO3.from_euler("ZYX", degrees, degrees=True)
+        np.testing.assert_allclose(back.as_matrix(), self.x.as_matrix(), atol=1e-14)
 
     def test_conversion(self):
         self.assertTrue(SO3.from_scipy(self.r).allclose(self.x, 1e-14))
@@ -66,7 +67,8 @@ class AgainstSciPy(unittest.TestCase):
         self.assertTrue(SO3.from_matrix(m).allclose(self.x, 1e-14))
         scaled = 3 * m + 1e-3
         self.assertTrue(SO3.from_matrix(scaled, fit=True).allclose(self.x, 2e-3))
-        with self.assertRaisesRegex(ValueError, r"SO3.from_matrix: matrix, shape \(200, 3, 3\): not a rotation.*\(0,\)"):
+        message = r"SO3.from_matrix: matrix, shape \(200, 3, 3\): not a rotation.*\(0,\)"
+        with self.assertRaisesRegex(ValueError, message):
             SO3.from_matrix(scaled)
 
 
@@ -237,7 +239,8 @@ class Arrays(unittest.TestCase):
         backwards = np.ascontiguousarray(wide[::-1])[::-1]
         read_only = v.astype(np.float64)
         read_only.flags.writeable = False
-        unaligned = np.frombuffer(b"x" + v.astype(np.float64).tobytes(), dtype=np.uint8)[1:].view(np.float64).reshape(60, 3)
+        memory = np.frombuffer(b"x" + v.astype(np.float64).tobytes(), dtype=np.uint8)
+        unaligned = memory[1:].view(np.float64).reshape(60, 3)
         self.assertFalse(unaligned.flags.aligned)
         layouts = {
             "float32": v,

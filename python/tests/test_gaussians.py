@@ -94,10 +94,9 @@ class Propagation(unittest.TestCase):
         np.testing.assert_allclose(by_hand[1], c, rtol=1e-7)
         joint = np.zeros((7, 7))
         joint[:6, :6], joint[6, 6] = x.covariance, 0.01
-        correlated = liestat.propagate(lambda pose, d: d - pose.act([1.0, 2, 3]), x, (0.5, 0.01), joint_covariance=joint)
-        np.testing.assert_allclose(
-            correlated[1], liestat.propagate(lambda pose, d: d - pose.act([1.0, 2, 3]), x, (0.5, 0.01))[1]
-        )
+        difference = lambda pose, d: d - pose.act([1.0, 2, 3])  # noqa: E731
+        correlated = liestat.propagate(difference, x, (0.5, 0.01), joint_covariance=joint)
+        np.testing.assert_allclose(correlated[1], liestat.propagate(difference, x, (0.5, 0.01))[1])
         with self.assertRaisesRegex(ValueError, r"propagate: jacobian: expected shape \(\.\.\., 6, 6\), got \(3, 3\)"):
             liestat.propagate(lambda pose: pose.inv(), x, jacobian=np.eye(3))
         with self.assertRaisesRegex(ValueError, "one feature"):

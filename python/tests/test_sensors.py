@@ -30,7 +30,8 @@ class Preintegration(unittest.TestCase):
             forces = SO3.exp(middle[:, None] * self.rate).act(self.force)
             np.testing.assert_allclose(result.increment[i].rotation.log(), h * self.rate, atol=1e-12)
             np.testing.assert_allclose(result.increment[i].velocity, forces.sum(0) * h / n, atol=1e-6)
-            np.testing.assert_allclose(result.increment[i].position, ((h - middle)[:, None] * forces).sum(0) * h / n, atol=1e-6)
+            position = ((h - middle)[:, None] * forces).sum(0) * h / n
+            np.testing.assert_allclose(result.increment[i].position, position, atol=1e-6)
             # White noise of the gyroscope alone determines the rotation's covariance.
             np.testing.assert_allclose(result.covariance[i][3:6, 3:6], 1e-6 * h * np.eye(3), rtol=1e-6, atol=1e-12)
 
@@ -171,7 +172,8 @@ class Motion(unittest.TestCase):
             tracks.append(np.arange(40))
             xy.append(points[:, :2] / points[:, 2:] + 5e-4 * rng.standard_normal((40, 2)))
             points = step.act(points)
-        result = liestat.motion(np.concatenate(frames), np.concatenate(tracks), np.concatenate(xy), 5e-4, essential=False)
+        data = [np.concatenate(part) for part in (frames, tracks, xy)]
+        result = liestat.motion(*data, 5e-4, essential=False)
         self.assertEqual((len(result.direction), len(result.rotation), result.ok.shape), (30, 30, (30,)))
         self.assertTrue(result.ok[-1])
         self.assertLess(result.rotation[-1].distance(step.rotation), 0.003)
@@ -198,8 +200,12 @@ class VisualInertial(unittest.TestCase):
             rotations.append(rotations[-1] * SO3.exp(h * 0.5 * (rates[i] + rates[i + 1])))
         R = SO3.stack(rotations)
         v0 = np.array([0.5, -0.3, 0.2])
-        velocity = v0 + np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * h * (accelerations[1:] + accelerations[:-1]), 0)])
-        position = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * h * (velocity[1:] + velocity[:-1]), 0)])
+
+        def integral(x):
+            return np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * h * (x[1:] + x[:-1]), 0)])
+
+        velocity = v0 + integral(accelerations)
+        position = integral(velocity)
         forces = R.inv().act(accelerations - g)
         noise = (1e-4, 1e-3)
         keep = slice(None, None, 5)
