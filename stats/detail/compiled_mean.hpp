@@ -2,6 +2,7 @@
 // compiles in a fraction of the time, and those of stats/compiled/ hold them. Ends stats/mean.hpp.
 #pragma once
 
+#include <stats/detail/any_executor.hpp>
 #include <stats/mean.hpp>
 
 #include <lie/frame3.hpp>
@@ -17,6 +18,8 @@
   instantiate MeanResult<M> frechetMean<M>(const SerialExecutor&, const Samples<M>&, const UnitWeights&,     \
                                            const MeanOptions<M>&);                                           \
   instantiate MeanResult<M> frechetMean<M>(const SerialExecutor&, const Samples<M>&, const Samples<double>&, \
+                                           const MeanOptions<M>&);                                           \
+  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&,    \
                                            const MeanOptions<M>&)
 
 /// `apply`, a macro of the two arguments above, for each feature whose mean is compiled.

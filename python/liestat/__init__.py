@@ -1,0 +1,51 @@
+"""Statistics on Lie groups and homogeneous manifolds: means with covariances, tests and sensors over NumPy arrays.
+
+Quaternions are x y z w, tangent vectors translation before rotation, perturbations on the right ("body axes"), lengths
+in metres and angles in radians.
+"""
+
+from . import _core
+from ._manifolds import (
+    R3,
+    S2,
+    SE2,
+    SE3,
+    SE23,
+    SO3,
+    Frame3,
+    Group,
+    Manifold,
+    NonOrientedFrame3,
+    SemiOrientedFrame3,
+)
+from ._columns import columns, from_columns
+from ._files import read_features, read_imu, read_tracks
+from ._gaussians import (
+    CONVENTIONS,
+    CounterRng,
+    Gaussian,
+    ValidationReport,
+    convert_covariance,
+    fuse,
+    propagate,
+    random_directions,
+    random_rotations,
+    sample,
+    validate,
+)
+from ._results import ConfidenceRegion, Law, MeanResult
+from ._sensors import (
+    VI_BLOCKS,
+    Camera,
+    InitialisedWindow,
+    Result,
+    hand_eye,
+    motion,
+    preintegrate,
+    robust_two_view,
+    two_view,
+    vi_init,
+)
+from ._statistics import group_mean, mahalanobis, mean
+
+__version__ = _core.__version__

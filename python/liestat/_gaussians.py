@@ -1,0 +1,574 @@
+"""Features with covariances: conventions, propagation, fusion, sampling, validation."""
+
+import math
+import numbers
+import warnings
+
+import numpy as np
+
+from . import _core
+from ._manifolds import R3, S2, SO3, Group, Manifold
+from ._operate import as_numbers, operate, require_finite
+from ._results import ConfidenceRegion, Law
+from ._statistics import _FRAMES, _axes, _covariances, _grouped, mahalanobis, require_manifold
+
+#: Conventions of covariances that `convert_covariance` knows.
+CONVENTIONS = ("body", "left", "world", "rotation_first", "left_rotation_first", "world_rotation_first", "chart")
+
+
+def convert_covariance(x, covariance, to="body", *, source="body", threads=1):
+    """A covariance at `x` from one convention to another.
+
+    Parameters
+    ----------
+    x : an array of features
+    covariance : array_like, shape (..., k, k)
+    to, source : str
+        'body'
+            The library's: x·Exp(e), translation before rotation, axes of `x`.
+        'left'
+            Exp(e)·x, groups only (Barfoot).
+        'world'
+            Each part along the axes of the world, R ← Exp(δ)·R, t ← t + τ (ROS' PoseWithCovariance).
+        'rotation_first', 'left_rotation_first', 'world_rotation_first'
+            The same with rotation before translation (GTSAM: 'rotation_first').
+        'chart'
+            Of the principal chart, the logarithm at the origin (Pennec's report; ``np.cov`` of rotation vectors).
+
+    Returns
+    -------
+    ndarray, shape (..., k, k)
+    """
+    x = require_manifold(x, "convert_covariance")
+    kind = type(x)
+    k = (kind.dof, kind.dof)
+    c = _covariances(covariance, "convert_covariance: covariance", kind)
+    for name, value in (("to", to), ("source", source)):
+        if value not in CONVENTIONS:
+            raise ValueError(f"convert_covariance: {name}: expected one of {', '.join(CONVENTIONS)}, got {value!r}")
+
+    def call(name, at_feature):
+        if name not in kind._operations:
+            raise ValueError(f"convert_covariance: {kind.__name__} has no convention {name.split('_', 1)[1]!r}")
+        operands = [("x", x.params, (kind.parameters,))] if at_feature else []
+        return operate(kind._operations[name], "convert_covariance", [*operands, ("covariance", c, k)], k, threads)
+
+    if source.endswith("rotation_first"):
+        c = call("from_rotation_first", False)
+        source = source[: -len("rotation_first")].rstrip("_") or "body"
+    if source != "body":
+        c = call("from_world_axes" if source == "world" else f"from_{source}", True)
+    target = to[: -len("rotation_first")].rstrip("_") or "body" if to.endswith("rotation_first") else to
+    if target != "body":
+        c = call("to_world_axes" if target == "world" else f"to_{target}", True)
+    if to.endswith("rotation_first"):
+        c = call("to_rotation_first", False)
+    return np.broadcast_to(c, np.broadcast_shapes((*x.shape, *k), c.shape)).copy() if c.shape[:-2] != x.shape else c
+
+
+class Gaussian:
+    """Features with the covariances of their errors, x·Exp(e), e ~ N(0, covariance).
+
+    Parameters
+    ----------
+    mean : an array of features
+    covariance : array_like, shape (..., k, k)
+        In the axes of `mean` ("body"), m² and rad², translation before rotation; broadcast to the shape of `mean`.
+    convention : str
+        That of the given covariance, see `convert_covariance`.
+    """
+
+    __slots__ = ("mean", "covariance")
+
+    def __init__(self, mean, covariance, convention="body"):
+        mean = require_manifold(mean, "Gaussian")
+        c = _covariances(covariance, "Gaussian: covariance", type(mean), mean.shape)
+        if convention != "body":
+            c = convert_covariance(mean, c, source=convention)
+        self.mean = mean
+        self.covariance = c if c.shape[:-2] == mean.shape else np.broadcast_to(c, (*mean.shape, *c.shape[-2:]))
+
+    @classmethod
+    def _of(cls, mean, covariance):
+        self = object.__new__(cls)
+        self.mean, self.covariance = mean, covariance
+        return self
+
+    @property
+    def shape(self):
+        """Shape of the array of features."""
+        return self.mean.shape
+
+    @property
+    def sigma(self):
+        """ndarray, shape (..., k): standard deviations in the axes of the mean."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    def __len__(self):
+        return len(self.mean)
+
+    def __getitem__(self, index):
+        mean = self.mean[index]
+        if not isinstance(index, tuple):
+            index = (index,)
+        tail = (slice(None), slice(None)) if any(i is Ellipsis for i in index) else (Ellipsis, slice(None), slice(None))
+        return Gaussian._of(mean, self.covariance[(*index, *tail)])
+
+    def __repr__(self):
+        sigma = ""
+        if self.mean.single:
+            sigma = ", sigma " + ", ".join(f"{s:.3g}" for s in self.sigma)
+        return f"Gaussian({self.mean!r}{sigma})"
+
+    def _call(self, name, operands, threads=1):
+        kind = type(self.mean)
+        k = (kind.dof, kind.dof)
+        first = [("mean", self.mean.params, (kind.parameters,)), ("covariance", self.covariance, k)]
+        return operate(kind._operations[name], f"Gaussian.{name}", [*first, *operands], k, threads)
+
+    def _other(self, other):
+        kind = type(self.mean)
+        return [
+            ("other", other.mean.params, (kind.parameters,)),
+            ("other covariance", other.covariance, (kind.dof, kind.dof)),
+        ]
+
+    def _group(self, other):
+        if isinstance(other, Group):
+            other = Gaussian._of(other, np.zeros((*other.shape, other.dof, other.dof)))
+        if not isinstance(other, Gaussian) or type(other.mean) is not type(self.mean):
+            return None
+        return other if isinstance(self.mean, Group) else None
+
+    def __mul__(self, other):
+        """The product of independent factors, covariance to first order; an exact factor may be a plain element."""
+        other = self._group(other)
+        if other is None:
+            return NotImplemented
+        return Gaussian._of(self.mean * other.mean, self._call("product_covariance", self._other(other)))
+
+    def __rmul__(self, other):
+        other = self._group(other)
+        return NotImplemented if other is None else other * self
+
+    def product_fourth_order(self, other):
+        """The product of independent factors, covariance to fourth order in the noise (Barfoot and Furgale)."""
+        other = self._group(other)
+        if other is None:
+            raise TypeError("product_fourth_order: expected a Gaussian of the same group")
+        return Gaussian._of(
+            self.mean * other.mean, self._call("product_covariance_fourth_order", self._other(other))
+        )
+
+    def inv(self):
+        """The inverse; exact."""
+        if not isinstance(self.mean, Group):
+            raise TypeError(f"{type(self.mean).__name__} is not a group")
+        return Gaussian._of(self.mean.inv(), self._call("inverse_covariance", []))
+
+    def between(self, other):
+        """``self.inv() * other`` of independent factors, first order."""
+        other = self._group(other)
+        if other is None:
+            raise TypeError("between: expected a Gaussian of the same group")
+        return Gaussian._of(self.mean.inv() * other.mean, self._call("between_covariance", self._other(other)))
+
+    def moved(self, by):
+        """Moved by exact transformations of the group that acts on the features."""
+        group = type(self.mean)._group()
+        if isinstance(self.mean, R3):
+            return propagate(lambda x: x.moved(by), self)
+        mean = self.mean.moved(by)
+        return Gaussian._of(mean, self._call("moved_covariance", [("by", by.params, (group.parameters,))]))
+
+    def transported(self, to):
+        """The covariance carried to other features (parallel transport on the sphere, unchanged elsewhere)."""
+        kind = type(self.mean)
+        covariance = self._call("transported_covariance", [("to", self.mean._operand(to, "to"), (kind.parameters,))])
+        return Gaussian._of(to, covariance)
+
+    def in_convention(self, convention):
+        """ndarray, shape (..., k, k): the covariance in another convention, see `convert_covariance`."""
+        return convert_covariance(self.mean, self.covariance, convention)
+
+    def mahalanobis(self, x):
+        """Mahalanobis distances of features, or of Gaussians under both covariances."""
+        if isinstance(x, Gaussian):
+            return mahalanobis(self.mean, self.covariance, x.mean, x.covariance)
+        return mahalanobis(self.mean, self.covariance, x)
+
+    def confidence_region(self, probability=0.95, law=None):
+        """The ellipsoid that covers the truth, under χ² or the given law; of a single feature."""
+        if not self.mean.single:
+            raise TypeError("confidence_region is that of one feature: index first")
+        law = Law(self.mean.dof) if law is None else law
+        return ConfidenceRegion(self.mean, np.ascontiguousarray(self.covariance), probability, law)
+
+    def sample(self, size=None, rng=None):
+        """See `sample`."""
+        return sample(self.mean, self.covariance, size, rng)
+
+
+class CounterRng:
+    """The library's random numbers, functions of a counter (Philox 4×32-10).
+
+    Element i of an array is drawn from ``(seed, trial + i, stream)``: the same numbers as in C++, however the work is
+    divided. Each call counts on from the last.
+
+    Parameters
+    ----------
+    seed, trial, stream : int
+    """
+
+    __slots__ = ("seed", "trial", "stream")
+
+    def __init__(self, seed, trial=0, stream=0):
+        self.seed, self.trial, self.stream = int(seed), int(trial), int(stream)
+
+    def _draw(self, function, shape):
+        rows = math.prod(shape[:-1])
+        result = function(self.seed, self.trial, self.stream, rows, shape[-1]).reshape(shape)
+        self.trial += rows
+        return result
+
+    def standard_normal(self, shape):
+        """Standard normals of a shape (..., k), k from each counter."""
+        return self._draw(_core.counter_normals, tuple(shape))
+
+    def uniform(self, shape):
+        """Uniform numbers in (0, 1) of a shape (..., k), k from each counter."""
+        return self._draw(_core.counter_uniforms, tuple(shape))
+
+    def __repr__(self):
+        return f"CounterRng({self.seed}, trial={self.trial}, stream={self.stream})"
+
+
+def _normals(rng, shape, caller):
+    if rng is None:
+        rng = np.random.default_rng()
+    if isinstance(rng, numbers.Integral):
+        rng = CounterRng(rng)
+    if not hasattr(rng, "standard_normal"):
+        raise TypeError(f"{caller}: rng: expected a numpy.random.Generator, a CounterRng or a seed")
+    return rng.standard_normal(shape)
+
+
+def sample(mean, covariance, size=None, rng=None):
+    """Random features mean·exp(e), e ~ N(0, covariance).
+
+    Parameters
+    ----------
+    mean : an array of features
+    covariance : array_like, shape (..., k, k)
+        May be singular.
+    size : int or tuple of ints, optional
+        Shape of the result, to which `mean` and `covariance` are broadcast; None: theirs.
+    rng : numpy.random.Generator, CounterRng or int, optional
+        An int is the seed of a CounterRng. None: a fresh generator.
+    """
+    mean = require_manifold(mean, "sample")
+    kind = type(mean)
+    k = (kind.dof, kind.dof)
+    c = _covariances(covariance, "sample: covariance", kind)
+    lead = np.broadcast_shapes(mean.shape, c.shape[:-2])
+    if size is not None:
+        size = (size,) if isinstance(size, numbers.Integral) else tuple(size)
+        lead = np.broadcast_shapes(size, lead)
+    operands = [
+        ("mean", mean.params, (kind.parameters,)),
+        ("covariance", c, k),
+        ("normals", _normals(rng, (*lead, kind.dof), "sample"), (kind.dof,)),
+    ]
+    return kind._of(operate(kind._operations["sampled"], "sample", operands, (kind.parameters,)))
+
+
+def random_rotations(size=None, rng=None):
+    """Uniform random rotations.
+
+    Parameters
+    ----------
+    size : int or tuple of ints, optional
+        None: a single one.
+    rng : numpy.random.Generator, CounterRng or int, optional
+
+    Returns
+    -------
+    SO3
+    """
+    shape = () if size is None else (size,) if isinstance(size, numbers.Integral) else tuple(size)
+    return SO3.from_quat(_normals(rng, (*shape, 4), "random_rotations"))
+
+
+def random_directions(size=None, rng=None):
+    """Uniform random directions; see `random_rotations`.
+
+    Returns
+    -------
+    S2
+    """
+    shape = () if size is None else (size,) if isinstance(size, numbers.Integral) else tuple(size)
+    return S2.from_vector(_normals(rng, (*shape, 3), "random_directions"))
+
+
+def fuse(x, covariances=None, axis=None, *, covariance_at=None):
+    """Independent estimates of one feature, fused: the mean of least Mahalanobis distances with its covariance.
+
+    Faster than ``mean(x, covariances=...)``, which looks for other minima, too.
+
+    Parameters
+    ----------
+    x : an array of features, or a Gaussian
+    covariances : array_like, shape (..., k, k)
+        Broadcast to ``x.shape``.
+    axis : None, int or tuple of ints
+        Axes along which features are fused; None: all of them.
+    covariance_at : {'measured', 'estimated'}
+        For frames: the axes of the covariances, see `mean`.
+
+    Returns
+    -------
+    Gaussian
+
+    Warns
+    -----
+    UserWarning
+        Where the covariance is withheld (NaN): directions or rotations as scattered as uniform ones, or a criterion
+        that is flat where the truth may be.
+    """
+    if isinstance(x, Gaussian):
+        if covariances is not None:
+            raise TypeError("fuse: a Gaussian has its covariances already")
+        x, covariances = x.mean, x.covariance
+    x = require_manifold(x, "fuse")
+    if covariances is None:
+        raise TypeError("fuse: covariances are missing")
+    if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
+        raise ValueError(
+            "fuse: covariance_at: say 'measured' (covariances in the axes of each measurement) or 'estimated'"
+        )
+    kind = type(x)
+    if x.ndim == 0:
+        x = x.reshape(1)
+    axes = _axes(axis, x.ndim, "fuse")
+    k = (kind.dof, kind.dof)
+    c = np.broadcast_to(_covariances(covariances, "fuse: covariances", kind, x.shape), (*x.shape, *k))
+    features, lead = _grouped(require_finite(x.params, "fuse: x"), axes, x.ndim)
+    if features.shape[1] == 0:
+        raise ValueError(f"fuse: x, shape {x.shape}: there are no features")
+    c = _grouped(c, axes, x.ndim)[0]
+    mean, covariance = _core.fuse(
+        kind._core_name,
+        np.ascontiguousarray(features),
+        np.ascontiguousarray(c),
+        covariance_at != "estimated",
+    )
+    bad = int(np.count_nonzero(~np.isfinite(covariance).all(axis=(1, 2))))
+    if bad:
+        warnings.warn(
+            f"liestat.fuse: no covariance of {bad} of {len(mean)} results: the measurements do not determine it",
+            UserWarning,
+            stacklevel=2,
+        )
+    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, *k))
+
+
+def _tangent_of(value):
+    """Dimension of a result of a user's function, how to compare two of them."""
+    if isinstance(value, Manifold):
+        if not value.single:
+            raise ValueError(f"propagate: the function returned {value!r}; expected one feature or a vector")
+        return value.dof, lambda a, b: a.local(b)
+    vector = np.asarray(value, dtype=np.float64)
+    if vector.ndim > 1:
+        raise ValueError(f"propagate: the function returned an array of shape {vector.shape}; expected a vector")
+    return vector.size, lambda a, b: np.ravel(np.asarray(b, dtype=np.float64) - np.asarray(a, dtype=np.float64))
+
+
+def propagate(function, *inputs, jacobian=None, joint_covariance=None, step=6e-6):
+    """The covariance of a function of uncertain features, to first order.
+
+    The function is called by this thread with the GIL held.
+
+    Parameters
+    ----------
+    function : callable
+        Takes the means of `inputs`, returns a feature, a number or a vector.
+    *inputs : Gaussian, or (mean, covariance) with a vector or number for a mean
+        Single features, independent of each other.
+    jacobian : array_like or callable, optional
+        Derivative with respect to the tangent vectors of all inputs, shape (result, inputs), in local axes, or a
+        function of the means that returns it. None: central differences.
+    joint_covariance : array_like, optional
+        Of all inputs together, where they are correlated.
+    step : float
+        Of the differences, in units of the tangent coordinates (rad, m).
+
+    Returns
+    -------
+    Gaussian, or (value, covariance) for numbers and vectors
+    """
+    means, blocks = [], []
+    for i, x in enumerate(inputs):
+        mean, covariance = (x.mean, x.covariance) if isinstance(x, Gaussian) else x
+        if isinstance(mean, Manifold):
+            if not mean.single:
+                raise ValueError(f"propagate: input {i}: expected one feature, got shape {mean.shape}")
+            dof = mean.dof
+        else:
+            mean = require_finite(as_numbers(mean, f"propagate: input {i}", ()), f"propagate: input {i}")
+            dof = mean.size
+        name = f"propagate: covariance {i}"
+        square = np.reshape(covariance, (1, 1)) if dof == 1 else covariance
+        c = require_finite(as_numbers(square, name, (dof, dof)), name)
+        means.append(mean)
+        blocks.append(c)
+    sizes = [len(b) for b in blocks]
+    total = sum(sizes)
+    if joint_covariance is not None:
+        name = "propagate: joint_covariance"
+        sigma = require_finite(as_numbers(joint_covariance, name, (total, total)), name)
+    else:
+        sigma = np.zeros((total, total))
+        at = 0
+        for block in blocks:
+            sigma[at : at + len(block), at : at + len(block)] = block
+            at += len(block)
+    value = function(*means)
+    rows, difference = _tangent_of(value)
+    if jacobian is not None:
+        J = jacobian(*means) if callable(jacobian) else jacobian
+        if np.ndim(J) < 2:
+            J = np.reshape(J, (rows, total))
+        J = require_finite(as_numbers(J, "propagate: jacobian", (rows, total)), "propagate: jacobian")
+    else:
+        J = np.empty((rows, total))
+        column = 0
+        for i, mean in enumerate(means):
+            for j in range(sizes[i]):
+                ends = []
+                for sign in (-1.0, 1.0):
+                    e = np.zeros(sizes[i])
+                    e[j] = sign * step
+                    moved = list(means)
+                    moved[i] = mean.retract(e) if isinstance(mean, Manifold) else mean + e.reshape(mean.shape)
+                    ends.append(difference(value, function(*moved)))
+                J[:, column] = (ends[1] - ends[0]) / (2 * step)
+                column += 1
+        require_finite(J, "propagate: derivative of the function by differences")
+    covariance = J @ sigma @ J.T
+    if isinstance(value, Manifold):
+        return Gaussian._of(value, covariance)
+    return value, covariance
+
+
+class ValidationReport:
+    """What a Monte-Carlo validation found; `str` gives the table.
+
+    Attributes
+    ----------
+    passed : bool
+    verdict, reason : str
+    index, expected_index, index_se, index_p_value : float
+        Mean squared Mahalanobis distance of the truth, and its expectation under the law.
+    coverage : dict
+        Observed frequency of the law's 50, 90, 95 and 99 % regions.
+    ks_statistic, ks_p_value : float
+        Kolmogorov-Smirnov distance from the law.
+    trials, failures, exceptions : int
+    distances : ndarray
+        Squared Mahalanobis distances in the order of the trials, NaN for failed ones.
+    """
+
+    def __init__(self, fields, distances, law):
+        self._table = fields.pop("table")
+        self.__dict__.update(fields)
+        self.distances, self.law = distances, law
+
+    def __str__(self):
+        return self._table
+
+    def __repr__(self):
+        index = f"index {self.index:.3g} of {self.expected_index:.3g}"
+        return f"<ValidationReport: {self.verdict}, {index}, {self.trials} trials>"
+
+
+def validate(
+    estimator,
+    draw,
+    *,
+    trials=1000,
+    seed=0,
+    law=None,
+    false_alarm=1e-5,
+    tolerance=0.0,
+    failure_fraction=0.0,
+    ks_tolerance=0.0,
+    tail=0.0,
+):
+    """Whether an estimator's covariance is right: Monte Carlo over scenes with known truth.
+
+    The functions are called by this thread with the GIL held.
+
+    Parameters
+    ----------
+    estimator : callable
+        Takes a scene's measurements and returns a Gaussian, a MeanResult, or (mean, covariance); None if it gives up.
+        An exception fails the trial.
+    draw : callable
+        Takes a ``numpy.random.Generator`` made for the trial alone and returns (truth, measurements).
+    trials, seed : int
+        Trial i draws from a generator seeded with (seed, i).
+    law : Law, optional
+        The law of the squared distances; None: χ², or that of the first MeanResult.
+    false_alarm : float
+        Probability that a correct estimator fails.
+    tolerance, failure_fraction, ks_tolerance, tail : float
+        Allowed relative deviation of the index, probability of a failed trial, distance from the law and excess beyond
+        its 99.9 % quantile.
+
+    Returns
+    -------
+    ValidationReport
+    """
+    distances = np.full(int(trials), np.nan)
+    exceptions = 0
+    dof = 0
+    for i in range(int(trials)):
+        truth, measurements = draw(np.random.default_rng((int(seed), i)))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                estimate = estimator(measurements)
+        except Exception:
+            exceptions += 1
+            continue
+        if estimate is None:
+            continue
+        if hasattr(estimate, "covariance"):
+            mean, covariance = estimate.mean, estimate.covariance
+        else:
+            mean, covariance = estimate
+        if covariance is None:
+            continue
+        if law is None and isinstance(getattr(estimate, "law", None), Law):
+            law = estimate.law
+        if isinstance(truth, Manifold):
+            dof = truth.dof
+            distances[i] = mahalanobis(mean, covariance, truth) ** 2
+        else:
+            error = np.atleast_1d(np.asarray(truth, dtype=np.float64) - mean)
+            dof = error.size
+            distances[i] = error @ np.linalg.solve(np.reshape(covariance, (dof, dof)), error)
+    law = Law(dof) if law is None else law
+    fields = _core.validation_report(
+        distances,
+        exceptions,
+        law.dof,
+        law.samples or 0,
+        float(false_alarm),
+        float(tolerance),
+        float(ks_tolerance),
+        float(failure_fraction),
+        float(tail),
+    )
+    return ValidationReport(fields, distances, law)

@@ -1,0 +1,604 @@
+"""Sensors and estimators: preintegration, visual-inertial initialisation, two views, hand-eye, motion from tracks."""
+
+import numbers
+import warnings
+
+import numpy as np
+
+from . import _core
+from ._gaussians import Gaussian
+from ._manifolds import S2, SE3, SE23, SO3
+from ._operate import as_numbers, require_finite
+from ._statistics import _covariances
+
+
+class Result:
+    """A result with named parts, which are attributes; `keys()` lists them."""
+
+    def __init__(self, title, **parts):
+        self._title = title
+        self.__dict__.update(parts)
+
+    def keys(self):
+        """Names of the parts."""
+        return [name for name in self.__dict__ if not name.startswith("_")]
+
+    def __getitem__(self, name):
+        return self.__dict__[name]
+
+    def __getattr__(self, name):
+        raise AttributeError(f"no part {name!r}; there are {', '.join(self.keys())}")
+
+    def __repr__(self):
+        status = self.__dict__.get("status")
+        return f"<{self._title}{'' if status is None else f': {status}'}; {', '.join(self.keys())}>"
+
+
+def _numbers(value, name, tail):
+    return np.asarray(require_finite(as_numbers(value, name, tail), name), order="C")
+
+
+def _rows(value, name, columns):
+    array = _numbers(value, name, (columns,))
+    if array.ndim != 2:
+        raise ValueError(f"{name}: expected shape (n, {columns}), got {array.shape}")
+    return array
+
+
+def _vector(value, name):
+    array = _numbers(value, name, ())
+    if array.ndim != 1:
+        raise ValueError(f"{name}: expected shape (n,), got {array.shape}")
+    return array
+
+
+def _same_length(caller, **arrays):
+    sizes = {name: len(a) for name, a in arrays.items()}
+    if len(set(sizes.values())) > 1:
+        raise ValueError(f"{caller}: lengths differ: " + ", ".join(f"{n} {s}" for n, s in sizes.items()))
+
+
+def _readings(caller, times, rates, forces):
+    t = _vector(times, f"{caller}: times")
+    w = _rows(rates, f"{caller}: rates", 3)
+    f = _rows(forces, f"{caller}: forces", 3)
+    _same_length(caller, times=t, rates=w, forces=f)
+    return np.ascontiguousarray(np.concatenate([t[:, None], w, f], axis=1))
+
+
+def _noise(caller, noise):
+    array = _vector(noise, f"{caller}: noise")
+    if len(array) not in (2, 4) or (array < 0).any():
+        raise ValueError(
+            f"{caller}: noise: expected (gyroscope, accelerometer), or these with their walks, none negative, "
+            f"got {array}"
+        )
+    return np.concatenate([array, np.zeros(4 - len(array))])
+
+
+def preintegrate(
+    times, rates, forces, begin, end, *, noise=(0.0, 0.0), bias=None, scheme="averaged", max_gap=0.1, threads=0
+):
+    """Preintegrated motions of many intervals of one inertial recording.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        s, ascending.
+    rates, forces : array_like, shape (n, 3)
+        Angular rate (rad/s) and specific force (m/s²) in the sensor's axes.
+    begin, end : float or array_like, shape (m,)
+        s; the ends of the intervals.
+    noise : sequence
+        Densities: gyroscope (rad/s/√Hz), accelerometer (m/s²/√Hz), and of the random walks of their biases
+        (rad/s²/√Hz, m/s³/√Hz).
+    bias : array_like, shape (6,), optional
+        Gyroscope (rad/s), accelerometer (m/s²); taken off every reading.
+    scheme : {'averaged', 'held', 'cubic'}
+        How motion goes on between readings.
+    max_gap : float
+        s; readings further apart than this make an interval not usable.
+
+    Returns
+    -------
+    Result
+        `increment` (SE23: rotation, position, velocity), `covariance` (..., 9, 9) in its tangent (position, rotation,
+        velocity), `covariance_with_bias` (..., 15, 15), `bias_jacobian` (..., 9, 6), `faults` (list of str, empty
+        where there is none) and `ok`.
+
+    Warns
+    -----
+    UserWarning
+        Where an interval is not usable: its covariance is NaN.
+    """
+    readings = _readings("preintegrate", times, rates, forces)
+    b, e = np.broadcast_arrays(
+        _numbers(begin, "preintegrate: begin", ()), _numbers(end, "preintegrate: end", ())
+    )
+    lead = b.shape
+    bias = np.zeros(6) if bias is None else _vector(bias, "preintegrate: bias")
+    if bias.shape != (6,):
+        raise ValueError(f"preintegrate: bias: expected shape (6,), got {bias.shape}")
+    d = _core.preintegrate(
+        readings,
+        np.ascontiguousarray(b).ravel(),
+        np.ascontiguousarray(e).ravel(),
+        _noise("preintegrate", noise),
+        bias,
+        scheme,
+        float(max_gap),
+        int(threads),
+    )
+    ok = np.array([not fault for fault in d["faults"]], dtype=bool)
+    if not ok.all():
+        first = int(np.argmin(ok))
+        warnings.warn(
+            f"liestat.preintegrate: {np.count_nonzero(~ok)} of {len(ok)} intervals are not usable; {first}: "
+            f"{d['faults'][first]}",
+            UserWarning,
+            stacklevel=2,
+        )
+        for name in ("covariance", "covariance_with_bias", "bias_jacobian"):
+            d[name][~ok] = np.nan
+    return Result(
+        "preintegrated motion",
+        increment=SE23._of(d["increment"].reshape(*lead, 10)),
+        covariance=d["covariance"].reshape(*lead, 9, 9),
+        covariance_with_bias=d["covariance_with_bias"].reshape(*lead, 15, 15),
+        bias_jacobian=d["bias_jacobian"].reshape(*lead, 9, 6),
+        faults=d["faults"],
+        ok=ok.reshape(lead)[()],
+    )
+
+
+def hand_eye(
+    a,
+    b,
+    a_covariance,
+    b_covariance,
+    *,
+    relative=False,
+    known_noise=True,
+    find_outliers=True,
+    gate=22.457744484825327,
+    samples=80,
+    seed=1,
+):
+    """Hand-eye calibration from pairs of poses that both carry noise.
+
+    Parameters
+    ----------
+    a, b : SE3, shape (n,)
+        base_T_gripper and target_T_camera (A X = Y B); with `relative` independent motions of both (A X = X B).
+    a_covariance, b_covariance : array_like, shape (6, 6) or (n, 6, 6)
+        m² and rad², body axes, translation before rotation. One of them may be zero.
+    relative : bool
+    known_noise : bool
+        False: the covariances are known up to a common factor, which is estimated.
+    find_outliers : bool
+    gate : float
+        Squared error of a pair beyond which it is an outlier; χ²₆ at 0.999 by default.
+    samples, seed : int
+        Of the search for outliers.
+
+    Returns
+    -------
+    Result
+        `status`, `reason`, `X` and `Y` (Gaussians: gripper_T_camera, base_T_target), the joint `covariance` (12, 12),
+        `directions` that the motions leave open, `excitations`, `outliers`, `errors` and `pair_chi2` of the pairs,
+        `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival`.
+
+    Warns
+    -----
+    UserWarning
+        Where the status is not 'ok'.
+    """
+    for name, value in (("a", a), ("b", b)):
+        if not isinstance(value, SE3) or value.ndim != 1:
+            shape = f" of shape {value.shape}" if hasattr(value, "shape") else ""
+            raise TypeError(f"hand_eye: {name}: expected SE3 of shape (n,), got {type(value).__name__}{shape}")
+    _same_length("hand_eye", a=a, b=b)
+    n = len(a)
+    covariances = []
+    for name, value in (("a_covariance", a_covariance), ("b_covariance", b_covariance)):
+        c = _covariances(value, f"hand_eye: {name}", SE3, (n,))
+        covariances.append(np.ascontiguousarray(np.broadcast_to(c, (n, 6, 6))))
+    d = _core.hand_eye(
+        np.ascontiguousarray(a.params),
+        covariances[0],
+        np.ascontiguousarray(b.params),
+        covariances[1],
+        not relative,
+        bool(known_noise),
+        bool(find_outliers),
+        float(gate),
+        int(samples),
+        int(seed),
+    )
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.hand_eye: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
+    X = Gaussian._of(SE3._of(d.pop("X")), d.pop("X_covariance"))
+    Y = Gaussian._of(SE3._of(d.pop("Y")), d.pop("Y_covariance"))
+    d["rival"] = None if d["rival"] is None else SE3._of(d["rival"])
+    d["directions"] = [Result("open direction", **one) for one in d["directions"]]
+    return Result("hand-eye calibration", X=X, Y=None if relative else Y, **d)
+
+
+class Camera:
+    """A central camera: pinhole, or with a lens that bends rays.
+
+    Parameters
+    ----------
+    fu, fv, cu, cv : float
+        Focal lengths and principal point, pixels.
+    distortion : {'none', 'radtan', 'equidistant'}
+    coefficients : sequence of 4 floats
+        k1 k2 p1 p2 of 'radtan', k1 k2 k3 k4 of 'equidistant'.
+    width, height : int
+        Pixels; 0 where they are not known.
+    """
+
+    _names = ("none", "radtan", "equidistant")
+
+    def __init__(self, fu, fv, cu, cv, distortion="none", coefficients=(0, 0, 0, 0), width=0, height=0):
+        if distortion not in self._names:
+            raise ValueError(f"Camera: distortion: expected one of {', '.join(self._names)}, got {distortion!r}")
+        if not (fu > 0 and fv > 0):
+            raise ValueError(f"Camera: focal lengths must be positive, got {fu} and {fv}")
+        self.fu, self.fv, self.cu, self.cv = float(fu), float(fv), float(cu), float(cv)
+        self.distortion = distortion
+        self.coefficients = tuple(float(c) for c in _vector(coefficients, "Camera: coefficients"))
+        if len(self.coefficients) != 4:
+            raise ValueError(f"Camera: coefficients: expected 4 numbers, got {len(self.coefficients)}")
+        self.width, self.height = int(width), int(height)
+
+    def _list(self):
+        distortion = float(self._names.index(self.distortion))
+        return np.array(
+            [self.fu, self.fv, self.cu, self.cv, distortion, *self.coefficients, self.width, self.height], dtype=float
+        )
+
+    def __repr__(self):
+        return f"Camera({self.fu:g}, {self.fv:g}, {self.cu:g}, {self.cv:g}, {self.distortion!r})"
+
+    def bearings(self, pixels, sigma=1.0):
+        """Unit vectors of pixels with their standard deviations.
+
+        Parameters
+        ----------
+        pixels : array_like, shape (n, 2)
+        sigma : float
+            Standard deviation of each coordinate, pixels.
+
+        Returns
+        -------
+        bearings : ndarray, shape (n, 3)
+            In the camera's axes: x right, y down, z ahead. NaN where no direction is seen at a pixel.
+        sigmas : ndarray, shape (n,)
+            rad.
+        """
+        rows = _core.bearings(self._list(), _rows(pixels, "Camera.bearings: pixels", 2), float(sigma))
+        return rows[:, :3].copy(), rows[:, 3].copy()
+
+
+def _relative_pose(d):
+    if d is None:
+        return None
+    return Result(
+        "relative pose",
+        rotation=SO3._of(d["quaternion"]),
+        direction=S2._of(d["direction"]),
+        covariance=d["covariance"],
+    )
+
+
+def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, seed=1):
+    """The motion between two images from matches of which some are wrong, its model chosen from several.
+
+    Parameters
+    ----------
+    matches : array_like, shape (n, 4)
+        x y x' y', pixels.
+    sigma : float
+        Standard deviation of each coordinate, pixels.
+    camera, second_camera : Camera, optional
+        Of the first image, and of the second if it is another one.
+    image_size : (width, height), optional
+    seed : int
+
+    Returns
+    -------
+    Result
+        `status`, `reason`, `model` (its name), `matrix` (H or F in pixels) with `matrix_covariance` (9, 9, of entries
+        column after column), `physical` (list; each with `names`, `units`, `values`, `covariance`), `relative_pose`
+        (`rotation`, `direction`, `covariance` of the tangent (direction, rotation); x' = R x + t), `inlier`, `errors`,
+        `threshold`, `lattice`.
+
+    Warns
+    -----
+    UserWarning
+        Where the status is not 'ok'.
+    """
+    m = _rows(matches, "two_view: matches", 4)
+    if not sigma > 0:
+        raise ValueError(f"two_view: sigma: expected a positive number, got {sigma}")
+    nothing = np.empty(0)
+    size = nothing if image_size is None else _vector(image_size, "two_view: image_size")
+    d = _core.two_view(
+        m,
+        float(sigma),
+        nothing if camera is None else camera._list(),
+        nothing if second_camera is None else second_camera._list(),
+        size,
+        int(seed),
+    )
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.two_view: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
+    d["relative_pose"] = _relative_pose(d["relative_pose"])
+    d["physical"] = [Result("physical parameters", **one) for one in d["physical"]]
+    return Result("two-view motion", **d)
+
+
+def robust_two_view(model, matches, sigma, *, confidence=0.9999, threshold=0.0, max_draws=100000, seed=1):
+    """One model of two views from matches of which some are wrong.
+
+    Parameters
+    ----------
+    model : {'homography', 'fundamental', 'pose'}
+        'pose' takes matches in normalised coordinates, (pixel - centre) / focal length.
+    matches : array_like, shape (n, 4)
+        x y x' y'.
+    sigma : float or (float, float)
+        Standard deviation of the coordinates in each image, in the unit of the matches.
+
+    Returns
+    -------
+    Result
+        `status`, `matrix` (H, F or E), `matrix_covariance`, `relative_pose`, `inliers`, `score`, `chi2`, `confidence`,
+        `draws`.
+    """
+    if model not in ("homography", "fundamental", "pose"):
+        raise ValueError(f"robust_two_view: model: expected 'homography', 'fundamental' or 'pose', got {model!r}")
+    first, second = (sigma, sigma) if isinstance(sigma, numbers.Real) else sigma
+    d = _core.robust_two_view(
+        model,
+        _rows(matches, "robust_two_view: matches", 4),
+        float(first),
+        float(second),
+        float(confidence),
+        float(threshold),
+        int(max_draws),
+        int(seed),
+    )
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.robust_two_view: {d['status']}", UserWarning, stacklevel=2)
+    d["relative_pose"] = _relative_pose(d["relative_pose"])
+    return Result(model, **d)
+
+
+def motion(
+    frames,
+    tracks,
+    points,
+    sigma,
+    *,
+    span=4,
+    outliers=False,
+    essential=True,
+    process_noise=1e-5,
+    gyroscope=None,
+    gyroscope_covariance=None,
+):
+    """Direction of motion and rotation of a camera, frame by frame, from point tracks.
+
+    Parameters
+    ----------
+    frames, tracks : array_like of int, shape (n,)
+        Which frame (0 to the last, in any order) and which track each point belongs to.
+    points : array_like, shape (n, 2)
+        Calibrated coordinates, (pixel - centre) / focal length.
+    sigma : float
+        Their standard deviation.
+    span : int
+        Pairs join a track's newest position with its oldest within so many frames.
+    outliers : bool
+        Expect some.
+    essential : bool
+        Hand over to the essential filter once one direction is left.
+    process_noise : float
+        rad² per frame of the direction: 1e-5 nearly constant, 1e-3 manoeuvring.
+    gyroscope : array_like, shape (m, 3), optional
+        Apparent rotation vector of the points over each frame's pairs, rad per frame.
+    gyroscope_covariance : array_like, shape (3, 3) or (m, 3, 3), optional
+
+    Returns
+    -------
+    Result
+        One entry for each frame: `direction` (S2) with `direction_covariance` (m, 2, 2), `rotation` (SO3,
+        second_R_first) with `rotation_covariance` (m, 3, 3), `mean_inverse_depth`, `innovation`, `inliers`, and the
+        flags `ok`, `standstill`, `degenerate`, `ambiguous`, `undecided_sign`, `lost`.
+    """
+    f = np.asarray(frames)
+    t = np.asarray(tracks)
+    p = _rows(points, "motion: points", 2)
+    for name, value in (("frames", f), ("tracks", t)):
+        if value.ndim != 1 or not np.issubdtype(value.dtype, np.integer) or (value < 0).any():
+            found = f"{value.dtype} {value.shape}"
+            raise ValueError(f"motion: {name}: expected integers of shape (n,), none negative, got {found}")
+    _same_length("motion", frames=f, tracks=t, points=p)
+    if not sigma > 0:
+        raise ValueError(f"motion: sigma: expected a positive number, got {sigma}")
+    n = int(f.max()) + 1 if len(f) else 0
+    order = np.argsort(f, kind="stable")
+    offsets = np.searchsorted(f[order], np.arange(n + 1)).astype(np.int64)
+    g, c = np.empty((0, 3)), np.empty((0, 3, 3))
+    if gyroscope is not None:
+        g = _rows(gyroscope, "motion: gyroscope", 3)
+        if len(g) != n:
+            raise ValueError(f"motion: gyroscope: expected shape ({n}, 3), one for each frame, got {g.shape}")
+        if gyroscope_covariance is None:
+            raise ValueError("motion: gyroscope_covariance is missing")
+        c = np.ascontiguousarray(
+            np.broadcast_to(_covariances(gyroscope_covariance, "motion: gyroscope_covariance", SO3, (n,)), (n, 3, 3))
+        )
+    d = _core.motion(
+        offsets,
+        np.ascontiguousarray(t[order], dtype=np.int64),
+        np.ascontiguousarray(p[order]),
+        float(sigma),
+        int(span),
+        bool(outliers),
+        bool(essential),
+        g,
+        c,
+        float(process_noise),
+    )
+    d["direction"] = S2._of(d["direction"])
+    d["rotation"] = SO3._of(d["rotation"])
+    return Result("motion of a camera", **d)
+
+
+#: Blocks of the joint covariance of a refined window: name and first row; three rows each.
+VI_BLOCKS = {
+    "velocity": 0,
+    "last_position": 3,
+    "last_rotation": 6,
+    "last_velocity": 9,
+    "gravity": 12,
+    "gyroscope_bias": 15,
+    "accelerometer_bias": 18,
+    "last_gyroscope_bias": 21,
+    "last_accelerometer_bias": 24,
+}
+
+
+class InitialisedWindow(Result):
+    """A window of a visual-inertial recording, in the body's axes at its first image.
+
+    Attributes
+    ----------
+    status, reason : str
+    begin, end : float
+        s.
+    velocity, gravity : ndarray, shape (3,), or None
+        At the first image, m/s and m/s².
+    gyroscope_bias, accelerometer_bias : ndarray, shape (3,)
+    states : SE23, shape (images,)
+    covariance : ndarray, shape (27, 27), or None
+        Joint covariance, see `block`; None where the window was not refined.
+    scale_sigma, tilt_sigma, chi2 : float
+    images, tracks, inliers : list of int
+    """
+
+    def block(self, row, column=None):
+        """ndarray, shape (3, 3): the covariance of a block by its name (`VI_BLOCKS`), or of two blocks."""
+        if self.covariance is None:
+            raise ValueError(f"no covariance: {self.reason}")
+        i, j = VI_BLOCKS[row], VI_BLOCKS[row if column is None else column]
+        return self.covariance[i : i + 3, j : j + 3]
+
+
+def vi_init(
+    times,
+    rates,
+    forces,
+    noise,
+    image_times,
+    images,
+    tracks,
+    bearings,
+    sigmas,
+    *,
+    body_T_camera=None,
+    cameras=None,
+    window=2.0,
+    stride=0.0,
+    image_rate=10.0,
+    consensus=True,
+    refinement=True,
+    stretch=12.0,
+    gravity=9.81,
+    gyroscope_sigma=0.1,
+    accelerometer_sigma=0.15,
+    seed=1,
+):
+    """Velocity, gravity, scale and biases of a visual-inertial recording, window by window, without a first guess.
+
+    Parameters
+    ----------
+    times, rates, forces : array_like
+        Inertial readings: s, rad/s, m/s², as in `preintegrate`.
+    noise : sequence
+        Densities as in `preintegrate`; both white ones positive.
+    image_times : array_like, shape (m,)
+        s, ascending.
+    images, tracks : array_like of int, shape (n,)
+        Which image and which track each bearing belongs to.
+    bearings : array_like, shape (n, 3)
+        In the camera's axes; `Camera.bearings` makes them of pixels.
+    sigmas : float or array_like, shape (n,)
+        Their standard deviations, rad.
+    body_T_camera : SE3, optional
+        Pose of the camera, or of each camera, in the body.
+    cameras : array_like of int, shape (n,), optional
+        Which camera each bearing belongs to.
+    window, stride, image_rate, stretch : float
+        s, s (0: the window), Hz, s.
+    consensus, refinement : bool
+        Tracks may be wrong; refine the closed form.
+    gravity : float or None
+        m/s²; None: unknown.
+    gyroscope_sigma, accelerometer_sigma : float
+        Priors of the biases, rad/s and m/s².
+
+    Returns
+    -------
+    Result
+        `windows` (list of InitialisedWindow), `stretches`, `images_outside`.
+    """
+    readings = _readings("vi_init", times, rates, forces)
+    stamps = _vector(image_times, "vi_init: image_times")
+    rays = _rows(bearings, "vi_init: bearings", 3)
+    n = len(rays)
+    indices = np.zeros((n, 3), dtype=np.int64)
+    for column, (name, value) in enumerate((("images", images), ("tracks", tracks), ("cameras", cameras))):
+        if value is None:
+            continue
+        array = np.asarray(value)
+        if array.shape != (n,) or not np.issubdtype(array.dtype, np.integer) or (array < 0).any():
+            found = f"{array.dtype} {array.shape}"
+            raise ValueError(f"vi_init: {name}: expected integers of shape ({n},), none negative, got {found}")
+        indices[:, column] = array
+    rows = np.empty((n, 4))
+    rows[:, :3] = rays
+    rows[:, 3] = _numbers(sigmas, "vi_init: sigmas", ())
+    poses = SE3.identity(1) if body_T_camera is None else body_T_camera
+    poses = poses.reshape(-1)
+    d = _core.vi_init(
+        readings,
+        _noise("vi_init", noise),
+        stamps,
+        np.ascontiguousarray(poses.params),
+        indices,
+        rows,
+        float(window),
+        float(stride),
+        float(image_rate),
+        bool(consensus),
+        bool(refinement),
+        float(stretch),
+        0.0 if gravity is None else float(gravity),
+        float(gyroscope_sigma),
+        float(accelerometer_sigma),
+        int(seed),
+    )
+    if d["fault"]:
+        raise ValueError(f"vi_init: {d['fault']}")
+    windows = []
+    for one in d["windows"]:
+        one["states"] = SE23._of(one["states"])
+        windows.append(InitialisedWindow("window", **one))
+    stretches = [Result("stretch", **one) for one in d["stretches"]]
+    return Result(
+        "visual-inertial initialisation", windows=windows, stretches=stretches, images_outside=d["images_outside"]
+    )

@@ -1,0 +1,43 @@
+// The report of a Monte-Carlo validation for Python, from the distances of its trials.
+#include <python/src/binding.hpp>
+#include <stats/detail/validation_sample.hpp>
+#include <stats/validation_report.hpp>
+
+namespace liestat::python {
+namespace {
+
+py::dict report(const DoubleArray& distances, std::size_t exceptions, int dof, int samples, double false_alarm,
+                double index_tolerance, double ks_tolerance, double failure_fraction, double tail) {
+  const ReferenceLaw law = samples > 0 ? ReferenceLaw::hotelling(dof, samples) : ReferenceLaw::chiSquared(dof);
+  liestat::detail::ValidationSample sample;
+  for (const double mu2 : numbers(distances)) sample.add(TrialOutcome{.mu2 = mu2});
+  sample.exceptions = exceptions;
+  const ValidationReport report = liestat::detail::summarize(sample, law);
+  const ValidationTolerance tolerance{
+      .index = index_tolerance, .ks = ks_tolerance, .failure_fraction = failure_fraction, .tail = tail};
+  const Verdict verdict = report.verdict(false_alarm, tolerance);
+  py::dict d;
+  d["trials"] = report.trials;
+  d["failures"] = report.failures;
+  d["exceptions"] = report.exceptions;
+  d["index"] = report.index;
+  d["expected_index"] = law.mean();
+  d["index_se"] = report.index_se;
+  d["index_p_value"] = report.index_p_value;
+  d["ks_statistic"] = report.ks_statistic;
+  d["ks_p_value"] = report.ks_p_value;
+  py::dict coverage;
+  for (const Coverage& c : report.coverage) coverage[py::float_(c.level)] = c.observed;
+  d["coverage"] = coverage;
+  d["verdict"] = text(name(verdict));
+  d["reason"] = text(reason(verdict));
+  d["passed"] = verdict == Verdict::passed;
+  d["table"] = table(report, false_alarm, tolerance);
+  return d;
+}
+
+}  // namespace
+
+void bindValidation(py::module_& module) { module.def("validation_report", &report); }
+
+}  // namespace liestat::python
