@@ -119,6 +119,16 @@ struct Pack {
     for (int i = 0; i < (sizeof(S) == 8 ? 4 : 3); ++i) y = y + y * (S(0.5) - half * y * y);
     return y;
   }
+  /// The integer next to a towards zero; |a| < 2⁵² (float: 2²³).
+  LIESTAT_ALWAYS_INLINE friend Pack truncated(const Pack& a) {
+    using Integer = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
+#if defined(__GNUC__)
+    typedef Integer Integers __attribute__((vector_size(registerBytes(Set))));
+    return Pack(__builtin_convertvector(__builtin_convertvector(a.v, Integers), Vector));
+#else
+    return Pack(static_cast<S>(static_cast<Integer>(a.v)));
+#endif
+  }
   LIESTAT_ALWAYS_INLINE friend S sumOf(const Pack& a) {
     S lanes[size], sum = 0;
     a.store(lanes);
