@@ -11,89 +11,69 @@ namespace liestat::detail {
 struct MotionArrays {
   static constexpr std::size_t DoF = 6, num_parameters = 7, Dim = 3;
 
-  struct Exp : RotationVectorVariants<3> {
-    static constexpr std::size_t a = 6, b = 0, out = 7, rows = 0;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Exp : RotationVectorOperation<6, 3, 7, 0> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
-      const PackVector<P> v = readVector(in, 0), omega = readVector(in, 3);
-      const PackAngle<Variant == 1, P> angle(dot(omega, omega));
+      const PackVector<P> v = readVector(in), omega = readVector(in + 3);
+      const PackAngle<special, P> angle(dot(omega, omega));
       const PackVector<P> ov = cross(omega, v);
       writeQuaternion(result, PackQuaternion<P>{(S(0.5) * angle.sinc) * omega, angle.cos});
-      writeVector(result, 4, v + (S(0.5) * angle.sinc * angle.sinc) * ov + angle.beta3() * cross(omega, ov));
+      writeVector(result + 4, v + (S(0.5) * angle.sinc * angle.sinc) * ov + angle.beta3() * cross(omega, ov));
     }
   };
-  struct Log : QuaternionVariants {
-    static constexpr std::size_t a = 7, b = 0, out = 6, rows = 0;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Log : QuaternionOperation<7, 6> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
       const PackQuaternion<P> q = readQuaternion(in);
-      const PackVector<P> t = readVector(in, 4);
-      const PackLogarithm<P> log = PackLogarithm<P>::template of<Variant, true>(q);
+      const PackVector<P> t = readVector(in + 4);
+      const PackLogarithm<P> log = PackLogarithm<P>::template of<special, true>(q);
       const PackVector<P> ut = cross(q.u, t);
-      writeVector(result, 0, t + (S(-0.5) * log.f) * ut + log.g * cross(q.u, ut));
-      writeVector(result, 3, log.f * q.u);
+      writeVector(result, t + (S(-0.5) * log.f) * ut + log.g * cross(q.u, ut));
+      writeVector(result + 3, log.f * q.u);
     }
   };
-  struct Product : OneVariant {
-    static constexpr std::size_t a = 7, b = 7, out = 7, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& left, const In& right, const Out& result) {
-      using P = typename In::Pack;
+  struct Product : ArrayOperation<7, 7, 7> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&left)[A], const P (&right)[B], P (&result)[N]) {
       const PackQuaternion<P> p = readQuaternion(left), q = readQuaternion(right);
-      const PackVector<P> t = p.rotate(readVector(right, 4)) + readVector(left, 4);
+      const PackVector<P> t = p.rotate(readVector(right + 4)) + readVector(left + 4);
       writeQuaternion(result, product(p, q));
-      writeVector(result, 4, t);
+      writeVector(result + 4, t);
     }
   };
-  struct Inverse : OneVariant {
-    static constexpr std::size_t a = 7, b = 0, out = 7, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Inverse : ArrayOperation<7, 0, 7> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       const PackQuaternion<P> q = readQuaternion(in).conjugate();
-      const PackVector<P> t = readVector(in, 4);
+      const PackVector<P> t = readVector(in + 4);
       writeQuaternion(result, q);
-      writeVector(result, 4, -q.rotate(t));
+      writeVector(result + 4, -q.rotate(t));
     }
   };
-  struct Act : OneVariant {
-    static constexpr std::size_t a = 7, b = 3, out = 3, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In& point, const Out& result) {
-      writeVector(result, 0, readQuaternion(in).rotate(readVector(point, 0)) + readVector(in, 4));
+  struct Act : ArrayOperation<7, 3, 3> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&point)[B], P (&result)[N]) {
+      writeVector(result, readQuaternion(in).rotate(readVector(point)) + readVector(in + 4));
     }
   };
-  struct Adjoint : OneVariant {
-    static constexpr std::size_t a = 7, b = 0, out = 36, rows = 6;
-    static constexpr bool sparse = true;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
-      const PackVector<P> t = readVector(in, 4);
+  struct Adjoint : ArrayOperation<7, 0, 36, 6> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
+      const PackVector<P> t = readVector(in + 4);
       const PackMatrix<P> R = PackMatrix<P>::rotation(readQuaternion(in));
       writeBlocks(result, R, PackMatrix<P>::skewTimes(t, R));
     }
   };
   template <int sign>
-  struct Jacobian : RotationVectorVariants<3> {
-    static constexpr std::size_t a = 6, b = 0, out = 36, rows = 6;
-    static constexpr bool sparse = true;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Jacobian : RotationVectorOperation<6, 3, 36, 6> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
-      const PackVector<P> rho = signedVector<sign>(readVector(in, 0)), phi = signedVector<sign>(readVector(in, 3));
+      const PackVector<P> rho = signedVector<sign>(readVector(in)), phi = signedVector<sign>(readVector(in + 3));
       const P t = dot(phi, phi), d = dot(phi, rho);
-      const PackAngle<Variant == 1, P> angle(t);
+      const PackAngle<special, P> angle(t);
       const P beta2 = S(0.5) * (angle.sinc * angle.sinc), beta3 = angle.beta3(), b5 = S(-2) * d * angle.beta5();
       const PackVector<P> axial = beta2 * rho + (d * (S(2) * angle.beta4() - beta3)) * phi;
       const PackVector<P> b = beta3 * rho + (S(0.5) * b5) * phi;
@@ -102,16 +82,13 @@ struct MotionArrays {
     }
   };
   template <int sign>
-  struct JacobianInverse : RotationVectorVariants<3> {
-    static constexpr std::size_t a = 6, b = 0, out = 36, rows = 6;
-    static constexpr bool sparse = true;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct JacobianInverse : RotationVectorOperation<6, 3, 36, 6> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
-      const PackVector<P> rho = signedVector<sign>(readVector(in, 0)), phi = signedVector<sign>(readVector(in, 3));
+      const PackVector<P> rho = signedVector<sign>(readVector(in)), phi = signedVector<sign>(readVector(in + 3));
       const P t = dot(phi, phi), d = dot(phi, rho);
-      const PackAngle<Variant == 1, P> angle(t);
+      const PackAngle<special, P> angle(t);
       const P c = angle.cotangentExcess(), slope = d * angle.cotangentExcessSlope();
       const PackVector<P> b = c * rho + (S(0.5) * slope) * phi;
       writeBlocks(result, PackMatrix<P>::rotationPolynomial(phi, P(S(1)), P(S(-0.5)), c),
@@ -126,9 +103,8 @@ struct MotionArrays {
     return -v;
   }
   /// [diagonal coupling; 0 diagonal]
-  template <class Out, class P>
-  LIESTAT_ALWAYS_INLINE static void writeBlocks(const Out& out, const PackMatrix<P>& diagonal,
-                                                const PackMatrix<P>& coupling) {
+  template <class P>
+  LIESTAT_ALWAYS_INLINE static void writeBlocks(P* out, const PackMatrix<P>& diagonal, const PackMatrix<P>& coupling) {
     writeBlock<6>(out, 0, 0, diagonal);
     writeBlock<6>(out, 3, 3, diagonal);
     writeBlock<6>(out, 0, 3, coupling);

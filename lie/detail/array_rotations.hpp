@@ -27,13 +27,13 @@ struct PackVector {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   }
 };
-template <class In>
-LIESTAT_ALWAYS_INLINE PackVector<typename In::Pack> readVector(const In& in, std::size_t first) {
-  return {in(first), in(first + 1), in(first + 2)};
+template <class P>
+LIESTAT_ALWAYS_INLINE PackVector<P> readVector(const P* in) {
+  return {in[0], in[1], in[2]};
 }
-template <class Out, class P>
-LIESTAT_ALWAYS_INLINE void writeVector(const Out& out, std::size_t first, const PackVector<P>& v) {
-  out(first, v.x), out(first + 1, v.y), out(first + 2, v.z);
+template <class P>
+LIESTAT_ALWAYS_INLINE void writeVector(P* out, const PackVector<P>& v) {
+  out[0] = v.x, out[1] = v.y, out[2] = v.z;
 }
 
 template <class P>
@@ -64,14 +64,19 @@ struct PackQuaternion {
     return p + w * t + cross(u, t);
   }
 };
-template <class In>
-LIESTAT_ALWAYS_INLINE PackQuaternion<typename In::Pack> readQuaternion(const In& in) {
-  return {readVector(in, 0), in(3)};
+template <class P>
+LIESTAT_ALWAYS_INLINE PackQuaternion<P> readQuaternion(const P* in) {
+  return {readVector(in), in[3]};
 }
-template <class Out, class P>
-LIESTAT_ALWAYS_INLINE void writeQuaternion(const Out& out, const PackQuaternion<P>& q) {
-  writeVector(out, 0, q.u), out(3, q.w);
+template <class P>
+LIESTAT_ALWAYS_INLINE void writeQuaternion(P* out, const PackQuaternion<P>& q) {
+  writeVector(out, q.u);
+  out[3] = q.w;
 }
+
+/// |q|² - 1 from which 1/|q| follows to second order.
+template <class S>
+inline constexpr S small_norm_excess = sizeof(S) == 8 ? S(5e-6) : S(1e-3);
 
 /// A 3×3 matrix, m[row][column].
 template <class P>
@@ -116,61 +121,46 @@ struct PackMatrix {
   }
 };
 /// As the block at (row, column) of a matrix of `rows` rows.
-template <std::size_t rows, class Out, class P>
-LIESTAT_ALWAYS_INLINE void writeBlock(const Out& out, std::size_t row, std::size_t column, const PackMatrix<P>& M) {
+template <std::size_t rows, class P>
+LIESTAT_ALWAYS_INLINE void writeBlock(P* out, std::size_t row, std::size_t column, const PackMatrix<P>& M) {
   LIESTAT_UNROLL for (std::size_t j = 0; j < 3; ++j) {
-    LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) out((column + j) * rows + row + i, M.m[i][j]);
+    LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) out[(column + j) * rows + row + i] = M.m[i][j];
   }
 }
 
-/// Operations on rotation vectors, numbers first … first + 2 of an element, of which those beyond the range of the
-/// polynomials need the second variant.
-template <std::size_t first>
-struct RotationVectorVariants {
-  static constexpr int variants = 2;
-
-  template <class In>
-  LIESTAT_ALWAYS_INLINE static bool variant(const In& in, std::size_t n) {
-    using P = typename In::Pack;
-    P largest = P::zero();
-    for (std::size_t j = 0; j < n; j += P::size) {
-      const PackVector<P> v = readVector(In{in.column, j}, first);
-      largest = larger(dot(v, v), largest);
-    }
-    return largestOf(largest) > static_cast<typename P::Scalar>(polynomial_range);
+/// Operations on tangent vectors whose rotation vector begins at number First; angles beyond the range of the
+/// polynomials are special.
+template <std::size_t A, std::size_t First, std::size_t Out, std::size_t Rows = 0>
+struct RotationVectorOperation : ArrayOperation<A, 0, Out, Rows> {
+  static constexpr bool variants = true;
+  template <class P>
+  LIESTAT_ALWAYS_INLINE static typename P::Mask special(const P (&in)[A]) {
+    const PackVector<P> v = readVector(in + First);
+    return PackAngle<true, P>::isLarge(dot(v, v));
   }
 };
 
-/// Operations on quaternions, of which those that are not of norm one need the second variant.
-struct QuaternionVariants {
-  static constexpr int variants = 2;
-
-  /// Below it, 1/|q| is known from |q|² - 1 to second order.
-  template <class S>
-  static constexpr S small_excess = sizeof(S) == 8 ? S(5e-6) : S(1e-3);
-
-  template <class In>
-  LIESTAT_ALWAYS_INLINE static bool variant(const In& in, std::size_t n) {
-    using P = typename In::Pack;
+/// Operations on elements that begin with a quaternion; those that are not of norm one are special.
+template <std::size_t A, std::size_t Out>
+struct QuaternionOperation : ArrayOperation<A, 0, Out> {
+  static constexpr bool variants = true;
+  template <class P>
+  LIESTAT_ALWAYS_INLINE static typename P::Mask special(const P (&in)[A]) {
     using S = typename P::Scalar;
-    P largest = P::zero();
-    for (std::size_t j = 0; j < n; j += P::size) {
-      const PackQuaternion<P> q = readQuaternion(In{in.column, j});
-      largest = larger(absolute(dot(q, q) - S(1)), largest);
-    }
-    return !(largestOf(largest) < small_excess<S>);
-  }
-
-  /// 1/|q|; not-a-number for zero.
-  template <int Variant, class P>
-  LIESTAT_ALWAYS_INLINE static P inverseNorm(const PackQuaternion<P>& q) {
-    using S = typename P::Scalar;
-    const P squared = dot(q, q), excess = squared - S(1);
-    const P near = S(1) - excess * (S(0.5) - S(0.375) * excess);
-    if constexpr (Variant == 0) return near;
-    return select(absolute(excess) < small_excess<S>, near, inverseSquareRoot(squared) * (squared / squared));
+    const PackQuaternion<P> q = readQuaternion(in);
+    return absolute(dot(q, q) - S(1)) > small_norm_excess<S>;
   }
 };
+
+/// 1/|q|, of quaternions that are not of norm one only if AnyNorm; not-a-number for zero.
+template <bool AnyNorm, class P>
+LIESTAT_ALWAYS_INLINE P inverseNorm(const PackQuaternion<P>& q) {
+  using S = typename P::Scalar;
+  const P squared = dot(q, q), excess = squared - S(1);
+  const P near = S(1) - excess * (S(0.5) - S(0.375) * excess);
+  if constexpr (!AnyNorm) return near;
+  return select(absolute(excess) > small_norm_excess<S>, inverseSquareRoot(squared) * (squared / squared), near);
+}
 
 /// The logarithm of a quaternion q: rotation vector f u, u the vector part of q; and g with
 /// leftJacobianInverse(f u) a = a - ½ f u×a + g u×(u×a).
@@ -178,10 +168,10 @@ template <class P>
 struct PackLogarithm {
   P f, g;
 
-  template <int Variant, bool WithG>
+  template <bool AnyNorm, bool WithG>
   LIESTAT_ALWAYS_INLINE static PackLogarithm of(const PackQuaternion<P>& q) {
     using S = typename P::Scalar;
-    const P scale = QuaternionVariants::inverseNorm<Variant>(q);
+    const P scale = inverseNorm<AnyNorm>(q);
     const P signed_scale = select(q.w < S(0), -scale, scale);
     const P variable = S(1) - S(2) * (q.w * signed_scale);
     PackLogarithm log;
@@ -195,85 +185,65 @@ struct PackLogarithm {
 struct RotationArrays {
   static constexpr std::size_t DoF = 3, num_parameters = 4, Dim = 3;
 
-  struct Exp : RotationVectorVariants<0> {
-    static constexpr std::size_t a = 3, b = 0, out = 4, rows = 0;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
-      const PackVector<P> v = readVector(in, 0);
-      const PackAngle<Variant == 1, P> angle(dot(v, v));
+  struct Exp : RotationVectorOperation<3, 0, 4, 0> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
+      const PackVector<P> v = readVector(in);
+      const PackAngle<special, P> angle(dot(v, v));
       writeQuaternion(result, PackQuaternion<P>{(typename P::Scalar(0.5) * angle.sinc) * v, angle.cos});
     }
   };
-  struct Log : QuaternionVariants {
-    static constexpr std::size_t a = 4, b = 0, out = 3, rows = 0;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Log : QuaternionOperation<4, 3> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       const PackQuaternion<P> q = readQuaternion(in);
-      writeVector(result, 0, PackLogarithm<P>::template of<Variant, false>(q).f * q.u);
+      writeVector(result, PackLogarithm<P>::template of<special, false>(q).f * q.u);
     }
   };
-  struct Product : OneVariant {
-    static constexpr std::size_t a = 4, b = 4, out = 4, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& left, const In& right, const Out& result) {
+  struct Product : ArrayOperation<4, 4, 4> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&left)[A], const P (&right)[B], P (&result)[N]) {
       writeQuaternion(result, product(readQuaternion(left), readQuaternion(right)));
     }
   };
-  struct Inverse : OneVariant {
-    static constexpr std::size_t a = 4, b = 0, out = 4, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
+  struct Inverse : ArrayOperation<4, 0, 4> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       writeQuaternion(result, readQuaternion(in).conjugate());
     }
   };
-  struct Act : OneVariant {
-    static constexpr std::size_t a = 4, b = 3, out = 3, rows = 0;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In& point, const Out& result) {
-      writeVector(result, 0, readQuaternion(in).rotate(readVector(point, 0)));
+  struct Act : ArrayOperation<4, 3, 3> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&point)[B], P (&result)[N]) {
+      writeVector(result, readQuaternion(in).rotate(readVector(point)));
     }
   };
-  struct Adjoint : OneVariant {
-    static constexpr std::size_t a = 4, b = 0, out = 9, rows = 3;
-    static constexpr bool sparse = false;
-    template <int, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      writeBlock<3>(result, 0, 0, PackMatrix<typename In::Pack>::rotation(readQuaternion(in)));
+  struct Adjoint : ArrayOperation<4, 0, 9, 3> {
+    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
+      writeBlock<3>(result, 0, 0, PackMatrix<P>::rotation(readQuaternion(in)));
     }
   };
   /// sign -1: the right Jacobian.
   template <int sign>
-  struct Jacobian : RotationVectorVariants<0> {
-    static constexpr std::size_t a = 3, b = 0, out = 9, rows = 3;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct Jacobian : RotationVectorOperation<3, 0, 9, 3> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
-      const PackVector<P> v = readVector(in, 0);
-      const PackAngle<Variant == 1, P> angle(dot(v, v));
+      const PackVector<P> v = readVector(in);
+      const PackAngle<special, P> angle(dot(v, v));
       writeBlock<3>(
           result, 0, 0,
           PackMatrix<P>::rotationPolynomial(v, P(S(1)), S(0.5 * sign) * (angle.sinc * angle.sinc), angle.beta3()));
     }
   };
   template <int sign>
-  struct JacobianInverse : RotationVectorVariants<0> {
-    static constexpr std::size_t a = 3, b = 0, out = 9, rows = 3;
-    static constexpr bool sparse = false;
-    template <int Variant, class In, class Out>
-    LIESTAT_ALWAYS_INLINE static void apply(const In& in, const In&, const Out& result) {
-      using P = typename In::Pack;
+  struct JacobianInverse : RotationVectorOperation<3, 0, 9, 3> {
+    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       using S = typename P::Scalar;
-      const PackVector<P> v = readVector(in, 0);
-      const PackAngle<Variant == 1, P> angle(dot(v, v));
+      const PackVector<P> v = readVector(in);
+      const PackAngle<special, P> angle(dot(v, v));
       writeBlock<3>(result, 0, 0,
                     PackMatrix<P>::rotationPolynomial(v, P(S(1)), P(S(-0.5 * sign)), angle.cotangentExcess()));
     }

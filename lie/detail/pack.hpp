@@ -19,6 +19,15 @@
 #define LIESTAT_CONTRACT
 #endif
 
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define LIESTAT_HAS_SHUFFLES 1
+#endif
+#endif
+#ifndef LIESTAT_HAS_SHUFFLES
+#define LIESTAT_HAS_SHUFFLES 0
+#endif
+
 namespace liestat::detail {
 
 constexpr std::size_t registerBytes(InstructionSet set) {
@@ -33,9 +42,16 @@ template <InstructionSet Set, class S>
 struct PackStorage {
 #if defined(__GNUC__)
   typedef S Type __attribute__((vector_size(registerBytes(Set))));
+  /// The same anywhere in memory. g++ 12 copies by memcpy in halves, through the stack, in kernels for larger registers
+  /// than those of their unit.
+  typedef S Memory __attribute__((vector_size(registerBytes(Set)), aligned(sizeof(S)), may_alias));
+  using Integer = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
+  typedef Integer Integers __attribute__((vector_size(registerBytes(Set))));
   static constexpr std::size_t size = registerBytes(Set) / sizeof(S);
 #else
   using Type = S;
+  using Memory = S;
+  using Integers = long long;
   static constexpr std::size_t size = 1;
 #endif
 };
@@ -45,6 +61,8 @@ template <InstructionSet Set, class S = double>
 struct Pack {
   using Scalar = S;
   using Vector = typename PackStorage<Set, S>::Type;
+  using Memory = typename PackStorage<Set, S>::Memory;
+  using Integers = typename PackStorage<Set, S>::Integers;
   static constexpr InstructionSet set = Set;
   static constexpr std::size_t size = PackStorage<Set, S>::size;
 
@@ -60,12 +78,8 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE explicit Pack(S x) : v(Vector{} + x) {}
 
   LIESTAT_ALWAYS_INLINE static Pack zero() { return Pack(Vector{}); }
-  LIESTAT_ALWAYS_INLINE static Pack load(const S* p) {
-    Pack x;
-    std::memcpy(&x.v, p, sizeof x.v);
-    return x;
-  }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { std::memcpy(p, &v, sizeof v); }
+  LIESTAT_ALWAYS_INLINE static Pack load(const S* p) { return Pack(*reinterpret_cast<const Memory*>(p)); }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<Memory*>(p) = v; }
 
   LIESTAT_ALWAYS_INLINE Pack operator-() const { return Pack(-v); }
   LIESTAT_ALWAYS_INLINE friend Pack operator+(const Pack& a, const Pack& b) {
@@ -101,6 +115,30 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE friend Pack select(const Mask& mask, const Pack& a, const Pack& b) {
     return Pack(mask.lanes ? a.v : b.v);
   }
+  /// Whether the mask holds in any lane.
+  LIESTAT_ALWAYS_INLINE friend bool anyOf(const Mask& mask) {
+#if LIESTAT_HAS_SHUFFLES
+    using Words = typename PackStorage<Set, std::int64_t>::Type;
+    const Words words = reinterpret_cast<Words>(mask.lanes);
+    if constexpr (registerBytes(Set) == 64) {
+      const auto half =
+          __builtin_shufflevector(words, words, 0, 1, 2, 3) | __builtin_shufflevector(words, words, 4, 5, 6, 7);
+      const auto quarter = __builtin_shufflevector(half, half, 0, 1) | __builtin_shufflevector(half, half, 2, 3);
+      return (quarter[0] | quarter[1]) != 0;
+    } else if constexpr (registerBytes(Set) == 32) {
+      const auto half = __builtin_shufflevector(words, words, 0, 1) | __builtin_shufflevector(words, words, 2, 3);
+      return (half[0] | half[1]) != 0;
+    } else {
+      return (words[0] | words[1]) != 0;
+    }
+#elif defined(__GNUC__)
+    auto any = mask.lanes[0];
+    for (std::size_t l = 1; l < size; ++l) any |= mask.lanes[l];
+    return any != 0;
+#else
+    return mask.lanes;
+#endif
+  }
   LIESTAT_ALWAYS_INLINE friend Pack absolute(const Pack& a) { return select(a < S(0), -a, a); }
   LIESTAT_ALWAYS_INLINE friend Pack larger(const Pack& a, const Pack& b) { return select(a > b, a, b); }
   LIESTAT_ALWAYS_INLINE friend Pack smaller(const Pack& a, const Pack& b) { return select(a < b, a, b); }
@@ -121,12 +159,10 @@ struct Pack {
   }
   /// The integer next to a towards zero; |a| < 2⁵² (float: 2²³).
   LIESTAT_ALWAYS_INLINE friend Pack truncated(const Pack& a) {
-    using Integer = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
 #if defined(__GNUC__)
-    typedef Integer Integers __attribute__((vector_size(registerBytes(Set))));
     return Pack(__builtin_convertvector(__builtin_convertvector(a.v, Integers), Vector));
 #else
-    return Pack(static_cast<S>(static_cast<Integer>(a.v)));
+    return Pack(static_cast<S>(static_cast<long long>(a.v)));
 #endif
   }
   LIESTAT_ALWAYS_INLINE friend S sumOf(const Pack& a) {
