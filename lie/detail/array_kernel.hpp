@@ -28,8 +28,8 @@ struct ArrayKernel {
   struct Arguments {
     Layout<const S> a, b;  ///< an operand whose elements are at distance 0 is one element for all
     Layout<S> out;
-    std::size_t count = 0;
-    bool by_rows = false;  ///< matrices
+    std::size_t count = 0;  ///< not zero
+    bool by_rows = false;   ///< matrices
   };
 
   template <InstructionSet Set>
@@ -48,10 +48,16 @@ struct ArrayKernel {
     const Layout<const S> from_a = arguments.a, from_b = arguments.b;
     const Layout<S> to = arguments.out;
     const std::size_t count = arguments.count;
+    loadOne(from_a, a);
+    if constexpr (Operation::b != 0) {
+      loadOne(from_b, b);
+    } else {
+      b[0] = P::zero();
+    }
     for (std::size_t i = 0; i < count; i += P::size) {
       const std::size_t n = count - i < P::size ? count - i : P::size;
-      loadElements(from_a, i, n, a);
-      if constexpr (Operation::b != 0) loadElements(from_b, i, n, b);
+      if (from_a.element != 0) loadElements(from_a, i, n, a);
+      if (Operation::b != 0 && from_b.element != 0) loadElements(from_b, i, n, b);
       if constexpr (Operation::variants) {
         if (anyOf(Operation::special(a))) {
           Operation::template apply<true>(a, b, out);

@@ -117,15 +117,21 @@ LIESTAT_ALWAYS_INLINE void storeDense(const P (&x)[N], typename P::Scalar* to) {
 }
 #endif
 
+/// One element in every lane.
+template <class P, std::size_t N>
+LIESTAT_ALWAYS_INLINE void loadOne(const Layout<const typename P::Scalar>& from, P (&x)[N]) {
+  LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) {
+    typename P::Scalar lanes[P::size];
+    for (std::size_t l = 0; l < P::size; ++l) lanes[l] = *from.at(0, c);
+    x[c] = P::load(lanes);
+  }
+}
+
 /// Elements i … i + n - 1, n <= P::size, of N numbers each; where there are fewer than lanes the last is repeated.
 template <class P, std::size_t N>
 LIESTAT_ALWAYS_INLINE void loadElements(const Layout<const typename P::Scalar>& from, std::size_t i, std::size_t n,
                                         P (&x)[N]) {
   using S = typename P::Scalar;
-  if (from.element == 0) {
-    LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) x[c] = P(*from.at(0, c));
-    return;
-  }
   if (n == P::size) {
     if (from.element == 1) {
       LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) x[c] = P::load(from.at(i, c));

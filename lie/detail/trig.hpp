@@ -63,7 +63,7 @@ template <std::size_t first, std::size_t terms, class S, std::size_t N>
 LIESTAT_ALWAYS_INLINE S everyFourth(const std::array<double, N>& c, const S& x4) {
   constexpr std::size_t last = first + (terms - 1 - first) / 4 * 4;
   S sum = constant<S>(c[last]);
-  for (std::size_t k = last; k > first; k -= 4) sum = sum * x4 + constant<S>(c[k - 4]);
+  LIESTAT_UNROLL for (std::size_t k = last; k > first; k -= 4) sum = sum * x4 + constant<S>(c[k - 4]);
   return sum;
 }
 
