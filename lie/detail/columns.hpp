@@ -2,6 +2,7 @@
 #pragma once
 
 #include <lie/detail/always_inline.hpp>
+#include <lie/detail/pack.hpp>
 #include <lie/instruction_set.hpp>
 
 #include <cstddef>
@@ -21,24 +22,16 @@ struct Layout {
   }
 };
 
-#if defined(__has_builtin)
-#if __has_builtin(__builtin_shufflevector)
-#define LIESTAT_HAS_SHUFFLES 1
-#endif
-#endif
-#ifndef LIESTAT_HAS_SHUFFLES
-#define LIESTAT_HAS_SHUFFLES 0
-#endif
-
 #if LIESTAT_HAS_SHUFFLES
 template <class S>
 struct FourNumbers {
   typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
-  typedef S InMemory __attribute__((vector_size(4 * sizeof(S)), aligned(sizeof(S)), may_alias));
+  /// The same anywhere in memory, as in lie/detail/pack.hpp.
+  typedef S Memory __attribute__((vector_size(4 * sizeof(S)), aligned(sizeof(S)), may_alias));
   Vector v;
 
-  LIESTAT_ALWAYS_INLINE void load(const S* p) { v = *reinterpret_cast<const InMemory*>(p); }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<InMemory*>(p) = v; }
+  LIESTAT_ALWAYS_INLINE void load(const S* p) { v = *reinterpret_cast<const Memory*>(p); }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<Memory*>(p) = v; }
 };
 /// Transposes four rows of four numbers.
 template <class S>

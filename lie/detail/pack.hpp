@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 
 // g++ contracts products and sums into fused operations by itself, clang within one expression only, unless told.
@@ -18,6 +19,15 @@
 #define LIESTAT_CONTRACT _Pragma("clang fp contract(fast)")
 #else
 #define LIESTAT_CONTRACT
+#endif
+
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define LIESTAT_HAS_SHUFFLES 1
+#endif
+#endif
+#ifndef LIESTAT_HAS_SHUFFLES
+#define LIESTAT_HAS_SHUFFLES 0
 #endif
 
 namespace liestat::detail {
@@ -34,12 +44,17 @@ template <InstructionSet Set, class S>
 struct PackStorage {
 #if defined(__GNUC__)
   typedef S Type __attribute__((vector_size(registerBytes(Set))));
-  /// The same anywhere in memory. Copies through memcpy are made of smaller pieces, which then are read back whole.
-  typedef S InMemory __attribute__((vector_size(registerBytes(Set)), aligned(sizeof(S)), may_alias));
+  /// The same anywhere in memory. g++ 12 copies by memcpy in halves, through the stack, in kernels for larger registers
+  /// than those of their unit.
+  typedef S Memory __attribute__((vector_size(registerBytes(Set)), aligned(sizeof(S)), may_alias));
+  using Integer = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
+  typedef Integer Integers __attribute__((vector_size(registerBytes(Set))));
   static constexpr std::size_t size = registerBytes(Set) / sizeof(S);
 #else
   using Type = S;
-  using InMemory = S;
+  using Memory = S;
+  using Integer = long long;
+  using Integers = long long;
   static constexpr std::size_t size = 1;
 #endif
 };
@@ -51,6 +66,9 @@ template <InstructionSet Set, PackScalar S = double>
 struct Pack {
   using Scalar = S;
   using Vector = typename PackStorage<Set, S>::Type;
+  using Memory = typename PackStorage<Set, S>::Memory;
+  using Integer = typename PackStorage<Set, S>::Integer;
+  using Integers = typename PackStorage<Set, S>::Integers;
   static constexpr InstructionSet set = Set;
   static constexpr std::size_t size = PackStorage<Set, S>::size;
 
@@ -63,15 +81,16 @@ struct Pack {
 
   Pack() = default;
   LIESTAT_ALWAYS_INLINE explicit Pack(const Vector& lanes) : v(lanes) {}
+  /// For constants: g++ 12 makes one vector of this sum, but no other expression of them. It turns -0 into 0.
   LIESTAT_ALWAYS_INLINE explicit Pack(S x) : v(Vector{} + x) {}
 
   LIESTAT_ALWAYS_INLINE static Pack zero() { return Pack(Vector{}); }
   LIESTAT_ALWAYS_INLINE static Pack load(const S* p) {
     Pack x;
-    x.v = *reinterpret_cast<const typename PackStorage<Set, S>::InMemory*>(p);
+    x.v = *reinterpret_cast<const Memory*>(p);
     return x;
   }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<typename PackStorage<Set, S>::InMemory*>(p) = v; }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<Memory*>(p) = v; }
 
   LIESTAT_ALWAYS_INLINE Pack operator-() const { return Pack(-v); }
   LIESTAT_ALWAYS_INLINE friend Pack operator+(const Pack& a, const Pack& b) {
@@ -107,7 +126,38 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE friend Pack select(const Mask& mask, const Pack& a, const Pack& b) {
     return Pack(mask.lanes ? a.v : b.v);
   }
-  LIESTAT_ALWAYS_INLINE friend Pack absolute(const Pack& a) { return select(a < S(0), -a, a); }
+  /// Whether the mask holds in any lane.
+  LIESTAT_ALWAYS_INLINE friend bool anyOf(const Mask& mask) {
+#if LIESTAT_HAS_SHUFFLES
+    using Words = typename PackStorage<Set, std::int64_t>::Type;
+    const Words words = reinterpret_cast<Words>(mask.lanes);
+    if constexpr (registerBytes(Set) == 64) {
+      const auto half =
+          __builtin_shufflevector(words, words, 0, 1, 2, 3) | __builtin_shufflevector(words, words, 4, 5, 6, 7);
+      const auto quarter = __builtin_shufflevector(half, half, 0, 1) | __builtin_shufflevector(half, half, 2, 3);
+      return (quarter[0] | quarter[1]) != 0;
+    } else if constexpr (registerBytes(Set) == 32) {
+      const auto half = __builtin_shufflevector(words, words, 0, 1) | __builtin_shufflevector(words, words, 2, 3);
+      return (half[0] | half[1]) != 0;
+    } else {
+      return (words[0] | words[1]) != 0;
+    }
+#elif defined(__GNUC__)
+    auto any = mask.lanes[0];
+    for (std::size_t l = 1; l < size; ++l) any |= mask.lanes[l];
+    return any != 0;
+#else
+    return mask.lanes;
+#endif
+  }
+  LIESTAT_ALWAYS_INLINE friend Pack absolute(const Pack& a) {
+#if defined(__GNUC__)
+    const Integers bits = reinterpret_cast<Integers>(a.v) & std::numeric_limits<Integer>::max();
+    return Pack(reinterpret_cast<Vector>(bits));
+#else
+    return select(a < S(0), -a, a);
+#endif
+  }
   LIESTAT_ALWAYS_INLINE friend Pack larger(const Pack& a, const Pack& b) { return select(a > b, a, b); }
   LIESTAT_ALWAYS_INLINE friend Pack smaller(const Pack& a, const Pack& b) { return select(a < b, a, b); }
   /// 1/√a of normal numbers a > 0, to two units in the last place: a first guess from the exponent's bits, and Newton's
@@ -124,6 +174,14 @@ struct Pack {
     const Pack half = S(0.5) * a;
     for (int i = 0; i < (sizeof(S) == 8 ? 4 : 3); ++i) y = y + y * (S(0.5) - half * y * y);
     return y;
+  }
+  /// The integer next to a towards zero; |a| < 2⁵² (float: 2²³).
+  LIESTAT_ALWAYS_INLINE friend Pack truncated(const Pack& a) {
+#if defined(__GNUC__)
+    return Pack(__builtin_convertvector(__builtin_convertvector(a.v, Integers), Vector));
+#else
+    return Pack(static_cast<S>(static_cast<long long>(a.v)));
+#endif
   }
   LIESTAT_ALWAYS_INLINE friend S sumOf(const Pack& a) {
     S lanes[size], sum = 0;
