@@ -11,7 +11,6 @@
 #pragma once
 
 #include <lie/detail/small_products.hpp>
-#include <stats/conventions.hpp>
 #include <stats/gaussian.hpp>
 
 #include <array>
