@@ -11,6 +11,7 @@ void addMotionCommand(const CommandList& program);
 void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);
+void addConvertCommand(const CommandList& program);
 void addHandEyeCommand(const CommandList& program);
 void addSimulateHandEyeCommand(const CommandList& simulate);
 void addSimulateMotionCommand(const CommandList& simulate);

@@ -46,6 +46,9 @@ class FeatureReader {
                        "a CSV file, whose header names the columns");
     }
     layout_ = format.reads(reader_, name_, options_);
+    for (std::string& column : layout_.columns) {
+      if (options_.without_covariances && column.rfind("cov_", 0) == 0) column.clear();
+    }
     const std::size_t first_line = reader_.number();
     places_ = findFeature(layout_.columns, name_, first_line);
     if (layout_.has_header && !reader_.next()) {

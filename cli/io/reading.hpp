@@ -48,6 +48,7 @@ struct ReadingOptions {
   double norm_tolerance = 1e-3;
   AngleUnit angles = AngleUnit::unsaid;
   bool ignore_unknown = false;            ///< CSV columns without a meaning are passed over
+  bool without_covariances = false;       ///< the columns cov_00 … are passed over too
   std::vector<std::string> columns = {};  ///< names of CSV columns that are not ours, each as "ours=theirs"
 };
 
