@@ -7,7 +7,7 @@ int main(int argc, char** argv) {
       argc, argv,
       {{"",
         "",
-        {addConvertCommand, addEvaluateCommand, addHandEyeCommand, addMeanCommand, addMotionCommand,
+        {addConvertCommand, addDoctorCommand, addEvaluateCommand, addHandEyeCommand, addMeanCommand, addMotionCommand,
          addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",

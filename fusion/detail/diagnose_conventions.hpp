@@ -727,15 +727,11 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
   std::vector<HypothesisFit> fits;
   for (const Convention& c : hypotheses) fits.push_back({.convention = c});
   rank(data, fits, options);
-  if (fits.empty() || std::isinf(fits.front().log_likelihood)) {
-    d.verdict = DiagnosisVerdict::none;
-    d.reason = "under no convention are all matrices positive definite";
-    return d;
-  }
-  d.tests = testsUnder(data, fits.front(), options);
+  const bool usable = !fits.empty() && !std::isinf(fits.front().log_likelihood);
+  if (usable) d.tests = testsUnder(data, fits.front(), options);
 
   // Correlated errors: absolute errors decide nothing.
-  if (options.ordered && d.tests.lag.fires() && d.tests.lag.statistic > 0) {
+  if (usable && options.ordered && d.tests.lag.fires() && d.tests.lag.statistic > 0) {
     d.correlated = true;
     const auto half_nees = [&](std::size_t begin, std::size_t end) {
       double sum = 0;
@@ -757,6 +753,11 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
       } else {
         d.verdict = DiagnosisVerdict::undecidable;
         d.reason = "dead reckoning: " + std::to_string(d.accepted.size()) + " conventions let the covariance grow";
+      }
+      if (!consistent && std::all_of(d.accepted.begin(), d.accepted.end(),
+                                     [](const Convention& c) { return c.perturbation == Perturbation::left; })) {
+        d.verdict = DiagnosisVerdict::inconsistent;
+        d.reason = "the matrices only grow, but not as those of poses do: increments were added without the adjoint";
       }
       if (!consistent) {
         d.notes.push_back("the increments do not follow the growth of the covariance (NEES ratio " +
@@ -783,8 +784,8 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
           if (f.log_likelihood > -d.margin) d.accepted.push_back(f.convention);
         }
         d.fits = step_fits;
-        d.reason = "increments fused as absolute: each pose carries the covariance of its last step (" +
-                   describe(d.accepted.front()) + ")";
+        d.reason = "increments fused as absolute: each pose carries the covariance of its last step";
+        if (d.accepted.size() == 1) d.reason += " (" + describe(d.accepted.front()) + ")";
         return d;
       }
     }
@@ -799,7 +800,7 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
 
   d.fits = fits;
   for (const HypothesisFit& f : fits) {
-    if (f.log_likelihood > -d.margin) d.accepted.push_back(f.convention);
+    if (usable && f.log_likelihood > -d.margin) d.accepted.push_back(f.convention);
   }
   if (d.tests.consistent()) {
     if (d.accepted.size() == 1) {
@@ -848,6 +849,11 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
       d.reason = std::string(describe(d.fault)) + others + " (" + describe(d.accepted.front()) + ")";
       return d;
     }
+  }
+  if (!usable) {
+    d.verdict = DiagnosisVerdict::none;
+    d.reason = "under no convention are all matrices positive definite";
+    return d;
   }
   if (options.alignment == AlignmentModel::none) {
     d.scale = profileScale(data, options);
