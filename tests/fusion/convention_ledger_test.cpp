@@ -156,7 +156,7 @@ std::vector<Bug> ledger() {
       return X;
     };
   };
-  bugs.push_back(
+  bugs.push_back(withLastingCorrelations(
       spoiled("a triangle symmetrised with its zeros", off_diagonal(0.5), repaired(MatrixFault::off_diagonal_half))));
   const auto factor = [](const Matrix6& M) { return Matrix6(M.llt().matrixL()); };
   bugs.push_back(spoiled(
