@@ -45,7 +45,8 @@ inline EulerSequence eulerSequence(EulerAxes axes) {
 /// The angle in [-pi, pi], from one in [-2 pi, 2 pi].
 template <class S>
 S wrappedOnce(const S& angle) {
-  const S turn(2 * EIGEN_PI), half(EIGEN_PI);
+  constexpr double pi = static_cast<double>(EIGEN_PI);
+  const S turn(2 * pi), half(pi);
   const S below = select(angle > half, S(angle - turn), angle);
   return select(below < -half, S(below + turn), below);
 }
@@ -79,7 +80,7 @@ auto toEuler(EulerAxes axes, const SO3Base<Derived>& rotation) {
   const S half_sum = atan2(b, a), half_difference = atan2(d, c);
   const S first_radius = sqrt(a * a + b * b), second_radius = sqrt(c * c + d * d);
   const S middle = proper ? S(S(2) * atan2(second_radius, first_radius))
-                          : S(S(2) * atan2(first_radius, second_radius) - S(EIGEN_PI / 2));
+                          : S(S(2) * atan2(first_radius, second_radius) - S(static_cast<double>(EIGEN_PI) / 2));
   const S last = half_sum - half_difference;
   return Eigen::Matrix<S, 3, 1>(detail::wrappedOnce(S(half_sum + half_difference)), middle,
                                 detail::wrappedOnce(proper ? last : S(sign * last)));

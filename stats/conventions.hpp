@@ -237,7 +237,7 @@ inline PoseBlocks perturbationBlocks(Perturbation perturbation, const SE3d& T) {
       J.rotation = -R;
       break;
     case Perturbation::transposed_axes:
-      J.translation = J.rotation = R.transpose();
+      J.translation = J.rotation = T.so3().inverse().matrix();
       break;
   }
   return J;
@@ -245,14 +245,16 @@ inline PoseBlocks perturbationBlocks(Perturbation perturbation, const SE3d& T) {
 /// ξ = J⁻¹ x, in closed form.
 inline PoseBlocks perturbationBlocksInverse(Perturbation perturbation, const SE3d& T) {
   using Matrix = Eigen::Matrix3d;
-  const Matrix Rt = T.rotationMatrix().transpose();
+  // Not R.transpose(): Eigen's check for aliasing makes g++ warn.
+  const Matrix R = T.rotationMatrix(), Rt = T.so3().inverse().matrix();
   PoseBlocks J{Rt, Matrix::Zero(), Rt};
   switch (perturbation) {
     case Perturbation::right:
     case Perturbation::body_axes:
       return {Matrix::Identity(), Matrix::Zero(), Matrix::Identity()};
     case Perturbation::left:
-      J.coupling = skewTimes(Eigen::Vector3d(T.translation()), T.rotationMatrix()).transpose();
+      // -Rᵀ [p]
+      J.coupling = product(Rt, skew(Eigen::Vector3d(-T.translation())));
       break;
     case Perturbation::world_axes:
       break;
@@ -272,7 +274,7 @@ inline PoseBlocks perturbationBlocksInverse(Perturbation perturbation, const SE3
       J.rotation = -Rt;
       break;
     case Perturbation::transposed_axes:
-      J.translation = J.rotation = T.rotationMatrix();
+      J.translation = J.rotation = R;
       break;
   }
   return J;
@@ -405,6 +407,24 @@ inline Gaussian<SE3d> fromConvention(const Convention& convention, const SE3d& T
                                      const Eigen::Matrix<double, 6, 6>& matrix) {
   return {T_hat, detail::congruenceOfKnown(conventionJacobianInverse(convention, T_hat),
                                            covarianceFromContent(convention.content, matrix))};
+}
+
+/// The matrix of one convention in another, at the pose as it is written beside it. With the same content there is no
+/// inversion, so that singular matrices pass, and with the same coordinates every digit stays.
+inline Eigen::Matrix<double, 6, 6> convertConvention(const Convention& from, const Convention& to, const SE3d& T_hat,
+                                                     const Eigen::Matrix<double, 6, 6>& matrix) {
+  if (from.content == to.content && from.order == to.order && from.perturbation == to.perturbation &&
+      from.unit == to.unit) {
+    return matrix;
+  }
+  if (from.content != to.content || from.content == CovarianceContent::sigmas) {
+    return toConvention(to, fromConvention(from, T_hat, matrix));
+  }
+  const bool information = from.content == CovarianceContent::information;
+  const Convention& a = information ? to : from;
+  const Convention& b = information ? from : to;
+  const detail::Matrix6d J = detail::product(conventionJacobian(b, T_hat), conventionJacobianInverse(a, T_hat));
+  return detail::congruenceOfKnown(information ? detail::Matrix6d(J.transpose()) : J, matrix);
 }
 
 }  // namespace liestat

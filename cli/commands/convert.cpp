@@ -109,7 +109,7 @@ class Converter {
     if (options_.sampled && family(from_.perturbation) != family(to_.perturbation) && g.covariance.allFinite()) {
       return sample(matrix, row);
     }
-    const Matrix6 converted = toConvention(to_, g);
+    const Matrix6 converted = convertConvention(from_, to_, row.pose, matrix);
     if (converted.array().isNaN().all()) throwUndetermined(matrix, row);
     return converted;
   }

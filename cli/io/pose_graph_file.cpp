@@ -158,12 +158,16 @@ class GraphReader {
 void writePose(std::back_insert_iterator<std::string> out, const GraphTag& tag, const SE3d& pose) {
   const Eigen::Vector3d p = pose.translation();
   if (tag.planar) {
-    fmt::format_to(out, " {:.17g} {:.17g} {:.17g}", p[0], p[1], pose.so3().angleZ());
+    // From the quaternion: the matrix would cost a digit.
+    const auto q = pose.unit_quaternion();
+    const double sign = q.w() < 0 ? -1 : 1;
+    fmt::format_to(out, " {:.17g} {:.17g} {:.17g}", p[0], p[1], 2 * std::atan2(sign * q.z(), sign * q.w()));
     return;
   }
   fmt::format_to(out, " {:.17g} {:.17g} {:.17g}", p[0], p[1], p[2]);
   if (tag.pose == 6) {
-    const Eigen::Vector3d a = toRollPitchYaw(pose.so3());
+    // Plus zero: no negative one.
+    const Eigen::Vector3d a = toRollPitchYaw(pose.so3()) + Eigen::Vector3d::Zero();
     fmt::format_to(out, " {:.17g} {:.17g} {:.17g}", a[0], a[1], a[2]);
   } else {
     const Eigen::Vector4d q = pose.unit_quaternion().coeffs();

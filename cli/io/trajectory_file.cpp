@@ -99,7 +99,9 @@ void readAsFeatures(std::string_view text, Trajectory& trajectory, const Traject
   readFields(text, trajectory, options);
   if (!trajectory.hasCovariances()) return;
   // The columns of a CSV are defined as the library's own, unless the file says otherwise.
-  trajectory.stated_convention = statedConvention(text, trajectory.name).value_or(Convention{});
+  const auto stated = statedConvention(text, trajectory.name);
+  trajectory.stated_convention = stated.value_or(Convention{});
+  trajectory.states_convention = stated.has_value();
   trajectory.covariance_source = trajectory.name;
 }
 void readTum(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
@@ -399,8 +401,7 @@ Convention conventionOf(const Trajectory& trajectory, const std::optional<Conven
   }
   convention = given ? *given : *trajectory.stated_convention;
   if (trajectory.fixed_order) convention.order = *trajectory.fixed_order;
-  if (trajectory.fixed_content) convention.content = *trajectory.fixed_content;
-  if (given && trajectory.stated_convention) {
+  if (given && trajectory.states_convention) {
     Convention stated = *trajectory.stated_convention;
     stated.layout = convention.layout;
     if (stated != convention) {

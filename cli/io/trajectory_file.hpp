@@ -40,12 +40,12 @@ struct Trajectory {
   std::string covariance_source;   ///< the name of the file that the covariances are from; empty if there are none
   /// The convention that file or format states; nothing if it is for the user to say.
   std::optional<Convention> stated_convention;
-  std::optional<CovarianceOrder> fixed_order;      ///< the order that the format has whatever the convention
-  std::optional<CovarianceContent> fixed_content;  ///< likewise the content
-  std::size_t n_normalised = 0;                    ///< rows whose rotation was off its norm by more than rounding
-  double largest_norm_error = 0;                   ///< the largest such error
-  std::size_t n_unmeasured = 0;                    ///< rows with a component that a sentinel marks as not measured
-  std::vector<std::string> frames;                 ///< frame and child frame of messages, if they name them
+  bool states_convention = false;  ///< a header of the file says it, which nobody may contradict; not only the format
+  std::optional<CovarianceOrder> fixed_order;  ///< the order that the format has whatever the convention
+  std::size_t n_normalised = 0;                ///< rows whose rotation was off its norm by more than rounding
+  double largest_norm_error = 0;               ///< the largest such error
+  std::size_t n_unmeasured = 0;                ///< rows with a component that a sentinel marks as not measured
+  std::vector<std::string> frames;             ///< frame and child frame of messages, if they name them
 
   std::size_t size() const { return poses.size(); }
   bool hasCovariances() const { return !covariances.empty(); }
@@ -72,8 +72,8 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
 Trajectory parseTrajectory(std::string_view text, std::string name, const TrajectoryOptions& options = {});
 
 /// The convention in which the covariances of a trajectory are to be read: what the file states and what the user says
-/// with an option (its name is for messages), which must not contradict each other. Throws InputError where neither
-/// says it.
+/// with an option (its name is for messages). What the user says stands above the rule of a format, but must not
+/// contradict a header. Throws InputError where neither says it.
 Convention conventionOf(const Trajectory& trajectory, const std::optional<Convention>& given, std::string_view option);
 
 /// Poses and covariances in the library's convention; NaN for what is unknown. Only for a trajectory that has

@@ -255,6 +255,7 @@ void readSideFile(const std::string& path, Trajectory& trajectory) {
                      "times with the same digits as in the file of the poses");
   }
   trajectory.stated_convention = convention;
+  trajectory.states_convention = true;
   trajectory.covariance_source = file.name;
 }
 

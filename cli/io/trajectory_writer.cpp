@@ -99,6 +99,10 @@ class Writer {
     }
     bool exact = true;
     const std::string text = ticksOfSeconds(trajectory_.time_texts[i], decimals, exact);
+    if (!isWhole(text)) {
+      throw InputError(trajectory_.name, trajectory_.lines[i], fmt::format("the time is {}", trajectory_.time_texts[i]),
+                       fmt::format("one that fits into the format {}", format_));
+    }
     if (!exact) ++result_.n_rounded_times;
     return text;
   }

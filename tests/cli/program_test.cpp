@@ -154,7 +154,8 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, validate (liestat --help explains "
+      "Commands: convert, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, validate (liestat --help "
+      "explains "
       "the usage)\n";
   EXPECT_EQ(complaint({"bogus"}), "liestat: bogus is no command. " + commands);
   EXPECT_EQ(complaint({"maen", "f.csv"}), "liestat: maen is no command, did you mean mean? " + commands);
@@ -181,8 +182,9 @@ TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
     return contentOf(directory_ / "out.txt");
   };
   const std::string manual = output("\"$0\" --man"), completion = output("\"$0\" --completion");
-  for (const std::string command : {"hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
-                                    "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
+  for (const std::string command :
+       {"convert", "hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
+        "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
     EXPECT_NE(manual.find(".SS \"liestat " + command), std::string::npos) << command;
     EXPECT_NE(completion.find('"' + command + "\")\n"), std::string::npos) << command;
   }

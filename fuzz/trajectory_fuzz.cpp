@@ -1,0 +1,71 @@
+// Any text as a trajectory or a graph, in any format: poses that keep their promises and go to every format, or an
+// InputError of one line. Anything else is a finding.
+//
+//   build/sanitize/fuzz/trajectory_fuzz -max_total_time=120 new_corpus fuzz/corpus/trajectory
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include <cli/io/input_error.hpp>
+#include <cli/io/pose_graph_file.hpp>
+#include <cli/io/trajectory_file.hpp>
+#include <cli/io/trajectory_writer.hpp>
+
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+/// Runs a function that may throw an InputError, whose message is one line.
+template <class Function>
+void mayRefuse(Function&& function) {
+  try {
+    function();
+  } catch (const liestat::cli::InputError& error) {
+    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
+  }
+}
+
+void check(const liestat::cli::Trajectory& trajectory) {
+  const std::size_t n = trajectory.size();
+  require(n > 0 && trajectory.lines.size() == n);
+  require(trajectory.times.size() == trajectory.time_texts.size());
+  require(trajectory.times.empty() || trajectory.times.size() == n);
+  require(trajectory.covariances.empty() || trajectory.covariances.size() == n);
+  for (const auto& pose : trajectory.poses) {
+    require(pose.translation().allFinite() && std::abs(pose.unit_quaternion().norm() - 1) < 1e-14);
+  }
+  for (const double time : trajectory.times) require(std::isfinite(time));
+  for (const auto& C : trajectory.covariances) {
+    for (int i = 0; i < 6; ++i) require(std::isnan(C(i, i)) || C(i, i) >= 0);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace liestat::cli;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const std::vector<std::string> formats = trajectoryFormatNames();
+  for (const std::string& format : formats) {
+    mayRefuse([&] {
+      TrajectoryOptions options;
+      options.format = format;
+      const Trajectory trajectory = parseTrajectory(text, "fuzz", options);
+      check(trajectory);
+      for (const std::string& to : formats) {
+        if (to != "auto") mayRefuse([&] { (void)formatTrajectory(trajectory, to, {}); });
+      }
+    });
+  }
+  mayRefuse([&] {
+    const PoseGraph graph = parseGraph(text, "fuzz");
+    for (const std::string& to : graphFormatNames()) mayRefuse([&] { (void)formatGraph(graph, to, {}); });
+  });
+  return 0;
+}
