@@ -56,8 +56,8 @@ int main() {
   Gaussian<SE3d> on_a_map = truth;
   on_a_map.mean = SE3d(world_T_body.so3(), Eigen::Vector3d(5.4e5, 4.8e6, 300));
   const liestat::ConversionLoss loss = conversionLoss(published, *liestat::parseConvention("left"), on_a_map);
-  std::printf("to `left` at map coordinates: %s (a round trip loses %.1g sd)\n",
-              liestat::message(loss.problem), loss.round_trip);
+  std::printf("to `left` at map coordinates: %s (a round trip loses %.1g sd)\n", liestat::message(loss.problem),
+              loss.round_trip);
 
   const bool fine = std::abs(right_reading - 6) < 1e-6 && worst > 60 && std::abs(misread - 0.25) < 1e-9 &&
                     loss.problem == liestat::ConversionProblem::far_origin;

@@ -45,8 +45,7 @@ inline EulerSequence eulerSequence(EulerAxes axes) {
 /// The angle in [-pi, pi], from one in [-2 pi, 2 pi].
 template <class S>
 S wrappedOnce(const S& angle) {
-  constexpr double pi = static_cast<double>(EIGEN_PI);
-  const S turn(2 * pi), half(pi);
+  const S half(static_cast<double>(EIGEN_PI)), turn(S(2) * half);
   const S below = select(angle > half, S(angle - turn), angle);
   return select(below < -half, S(below + turn), below);
 }
