@@ -163,7 +163,6 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     options.alignment = AlignmentModel::none;
   } else {
     std::optional<CovarianceOrder> order;
-    std::optional<CovarianceContent> content;
     Trajectory truth;
     if (!truth_path.empty()) {
       truth = readTimedTrajectory(truth_path, o.input.reference);
@@ -175,7 +174,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     for (const std::string& path : estimates) {
       const Trajectory estimate = readWithCovariances(path, o.input.estimate);
       output.files.push_back(estimate.name);
-      order = estimate.fixed_order, content = estimate.fixed_content;
+      order = estimate.fixed_order;
       if (estimate.stated_convention) {
         output.notes.push_back(fmt::format("{} states {}", estimate.covariance_source,
                                            conventionName(*estimate.stated_convention, false)));
@@ -191,7 +190,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
       }
       runs.push_back(list), times.push_back(at);
     }
-    options.hypotheses = possible(order, content);
+    options.hypotheses = possible(order, std::nullopt);
     output.what = "poses";
     if (runs.size() == 1) {
       poses = runs[0];
