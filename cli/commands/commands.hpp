@@ -12,6 +12,8 @@ void addPreintegrateCommand(const CommandList& program);
 void addViInitCommand(const CommandList& program);
 void addTwoViewCommand(const CommandList& program);
 void addConvertCommand(const CommandList& program);
+void addDoctorCommand(const CommandList& program);
+void addEvaluateCommand(const CommandList& program);
 void addHandEyeCommand(const CommandList& program);
 void addSimulateHandEyeCommand(const CommandList& simulate);
 void addSimulateMotionCommand(const CommandList& simulate);

@@ -1,0 +1,6 @@
+// Evaluation of trajectories, compiled once; see initialisation.cpp.
+#ifndef LIESTAT_COMPILED_FUSION
+#define LIESTAT_COMPILED_FUSION
+#endif
+
+#include <fusion/detail/evaluate_trajectories.hpp>

@@ -1,0 +1,319 @@
+// Conventions found from errors: planted ones in scenes of different richness, classes that are equal, the bound of the
+// margin, correlated errors, scales, faults, plan, bad input.
+
+#include <experiments/trajectory_scene.hpp>
+#include <fusion/convention_diagnosis.hpp>
+#include <stats/convention_charts.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace liestat {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using experiments::SceneMotion;
+using experiments::SceneNoise;
+using experiments::TrajectoryScene;
+using experiments::TrajectorySceneOptions;
+
+/// The scene as a file in a convention.
+std::vector<DiagnosedPose> written(const TrajectoryScene& scene, const Convention& c) {
+  std::vector<DiagnosedPose> poses;
+  for (std::size_t i = 0; i < scene.truth.size(); ++i) {
+    poses.push_back({scene.estimate[i].mean, toConvention(c, scene.estimate[i]), scene.truth[i]});
+  }
+  return poses;
+}
+bool contains(const std::vector<Convention>& list, const Convention& c) {
+  return std::find(list.begin(), list.end(), c) != list.end();
+}
+
+using P = Perturbation;
+using U = RotationUnit;
+Convention convention(P perturbation, U unit = U::radian, CovarianceContent content = CovarianceContent::covariance,
+                      CovarianceOrder order = CovarianceOrder::translation_rotation) {
+  Convention c;
+  c.order = order, c.perturbation = perturbation, c.unit = unit, c.content = content;
+  return c;
+}
+
+/// The fifteen conventions that are planted.
+std::vector<Convention> planted() {
+  using C = CovarianceContent;
+  const auto rt = CovarianceOrder::rotation_translation;
+  return {convention(P::right),
+          convention(P::left),
+          convention(P::world_axes),
+          convention(P::world_body_axes),
+          convention(P::roll_pitch_yaw),
+          convention(P::yaw_pitch_roll),
+          convention(P::transposed_axes),
+          convention(P::right, U::half_angle),
+          convention(P::right, U::double_angle),
+          convention(P::right, U::degree),
+          convention(P::right, U::radian, C::information),
+          convention(P::right, U::half_angle, C::information),
+          convention(P::right, U::radian, C::sigmas),
+          convention(P::right, U::radian, C::covariance, rt),
+          convention(P::world_axes, U::radian, C::covariance, rt)};
+}
+
+struct Shares {
+  double identified = 0, wrong = 0, fired = 0;
+};
+Shares shares(SceneMotion motion, SceneNoise noise, const Convention& c, std::size_t n, int trials,
+              const DiagnosisOptions& options = {}) {
+  Shares s;
+  for (int trial = 0; trial < trials; ++trial) {
+    CounterRng rng(77, static_cast<std::uint64_t>(trial), static_cast<std::uint32_t>(n));
+    const TrajectoryScene scene = experiments::independentScene({.motion = motion, .noise = noise, .n = n}, rng);
+    const ConventionDiagnosis d = diagnoseConventions(written(scene, c), options);
+    const bool single = d.accepted.size() == 1;
+    s.identified += d.verdict == DiagnosisVerdict::identified && contains(d.accepted, c);
+    s.wrong += (single || d.verdict == DiagnosisVerdict::undecidable) && !contains(d.accepted, c) && !d.correlated;
+    s.fired += d.verdict == DiagnosisVerdict::inconsistent || d.verdict == DiagnosisVerdict::none || d.correlated;
+  }
+  s.identified /= trials, s.wrong /= trials, s.fired /= trials;
+  return s;
+}
+
+TEST(ConventionDiagnosis, RichMotionIdentifiesAllFifteen) {
+  double fired = 0;
+  for (const Convention& c : planted()) {
+    const Shares s = shares(SceneMotion::space, SceneNoise::full, c, 50, 12);
+    EXPECT_GE(s.identified, 11. / 12) << describe(c);
+    EXPECT_EQ(s.wrong, 0) << describe(c);
+    fired += s.fired / 15;
+  }
+  EXPECT_LT(fired, 0.03);  // 0.7 % of 180 on average
+}
+
+TEST(ConventionDiagnosis, ClassesThatAreEqualStayTogether) {
+  // A planar motion with decoupled roll and pitch: three perturbations write the same file.
+  CounterRng rng(3);
+  const TrajectoryScene scene =
+      experiments::independentScene({.motion = SceneMotion::planar, .noise = SceneNoise::planar, .n = 200}, rng);
+  // The estimate is planar too.
+  TrajectoryScene flat = scene;
+  for (std::size_t i = 0; i < 200; ++i) flat.estimate[i].mean = scene.truth[i];
+  for (std::size_t i = 0; i < 200; ++i) {
+    flat.truth[i] = flat.estimate[i].mean * (scene.estimate[i].mean.inverse() * scene.truth[i]);
+  }
+  const ConventionDiagnosis d = diagnoseConventions(written(flat, convention(P::world_axes)));
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::undecidable) << d.reason;
+  EXPECT_EQ(d.accepted.size(), 3u);
+  EXPECT_TRUE(contains(d.accepted, convention(P::roll_pitch_yaw)));
+  EXPECT_NE(d.reason.find("planar"), std::string::npos) << d.reason;
+  // Isotropic blocks say nothing about axes.
+  const TrajectoryScene round = experiments::independentScene({.noise = SceneNoise::isotropic, .n = 200}, rng);
+  const ConventionDiagnosis same = diagnoseConventions(written(round, convention(P::right)));
+  EXPECT_EQ(same.verdict, DiagnosisVerdict::undecidable);
+  EXPECT_EQ(same.accepted.size(), 4u);
+  EXPECT_NE(same.reason.find("s^2 I"), std::string::npos) << same.reason;
+}
+
+TEST(ConventionDiagnosis, SmallRotationsAreUndecidableAndThePlanSaysSo) {
+  const Shares few = shares(SceneMotion::small, SceneNoise::full, convention(P::world_axes), 50, 20);
+  EXPECT_LT(few.identified, 0.2);
+  EXPECT_EQ(few.wrong, 0);
+  const Shares left = shares(SceneMotion::small, SceneNoise::full, convention(P::left), 50, 20);
+  EXPECT_GT(left.identified, 0.9);
+  CounterRng rng(4);
+  const TrajectoryScene scene = experiments::independentScene({.motion = SceneMotion::small, .n = 100}, rng);
+  const std::vector<Convention> of{convention(P::right), convention(P::world_axes)};
+  const std::vector<PlanRow> plan = planDiagnosis(written(scene, convention(P::right)), of);
+  ASSERT_EQ(plan.size(), 2u);
+  EXPECT_GT(plan[0].poses, 100);
+  EXPECT_LT(plan[0].poses, 3000);
+  EXPECT_GT(plan[0].divergence, 0);
+}
+
+TEST(ConventionDiagnosis, MarginIsABound) {
+  // The true hypothesis is rejected with probability alpha at most: 200 trials at 0.05 have 4 rejections in a thousand
+  // cases more than 20.
+  int rejected = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    CounterRng rng(5, static_cast<std::uint64_t>(trial));
+    const TrajectoryScene scene =
+        experiments::independentScene({.motion = SceneMotion::yaw, .noise = SceneNoise::diagonal, .n = 20}, rng);
+    const Convention c = planted()[static_cast<std::size_t>(trial) % 7];
+    const ConventionDiagnosis d = diagnoseConventions(written(scene, c), {.alpha = 0.05});
+    double own = -1e9;
+    for (const HypothesisFit& f : d.fits) {
+      if (f.convention == c) own = f.log_likelihood;
+    }
+    rejected += !d.correlated && !(own > -d.margin);
+  }
+  EXPECT_LE(rejected, 10);
+}
+
+TEST(ConventionDiagnosis, AnUnknownWorldIsAligned) {
+  CounterRng rng(6);
+  const TrajectoryScene scene = experiments::independentScene({.n = 60}, rng);
+  const SE3d A(SO3d(rng.unitQuaternion()), Eigen::Vector3d(20, -10, 5));
+  for (const Convention& c : {convention(P::right), convention(P::left), convention(P::world_axes),
+                              convention(P::world_body_axes, U::half_angle)}) {
+    std::vector<DiagnosedPose> poses = written(scene, c);
+    for (DiagnosedPose& p : poses) p.truth = A * p.truth;
+    const ConventionDiagnosis d = diagnoseConventions(poses, {.alignment = AlignmentModel::se3});
+    EXPECT_EQ(d.verdict, DiagnosisVerdict::identified) << d.reason;
+    EXPECT_TRUE(contains(d.accepted, c)) << describe(c) << ": " << d.reason;
+    EXPECT_NE(diagnoseConventions(poses).verdict, DiagnosisVerdict::identified);
+  }
+}
+
+TEST(ConventionDiagnosis, LargeErrorsKeepTheirOwnCoordinates) {
+  for (const Convention& c : {convention(P::world_axes), convention(P::roll_pitch_yaw)}) {
+    CounterRng rng(8);
+    TrajectoryScene scene = experiments::independentScene({.motion = SceneMotion::yaw, .n = 200}, rng);
+    std::vector<DiagnosedPose> poses;
+    for (std::size_t i = 0; i < 200; ++i) {
+      // Errors of 0.3 rad, normal in the coordinates of the convention itself.
+      const Eigen::Matrix<double, 6, 1> unit = (Eigen::Matrix<double, 6, 1>() << 1, 1, 1, 30, 30, 30).finished();
+      const Matrix6 C = unit.asDiagonal() * scene.estimate[i].covariance * unit.asDiagonal();
+      const Eigen::Matrix<double, 6, 1> x = detail::SemidefiniteRoot<double, 6>(C) * rng.normalVector<6>();
+      const SE3d truth = conventionExp(c, scene.truth[i], x);
+      poses.push_back({scene.truth[i], C, truth});
+    }
+    const ConventionDiagnosis d = diagnoseConventions(poses);
+    EXPECT_TRUE(d.exact_coordinates);
+    EXPECT_TRUE(contains(d.accepted, c)) << d.reason;
+    EXPECT_TRUE(d.tests.consistent()) << d.reason;
+  }
+}
+
+TEST(ConventionDiagnosis, DeadReckoningIsDecidedByItsChain) {
+  const TrajectorySceneOptions options{.n = 200, .sigma_translation = 0.01, .sigma_rotation = 0.002};
+  for (const P p : {P::right, P::world_axes, P::world_body_axes, P::roll_pitch_yaw}) {
+    for (const SceneMotion motion : {SceneMotion::space, SceneMotion::yaw}) {
+      for (std::uint64_t trial = 0; trial < 3; ++trial) {
+        CounterRng rng(9, trial);
+        TrajectorySceneOptions o = options;
+        o.motion = motion;
+        const TrajectoryScene scene = experiments::deadReckoningScene(o, rng);
+        const ConventionDiagnosis d = diagnoseConventions(written(scene, convention(p)));
+        EXPECT_TRUE(d.correlated);
+        EXPECT_TRUE(d.fits.empty());  // no ranking on absolute errors
+        EXPECT_EQ(d.verdict, DiagnosisVerdict::identified) << describe(convention(p)) << ": " << d.reason;
+        EXPECT_TRUE(contains(d.accepted, convention(p))) << d.reason;
+        // Without truth.
+        std::vector<DiagnosedPose> blind = written(scene, convention(p));
+        for (DiagnosedPose& pose : blind) pose.truth = SE3d();
+        const ChainDiagnosis chain = diagnoseChain(blind);
+        EXPECT_TRUE(chain.is_chain);
+        EXPECT_TRUE(contains(chain.accepted, convention(p)));
+        EXPECT_EQ(chain.accepted.size(), 1u) << describe(convention(p)) << chain.fits[1].indefinite;
+      }
+    }
+  }
+}
+
+TEST(ConventionDiagnosis, StepsFusedAsAbsoluteAreNamed) {
+  CounterRng rng(10);
+  const TrajectorySceneOptions o{.n = 200, .sigma_translation = 0.01, .sigma_rotation = 0.002};
+  TrajectoryScene scene = experiments::deadReckoningScene(o, rng);
+  for (std::size_t i = 199; i > 0; --i) {
+    const Matrix6 A = (scene.estimate[i].mean.inverse() * scene.estimate[i - 1].mean).Adj();
+    scene.estimate[i].covariance -= A * scene.estimate[i - 1].covariance * A.transpose();
+  }
+  const ConventionDiagnosis d = diagnoseConventions(written(scene, convention(P::right)));
+  EXPECT_TRUE(d.increments_as_absolute) << d.reason;
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::inconsistent);
+  EXPECT_GT(d.growth, 2);
+}
+
+TEST(ConventionDiagnosis, ScalesAreNamed) {
+  CounterRng rng(11);
+  const TrajectoryScene scene = experiments::independentScene({.n = 300}, rng);
+  std::vector<DiagnosedPose> poses = written(scene, convention(P::world_axes));
+  const auto scaled = [&](double k_t, double k_r) {
+    std::vector<DiagnosedPose> all = poses;
+    for (DiagnosedPose& p : all) {
+      p.matrix.topRows<3>() *= std::sqrt(k_t), p.matrix.leftCols<3>() *= std::sqrt(k_t);
+      p.matrix.bottomRows<3>() *= std::sqrt(k_r), p.matrix.rightCols<3>() *= std::sqrt(k_r);
+    }
+    return diagnoseConventions(all);
+  };
+  const ConventionDiagnosis overconfident = scaled(0.5, 0.5);
+  EXPECT_EQ(overconfident.verdict, DiagnosisVerdict::inconsistent);
+  ASSERT_TRUE(overconfident.scale);
+  EXPECT_TRUE(contains(overconfident.accepted, convention(P::world_axes)));
+  EXPECT_EQ(overconfident.accepted.size(), 1u);
+  EXPECT_NE(overconfident.reason.find("overconfident"), std::string::npos) << overconfident.reason;
+  const ConventionDiagnosis millimetres = scaled(1e6, 1);
+  EXPECT_NE(millimetres.reason.find("millimetres"), std::string::npos) << millimetres.reason;
+  const ConventionDiagnosis both = scaled(0.4, 0.25);
+  ASSERT_TRUE(both.scale);
+  EXPECT_NEAR(both.scale->translation, 0.4, 0.1);
+  EXPECT_NEAR(both.scale->rotation, 0.25, 0.06);
+}
+
+TEST(ConventionDiagnosis, FaultsAreRepaired) {
+  // Each repair undoes what its words say, on one matrix.
+  CounterRng rng(12);
+  const TrajectoryScene scene = experiments::independentScene({.n = 200}, rng);
+  const auto spoiled = [&](auto&& spoil) {
+    std::vector<DiagnosedPose> poses = written(scene, convention(P::right));
+    for (DiagnosedPose& p : poses) p.matrix = spoil(p.matrix, p.estimate);
+    return diagnoseConventions(poses);
+  };
+  const ConventionDiagnosis sign = spoiled([](Matrix6 M, const SE3d&) {
+    M.topRightCorner<3, 3>() *= -1, M.bottomLeftCorner<3, 3>() *= -1;
+    return M;
+  });
+  EXPECT_EQ(sign.fault, MatrixFault::cross_sign) << sign.reason;
+  EXPECT_EQ(sign.verdict, DiagnosisVerdict::inconsistent);
+  const ConventionDiagnosis factor = spoiled([](const Matrix6& M, const SE3d&) {
+    const Matrix6 L = M.llt().matrixL();
+    return Matrix6(L.transpose() * L);
+  });
+  EXPECT_EQ(factor.fault, MatrixFault::factor_transposed) << factor.reason;
+  const ConventionDiagnosis arm = spoiled([](const Matrix6& M, const SE3d& T) {
+    Matrix6 J = T.Adj();
+    J.topRightCorner<3, 3>() *= -1;
+    return Matrix6(J * M * J.transpose());
+  });
+  EXPECT_EQ(arm.fault, MatrixFault::lever_arm_sign) << arm.reason;
+}
+
+TEST(ConventionDiagnosis, UnknownCrossBlocksAreNotZero) {
+  CounterRng rng(13);
+  const TrajectoryScene scene = experiments::independentScene({.n = 300}, rng);
+  std::vector<DiagnosedPose> poses = written(scene, convention(P::world_body_axes));
+  for (DiagnosedPose& p : poses) {
+    p.matrix.topRightCorner<3, 3>().setConstant(std::numeric_limits<double>::quiet_NaN());
+    p.matrix.bottomLeftCorner<3, 3>().setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  const ConventionDiagnosis d = diagnoseConventions(poses);
+  EXPECT_TRUE(d.structure.blocks_only);
+  EXPECT_TRUE(contains(d.accepted, convention(P::world_body_axes))) << d.reason;
+  EXPECT_EQ(d.accepted.size(), 1u) << d.reason;
+  for (const HypothesisFit& f : d.fits) EXPECT_NE(f.convention.perturbation, P::left);
+}
+
+TEST(ConventionDiagnosis, BadInputIsSaid) {
+  EXPECT_EQ(diagnoseConventions({}).verdict, DiagnosisVerdict::undecidable);
+  CounterRng rng(14);
+  const TrajectoryScene scene = experiments::independentScene({.n = 30}, rng);
+  std::vector<DiagnosedPose> poses = written(scene, convention(P::right));
+  EXPECT_EQ(diagnoseConventions(std::span(poses).first(5)).verdict, DiagnosisVerdict::undecidable);
+  poses[3].matrix.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(diagnoseConventions(poses).skipped, 1u);
+  for (DiagnosedPose& p : poses) p.matrix(2, 2) = -1;
+  const ConventionDiagnosis d = diagnoseConventions(poses);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::none);
+  EXPECT_GT(d.structure.indefinite, 0u);
+  EXPECT_FALSE(d.notes.empty());
+  EXPECT_FALSE(diagnoseChain({}).is_chain);
+  EXPECT_TRUE(planDiagnosis({}).empty());
+}
+
+}  // namespace
+}  // namespace liestat
