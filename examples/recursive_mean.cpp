@@ -29,7 +29,7 @@ int main() {
               << (truth.inverse() * mean.mean()).log()[2] << " rad\n";
     return sigma;
   };
-  // What the platform has turned in the meantime is no noise: the covariances do not include it. Forgetting limits it to
+  // The platform's turn in the meantime is no noise: the covariances do not include it. Forgetting limits it to
   // 0.001 rad · λ/(1-λ) = 0.019 rad.
   const double sigma_all = print("none forgotten", all), sigma_recent = print("forgetting    ", recent);
   const double lag = (truth.inverse() * recent.mean()).log()[2];

@@ -17,7 +17,7 @@
 
 namespace liestat::experiments {
 
-/// How the body moves: 3-D rotations of 1.5 rad (rms), free yaw with roll and pitch of 5 degrees, a car in the plane, or
+/// The body's motion: 3-D rotations of 1.5 rad (rms), free yaw with roll and pitch of 5 degrees, a car in the plane, or
 /// rotations below 0.14 rad. Positions are some 4 m from the origin.
 enum class SceneMotion { space, yaw, planar, small };
 

@@ -1,4 +1,4 @@
-// Which convention is a file of covariances in? The answer from its errors against a ground truth, or, for dead reckoning,
+// The convention that a file of covariances is in, from its errors against a ground truth, or, for dead reckoning,
 // without one. (Needs Boost.Math.)
 //
 //   std::vector<liestat::DiagnosedPose> poses;  // {estimate, matrix as the file has it, truth}, in order of time
@@ -70,7 +70,7 @@ const char* describe(MatrixFault fault);
 /// The enumerator's name, for files.
 const char* name(MatrixFault fault);
 
-/// What the matrices of a file look like, before any error is seen.
+/// The looks of a file's matrices, before any error is seen.
 struct MatrixStructure {
   std::size_t n = 0;
   std::size_t unknown = 0;     ///< matrices with unknown entries outside of the cross block: not used
@@ -161,7 +161,7 @@ struct ConventionDiagnosis {
 /// Finds the conventions that explain the errors. Fewer than ten usable poses are "undecidable".
 ConventionDiagnosis diagnoseConventions(std::span<const DiagnosedPose> poses, const DiagnosisOptions& options = {});
 
-/// What a file can decide, from its poses and matrices alone: if `convention` is the truth, the nearest other hypothesis and
+/// The hypotheses that a file can decide, from its poses and matrices alone: if `convention` is the truth, the nearest other hypothesis and
 /// the number of poses that tell them apart with 95 %.
 struct PlanRow {
   Convention convention, nearest;

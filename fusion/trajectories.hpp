@@ -188,7 +188,7 @@ std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const Match
 std::vector<double> relativeErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
                                    std::vector<std::pair<std::size_t, std::size_t>>& pairs, PoseRelation relation);
 
-/// What is assumed of the errors of a pair of poses. Files have covariances of single poses only, so it cannot be read off.
+/// The assumption on the errors of a pair of poses. Files have covariances of single poses only, so it cannot be read off.
 enum class PairsModel {
   independent,  ///< of each other: Σ_j + A Σ_i Aᵀ
   chain         ///< dead reckoning, the later error contains the earlier: Σ_j - A Σ_i Aᵀ

@@ -34,7 +34,7 @@ class ArrayView;
 
 namespace detail {
 
-/// Where the numbers of an element of type X are, for types that hold nothing else.
+/// The place of an element's numbers, X its type, for types that hold nothing else.
 template <class X>
 struct ElementNumbers;
 template <class X>
@@ -144,13 +144,13 @@ class ArrayView {
   /// One element. Operations take it for every element of their other operand.
   template <detail::ElementOfNumbers<T> X>
   ArrayView(X& element) : ArrayView(ofElement(element, 1)) {}  // NOLINT: implicit
-  /// Of a 4×n matrix the columns, of an n×4 matrix the rows: a Matrix, Map, Ref or Block of Eigen in memory. Where both
+  /// The columns of a 4×n matrix, the rows of an n×4 matrix: a Matrix, Map, Ref or Block of Eigen in memory. Where both
   /// numbers are dynamic, columnsOf() and rowsOf() tell.
   template <detail::MatrixOfElements<T> D>
   ArrayView(D&& m);  // NOLINT: implicit
 
   std::size_t size() const { return size_; }
-  /// How many numbers an element has; 0 where the view was not told.
+  /// The number of numbers in an element; 0 where the view was not told.
   std::size_t components() const { return components_; }
   const detail::Layout<T>& layout() const { return layout_; }
   T& operator()(std::size_t element, std::size_t component) const { return *layout_.at(element, component); }

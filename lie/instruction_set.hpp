@@ -63,7 +63,7 @@ namespace detail {
                               name(supportedInstructionSet()) + ", which is what this processor supports");
 }
 
-/// What LIESTAT_INSTRUCTION_SET says, or the largest set there is.
+/// The set that LIESTAT_INSTRUCTION_SET names, or the largest set there is.
 inline InstructionSet initialInstructionSet() {
   constexpr const char* variable = "LIESTAT_INSTRUCTION_SET";
   const InstructionSet supported = supportedInstructionSet();

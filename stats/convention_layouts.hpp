@@ -11,7 +11,7 @@
 
 namespace liestat {
 
-/// How many numbers a layout has.
+/// The number of numbers in a layout.
 constexpr std::size_t layoutSize(CovarianceLayout layout) {
   switch (layout) {
     case CovarianceLayout::full36:
@@ -99,7 +99,7 @@ inline PackedCovariance packCovariance(const Convention& convention, const Eigen
 }
 
 /// The symmetric matrix of the numbers of a layout, NaN (unknown, not zero) for entries that the layout does not have.
-/// Of full36 the mean of both triangles is taken; asymmetry(numbers) tells whether they agree. Nothing if the count of
+/// Takes the mean of both triangles of full36; asymmetry(numbers) tells whether they agree. Nothing if the count of
 /// numbers is not layoutSize.
 inline std::optional<Eigen::Matrix<double, 6, 6>> unpackCovariance(const Convention& convention,
                                                                    std::span<const double> numbers) {

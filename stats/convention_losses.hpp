@@ -1,4 +1,4 @@
-// What a covariance loses when it is converted from one convention to another: digits far from the origin and near the
+// Losses of a covariance when it is converted from one convention to another: digits far from the origin and near the
 // pole of Euler angles, and what is not linear. docs/theory/conventions.md, section 5.
 #pragma once
 
@@ -57,7 +57,7 @@ constexpr const char* message(ConversionProblem problem) {
 /// mean nothing; and the error of a round trip that is accepted, in units of the standard deviations.
 inline constexpr double first_order_sigma = 0.1, largest_angle_sigma = 0.5, largest_round_trip = 1e-6;
 
-/// What is lost.
+/// The losses.
 struct ConversionLoss {
   /// Bound of the rounding of there and back, of an entry (i, j) in units of σ_i σ_j of the library's covariance:
   /// 64 eps (1 + |p|² σ_r²/σ_t²) for a perturbation of the world, over cos² pitch for Euler angles.

@@ -160,7 +160,7 @@ enum class CovarianceLayout {
   toro6      ///< 11 12 22 33 13 23 of (x, y, yaw): TORO's EDGE2
 };
 
-/// What the numbers of a pose's covariance mean: five independent answers. The default is the library's own.
+/// The meaning of the numbers of a pose's covariance: five independent answers. The default is the library's own.
 struct Convention {
   CovarianceOrder order = CovarianceOrder::translation_rotation;
   Perturbation perturbation = Perturbation::right;

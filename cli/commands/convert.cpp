@@ -128,7 +128,7 @@ class Converter {
     return any;
   }
 
-  /// What the conversion loses; throws InputError where the result would not be a covariance any more.
+  /// The conversion's losses; throws InputError where the result would not be a covariance any more.
   void look(const Gaussian<SE3d>& g, const ConvertRow& row) {
     const ConversionLoss loss = conversionLoss(from_, to_, g);
     output_.round_trip = std::max(output_.round_trip, loss.round_trip);
@@ -136,7 +136,7 @@ class Converter {
     if (loss.firstOrderFails()) ++output_.beyond_first_order;
     if (loss.problem == ConversionProblem::none) return;
     if (loss.problem == ConversionProblem::far_origin && to_.perturbation != Perturbation::left) {
-      // What was lost, was lost by whoever wrote the file.
+      // Losses before this file are its writer's.
       ++output_.far_input;
       return;
     }

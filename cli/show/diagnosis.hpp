@@ -10,7 +10,7 @@
 
 namespace liestat::cli {
 
-/// What `liestat doctor` shows.
+/// The text, JSON and page of `liestat doctor`.
 struct DiagnosisOutput {
   std::vector<std::string> files;  ///< estimates, or the graph
   std::string reference;           ///< empty without truth

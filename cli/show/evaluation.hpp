@@ -10,7 +10,7 @@
 
 namespace liestat::cli {
 
-/// What `liestat evaluate` found of one estimate.
+/// One estimate as `liestat evaluate` found it.
 struct EvaluatedEstimate {
   std::string name;       ///< of the file
   std::size_t poses = 0;  ///< in the file
@@ -39,7 +39,7 @@ struct EvaluationVerdict {
 };
 EvaluationVerdict verdictOf(const EvaluatedEstimate& e);
 
-/// What `liestat evaluate` shows.
+/// The result of `liestat evaluate`.
 struct EvaluationOutput {
   std::string reference;
   std::size_t reference_poses = 0;

@@ -649,7 +649,7 @@ inline void rankIncrements(const DiagnosisData& data, ChainDiagnosis& chain, dou
   chain.increments = neesTest(nees[best], 6 * static_cast<double>(used));
 }
 
-/// What several accepted hypotheses share.
+/// The fields that several accepted hypotheses share.
 inline std::string ambiguity(const DiagnosisData& data, const MatrixStructure& structure,
                              const std::vector<Convention>& accepted, const std::vector<PlanRow>& plan) {
   double tilt = 0, turn = 0;

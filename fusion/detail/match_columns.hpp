@@ -104,7 +104,7 @@ class EpipolarColumns {
     const Form<P> f(F_.m, x, y, u, v);
     return f.c * f.c / variance(f);
   }
-  /// That of ũ'ᵀ F ũ.
+  /// Variance of ũ'ᵀ F ũ.
   template <class P>
   LIESTAT_ALWAYS_INLINE P variance(const P& x, const P& y, const P& u, const P& v) const {
     return variance(Form<P>(F_.m, x, y, u, v));
@@ -189,7 +189,7 @@ class HomographyColumns {
   double v1_, v2_;
 };
 
-/// What the kernels below read and write; all columns hold a whole number of packs.
+/// Arguments of the kernels below; all columns hold a whole number of packs.
 template <class Equation>
 struct MatchArguments {
   const Equation& equation;

@@ -324,7 +324,7 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
       out.leverage = root.halfSolve<7>(e.jacobian).cwiseProduct(root.halfSolve<7>(JC)).sum();
     }
     const Cholesky<double, 6> left(out.covariance);
-    // Where the alignment explains a direction of the pose entirely there is nothing to test; rounding decides near it.
+    // A direction of the pose that the alignment explains entirely leaves nothing to test; rounding decides near it.
     const bool regular = left.ok() && out.leverage < 6 - 1e-6;
     out.nees = regular ? left.halfSolve<1>(e.error).squaredNorm() : not_a_number;
     r.errors.push_back(out);

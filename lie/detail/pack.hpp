@@ -72,7 +72,7 @@ struct Pack {
   static constexpr InstructionSet set = Set;
   static constexpr std::size_t size = PackStorage<Set, S>::size;
 
-  /// What a comparison gives.
+  /// The result of a comparison.
   struct Mask {
     decltype(Vector{} < Vector{}) lanes;
   };
@@ -126,7 +126,7 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE friend Pack select(const Mask& mask, const Pack& a, const Pack& b) {
     return Pack(mask.lanes ? a.v : b.v);
   }
-  /// Whether the mask holds in any lane.
+  /// True if the mask holds in any lane.
   LIESTAT_ALWAYS_INLINE friend bool anyOf(const Mask& mask) {
 #if LIESTAT_HAS_SHUFFLES
     using Words = typename PackStorage<Set, std::int64_t>::Type;

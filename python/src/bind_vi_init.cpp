@@ -23,7 +23,7 @@ DoubleArray vector3(const Eigen::Vector3d& v) {
   return array;
 }
 
-/// What a window says, in plain numbers.
+/// A window's result in plain numbers.
 py::dict windowOf(const InitialisedWindow& window) {
   py::dict d;
   d["begin"] = window.begin;

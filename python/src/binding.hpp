@@ -1,4 +1,4 @@
-// What the units of the extension module share. Arrays arrive as the package's Python side prepares them: float64, aligned,
+// Shared by the units of the extension module. Arrays arrive as the package's Python side prepares them: float64, aligned,
 // rows contiguous in their last axis; it also words the messages, since it alone knows the caller's names and shapes.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Where the work of a call is done: threads if oneTBB is there, and Python's signals are looked for all the while.
+// The executor of a call: threads if oneTBB is there, and Python's signals are looked for all the while.
 #pragma once
 
 #include <stats/executor.hpp>

@@ -65,7 +65,7 @@ inline UniquenessOptions uniquenessOptions(const MeanRequest& request, SignalWat
   return how;
 }
 
-/// What every certified estimate says.
+/// The fields of every certified estimate.
 template <class M, class Iteration, class Certified>
 void setEstimate(MeanAnswer& answer, const Iteration& iteration, const Certified& result) {
   answer.n = iteration.n;
@@ -102,7 +102,7 @@ void setDispersion(MeanAnswer& answer, const MeanRequest& request, std::span<con
   store(dispersion, answer.dispersion.data());
 }
 
-/// What an uncertified estimate says: the iteration, and its covariance where the features show a mean at all.
+/// The fields of an uncertified estimate: the iteration, and its covariance where the features show a mean at all.
 template <class M, class Iteration>
 void setPlainEstimate(MeanAnswer& answer, const Iteration& iteration, const SquareOf<M>& covariance,
                       const Concentration& concentration) {

@@ -11,7 +11,7 @@
 
 namespace liestat::python {
 
-/// How means are asked for.
+/// Arguments of the means.
 struct MeanRequest {
   std::span<const double> features;     ///< rows of parameters
   std::span<const double> weights;      ///< one for each feature, or empty

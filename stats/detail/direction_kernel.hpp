@@ -106,7 +106,7 @@ struct DirectionKernel {
       for (std::size_t i = 0; i < arguments.count; i += block) {
         const std::size_t count = std::min(arguments.count - i, block);
         loadColumns<P::set, 3>(arguments.features, 0, i, count, data);
-        // What fills the last register is y, with weight 0; without weights it counts once in Σ h c.
+        // The last register is filled up with y, with weight 0; without weights it counts once in Σ h c.
         for (std::size_t j = count; j % P::size != 0; ++j) {
           for (std::size_t c = 0; c < 3; ++c) data[c][j] = arguments.reference[c];
           data[4][j] = 0;

@@ -64,7 +64,7 @@ struct MahaKernel {
     }
 
     LIESTAT_ALWAYS_INLINE static P number(const double* p, std::size_t which) { return P::load(p + which * lanes); }
-    /// Where row i, column j of a symmetric matrix is in its lower triangle.
+    /// Index in the lower triangle of row i, column j of a symmetric matrix.
     static constexpr std::size_t entry(std::size_t i, std::size_t j) {
       return i >= j ? i * (i + 1) / 2 + j : entry(j, i);
     }

@@ -104,7 +104,7 @@ struct RotationKernel {
         }
       }
       if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
-      // What is missing in the last pack is filled with y itself, which adds nothing.
+      // The last pack is filled up with y itself, which adds nothing.
       for (std::size_t j = count; j % P::size != 0; ++j) {
         for (std::size_t c = 0; c < 4; ++c) data[c][j] = arguments.reference[c];
         for (std::size_t c = 4; c < columns; ++c) data[c][j] = 0;

@@ -184,7 +184,7 @@ TEST(EvaluateCommand, ResultFileIsThatOfEvo) {
     EXPECT_EQ(python.status, 0) << python.errors;
   }
   EXPECT_EQ(crc32("123456789"), 0xcbf43926u);
-  // What is no archive is said.
+  // A file that is no archive is named.
   EXPECT_TRUE(contains(errorOf([] { readZipArchive("nonsense", "x.zip"); }), "x.zip"));
 }
 
@@ -232,7 +232,7 @@ TEST(EvaluateCommand, ConventionsAreAppliedBeforeTheAlignment) {
   };
   EXPECT_EQ(with("ros-fixed")["consistent"], true);
   EXPECT_EQ(with("right")["consistent"], false);
-  // What no file says is asked for.
+  // A convention that no file states is asked for.
   const ProgramOutput unsaid = run(base);
   EXPECT_EQ(unsaid.exit_code, 2);
   EXPECT_TRUE(contains(unsaid.error, "--cov-from")) << unsaid.error;

@@ -1,4 +1,4 @@
-// What tf2 does with a covariance is what the preset ros-fixed says.
+// tf2 treats a covariance as the preset ros-fixed says.
 #include <stats/convention_presets.hpp>
 #include <stats/propagation.hpp>
 

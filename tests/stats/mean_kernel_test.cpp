@@ -30,7 +30,7 @@ template <class M>
 constexpr int num_parameters = static_cast<int>(sizeof(M) / sizeof(ScalarOf<M>)) - (sizeof(M) == 64 ? 1 : 0);
 /// The first parameters, which have length one.
 template <class M>
-constexpr int unit_parameters = detail::HasRotationSums<M>     ? 4
+constexpr int unit_parameters = detail::HasRotationSums<M>    ? 4
                                 : detail::HasDirectionSums<M> ? 3
                                 : detail::HasPlanarSums<M>    ? 2
                                                               : 0;
@@ -115,7 +115,8 @@ class MeanKernel : public testing::Test {
   std::normal_distribution<double> gauss_;
 };
 
-using Manifolds = testing::Types<SO3d, Frame3d, SemiOrientedFrame3d, NonOrientedFrame3d, S2d, SO2d, Frame2d, Eigen::Vector3d>;
+using Manifolds =
+    testing::Types<SO3d, Frame3d, SemiOrientedFrame3d, NonOrientedFrame3d, S2d, SO2d, Frame2d, Eigen::Vector3d>;
 TYPED_TEST_SUITE(MeanKernel, Manifolds);
 
 TYPED_TEST(MeanKernel, agrees_at_every_decade_of_the_angle) {

@@ -87,7 +87,7 @@ class RecursiveMeanTest : public testing::Test {};
 using Manifolds = testing::Types<Eigen::Vector3d, SO3d, SO3f, liestat_test::TurnedS2<double>, NonOrientedFrame3d, SE3d>;
 TYPED_TEST_SUITE(RecursiveMeanTest, Manifolds);
 
-// What the carried sums neglect leaves a distance of sigma⁵/n times a constant, sigma⁴/n for groups without a metric: at
+// The terms that the carried sums neglect leave a distance of sigma⁵/n times a constant, sigma⁴/n for groups without a metric: at
 // most 0.35 and 0.8 in the root mean square of docs/recursive_mean.md. Single clouds stay below eight times that.
 TYPED_TEST(RecursiveMeanTest, IsNearTheMeanOfTheBatch) {
   using M = TypeParam;
