@@ -86,7 +86,11 @@ struct Pack {
   LIESTAT_ALWAYS_INLINE explicit Pack(S x) : v(Vector{} + x) {}
 
   LIESTAT_ALWAYS_INLINE static Pack zero() { return Pack(Vector{}); }
-  LIESTAT_ALWAYS_INLINE static Pack load(const S* p) { return Pack(reinterpret_cast<const Memory*>(p)->v); }
+  LIESTAT_ALWAYS_INLINE static Pack load(const S* p) {
+    Pack x;  // no constructor: a reference to the vector in memory would promise its alignment
+    x.v = reinterpret_cast<const Memory*>(p)->v;
+    return x;
+  }
   LIESTAT_ALWAYS_INLINE void store(S* p) const { reinterpret_cast<Memory*>(p)->v = v; }
 
   LIESTAT_ALWAYS_INLINE Pack operator-() const { return Pack(-v); }
