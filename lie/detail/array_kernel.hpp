@@ -69,6 +69,10 @@ struct ArrayKernel {
         } else {
           Operation::template prepare<false>(a, coefficients);
         }
+#if defined(__clang__)
+        // Else clang 14 fuses what follows in another way for each branch.
+        asm volatile("" : "+m"(coefficients));
+#endif
         Operation::apply(a, coefficients, out);
       } else {
         Operation::apply(a, b, out);
