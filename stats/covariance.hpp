@@ -81,7 +81,8 @@ SquareOf<M> covarianceFromCommonNoise(const MeanResult<M>& result, const SquareO
 /// (stats/inference.hpp), not χ². Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
 /// measurement.
 template <Metric M>
-SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result, ResidualNoise noise = ResidualNoise::scaled) {
+LIESTAT_NO_INLINE SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result,
+                                                      ResidualNoise noise = ResidualNoise::scaled) {
   using S = ScalarOf<M>;
   const S n = S(result.n);
   if (result.n < 2) return SquareOf<M>::Constant(std::numeric_limits<S>::quiet_NaN());

@@ -4,6 +4,7 @@
 // safeguard, or the report's fixed point y ← f_y⋆(Σ p_i z_i / Σ p_i), eq. (4). Needs Eigen alone.
 #pragma once
 
+#include <lie/detail/always_inline.hpp>
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/mean_pass.hpp>
@@ -79,8 +80,10 @@ double automaticTolerance(double scale) {
   return std::max(1e-12, 4 * static_cast<double>(std::numeric_limits<S>::epsilon()) * scale);
 }
 
+/// Never inlined: a program has one of it, and its results the same bits, whatever flags its units have.
 template <Metric M, Executor E, class R, class W>
-MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights, const MeanOptions<M>& options) {
+LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
+                                            const MeanOptions<M>& options) {
   using T = ManifoldTraits<M>;
   using S = ScalarOf<M>;
   MeanResult<M> result;

@@ -4,7 +4,12 @@
 
 #if defined(__GNUC__)
 #define LIESTAT_ALWAYS_INLINE __attribute__((always_inline)) inline
+// Nor copied for one caller: a copy belongs to its unit, and has the bits of the unit's flags.
+#if defined(__clang__)
 #define LIESTAT_NO_INLINE __attribute__((noinline))
+#else
+#define LIESTAT_NO_INLINE __attribute__((noinline, noclone))
+#endif
 #else
 #define LIESTAT_ALWAYS_INLINE inline
 #define LIESTAT_NO_INLINE

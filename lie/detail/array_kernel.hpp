@@ -4,9 +4,13 @@
 // An operation is a class with
 //   a, b, out          how many numbers an element of its operands and of its result has; b = 0 if there is one operand
 //   rows               of a result that is a matrix, by columns; else 0
-//   special(a)         for two variants: the mask of the elements for which apply<true> has to be taken
-//   apply<special>     the result of a register of elements; numbers of a matrix that it does not write are zero
-// An element's result does not depend on the elements beside it: where variants differ, they do so lane by lane.
+//   apply(a, b, out)   the result of a register of elements; numbers of a matrix that it does not write are zero
+// and where there are elements that cost more than the others, of the one operand a,
+//   special(a)         the mask of those elements
+//   prepare<any>(a, c) some numbers that apply takes for b; any: some of the elements are special
+// An element's result does not depend on the elements beside it: prepare<true> treats special lanes alone in another way,
+// and what follows is one code for both, which the compiler fuses in one way. prepare has no sums of two products: it is
+// open which of them is fused.
 #pragma once
 
 #include <lie/detail/kernel.hpp>
@@ -59,13 +63,19 @@ struct ArrayKernel {
       if (from_a.element != 0) loadElements(from_a, i, n, a);
       if (Operation::b != 0 && from_b.element != 0) loadElements(from_b, i, n, b);
       if constexpr (Operation::variants) {
+        P coefficients[Operation::coefficients];
         if (anyOf(Operation::special(a))) {
-          Operation::template apply<true>(a, b, out);
+          Operation::template prepare<true>(a, coefficients);
         } else {
-          Operation::template apply<false>(a, b, out);
+          Operation::template prepare<false>(a, coefficients);
         }
+#if defined(__clang__)
+        // Else clang 14 fuses what follows in another way for each branch.
+        asm volatile("" : "+m"(coefficients));
+#endif
+        Operation::apply(a, coefficients, out);
       } else {
-        Operation::template apply<false>(a, b, out);
+        Operation::apply(a, b, out);
       }
       if constexpr (Operation::rows == 0) {
         storeElements(out, to, i, n);

@@ -186,40 +186,50 @@ struct RotationArrays {
   static constexpr std::size_t DoF = 3, num_parameters = 4, Dim = 3;
 
   struct Exp : RotationVectorOperation<3, 0, 4, 0> {
-    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
-    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
+    static constexpr std::size_t coefficients = 2;
+    template <bool special, class P>
+    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[3], P (&c)[coefficients]) {
+      using S = typename P::Scalar;
       const PackVector<P> v = readVector(in);
       const PackAngle<special, P> angle(dot(v, v));
-      writeQuaternion(result, PackQuaternion<P>{(typename P::Scalar(0.5) * angle.sinc) * v, angle.cos});
+      c[0] = S(0.5) * angle.sinc, c[1] = angle.cos;
+    }
+    template <class P>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[3], const P (&c)[coefficients], P (&result)[4]) {
+      writeQuaternion(result, PackQuaternion<P>{c[0] * readVector(in), c[1]});
     }
   };
   struct Log : QuaternionOperation<4, 3> {
-    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
-    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
-      const PackQuaternion<P> q = readQuaternion(in);
-      writeVector(result, PackLogarithm<P>::template of<special, false>(q).f * q.u);
+    static constexpr std::size_t coefficients = 1;
+    template <bool special, class P>
+    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[4], P (&c)[coefficients]) {
+      c[0] = PackLogarithm<P>::template of<special, false>(readQuaternion(in)).f;
+    }
+    template <class P>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[4], const P (&c)[coefficients], P (&result)[3]) {
+      writeVector(result, c[0] * readVector(in));
     }
   };
   struct Product : ArrayOperation<4, 4, 4> {
-    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    template <class P, std::size_t A, std::size_t B, std::size_t N>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&left)[A], const P (&right)[B], P (&result)[N]) {
       writeQuaternion(result, product(readQuaternion(left), readQuaternion(right)));
     }
   };
   struct Inverse : ArrayOperation<4, 0, 4> {
-    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    template <class P, std::size_t A, std::size_t B, std::size_t N>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       writeQuaternion(result, readQuaternion(in).conjugate());
     }
   };
   struct Act : ArrayOperation<4, 3, 3> {
-    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    template <class P, std::size_t A, std::size_t B, std::size_t N>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&point)[B], P (&result)[N]) {
       writeVector(result, readQuaternion(in).rotate(readVector(point)));
     }
   };
   struct Adjoint : ArrayOperation<4, 0, 9, 3> {
-    template <bool, class P, std::size_t A, std::size_t B, std::size_t N>
+    template <class P, std::size_t A, std::size_t B, std::size_t N>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
       writeBlock<3>(result, 0, 0, PackMatrix<P>::rotation(readQuaternion(in)));
     }
@@ -227,25 +237,33 @@ struct RotationArrays {
   /// sign -1: the right Jacobian.
   template <int sign>
   struct Jacobian : RotationVectorOperation<3, 0, 9, 3> {
-    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
-    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
+    static constexpr std::size_t coefficients = 2;
+    template <bool special, class P>
+    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[3], P (&c)[coefficients]) {
       using S = typename P::Scalar;
       const PackVector<P> v = readVector(in);
       const PackAngle<special, P> angle(dot(v, v));
-      writeBlock<3>(
-          result, 0, 0,
-          PackMatrix<P>::rotationPolynomial(v, P(S(1)), S(0.5 * sign) * (angle.sinc * angle.sinc), angle.beta3()));
+      c[0] = S(0.5) * (angle.sinc * angle.sinc), c[1] = angle.beta3();
+    }
+    template <class P>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[3], const P (&c)[coefficients], P (&result)[9]) {
+      using S = typename P::Scalar;
+      writeBlock<3>(result, 0, 0, PackMatrix<P>::rotationPolynomial(readVector(in), P(S(1)), S(sign) * c[0], c[1]));
     }
   };
   template <int sign>
   struct JacobianInverse : RotationVectorOperation<3, 0, 9, 3> {
-    template <bool special, class P, std::size_t A, std::size_t B, std::size_t N>
-    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[A], const P (&)[B], P (&result)[N]) {
-      using S = typename P::Scalar;
+    static constexpr std::size_t coefficients = 1;
+    template <bool special, class P>
+    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[3], P (&c)[coefficients]) {
       const PackVector<P> v = readVector(in);
       const PackAngle<special, P> angle(dot(v, v));
-      writeBlock<3>(result, 0, 0,
-                    PackMatrix<P>::rotationPolynomial(v, P(S(1)), P(S(-0.5 * sign)), angle.cotangentExcess()));
+      c[0] = angle.cotangentExcess();
+    }
+    template <class P>
+    LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[3], const P (&c)[coefficients], P (&result)[9]) {
+      using S = typename P::Scalar;
+      writeBlock<3>(result, 0, 0, PackMatrix<P>::rotationPolynomial(readVector(in), P(S(1)), P(S(-0.5 * sign)), c[0]));
     }
   };
 };

@@ -27,11 +27,13 @@ template <class S>
 struct FourNumbers {
   typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
   /// The same anywhere in memory, as in lie/detail/pack.hpp.
-  typedef S Memory __attribute__((vector_size(4 * sizeof(S)), aligned(sizeof(S)), may_alias));
+  struct __attribute__((packed, may_alias)) Memory {
+    Vector v;
+  };
   Vector v;
 
-  LIESTAT_ALWAYS_INLINE void load(const S* p) { v = *reinterpret_cast<const Memory*>(p); }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<Memory*>(p) = v; }
+  LIESTAT_ALWAYS_INLINE void load(const S* p) { v = reinterpret_cast<const Memory*>(p)->v; }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { reinterpret_cast<Memory*>(p)->v = v; }
 };
 /// Transposes four rows of four numbers.
 template <class S>

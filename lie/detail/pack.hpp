@@ -46,13 +46,17 @@ struct PackStorage {
   typedef S Type __attribute__((vector_size(registerBytes(Set))));
   /// The same anywhere in memory. g++ 12 copies by memcpy in halves, through the stack, in kernels for larger registers
   /// than those of their unit.
-  typedef S Memory __attribute__((vector_size(registerBytes(Set)), aligned(sizeof(S)), may_alias));
+  struct __attribute__((packed, may_alias)) Memory {
+    Type v;
+  };
   using Integer = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
   typedef Integer Integers __attribute__((vector_size(registerBytes(Set))));
   static constexpr std::size_t size = registerBytes(Set) / sizeof(S);
 #else
   using Type = S;
-  using Memory = S;
+  struct Memory {
+    Type v;
+  };
   using Integer = long long;
   using Integers = long long;
   static constexpr std::size_t size = 1;
@@ -86,11 +90,11 @@ struct Pack {
 
   LIESTAT_ALWAYS_INLINE static Pack zero() { return Pack(Vector{}); }
   LIESTAT_ALWAYS_INLINE static Pack load(const S* p) {
-    Pack x;
-    x.v = *reinterpret_cast<const Memory*>(p);
+    Pack x;  // no constructor: a reference to the vector in memory would promise its alignment
+    x.v = reinterpret_cast<const Memory*>(p)->v;
     return x;
   }
-  LIESTAT_ALWAYS_INLINE void store(S* p) const { *reinterpret_cast<Memory*>(p) = v; }
+  LIESTAT_ALWAYS_INLINE void store(S* p) const { reinterpret_cast<Memory*>(p)->v = v; }
 
   LIESTAT_ALWAYS_INLINE Pack operator-() const { return Pack(-v); }
   LIESTAT_ALWAYS_INLINE friend Pack operator+(const Pack& a, const Pack& b) {

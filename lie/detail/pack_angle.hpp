@@ -101,10 +101,6 @@ class PackAngle {
     return select(isLarge(t_), (S(2) - S(3) * sinc * cos + cos_theta) / (S(2) * t_ * t_), near);
   }
   LIESTAT_ALWAYS_INLINE P cotangentExcess() const { return halfExcess() / (S(4) * sinc); }
-  LIESTAT_ALWAYS_INLINE P cotangentExcessSlope() const {
-    const P e = halfExcess();
-    return (halfExcessSlope() * sinc + S(0.5) * e * e) / (S(8) * sinc * sinc);
-  }
 
  private:
   P t_, quarter_;

@@ -3,8 +3,9 @@
 //
 // The estimators themselves see one type, Samples: random access to owning types, indexed by any integer. Values of
 // such a type in random-access memory are used where they are (std::vector, std::array, std::span, std::deque, a view of
-// one). Everything else is copied once: std::list, the columns of a matrix, views that compute their elements, ranges of
-// Eigen::Map or of Eigen::Quaternion, weights that are not double.
+// one), and so are the elements of a Strided<M> (lie/array_view.hpp), a column of a table. Everything else is copied
+// once: std::list, the columns of a matrix, views that compute their elements, ranges of Eigen::Map or of
+// Eigen::Quaternion, weights that are not double.
 #pragma once
 
 #include <lie/manifold.hpp>
@@ -103,11 +104,21 @@ auto inPlaceOrCopied(R& range, Convert&& convert) {
   }
 }
 
-/// The points of a range for the estimators, of type Samples<SampleOf<R>, …>. The range must outlive them.
+/// A Strided<T>: kernels read its memory, the rest copies its elements one by one.
+template <class R, class T>
+concept StridedInMemory = std::same_as<std::ranges::range_value_t<R>, T> && requires(const R& range) {
+  range.layout();
+};
+
+/// The points of a range for the estimators, of type Samples<SampleOf<R>, …> or a Strided<SampleOf<R>>. The range must
+/// outlive them.
 template <SampleRange R>
 auto asSamples(R& range) {
-  return inPlaceOrCopied<SampleOf<R>>(
-      range, [](const auto& x) -> SampleOf<R> { return PointTraits<std::remove_cvref_t<decltype(x)>>::from(x); });
+  if constexpr (StridedInMemory<R, SampleOf<R>>)
+    return std::remove_const_t<R>(range);
+  else
+    return inPlaceOrCopied<SampleOf<R>>(
+        range, [](const auto& x) -> SampleOf<R> { return PointTraits<std::remove_cvref_t<decltype(x)>>::from(x); });
 }
 
 /// The weights of a range for the estimators, of type Samples<double, …>. The range must outlive them.

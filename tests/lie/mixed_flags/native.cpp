@@ -1,0 +1,2 @@
+#define LIESTAT_UNIT NativeUnit
+#include "operations.inc"

@@ -1,0 +1,2 @@
+#define LIESTAT_UNIT PlainUnit
+#include "operations.inc"
