@@ -1,6 +1,6 @@
 // Operations of the manifolds on arrays: each takes rows of parameters, tangent vectors or matrices and writes one row for
-// each. The kernels are plain loops over the library's operations for one element; faster ones replace this file's
-// `rowsOf` or an entry of a table. Needs Eigen and lie/, stats/; knows nothing of Python.
+// each. The kernels are plain loops over the library's operations for one element, and those of lie/arrays.hpp where a
+// group has them (takeArrayKernels in manifold_operations.hpp). Needs Eigen and lie/, stats/; knows nothing of Python.
 //
 // Matrices are in row-major order, as NumPy's are. Covariances and Jacobians have the library's tangent order.
 #pragma once

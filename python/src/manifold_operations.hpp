@@ -1,6 +1,7 @@
 // The tables of operations that every manifold and every group shares (array_operations.hpp).
 #pragma once
 
+#include <lie/arrays.hpp>
 #include <lie/concepts.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/manifold.hpp>
@@ -9,7 +10,10 @@
 #include <stats/gaussian.hpp>
 #include <stats/propagation.hpp>
 
+#include <array>
+#include <cstddef>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace liestat::python {
@@ -104,6 +108,45 @@ void addManifoldOperations(std::vector<ArrayOperation>& list) {
   }
 }
 
+/// An operand of the kernels of lie/arrays.hpp: rows of `columns` numbers, or one for all.
+template <std::size_t columns>
+ArrayView<const double> viewOf(const Rows& rows, std::size_t n) {
+  return {rows.data, rows.step == 0 ? std::size_t{1} : n, rows.step, 1, columns};
+}
+/// One of these kernels as an entry of a table; Result numbers come of operands of A and B numbers, B zero where there
+/// is one operand. Matrices by rows.
+template <auto function, std::size_t Result, std::size_t A, std::size_t B = 0>
+void arrayKernel(const std::array<Rows, most_operands>& operands, double* out, std::size_t n) {
+  const ArrayView<double> result = ArrayView<double>(out, n, Result, 1, Result).byRows();
+  if constexpr (B == 0) {
+    function(viewOf<A>(operands[0], n), result);
+  } else {
+    function(viewOf<A>(operands[0], n), viewOf<B>(operands[1], n), result);
+  }
+}
+/// The kernels in place of loops, for the groups that have them.
+template <arrays::ArrayGroup G>
+void takeArrayKernels(std::vector<ArrayOperation>& list) {
+  constexpr std::size_t p = G::num_parameters, k = G::DoF, kk = k * k, d = G::Dim;
+  const std::pair<std::string_view, Kernel> kernels[] = {
+      {"exp", &arrayKernel<arrays::exp<G>, p, k>},
+      {"log", &arrayKernel<arrays::log<G>, k, p>},
+      {"product", &arrayKernel<arrays::product<G>, p, p, p>},
+      {"inverse", &arrayKernel<arrays::inverse<G>, p, p>},
+      {"act", &arrayKernel<arrays::act<G>, d, p, d>},
+      {"Adj", &arrayKernel<arrays::Adj<G>, kk, p>},
+      {"left_jacobian", &arrayKernel<arrays::leftJacobian<G>, kk, k>},
+      {"right_jacobian", &arrayKernel<arrays::rightJacobian<G>, kk, k>},
+      {"left_jacobian_inverse", &arrayKernel<arrays::leftJacobianInverse<G>, kk, k>},
+      {"right_jacobian_inverse", &arrayKernel<arrays::rightJacobianInverse<G>, kk, k>},
+  };
+  for (ArrayOperation& entry : list) {
+    for (const auto& [name, kernel] : kernels) {
+      if (entry.name == name) entry.kernel = kernel;
+    }
+  }
+}
+
 /// Product, inverse, action, exponential, matrices and Jacobians of a group.
 template <class G>
 void addGroupOperations(std::vector<ArrayOperation>& list) {
@@ -183,6 +226,7 @@ template <class G>
 ArrayType groupOperations(std::string_view name) {
   ArrayType type = manifoldOperations<G>(name);
   addGroupOperations<G>(type.operations);
+  if constexpr (arrays::ArrayGroup<G>) takeArrayKernels<G>(type.operations);
   return type;
 }
 

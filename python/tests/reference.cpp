@@ -1,5 +1,6 @@
 // Calls the library with doubles from standard input and writes the results' doubles to standard output:
 //   reference OPERATION ROWS
+#include <lie/arrays.hpp>
 #include <lie/frame3.hpp>
 #include <lie/se3.hpp>
 #include <lie/so3.hpp>
@@ -15,6 +16,7 @@
 namespace {
 
 using namespace liestat;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 template <int N>
 Eigen::Matrix<double, N, 1> read() {
@@ -34,6 +36,16 @@ std::vector<M> readPoints(std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) list.push_back(M::fromParams(read<M::num_parameters>()));
   return list;
 }
+template <int N>
+std::vector<Eigen::Matrix<double, N, 1>> readVectors(std::size_t n) {
+  std::vector<Eigen::Matrix<double, N, 1>> list;
+  for (std::size_t i = 0; i < n; ++i) list.push_back(read<N>());
+  return list;
+}
+template <class T>
+void writePoints(const std::vector<T>& list) {
+  for (const T& x : list) write(x.params());
+}
 template <class Result>
 int writeEstimate(const Result& result) {
   if (!result.estimate) return 1;
@@ -49,15 +61,30 @@ int main(int argc, char** argv) {
   const std::string operation = argv[1];
   const std::size_t n = std::strtoull(argv[2], nullptr, 10);
   if (operation == "so3_exp") {
-    for (std::size_t i = 0; i < n; ++i) write(SO3d::exp(read<3>()).params());
+    std::vector<SO3d> x(n);
+    const auto v = readVectors<3>(n);
+    arrays::exp<SO3d>(v, x);
+    writePoints(x);
   } else if (operation == "se3_exp") {
-    for (std::size_t i = 0; i < n; ++i) write(SE3d::exp(read<6>()).params());
+    std::vector<SE3d> x(n);
+    const auto v = readVectors<6>(n);
+    arrays::exp<SE3d>(v, x);
+    writePoints(x);
   } else if (operation == "se3_log") {
-    for (const SE3d& x : readPoints<SE3d>(n)) write(x.log());
+    const std::vector<SE3d> x = readPoints<SE3d>(n);
+    std::vector<Vector6> v(n);
+    arrays::log<SE3d>(x, v);
+    for (const Vector6& z : v) write(z);
   } else if (operation == "se3_left_jacobian") {
-    for (std::size_t i = 0; i < n; ++i) write(SE3d::leftJacobian(read<6>()));
+    std::vector<Eigen::Matrix<double, 6, 6>> J(n);
+    const auto v = readVectors<6>(n);
+    arrays::leftJacobian<SE3d>(v, J);
+    for (const auto& m : J) write(m);
   } else if (operation == "se3_square") {
-    for (const SE3d& x : readPoints<SE3d>(n)) write((x * x).params());
+    const std::vector<SE3d> x = readPoints<SE3d>(n);
+    std::vector<SE3d> squares(n);
+    arrays::product<SE3d>(x, x, squares);
+    writePoints(squares);
   } else if (operation == "so3_mean") {
     return writeEstimate(certifiedMean(readPoints<SO3d>(n)));
   } else if (operation == "frame3_mean") {

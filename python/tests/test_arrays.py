@@ -73,7 +73,7 @@ class AgainstSciPy(unittest.TestCase):
 
 
 class AgainstCpp(unittest.TestCase):
-    """The bits are those of the C++ library built with the same flags."""
+    """The bits are those of the C++ library with the same flags and instruction set."""
 
     def check(self, operation, values, ours, tail):
         theirs = support.reference(operation, values, tail)
