@@ -1,6 +1,6 @@
-// Operations on arrays beside the same by a loop of liestat's scalar operations, by a loop with the mathematical library's
-// sin, cos and atan2 (rotations), and beside reading the operands and writing the result, in turns. Prints Markdown, ns
-// per element, for arrays in cache and in memory, and each set of instructions that the processor has.
+// Operations on arrays beside the same by a loop of liestat's scalar operations, by a loop with the mathematical
+// library's sin, cos and atan2 (rotations), and beside reading the operands and writing the result, in turns. Prints
+// Markdown, ns per element, for arrays in cache and in memory, and each set of instructions that the processor has.
 #include "../inputs.hpp"
 #include "../stats/interleaved.hpp"
 
