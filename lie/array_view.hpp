@@ -112,7 +112,8 @@ concept MatrixOfElements = MatrixInMemory<D> && std::convertible_to < NumberOf<D
 
 /// `size` elements of T, double or float, const or not: number c of element i is
 /// data[i element_stride + c component_stride]; strides are counted in numbers and may have any sign. An element that
-/// is a matrix has its numbers by columns unless byRows() says otherwise. plate <class T>
+/// is a matrix has its numbers by columns unless byRows() says otherwise.
+template <class T>
 class ArrayView {
  public:
   using Scalar = std::remove_const_t<T>;
