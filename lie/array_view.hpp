@@ -1,5 +1,5 @@
-// Arrays of elements where they are, without a copy: arrays of SO3d, SE3d, Vector3d …, structures of arrays, a column of
-// poses inside a user's struct, matrices of Eigen with an element in each column or row.
+// Arrays of elements where they are, without a copy: arrays of SO3d, SE3d, Vector3d …, structures of arrays, a column
+// of poses inside a user's struct, matrices of Eigen with an element in each column or row.
 //
 //   std::vector<SE3d> poses;                       ArrayView<double> a(poses);
 //   Eigen::Matrix<double, 4, Eigen::Dynamic> q;    ArrayView<double> b(q);           an element in each column
@@ -111,8 +111,8 @@ concept MatrixOfElements = MatrixInMemory<D> && std::convertible_to < NumberOf<D
 }  // namespace detail
 
 /// `size` elements of T, double or float, const or not: number c of element i is
-/// data[i element_stride + c component_stride]; strides are counted in numbers and may have any sign. An element that is
-/// a matrix has its numbers by columns unless byRows() says otherwise.
+/// data[i element_stride + c component_stride]; strides are counted in numbers and may have any sign. An element that
+/// is a matrix has its numbers by columns unless byRows() says otherwise.
 template <class T>
 class ArrayView {
  public:

@@ -6,13 +6,13 @@
 //   arrays::act<SE3d>(world_T_body, points, points);        one pose, many points, in place
 //   arrays::log<SE3d>(memberOf(log, &Row::pose), tangents);
 //
-// Arguments        ArrayView (lie/array_view.hpp), which arrays of elements, matrices of Eigen and members of structs
-//                  become by themselves; an element's numbers are those of params(), of a tangent vector in the group's
+// Arguments        ArrayView (lie/array_view.hpp), which arrays of elements and matrices of Eigen become by themselves;
+//                  an element's numbers are those of params(), of a tangent vector in the group's
 //                  order, of a matrix by columns (ArrayView::byRows: by rows)
-// Sizes            those of the result, or one: then it holds for all elements; anything else is an assertion's business
+// Sizes            those of the result, or one: then it holds for all elements; anything else fails an assertion
 // In place         the result may be an operand if their elements begin in the same places; they must not overlap else
 // Accuracy         as of the operation on one element, to some eps; exp takes angles of any size
-// Bits             follow from the element and the instruction set alone, not from its place or from the compiler's flags
+// Bits             follow from the element and the instruction set alone, not from its place or the compiler's flags
 // Bad input        not-a-number in, not-a-number out; a zero quaternion has the logarithm not-a-number
 #pragma once
 

@@ -8,9 +8,9 @@
 // and where there are elements that cost more than the others, of the one operand a,
 //   special(a)         the mask of those elements
 //   prepare<any>(a, c) some numbers that apply takes for b; any: some of the elements are special
-// An element's result does not depend on the elements beside it: prepare<true> treats special lanes alone in another way,
-// and what follows is one code for both, which the compiler fuses in one way. prepare has no sums of two products: it is
-// open which of them is fused.
+// An element's result does not depend on the elements beside it: prepare<true> treats special lanes alone in another
+// way, and what follows is one code for both, which the compiler fuses in one way. prepare has no sums of two products:
+// it is open which of them is fused.
 #pragma once
 
 #include <lie/detail/kernel.hpp>

@@ -1,4 +1,5 @@
-// Operations on arrays of rigid motions for lie/detail/array_kernel.hpp: the formulas of Se3Math (lie/se3.hpp) on packs.
+// Operations on arrays of rigid motions for lie/detail/array_kernel.hpp: the formulas of Se3Math (lie/se3.hpp) on
+// packs.
 #pragma once
 
 #include <lie/detail/array_rotations.hpp>

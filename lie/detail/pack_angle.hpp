@@ -1,6 +1,6 @@
-// The coefficients of the rotation groups of lie/detail/trig.hpp for packs of squared angles, from the same polynomials.
-// Angles beyond their range are reduced by multiples of 2π, so that no result depends on a mathematical library, nor on
-// what stands in the other lanes.
+// The coefficients of the rotation groups of lie/detail/trig.hpp for packs of squared angles, from the same
+// polynomials. Angles beyond their range are reduced by multiples of 2π, so that no result depends on a mathematical
+// library, nor on what stands in the other lanes.
 #pragma once
 
 #include <lie/detail/pack.hpp>

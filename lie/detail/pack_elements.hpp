@@ -39,8 +39,8 @@ LIESTAT_ALWAYS_INLINE void split(const P& x, FourNumbers<typename P::Scalar>* pa
   if constexpr (P::size > 8) takePart<2>(x, parts[2 * stride]), takePart<3>(x, parts[3 * stride]);
 }
 
-/// Twelve numbers x0 y0 z0 x1 … z3 to x0 … x3, y0 … y3, z0 … z3, and back: each of x, y, z has one number in every place
-/// of the three rows.
+/// Twelve numbers x0 y0 z0 x1 … z3 to x0 … x3, y0 … y3, z0 … z3, and back: each of x, y, z has one number in every
+/// place of the three rows.
 template <class S>
 LIESTAT_ALWAYS_INLINE void separate(FourNumbers<S> (&r)[3]) {
   using V = typename FourNumbers<S>::Vector;

@@ -2,9 +2,9 @@
 // what stands for them (PointTraits in lie/manifold.hpp), and any such range of numbers as weights.
 //
 // The estimators themselves see one type, Samples: random access to owning types, indexed by any integer. Values of
-// such a type in random-access memory are used where they are (std::vector, std::array, std::span, std::deque, a view of
-// one), and so are the elements of a Strided<M> (lie/array_view.hpp), a column of a table. Everything else is copied
-// once: std::list, the columns of a matrix, views that compute their elements, ranges of Eigen::Map or of
+// such a type in random-access memory are used where they are (std::vector, std::array, std::span, std::deque, a view
+// of one), and so are the elements of a Strided<M> (lie/array_view.hpp), a column of a table. Everything else is
+// copied once: std::list, the columns of a matrix, views that compute their elements, ranges of Eigen::Map or of
 // Eigen::Quaternion, weights that are not double.
 #pragma once
 
