@@ -39,6 +39,7 @@ from ._sensors import (
     Camera,
     InitialisedWindow,
     Result,
+    evaluate_trajectory,
     hand_eye,
     motion,
     preintegrate,

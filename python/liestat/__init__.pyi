@@ -376,6 +376,21 @@ def preintegrate(
     max_gap: float = 0.1,
     threads: int = 0,
 ) -> Result: ...
+def evaluate_trajectory(
+    reference: SE3,
+    estimate: SE3,
+    covariances: ArrayLike | None = None,
+    *,
+    reference_times: ArrayLike | None = None,
+    times: ArrayLike | None = None,
+    reference_covariances: ArrayLike | None = None,
+    alignment: Literal["none", "origin", "posyaw", "se3", "sim3", "scale"] = "se3",
+    verdict_alignment: Literal["none", "origin", "posyaw", "se3", "sim3"] | None = None,
+    association: Literal["interpolate", "nearest"] = "interpolate",
+    interpolation: Literal["geodesic", "slerp"] = "geodesic",
+    max_gap: float | None = None,
+    n_to_align: int = 0,
+) -> Result: ...
 def hand_eye(
     a: SE3,
     b: SE3,

@@ -151,6 +151,136 @@ def preintegrate(
     )
 
 
+def evaluate_trajectory(
+    reference,
+    estimate,
+    covariances=None,
+    *,
+    reference_times=None,
+    times=None,
+    reference_covariances=None,
+    alignment="se3",
+    verdict_alignment=None,
+    association="interpolate",
+    interpolation="geodesic",
+    max_gap=None,
+    n_to_align=0,
+):
+    """Errors of a trajectory against a reference, and whether its covariances know them.
+
+    Parameters
+    ----------
+    reference, estimate : SE3, shapes (m,) and (n,)
+        world_T_body. Without times row i belongs to row i, and m = n.
+    covariances : array_like, shape (6, 6) or (n, 6, 6), optional
+        Of the estimate: m² and rad², body axes, translation before rotation. Without them there is no verdict.
+    reference_times, times : array_like, shapes (m,) and (n,), optional
+        Seconds, ascending.
+    reference_covariances : array_like, shape (6, 6) or (m, 6, 6), optional
+        The reference is exact by default.
+    alignment : {'none', 'origin', 'posyaw', 'se3', 'sim3', 'scale'}
+        Least squares of the positions, as evo does it; for the errors `position` and `rotation`.
+    verdict_alignment : str, optional
+        The model that is weighted with the covariances, for `consistency`; as `alignment` by default.
+    association : {'interpolate', 'nearest'}
+        The reference at the times of the estimate, or its nearest stamps.
+    interpolation : {'geodesic', 'slerp'}
+    max_gap : float, optional
+        Seconds between two stamps of the reference to interpolate between, or to the nearest one. Five median steps of
+        the reference, 0.01 s for nearest stamps.
+    n_to_align : int
+        The first poses that are aligned; 0: all.
+
+    Returns
+    -------
+    Result
+        `rows` of the estimate that have a partner, `position_errors` (m) and `rotation_errors` (rad) of these,
+        statistics `position` and `rotation` (rmse, mean, median, std, min, max, sse), `alignment`; `consistency`, None
+        without covariances: NEES `joint`, `position` and `rotation` with degrees of freedom that know the alignment,
+        `tests` of whitened residuals (p of seven tests), `errors`, `covariances` and `nees` of each pose, `indefinite`
+        matrices, `alignment` with its covariance.
+
+    Warns
+    -----
+    UserWarning
+        Where an alignment or the verdict is not to be trusted, with the reason.
+    """
+    caller = "evaluate_trajectory"
+    for name, value in (("reference", reference), ("estimate", estimate)):
+        if not isinstance(value, SE3) or value.ndim != 1 or len(value) == 0:
+            shape = f" of shape {value.shape}" if hasattr(value, "shape") else ""
+            raise TypeError(f"{caller}: {name}: expected SE3 of shape (n,), got {type(value).__name__}{shape}")
+    if (reference_times is None) != (times is None):
+        raise ValueError(f"{caller}: times of both trajectories, or of none")
+    choices = {
+        "alignment": (alignment, ("none", "origin", "posyaw", "se3", "sim3", "scale")),
+        "verdict_alignment": (verdict_alignment, (None, "none", "origin", "posyaw", "se3", "sim3")),
+        "association": (association, ("interpolate", "nearest")),
+        "interpolation": (interpolation, ("geodesic", "slerp")),
+    }
+    for name, (value, allowed) in choices.items():
+        if value not in allowed:
+            raise ValueError(f"{caller}: {name}: expected one of {', '.join(map(repr, allowed))}, got {value!r}")
+    if times is None:
+        _same_length(caller, reference=reference, estimate=estimate)
+    else:
+        stamps = []
+        for name, value, poses in (("reference_times", reference_times, reference), ("times", times, estimate)):
+            t = _vector(value, f"{caller}: {name}")
+            _same_length(caller, **{name: t, "poses": poses})
+            if not (np.diff(t) > 0).all():
+                raise ValueError(f"{caller}: {name}: expected ascending times, each once")
+            stamps.append(t)
+        reference_times, times = stamps
+        if max_gap is None:
+            steps = np.diff(reference_times)
+            max_gap = 0.01 if association == "nearest" else 5 * float(np.median(steps)) if len(steps) else 0.0
+    matrices = []
+    for name, value, poses in (
+        ("reference_covariances", reference_covariances, reference),
+        ("covariances", covariances, estimate),
+    ):
+        if value is not None:
+            c = _covariances(value, f"{caller}: {name}", SE3, (len(poses),))
+            value = np.ascontiguousarray(np.broadcast_to(c, (len(poses), 6, 6)))
+        matrices.append(value)
+    verdict = verdict_alignment or ("se3" if alignment == "scale" else alignment)
+    d = _core.evaluate_trajectory(
+        np.ascontiguousarray(reference.params),
+        reference_times,
+        matrices[0],
+        np.ascontiguousarray(estimate.params),
+        times,
+        matrices[1],
+        alignment,
+        verdict,
+        association == "nearest",
+        interpolation == "slerp",
+        0.0 if max_gap is None else float(max_gap),
+        int(n_to_align),
+    )
+    if len(d["rows"]) == 0:
+        raise ValueError(f"{caller}: no pose of the estimate has a partner in the reference: do the times overlap?")
+
+    def alignment_of(a):
+        return Result("alignment", transform=SE3._of(a.pop("transform")), **a)
+
+    d["alignment"] = alignment_of(d["alignment"])
+    faults = [] if d["alignment"].ok else [d["alignment"].fault]
+    c = d.pop("consistency")
+    if c is not None:
+        c["alignment"] = alignment_of(c["alignment"])
+        for name in ("joint", "position", "rotation"):
+            c[name] = Result("test", **c[name])
+        c["tests"] = Result("tests", **{name: Result("test", **t) for name, t in c["tests"].items()})
+        if not c["ok"]:
+            faults.append(c["fault"] or c["alignment"].fault)
+        c = Result("consistency", **c)
+    for fault in faults:
+        warnings.warn(f"liestat.{caller}: {fault}", UserWarning, stacklevel=2)
+    return Result("evaluation", consistency=c, **{k: Result(k, **v) if isinstance(v, dict) else v for k, v in d.items()})
+
+
 def hand_eye(
     a,
     b,

@@ -42,6 +42,7 @@ void bindMotion(py::module_& module);
 void bindTwoView(py::module_& module);
 void bindViInit(py::module_& module);
 void bindReaders(py::module_& module);
+void bindTrajectories(py::module_& module);
 void bindMeans(py::module_& module);
 
 }  // namespace liestat::python

@@ -26,6 +26,7 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindPreintegration(module);
   liestat::python::bindHandEye(module);
   liestat::python::bindMotion(module);
+  liestat::python::bindTrajectories(module);
   liestat::python::bindTwoView(module);
   liestat::python::bindViInit(module);
 #ifdef LIESTAT_PYTHON_READERS
