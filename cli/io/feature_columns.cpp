@@ -59,16 +59,18 @@ void findParts(const Header& header, FeatureColumns& found) {
   std::array<int, 3> translation{}, point{};
   const bool has_quaternion = header.findGroup<4>({"qx", "qy", "qz", "qw"}, found.quaternion);
   const bool has_rotation_vector = header.findGroup<3>({"rx", "ry", "rz"}, found.rotation_vector);
+  const bool has_euler = header.findGroup<3>({"roll", "pitch", "yaw"}, found.euler);
   const bool has_matrix =
       header.findGroup<9>({"r00", "r01", "r02", "r10", "r11", "r12", "r20", "r21", "r22"}, found.matrix);
   const bool has_translation = header.findGroup<3>({"tx", "ty", "tz"}, translation);
   const bool has_point = header.findGroup<3>({"x", "y", "z"}, point);
   const bool has_direction = header.findGroup<3>({"dx", "dy", "dz"}, found.direction);
-  const bool has_rotation = has_quaternion || has_rotation_vector || has_matrix;
+  const bool has_rotation = has_quaternion || has_rotation_vector || has_euler || has_matrix;
 
   std::vector<std::string> groups;  // those that may be a feature by themselves
   if (has_quaternion) groups.emplace_back("qx,qy,qz,qw");
   if (has_rotation_vector) groups.emplace_back("rx,ry,rz");
+  if (has_euler) groups.emplace_back("roll,pitch,yaw");
   if (has_matrix) groups.emplace_back("r00 ... r22");
   if (has_point) groups.emplace_back("x,y,z");
   if (has_direction) groups.emplace_back("dx,dy,dz");
@@ -118,7 +120,8 @@ void findCovariance(const Header& header, FeatureColumns& found) {
 
 const std::vector<std::string>& knownColumns() {
   static const std::vector<std::string> columns = [] {
-    std::vector<std::string> result = {"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "rx", "ry", "rz"};
+    std::vector<std::string> result = {"t",  "tx", "ty", "tz", "qx",   "qy",    "qz",
+                                       "qw", "rx", "ry", "rz", "roll", "pitch", "yaw"};
     for (int i = 0; i < 9; ++i) result.push_back(fmt::format("r{}{}", i / 3, i % 3));
     for (const char* column : {"x", "y", "z", "dx", "dy", "dz", "weight"}) result.emplace_back(column);
     for (int i = 0; i < 6; ++i) {

@@ -16,13 +16,14 @@ inline constexpr int absent = -1;
 
 /// The columns of features, in words.
 inline constexpr std::string_view feature_columns_text =
-    "qx,qy,qz,qw or rx,ry,rz or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz";
+    "qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz";
 
-/// The columns of the parts of a feature. At most one of the three forms of a rotation is there.
+/// The columns of the parts of a feature. At most one of the four forms of a rotation is there.
 struct FeatureColumns {
   experiments::Feature kind = experiments::Feature::point;
   std::array<int, 4> quaternion{absent, absent, absent, absent};  ///< x y z w
   std::array<int, 3> rotation_vector{absent, absent, absent};
+  std::array<int, 3> euler{absent, absent, absent};  ///< roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll)
   std::array<int, 9> matrix{absent, absent, absent, absent, absent, absent, absent, absent, absent};
   std::array<int, 3> position{absent, absent, absent};
   std::array<int, 3> direction{absent, absent, absent};

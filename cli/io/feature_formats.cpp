@@ -14,7 +14,7 @@ namespace liestat::cli {
 namespace {
 
 constexpr std::string_view known_columns_text =
-    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55";
+    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55";
 
 bool isKnown(std::string_view column) {
   const std::vector<std::string>& known = knownColumns();
@@ -182,6 +182,15 @@ RowLayout readCsv(const LineReader& reader, const std::string& file, const Readi
                          : fmt::format("a line that names the columns: {}", feature_columns_text));
   }
   RowLayout layout{.columns = readHeader(fields, file, line), .description = "as in the header", .has_header = true};
+  // With a column w beside them x, y and z are a quaternion's, whichever comes first.
+  const auto has = [&](std::string_view column) {
+    return std::find(layout.columns.begin(), layout.columns.end(), column) != layout.columns.end();
+  };
+  if (has("w") && has("x") && has("y") && has("z") && !has("qw")) {
+    for (std::string& column : layout.columns) {
+      if (column == "w" || column == "x" || column == "y" || column == "z") column.insert(0, 1, 'q');
+    }
+  }
   rename(layout, options.columns, file, line);
   for (std::string& column : layout.columns) {
     if (isKnown(column)) continue;
@@ -205,7 +214,9 @@ std::span<const FeatureFormat> featureFormats() { return formats; }
 const FeatureFormat& featureFormat(std::string_view name, const LineReader& reader, const std::string& file) {
   FirstLine first{.comment = reader.comment(), .words = {}, .commas = {}, .numbers = {}};
   splitFields(reader.line(), Separator::comma, first.commas);
-  if (first.commas.size() == 1) splitFields(reader.line(), Separator::blanks, first.words);
+  if (reader.line().find_first_of(",;") == std::string_view::npos) {
+    splitFields(reader.line(), Separator::blanks, first.words);
+  }
   if (first.words.size() > 1 && looksNumeric(first.words)) first.numbers = first.words;
   std::vector<std::string> without_header;
   for (const FeatureFormat& format : formats) {

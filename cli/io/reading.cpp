@@ -54,8 +54,9 @@ class FeatureReader {
     if (layout_.has_header && !reader_.next()) {
       throw InputError(name_, first_line, "there is a header but no data", "at least one row after it");
     }
-    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == absent) {
-      throw InputError(name_, first_line, "--degrees, but there are no rotation vectors", "the columns rx,ry,rz");
+    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == absent && places_.euler[0] == absent) {
+      throw InputError(name_, first_line, "--degrees, but there are no angles",
+                       "the columns rx,ry,rz or roll,pitch,yaw");
     }
     readRows();
     return std::move(file_);
@@ -172,6 +173,20 @@ class FeatureReader {
       q.w() = std::cos(angle / 2);
       q.vec() = scale * r;
       return q;
+    }
+    if (places_.euler[0] != absent) {
+      const Eigen::Vector3d angles = readVector(places_.euler);
+      const double largest = angles.cwiseAbs().maxCoeff();
+      if (options_.angles == AngleUnit::unsaid && largest > 2 * std::numbers::pi * (1 + 1e-6)) {
+        throw InputError(name_, line_,
+                         fmt::format("an angle of roll, pitch, yaw is {:.6g}, more than a turn: in degrees?", largest),
+                         "radians, or --degrees; --radians takes them as they are");
+      }
+      if (!(largest < 1e6)) throw InputError(name_, line_, fmt::format("an angle is {:.6g}", largest), "radians");
+      const Eigen::Vector3d rad = (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * angles;
+      return Eigen::Quaterniond(Eigen::AngleAxisd(rad[2], Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(rad[1], Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(rad[0], Eigen::Vector3d::UnitX()));
     }
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = value(places_.matrix[static_cast<std::size_t>(i)]);

@@ -198,12 +198,17 @@ bool LineReader::next() {
 void splitFields(std::string_view line, Separator separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == Separator::comma_or_blanks) {
-    separator = line.find(',') == std::string_view::npos ? Separator::blanks : Separator::comma;
+    separator = line.find_first_of(",;") == std::string_view::npos ? Separator::blanks : Separator::comma;
   }
   if (separator == Separator::comma) {
+    // Spreadsheets of half of Europe write semicolons, others tabs; a line with either has no commas that part fields.
+    const char mark = line.find(';') != std::string_view::npos    ? ';'
+                      : line.find(',') != std::string_view::npos  ? ','
+                      : line.find('\t') != std::string_view::npos ? '\t'
+                                                                  : ',';
     std::size_t start = 0;
     while (true) {
-      const std::size_t end = line.find(',', start);
+      const std::size_t end = line.find(mark, start);
       fields.push_back(unquoted(line.substr(start, end == std::string_view::npos ? end : end - start)));
       if (end == std::string_view::npos) return;
       start = end + 1;

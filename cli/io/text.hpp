@@ -46,7 +46,7 @@ class LineReader {
   std::size_t comment_number_ = 0;
 };
 
-/// The separator of a line's fields.
+/// The separator of a line's fields. comma: that of CSV files, a semicolon if the line has one, else a comma, else a tab.
 enum class Separator { comma, blanks, comma_or_blanks };
 
 /// Splits a line into fields without the blanks and the double quotes around them. `fields` is overwritten.

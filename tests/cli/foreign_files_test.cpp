@@ -99,7 +99,7 @@ TEST(RotationVectors, BeyondAHalfTurnAreCountedAndBeyondATurnSuspected) {
   EXPECT_NEAR(2 * std::acos(read_so.rotations[1].w()), 22.912878474779198 * pi / 180, 1e-12);
   EXPECT_EQ(read_so.n_beyond_half_turn, 0U);
   EXPECT_EQ(read(degrees, {.angles = AngleUnit::radians}).size(), 2U);
-  EXPECT_TRUE(contains(errorIn("x,y,z\n1,2,3\n", {.angles = AngleUnit::degrees}), "there are no rotation vectors"));
+  EXPECT_TRUE(contains(errorIn("x,y,z\n1,2,3\n", {.angles = AngleUnit::degrees}), "there are no angles"));
 }
 
 TEST(Readings, InMillimetresAreSuspected) {

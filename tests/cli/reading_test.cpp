@@ -224,8 +224,48 @@ TEST(Reading, TextThatIsNone) {
 }
 
 const std::string known =
-    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55";
+    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55";
 const std::string or_else = " (--ignore-unknown passes over others, --columns maps names)";
+
+TEST(Reading, SemicolonsAndTabs) {
+  for (const char* mark : {";", "\t", " ; ", ","}) {
+    const std::string m = mark;
+    const FeatureFile file = readFeatures("x" + m + "y" + m + "z\n1" + m + "2" + m + "3\n", "f.csv", {});
+    ASSERT_EQ(file.size(), 1U) << mark;
+    EXPECT_EQ(file.positions[0], Eigen::Vector3d(1, 2, 3)) << mark;
+  }
+  // Decimal commas are not guessed at.
+  EXPECT_EQ(errorIn("x;y;z\n0,5;2;3\n"), "f.csv:2: x is '0,5', expected a number");
+  // TUM's rows, with tabs.
+  const FeatureFile tum = readFeatures("0\t1\t2\t3\t0\t0\t0\t1\n", "f.tum", {});
+  EXPECT_EQ(tum.format, "tum");
+}
+
+TEST(Reading, QuaternionsCalledWxyz) {
+  const FeatureFile file = readFeatures("w,x,y,z\n0.5,-0.5,0.1,0.7\n", "f.csv", {});
+  EXPECT_EQ(file.kind, experiments::Feature::rotation);
+  EXPECT_EQ(file.rotations[0].coeffs(), Eigen::Vector4d(-0.5, 0.1, 0.7, 0.5));
+  const FeatureFile pose = readFeatures("tx;ty;tz;x;y;z;w\n1;2;3;0;0;0;1\n", "f.csv", {});
+  EXPECT_EQ(pose.kind, experiments::Feature::frame);
+}
+
+TEST(Reading, RollPitchYaw) {
+  const double roll = 0.3, pitch = -0.4, yaw = 2.1;
+  const Eigen::Matrix3d expected =
+      (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
+  const FeatureFile rad = readFeatures("yaw,pitch,roll\n2.1,-0.4,0.3\n", "f.csv", {});
+  EXPECT_LE((rad.rotations[0].toRotationMatrix() - expected).norm(), 1e-15);
+  const FeatureFile deg =
+      readFeatures("roll,pitch,yaw\n90,0,0\n", "f.csv", ReadingOptions{.angles = AngleUnit::degrees});
+  EXPECT_LE((deg.rotations[0] * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(), 1e-15);
+  EXPECT_EQ(
+      errorIn("roll,pitch,yaw\n90,0,0\n"),
+      "f.csv:2: an angle of roll, pitch, yaw is 90, more than a turn: in degrees?, expected radians, or --degrees; "
+      "--radians takes them as they are");
+  EXPECT_EQ(errorIn("roll,pitch\n1,2\n"), "f.csv:1: yaw is missing, expected all of roll,pitch,yaw");
+}
 
 TEST(Reading, UnknownColumns) {
   EXPECT_EQ(errorIn("x,y,z,wieght\n1,2,3,1\n"),
@@ -234,8 +274,8 @@ TEST(Reading, UnknownColumns) {
   EXPECT_EQ(errorIn("timestamp,x,y,z\n"),
             "f.csv:1: unknown column 'timestamp' (is it 't'?), expected " + known + or_else);
   EXPECT_EQ(errorIn("#\n\nx,y,z,elephant\n"), "f.csv:3: unknown column 'elephant', expected " + known + or_else);
-  EXPECT_EQ(errorIn("x;y;z\n1;2;3\n"),
-            "f.csv:1: unknown column 'x;y;z', expected columns separated by commas: " + known);
+  EXPECT_EQ(errorIn("x y q\n1 2 3\n"),
+            "f.csv:1: unknown column 'x y q', expected columns separated by commas: " + known);
 }
 
 TEST(Reading, HeadersThatDoNotMakeAFeature) {
