@@ -209,14 +209,16 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     // Where standard deviations differ by factors of hundreds, the rounding of the precise measurements moves the
     // estimate along its less certain directions by more than the tolerance, for ever. Steps that no longer shrink,
     // and are below √eps standard deviations of the estimate, are such rounding.
-    const bool stalled =
-        result.residual > 0.5 * previous && step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
+    const bool negligible = step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
+    const bool stalled = result.residual > 0.5 * previous && negligible;
     ++result.iterations;
     // Halving until the cost decreases keeps the iteration from cycling between two sets of representatives.
     const S rounding = S(16) * std::numeric_limits<S>::epsilon() * (S(1) + std::abs(sums.cost));
     M next = exp(y, step);
     MahaSums<M> next_sums = problem.evaluate(executor, next);
-    bool accepted = next_sums.cost <= sums.cost + rounding;
+    // What such steps change of the cost is less than its rounding, which errors many deviations long make large: the
+    // test would refuse them by chance.
+    bool accepted = negligible || next_sums.cost <= sums.cost + rounding;
     for (int halving = 0; !accepted && halving < 30; ++halving) {
       step *= S(0.5);
       next = exp(y, step);
