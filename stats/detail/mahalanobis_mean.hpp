@@ -188,10 +188,8 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
   M y = options.start ? *options.start
                       : startOfMean<M>(executor, Samples<M>(std::move(features)), Samples<S>(std::move(weights)));
   MahaSums<M> sums = problem.evaluate(executor, y);
-  {
-    double scale = 1 + static_cast<double>(T::logOrigin(y).norm());
-    result.tolerance = options.tolerance.value_or(automaticTolerance<S>(scale));
-  }
+  const S scale = S(1) + T::logOrigin(y).norm();
+  result.tolerance = options.tolerance.value_or(automaticTolerance<S>(static_cast<double>(scale)));
   result.status = Status::not_converged;
   bool reached = false;
   while (result.iterations < options.max_iterations) {
@@ -209,16 +207,18 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     // Where standard deviations differ by factors of hundreds, the rounding of the precise measurements moves the
     // estimate along its less certain directions by more than the tolerance, for ever. Steps that no longer shrink,
     // and are below √eps standard deviations of the estimate, are such rounding.
-    const bool negligible = step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
-    const bool stalled = result.residual > 0.5 * previous && negligible;
+    const bool stalled =
+        result.residual > 0.5 * previous && step.dot(sums.gauss_newton * step) < std::numeric_limits<S>::epsilon();
     ++result.iterations;
     // Halving until the cost decreases keeps the iteration from cycling between two sets of representatives.
-    const S rounding = S(16) * std::numeric_limits<S>::epsilon() * (S(1) + std::abs(sums.cost));
+    // The cost's rounding: of its sum, and of the errors, whose coordinates are rounded in units of the scale; a change
+    // of an error changes the cost by the root of its information, however many deviations the scale has.
+    const S rounding = std::numeric_limits<S>::epsilon() *
+                       (S(16) * (S(1) + std::abs(sums.cost)) +
+                        S(4) * scale * std::sqrt(S(2) * std::abs(sums.cost) * sums.gauss_newton.trace()));
     M next = exp(y, step);
     MahaSums<M> next_sums = problem.evaluate(executor, next);
-    // What such steps change of the cost is less than its rounding, which errors many deviations long make large: the
-    // test would refuse them by chance.
-    bool accepted = negligible || next_sums.cost <= sums.cost + rounding;
+    bool accepted = next_sums.cost <= sums.cost + rounding;
     for (int halving = 0; !accepted && halving < 30; ++halving) {
       step *= S(0.5);
       next = exp(y, step);
