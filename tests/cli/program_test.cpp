@@ -154,7 +154,8 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: convert, doctor, evaluate, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, validate (liestat --help "
+      "Commands: convert, doctor, evaluate, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, "
+      "validate (liestat --help "
       "explains "
       "the usage)\n";
   EXPECT_EQ(complaint({"bogus"}), "liestat: bogus is no command. " + commands);
