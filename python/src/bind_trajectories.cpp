@@ -1,5 +1,6 @@
 // Evaluation of trajectories for Python.
 #include <fusion/trajectories.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/binding.hpp>
 #include <python/src/interruptible.hpp>
@@ -66,6 +67,7 @@ struct Evaluation {
   std::vector<double> position, rotation;
   ErrorStatistics position_statistics, rotation_statistics;
   Consistency consistency;
+  std::vector<std::size_t> indefinite;  ///< matched poses whose covariance is not positive definite
 };
 
 py::dict evaluate(const DoubleArray& reference, const py::object& reference_times,
@@ -100,6 +102,9 @@ py::dict evaluate(const DoubleArray& reference, const py::object& reference_time
       r.rotation = absoluteErrors(matched, r.alignment, PoseRelation::angle_rad);
       r.position_statistics = errorStatistics(r.position), r.rotation_statistics = errorStatistics(r.rotation);
       if (with_covariances) {
+        for (std::size_t i = 0; i < matched.size(); ++i) {
+          if (!liestat::detail::Cholesky<double, 6>(matched[i].estimate.covariance).ok()) r.indefinite.push_back(i);
+        }
         r.weighted = alignWeighted(matched, verdict_model, n_to_align);
         r.consistency = evaluateConsistency(matched, r.weighted);
       }
@@ -142,7 +147,7 @@ py::dict evaluate(const DoubleArray& reference, const py::object& reference_time
   }
   c["errors"] = errors, c["covariances"] = matrices, c["nees"] = nees;
   py::list indefinite;
-  for (const std::size_t i : e.consistency.indefinite) indefinite.append(i);
+  for (const std::size_t i : e.indefinite) indefinite.append(i);
   c["indefinite"] = indefinite;
   d["consistency"] = c;
   return d;
