@@ -335,7 +335,8 @@ TEST(Trajectories, StatisticsAreThoseOfTheirDefinitions) {
     check(absoluteErrors(m.poses, a, relation), ape, "ape");
     auto pairs = posePairs(m.poses, a, {.delta = 3});
     ASSERT_EQ(pairs.size(), 33u);
-    for (const auto& [i, j] : pairs) {
+    for (const auto& pair : pairs) {
+      const std::size_t i = pair.first, j = pair.second;
       if (relation == PoseRelation::point_distance) {
         const auto length = [&](const std::vector<Matrix4>& T) {
           return (T[i].topRightCorner<3, 1>() - T[j].topRightCorner<3, 1>()).norm();
