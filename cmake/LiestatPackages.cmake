@@ -23,7 +23,7 @@ liestat_dependency(gmock libgmock-dev gmock/gmock.h)
 liestat_dependency(rapidcheck librapidcheck-dev rapidcheck.h)
 liestat_dependency(benchmark libbenchmark-dev benchmark/benchmark.h)
 liestat_dependency(opencv libopencv-calib3d-dev opencv2/calib3d.hpp)
-# What covariances mean in these is compared with ours; nothing else uses them.
+# Compared with: the meaning of a covariance in these. Nothing else uses them.
 liestat_dependency(kdl liborocos-kdl-dev kdl/frames.hpp)
 liestat_dependency(tf2 libtf2-geometry-msgs-dev tf2_geometry_msgs/tf2_geometry_msgs.h)
 liestat_dependency(mrpt libmrpt-poses-dev mrpt/poses/CPose3DPDFGaussian.h)

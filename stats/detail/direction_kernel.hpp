@@ -58,13 +58,6 @@ struct AngleOverSine {
   }
 };
 
-/// 1/√(1 + excess), to second order.
-template <class P>
-LIESTAT_ALWAYS_INLINE P unitScale(const P& excess) {
-  using S = typename P::Scalar;
-  return S(1) - excess * (S(0.5) - S(0.375) * excess);
-}
-
 /// Unit vectors x about the reference y. All sums are in the axes of the space.
 template <class S, bool Weighted, bool Scatter>
 struct DirectionKernel {
@@ -91,15 +84,10 @@ struct DirectionKernel {
 
   template <class P>
   struct Run {
-    P cost = P::zero(), largest = P::zero(), defect = P::zero(), weight = P::zero(), across = P::zero(), gradient[3],
-      along[6], scatter[6], squared[6];
+    ResidualSums<P, 3, Weighted, Scatter> residuals;
+    P defect = P::zero(), across = P::zero(), along[6];
 
-    LIESTAT_ALWAYS_INLINE Run() {
-      LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
-      LIESTAT_UNROLL for (P& x : along) x = P::zero();
-      LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
-      LIESTAT_UNROLL for (P& x : squared) x = P::zero();
-    }
+    LIESTAT_ALWAYS_INLINE Run() { LIESTAT_UNROLL for (P& x : along) x = P::zero(); }
     LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
       alignas(64) S data[columns][block];
       Run sums;
@@ -124,16 +112,10 @@ struct DirectionKernel {
         }
       }
       const std::size_t surplus = (P::size - arguments.count % P::size) % P::size;
-      arguments.weight = Weighted ? sumOf(sums.weight) : static_cast<S>(arguments.count);
+      sums.residuals.finish(arguments);
       arguments.across = sumOf(sums.across) - (Weighted ? S(0) : static_cast<S>(surplus));
-      arguments.cost = S(0.5) * sumOf(sums.cost);
-      arguments.largest = largestOf(sums.largest), arguments.defect = largestOf(sums.defect);
-      for (std::size_t a = 0; a < 3; ++a) arguments.gradient[a] = sumOf(sums.gradient[a]);
-      for (std::size_t a = 0; a < 6; ++a) {
-        arguments.along[a] = sumOf(sums.along[a]);
-        arguments.scatter[a] = sumOf(sums.scatter[a]);
-        arguments.squared[a] = Weighted ? sumOf(sums.squared[a]) : arguments.scatter[a];
-      }
+      arguments.defect = largestOf(sums.defect);
+      for (std::size_t a = 0; a < 6; ++a) arguments.along[a] = sumOf(sums.along[a]);
     }
     /// Replaces unit vectors x by x - c y and c.
     LIESTAT_ALWAYS_INLINE void project(S (&data)[columns][block], std::size_t j, const S (&y)[3], P& least) {
@@ -154,26 +136,16 @@ struct DirectionKernel {
       AngleOverSine<P> angle;
       angle.template evaluate<Wide, true, Scatter>(c, s2, polynomials);
       defect = larger(angle.antipode, defect);
-      P v[3], weighted[3], gu[3];
-      P length2 = angle.h * angle.h * s2, weighted_length2 = length2, hc = angle.h * c;
-      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) {
-        weighted[a] = v[a] = angle.h * u[a];
-        gu[a] = angle.g * u[a];
-      }
+      P v[3], gu[3], hc = angle.h * c, p(S(1));
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) v[a] = angle.h * u[a], gu[a] = angle.g * u[a];
       if constexpr (Weighted) {
-        const P p = P::load(data[4] + j);
-        weight += p;
-        weighted_length2 *= p, hc *= p;
-        LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) weighted[a] *= p, gu[a] *= p;
+        p = P::load(data[4] + j);
+        hc *= p;
+        LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) gu[a] *= p;
       }
-      cost += weighted_length2, across += hc;
-      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) gradient[a] += weighted[a];
+      residuals.add(v, angle.h * angle.h * s2, p);
+      across += hc;
       addOuter(along, u, gu, std::make_index_sequence<6>());
-      if constexpr (Scatter) {
-        largest = larger(length2, largest);
-        addOuter(scatter, v, weighted, std::make_index_sequence<6>());
-        if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<6>());
-      }
     }
   };
 };
@@ -196,11 +168,8 @@ struct PlanarKernel {
     using P = Pack<Set, S>;
     constexpr std::size_t block = 64;
     alignas(64) S data[numbers + 1][block];
-    P cost = P::zero(), largest = P::zero(), defect = P::zero(), weight = P::zero(), gradient[k], scatter[entries],
-      squared[entries];
-    LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
-    LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
-    LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    ResidualSums<P, k, Weighted, Scatter> residuals;
+    P defect = P::zero();
     const S(&y)[4] = arguments.reference;
     for (std::size_t i = 0; i < arguments.count; i += block) {
       const std::size_t count = std::min(arguments.count - i, block);
@@ -218,39 +187,20 @@ struct PlanarKernel {
         AngleOverSine<P> angle;
         angle.template evaluate<true, false, false>(c, s * s, any_rotation<S>);
         defect = larger(angle.antipode, defect);
-        P v[k], weighted[k];
+        P v[k], p(S(1));
         v[k - 1] = angle.h * s;
+        P length2 = v[k - 1] * v[k - 1];
         if constexpr (Frame) {
           v[0] = P::load(data[2] + j) - y[2];
           v[1] = P::load(data[3] + j) - y[3];
+          length2 += v[0] * v[0] + v[1] * v[1];
         }
-        P length2 = v[0] * v[0];
-        if constexpr (Frame) length2 += v[1] * v[1] + v[2] * v[2];
-        P weighted_length2 = length2;
-        LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) weighted[l] = v[l];
-        if constexpr (Weighted) {
-          const P p = P::load(data[numbers] + j);
-          weight += p;
-          weighted_length2 *= p;
-          LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) weighted[l] *= p;
-        }
-        cost += weighted_length2;
-        LIESTAT_UNROLL for (std::size_t l = 0; l < k; ++l) gradient[l] += weighted[l];
-        if constexpr (Scatter) {
-          largest = larger(length2, largest);
-          addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
-          if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
-        }
+        if constexpr (Weighted) p = P::load(data[numbers] + j);
+        residuals.add(v, length2, p);
       }
     }
-    arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
-    arguments.cost = S(0.5) * sumOf(cost);
-    arguments.largest = largestOf(largest), arguments.defect = largestOf(defect);
-    for (std::size_t l = 0; l < k; ++l) arguments.gradient[l] = sumOf(gradient[l]);
-    for (std::size_t l = 0; l < entries; ++l) {
-      arguments.scatter[l] = sumOf(scatter[l]);
-      arguments.squared[l] = Weighted ? sumOf(squared[l]) : arguments.scatter[l];
-    }
+    residuals.finish(arguments);
+    arguments.defect = largestOf(defect);
   }
 };
 
@@ -271,10 +221,7 @@ struct PointKernel {
     using P = Pack<Set, S>;
     constexpr std::size_t block = 64;
     alignas(64) S data[N + 1][block];
-    P cost = P::zero(), largest = P::zero(), weight = P::zero(), gradient[N], scatter[entries], squared[entries];
-    LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
-    LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
-    LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+    ResidualSums<P, N, Weighted, Scatter> residuals;
     for (std::size_t i = 0; i < arguments.count; i += block) {
       const std::size_t count = std::min(arguments.count - i, block);
       loadColumns<Set, N>(arguments.features, 0, i, count, data);
@@ -284,35 +231,16 @@ struct PointKernel {
         data[N][j] = 0;
       }
       for (std::size_t j = 0; j < count; j += P::size) {
-        P v[N], weighted[N], length2 = P::zero();
+        P v[N], length2 = P::zero(), p(S(1));
         LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) {
-          weighted[c] = v[c] = P::load(data[c] + j) - arguments.reference[c];
+          v[c] = P::load(data[c] + j) - arguments.reference[c];
           length2 += v[c] * v[c];
         }
-        P weighted_length2 = length2;
-        if constexpr (Weighted) {
-          const P p = P::load(data[N] + j);
-          weight += p;
-          weighted_length2 *= p;
-          LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) weighted[c] *= p;
-        }
-        cost += weighted_length2;
-        LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) gradient[c] += weighted[c];
-        if constexpr (Scatter) {
-          largest = larger(length2, largest);
-          addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
-          if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
-        }
+        if constexpr (Weighted) p = P::load(data[N] + j);
+        residuals.add(v, length2, p);
       }
     }
-    arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
-    arguments.cost = S(0.5) * sumOf(cost);
-    arguments.largest = largestOf(largest);
-    for (std::size_t c = 0; c < N; ++c) arguments.gradient[c] = sumOf(gradient[c]);
-    for (std::size_t e = 0; e < entries; ++e) {
-      arguments.scatter[e] = sumOf(scatter[e]);
-      arguments.squared[e] = Weighted ? sumOf(squared[e]) : arguments.scatter[e];
-    }
+    residuals.finish(arguments);
   }
 };
 

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <lie/detail/columns.hpp>
+#include <lie/detail/kernel.hpp>
 #include <lie/detail/pack.hpp>
 #include <lie/manifold.hpp>
 
+#include <algorithm>
 #include <concepts>
 #include <cstddef>
 #include <memory>
@@ -83,5 +85,27 @@ class WeightBlock {
  private:
   S copies_[size];
 };
+
+/// Runs a kernel on the features begin … end - 1, `numbers` parameters each, as many at a time as it takes, and calls
+/// each(begin of these) after every run, until that is false. The kernel's arguments are features, weights and count.
+template <class Kernel, class M, std::size_t numbers, bool Weighted, class R, class W, class Each>
+bool runOnFeatures(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end,
+                   typename Kernel::Arguments& arguments, const Each& each) {
+  using S = typename ManifoldTraits<M>::Scalar;
+  FeatureBlock<M, numbers, Kernel::max_count> features;
+  WeightBlock<S, Weighted ? Kernel::max_count : 1> values;
+  for (std::size_t i = begin; i < end; i += Kernel::max_count) {
+    arguments.count = std::min(end - i, Kernel::max_count);
+    arguments.features = features.layout(samples, i, arguments.count);
+    if constexpr (Weighted) arguments.weights = values.weights(weights, i, arguments.count);
+    runKernel<Kernel>(set, arguments);
+    if (!each(i)) return false;
+  }
+  return true;
+}
+
+/// The excess of a unit vector's squared length up to which unitScale holds.
+template <class S>
+inline constexpr S largest_excess = std::same_as<S, float> ? S(1e-3) : S(1e-5);
 
 }  // namespace liestat::detail

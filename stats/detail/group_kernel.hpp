@@ -113,8 +113,7 @@ struct PoseKernel {
       P u[3] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j)};
       const P raw = P::load(data[3] + j);
       const P excess = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + raw * raw - S(1);
-      // 1/|q| to second order.
-      const P scale = S(1) - excess * (S(0.5) - S(0.375) * excess);
+      const P scale = unitScale(excess);
       defect = larger(absolute(excess), defect);
       LIESTAT_UNROLL for (P& x : u) x *= scale;
       const P variable = (S(1) - scale * raw) * static_cast<S>(1 / polynomials.range) - S(1);

@@ -29,7 +29,7 @@ concept HasPointSums = HasMomentsLike<M, FlatMoments> && Metric<M> &&(ManifoldTr
 /// Σ over some features about a reference y, in the frame of y, like RotationSums.
 template <class M>
   requires(HasDirectionSums<M> || HasPlanarSums<M> || HasPointSums<M>)
-class SimpleSums {
+class SimpleSums : public TangentSums<M> {
   using T = ManifoldTraits<M>;
   using S = typename T::Scalar;
   static constexpr int k = T::DoF;
@@ -47,14 +47,9 @@ class SimpleSums {
   }
 
  public:
-  using Tangent = typename T::Tangent;
-  using Square = typename T::Square;
-
-  S cost = 0;
-  double weight = 0;
-  Tangent gradient = Tangent::Zero();
-  Square hessian = Square::Zero(), scatter = Square::Zero(), squared = Square::Zero();
-  S largest = 0, smallest_gap = std::numeric_limits<S>::infinity();
+  using Base = TangentSums<M>;
+  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest;
+  using typename Base::Square, typename Base::Tangent;
 
   /// As RotationSums::add; false also for directions and plane rotations opposite to y.
   template <bool Weighted, bool Scatter, class R, class W>
@@ -62,18 +57,13 @@ class SimpleSums {
     using Kernel = typename decltype(kernel<Weighted, Scatter>())::type;
     typename Kernel::Arguments arguments;
     for (std::size_t c = 0; c < numbers; ++c) arguments.reference[c] = parametersOf(y)[c];
-    FeatureBlock<M, numbers, Kernel::max_count> features;
-    WeightBlock<S, Weighted ? Kernel::max_count : 1> values;
-    const S limit = std::same_as<S, float> ? S(1e-3) : S(1e-5);
-    for (std::size_t i = begin; i < end; i += Kernel::max_count) {
-      arguments.count = std::min(end - i, Kernel::max_count);
-      arguments.features = features.layout(samples, i, arguments.count);
-      if constexpr (Weighted) arguments.weights = values.weights(weights, i, arguments.count);
-      runKernel<Kernel>(set, arguments);
-      if (!(arguments.defect < limit)) return false;
-      addSums<Scatter>(arguments, y);
-    }
-    return std::isfinite(cost) && gradient.allFinite() && hessian.allFinite();
+    return runOnFeatures<Kernel, M, numbers, Weighted>(set, samples, weights, begin, end, arguments,
+                                                       [&](std::size_t) {
+                                                         if (!(arguments.defect < largest_excess<S>)) return false;
+                                                         addSums<Scatter>(arguments, y);
+                                                         return true;
+                                                       }) &&
+           this->isFinite();
   }
 
  private:

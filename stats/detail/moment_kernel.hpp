@@ -29,6 +29,56 @@ LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[
   ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
 }
 
+/// 1/√(1 + excess), to second order.
+template <class P>
+LIESTAT_ALWAYS_INLINE P unitScale(const P& excess) {
+  using S = typename P::Scalar;
+  return S(1) - excess * (S(0.5) - S(0.375) * excess);
+}
+
+/// The sums that every mean makes of its residuals v: Σ p |v|², Σ p v, and with Scatter the largest |v|², Σ p v vᵀ and
+/// Σ p² v vᵀ, these by their lower triangles. Without Weighted all p are one.
+template <class P, std::size_t K, bool Weighted, bool Scatter>
+struct ResidualSums {
+  using S = typename P::Scalar;
+  static constexpr std::size_t entries = K * (K + 1) / 2;
+  P cost = P::zero(), largest = P::zero(), weight = P::zero(), gradient[K], scatter[entries], squared[entries];
+
+  LIESTAT_ALWAYS_INLINE ResidualSums() {
+    LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
+    LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
+    LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+  }
+  LIESTAT_ALWAYS_INLINE void add(const P (&v)[K], const P& length2, const P& p) {
+    P weighted[K], weighted_length2 = length2;
+    LIESTAT_UNROLL for (std::size_t a = 0; a < K; ++a) weighted[a] = v[a];
+    if constexpr (Weighted) {
+      weight += p;
+      weighted_length2 *= p;
+      LIESTAT_UNROLL for (std::size_t a = 0; a < K; ++a) weighted[a] *= p;
+    }
+    cost += weighted_length2;
+    LIESTAT_UNROLL for (std::size_t a = 0; a < K; ++a) gradient[a] += weighted[a];
+    if constexpr (Scatter) {
+      largest = larger(length2, largest);
+      addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
+      if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
+    }
+  }
+  /// Over the lanes; the cost is half of Σ p |v|².
+  template <class Arguments>
+  LIESTAT_ALWAYS_INLINE void finish(Arguments& arguments) const {
+    arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
+    arguments.cost = S(0.5) * sumOf(cost);
+    arguments.largest = largestOf(largest);
+    for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
+    for (std::size_t a = 0; a < entries; ++a) {
+      arguments.scatter[a] = sumOf(scatter[a]);
+      arguments.squared[a] = Weighted ? sumOf(squared[a]) : arguments.scatter[a];
+    }
+  }
+};
+
 /// Σ p c cᵀ and Σ p c; Sums a ParameterSums.
 template <class S, class Sums, bool Weighted>
 struct MomentKernel {
@@ -108,15 +158,11 @@ auto parameterSums(InstructionSet set, const R& samples, const W& weights, std::
   using Kernel = MomentKernel<S, Sums, Weighted>;
   Sums sums;
   typename Kernel::Arguments arguments;
-  FeatureBlock<M, Sums::outer + Sums::linear, Kernel::max_count> features;
-  WeightBlock<S, Weighted ? Kernel::max_count : 1> numbers;
-  for (std::size_t i = begin; i < end; i += Kernel::max_count) {
-    arguments.count = std::min(end - i, Kernel::max_count);
-    arguments.features = features.layout(samples, i, arguments.count);
-    if constexpr (Weighted) arguments.weights = numbers.weights(weights, i, arguments.count);
-    runKernel<Kernel>(set, arguments);
-    sums += arguments.sums;
-  }
+  runOnFeatures<Kernel, M, Sums::outer + Sums::linear, Weighted>(set, samples, weights, begin, end, arguments,
+                                                                 [&](std::size_t) {
+                                                                   sums += arguments.sums;
+                                                                   return true;
+                                                                 });
   return sums;
 }
 

@@ -65,16 +65,11 @@ struct PoseSums {
     using Kernel = PoseKernel<S, Weighted, Full>;
     typename Kernel::Arguments arguments;
     for (std::size_t c = 0; c < 7; ++c) arguments.reference[c] = y.data()[c];
-    FeatureBlock<G, 7, Kernel::max_count> features;
-    WeightBlock<S, Weighted ? Kernel::max_count : 1> numbers;
-    for (std::size_t i = begin; i < end; i += Kernel::max_count) {
-      arguments.count = std::min(end - i, Kernel::max_count);
-      arguments.features = features.layout(samples, i, arguments.count);
-      if constexpr (Weighted) arguments.weights = numbers.weights(weights, i, arguments.count);
-      runKernel<Kernel>(set, arguments);
-      if (!(arguments.defect < (std::same_as<S, float> ? S(1e-3) : S(1e-5)))) refused = 1;
+    runOnFeatures<Kernel, G, 7, Weighted>(set, samples, weights, begin, end, arguments, [&](std::size_t) {
+      if (!(arguments.defect < largest_excess<S>)) refused = 1;
       addSums<Full>(arguments, y);
-    }
+      return true;
+    });
   }
 
  private:

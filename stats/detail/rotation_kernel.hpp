@@ -45,27 +45,17 @@ struct RotationKernel {
 
   template <class P>
   struct Run {
-    P cost = P::zero(), largest = P::zero(), defect = P::zero(), gradient[k], hessian[6], scatter[entries],
-      squared[entries];
-    P largest_gap_cosine = P(S(-1));
+    ResidualSums<P, k, Weighted, Scatter> residuals;
+    P defect = P::zero(), largest_gap_cosine = P(S(-1)), hessian[6];
 
-    LIESTAT_ALWAYS_INLINE Run() {
-      LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
-      LIESTAT_UNROLL for (P& x : hessian) x = P::zero();
-      LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
-      LIESTAT_UNROLL for (P& x : squared) x = P::zero();
-    }
+    LIESTAT_ALWAYS_INLINE Run() { LIESTAT_UNROLL for (P& x : hessian) x = P::zero(); }
 
     LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
       alignas(64) S data[columns][block];
       Run sums;
-      S weight = 0;
       for (std::size_t i = 0; i < arguments.count; i += block) {
         const std::size_t count = arguments.count - i < block ? arguments.count - i : block;
         load(arguments, i, count, data);
-        if constexpr (Weighted) {
-          for (std::size_t j = 0; j < count; ++j) weight += data[4][j];
-        }
         P cosine(S(1));
         for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, arguments, i, cosine);
         if (-largestOf(-cosine) > static_cast<S>(small_rotation_cosine)) {
@@ -74,17 +64,9 @@ struct RotationKernel {
           for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, any_rotation<S>);
         }
       }
-      arguments.weight = Weighted ? weight : static_cast<S>(arguments.count);
-      arguments.cost = S(0.5) * sumOf(sums.cost);
-      arguments.largest = largestOf(sums.largest), arguments.defect = largestOf(sums.defect);
-      for (std::size_t a = 0; a < k; ++a) arguments.gradient[a] = sumOf(sums.gradient[a]);
+      sums.residuals.finish(arguments);
+      arguments.defect = largestOf(sums.defect);
       for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
-      if constexpr (Scatter) {
-        for (std::size_t a = 0; a < entries; ++a) arguments.scatter[a] = sumOf(sums.scatter[a]);
-        for (std::size_t a = 0; a < entries; ++a) {
-          arguments.squared[a] = Weighted ? sumOf(sums.squared[a]) : arguments.scatter[a];
-        }
-      }
       if constexpr (HalfTurns != 0 && Scatter) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
     }
 
@@ -165,9 +147,7 @@ struct RotationKernel {
     LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Polynomials& polynomials) {
       const P q[4] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j), P::load(data[3] + j)};
       const P xx = q[0] * q[0], yy = q[1] * q[1], zz = q[2] * q[2], u2 = xx + yy + zz;
-      // 1/|q| to second order.
-      const P excess = u2 + q[3] * q[3] - S(1);
-      const P scale = S(1) - excess * (S(0.5) - S(0.375) * excess);
+      const P excess = u2 + q[3] * q[3] - S(1), scale = unitScale(excess);
       defect = larger(absolute(excess), defect);
       const P variable = (S(1) - scale * absolute(q[3])) * static_cast<S>(1 / polynomials.range) - S(1);
       const P f = scale * evaluatePolynomial(polynomials.log, variable);
@@ -186,8 +166,7 @@ struct RotationKernel {
       hessian[3] += g * yy, hessian[4] += gy * q[2], hessian[5] += g * zz;
 
       constexpr std::size_t r0 = Frame ? 3 : 0;
-      P v[k], weighted[k];
-      P length2 = f * f * u2;
+      P v[k], length2 = f * f * u2;
       LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) v[r0 + i] = sign_f * q[i];
       if constexpr (Frame) {
         LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {
@@ -195,21 +174,7 @@ struct RotationKernel {
           length2 += v[i] * v[i];
         }
       }
-      LIESTAT_UNROLL for (std::size_t i = 0; i < k; ++i) {
-        weighted[i] = v[i];
-        if constexpr (Weighted) weighted[i] *= p;
-        gradient[i] += weighted[i];
-      }
-      if constexpr (Weighted) {
-        cost += p * length2;
-      } else {
-        cost += length2;
-      }
-      if constexpr (Scatter) {
-        largest = larger(length2, largest);
-        addOuter(scatter, v, weighted, std::make_index_sequence<entries>());
-        if constexpr (Weighted) addOuter(squared, weighted, weighted, std::make_index_sequence<entries>());
-      }
+      residuals.add(v, length2, p);
     }
   };
 };

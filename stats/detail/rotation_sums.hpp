@@ -39,24 +39,36 @@ Square symmetricFromTriangle(const S* entries) {
   return m;
 }
 
-/// Σ over some features about a reference y, in the frame of y. The Hessian is exact where the scatter is asked for,
-/// else good to eight digits, as Newton's method needs it.
-template <HasRotationSums M>
-class RotationSums {
-  using T = ManifoldTraits<M>;
-  using S = typename T::Scalar;
-  static constexpr int k = T::DoF;
-  static constexpr bool frame = k == 6;
-
- public:
-  using Tangent = typename T::Tangent;
-  using Square = typename T::Square;
+/// The sums of a pass, in the frame of its reference.
+template <class M>
+struct TangentSums {
+  using S = typename ManifoldTraits<M>::Scalar;
+  using Tangent = typename ManifoldTraits<M>::Tangent;
+  using Square = typename ManifoldTraits<M>::Square;
 
   S cost = 0;
   double weight = 0;
   Tangent gradient = Tangent::Zero();
   Square hessian = Square::Zero(), scatter = Square::Zero(), squared = Square::Zero();
   S largest = 0, smallest_gap = std::numeric_limits<S>::infinity();
+
+  bool isFinite() const { return std::isfinite(cost) && gradient.allFinite() && hessian.allFinite(); }
+};
+
+/// Σ over some features about a reference y, in the frame of y. The Hessian is exact where the scatter is asked for,
+/// else good to eight digits, as Newton's method needs it.
+template <HasRotationSums M>
+class RotationSums : public TangentSums<M> {
+  using T = ManifoldTraits<M>;
+  using S = typename T::Scalar;
+  static constexpr int k = T::DoF;
+  static constexpr bool frame = k == 6;
+
+ public:
+  using Base = TangentSums<M>;
+  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest,
+      Base::smallest_gap;
+  using typename Base::Square, typename Base::Tangent;
 
   /// Sums over the features begin … end-1; Weighted false takes all weights as one. False, and nothing of value in the
   /// sums, if a quaternion is not a unit one to 1e-5 (float: 1e-3) or something is not finite: then the general
@@ -66,25 +78,19 @@ class RotationSums {
     using Kernel = RotationKernel<S, frame, halfTurns<M>(), Weighted, Scatter>;
     typename Kernel::Arguments arguments;
     for (int i = 0; i < (frame ? 7 : 4); ++i) arguments.reference[i] = T::parameters(y)[i];
-    FeatureBlock<M, frame ? 7 : 4, Kernel::max_count> features;
-    WeightBlock<S, Weighted ? Kernel::max_count : 1> numbers;
-    const S limit = std::same_as<S, float> ? S(1e-3) : S(1e-5);
-    bool good = true;
-    for (std::size_t i = begin; i < end && good; i += Kernel::max_count) {
-      arguments.count = std::min(end - i, Kernel::max_count);
-      arguments.features = features.layout(samples, i, arguments.count);
-      if constexpr (Weighted) arguments.weights = numbers.weights(weights, i, arguments.count);
-      runKernel<Kernel>(set, arguments);
-      good = arguments.defect < limit;
-      addSums<Weighted, Scatter>(arguments);
-      if constexpr (Scatter && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y);
-    }
+    const bool good = runOnFeatures < Kernel, M, frame ? 7 : 4,
+               Weighted > (set, samples, weights, begin, end, arguments, [&](std::size_t i) {
+                 if (!(arguments.defect < largest_excess<S>)) return false;
+                 addSums<Scatter>(arguments);
+                 if constexpr (Scatter && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y);
+                 return true;
+               });
     if constexpr (frame) toReference<Scatter>(y);
-    return good && std::isfinite(cost) && gradient.allFinite() && hessian.allFinite();
+    return good && this->isFinite();
   }
 
  private:
-  template <bool Weighted, bool Scatter, class Arguments>
+  template <bool Scatter, class Arguments>
   void addSums(const Arguments& a) {
     constexpr int r0 = frame ? 3 : 0;
     cost += a.cost;

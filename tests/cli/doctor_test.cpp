@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
+#include <cli/program_output.hpp>
 #include <cli/temporary_directory.hpp>
 #include <support/trajectory_files.hpp>
 
@@ -19,18 +19,6 @@ using Json = nlohmann::json;
 using Words = std::vector<std::string>;
 using experiments::TrajectoryScene;
 
-struct ProgramOutput {
-  int exit_code = -1;
-  std::string output, error;
-};
-ProgramOutput run(const Words& words) {
-  const TemporaryDirectory directory;
-  Words command{"sh", "-c", "\"$0\" \"$@\" > '" + (directory / "out") + "'", LIESTAT_PROGRAM};
-  command.insert(command.end(), words.begin(), words.end());
-  const ProgramResult result = runProgram(command, ".");
-  return {result.status, contentOf(directory / "out"), result.errors};
-}
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 Json json(Words words, int exit_code) {
   words.insert(words.end(), {"--json", "-"});
   const ProgramOutput out = run(words);

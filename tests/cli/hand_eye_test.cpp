@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
+#include <cli/program_output.hpp>
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
@@ -21,19 +21,6 @@ namespace {
 
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
-
-struct ProgramOutput {
-  int exit_code = -1;
-  std::string output, error;
-};
-ProgramOutput run(const Words& words) {
-  const TemporaryDirectory directory;
-  Words command{"sh", "-c", "\"$0\" \"$@\" > '" + (directory / "out") + "'", LIESTAT_PROGRAM};
-  command.insert(command.end(), words.begin(), words.end());
-  const ProgramResult result = runProgram(command, ".");
-  return {result.status, contentOf(directory / "out"), result.errors};
-}
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// A simulated calibration: the files of poses and the truth.
 struct Scene {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
+#include <cli/program_output.hpp>
 #include <cli/temporary_directory.hpp>
 
 namespace liestat::cli {
@@ -18,17 +18,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct ProgramOutput {
-  int exit_code = -1;
-  std::string output, error;
-};
-ProgramOutput run(const std::vector<std::string>& words) {
-  const TemporaryDirectory directory;
-  std::vector<std::string> command{"sh", "-c", "\"$0\" \"$@\" > '" + (directory / "out") + "'", LIESTAT_PROGRAM};
-  command.insert(command.end(), words.begin(), words.end());
-  const ProgramResult result = runProgram(command, ".");
-  return {result.status, contentOf(directory / "out"), result.errors};
-}
 std::string simulate(const TemporaryDirectory& directory, const std::string& motion,
                      const std::vector<std::string>& more = {}) {
   std::vector<std::string> words{"simulate", "two-view", "--output", directory / (motion + ".csv"), "--motion", motion};

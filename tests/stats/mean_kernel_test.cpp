@@ -162,11 +162,12 @@ TYPED_TEST(MeanKernel, leaves_quaternions_far_from_unit_to_the_general_formulas)
   const TypeParam y = T::expOrigin(this->normal(0.7));
   auto features = this->ring(y, 0.7, 100);
   for (int c = 0; c < unit_parameters<TypeParam>; ++c) features[50].data()[c] *= 1.001;
-  if (unit_parameters<TypeParam> == 0) GTEST_SKIP() << "points have no constraint";
+  constexpr bool constrained = unit_parameters < TypeParam >> 0;  // any numbers are a point
   const detail::UnitWeights p;
   for (const InstructionSet set : instructionSets()) {
     detail::MeanPass<TypeParam> pass;
-    EXPECT_FALSE(detail::addTermsByPacks<true>(set, features, p, y, {0, features.size()}, pass)) << name(set);
+    EXPECT_EQ(detail::addTermsByPacks<true>(set, features, p, y, {0, features.size()}, pass), !constrained)
+        << name(set);
     EXPECT_TRUE(detail::addTermsByPacks<true>(set, features, p, y, {0, 50}, pass)) << name(set);
   }
 }

@@ -1,4 +1,4 @@
-// What the two units of tests/lie/mixed_flags_test.cpp compute, over plain numbers: one is compiled for plain
+// The computations of the two units of tests/lie/mixed_flags_test.cpp, over plain numbers: one is compiled for plain
 // x86-64, the other with -march=native.
 #pragma once
 
