@@ -202,7 +202,7 @@ auto rowsOf(D&& m) {
 }
 
 template <class T>
-template <detail::MatrixOfElements<T> D>
+template <detail::MatrixOfElements<T> D>  // NOLINTNEXTLINE(bugprone-forwarding-reference-overload): no view is a matrix
 ArrayView<T>::ArrayView(D&& m) {
   if constexpr (std::remove_cvref_t<D>::ColsAtCompileTime == Eigen::Dynamic) {
     *this = columnsOf(m);

@@ -19,11 +19,12 @@ inline double angleDifference(double to, double from) {
 
 /// The rotation vector of R that is nearest to another: Log(R), or the one that turns the other way.
 inline Eigen::Vector3d rotationVectorNear(const SO3d& R, const Eigen::Vector3d& near) {
-  const Eigen::Vector3d v = R.log();
+  Eigen::Vector3d v = R.log();
   const double angle = v.norm();
   if (!(angle > 0)) return v;
-  const Eigen::Vector3d other = v * (1 - 2 * static_cast<double>(EIGEN_PI) / angle);
-  return (other - near).squaredNorm() < (v - near).squaredNorm() ? other : v;
+  Eigen::Vector3d other = v * (1 - 2 * static_cast<double>(EIGEN_PI) / angle);
+  if ((other - near).squaredNorm() < (v - near).squaredNorm()) return other;
+  return v;
 }
 
 }  // namespace detail

@@ -30,7 +30,8 @@ constexpr std::size_t layoutSize(CovarianceLayout layout) {
 struct PackedCovariance {
   std::array<double, 36> storage{};
   std::size_t size = 0;
-  std::span<const double> numbers() const { return {storage.data(), size}; }
+  std::span<const double> numbers() const& { return {storage.data(), size}; }
+  std::span<const double> numbers() const&& = delete;  // a view into a temporary
 };
 
 namespace detail {

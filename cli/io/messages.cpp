@@ -103,12 +103,21 @@ std::string withoutNan(std::string_view text) {
 
 Json parsed(std::string_view text, const std::string& file, std::size_t first_line) {
   const std::string json = withoutNan(text);
+  const auto line_of = [&](std::size_t at) {
+    const auto end = json.begin() + static_cast<std::ptrdiff_t>(std::min(at, json.size()));
+    return first_line + static_cast<std::size_t>(std::count(json.begin(), end, '\n'));
+  };
   try {
     return Json::parse(json);
   } catch (const Json::parse_error& error) {
-    const auto end = json.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, json.size()));
-    throw InputError(file, first_line + static_cast<std::size_t>(std::count(json.begin(), end, '\n')),
-                     "this is no JSON", "a message, a list of messages, or one message per line");
+    throw InputError(file, line_of(error.byte), "this is no JSON",
+                     "a message, a list of messages, or one message per line");
+  } catch (const Json::out_of_range& error) {
+    // A number beyond double's; the library's message ends with it, in quotes, and says no place.
+    const std::string_view message = error.what();
+    const std::size_t open = message.find('\''), close = message.rfind('\'');
+    const std::string number(open < close ? message.substr(open + 1, close - open - 1) : message);
+    throw InputError(file, line_of(json.find(number)), "a number is '" + printable(number) + "'", "a finite number");
   }
 }
 

@@ -725,6 +725,7 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
     return d;
   }
   std::vector<HypothesisFit> fits;
+  fits.reserve(hypotheses.size());
   for (const Convention& c : hypotheses) fits.push_back({.convention = c});
   rank(data, fits, options);
   const bool usable = !fits.empty() && !std::isinf(fits.front().log_likelihood);
@@ -769,6 +770,7 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
     const std::vector<DiagnosedPose> step_poses = steps(data);
     const DiagnosisData step_data(step_poses, true);
     std::vector<HypothesisFit> step_fits;
+    step_fits.reserve(hypotheses.size());
     for (const Convention& c : hypotheses) step_fits.push_back({.convention = c});
     DiagnosisOptions plain = options;
     plain.alignment = AlignmentModel::none;
@@ -917,6 +919,7 @@ LIESTAT_FUSION_INLINE std::vector<PlanRow> planDiagnosis(std::span<const Diagnos
     return p;
   };
   std::vector<Prepared> prepared;
+  prepared.reserve(all.size());
   for (const Convention& c : all) prepared.push_back(prepare(c));
   const double margin = std::log(static_cast<double>(all.size()) / options.alpha) * (data.blocks_only ? 2 : 1);
   std::vector<PlanRow> rows;

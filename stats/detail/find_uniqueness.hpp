@@ -2,6 +2,7 @@
 // that its traits say, else by distances alone.
 #pragma once
 
+#include <stats/detail/compact_part.hpp>
 #include <stats/detail/searched_manifold.hpp>
 #include <stats/detail/uniqueness_circle.hpp>
 #include <stats/mean.hpp>

@@ -139,7 +139,8 @@ TEST(DoctorCommand, EdgesOfAGraph) {
     const Eigen::Vector4d q = Z.so3().params();
     edges +=
         fmt::format("EDGE_SE3:QUAT {} {} {} {} {} {} {} {} {}", i, i + 1, t[0], t[1], t[2], q[0], q[1], q[2], q[3]);
-    for (const double x : packCovariance(c, toConvention(c, {Z, covariance})).numbers()) edges += fmt::format(" {}", x);
+    const PackedCovariance packed = packCovariance(c, toConvention(c, {Z, covariance}));
+    for (const double x : packed.numbers()) edges += fmt::format(" {}", x);
     edges += "\n";
   }
   const std::string graph = directory.write("graph.g2o", edges), truth = directory.write("truth.g2o", vertices);

@@ -35,8 +35,8 @@ inline std::string covarianceFileOf(const std::vector<double>& times, const std:
   std::string text = conventionHeader(c);
   for (std::size_t i = 0; i < times.size(); ++i) {
     text += fmt::format("{:.9f}", times[i]);
-    for (const double x : packCovariance(c, toConvention(c, gaussians[i])).numbers())
-      text += fmt::format(" {:.17g}", x);
+    const PackedCovariance packed = packCovariance(c, toConvention(c, gaussians[i]));
+    for (const double x : packed.numbers()) text += fmt::format(" {:.17g}", x);
     text += "\n";
   }
   return text;
