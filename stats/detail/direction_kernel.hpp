@@ -20,7 +20,7 @@ template <class P>
 struct AngleOverSine {
   using S = typename P::Scalar;
   P h, g;
-  P antipode = P::zero();  ///< 1 where the angle is so near π that h is lost
+  P antipode = P::zero();  ///< 1 where the angle is so near π that the direction of u is lost
 
   /// Wide for all angles, else for c > -0.01 in every lane; g where Slope says so, and to eight digits only if not Exact.
   template <bool Wide, bool Slope, bool Exact, class Polynomials>
@@ -42,8 +42,9 @@ struct AngleOverSine {
       if constexpr (Slope) {
         g = select(near, slope<Exact>(variable, polynomials), (S(1) - h * c) / s2);
       }
-      constexpr S tiny = sizeof(S) == 8 ? S(1e-280) : S(1e-34);
-      antipode = select(near, P::zero(), select(w2 > tiny, P::zero(), P(S(1))));
+      // There the direction of u is a rounding error, which may even lie along y; a few 10^-10 rad in double.
+      constexpr S lost = sizeof(S) == 8 ? S(1e-20) : S(1e-9);
+      antipode = select(near, P::zero(), select(w2 > lost, P::zero(), P(S(1))));
     }
   }
 

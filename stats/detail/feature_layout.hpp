@@ -16,10 +16,14 @@
 
 namespace liestat::detail {
 
+template <class M>
+concept TellsParameters = requires(const M& x) {
+  ManifoldTraits<M>::parameters(x);
+};
 /// The numbers of a feature in memory, one after the other.
 template <class M>
-const auto* parametersOf(const M& x) {
-  if constexpr (requires { ManifoldTraits<M>::parameters(x); }) {
+const auto* parametersOf(const M& x) requires(TellsParameters<M> || requires { x.data(); }) {
+  if constexpr (TellsParameters<M>) {
     return ManifoldTraits<M>::parameters(x);
   } else {
     return x.data();

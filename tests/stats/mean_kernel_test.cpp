@@ -283,6 +283,34 @@ TEST(MeanKernelFloat, agrees_with_double) {
   }
 }
 
+/// Where one datum is the start, the log of the other is as long as can be and its direction a rounding error. There is a
+/// minimum half way on either side; a datum itself costs twice as much.
+TEST(MeanKernel, antipodes_meet_half_way) {
+  std::mt19937 engine(77);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] {
+    const double x = normal(engine), y = normal(engine), z = normal(engine);
+    return Eigen::Vector3d(Eigen::Vector3d(x, y, z).normalized());
+  };
+  for (const double delta : {0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3}) {
+    SCOPED_TRACE(delta);
+    const double cost = 0.25 * std::pow(static_cast<double>(EIGEN_PI) + delta, 2);
+    for (int trial = 0; trial < 100; ++trial) {
+      const Eigen::Vector3d axis = direction();
+      const S2d x(axis);
+      const S2d y(SO3d::exp(delta * axis.unitOrthogonal()) * Eigen::Vector3d(-axis));
+      EXPECT_LE(mean(std::vector<S2d>{x, y}).cost, cost + 1e-12);
+      const SO3d R = SO3d::exp(3 * direction()), turn = SO3d::exp((static_cast<double>(EIGEN_PI) - delta) * axis);
+      EXPECT_LE(mean(std::vector<SO3d>{R, R * turn}).cost, cost + 1e-12);
+      const SO2d a(axis[0]), half_turn(static_cast<double>(EIGEN_PI) - delta);
+      EXPECT_LE(mean(std::vector<SO2d>{a, a * half_turn}).cost, cost + 1e-12);
+      const S2f xf(axis.cast<float>());
+      EXPECT_NEAR(mean(std::vector<S2f>{xf, S2f(Eigen::Vector3f(-xf.params()))}).cost, 0.25 * EIGEN_PI * EIGEN_PI,
+                  1e-5);
+    }
+  }
+}
+
 static_assert(detail::HasRotationSums<SO3d> && detail::HasRotationSums<SO3f> &&
               detail::HasRotationSums<NonOrientedFrame3d>);
 static_assert(!detail::HasRotationSums<S2d> && !detail::HasRotationSums<SE3d> &&
