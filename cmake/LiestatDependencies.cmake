@@ -111,4 +111,4 @@ endfunction()
 # What the experiments cannot do without; their tests share the list.
 set(LIESTAT_EXPERIMENTS_NEEDS boost random123 fmt)
 # What the program cannot do without; its tests share the list.
-set(LIESTAT_CLI_NEEDS boost random123 cli11 fmt json yaml)
+set(LIESTAT_CLI_NEEDS boost random123 cli11 fmt json yaml zlib)

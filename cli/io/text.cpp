@@ -15,6 +15,7 @@
 #include <limits>
 #include <numeric>
 
+#include <cli/io/gzip.hpp>
 #include <cli/io/input_error.hpp>
 
 namespace liestat::cli {
@@ -170,6 +171,7 @@ TextFile loadText(const std::string& path) {
     size += static_cast<std::size_t>(count);
   }
   file.text.resize(size);
+  if (isGzip(file.text)) file.text = unzipped(file.text, file.name);
   return file;
 }
 

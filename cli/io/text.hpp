@@ -16,7 +16,8 @@ struct TextFile {
 /// The name of an input in messages: `-` is standard input, and control characters never reach a terminal.
 std::string sourceName(const std::string& path);
 
-/// Reads a file in one go; `-` is standard input. Throws InputError where that is not possible.
+/// Reads a file in one go, unzipped if it begins as gzip files do; `-` is standard input. Throws InputError where that is
+/// not possible.
 TextFile loadText(const std::string& path);
 
 /// Walks over the lines of a text that carry data: comments (from `#` to the end of the line), blank lines, a byte

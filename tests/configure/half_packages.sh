@@ -40,8 +40,8 @@ expect() {
 
 # The packages found by modules: their names for CMake, and a target that the project links.
 modules="TBB=TBB::tbb MPI=MPI::MPI_CXX Ceres=Ceres::ceres CLI11=CLI11::CLI11 fmt=fmt::fmt
-  nlohmann_json=nlohmann_json::nlohmann_json yaml-cpp=yaml-cpp rapidcheck=rapidcheck benchmark=benchmark::benchmark_main"
-debian="libtbb-dev libopenmpi-dev libceres-dev libcli11-dev libfmt-dev nlohmann-json3-dev libyaml-cpp-dev
+  nlohmann_json=nlohmann_json::nlohmann_json yaml-cpp=yaml-cpp ZLIB=ZLIB::ZLIB rapidcheck=rapidcheck benchmark=benchmark::benchmark_main"
+debian="libtbb-dev libopenmpi-dev libceres-dev libcli11-dev libfmt-dev nlohmann-json3-dev libyaml-cpp-dev zlib1g-dev
   librapidcheck-dev libbenchmark-dev"
 
 # 1. A module that raises an error, as FindMPI did where Open MPI's programs were installed without its headers.
