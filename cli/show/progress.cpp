@@ -1,6 +1,8 @@
 #include <cli/show/progress.hpp>
 
 #include <fmt/format.h>
+#include <signal.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +24,40 @@ std::string duration(double seconds) {
   return fmt::format("{}:{:02}", minutes, whole % 60);
 }
 
+/// Columns but one: a full line would make some terminals begin the next.
+std::size_t widthOf(std::FILE* terminal) {
+  winsize size{};
+  const bool known = ::ioctl(::fileno(terminal), TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col - std::size_t{1} : 79;
+}
+
+std::atomic<int> interrupted_terminal{-1};
+
+/// The shell's prompt goes below the bar. Resets itself, and the signal that is raised again ends the program.
+extern "C" void endLineOnInterrupt(int signal) {
+  const int terminal = interrupted_terminal.load();
+  if (terminal >= 0 && ::write(terminal, "\n", 1) < 0) interrupted_terminal.store(-1);
+  ::raise(signal);
+}
+
+/// Where nobody else, such as nohup, has said what an interrupt does.
+void watchInterrupts(std::FILE* terminal) {
+  struct sigaction present {};
+  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != SIG_DFL) return;
+  interrupted_terminal.store(::fileno(terminal));
+  struct sigaction action {};
+  action.sa_handler = endLineOnInterrupt;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigemptyset(&action.sa_mask);
+  ::sigaction(SIGINT, &action, nullptr);
+}
+void leaveInterrupts() {
+  struct sigaction present {};
+  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != endLineOnInterrupt) return;
+  ::signal(SIGINT, SIG_DFL);
+  interrupted_terminal.store(-1);
+}
+
 }  // namespace
 
 std::string progressLine(std::string_view label, std::uint64_t done, std::uint64_t total, double elapsed_s,
@@ -32,7 +68,11 @@ std::string progressLine(std::string_view label, std::uint64_t done, std::uint64
   if (done > 0 && done < total) left = duration(elapsed_s * (1 - share) / share) + " left";
   const std::string numbers = fmt::format(" {:3}%  {:>12}", static_cast<int>(100 * share), left);
   const std::size_t taken = displayWidth(label) + 3 + numbers.size();
-  const std::size_t bar = taken < width ? std::min<std::size_t>(width - taken, 40) : 0;
+  if (taken >= width) {
+    const std::string short_numbers = numbers.substr(numbers.size() > width ? numbers.size() - width : 0);
+    return std::string(label.substr(0, width - short_numbers.size())) + short_numbers;
+  }
+  const std::size_t bar = std::min<std::size_t>(width - taken, 40);
   const auto filled = static_cast<std::size_t>(share * static_cast<double>(bar));
   return fmt::format("{} [{}{}]{}", label, std::string(filled, '='), std::string(bar - filled, ' '), numbers);
 }
@@ -57,7 +97,9 @@ void Progress::draw() {
   if (!lock.owns_lock() || !visible_) return;
   const Clock::duration elapsed = Clock::now() - start_;
   next_draw_.store((elapsed + redraw_period).count(), std::memory_order_relaxed);
-  const std::string line = progressLine(label_, done(), total_, std::chrono::duration<double>(elapsed).count());
+  const double seconds = std::chrono::duration<double>(elapsed).count();
+  const std::string line = progressLine(label_, done(), total_, seconds, widthOf(stream_));
+  if (!drawn_) watchInterrupts(stream_);
   std::fputs(("\r" + line + "\x1b[K").c_str(), stream_);
   std::fflush(stream_);
   drawn_ = true;
@@ -68,6 +110,7 @@ void Progress::finish() {
   if (drawn_) {
     std::fputs("\r\x1b[K", stream_);
     std::fflush(stream_);
+    leaveInterrupts();
   }
   drawn_ = false;
   visible_ = false;

@@ -10,8 +10,9 @@
 
 namespace liestat::cli {
 
-/// A progress bar with the time left on standard error. It is drawn only when that is a terminal, a few times a second,
-/// and removed when the work is done, so that it leaves nothing in logs and pipes.
+/// A progress bar with the time left on standard error. It is drawn only when that is a terminal, a few times a second
+/// and no wider than it, and removed when the work is done, so that it leaves nothing in logs and pipes. An interrupt
+/// (SIGINT, Ctrl-C) ends its line before it ends the program.
 class Progress {
  public:
   /// `total` is the amount of work in the units of advance().
@@ -44,7 +45,8 @@ class Progress {
   bool drawn_ = false;
 };
 
-/// One line of a progress bar, for a terminal of that width.
+/// One line of a progress bar, no longer than `width`: without the bar, then with less of the label, where that is
+/// narrow.
 std::string progressLine(std::string_view label, std::uint64_t done, std::uint64_t total, double elapsed_s,
                          std::size_t width = 79);
 

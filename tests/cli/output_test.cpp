@@ -1,12 +1,17 @@
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -152,6 +157,71 @@ TEST(Progress, Line) {
   EXPECT_NE(progressLine("trials", 7, 7, 1).find("100%"), std::string::npos);
   EXPECT_NE(progressLine("trials", 0, 0, 0).find("100%"), std::string::npos);
   for (std::uint64_t done = 0; done <= 100; ++done) EXPECT_LE(progressLine("trials", done, 100, 5).size(), 79U);
+  // Narrow: no bar, then less of the label, and the percentage and the time to the end.
+  EXPECT_EQ(progressLine("validate two-view", 25, 100, 10, 36), "validate two-view  25%     0:30 left");
+  EXPECT_EQ(progressLine("validate two-view", 25, 100, 10, 24), "valid  25%     0:30 left");
+  for (std::size_t width = 0; width <= 100; ++width) {
+    EXPECT_LE(progressLine("validate two-view", 25, 100, 10, width).size(), width) << width;
+  }
+}
+
+/// A terminal of so many columns whose other end the test reads.
+class Terminal {
+ public:
+  explicit Terminal(unsigned short columns) : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
+    EXPECT_GE(master_, 0);
+    EXPECT_EQ(::grantpt(master_), 0);
+    EXPECT_EQ(::unlockpt(master_), 0);
+    stream_ = std::fopen(::ptsname(master_), "w");
+    const winsize size{24, columns, 0, 0};
+    EXPECT_EQ(::ioctl(master_, TIOCSWINSZ, &size), 0);
+  }
+  ~Terminal() {
+    if (stream_ != nullptr) std::fclose(stream_);
+    ::close(master_);
+  }
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  std::FILE* stream() { return stream_; }
+  std::string shown() {
+    std::string text(4096, '\0');
+    const ssize_t count = ::read(master_, text.data(), text.size());
+    text.resize(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    return text;
+  }
+
+ private:
+  int master_;
+  std::FILE* stream_ = nullptr;
+};
+
+TEST(Progress, FitsTheTerminalAndIsRemoved) {
+  Terminal terminal(30);
+  ASSERT_NE(terminal.stream(), nullptr);
+  {
+    Progress progress("validate two-view", 100, terminal.stream());
+    progress.advance(25);
+  }
+  EXPECT_EQ(terminal.shown(), "\rvalidate t  25%     0:01 left\x1b[K\r\x1b[K");
+}
+
+TEST(Progress, AnInterruptEndsTheLineAndTheProgram) {
+  Terminal terminal(60);
+  ASSERT_NE(terminal.stream(), nullptr);
+  const auto interrupted = [&] {
+    Progress progress("work", 100, terminal.stream());
+    progress.advance(25);
+    std::raise(SIGINT);
+  };
+  EXPECT_EXIT(interrupted(), ::testing::KilledBySignal(SIGINT), "");
+  const std::string shown = terminal.shown();
+  EXPECT_EQ(shown.substr(0, 7), "\rwork [");
+  EXPECT_EQ(shown.substr(shown.size() - 2), "\r\n") << "as a terminal shows the end of a line";
+  // Without a bar the interrupt is as it was.
+  struct sigaction present {};
+  ASSERT_EQ(::sigaction(SIGINT, nullptr, &present), 0);
+  EXPECT_EQ(present.sa_handler, SIG_DFL);
 }
 
 TEST(Progress, CountsFromAllThreadsAndLeavesFilesAlone) {
