@@ -13,6 +13,7 @@ root=$(cd "$2" && pwd)
 shift 2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+# shellcheck disable=SC2317 # called by the commands of the pages
 liestat() { "$build/liestat" "$@"; }
 export build
 
