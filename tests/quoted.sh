@@ -80,6 +80,7 @@ check() {
     code=0
     # What builds a program has been done, and a program says with its exit code whether its result may be used.
     sed -i -E 's/^ninja -C [^&]*&& //' "$directory/$number.command"
+    # shellcheck source=/dev/null
     (cd "$directory/run" && set +e && . "$directory/$number.command") >"$directory/$number.output" 2>&1 || code=$?
     missing=$(quotes "$directory/$number.output" "$directory/$number.quoted")
     if [ -n "$missing" ] || [ "$code" -gt 3 ]; then
