@@ -1,4 +1,4 @@
-// Operations on arrays of group elements with stored results: SO3, SE3, double and float, a register of elements at a
+// Operations on arrays of group elements with stored results: SO2, SO3, SE2, SE3, double and float, a register of elements at a
 // time, with the instructions that the processor has (lie/instruction_set.hpp), whatever the unit is compiled for.
 //
 //   std::vector<SE3d> poses(n), inverses(n);
@@ -13,13 +13,17 @@
 // In place         the result may be an operand if their elements begin in the same places; they must not overlap else
 // Accuracy         as of the operation on one element, to some eps; exp takes angles of any size
 // Bits             follow from the element and the instruction set alone, not from its place or the compiler's flags
-// Bad input        not-a-number in, not-a-number out; a zero quaternion has the logarithm not-a-number
+// Bad input        not-a-number in, not-a-number out; a zero quaternion or complex number has the logarithm
+//                  not-a-number
 #pragma once
 
 #include <lie/array_view.hpp>
 #include <lie/detail/array_motions.hpp>
+#include <lie/detail/array_planar.hpp>
 #include <lie/detail/array_rotations.hpp>
+#include <lie/se2.hpp>
 #include <lie/se3.hpp>
+#include <lie/so2.hpp>
 #include <lie/so3.hpp>
 
 #include <concepts>
@@ -31,6 +35,10 @@ namespace detail {
 /// The operations of a group on arrays.
 template <class G>
 struct ArrayOperations;
+template <class S, int Options>
+struct ArrayOperations<SO2<S, Options>> : PlaneRotationArrays {};
+template <class S, int Options>
+struct ArrayOperations<SE2<S, Options>> : PlaneMotionArrays {};
 template <class S, int Options>
 struct ArrayOperations<SO3<S, Options>> : RotationArrays {};
 template <class S, int Options>
@@ -63,7 +71,7 @@ void runOnArrays(const ArrayView<const S>& a, const ArrayView<const S>& b, const
 /// Operations on arrays; see the header comment.
 namespace arrays {
 
-/// Groups whose arrays have operations: SO3, SE3, of double or float.
+/// Groups whose arrays have operations: SO2, SO3, SE2, SE3, of double or float.
 template <class G>
 concept ArrayGroup = requires {
   detail::ArrayOperations<G>::DoF;
@@ -80,7 +88,7 @@ template <ArrayGroup G>
 void exp(ConstView<G> v, View<G> x) {
   detail::runOnArrays<typename detail::ArrayOperations<G>::Exp>(v, ConstView<G>(), x);
 }
-/// v_i = Log(x_i); quaternions of any norm and sign.
+/// v_i = Log(x_i); quaternions of any norm and sign, complex numbers of any norm.
 template <ArrayGroup G>
 void log(ConstView<G> x, View<G> v) {
   detail::runOnArrays<typename detail::ArrayOperations<G>::Log>(x, ConstView<G>(), v);

@@ -57,12 +57,16 @@ void rows(std::size_t n) {
   std::vector<Eigen::Matrix<double, 6, 1>> s(n), t(n);
   std::vector<SO3d> x(n), y(n), z(n);
   std::vector<SE3d> a(n), b(n), c(n);
+  std::vector<Eigen::Vector2d> p2(n), q2(n);
+  std::vector<SE2d> a2(n), b2(n), c2(n);
   for (std::size_t i = 0; i < n; ++i) {
     v[i] = inputs.tangent<3>();
     p[i] = inputs.normal<3>();
     s[i] << p[i], v[i];
     x[i] = y[i] = SO3d::exp(v[i]);
     a[i] = b[i] = SE3d::exp(s[i]);
+    p2[i] = p[i].head<2>();
+    a2[i] = b2[i] = SE2d::exp(v[i]);
   }
   const auto loop = [n](auto& result, const auto& f) {
     return [&result, f, n] {
@@ -99,6 +103,14 @@ void rows(std::size_t n) {
       loop(c, [&](std::size_t i) { return a[i] * b[i]; }), {});
   row("SE3 act", n, 10, 3, [&] { arrays::act<SE3d>(a, p, q), keep(q); },
       loop(q, [&](std::size_t i) { return Vector3d(a[i] * p[i]); }), {});
+  row("SE2 exp", n, 3, 4, [&] { arrays::exp<SE2d>(v, c2), keep(c2); },
+      loop(c2, [&](std::size_t i) { return SE2d::exp(v[i]); }), {});
+  row("SE2 log", n, 4, 3, [&] { arrays::log<SE2d>(a2, w), keep(w); },
+      loop(w, [&](std::size_t i) { return a2[i].log(); }), {});
+  row("SE2 product", n, 8, 4, [&] { arrays::product<SE2d>(a2, b2, c2), keep(c2); },
+      loop(c2, [&](std::size_t i) { return a2[i] * b2[i]; }), {});
+  row("SE2 act", n, 6, 2, [&] { arrays::act<SE2d>(a2, p2, q2), keep(q2); },
+      loop(q2, [&](std::size_t i) { return Eigen::Vector2d(a2[i] * p2[i]); }), {});
 }
 
 int print() {

@@ -152,11 +152,11 @@ struct QuaternionOperation : ArrayOperation<A, 0, Out> {
   }
 };
 
-/// 1/|q|, of quaternions that are not of norm one only if AnyNorm; not-a-number for zero.
+/// One by the root of a squared norm, of norms that are not one only if AnyNorm; not-a-number for zero.
 template <bool AnyNorm, class P>
-LIESTAT_ALWAYS_INLINE P inverseNorm(const PackQuaternion<P>& q) {
+LIESTAT_ALWAYS_INLINE P inverseNorm(const P& squared) {
   using S = typename P::Scalar;
-  const P squared = dot(q, q), excess = squared - S(1);
+  const P excess = squared - S(1);
   const P near = S(1) - excess * (S(0.5) - S(0.375) * excess);
   if constexpr (!AnyNorm) return near;
   return select(absolute(excess) > small_norm_excess<S>, inverseSquareRoot(squared) * (squared / squared), near);
@@ -171,7 +171,7 @@ struct PackLogarithm {
   template <bool AnyNorm, bool WithG>
   LIESTAT_ALWAYS_INLINE static PackLogarithm of(const PackQuaternion<P>& q) {
     using S = typename P::Scalar;
-    const P scale = inverseNorm<AnyNorm>(q);
+    const P scale = inverseNorm<AnyNorm>(dot(q, q));
     const P signed_scale = select(q.w < S(0), -scale, scale);
     const P variable = S(1) - S(2) * (q.w * signed_scale);
     PackLogarithm log;
