@@ -17,6 +17,18 @@ void keep(const T& value) {
   asm volatile("" : : "m"(value) : "memory");
 }
 
+/// One read of memory: the sum of all numbers, in lanes enough that the additions do not count.
+inline double readOnce(const double* p, std::size_t n) {
+  constexpr std::size_t lanes = 32;
+  double sums[lanes] = {};
+  for (std::size_t i = 0; i + lanes <= n; i += lanes) {
+    for (std::size_t l = 0; l < lanes; ++l) sums[l] += p[i + l];
+  }
+  double sum = 0;
+  for (const double s : sums) sum += s;
+  return sum;
+}
+
 /// Median time of one call of each candidate, in ns. A candidate is called as often in each round as fills
 /// round_seconds, at least once.
 inline std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& candidates, int rounds,

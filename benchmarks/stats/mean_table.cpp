@@ -18,18 +18,6 @@ namespace {
 
 constexpr double spread = 0.2;  // standard deviation in each coordinate, rad or m
 
-/// One read of memory: the sum of all numbers, in lanes enough that the additions do not count.
-double readOnce(const double* p, std::size_t n) {
-  constexpr std::size_t lanes = 32;
-  double sums[lanes] = {};
-  for (std::size_t i = 0; i + lanes <= n; i += lanes) {
-    for (std::size_t l = 0; l < lanes; ++l) sums[l] += p[i + l];
-  }
-  double sum = 0;
-  for (const double s : sums) sum += s;
-  return sum;
-}
-
 /// `ours` of the features M with its number of steps, `run` of the same converted.
 template <class M, class Convert, class Ours, class Run>
 void row(const char* name, std::size_t n, const Convert& convert, const Ours& mean_of, const Run& run) {
