@@ -724,17 +724,9 @@ std::vector<MotionRow> validateMotion(const MotionValidation& validation,
     all += costOf(row);
     tests += row.promise ? testsOf(*row.promise) : 0;
   }
-  constexpr std::size_t chunk_size = 4;
   for (MotionRow& row : rows) {
-    const std::size_t chunks = chunkCount(validation.trials, chunk_size);
     const std::vector<Trial> trials = ProgramExecutor{validation.threads}.reduce(
-        chunks,
-        [&](std::size_t chunk) {
-          std::vector<Trial> part;
-          const ChunkRange range = chunkRange(validation.trials, chunks, chunk);
-          for (std::size_t i = range.begin; i < range.end; ++i) part.push_back(runTrial(row, validation, i));
-          return part;
-        },
+        validation.trials, [&](std::size_t i) { return std::vector<Trial>{runTrial(row, validation, i)}; },
         [](std::vector<Trial>& left, const std::vector<Trial>& right) {
           left.insert(left.end(), right.begin(), right.end());
         });

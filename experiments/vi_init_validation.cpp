@@ -106,17 +106,12 @@ template <class Outcome>
 std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window, std::size_t trials,
                                const ViInitValidation& validation, const std::function<void(std::size_t)>& progress) {
   using Outcomes = std::vector<Outcome>;
-  const std::size_t n_chunks = chunkCount(trials, 8);
+  // One by one: a dear trial takes a second, and there may be ten of them.
   return ProgramExecutor{validation.threads}.reduce(
-      n_chunks,
-      [&](std::size_t chunk) {
-        Outcomes part;
-        const ChunkRange range = chunkRange(trials, n_chunks, chunk);
-        for (std::size_t i = range.begin; i < range.end; ++i) {
-          CounterRng rng(validation.seed, i);
-          part.push_back(trial(window, validation.noise, rng));
-        }
-        return part;
+      trials,
+      [&](std::size_t i) {
+        CounterRng rng(validation.seed, i);
+        return Outcomes{trial(window, validation.noise, rng)};
       },
       [&](Outcomes& done, const Outcomes& next) {
         done.insert(done.end(), next.begin(), next.end());
