@@ -209,19 +209,21 @@ TEST(Progress, FitsTheTerminalAndIsRemoved) {
 TEST(Progress, AnInterruptEndsTheLineAndTheProgram) {
   Terminal terminal(60);
   ASSERT_NE(terminal.stream(), nullptr);
-  const auto interrupted = [&] {
+  const auto interrupted = [&](auto disposition) {
+    std::signal(SIGINT, disposition);
     Progress progress("work", 100, terminal.stream());
     progress.advance(25);
     std::raise(SIGINT);
+    progress.finish();
+    std::_Exit(std::signal(SIGINT, SIG_DFL) == disposition ? 7 : 8);
   };
-  EXPECT_EXIT(interrupted(), ::testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(interrupted(SIG_DFL), ::testing::KilledBySignal(SIGINT), "");
   const std::string shown = terminal.shown();
   EXPECT_EQ(shown.substr(0, 7), "\rwork [");
   EXPECT_EQ(shown.substr(shown.size() - 2), "\r\n") << "as a terminal shows the end of a line";
-  // Without a bar the interrupt is as it was.
-  struct sigaction present {};
-  ASSERT_EQ(::sigaction(SIGINT, nullptr, &present), 0);
-  EXPECT_EQ(present.sa_handler, SIG_DFL);
+  // In the background of a shell, or under nohup, interrupts are ignored and stay so.
+  EXPECT_EXIT(interrupted(SIG_IGN), ::testing::ExitedWithCode(7), "");
+  EXPECT_EQ(terminal.shown().find('\n'), std::string::npos);
 }
 
 TEST(Progress, CountsFromAllThreadsAndLeavesFilesAlone) {
