@@ -8,6 +8,11 @@ CXX=${CXX:-c++}
 CMAKE=${CMAKE:-cmake}
 if [ -z "${CMAKE_GENERATOR:-}" ] && command -v ninja >/dev/null; then export CMAKE_GENERATOR=Ninja; fi
 work=${1:-$(mktemp -d)}
+# Begins anew, but deletes nothing that an earlier run, whose first configuration is in_pieces_error, has not made.
+if [ -n "$(ls -A "$work" 2>/dev/null)" ] && [ ! -e "$work/in_pieces_error" ]; then
+  echo "half_packages: $work holds other files, expected a directory of its own" >&2
+  exit 2
+fi
 rm -rf "$work"
 mkdir -p "$work"
 work=$(cd "$work" && pwd)
