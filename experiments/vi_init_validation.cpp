@@ -106,7 +106,7 @@ template <class Outcome>
 std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window, std::size_t trials,
                                const ViInitValidation& validation, const std::function<void(std::size_t)>& progress) {
   using Outcomes = std::vector<Outcome>;
-  // One by one: a dear trial takes a second, and there may be ten of them.
+  // One trial a chunk: some experiments have ten trials of a second each.
   return ProgramExecutor{validation.threads}.reduce(
       trials,
       [&](std::size_t i) {

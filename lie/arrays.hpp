@@ -1,5 +1,5 @@
-// Operations on arrays of group elements with stored results: SO2, SO3, SE2, SE3, double and float, a register of elements at a
-// time, with the instructions that the processor has (lie/instruction_set.hpp), whatever the unit is compiled for.
+// Operations on arrays of group elements with stored results: SO2, SO3, SE2, SE3, double and float, a register of
+// elements at a time, with the instructions that the processor has (lie/instruction_set.hpp), whatever the unit is compiled for.
 //
 //   std::vector<SE3d> poses(n), inverses(n);
 //   arrays::inverse<SE3d>(poses, inverses);

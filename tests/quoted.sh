@@ -78,7 +78,7 @@ check() {
   for number in $(find "$directory" -maxdepth 1 -name '*.command' -printf '%f\n' | sort -n | sed 's/[.]command//'); do
     if [ ! -e "$directory/$number.quoted" ]; then continue; fi
     code=0
-    # What builds a program has been done, and a program says with its exit code whether its result may be used.
+    # The programs are built already. An exit code up to 3 is a program's verdict on its result.
     sed -i -E 's/^ninja -C [^&]*&& //' "$directory/$number.command"
     # shellcheck source=/dev/null
     (cd "$directory/run" && set +e && . "$directory/$number.command") >"$directory/$number.output" 2>&1 || code=$?

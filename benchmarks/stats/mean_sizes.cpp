@@ -1,4 +1,4 @@
-// What a mean with its covariance costs per feature, from ten features to more than the caches hold, beside reading the
+// The time per feature of a mean with its covariance, from ten features to more than the caches hold, beside reading the
 // data once and, for rotations, beside a hand-written loop in Eigen alone. Prints CSV, ns per feature, which
 // benchmarks/plot_sizes.sh draws. Spread 0.2 rad (m) in each coordinate.
 #include "../inputs.hpp"

@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 #include <cli/io/input_error.hpp>
@@ -31,7 +30,7 @@ class Inflation {
 
 }  // namespace
 
-std::string unzipped(std::string_view bytes, const std::string& file) {
+std::string decompressed(std::string_view bytes, const std::string& file) {
   Inflation inflation;
   if (!inflation.ready()) throw InputError(file, 0, "zlib refused to start", "a gzip file and memory to read it");
   z_stream& stream = inflation.stream();

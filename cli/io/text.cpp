@@ -171,7 +171,7 @@ TextFile loadText(const std::string& path) {
     size += static_cast<std::size_t>(count);
   }
   file.text.resize(size);
-  if (isGzip(file.text)) file.text = unzipped(file.text, file.name);
+  if (isGzip(file.text)) file.text = decompressed(file.text, file.name);
   return file;
 }
 

@@ -16,7 +16,7 @@ struct TextFile {
 /// The name of an input in messages: `-` is standard input, and control characters never reach a terminal.
 std::string sourceName(const std::string& path);
 
-/// Reads a file in one go, unzipped if it begins as gzip files do; `-` is standard input. Throws InputError where that is
+/// Reads a file in one go, decompressed if it is a gzip file; `-` is standard input. Throws InputError where that is
 /// not possible.
 TextFile loadText(const std::string& path);
 

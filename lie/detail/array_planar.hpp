@@ -1,5 +1,5 @@
-// Operations on arrays of rotations and rigid motions of the plane for lie/detail/array_kernel.hpp: the formulas of So2Math
-// (lie/so2.hpp) and Se2Math (lie/se2.hpp) on packs.
+// Operations on arrays of rotations and rigid motions of the plane for lie/detail/array_kernel.hpp: the formulas of
+// So2Math (lie/so2.hpp) and Se2Math (lie/se2.hpp) on packs.
 #pragma once
 
 #include <lie/detail/array_kernel.hpp>
@@ -57,6 +57,24 @@ struct AngleOperation : ArrayOperation<A, 0, Out, Rows> {
   }
 };
 
+/// The exponential of tangent vectors whose angle θ is number At.
+template <std::size_t A, std::size_t At, std::size_t Out>
+struct AngleExponential : AngleOperation<A, At, Out> {
+  static constexpr std::size_t coefficients = 2;  ///< sin θ/θ, (1 - cos θ)/θ²
+  template <bool special, class P>
+  LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[A], P (&c)[coefficients]) {
+    using S = typename P::Scalar;
+    const PackAngle<special, P> angle(in[At] * in[At]);
+    c[0] = angle.sinc * angle.cos, c[1] = S(0.5) * (angle.sinc * angle.sinc);
+  }
+  /// (cos θ, sin θ)
+  template <class P>
+  LIESTAT_ALWAYS_INLINE static PackComplex<P> rotation(const P& theta, const P (&c)[coefficients]) {
+    using S = typename P::Scalar;
+    return {S(1) - theta * theta * c[1], theta * c[0]};
+  }
+};
+
 /// The logarithm of elements that begin with a complex number; what is not of norm one is special.
 template <std::size_t A, std::size_t Out>
 struct ComplexLogarithm : ArrayOperation<A, 0, Out> {
@@ -100,18 +118,10 @@ struct PackArgument {
 struct PlaneRotationArrays {
   static constexpr std::size_t DoF = 1, num_parameters = 2, Dim = 2;
 
-  struct Exp : AngleOperation<1, 0, 2> {
-    static constexpr std::size_t coefficients = 2;
-    template <bool special, class P>
-    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[1], P (&c)[coefficients]) {
-      using S = typename P::Scalar;
-      const PackAngle<special, P> angle(in[0] * in[0]);
-      c[0] = angle.sinc * angle.cos, c[1] = S(0.5) * (angle.sinc * angle.sinc);
-    }
+  struct Exp : AngleExponential<1, 0, 2> {
     template <class P>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[1], const P (&c)[coefficients], P (&result)[2]) {
-      using S = typename P::Scalar;
-      writeComplex(result, PackComplex<P>{S(1) - in[0] * in[0] * c[1], in[0] * c[0]});
+      writeComplex(result, rotation(in[0], c));
     }
   };
   struct Log : ComplexLogarithm<2, 1> {
@@ -158,20 +168,11 @@ struct PlaneRotationArrays {
 struct PlaneMotionArrays {
   static constexpr std::size_t DoF = 3, num_parameters = 4, Dim = 2;
 
-  struct Exp : AngleOperation<3, 2, 4> {
-    static constexpr std::size_t coefficients = 2;
-    template <bool special, class P>
-    LIESTAT_ALWAYS_INLINE static void prepare(const P (&in)[3], P (&c)[coefficients]) {
-      using S = typename P::Scalar;
-      const PackAngle<special, P> angle(in[2] * in[2]);
-      c[0] = angle.sinc * angle.cos, c[1] = S(0.5) * (angle.sinc * angle.sinc);
-    }
+  struct Exp : AngleExponential<3, 2, 4> {
     template <class P>
     LIESTAT_ALWAYS_INLINE static void apply(const P (&in)[3], const P (&c)[coefficients], P (&result)[4]) {
-      using S = typename P::Scalar;
-      const P theta = in[2];
-      writeComplex(result, PackComplex<P>{S(1) - theta * theta * c[1], theta * c[0]});
-      writeComplex(result + 2, PackComplex<P>{c[0], theta * c[1]} * readComplex(in));
+      writeComplex(result, rotation(in[2], c));
+      writeComplex(result + 2, PackComplex<P>{c[0], in[2] * c[1]} * readComplex(in));
     }
   };
   struct Log : ComplexLogarithm<4, 3> {
