@@ -8,26 +8,28 @@
 namespace liestat::detail {
 
 /// Blocks of position, rotation and velocity by the biases of gyroscope and accelerometer, in the axes of the start:
-/// derivatives, or covariances with them. The rotation does not feel the accelerometer.
+/// derivatives, or covariances with them, all transposed: a row belongs to a coordinate of the bias. The rotation does not
+/// feel the accelerometer.
 template <class S>
 struct BiasBlocks {
   using Columns = detail::Columns<S>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
 
-  Columns pg = Columns::zero(), pa = Columns::zero(), rg = Columns::zero();
-  Columns vg = Columns::zero(), va = Columns::zero();
+  Columns gp = Columns::zero(), ap = Columns::zero(), gr = Columns::zero();
+  Columns gv = Columns::zero(), av = Columns::zero();
 
   void operator+=(const BiasBlocks& other) {
-    pg += other.pg, pa += other.pa, rg += other.rg, vg += other.vg, va += other.va;
+    gp += other.gp, ap += other.ap, gr += other.gr, gv += other.gv, av += other.av;
   }
   BiasBlocks scaled(const S& gyroscope, const S& accelerometer) const {
-    return {pg * gyroscope, pa * accelerometer, rg * gyroscope, vg * gyroscope, va * accelerometer};
+    return {gp * gyroscope, ap * accelerometer, gr * gyroscope, gv * gyroscope, av * accelerometer};
   }
-  /// p ← p - U r + h v, then v ← v - W r.
-  void carry(const S& h, const Columns& U, const Columns& W) {
-    pg += vg * h;
-    pg -= U * rg;
-    pa += va * h;
-    vg -= W * rg;
+  /// p ← p - [u] r + h v, then v ← v - [w] r, in which a transposed block meets [u] on its right.
+  void carry(const S& h, const Vector3& u, const Vector3& w) {
+    gp.addScaled(gv, h);
+    gp.addTimesSkew(gr, u);
+    ap.addScaled(av, h);
+    gv.addTimesSkew(gr, w);
   }
 };
 
@@ -36,6 +38,7 @@ struct BiasBlocks {
 template <class S>
 struct IncrementCovariance {
   using Columns = detail::Columns<S>;
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
   using Matrix3 = Eigen::Matrix<S, 3, 3>;
   using Matrix9 = Eigen::Matrix<S, 9, 9>;
 
@@ -57,37 +60,39 @@ struct IncrementCovariance {
     return m;
   }
 
-  /// Carries it over a step of h seconds with gains u of position (U = [u]) and w of velocity (W = [w]), without noise.
-  void carry(const S& h, const Columns& U, const Columns& W) {
-    // With p' = p - [u] r + h v: pp' = pp + Yᵀ + Y', Y = pr U + h pv of before and Y' of after; pp is kept up to a skew
-    // part, so Yᵀ may be Y. A skew matrix is its own transpose's negative: X Uᵀ = -X U.
-    pp.addProduct(pr, U);
-    pp += pv * h;
-    pr += vr * h;
-    pr -= U * rr;
-    pv += vv * h;
-    pv -= U.timesTransposed(vr);
-    pp.addProduct(pr, U);
-    pp += pv * h;
+  /// Carries it over a step of h seconds with gains u of position and w of velocity, without noise.
+  void carry(const S& h, const Vector3& u, const Vector3& w) {
+    // With p' = p - [u] r + h v: pp' = pp + Yᵀ + Y', Y = pr [u] + h pv of before and Y' of after; pp is kept up to a skew
+    // part, so Yᵀ may be Y. All skew matrices stand on the right: -[u] rr = (rr [u])ᵀ, for rr is symmetric, and
+    // -[u] vrᵀ = (vr [u])ᵀ.
+    pp.addTimesSkew(pr, u);
+    pp.addScaled(pv, h);
+    pr.addScaled(vr, h);
+    pr += rr.timesSkew(u).transposed();
+    pv.addScaled(vv, h);
+    pv += vr.timesSkew(u).transposed();
+    pp.addTimesSkew(pr, u);
+    pp.addScaled(pv, h);
     // v' = v - [w] r.
-    pv.addProduct(pr, W);
-    vv -= W.timesTransposed(vr);
-    vr -= W * rr;
-    vv.addProduct(vr, W);
+    pv.addTimesSkew(pr, w);
+    vv += vr.timesSkew(w).transposed();
+    vr += rr.timesSkew(w).transposed();
+    vv.addTimesSkew(vr, w);
   }
 
   /// Adds what the drift of the biases does through a response J to them: with C their covariance with the errors,
   /// `walk` before and `now` = C + q t J after, P += C Jᵀ + J Cᵀ + q t J Jᵀ.
   void drift(const BiasBlocks<S>& walk, const BiasBlocks<S>& now, const BiasBlocks<S>& J) {
-    pp += now.pg.timesTransposed(J.pg) + J.pg.timesTransposed(walk.pg) + now.pa.timesTransposed(J.pa) +
-          J.pa.timesTransposed(walk.pa);
-    pr += now.pg.timesTransposed(J.rg) + J.pg.timesTransposed(walk.rg);
-    pv += now.pg.timesTransposed(J.vg) + J.pg.timesTransposed(walk.vg) + now.pa.timesTransposed(J.va) +
-          J.pa.timesTransposed(walk.va);
-    rr += now.rg.timesTransposed(J.rg) + J.rg.timesTransposed(walk.rg);
-    vr += now.vg.timesTransposed(J.rg) + J.vg.timesTransposed(walk.rg);
-    vv += now.vg.timesTransposed(J.vg) + J.vg.timesTransposed(walk.vg) + now.va.timesTransposed(J.va) +
-          J.va.timesTransposed(walk.va);
+    const Columns pg = now.gp.transposed(), pa = now.ap.transposed(), rg = now.gr.transposed(),
+                  vg = now.gv.transposed(), va = now.av.transposed();
+    const Columns J_pg = J.gp.transposed(), J_pa = J.ap.transposed(), J_rg = J.gr.transposed(),
+                  J_vg = J.gv.transposed(), J_va = J.av.transposed();
+    pp += pg * J.gp + J_pg * walk.gp + pa * J.ap + J_pa * walk.ap;
+    pr += pg * J.gr + J_pg * walk.gr;
+    pv += pg * J.gv + J_pg * walk.gv + pa * J.av + J_pa * walk.av;
+    rr += rg * J.gr + J_rg * walk.gr;
+    vr += vg * J.gr + J_vg * walk.gr;
+    vv += vg * J.gv + J_vg * walk.gv + va * J.av + J_va * walk.av;
   }
 };
 

@@ -1,4 +1,4 @@
-// The coefficients, by its angle, and the matrices of one preintegration step of constant rate and force.
+// The coefficients, by its angle, and the vectors of one preintegration step of constant rate and force.
 #pragma once
 
 #include <lie/detail/small_columns.hpp>
@@ -42,41 +42,37 @@ struct StepCoefficients {
   }
 };
 
-/// The matrices of one preintegration step of constant rate and force, for one rotation vector φ: polynomials in
-/// K = [φ], and derivatives of the integrated force by φ.
+/// A step's rotation vector φ and its force in the axes of the start of the interval, and what is made of them.
 template <class S>
-class StepMatrices {
- public:
+struct StepVectors {
   using Vector3 = Eigen::Matrix<S, 3, 1>;
-  using Column = typename Columns<S>::Column;
 
-  StepMatrices(const Vector3& phi, const Vector3& force)
-      : phi_(phi), force_(force), t_(phi.dot(phi)), skew_(Columns<S>::skew(phi)) {}
+  Vector3 phi, force;
+  Vector3 once, twice;       ///< φ×f and φ×(φ×f)
+  S squared_angle, along;    ///< |φ|², φ·f
+  Columns<S> skew, squared;  ///< K = [φ], K²
 
-  /// a I + b K + c K².
-  Columns<S> polynomial(const S& a, const S& b, const S& c) const {
-    Columns<S> m = outer<S>(Columns<S>::column(phi_) * c, phi_);
-    m += skew_ * b;
-    m.addDiagonal(a - c * t_);
-    return m;
+  StepVectors(const Vector3& rotation_vector, const Vector3& specific_force)
+      : phi(rotation_vector),
+        force(specific_force),
+        once(phi.cross(force)),
+        twice(phi.cross(once)),
+        squared_angle(phi.dot(phi)),
+        along(phi.dot(force)),
+        skew(Columns<S>::skew(phi)),
+        squared(outer<S>(Columns<S>::column(phi), phi)) {
+    squared.addDiagonal(-squared_angle);
   }
-  /// ∂(k0 f + k1 φ×f + k2 φ×(φ×f))/∂φ for coefficients k1, k2 that are functions of |φ| with slopes q1, q2 (derivative
-  /// over |φ|), f the force.
-  Columns<S> slope(const S& k1, const S& k2, const S& q1, const S& q2) const {
-    const Vector3 w = phi_.cross(force_), ww = phi_.cross(w);
-    // d/dφ of φ×(φ×f) = φ (φ·f) - f |φ|² is (φ·f) I + φ fᵀ - 2 f φᵀ.
-    Columns<S> m = outer<S>(Columns<S>::column(Vector3(q1 * w + q2 * ww - (S(2) * k2) * force_)), phi_);
-    m += outer<S>(Columns<S>::column(phi_) * k2, force_);
-    m -= Columns<S>::skew(force_) * k1;
-    m.addDiagonal(k2 * phi_.dot(force_));
-    return m;
-  }
-  const S& squaredAngle() const { return t_; }
 
- private:
-  Vector3 phi_, force_;
-  S t_;
-  Columns<S> skew_;
+  /// m += a I + c K², and m += a I + b K + c K².
+  EIGEN_ALWAYS_INLINE void addSymmetric(Columns<S>& m, const S& a, const S& c) const {
+    m.addScaled(squared, c);
+    m.addDiagonal(a);
+  }
+  EIGEN_ALWAYS_INLINE void addPolynomial(Columns<S>& m, const S& a, const S& b, const S& c) const {
+    addSymmetric(m, a, c);
+    m.addScaled(skew, b);
+  }
 };
 
 }  // namespace liestat::detail

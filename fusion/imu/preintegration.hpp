@@ -23,6 +23,7 @@
 #include <fusion/detail/increment_covariance.hpp>
 #include <fusion/detail/step_matrices.hpp>
 #include <fusion/imu/readings.hpp>
+#include <lie/detail/always_inline.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/se23.hpp>
 #include <stats/gaussian.hpp>
@@ -54,15 +55,15 @@ class Preintegration {
 
   /// Adds a step of h > 0 seconds with constant rate (rad/s) and force (m/s²) in the body's axes, as measured.
   void add(const S& h, const Vector3& angular_rate, const Vector3& specific_force) {
-    const Columns R = Columns::of(increment_.so3().matrix());
+    const Matrix3 R = increment_.so3().matrix();
     const Vector3 rotation = h * (angular_rate - options_.bias.gyroscope);
+    const Vector3 force = specific_force - options_.bias.accelerometer;
     // All that follows in the axes of the start.
-    const Vector3 theta = R * rotation, force = R * Vector3(specific_force - options_.bias.accelerometer);
-    const detail::StepCoefficients<S> k(theta.dot(theta));
-    const Vector3 w = theta.cross(force), ww = theta.cross(w);
-    const Vector3 velocity = h * (force + k.b * w + k.c * ww);
-    const Vector3 position = (h * h) * (S(0.5) * force + k.c * w + k.d * ww);
-    advance(h, R, rotation, position, velocity, detail::StepMatrices<S>(theta, force), k);
+    const detail::StepVectors<S> step(R * rotation, R * force);
+    const detail::StepCoefficients<S> k(step.squared_angle);
+    const Vector3 velocity = h * (step.force + k.b * step.once + k.c * step.twice);
+    const Vector3 position = (h * h) * (S(0.5) * step.force + k.c * step.once + k.d * step.twice);
+    advance(h, R, rotation, force, position, velocity, step, k);
   }
 
   /// The same over a step within which rate and force vary: the mean force, for the covariance, and what they do: the
@@ -70,9 +71,10 @@ class Preintegration {
   /// without the biases.
   void addVarying(const S& h, const Vector3& specific_force, const Vector3& rotation, const Vector3& position,
                   const Vector3& velocity) {
-    const Columns R = Columns::of(increment_.so3().matrix());
-    const detail::StepMatrices<S> step(R * rotation, R * Vector3(specific_force - options_.bias.accelerometer));
-    advance(h, R, rotation, R * position, R * velocity, step, detail::StepCoefficients<S>(step.squaredAngle()));
+    const Matrix3 R = increment_.so3().matrix();
+    const Vector3 force = specific_force - options_.bias.accelerometer;
+    const detail::StepVectors<S> step(R * rotation, R * force);
+    advance(h, R, rotation, force, R * position, R * velocity, step, detail::StepCoefficients<S>(step.squared_angle));
   }
 
   /// Seconds.
@@ -87,13 +89,13 @@ class Preintegration {
     using Vector = Eigen::Matrix<T, 3, 1>;
     const Vector g = bias.gyroscope - options_.bias.gyroscope.template cast<T>();
     const Vector a = bias.accelerometer - options_.bias.accelerometer.template cast<T>();
-    const auto by = [](const Columns& J, const Vector& change) {
-      return Vector(J.matrix().template cast<T>() * change);
+    const auto by = [](const Columns& transposed, const Vector& change) {
+      return Vector(transposed.matrix().transpose().template cast<T>() * change);
     };
     const SE23<T> increment = increment_.template cast<T>();
-    return SE23<T>(SO3<T>::exp(by(bias_.rg, g)) * SO3<T>(increment.so3()),
-                   Vector(increment.translation() + by(bias_.pg, g) + by(bias_.pa, a)),
-                   Vector(increment.velocity() + by(bias_.vg, g) + by(bias_.va, a)));
+    return SE23<T>(SO3<T>::exp(by(bias_.gr, g)) * SO3<T>(increment.so3()),
+                   Vector(increment.translation() + by(bias_.gp, g) + by(bias_.ap, a)),
+                   Vector(increment.velocity() + by(bias_.gv, g) + by(bias_.av, a)));
   }
   /// Whether other biases are so far that the readings should be integrated anew: a change of the gyroscope's by more
   /// than 0.05 rad/s, or by more than 0.05 rad over the duration.
@@ -112,12 +114,13 @@ class Preintegration {
   Matrix96 biasJacobian() const { return biasJacobian(options_.bias); }
   /// The same at other biases, of increment(bias); exact for that function.
   Matrix96 biasJacobian(const ImuBias<S>& bias) const {
-    const Vector3 turn = bias_.rg * (bias.gyroscope - options_.bias.gyroscope);
+    const Vector3 turn = bias_.gr.matrix().transpose() * (bias.gyroscope - options_.bias.gyroscope);
     const Matrix3 back = increment(bias).so3().matrix().transpose();
     // Exp(φ + d) R = Exp(φ) R Exp(R⁻¹ J_r(φ) d), and increment(bias) is turned by Exp(φ).
     Matrix96 J;
-    J << back * bias_.pg.matrix(), back * bias_.pa.matrix(), back * SO3<S>::leftJacobian(turn) * bias_.rg.matrix(),
-        Matrix3::Zero(), back * bias_.vg.matrix(), back * bias_.va.matrix();
+    J << back * bias_.gp.matrix().transpose(), back * bias_.ap.matrix().transpose(),
+        back * SO3<S>::leftJacobian(turn) * bias_.gr.matrix().transpose(), Matrix3::Zero(),
+        back * bias_.gv.matrix().transpose(), back * bias_.av.matrix().transpose();
     return J;
   }
   /// The covariance of additive errors in the axes of the start, order (rotation, velocity, position), the rotation's
@@ -137,8 +140,9 @@ class Preintegration {
     const Matrix3 T = increment_.so3().matrix().transpose();
     Matrix15 m = Matrix15::Zero();
     m.template topLeftCorner<9, 9>() = covariance_.assembled(T);
-    m.template block<9, 6>(0, 9) << T * walk_.pg.matrix(), T * walk_.pa.matrix(), T * walk_.rg.matrix(),
-        Matrix3::Zero(), T * walk_.vg.matrix(), T * walk_.va.matrix();
+    m.template block<9, 6>(0, 9) << T * walk_.gp.matrix().transpose(), T * walk_.ap.matrix().transpose(),
+        T * walk_.gr.matrix().transpose(), Matrix3::Zero(), T * walk_.gv.matrix().transpose(),
+        T * walk_.av.matrix().transpose();
     m.template block<6, 9>(9, 0) = m.template block<9, 6>(0, 9).transpose();
     m.diagonal().template segment<3>(9).array() = gyroscopeWalk(duration_);
     m.diagonal().template tail<3>().array() = accelerometerWalk(duration_);
@@ -156,18 +160,21 @@ class Preintegration {
     all.increment_ = SE23<S>(rotation * SO3<S>(next.increment_.so3()),
                              Vector3(increment_.translation() + next.duration_ * increment_.velocity() + u),
                              Vector3(increment_.velocity() + w));
-    all.carry(next.duration_, Columns::skew(u), Columns::skew(w));
+    all.carry(next.duration_, u, w);
     const auto turned = [&R](const Columns& block) { return (R * block).timesTransposed(R); };
     const Covariance& n = next.covariance_;
     Covariance& c = all.covariance_;
     c.pp += turned(n.pp), c.pr += turned(n.pr), c.pv += turned(n.pv);
     c.rr += turned(n.rr), c.vr += turned(n.vr), c.vv += turned(n.vv);
     // The drift of the biases since the start acts on the second interval as a whole.
-    const BiasBlocks response{R * next.bias_.pg, R * next.bias_.pa, R * next.bias_.rg, R * next.bias_.vg,
-                              R * next.bias_.va};
+    const auto carried = [&R](const BiasBlocks& b) {
+      return BiasBlocks{b.gp.timesTransposed(R), b.ap.timesTransposed(R), b.gr.timesTransposed(R),
+                        b.gv.timesTransposed(R), b.av.timesTransposed(R)};
+    };
+    const BiasBlocks response = carried(next.bias_);
     if (has_walk_) {
       all.drift(response, duration_);
-      all.walk_ += {R * next.walk_.pg, R * next.walk_.pa, R * next.walk_.rg, R * next.walk_.vg, R * next.walk_.va};
+      all.walk_ += carried(next.walk_);
     }
     all.bias_ += response;
     return all;
@@ -184,61 +191,95 @@ class Preintegration {
     return options_.noise.accelerometer_walk * options_.noise.accelerometer_walk * t;
   }
 
-  /// Covariance and Jacobian over a step of h seconds with gains u of position (U = [u]) and w of velocity, in the axes
-  /// of the start, without noise.
-  void carry(const S& h, const Columns& U, const Columns& W) {
-    covariance_.carry(h, U, W);
-    bias_.carry(h, U, W);
-    if (has_walk_) walk_.carry(h, U, W);
+  /// Covariance and Jacobian over a step of h seconds with gains u of position and w of velocity, in the axes of the
+  /// start, without noise.
+  void carry(const S& h, const Vector3& u, const Vector3& w) {
+    covariance_.carry(h, u, w);
+    bias_.carry(h, u, w);
+    if (has_walk_) walk_.carry(h, u, w);
   }
 
-  /// Adds what biases that have walked for t seconds do through a response J to them.
-  void drift(const BiasBlocks& J, const S& t) {
+  /// Adds what biases that have walked for t seconds do through a response J to them. Few sensors are given a walk, so
+  /// that its registers are not those of a step.
+  LIESTAT_NO_INLINE void drift(const BiasBlocks& J, const S& t) {
     BiasBlocks now = walk_;
     now += J.scaled(gyroscopeWalk(t), accelerometerWalk(t));
     covariance_.drift(walk_, now, J);
     walk_ = now;
   }
 
-  /// A step by its rotation vector in the body's axes at its start and its gains in those of the start of the interval.
-  void advance(const S& h, const Columns& R, const Vector3& rotation, const Vector3& position, const Vector3& velocity,
-               const detail::StepMatrices<S>& step, const detail::StepCoefficients<S>& k) {
-    carry(h, Columns::skew(position), Columns::skew(velocity));
+  /// A step by its rotation vector and its force in the body's axes at its start, whose orientation is R, and its gains in
+  /// the axes of the start of the interval.
+  void advance(const S& h, const Matrix3& R, const Vector3& rotation, const Vector3& force, const Vector3& position,
+               const Vector3& velocity, const detail::StepVectors<S>& step, const detail::StepCoefficients<S>& k) {
+    carry(h, position, velocity);
+    const BiasBlocks response = readingResponse(h, R, rotation, force, step, k);
+    if (has_walk_) drift(response.scaled(-h, -h), duration_);
+    bias_.gp.addScaled(response.gp, -h);
+    bias_.ap.addScaled(response.ap, -h);
+    bias_.gr.addScaled(response.gr, -h);
+    bias_.gv.addScaled(response.gv, -h);
+    bias_.av.addScaled(response.av, -h);
 
-    // Errors of rate and force within the step move the increment by h [h² D2; G1; h D1] and h [h G2; 0; G1].
-    const Columns G1 = step.polynomial(S(1), k.b, k.c), G2 = step.polynomial(S(0.5), k.c, k.d);
-    const Columns D1 = step.slope(k.b, k.c, k.b_slope, k.c_slope) * h;
-    const Columns D2 = step.slope(k.c, k.d, k.c_slope, k.d_slope) * (h * h);
-    const Columns minus = R * S(-h), turn = G1 * minus;
-    const BiasBlocks response{D2 * minus, (G2 * minus) * h, turn, D1 * minus, turn};
-    if (has_walk_) drift(response, duration_);
-    bias_ += response;
-
-    // White noise has the same variance along all axes, so R cancels from its covariance, and so do products of
-    // polynomials in [θ], by [θ]³ = -|θ|² [θ].
-    const S t = step.squaredAngle();
+    // Over a step white noise is an error of the reading with this variance over h², the same along all axes, so that R
+    // cancels from its covariance. So do products of polynomials in K, by K³ = -|θ|² K.
     const S gyroscope = options_.noise.gyroscope * options_.noise.gyroscope * h;
     const S accelerometer = options_.noise.accelerometer * options_.noise.accelerometer * h;
-    const Columns turned = step.polynomial(S(1), S(0), S(2) * k.c - k.b * k.b - k.c * k.c * t);  // G1 G1ᵀ
+    const S& t = step.squared_angle;
+    const S turned = S(2) * k.c - k.b * k.b - k.c * k.c * t;  // G1 G1ᵀ = I + turned K²
     const S bend = k.c * k.c - k.b * k.d;
-    const Columns slid =  // G2 G1ᵀ
-        step.polynomial(S(0.5), k.c - S(0.5) * k.b - t * bend, k.d + S(0.5) * k.c - k.b * k.c - t * k.c * k.d);
-    const Columns E1 = D1 * gyroscope, E2 = D2 * gyroscope;
+    const Columns pg = response.gp.transposed() * gyroscope, vg = response.gv.transposed() * gyroscope;
     Covariance& c = covariance_;
-    c.pp.addProductTransposed(E2, D2);
-    c.pp += step.polynomial(S(0.25), S(0), k.d - k.c * k.c - k.d * k.d * t) * (accelerometer * h * h);  // G2 G2ᵀ
-    c.pr.addProductTransposed(E2, G1);
-    c.pv.addProductTransposed(E2, D1);
-    c.pv += slid * (accelerometer * h);
-    c.rr += turned * gyroscope;
-    c.vr.addProductTransposed(E1, G1);
-    c.vv.addProductTransposed(E1, D1);
-    c.vv += turned * accelerometer;
+    c.pp.addProduct(pg, response.gp);
+    const S p = accelerometer * h * h;  // G2 G2ᵀ
+    step.addSymmetric(c.pp, S(0.25) * p, (k.d - k.c * k.c - k.d * k.d * t) * p);
+    c.pr.addProduct(pg, response.gr);
+    c.pv.addProduct(pg, response.gv);
+    const S v = accelerometer * h;  // G2 G1ᵀ
+    step.addPolynomial(c.pv, S(0.5) * v, (k.c - S(0.5) * k.b - t * bend) * v,
+                       (k.d + S(0.5) * k.c - k.b * k.c - t * k.c * k.d) * v);
+    step.addSymmetric(c.rr, gyroscope, turned * gyroscope);
+    c.vr.addProduct(vg, response.gr);
+    c.vv.addProduct(vg, response.gv);
+    step.addSymmetric(c.vv, accelerometer, turned * accelerometer);
 
     increment_.translation() += h * Vector3(increment_.velocity()) + position;
     increment_.velocity() += velocity;
     increment_.so3() *= SO3<S>::exp(rotation);
     duration_ += h;
+  }
+
+  /// What errors of the rate and of the force during a step of one second do, [h² D2 R; G1 R; h D1 R] and
+  /// [h G2 R; 0; G1 R], transposed, with G1 = I + b K + c K² and G2 = I/2 + c K + d K², K = [θ], and D1, D2 the derivatives
+  /// of G1 f and G2 f by θ. All of them are made of Rᵀ and its products with skew matrices, for Rᵀ θ and Rᵀ f are what is
+  /// measured.
+  static EIGEN_ALWAYS_INLINE BiasBlocks readingResponse(const S& h, const Matrix3& R, const Vector3& rotation,
+                                                        const Vector3& force, const detail::StepVectors<S>& step,
+                                                        const detail::StepCoefficients<S>& k) {
+    const Columns T = Columns::of(Matrix3(R.transpose()));
+    const Columns once = T.timesSkew(step.phi), twice = once.timesSkew(step.phi), across = T.timesSkew(step.force);
+    const auto theta = Columns::column(rotation), pulled = Columns::column(force);
+    // Rᵀ Dᵀ with D = s θᵀ + k2 θ fᵀ - k1 [f] + k2 (θ·f) I, s = q1 θ×f + q2 θ×(θ×f) - 2 k2 f: the derivative of
+    // k1 θ×f + k2 θ×(θ×f) whose coefficients have the slopes q1 and q2 (derivative over |θ|).
+    const auto slope = [&](const S& k1, const S& k2, const S& q1, const S& q2) {
+      Columns m = detail::outer<S>(theta, Vector3(q1 * step.once + q2 * step.twice - (S(2) * k2) * step.force));
+      m.addOuter(pulled, Vector3(k2 * step.phi));
+      m.addScaled(across, k1);
+      m.addScaled(T, k2 * step.along);
+      return m;
+    };
+    BiasBlocks J;
+    J.gr = T;
+    J.gr.addScaled(once, -k.b);
+    J.gr.addScaled(twice, k.c);
+    J.av = J.gr;
+    J.ap = T * (S(0.5) * h);
+    J.ap.addScaled(once, -h * k.c);
+    J.ap.addScaled(twice, h * k.d);
+    J.gv = slope(h * k.b, h * k.c, h * k.b_slope, h * k.c_slope);
+    const S hh = h * h;
+    J.gp = slope(hh * k.c, hh * k.d, hh * k.c_slope, hh * k.d_slope);
+    return J;
   }
 
   PreintegrationOptions<S> options_;
