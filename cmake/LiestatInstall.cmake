@@ -14,11 +14,12 @@ set(liestat_package_dir ${CMAKE_INSTALL_DATADIR}/cmake/liestat)
 install(TARGETS liestat EXPORT liestatTargets)
 install(EXPORT liestatTargets NAMESPACE liestat:: DESTINATION ${liestat_package_dir})
 configure_package_config_file(cmake/liestatConfig.cmake.in ${PROJECT_BINARY_DIR}/liestatConfig.cmake
-                              INSTALL_DESTINATION ${liestat_package_dir})
+                              INSTALL_DESTINATION ${liestat_package_dir} PATH_VARS CMAKE_INSTALL_INCLUDEDIR)
 # Before 1.0 a minor version may change the interface.
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/liestatConfigVersion.cmake COMPATIBILITY SameMinorVersion
                                  ARCH_INDEPENDENT)
 install(FILES ${PROJECT_BINARY_DIR}/liestatConfig.cmake ${PROJECT_BINARY_DIR}/liestatConfigVersion.cmake
+              cmake/LiestatPackages.cmake cmake/LiestatCompiled.cmake
         DESTINATION ${liestat_package_dir})
 
 # The prefix is written relative to the file's own directory, so that the tree may be moved.

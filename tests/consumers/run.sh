@@ -99,6 +99,13 @@ done
 quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved"
 quietly "$CMAKE" --build find_package
 built_and_ran ./find_package/consumer "find_package"
+built_and_ran ./find_package/compiled "find_package with components"
+if "$CMAKE" -S "$here/find_package" -B bogus -DCMAKE_PREFIX_PATH="$work/moved" -DWANTED=bogus >"$work/log" 2>&1 ||
+  ! grep -q 'There is no component bogus; there are means, fusion, trajectories' "$work/log"; then
+  cat "$work/log"
+  echo "consumers: failed: a component that there is not is not answered by the list of those that there are" >&2
+  exit 1
+fi
 
 if ! command -v pkg-config >/dev/null; then
   echo "consumers: pkg-config: SKIPPED, it is not installed"

@@ -1,0 +1,45 @@
+# The estimators as libraries, compiled once by whoever builds them, with the flags of that build: this project, a project
+# that adds its directory, or one that finds the installed package. A unit that links one reads declarations only.
+#
+#   means          Fréchet, Mahalanobis and certified means of the common features in double
+#   fusion         the estimators of fusion/, but for those of trajectories (Random123)
+#   trajectories   evaluation of trajectories and diagnosis of conventions (Boost.Math)
+
+set(LIESTAT_COMPILED_PARTS means fusion trajectories)
+
+set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
+set(LIESTAT_COMPILED_SOURCES_fusion
+    initialisation recording noise_calibration homography_models epipolar_models pose_models robust_two_view two_view
+    hand_eye motion)
+set(LIESTAT_COMPILED_SOURCES_trajectories trajectories convention_diagnosis)
+set(LIESTAT_COMPILED_NEEDS_fusion random123)
+set(LIESTAT_COMPILED_NEEDS_trajectories boost)
+
+# liestat_compiled(PART ROOT LIBRARY): the static library liestat_PART of ROOT/<room>/compiled, known as liestat::PART, too.
+# LIBRARY is the target of the headers. There is none if a package is missing that the part needs.
+function(liestat_compiled part root library)
+  set(target liestat_${part})
+  if(TARGET ${target})
+    return()
+  endif()
+  foreach(need IN LISTS LIESTAT_COMPILED_NEEDS_${part})
+    if(NOT TARGET liestat_${need})
+      return()
+    endif()
+  endforeach()
+  set(room fusion)
+  set(definition LIESTAT_COMPILED_FUSION)
+  if(part STREQUAL "means")
+    set(room stats)
+    set(definition LIESTAT_COMPILED_MEANS)
+  endif()
+  list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${room}/compiled/ OUTPUT_VARIABLE sources)
+  list(TRANSFORM sources APPEND .cpp)
+  list(TRANSFORM LIESTAT_COMPILED_NEEDS_${part} PREPEND liestat_ OUTPUT_VARIABLE packages)
+  add_library(${target} STATIC EXCLUDE_FROM_ALL ${sources})
+  add_library(liestat::${part} ALIAS ${target})
+  target_link_libraries(${target} PUBLIC ${library} ${packages})
+  target_compile_definitions(${target} PUBLIC ${definition})
+  # Shared libraries, such as modules of Python, link them as well.
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endfunction()
