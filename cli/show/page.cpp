@@ -27,7 +27,7 @@ constexpr std::string_view style_sheet = R"css(
   :root { --ink: #e4e7eb; --soft: #9aa4b0; --rule: #3a414a; --page: #16191d; --stripe: #1e2227; --link: #6db7f2; }
 }
 * { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 60rem; padding: 2.5rem 1.25rem 4rem; background: var(--page); color: var(--ink);
+body { margin: 0 auto; max-width: 75rem; padding: 2.5rem 1.25rem 4rem; background: var(--page); color: var(--ink);
   font: 16px/1.55 "Helvetica Neue", Helvetica, Arial, sans-serif; }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 1.5rem; padding-bottom: .6rem; border-bottom: 2px solid var(--rule); }
 h2 { font-size: 1.2rem; margin: 2.5rem 0 .8rem; }
@@ -43,7 +43,7 @@ td { border-bottom: 1px solid var(--rule); }
 tbody tr:nth-child(even) { background: var(--stripe); }
 .number { text-align: right; }
 figure { margin: 1.5rem 0 2rem; }
-.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem; overflow-x: auto; }
+.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem 0; overflow-x: auto; }
 .plot svg { display: block; width: 100%; height: auto; margin: 0 auto; }
 @media (prefers-color-scheme: dark) {
   .plot { background: #161616; }

@@ -1,3 +1,4 @@
+#include <cli/show/axes.hpp>
 #include <cli/show/plots.hpp>
 
 #include <fmt/format.h>
@@ -79,58 +80,168 @@ struct Extent {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 
-  void add(const std::vector<double>& values, const Axis& axis) {
-    for (const double value : values) {
-      if (!drawable(value, axis)) continue;
-      low = std::min(low, value);
-      high = std::max(high, value);
-    }
+  void add(double value, const Axis& axis) {
+    if (!drawable(value, axis)) return;
+    low = std::min(low, value);
+    high = std::max(high, value);
   }
+  void add(const std::vector<double>& values, const Axis& axis) {
+    for (const double value : values) add(value, axis);
+  }
+  bool empty() const { return !(low <= high); }
 };
 
-/// gnuplot extends a logarithmic axis to whole decades, which leaves most of it empty when the data span one or two,
-/// and labels nothing between. Here the range follows the data, and short axes are labelled 1, 2, 5, 10.
-std::string logarithmicAxis(std::string_view letter, const Axis& axis, Extent data) {
-  double low = data.low / 1.25;
-  double high = data.high * 1.25;
-  if (axis.low && drawable(*axis.low, axis)) low = *axis.low;
-  if (axis.high && drawable(*axis.high, axis)) high = *axis.high;
-  if (!(low < high) || !(low > 0) || !std::isfinite(high))
-    return fmt::format("set {}range [*:*]\nset {}tics auto\n", letter, letter);
-  std::string script = fmt::format("set {}range [{}:{}]\n", letter, low, high);
-  if (high / low > 1e3) return script + fmt::format("set {}tics auto\n", letter);
-  std::string tics;
-  // Fine steps only where coarse ones leave less than two marks.
-  for (const std::vector<double>& digits : {std::vector<double>{1, 2, 5}, {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}}) {
-    std::size_t marks = 0;
-    tics.clear();
-    for (int exponent = static_cast<int>(std::floor(std::log10(low)));
-         exponent <= static_cast<int>(std::ceil(std::log10(high))); ++exponent) {
-      for (const double digit : digits) {
-        const double tic = digit * std::pow(10.0, exponent);
-        if (tic < low || tic > high) continue;
-        tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", tic);
-        ++marks;
-      }
-    }
-    if (marks > 1) break;
+/// The smallest distance between different values; 0 if there is only one.
+double spacing(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  double least = 0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double distance = values[i] - values[i - 1];
+    if (distance > 0 && std::isfinite(distance) && (least == 0 || distance < least)) least = distance;
   }
-  return script +
-         (tics.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, tics));
+  return least;
 }
 
-std::string axisText(std::string_view letter, const Axis& axis, const Extent& data) {
-  std::string script = fmt::format("set {0}label {1}{2}\nset format {0} '{3}'\n", letter, quotedText(axis.label),
-                                   letter == "x" ? " offset 0,0.6" : "",
-                                   !axis.numbers      ? ""
-                                   : axis.logarithmic ? "%.6g"
-                                                      : "% .6g");
-  if (axis.logarithmic) return script + fmt::format("set logscale {}\n", letter) + logarithmicAxis(letter, axis, data);
-  const auto end = [](const std::optional<double>& value) {
-    return value && std::isfinite(*value) ? fmt::format("{}", *value) : std::string("*");
-  };
-  return script + fmt::format("unset logscale {0}\nset {0}tics auto\nset {0}range [{1}:{2}]\n", letter, end(axis.low),
-                              end(axis.high));
+bool hasMarkers(const Series& series) {
+  return series.style == Style::points || series.style == Style::stars || series.style == Style::linespoints ||
+         series.style == Style::errorbars || series.style == Style::label;
+}
+bool isImage(const Series& series) { return series.style == Style::image; }
+bool isBoxes(const Series& series) { return series.style == Style::boxes; }
+
+/// The data along one axis: what is drawn there, and whether it may touch the ends.
+Extent extentOf(const Panel& panel, bool horizontal) {
+  const Axis& axis = horizontal ? panel.x : panel.y;
+  Extent extent;
+  for (const Series& series : panel.series) {
+    const double half = isBoxes(series) || isImage(series) ? 0.5 * spacing(horizontal ? series.x : series.y) : 0;
+    for (std::size_t i = 0; i < series.x.size(); ++i) {
+      if (horizontal) {
+        const double reach = isBoxes(series) && i < series.width.size() ? 0.5 * series.width[i] : half;
+        extent.add(series.x[i] - reach, axis), extent.add(series.x[i] + reach, axis);
+        continue;
+      }
+      const double x = series.x[i];
+      if ((panel.x.low && x < std::min(*panel.x.low, panel.x.high.value_or(*panel.x.low))) ||
+          (panel.x.high && x > std::max(*panel.x.high, panel.x.low.value_or(*panel.x.high)))) {
+        continue;  // not seen
+      }
+      if (series.style != Style::filled_curve && i < series.y.size()) {
+        const double reach = isImage(series) ? half : 0;
+        extent.add(series.y[i] - reach, axis), extent.add(series.y[i] + reach, axis);
+      }
+      for (const auto* values : {&series.low, &series.high}) {
+        if (i < values->size()) extent.add((*values)[i], axis);
+      }
+      if (isBoxes(series)) extent.add(0, axis);
+    }
+  }
+  return extent;
+}
+
+/// The range of an axis: the ends that are asked for, else the data with a margin.
+struct Range {
+  double low = 0, high = 0;
+  bool given() const { return low != high; }
+  double width() const { return std::abs(high - low); }
+};
+
+Range rangeOf(const Axis& axis, const Extent& data, double low_margin, double high_margin) {
+  const auto usable = [&](const std::optional<double>& end) { return end && drawable(*end, axis); };
+  Range range{usable(axis.low) ? *axis.low : data.low, usable(axis.high) ? *axis.high : data.high};
+  if (usable(axis.low) && usable(axis.high)) return range;
+  if (!std::isfinite(range.low) || !std::isfinite(range.high)) return {};
+  if (axis.logarithmic) {
+    if (!usable(axis.low)) range.low /= 1.25;
+    if (!usable(axis.high)) range.high *= 1.25;
+    return range.low < range.high && std::isfinite(range.high) && range.low > 0 ? range : Range{};
+  }
+  if (!isRange(range.low, range.high)) {
+    // All are equal, but for rounding; a tenth of it shows that.
+    const double size = std::max(std::abs(range.low), std::abs(range.high));
+    const double margin = size > 1e-290 ? 0.1 * size : 1;
+    if (!usable(axis.low)) range.low -= margin;
+    if (!usable(axis.high)) range.high = std::max(range.high, range.low) + margin;
+  } else {
+    const double width = range.high - range.low;
+    // Values that are never negative have no margin below zero.
+    if (!usable(axis.low))
+      range.low = range.low >= 0 ? std::max(0.0, range.low - low_margin * width) : range.low - low_margin * width;
+    if (!usable(axis.high)) range.high += high_margin * width;
+  }
+  return isRange(range.low, range.high) ? range : Range{};
+}
+
+std::string tickText(std::string_view letter, const Ticks& ticks) {
+  std::string list;
+  for (const Tick& tick : ticks.marks) list += fmt::format("{}'{}' {}", list.empty() ? "" : ", ", tick.label, tick.at);
+  return list.empty() ? fmt::format("set {}tics auto\n", letter) : fmt::format("set {}tics ({})\n", letter, list);
+}
+
+/// The label of an axis; one whose marks have an offset says so.
+std::string labelText(std::string_view letter, const Axis& axis, const Ticks& ticks) {
+  std::string label = axis.label;
+  if (ticks.offset != 0) {
+    label += fmt::format(" {} {:.15g}", ticks.offset > 0 ? "−" : "+", std::abs(ticks.offset));
+  }
+  return fmt::format("set {}label {}{}\n", letter, quotedText(label), letter == "x" ? " offset 0,0.6" : "");
+}
+
+/// Range, marks and label of an axis. gnuplot's own marks overlap on short axes, repeat themselves where the values have
+/// many digits in common, and leave most of a logarithmic axis empty.
+std::string axisText(std::string_view letter, const Axis& axis, const Range& range, const Ticks& ticks) {
+  std::string script = labelText(letter, axis, ticks);
+  script += fmt::format("set format {} '{}'\n{} logscale {}\n", letter, axis.numbers ? "% .6g" : "",
+                        axis.logarithmic ? "set" : "unset", letter);
+  script += range.given() ? fmt::format("set {}range [{}:{}]\n", letter, range.low, range.high)
+                          : fmt::format("set {}range [*:*]\n", letter);
+  return script + (axis.numbers ? tickText(letter, ticks) : fmt::format("set {}tics auto\n", letter));
+}
+
+Ticks ticksOf(const Axis& axis, const Range& range, const AxisOnPaper& paper, double least_step = 0) {
+  if (!range.given()) return {};
+  const double low = std::min(range.low, range.high), high = std::max(range.low, range.high);
+  return axis.logarithmic ? logarithmicTicks(low, high, paper) : linearTicks(low, high, paper, least_step);
+}
+
+/// Width and height of the area inside a panel's axes, px, about.
+struct PanelSize {
+  double width = 0, height = 0;
+};
+
+std::string axesText(const Panel& panel, const PanelSize& size) {
+  bool markers = false, images = false, boxes = false;
+  for (const Series& series : panel.series) {
+    markers = markers || hasMarkers(series), images = images || isImage(series), boxes = boxes || isBoxes(series);
+  }
+  // Symbols on the frame would be cut in half, or hide in it.
+  const double y_margin = images ? 0 : 0.05;
+  const double x_margin = images ? 0 : panel.equal_aspect ? y_margin : markers ? 0.03 : 0;
+  const Extent x_data = extentOf(panel, true), y_data = extentOf(panel, false);
+  Range x = rangeOf(panel.x, x_data, x_margin, x_margin);
+  Range y = rangeOf(panel.y, y_data, boxes && !panel.y.logarithmic && y_data.low >= 0 ? 0 : y_margin, y_margin);
+  AxisOnPaper x_paper{.horizontal = true, .length = size.width}, y_paper{.horizontal = false, .length = size.height};
+  const bool equal = panel.equal_aspect && x.given() && y.given() && !panel.x.logarithmic && !panel.y.logarithmic;
+  if (equal) {
+    // A strip has no room for marks.
+    const auto widen = [](Range& range, const Axis& axis, double least) {
+      if (axis.low || axis.high || range.width() >= least) return;
+      const double middle = 0.5 * (range.low + range.high);
+      range = {middle - 0.5 * least, middle + 0.5 * least};
+    };
+    widen(x, panel.x, 0.5 * y.width());
+    widen(y, panel.y, 0.5 * x.width());
+    const double scale = std::min(size.width / x.width(), size.height / y.width());
+    x_paper.length = scale * x.width(), y_paper.length = scale * y.width();
+  }
+  Ticks x_ticks = ticksOf(panel.x, x, x_paper), y_ticks = ticksOf(panel.y, y, y_paper);
+  if (equal) {
+    // Equal steps show that a unit is as long on both axes.
+    const double step = std::max(x_ticks.step, y_ticks.step);
+    Ticks x_same = ticksOf(panel.x, x, x_paper, step), y_same = ticksOf(panel.y, y, y_paper, step);
+    if (x_same.marks.size() > 1 && y_same.marks.size() > 1) x_ticks = std::move(x_same), y_ticks = std::move(y_same);
+  }
+  return axisText("x", panel.x, x, x_ticks) + axisText("y", panel.y, y, y_ticks);
 }
 
 /// Clouds are drawn with small points, so that their density shows.
@@ -187,17 +298,12 @@ bool isColoured(const Plot& plot) {
   return std::any_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return isColoured(panel); });
 }
 
-std::string colourText(const Panel& panel) {
+std::string colourText(const Panel& panel, const PanelSize& size) {
   const Axis& axis = panel.colour;
   Extent data;
   for (const Series& series : panel.series) data.add(series.value, axis);
-  const std::string label = fmt::format("set cblabel {}\n", quotedText(axis.label));
-  if (axis.logarithmic) return label + "set logscale cb\n" + logarithmicAxis("cb", axis, data);
-  const auto end = [](const std::optional<double>& value) {
-    return value ? fmt::format("{}", *value) : std::string("*");
-  };
-  return label +
-         fmt::format("unset logscale cb\nset cbtics auto\nset cbrange [{}:{}]\n", end(axis.low), end(axis.high));
+  const Range range = rangeOf(axis, data, 0, 0);
+  return axisText("cb", axis, range, ticksOf(axis, range, {.horizontal = false, .length = size.height}));
 }
 
 /// Every k-th point of a scatter that nobody could tell apart anyway, and that no browser could show.
@@ -205,7 +311,8 @@ std::size_t stride(const Series& series) {
   return series.style == Style::points ? (series.x.size() + most_points_drawn - 1) / most_points_drawn : 1;
 }
 
-void appendPanel(std::string& script, const Plot& plot, std::size_t number, const std::string& csv) {
+void appendPanel(std::string& script, const Plot& plot, std::size_t number, const std::string& csv,
+                 const PanelSize& size) {
   const Panel& panel = plot.panels[number];
   // The index counts the blocks of the CSV: all series before, without the empty ones.
   std::size_t index = 0;
@@ -215,15 +322,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   }
   is_first_block = index == 0;
 
-  Extent x;
-  Extent y;
-  for (const Series& series : panel.series) {
-    x.add(series.x, panel.x);
-    for (const auto* values : {&series.y, &series.low, &series.high}) y.add(*values, panel.y);
-  }
-  script +=
-      fmt::format("\nset title {}\n", quotedText(panel.title)) + axisText("x", panel.x, x) + axisText("y", panel.y, y);
-  if (isColoured(panel)) script += colourText(panel);
+  script += fmt::format("\nset title {}\n", quotedText(panel.title)) + axesText(panel, size);
+  if (isColoured(panel)) script += colourText(panel, size);
   script += panel.equal_aspect ? "set size ratio -1\n" : "set size noratio\n";
   script += "unset arrow\nunset label\n";
   for (const ReferenceLine& line : panel.references) {
@@ -245,8 +345,8 @@ void appendPanel(std::string& script, const Plot& plot, std::size_t number, cons
   for (const Series& series : panel.series) {
     if (series.style != Style::label || series.x.empty() || series.y.empty()) continue;
     if (!drawable(series.x[0], panel.x) || !drawable(series.y[0], panel.y)) continue;
-    script += fmt::format("set label {} at first {}, first {} center front font ',10'\n", quotedText(series.name),
-                          series.x[0], series.y[0]);
+    script += fmt::format("set label {} at first {}, first {} center front\n", quotedText(series.name), series.x[0],
+                          series.y[0]);
   }
   script += named > 1 ? "set key\n" : "unset key\n";
 
@@ -338,10 +438,14 @@ std::string plotScript(const Plot& plot, const std::string& name) {
     // Light is small; lightness rises steadily, also to eyes that miss red or green.
     script +=
         "set palette defined (0 '#fde725', 1 '#7ad151', 2 '#22a884', 3 '#2a788e', 4 '#414487', 5 '#440154')\n"
-        "set cbtics format '%.3g' font ',10'\n";
+        "set cbtics format '%.6g'\n";
   }
   if (n > 1) script += fmt::format("set multiplot layout {},{}\n", rows, columns);
-  for (std::size_t i = 0; i < n; ++i) appendPanel(script, plot, i, name + ".csv");
+  // Without the labels, the title and the legend.
+  const double right = isColoured(plot) ? 90 : 0;
+  const PanelSize size{static_cast<double>(width) / static_cast<double>(n == 1 ? 1 : columns) - 105 - right,
+                       static_cast<double>(height) / static_cast<double>(n == 1 ? 1 : rows) - 120};
+  for (std::size_t i = 0; i < n; ++i) appendPanel(script, plot, i, name + ".csv", size);
   if (n > 1) script += "\nunset multiplot\n";
   return script;
 }

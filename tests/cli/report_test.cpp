@@ -1,5 +1,6 @@
 #include <cli/show/page.hpp>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include <cli/io/run_program.hpp>
+#include <cli/show/axes.hpp>
 #include <cli/show/plots.hpp>
 #include <cli/temporary_directory.hpp>
 
@@ -267,6 +269,84 @@ TEST(Report, OddButFiniteDataIsDrawn) {
                .panels = {Panel{.x = {.low = 10.0, .high = 20.0}, .y = {.low = 0.0, .high = 1.0}, .series = {point}}}});
   const std::string page = contentOf(report.write());
   EXPECT_EQ(count(page, "<svg"), 4U) << page.substr(page.find("class=\"notice\""), 300);
+}
+
+TEST(Report, MarksOfAlmostEqualValuesDiffer) {
+  Series ratio{.name = "ratio", .style = Style::linespoints};
+  for (int i = 0; i < 20; ++i) ratio.x.push_back(i), ratio.y.push_back(1 + 1e-8 * std::sin(i));
+  Panel panel{.y = {.label = "ratio"}, .series = {ratio}};
+  EXPECT_TRUE(contains(plotScript({.name = "a", .panels = {panel}}, "a"), "set ylabel 'ratio − 1'\n"));
+  // Rounding is not magnified.
+  for (double& y : panel.series[0].y) y = 1 + 1e-8 * (y - 1);
+  const std::string script = plotScript({.name = "a", .panels = {panel}}, "a");
+  EXPECT_TRUE(contains(script, "set ylabel 'ratio'\n"));
+  EXPECT_TRUE(contains(script, "set ytics ('0.9' 0.9, '0.95' 0.95, '1' 1, ")) << script;
+}
+
+TEST(Report, StripsOfEqualAspectHaveRoomForMarks) {
+  Series path{.name = "path"};
+  for (int i = 0; i < 50; ++i) path.x.push_back(0.01 * std::sin(i)), path.y.push_back(std::cos(i));
+  const std::string script = plotScript({.name = "a", .panels = {Panel{.series = {path}, .equal_aspect = true}}}, "a");
+  EXPECT_TRUE(contains(script, "set xtics ('-0.5' -0.5, '0' 0, '0.5' 0.5)\n")) << script;
+  EXPECT_TRUE(contains(script, "set ytics ('-1' -1, '-0.5' -0.5, '0' 0, '0.5' 0.5, '1' 1)\n")) << script;
+}
+
+/// Marks in their order whose labels differ, do not touch, and state their places to six digits of the range.
+void expectLegible(const Ticks& ticks, double low, double high, const AxisOnPaper& paper, bool logarithmic) {
+  const auto position = [&](double x) {
+    return paper.length * (logarithmic ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low));
+  };
+  ASSERT_FALSE(ticks.marks.empty() && paper.length >= 150);
+  EXPECT_LE(ticks.marks.size(), 12U);
+  for (std::size_t i = 0; i < ticks.marks.size(); ++i) {
+    const Tick& tick = ticks.marks[i];
+    EXPECT_GE(tick.at, low - 1e-6 * (high - low));
+    EXPECT_LE(tick.at, high + 1e-6 * (high - low));
+    const double stated = ticks.offset + std::stod(tick.label);
+    EXPECT_NEAR(stated, tick.at, logarithmic ? 1e-5 * tick.at : 1e-2 * ticks.step + 4e-16 * std::abs(tick.at));
+    if (i == 0) continue;
+    const Tick& last = ticks.marks[i - 1];
+    EXPECT_NE(tick.label, last.label);
+    const double letters = 0.5 * static_cast<double>(tick.label.size() + last.label.size());
+    EXPECT_GE(position(tick.at) - position(last.at), paper.horizontal ? 7 * letters : 15) << tick.label;
+  }
+}
+
+TEST(Axes, MarksAreLegibleAtAnyRange) {
+  for (const double centre : {0.0, 1.0, -1.0, 0.123456789, 1e-6, 4512345.25, 1403636579.763, -1e12, 1e100}) {
+    for (int decade = -11; decade <= 9; ++decade) {
+      for (const double digit : {1.0, 1.7, 3.3, 9.9}) {
+        const double width = digit * std::pow(10.0, decade) * (centre == 0 ? 1 : std::abs(centre));
+        const double low = centre - 0.37 * width, high = centre + 0.63 * width;
+        for (const bool horizontal : {true, false}) {
+          for (const double length : {60.0, 150.0, 350.0, 575.0}) {
+            SCOPED_TRACE(fmt::format("{} to {} on {} px, {}", low, high, length, horizontal));
+            const AxisOnPaper paper{horizontal, length};
+            expectLegible(linearTicks(low, high, paper), low, high, paper, false);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_TRUE(linearTicks(1, 1, {}).marks.empty());
+  EXPECT_TRUE(linearTicks(1, nan, {}).marks.empty());
+  EXPECT_TRUE(linearTicks(-1.7e308, 1.7e308, {}).marks.empty());
+}
+
+TEST(Axes, LogarithmicMarksAreLegibleAtAnyRange) {
+  for (int exponent = -300; exponent <= 200; exponent += 20) {
+    for (const double ratio : {1.5, 1.9, 3.0, 9.0, 30.0, 1e3, 1e5, 1e10, 1e20, 1e80}) {
+      const double low = 1.3 * std::pow(10.0, exponent), high = low * ratio;
+      for (const bool horizontal : {true, false}) {
+        for (const double length : {150.0, 350.0, 575.0}) {
+          SCOPED_TRACE(fmt::format("{} to {} on {} px, {}", low, high, length, horizontal));
+          const AxisOnPaper paper{horizontal, length};
+          expectLegible(logarithmicTicks(low, high, paper), low, high, paper, true);
+        }
+      }
+    }
+  }
+  EXPECT_TRUE(logarithmicTicks(0, 1, {}).marks.empty());
 }
 
 TEST(Report, OfAMillionPointsAPartIsDrawn) {
