@@ -31,6 +31,19 @@ UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
   return how;
 }
 
+/// Rivals and near ties in the charts of the report; a rigid motion's are those of its frame.
+template <class M, class Certified>
+void setRivalCharts(MeanAnalysis& analysis, const M& y, const Certified& result) {
+  using Chart = std::conditional_t<is_group<M>, Frame3d, M>;
+  std::vector<Chart> rivals;
+  for (const M& rival : result.uniqueness.rivals) rivals.emplace_back(rival);
+  for (const auto& tie : result.near_ties) rivals.emplace_back(tie.feature);
+  if (rivals.empty()) return;
+  ChartScatter charts = chartScatter(rivals, std::vector<double>(rivals.size(), 1.0), Chart(y));
+  analysis.rivals_principal = std::move(charts.principal);
+  analysis.rivals_centred = std::move(charts.centred);
+}
+
 /// Copies what every certified estimate says: its iteration, uniqueness, status and covariance, which comes from the
 /// residuals or from noise. Returns the mean.
 template <class M, class Iteration, class Certified>
@@ -46,6 +59,7 @@ M setEstimate(MeanAnalysis& analysis, const Iteration& iteration, const Certifie
   analysis.cells = result.uniqueness.cells;
   for (const M& rival : result.uniqueness.rivals) analysis.rivals.push_back(describe(rival));
   analysis.more_rivals = result.uniqueness.more_rivals;
+  setRivalCharts(analysis, iteration.mean, result);
   for (const auto& tie : result.near_ties) analysis.near_ties.push_back({describe(tie.feature), tie.z});
   analysis.cut_locus_mass = result.cut_locus.mass;
   analysis.hessian_change = result.hessian_change;

@@ -75,6 +75,7 @@ struct MeanAnalysis {
 
   std::optional<TimeBlocks> time_blocks = {};  ///< rows with times that can be split
   std::optional<ChartScatter> charts = {};
+  Eigen::MatrixXd rivals_principal, rivals_centred;  ///< rivals and near ties in the two charts, columns; or empty
   std::vector<std::string> notes = {};
 };
 

@@ -14,7 +14,8 @@ namespace liestat::cli {
 namespace {
 
 // The palette's colours by what they stand for.
-constexpr std::size_t mean_colour = 1, measurement_colour = 0, barycentre_colour = 2, frontier_colour = 6;
+constexpr std::size_t mean_colour = 1, measurement_colour = 0, barycentre_colour = 2, rival_colour = 3,
+                      frontier_colour = 6;
 constexpr double ellipsoid_chi2 = 6, dispersion_chi2 = 5;
 
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
@@ -31,8 +32,8 @@ struct Plane {
   }
 };
 
-Series scatter(const Eigen::MatrixXd& data, Plane plane) {
-  Series series{.name = "measurements", .style = Style::points, .colour = measurement_colour};
+Series scatter(std::string name, Style style, std::size_t colour, const Eigen::MatrixXd& data, Plane plane) {
+  Series series{.name = std::move(name), .style = style, .colour = colour};
   for (Eigen::Index i = 0; i < data.cols(); ++i) {
     series.x.push_back(data(plane.a, i));
     series.y.push_back(data(plane.b, i));
@@ -67,7 +68,8 @@ struct ChartPanel {
   Eigen::MatrixXd mean_covariance, dispersion;
   Eigen::VectorXd barycentre;
   Eigen::MatrixXd barycentre_covariance;
-  double frontier = 0;  ///< radius, 0 for none
+  double frontier = 0;     ///< radius, 0 for none
+  Eigen::MatrixXd rivals;  ///< columns; empty: the mean has none
 
   const std::string& label(int i) const { return labels[static_cast<std::size_t>(i)]; }
 };
@@ -91,6 +93,10 @@ Panel panelOf(const ChartPanel& chart, Plane plane) {
     const Eigen::Vector2d reach = (dispersion_chi2 * plane.of(chart.dispersion).diagonal()).cwiseSqrt();
     low = low.cwiseMin(plane.of(chart.mean) - reach);
     high = high.cwiseMax(plane.of(chart.mean) + reach);
+    for (Eigen::Index i = 0; i < chart.rivals.cols(); ++i) {
+      const Eigen::Vector2d rival = plane.of(Eigen::VectorXd(chart.rivals.col(i)));
+      low = low.cwiseMin(rival), high = high.cwiseMax(rival);
+    }
     const Eigen::Vector2d middle = 0.5 * (low + high);
     Eigen::Vector2d half = 0.525 * (high - low);
     panel.equal_aspect = half.maxCoeff() < 4 * half.minCoeff();
@@ -101,7 +107,7 @@ Panel panelOf(const ChartPanel& chart, Plane plane) {
       panel.y.low = middle.y() - half.y(), panel.y.high = middle.y() + half.y();
     }
   }
-  panel.series.push_back(scatter(chart.data, plane));
+  panel.series.push_back(scatter("measurements", Style::points, measurement_colour, chart.data, plane));
   if (chart.dispersion.size() > 0) {
     panel.series.push_back(coloured(
         ellipse("dispersion", plane.of(chart.mean), plane.of(chart.dispersion), dispersion_chi2), mean_colour, true));
@@ -119,6 +125,9 @@ Panel panelOf(const ChartPanel& chart, Plane plane) {
     panel.series.push_back(
         coloured(ellipse("", plane.of(chart.mean), plane.of(chart.mean_covariance), ellipsoid_chi2), mean_colour));
   }
+  if (chart.rivals.cols() > 0) {
+    panel.series.push_back(scatter("rivals of the mean", Style::stars, rival_colour, chart.rivals, plane));
+  }
   panel.series.push_back(cross("mean", plane.of(chart.mean), 0.035 * size, false, mean_colour));
   return panel;
 }
@@ -131,6 +140,12 @@ Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentBlock& part) {
 /// The largest distance of a rotation or direction from the origin, rad.
 double largestAngle(Feature feature) {
   return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
+}
+
+/// The rows of the rivals' coordinates, if there are rivals.
+Eigen::MatrixXd rivalsOf(const Eigen::MatrixXd& rivals, const TangentBlock& part) {
+  if (rivals.cols() == 0) return {};
+  return rivals.middleRows(part.begin, part.size);
 }
 
 /// True if a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
@@ -150,7 +165,10 @@ void plotAngles(Report& report, const Measurements& measurements, const MeanAnal
   const std::vector<std::string> labels =
       direction ? std::vector<std::string>{"first coordinate (rad)", "second coordinate (rad)"}
                 : std::vector<std::string>{"r_x (rad)", "r_y (rad)", "r_z (rad)"};
-  const double frontier = fillsItsSpace(centred, principal) ? largestAngle(measurements.feature) : 0;
+  const Eigen::MatrixXd rivals_principal = rivalsOf(analysis.rivals_principal, part);
+  const Eigen::MatrixXd rivals_centred = rivalsOf(analysis.rivals_centred, part);
+  const bool far_rival = rivals_centred.cols() > 0 && rivals_centred.colwise().norm().maxCoeff() > 0.8;
+  const double frontier = far_rival || fillsItsSpace(centred, principal) ? largestAngle(measurements.feature) : 0;
   ChartPanel left{.title = "Principal chart",
                   .labels = labels,
                   .data = principal,
@@ -159,7 +177,8 @@ void plotAngles(Report& report, const Measurements& measurements, const MeanAnal
                   .dispersion = blockOf(charts.dispersion, part),
                   .barycentre = charts.barycentre.segment(part.begin, part.size),
                   .barycentre_covariance = blockOf(charts.barycentre_covariance, part),
-                  .frontier = frontier};
+                  .frontier = frontier,
+                  .rivals = rivals_principal};
   ChartPanel right{.title = "Exponential chart about the mean",
                    .labels = labels,
                    .data = centred,
@@ -168,12 +187,16 @@ void plotAngles(Report& report, const Measurements& measurements, const MeanAnal
                    .dispersion = blockOf(analysis.dispersion, part),
                    .barycentre = charts.barycentre_centred.segment(part.begin, part.size),
                    .barycentre_covariance = blockOf(charts.barycentre_covariance_centred, part),
-                   .frontier = frontier};
+                   .frontier = frontier,
+                   .rivals = rivals_centred};
   const std::string what = direction ? "directions" : "rotation vectors";
   std::string caption = fmt::format(
       "The {}{}: left about the origin, right about the mean. Crosses: the mean, and the plain mean of the coordinates "
       "of the left chart, with their covariance ellipsoids at chi-square {:g}; dashed, the dispersion at {:g}.",
       what, direction ? "" : " seen along the third axis", ellipsoid_chi2, dispersion_chi2);
+  if (rivals_centred.cols() > 0) {
+    caption += " Stars: other features that the measurements do not exclude, so that the mean is one of several.";
+  }
   if (frontier > 0) caption += fmt::format(" The circle is where the charts end, at {:.4g} rad.", frontier);
   report.plot({.name = "mean", .caption = caption, .panels = {panelOf(left, {0, 1}), panelOf(right, {0, 1})}});
   if (!direction) {
@@ -194,7 +217,9 @@ void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBl
                          .mean_covariance = blockOf(charts.mean_covariance, part),
                          .dispersion = blockOf(charts.dispersion, part),
                          .barycentre = {},
-                         .barycentre_covariance = {}};
+                         .barycentre_covariance = {},
+                         .frontier = 0,
+                         .rivals = rivalsOf(analysis.rivals_principal, part)};
   report.plot({.name = std::string(name(part.part)) + "s",
                .caption = fmt::format("The {}s in the file's coordinates with their mean, its covariance ellipsoid at "
                                       "chi-square {:g} and, dashed, the dispersion at {:g}.",
