@@ -56,6 +56,9 @@ struct ValidationOptions {
   /// Called now and then with the number of trials done, from any thread but never twice at the same time (under MPI on
   /// rank 0 only).
   std::function<void(std::size_t done, std::size_t trials)> progress = {};
+  /// Asked before each task, from any thread. From the first true on no task begins, and the reports are those of the
+  /// trials done by then, the first ones of the run (perhaps none).
+  std::function<bool()> stop = {};
 };
 
 namespace detail {
@@ -118,11 +121,13 @@ std::vector<detail::ReportOfTrial<Trial>> validateAll(const E& executor, const V
                                                       const std::vector<ReferenceLaw>& laws, Trial&& trial) {
   using Outcome = detail::OutcomeOfTrial<Trial>;
   const std::size_t n_chunks = chunkCount(options.trials, options.chunk_size);
+  bool cut = false;
   detail::ValidationSamples samples = executor.reduce(
       n_chunks,
       [&](std::size_t chunk) {
         detail::ValidationSamples part;
         part.list.resize(laws.size());
+        if (options.stop && options.stop()) return part;
         const ChunkRange range = chunkRange(options.trials, n_chunks, chunk);
         for (std::size_t i = range.begin; i < range.end; ++i) {
           const std::uint64_t number = options.first_trial + i;
@@ -143,6 +148,9 @@ std::vector<detail::ReportOfTrial<Trial>> validateAll(const E& executor, const V
         return part;
       },
       [&](detail::ValidationSamples& done, const detail::ValidationSamples& next) {
+        // A task that began a little before the stop may come after one that did not.
+        cut = cut || (!laws.empty() && (done.list[0].trials == 0 || next.list[0].trials == 0));
+        if (cut) return;
         for (std::size_t m = 0; m < laws.size(); ++m) done.list[m].append(next.list[m]);
         if (options.progress && !laws.empty()) options.progress(done.list[0].trials, options.trials);
       });

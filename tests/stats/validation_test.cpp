@@ -432,6 +432,32 @@ TEST(Validation, severalEstimatorsSeeTheSameScenes) {
   EXPECT_EQ(validateAll(serial, {.trials = 2000}, {law}, list)[0].mu2, reports[0].mu2);
 }
 
+TEST(Validation, aRunThatIsStoppedHasItsFirstTrials) {
+  const auto law = ReferenceLaw::chiSquared(3);
+  const auto trial = [](CounterRng& rng, std::uint64_t) {
+    return TrialOutcome{.mu2 = rng.normalVector<3>().squaredNorm()};
+  };
+  for (const std::size_t least : {0U, 1U, 100U, 1900U, 2000U}) {
+    std::atomic<std::size_t> begun{0};
+    ValidationOptions options{.trials = 2000, .seed = 3, .stop = [&] { return begun >= least; }};
+    const auto counted = [&](CounterRng& rng, std::uint64_t number) {
+      ++begun;
+      return trial(rng, number);
+    };
+    for (const bool threads : {false, true}) {
+      begun = 0;
+      const auto part =
+          threads ? validate(TbbExecutor{2}, options, law, counted) : validate(serial, options, law, counted);
+      ASSERT_LE(part.trials, 2000U);
+      if (!threads) {
+        // Tasks of 16 that have begun are finished.
+        EXPECT_EQ(part.trials, (least + 15) / 16 * 16);
+      }
+      EXPECT_EQ(part.mu2, validate(serial, {.trials = part.trials, .seed = 3}, law, trial).mu2);
+    }
+  }
+}
+
 TEST(Validation, statisticsHaveMeanAndStandardDeviation) {
   const auto trial = [](CounterRng& rng, std::uint64_t number) {
     MixedOutcome outcome;
