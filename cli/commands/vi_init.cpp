@@ -149,11 +149,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     writeJson(options.json, object);
   }
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
-  const bool any = std::any_of(result.windows.begin(), result.windows.end(), [](const ViWindow& w) { return w.ok(); });
-  // Stretches without a second window have nothing to contradict.
-  const bool fused = result.fusions.empty() || std::any_of(result.fusions.begin(), result.fusions.end(),
-                                                           [](const ViFusion& f) { return f.ok(); });
-  return any && fused ? exit_fine : exit_not_trusted;
+  return result.trusted() ? exit_fine : exit_not_trusted;
 }
 
 }  // namespace

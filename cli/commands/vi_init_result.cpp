@@ -89,6 +89,18 @@ void compare(ViFusion& stretch, const GroundTruth& truth) {
 
 }  // namespace
 
+std::size_t ViInitResult::okWindows() const {
+  return static_cast<std::size_t>(
+      std::count_if(windows.begin(), windows.end(), [](const ViWindow& w) { return w.ok(); }));
+}
+
+bool ViInitResult::trusted() const {
+  // Stretches without a second window have nothing to contradict.
+  const bool fused =
+      fusions.empty() || std::any_of(fusions.begin(), fusions.end(), [](const ViFusion& f) { return f.ok(); });
+  return okWindows() > 0 && fused;
+}
+
 ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& recording, std::optional<double> gravity) {
   ViInitResult result;
   result.gravity = gravity;

@@ -490,8 +490,8 @@ void setHandEye(JsonObject& object, const HandEyeOutput& output) {
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {
   const HandEyeResult& r = output.result;
   Report report(directory, "Hand-eye calibration");
+  report.verdict(r.ok(), answer(output));
   report.code(command_line);
-  report.paragraph(answer(output));
   report.section("Result");
   const std::vector<Unknown> unknowns = unknownsOf(r);
   for (const Unknown& unknown : unknowns) {

@@ -703,11 +703,12 @@ void writeMotionReport(const std::string& directory, const std::string& command_
                      fmt::format("one of {} to {}", result.frames.front().frame, result.frames.back().frame));
   }
   Report report(directory, "Motion from point tracks");
-  report.code(command_line);
   const std::size_t usable = result.usable(), n = result.frames.size();
-  report.paragraph(
+  report.verdict(
+      usable > 0,
       usable > 0 ? fmt::format("{} of {} frames have a direction of motion that may be used.", usable, n)
                  : fmt::format("Not to be trusted: none of {} frames has a direction of motion that may be used.", n));
+  report.code(command_line);
   report.section("Estimates");
   report.plot(estimatesPlot(result));
   if (result.with_truth) report.plot(errorsPlot(result));

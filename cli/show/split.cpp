@@ -56,6 +56,24 @@ std::vector<std::vector<std::string>> halfRows(const FileSplit& split) {
 
 }  // namespace
 
+std::string adviceOf(const SplitOutcome& outcome) {
+  const SplitSeries& blocks = outcome.by_blocks;
+  if (outcome.passed()) {
+    return fmt::format(
+        "PASSED: halves made of blocks of time agree as well as their covariances say (factor {}, 95 %: {} to {}). "
+        "Nothing speaks against independent errors.",
+        number(blocks.factor(), 3), number(blocks.factorLow(), 3), number(blocks.factorHigh(), 3));
+  }
+  return fmt::format(
+      "FAILED: halves made of blocks of time differ by {} times the expected squared distance{}. The errors of "
+      "successive measurements are not independent: multiply the covariance of the mean by {} (95 %: {} to {}), its "
+      "standard deviations by {}; by more if the errors hold on for longer than a block.",
+      number(blocks.factor(), 3),
+      outcome.random.pValue() < split_false_alarm ? "" : ", which halves at random do not show",
+      number(blocks.factor(), 3), number(blocks.factorLow(), 3), number(blocks.factorHigh(), 3),
+      number(std::sqrt(blocks.factor()), 3));
+}
+
 std::string splitVerdict(const SplitOutcome& outcome) {
   const SplitSeries& blocks = outcome.by_blocks;
   std::string text = seriesInWords("halves at random", outcome.random);
@@ -65,26 +83,12 @@ std::string splitVerdict(const SplitOutcome& outcome) {
   text += "\n";
   const bool random_fails = outcome.random.pValue() < split_false_alarm;
   if (random_fails) {
-    text += fmt::format(
-        "Already at random the halves differ by {} times the expected squared distance: the measurements "
-        "scatter more than their covariances say.\n",
-        number(outcome.random.factor(), 3));
+    text +=
+        wrapped(fmt::format("Already at random the halves differ by {} times the expected squared distance: the "
+                            "measurements scatter more than their covariances say.",
+                            number(outcome.random.factor(), 3)));
   }
-  if (outcome.passed()) {
-    text += fmt::format(
-        "PASS: halves made of blocks of time agree as well as their covariances say (factor {}, 95 %: {} to {}). "
-        "Nothing speaks against independent errors.\n",
-        number(blocks.factor(), 3), number(blocks.factorLow(), 3), number(blocks.factorHigh(), 3));
-  } else {
-    text += fmt::format(
-        "FAIL: halves made of blocks of time differ by {} times the expected squared distance{}. The errors of "
-        "successive measurements are not independent: multiply the covariance of the mean by {} (95 %: {} to {}), its "
-        "standard deviations by {}; by more if the errors hold on for longer than a block.\n",
-        number(blocks.factor(), 3), random_fails ? "" : ", which halves at random do not show",
-        number(blocks.factor(), 3), number(blocks.factorLow(), 3), number(blocks.factorHigh(), 3),
-        number(std::sqrt(blocks.factor()), 3));
-  }
-  return text;
+  return text + wrapped(adviceOf(outcome));
 }
 
 JsonObject splitEnvelope(const SplitOutcome& outcome, const std::string& command_line) {
@@ -149,6 +153,7 @@ JsonObject toJson(const FileSplit& split, const std::string& command_line) {
 
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split) {
   Report report(directory, "Split of the measurements in " + split.source);
+  report.verdict(split.passed(), adviceOf(split));
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));

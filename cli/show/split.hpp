@@ -72,6 +72,8 @@ void writeSplitReport(const std::string& directory, const std::string& command_l
 
 /// Parts of these views: the last lines, the fields in JSON and the plots that both have.
 std::string splitVerdict(const SplitOutcome& outcome);
+/// Its last paragraph in one line: PASSED or FAILED, and what follows from that.
+std::string adviceOf(const SplitOutcome& outcome);
 JsonObject splitEnvelope(const SplitOutcome& outcome, const std::string& command_line);
 void plotSplits(Report& report, const SplitOutcome& outcome);
 

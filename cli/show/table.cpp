@@ -148,4 +148,23 @@ std::string Table::str(std::size_t width) const {
   return text;
 }
 
+std::string wrapped(std::string_view text, std::size_t width, std::size_t indent) {
+  std::string result, line;
+  bool empty = true;
+  while (true) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    const std::string_view word = text.substr(0, end);
+    if (!empty && displayWidth(line) + 1 + displayWidth(word) > width) {
+      result += line + "\n";
+      line = std::string(indent, ' ');
+      empty = true;
+    }
+    if (!empty) line += ' ';
+    line += word;
+    empty = false;
+    if (end == text.size()) return result + line + "\n";
+    text.remove_prefix(end + 1);
+  }
+}
+
 }  // namespace liestat::cli

@@ -28,6 +28,10 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+/// A text in lines of at most so many columns, those after the first indented, each ended by a newline. Longer words keep
+/// a line of their own.
+std::string wrapped(std::string_view text, std::size_t width = 80, std::size_t indent = 0);
+
 /// Columns that a text takes on the terminal, for UTF-8 without wide or combining characters.
 std::size_t displayWidth(std::string_view text);
 

@@ -316,9 +316,9 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
                               const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   Report report(directory, "The motion between two images");
+  report.verdict(e.ok(), answer(output));
   report.code(command_line);
   report.paragraph(summary(output));
-  report.paragraph(answer(output));
   if (!e.physical.empty()) report.section("Parameters");
   for (std::size_t i = 0; i < e.physical.size(); ++i) {
     report.table(parameter_headers, parameterRows(e.physical[i]), headingOf(e, i));

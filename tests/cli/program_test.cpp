@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -302,6 +303,16 @@ TEST_F(Program, TwoAntipodalRotationsAreAmbiguous) {
   EXPECT_NEAR(std::abs(one), pi / 2, 1e-6);
   EXPECT_NEAR(one + other, 0, 1e-6);
   EXPECT_TRUE(r.json["covariance"].is_null());
+  // The report says so first and draws the rival in both charts.
+  EXPECT_EQ(mean(fmt::format("rx,ry,rz\n0,0,0\n{},0,0\n", pi), {"--report", "report"}).status, 3);
+  const std::string page = contentOf(directory_ / "report/index.html");
+  EXPECT_NE(page.find("</h1>\n<p class=\"verdict bad\">✗ Not to be trusted (ambiguous)"), std::string::npos);
+  const std::string csv = contentOf(directory_ / "report/mean.csv");
+  for (const char* chart : {"Principal chart", "Exponential chart about the mean"}) {
+    EXPECT_NE(csv.find(fmt::format("\n{},rivals of the mean,", chart)), std::string::npos) << chart;
+  }
+  EXPECT_EQ(mean("rx,ry,rz\n0,0,0\n0.1,0,0\n0,0.2,0\n0,0,0.1\n0.1,0,0.1\n", {"--report", "report"}).status, 0);
+  EXPECT_EQ(contentOf(directory_ / "report/mean.csv").find("rivals"), std::string::npos);
 }
 
 TEST_F(Program, IdenticalMeasurements) {
@@ -474,7 +485,12 @@ TEST_F(Program, SplitsOfIndependentMeasurementsPass) {
   EXPECT_NEAR(r.json["random"]["index"].get<double>(), 3, 4 * r.json["random"]["index_se"].get<double>());
   EXPECT_NEAR(r.json["by_blocks"]["index"].get<double>(), 3, 4 * r.json["by_blocks"]["index_se"].get<double>());
   EXPECT_EQ(r.json["merged"]["n"], 2000);
-  EXPECT_TRUE(std::filesystem::exists(directory_ / "report/index.html"));
+  const std::string page = contentOf(directory_ / "report/index.html");
+  EXPECT_NE(page.find("</h1>\n<p class=\"verdict good\">✓ PASSED: halves"), std::string::npos);
+  // The advice, too, fits a terminal.
+  const std::size_t begin = page.find("\nPASSED: ") + 1, end = page.find("</pre>", begin);
+  std::istringstream lines(page.substr(begin, end - begin));
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
 }
 
 TEST_F(Program, SplitsByBlocksRevealSharedErrors) {
