@@ -1,6 +1,7 @@
 #include <experiments/estimator_validation.hpp>
 
 #include <experiments/conic_scene.hpp>
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/rotated_pairs.hpp>
 #include <experiments/semidefinite_distance.hpp>
@@ -286,23 +287,27 @@ std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validatio
     all += plan.cost;
     for (const RowPlan& row : plan.rows) judged += row.promise ? 1 : 0;
   }
+  trials_of_run.planned += plans.size() * validation.trials;
   std::vector<EstimatorRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options{.trials = validation.trials,
-                                    .seed = validation.seed,
-                                    .chunk_size = 16,
-                                    .progress = [&](std::size_t done, std::size_t of) {
-                                      const double share = static_cast<double>(done) / static_cast<double>(of);
-                                      if (progress) {
-                                        progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost) / all),
-                                                 1000000);
-                                      }
-                                    }};
+    const ValidationOptions options{
+        .trials = validation.trials,
+        .seed = validation.seed,
+        .chunk_size = 16,
+        .progress =
+            [&](std::size_t done, std::size_t of) {
+              const double share = static_cast<double>(done) / static_cast<double>(of);
+              if (progress) {
+                progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost) / all), 1000000);
+              }
+            },
+        .stop = runStopped};
     std::vector<ReferenceLaw> laws;
     for (const RowPlan& row : plan.rows) laws.push_back(ReferenceLaw::chiSquared(row.dof));
     auto reports =
         validateAll(ProgramExecutor{validation.threads}, options, laws,
                     [&](CounterRng& rng, std::uint64_t number) { return trial(plan, validation, number, rng); });
+    if (!countTrials(reports[0].trials)) break;
     for (std::size_t i = 0; i < plan.rows.size(); ++i) {
       EstimatorRow& row = rows.emplace_back();
       row.experiment = plan.experiment;

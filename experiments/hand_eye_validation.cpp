@@ -1,5 +1,6 @@
 #include <experiments/hand_eye_validation.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <fusion/hand_eye.hpp>
 #include <stats/propagation.hpp>
@@ -230,18 +231,21 @@ std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation,
     all += plan.cost();
     judged += (plan.calibration ? 1 : 0) + (plan.fit ? 1 : 0);
   }
+  trials_of_run.planned += plans.size() * validation.trials;
   std::vector<HandEyeRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options{.trials = validation.trials,
-                                    .seed = validation.seed,
-                                    .chunk_size = 4,
-                                    .progress = [&](std::size_t done, std::size_t of) {
-                                      const double share = static_cast<double>(done) / static_cast<double>(of);
-                                      if (progress) {
-                                        progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost()) / all),
-                                                 1000000);
-                                      }
-                                    }};
+    const ValidationOptions options{
+        .trials = validation.trials,
+        .seed = validation.seed,
+        .chunk_size = 4,
+        .progress =
+            [&](std::size_t done, std::size_t of) {
+              const double share = static_cast<double>(done) / static_cast<double>(of);
+              if (progress) {
+                progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost()) / all), 1000000);
+              }
+            },
+        .stop = runStopped};
     const bool independent = plan.row.formulation == Formulation::motions;
     const int n = static_cast<int>(plan.row.pairs), open = openDimension(plan.row.motion);
     auto reports = validateAll(
@@ -251,9 +255,10 @@ std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation,
           return runTrial(plan, validation.noise_factor, validation.seed, number);
         });
     before += plan.cost();
+    if (!countTrials(reports[0].trials)) break;
 
     HandEyeRow row = plan.row;
-    row.trials = validation.trials;
+    row.trials = reports[0].trials;
     const auto root = [&](double Outcome::*of, double& value, double& error) {
       const auto statistic = reports[0].of(of);
       value = std::sqrt(statistic.mean);

@@ -1,3 +1,4 @@
+#include <experiments/interruption.hpp>
 #include <experiments/means_report.hpp>
 #include <experiments/means_trial.hpp>
 #include <experiments/parallel.hpp>
@@ -53,7 +54,8 @@ std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
     laws.push_back(methods[m].known_noise ? ReferenceLaw::chiSquared(k)
                                           : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
   }
-  const ValidationOptions options{.trials = experiment.trials, .seed = experiment.seed, .progress = progress};
+  const ValidationOptions options{
+      .trials = experiment.trials, .seed = experiment.seed, .progress = progress, .stop = runStopped};
   return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
     return wantedOutcomes(experiment, detail::meansTrial(experiment, rng));
   });

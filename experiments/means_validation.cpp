@@ -1,3 +1,4 @@
+#include <experiments/interruption.hpp>
 #include <experiments/means_validation.hpp>
 
 #include <algorithm>
@@ -78,7 +79,10 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
   // Work goes with the number of measurements.
   const auto work = [](const MeansExperiment& e) { return static_cast<std::uint64_t>(e.n); };
   std::uint64_t all = 0, before = 0;
-  for (const Run& r : runs) all += work(r.experiment) * r.experiment.trials;
+  for (const Run& r : runs) {
+    all += work(r.experiment) * r.experiment.trials;
+    trials_of_run.planned += r.experiment.trials;
+  }
 
   std::vector<MeansRow> rows;
   for (const Run& r : runs) {
@@ -86,6 +90,7 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
       if (progress) progress(before + work(r.experiment) * done, all);
     });
     before += work(r.experiment) * r.experiment.trials;
+    if (!countTrials(reports.empty() ? r.experiment.trials : reports[0].trials)) break;
     std::size_t next = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (!r.experiment.wanted[m]) continue;

@@ -1,6 +1,7 @@
 #include <experiments/means_verdicts.hpp>
 
 #include <experiments/means_experiment.hpp>
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/scattered_features.hpp>
 #include <stats/certified_mean.hpp>
@@ -87,6 +88,7 @@ VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, int threads, const
       chunks,
       [&](std::size_t chunk) {
         VerdictRow part;
+        if (runStopped()) return part;
         const std::size_t end = std::min(cell.trials, (chunk + 1) * trials_a_chunk);
         for (std::size_t t = chunk * trials_a_chunk; t < end; ++t) {
           CounterRng rng(seed, t, 7);
@@ -221,9 +223,10 @@ std::vector<VerdictCell> verdictCells(bool full) {
 std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std::uint64_t seed, int threads,
                                       const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
   std::uint64_t all = 0, finished = 0;
-  for (const VerdictCell& cell : cells) all += cell.n * cell.trials;
+  for (const VerdictCell& cell : cells) all += cell.n * cell.trials, trials_of_run.planned += cell.trials;
   std::vector<VerdictRow> rows;
   for (const VerdictCell& cell : cells) {
+    if (runStopped()) break;
     const auto done = [&] {
       finished += cell.n * cell.trials;
       if (progress) progress(finished, all);
@@ -235,6 +238,12 @@ std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std
         return {};
       }
     }));
+    // Its rates are of all of its trials.
+    if (runStopped()) {
+      rows.pop_back();
+      break;
+    }
+    countTrials(cell.trials);
     rows.back().promise = promiseOf(cell);
     giveVerdict(rows.back());
   }

@@ -1,5 +1,6 @@
 #include <experiments/motion_validation.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/summary.hpp>
 #include <fusion/motion/motion_filter.hpp>
@@ -724,17 +725,24 @@ std::vector<MotionRow> validateMotion(const MotionValidation& validation,
     all += costOf(row);
     tests += row.promise ? testsOf(*row.promise) : 0;
   }
+  trials_of_run.planned += rows.size() * validation.trials;
   for (MotionRow& row : rows) {
     const std::vector<Trial> trials = ProgramExecutor{validation.threads}.reduce(
-        validation.trials, [&](std::size_t i) { return std::vector<Trial>{runTrial(row, validation, i)}; },
+        validation.trials,
+        [&](std::size_t i) {
+          return runStopped() ? std::vector<Trial>{} : std::vector<Trial>{runTrial(row, validation, i)};
+        },
         [](std::vector<Trial>& left, const std::vector<Trial>& right) {
           left.insert(left.end(), right.begin(), right.end());
         });
+    if (!countTrials(trials.size())) break;
     row = summarised(row, trials);
     judge(row, trials, run_false_alarm / static_cast<double>(std::max<std::size_t>(tests, 1)));
     done += costOf(row);
     if (progress) progress(done, all);
   }
+  // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
+  std::erase_if(rows, [](const MotionRow& row) { return row.trials == 0; });
   return rows;
 }
 

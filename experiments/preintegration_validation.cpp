@@ -1,5 +1,6 @@
 #include <experiments/preintegration_validation.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/recording.hpp>
 #include <fusion/imu/preintegration.hpp>
@@ -97,16 +98,18 @@ std::vector<PreintegrationRow> validatePreintegration(
   // The amount of work is that of the readings.
   double all = 0, before = 0;
   for (const PreintegrationRow& row : rows) all += row.window;
+  trials_of_run.planned += rows.size() * validation.trials;
   for (PreintegrationRow& row : rows) {
-    const ValidationOptions options{.trials = validation.trials,
-                                    .seed = validation.seed,
-                                    .chunk_size = 16,
-                                    .progress = [&](std::size_t done, std::size_t of) {
-                                      const double share = static_cast<double>(done) / static_cast<double>(of);
-                                      if (progress)
-                                        progress(static_cast<std::uint64_t>(1e6 * (before + share * row.window) / all),
-                                                 1000000);
-                                    }};
+    const ValidationOptions options{
+        .trials = validation.trials,
+        .seed = validation.seed,
+        .chunk_size = 16,
+        .progress =
+            [&](std::size_t done, std::size_t of) {
+              const double share = static_cast<double>(done) / static_cast<double>(of);
+              if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * row.window) / all), 1000000);
+            },
+        .stop = runStopped};
     std::vector<ValidationReport> reports =
         validateAll(ProgramExecutor{validation.threads}, options,
                     std::vector<ReferenceLaw>{ReferenceLaw::chiSquared(degreesOfFreedom(row.check))},
@@ -115,11 +118,14 @@ std::vector<PreintegrationRow> validatePreintegration(
                       outcome.mu2 = trial(row.check, row.window, row.noise, rng);
                       return std::vector<TrialOutcome>{outcome};
                     });
+    if (!countTrials(reports.front().trials)) break;
     row.setReport(std::move(reports.front()));
     row.judge(run_false_alarm / judged);
     row.forgetDistances();
     before += row.window;
   }
+  // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
+  std::erase_if(rows, [](const PreintegrationRow& row) { return row.report.trials == 0; });
   return rows;
 }
 

@@ -1,5 +1,6 @@
 #include <experiments/propagation_experiment.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/propagation_trial.hpp>
 
@@ -17,8 +18,11 @@ std::vector<ValidationReport> run(const PropagationExperiment& experiment, int t
     laws.push_back(ReferenceLaw::chiSquared(degreesOfFreedom(experiment.feature, method.operation)));
   }
   // A trial takes microseconds.
-  const ValidationOptions options{
-      .trials = experiment.trials, .seed = experiment.seed, .chunk_size = 256, .progress = progress};
+  const ValidationOptions options{.trials = experiment.trials,
+                                  .seed = experiment.seed,
+                                  .chunk_size = 256,
+                                  .progress = progress,
+                                  .stop = runStopped};
   return validateAll(ProgramExecutor{threads}, options, laws,
                      [&](CounterRng& rng, std::uint64_t) { return detail::propagationTrial(experiment, rng); });
 }

@@ -1,3 +1,4 @@
+#include <experiments/interruption.hpp>
 #include <experiments/propagation_validation.hpp>
 
 #include <algorithm>
@@ -83,6 +84,7 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
   }
 
   const std::uint64_t all = validation.trials * spreads.size() * validation.features.size();
+  trials_of_run.planned += all;
   std::uint64_t before = 0;
   std::vector<PropagationRow> rows;
   for (const Propagated feature : validation.features) {
@@ -98,6 +100,7 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
         if (progress) progress(before + done, all);
       });
       before += validation.trials;
+      if (!countTrials(reports.empty() ? validation.trials : reports[0].trials)) break;
       for (std::size_t m = 0; m < methods.size(); ++m) {
         PropagationRow& row = rows[first + m * spreads.size() + s];
         row.experiment = experiment;
@@ -109,6 +112,8 @@ std::vector<PropagationRow> validatePropagation(const PropagationValidation& val
       }
     }
   }
+  // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
+  std::erase_if(rows, [](const PropagationRow& row) { return row.report.trials == 0; });
   return rows;
 }
 

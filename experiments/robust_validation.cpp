@@ -1,6 +1,7 @@
 #include <experiments/robust_validation.hpp>
 
 #include <experiments/conic_scene.hpp>
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
@@ -325,18 +326,21 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
       judged += static_cast<double>(validation.scores.size()) * (promiseOf(cases.back()) ? 2 : 0);
     }
   }
+  trials_of_run.planned += cases.size() * validation.trials;
   RobustValidationResult result;
   for (const Case& one : cases) {
-    const ValidationOptions options{.trials = validation.trials,
-                                    .seed = validation.seed,
-                                    .chunk_size = 4,
-                                    .progress = [&](std::size_t done, std::size_t of) {
-                                      const double share = static_cast<double>(done) / static_cast<double>(of);
-                                      if (progress) {
-                                        progress(static_cast<std::uint64_t>(1e6 * (before + share * costOf(one)) / all),
-                                                 1000000);
-                                      }
-                                    }};
+    const ValidationOptions options{
+        .trials = validation.trials,
+        .seed = validation.seed,
+        .chunk_size = 4,
+        .progress =
+            [&](std::size_t done, std::size_t of) {
+              const double share = static_cast<double>(done) / static_cast<double>(of);
+              if (progress) {
+                progress(static_cast<std::uint64_t>(1e6 * (before + share * costOf(one)) / all), 1000000);
+              }
+            },
+        .stop = runStopped};
     const bool conic = one.structure == RobustStructure::conic;
     const int k = conic ? ConicModel::free_parameters : PlaneModel::free_parameters;
     const int equations = conic ? ConicModel::equations : PlaneModel::equations;
@@ -351,11 +355,14 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
                                  }
                                  return outcomes;
                                });
+    const std::size_t n_trials = reports.empty() ? validation.trials : reports[0].trials;
+    if (!countTrials(n_trials)) break;
+    trials.resize(n_trials);
     for (std::size_t i = 0; i < validation.scores.size(); ++i) {
       RobustRow& row = result.rows.emplace_back();
       row.structure = one.structure, row.score = validation.scores[i], row.outliers = one.outliers;
-      row.confidence = validation.confidence, row.needed = one.needed, row.trials = validation.trials;
-      const auto n = static_cast<double>(validation.trials);
+      row.confidence = validation.confidence, row.needed = one.needed, row.trials = n_trials;
+      const auto n = static_cast<double>(n_trials);
       for (const Trial& trial : trials) {
         if (trial.searches.size() <= i) continue;  // ended in an exception
         const Search& search = trial.searches[i];

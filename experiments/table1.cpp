@@ -1,5 +1,6 @@
 #include <experiments/table1.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -83,13 +84,13 @@ void fill(Table1Row& row, const Case& c, std::size_t scenes, std::uint64_t seed,
   row.images = c.scene.images;
   row.features = c.scene.features;
   row.bias = c.bias;
-  row.scenes = scenes;
   using List = std::vector<Recognised>;
   const std::size_t n_chunks = chunkCount(scenes, 8);
   const List all = ProgramExecutor{threads}.reduce(
       n_chunks,
       [&](std::size_t chunk) {
         List part;
+        if (runStopped()) return part;
         const ChunkRange range = chunkRange(scenes, n_chunks, chunk);
         for (std::size_t i = range.begin; i < range.end; ++i) {
           CounterRng rng(seed, i);
@@ -98,6 +99,7 @@ void fill(Table1Row& row, const Case& c, std::size_t scenes, std::uint64_t seed,
         return part;
       },
       [](List& done, const List& next) { done.insert(done.end(), next.begin(), next.end()); });
+  row.scenes = all.size();
   for (const Recognised& r : all) {
     row.null_right += r.null_right;
     row.wrong += r.wrong;
@@ -242,7 +244,10 @@ std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, i
   std::vector<Table1Row> rows;
   const auto& entries = table1Entries();
   std::size_t all = 0;
-  for (const Table1Entry& entry : entries) all += entry.exact.size() + 9 * entry.noisy.size();
+  for (const Table1Entry& entry : entries) {
+    all += entry.exact.size() + 9 * entry.noisy.size();
+    trials_of_run.planned += (entry.exact.size() + entry.noisy.size()) * scenes;
+  }
   std::size_t done = 0;
   const double false_alarm =
       run_false_alarm / static_cast<double>(closedFormCases().size() + noisyClosedFormCases().size());
@@ -264,6 +269,7 @@ std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, i
       row.expected = {c->status};
       if (c->or_status != c->status) row.expected.push_back(c->or_status);
       fill(row, *c, scenes, seed, threads);
+      if (!countTrials(row.scenes)) return rows;
       judge(row, table1_near_another_case);
       rows.push_back(std::move(row));
       done += 1;
@@ -279,6 +285,7 @@ std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, i
       row.noisy = true;
       row.expected = c->expected;
       fill(row, *c, scenes, seed, threads);
+      if (!countTrials(row.scenes)) return rows;
       judge(row, 1 - c->share);
       rows.push_back(std::move(row));
       done += 9;

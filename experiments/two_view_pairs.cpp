@@ -1,5 +1,6 @@
 #include <experiments/two_view_pairs.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/models.hpp>
@@ -393,7 +394,10 @@ TwoViewPairsResult validateTwoViewPairs(const std::vector<TwoViewPair>& pairs, c
   TwoViewPairsResult result;
   std::uint64_t all = 0, done = 0;
   for (const TwoViewPair& pair : pairs) all += pair.matches.size();
+  trials_of_run.planned += pairs.size() * validation.runs;
   for (const TwoViewPair& pair : pairs) {
+    // All runs of a pair or none: a pair takes seconds.
+    if (runStopped()) break;
     const Normalised normalised(pair, validation);
     if (pair.family == PairFamily::adelaide) {
       result.structures.push_back(summarise(
@@ -405,6 +409,7 @@ TwoViewPairsResult validateTwoViewPairs(const std::vector<TwoViewPair>& pairs, c
       result.choices.push_back(
           summarise(normalised, repeat(validation, [&](std::uint64_t seed) { return runChoice(normalised, seed); })));
     }
+    countTrials(validation.runs);
     done += pair.matches.size();
     if (progress) progress(done, all);
   }

@@ -1,5 +1,6 @@
 #include <experiments/two_view_validation.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/two_view_lattice.hpp>
 #include <fusion/two_view/models.hpp>
@@ -83,6 +84,7 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
                                         const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
   TwoViewValidationResult result;
   const std::uint64_t all = validation.trials * validation.motions.size();
+  trials_of_run.planned += all;
   std::uint64_t before = 0;
   for (const TwoViewMotion motion : validation.motions) {
     const TwoViewSceneOptions options{
@@ -92,9 +94,11 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
     const ValidationOptions how{.trials = validation.trials,
                                 .seed = validation.seed,
                                 .chunk_size = 4,
-                                .progress = [&](std::size_t done, std::size_t) {
-                                  if (progress) progress(before + done, all);
-                                }};
+                                .progress =
+                                    [&](std::size_t done, std::size_t) {
+                                      if (progress) progress(before + done, all);
+                                    },
+                                .stop = runStopped};
     auto reports = validateAll(ProgramExecutor{validation.threads}, how, {ReferenceLaw::chiSquared(std::max(k, 1))},
                                [&](CounterRng&, std::uint64_t number) {
                                  // Each trial has a place of its own.
@@ -106,9 +110,11 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
                                  return std::vector<TrialOutcome>{outcome};
                                });
     before += validation.trials;
+    if (!countTrials(reports[0].trials)) return result;
+    chosen.resize(reports[0].trials);
     TwoViewChoice choice;
     choice.truth = motion;
-    choice.trials = validation.trials;
+    choice.trials = chosen.size();
     for (const std::size_t c : chosen) ++choice.chosen[c];
     choice.passed = reaches(static_cast<double>(choice.right()), static_cast<double>(choice.trials), promised_row);
     result.choices.push_back(choice);
@@ -125,6 +131,7 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
     row.forgetDistances();
     result.rows.push_back(std::move(row));
   }
+  if (trials_of_run.incomplete()) return result;
   const auto asked = [&](TwoViewMotion motion) {
     return std::find(validation.motions.begin(), validation.motions.end(), motion) != validation.motions.end();
   };

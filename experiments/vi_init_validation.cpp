@@ -1,5 +1,6 @@
 #include <experiments/vi_init_validation.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/vi_init_evaluation.hpp>
 #include <stats/executor.hpp>
@@ -110,6 +111,7 @@ std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& w
   return ProgramExecutor{validation.threads}.reduce(
       trials,
       [&](std::size_t i) {
+        if (runStopped()) return Outcomes{};
         CounterRng rng(validation.seed, i);
         return Outcomes{trial(window, validation.noise, rng)};
       },
@@ -285,6 +287,7 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
   double all = 0, before = 0;
   for (const Experiment& e : list) {
     all += e.work(validation);
+    trials_of_run.planned += e.trials(validation);
     for (const Experiment::Row& of : e.rows) {
       ViInitRow row;
       row.check = e.check;
@@ -303,6 +306,11 @@ std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
       const double share = static_cast<double>(done) / static_cast<double>(e.trials(validation));
       if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work(validation)) / all), 1000000);
     });
+    // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
+    if (!countTrials(values.empty() ? e.trials(validation) : values[0].value.size())) {
+      rows.erase(row, rows.end());
+      break;
+    }
     for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);
     before += e.work(validation);
   }

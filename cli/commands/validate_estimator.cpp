@@ -22,8 +22,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   EstimatorValidation validation = options.validation;
   validation.experiments = chosen(all_estimator_experiments, options.experiments);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 40000 : 2000;
-  const std::vector<EstimatorRow> rows = withProgressBar(
-      "validate estimator", [&](const auto& progress) { return validateEstimator(validation, progress); });
+  const std::vector<EstimatorRow> rows =
+      runTrials("validate estimator", [&](const auto& progress) { return validateEstimator(validation, progress); });
   return publish(
       options.output, invocation, validation.seed, run_false_alarm, rows, formatEstimatorTables,
       [](const EstimatorRow& row) { return toJson(row); }, writeEstimatorReport);

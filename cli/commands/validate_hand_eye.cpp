@@ -24,7 +24,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
   validation.many_pairs = options.full;
   const std::vector<HandEyeRow> rows =
-      withProgressBar("validate hand-eye", [&](const auto& progress) { return validateHandEye(validation, progress); });
+      runTrials("validate hand-eye", [&](const auto& progress) { return validateHandEye(validation, progress); });
   FurtherRows counted;
   counted.tally = countedTally(rows);
   return publish(

@@ -53,8 +53,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.all_printed = options.full;
 
   const std::vector<MeansRow> rows =
-      withProgressBar("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
-  const std::vector<VerdictRow> verdicts = withProgressBar("verdicts", [&](const auto& progress) {
+      runTrials("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
+  const std::vector<VerdictRow> verdicts = runTrials("verdicts", [&](const auto& progress) {
     return judgeVerdicts(chosenCells(options, validation.features), options.seed, options.threads, progress);
   });
   FurtherRows further{"verdicts", {}, tally(verdicts)};

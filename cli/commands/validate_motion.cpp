@@ -23,7 +23,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.methods = chosen(all_motion_methods, options.methods);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 300;
   const std::vector<MotionRow> rows =
-      withProgressBar("validate motion", [&](const auto& progress) { return validateMotion(validation, progress); });
+      runTrials("validate motion", [&](const auto& progress) { return validateMotion(validation, progress); });
   return publish(
       options.output, invocation, validation.seed, run_false_alarm, rows,
       [](const auto& list) { return formatMotionTables(list); }, [](const MotionRow& row) { return toJson(row); },

@@ -20,7 +20,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.checks = chosen(all_preintegration_checks, options.checks);
   if (!options.windows.empty()) validation.windows = options.windows;
   if (!options.noises.empty()) validation.noises = options.noises;
-  const std::vector<PreintegrationRow> rows = withProgressBar(
+  const std::vector<PreintegrationRow> rows = runTrials(
       "validate preintegration", [&](const auto& progress) { return validatePreintegration(validation, progress); });
   return publish(options.output, invocation, validation.seed, run_false_alarm, rows, formatPreintegrationTable, toJson,
                  writePreintegrationReport);

@@ -21,7 +21,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.operations = chosen(all_operations, options.operations);
   if (!options.spreads.empty()) validation.spreads = options.spreads;
 
-  const std::vector<PropagationRow> rows = withProgressBar(
+  const std::vector<PropagationRow> rows = runTrials(
       "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
   return publish(options.output, invocation, validation.seed, run_false_alarm, rows, formatPropagationTables, toJson,
                  writePropagationReport);

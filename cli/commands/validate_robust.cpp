@@ -26,7 +26,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (!options.outliers.empty()) validation.outliers = options.outliers;
   validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
   const RobustValidationResult result =
-      withProgressBar("validate robust", [&](const auto& progress) { return validateRobust(validation, progress); });
+      runTrials("validate robust", [&](const auto& progress) { return validateRobust(validation, progress); });
   // The share of structures that were found is judged beside the distances.
   FurtherRows thresholds{"thresholds", {}, result.tally()};
   for (const ThresholdRow& row : result.thresholds) thresholds.rows.push_back(toJson(row));

@@ -34,18 +34,19 @@ int runPairs(const Options& options, const Invocation& invocation) {
   validation.runs = options.trials != 0 ? options.trials : validation.runs;
   validation.seed = options.validation.seed, validation.threads = options.validation.threads;
   validation.contradicted = options.all_matches;
-  const TwoViewPairsResult result = withProgressBar(
+  const TwoViewPairsResult result = runTrials(
       "validate two-view", [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
+  if (endedBeforeTrials()) return exit_interrupted;
   if (options.output.json != "-") printLines(formatTwoViewPairs(result));
   if (!options.output.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line, validation.seed);
-    object.set("passed", result.tally().failed == 0);
+    setVerdict(object, result.tally().failed == 0);
     writeJson(options.output.json, toJson(result, std::move(object)));
   }
   if (!options.output.report.empty()) {
     writeTwoViewPairsReport(options.output.report, invocation.command_line, result);
   }
-  return result.tally().failed == 0 ? exit_fine : exit_validation_failed;
+  return exitCode(result.tally().failed == 0);
 }
 
 /// Nothing is promised of the rules, so nothing is judged.
@@ -75,7 +76,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.full || !options.motions.empty()) validation.motions = chosen(all_two_view_motions, options.motions);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 500 : 50;
   const TwoViewValidationResult result =
-      withProgressBar("validate two-view", [&](const auto& progress) { return validateTwoView(validation, progress); });
+      runTrials("validate two-view", [&](const auto& progress) { return validateTwoView(validation, progress); });
   FurtherRows choices{"choices", {}, result.tally()};
   for (const TwoViewChoice& choice : result.choices) choices.rows.push_back(toJson(choice));
   return publish(

@@ -27,7 +27,7 @@ struct Options {
 
 int runTable1(const Options& options, const Invocation& invocation) {
   const std::size_t scenes = options.trials != 0 ? options.trials : options.full ? 1000 : 100;
-  const std::vector<Table1Row> rows = withProgressBar("validate vi-init --table1", [&](const auto& progress) {
+  const std::vector<Table1Row> rows = runTrials("validate vi-init --table1", [&](const auto& progress) {
     return recogniseTable1(scenes, options.seed, options.threads, progress);
   });
   return publish(
@@ -67,7 +67,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.seed = options.seed;
   validation.threads = options.threads;
   const std::vector<ViInitRow> rows =
-      withProgressBar("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
+      runTrials("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
   if (rows.empty()) throw InputError("--window", 0, "none of these checks has windows of this length");
   return publish(
       options.output, invocation, options.seed, run_false_alarm, rows, formatViInitTables,

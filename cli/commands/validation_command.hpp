@@ -7,6 +7,8 @@
 #include <cli/commands/commands.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/progress.hpp>
+#include <cli/show/validation.hpp>
+#include <experiments/interruption.hpp>
 #include <experiments/judged_report.hpp>
 
 #include <algorithm>
@@ -49,6 +51,19 @@ auto withProgressBar(const std::string& label, const Run& run) {
   return run(progress);
 }
 
+/// The same for the trials of a validation, which an interrupt stops: run() returns what was computed.
+template <class Run>
+auto runTrials(const std::string& label, const Run& run) {
+  const StopOnInterrupt watch;
+  return withProgressBar(label, run);
+}
+
+/// The exit code of a validation.
+inline int exitCode(bool passed) {
+  if (experiments::trials_of_run.incomplete()) return exit_interrupted;
+  return passed ? exit_fine : exit_validation_failed;
+}
+
 /// The places where the rows go besides the terminal; empty: none.
 struct ValidationOutput {
   std::string json, report;
@@ -79,6 +94,7 @@ template <class Row, class Format, class ToJson, class WriteReport>
 int publish(const ValidationOutput& output, const Invocation& invocation, std::uint64_t seed, double false_alarm,
             const std::vector<Row>& rows, const Format& format, const ToJson& toJson, const WriteReport& writeReport,
             const FurtherRows& further = {}) {
+  if (endedBeforeTrials()) return exit_interrupted;
   const bool passed = (experiments::tally(rows) + further.tally).passed();
   // Whoever asks for JSON on standard output wants nothing else there.
   if (output.json != "-") printLines(format(rows));
@@ -86,12 +102,13 @@ int publish(const ValidationOutput& output, const Invocation& invocation, std::u
     JsonObject object = jsonEnvelope(invocation.command_line, seed);
     std::vector<JsonObject> list;
     for (const Row& row : rows) list.push_back(toJson(row));
-    object.set("false_alarm", false_alarm).set("passed", passed).set("rows", list);
+    object.set("false_alarm", false_alarm);
+    setVerdict(object, passed).set("rows", list);
     if (!further.key.empty()) object.set(further.key, further.rows);
     writeJson(output.json, object);
   }
   if (!output.report.empty()) writeReport(output.report, invocation.command_line, rows);
-  return passed ? exit_fine : exit_validation_failed;
+  return exitCode(passed);
 }
 
 }  // namespace liestat::cli

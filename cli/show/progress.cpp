@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <cli/show/table.hpp>
+#include <experiments/interruption.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -40,25 +41,35 @@ extern "C" void endLineOnInterrupt(int signal) {
   ::raise(signal);
 }
 
-/// Where nobody else, such as nohup, has said what an interrupt does.
-void watchInterrupts(std::FILE* terminal) {
-  struct sigaction present {};
-  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != SIG_DFL) return;
-  interrupted_terminal.store(::fileno(terminal));
-  struct sigaction action {};
-  action.sa_handler = endLineOnInterrupt;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigemptyset(&action.sa_mask);
-  ::sigaction(SIGINT, &action, nullptr);
+/// The end of the bar's line, and a line of its own. Resets itself, so that the next interrupt ends the program.
+extern "C" void stopOnInterrupt(int /*signal*/) {
+  experiments::trials_of_run.stop.store(true);
+  constexpr std::string_view note =
+      "\nliestat: interrupted; what was computed is shown and written. Another interrupt ends the program at once.\n";
+  const std::size_t skip = ::isatty(STDERR_FILENO) == 1 ? 0 : 1;
+  if (::write(STDERR_FILENO, note.data() + skip, note.size() - skip) < 0) return;
 }
-void leaveInterrupts() {
+
+/// Handles the next interrupt, where nobody else, such as nohup, has said what an interrupt does.
+bool handleNextInterrupt(void (*handler)(int)) {
   struct sigaction present {};
-  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != endLineOnInterrupt) return;
+  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != SIG_DFL) return false;
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  return ::sigaction(SIGINT, &action, nullptr) == 0;
+}
+void leaveInterrupts(void (*handler)(int)) {
+  struct sigaction present {};
+  if (::sigaction(SIGINT, nullptr, &present) != 0 || present.sa_handler != handler) return;
   ::signal(SIGINT, SIG_DFL);
-  interrupted_terminal.store(-1);
 }
 
 }  // namespace
+
+StopOnInterrupt::StopOnInterrupt() { handleNextInterrupt(stopOnInterrupt); }
+StopOnInterrupt::~StopOnInterrupt() { leaveInterrupts(stopOnInterrupt); }
 
 std::string progressLine(std::string_view label, std::uint64_t done, std::uint64_t total, double elapsed_s,
                          std::size_t width) {
@@ -94,12 +105,12 @@ void Progress::advance(std::uint64_t n) {
 void Progress::draw() {
   // Who comes while another thread draws has better things to do than to wait for it.
   const std::unique_lock lock(drawing_, std::try_to_lock);
-  if (!lock.owns_lock() || !visible_) return;
+  if (!lock.owns_lock() || !visible_ || experiments::runStopped()) return;
   const Clock::duration elapsed = Clock::now() - start_;
   next_draw_.store((elapsed + redraw_period).count(), std::memory_order_relaxed);
   const double seconds = std::chrono::duration<double>(elapsed).count();
   const std::string line = progressLine(label_, done(), total_, seconds, widthOf(stream_));
-  if (!drawn_) watchInterrupts(stream_);
+  if (!drawn_ && handleNextInterrupt(endLineOnInterrupt)) interrupted_terminal.store(::fileno(stream_));
   std::fputs(("\r" + line + "\x1b[K").c_str(), stream_);
   std::fflush(stream_);
   drawn_ = true;
@@ -108,9 +119,10 @@ void Progress::draw() {
 void Progress::finish() {
   const std::lock_guard lock(drawing_);
   if (drawn_) {
-    std::fputs("\r\x1b[K", stream_);
+    // The line of a bar that was interrupted has ended.
+    if (!experiments::runStopped()) std::fputs("\r\x1b[K", stream_);
     std::fflush(stream_);
-    leaveInterrupts();
+    leaveInterrupts(endLineOnInterrupt);
   }
   drawn_ = false;
   visible_ = false;

@@ -12,7 +12,7 @@ namespace liestat::cli {
 
 /// A progress bar with the time left on standard error. It is drawn only when that is a terminal, a few times a second
 /// and no wider than it, and removed when the work is done, so that it leaves nothing in logs and pipes. An interrupt
-/// (SIGINT, Ctrl-C) ends its line before it ends the program.
+/// (SIGINT, Ctrl-C) ends its line before it ends the program, or before StopOnInterrupt stops the trials.
 class Progress {
  public:
   /// `total` is the amount of work in the units of advance().
@@ -43,6 +43,17 @@ class Progress {
   std::atomic<Clock::rep> next_draw_{0};
   std::mutex drawing_;
   bool drawn_ = false;
+};
+
+/// While it lives, the first interrupt (SIGINT, Ctrl-C) stops the trials of the experiments (experiments/interruption.hpp)
+/// in place of the program, and says so on standard error; the second one ends the program. Interrupts that are ignored,
+/// as under nohup, stay so.
+class StopOnInterrupt {
+ public:
+  StopOnInterrupt();
+  ~StopOnInterrupt();
+  StopOnInterrupt(const StopOnInterrupt&) = delete;
+  StopOnInterrupt& operator=(const StopOnInterrupt&) = delete;
 };
 
 /// One line of a progress bar, no longer than `width`: without the bar, then with less of the label, where that is

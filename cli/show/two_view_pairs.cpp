@@ -3,6 +3,7 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/validation.hpp>
+#include <experiments/interruption.hpp>
 
 #include <fmt/format.h>
 
@@ -110,6 +111,9 @@ std::string formatTwoViewPairs(const TwoViewPairsResult& result) {
   }
   if (!result.checks.empty()) text += "\n" + checks.str();
   const Tally count = result.tally();
+  if (trials_of_run.incomplete()) {
+    return text + "\n" + verdictLines(count, "of promises");
+  }
   return text + fmt::format("\n{} of {} promises are kept\n{}\n", count.judged - count.failed, count.judged,
                             count.judged == 0 ? "nothing was promised"
                             : count.passed()  ? "PASSED"
@@ -174,6 +178,7 @@ JsonObject toJson(const TwoViewPairsResult& result, JsonObject envelope) {
 void writeTwoViewPairsReport(const std::string& directory, const std::string& command_line,
                              const TwoViewPairsResult& result) {
   Report report(directory, "Two-view motion: what the hierarchy makes of real pairs");
+  if (result.tally().judged > 0) showVerdict(report, formatTwoViewPairs(result));
   report.code(command_line);
   const auto add = [&](const char* title, const std::vector<std::string>& headers, const Rows& rows,
                        const char* notes) {

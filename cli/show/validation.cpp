@@ -1,8 +1,10 @@
 #include <cli/show/validation.hpp>
+#include <experiments/interruption.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <vector>
 
 namespace liestat::cli {
@@ -20,7 +22,27 @@ std::string verdictCell(const std::optional<bool>& passed) {
   return *passed ? "pass" : "FAIL";
 }
 
+JsonObject& setVerdict(JsonObject& o, bool passed) {
+  const TrialsOfRun& run = trials_of_run;
+  if (!run.incomplete()) return o.set("passed", passed);
+  return o.set("passed", false)
+      .set("interrupted", true)
+      .set("trials_done", run.done.load())
+      .set("trials_planned", run.planned.load());
+}
+
+bool endedBeforeTrials() {
+  if (!trials_of_run.incomplete() || trials_of_run.done > 0) return false;
+  std::fputs("liestat: interrupted before the first trial ended: there is nothing to write\n", stderr);
+  return true;
+}
+
 std::string verdictLines(const Tally& tally, const std::string& where) {
+  if (trials_of_run.incomplete()) {
+    return fmt::format("partial: {} of {} trials were done, and {} of {} rows {} pass so far\nINTERRUPTED\n",
+                       trials_of_run.done.load(), trials_of_run.planned.load(), tally.judged - tally.failed,
+                       tally.judged, where);
+  }
   if (tally.judged == 0) return fmt::format("no row is {}: nothing was judged\nFAILED\n", where);
   return fmt::format("{} of {} rows {} pass; false alarms: one in {:g} runs\n{}\n", tally.judged - tally.failed,
                      tally.judged, where, 1 / run_false_alarm, tally.passed() ? "PASSED" : "FAILED");

@@ -15,11 +15,17 @@ namespace liestat::cli {
 /// The fields of a row in JSON that are the same in every validation.
 void setStatistics(JsonObject& o, const ValidationReport& report);
 
+/// The verdict in JSON: `passed`, which is false after an interrupt, and then `interrupted` with the numbers of trials.
+JsonObject& setVerdict(JsonObject& o, bool passed);
+
+/// Says so where an interrupt came before any trial ended, so that there is nothing to show.
+bool endedBeforeTrials();
+
 /// A cell of a table: pass, FAIL, or empty where nothing was judged.
 std::string verdictCell(const std::optional<bool>& passed);
 
 /// The last lines on the terminal: how many of the judged rows pass, where they are (`in the promised domain`), and
-/// PASSED or FAILED, which a run without a judged row has too.
+/// PASSED or FAILED, which a run without a judged row has too, or INTERRUPTED after how many trials.
 std::string verdictLines(const experiments::Tally& tally, const std::string& where);
 
 /// The same verdict on the page: `text` is what the terminal shows, which ends with verdictLines().

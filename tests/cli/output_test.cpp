@@ -25,6 +25,7 @@
 #include <cli/show/progress.hpp>
 #include <cli/show/table.hpp>
 #include <cli/temporary_directory.hpp>
+#include <experiments/interruption.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -144,6 +145,14 @@ TEST(Table, NeverWiderThanAskedFor) {
   EXPECT_NE(text.find("…"), std::string::npos);
 }
 
+TEST(Table, WrappedText) {
+  EXPECT_EQ(wrapped("aa bb cc", 5), "aa bb\ncc\n");
+  EXPECT_EQ(wrapped("aa bb cc", 6, 2), "aa bb\n  cc\n");
+  EXPECT_EQ(wrapped("σσ ττ υ", 5), "σσ ττ\nυ\n") << "columns, not bytes";
+  EXPECT_EQ(wrapped("a-word-too-long b", 5), "a-word-too-long\nb\n");
+  EXPECT_EQ(wrapped(""), "\n");
+}
+
 TEST(Table, Numbers) {
   EXPECT_EQ(number(3.14159), "3.142");
   EXPECT_EQ(number(nan), "n/a");
@@ -224,6 +233,27 @@ TEST(Progress, AnInterruptEndsTheLineAndTheProgram) {
   // In the background of a shell, or under nohup, interrupts are ignored and stay so.
   EXPECT_EXIT(interrupted(SIG_IGN), ::testing::ExitedWithCode(7), "");
   EXPECT_EQ(terminal.shown().find('\n'), std::string::npos);
+}
+
+TEST(Progress, AnInterruptOfTrialsStopsThemAndTheNextOneTheProgram) {
+  Terminal terminal(60);
+  ASSERT_NE(terminal.stream(), nullptr);
+  const auto interrupted = [&](int times) {
+    std::signal(SIGINT, SIG_DFL);
+    {
+      const StopOnInterrupt watch;
+      Progress progress("work", 100, terminal.stream());
+      progress.advance(25);
+      for (int i = 0; i < times; ++i) std::raise(SIGINT);
+      progress.advance(25);
+    }
+    const bool handed_back = std::signal(SIGINT, SIG_DFL) == SIG_DFL;
+    std::_Exit(experiments::runStopped() && handed_back ? 7 : 8);
+  };
+  EXPECT_EXIT(interrupted(1), ::testing::ExitedWithCode(7), "^liestat: interrupted; what was computed is shown");
+  EXPECT_EQ(terminal.shown().find('\n'), std::string::npos) << "the line of the bar stays: the note ends it";
+  EXPECT_EXIT(interrupted(2), ::testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(interrupted(0), ::testing::ExitedWithCode(8), "^$");
 }
 
 TEST(Progress, CountsFromAllThreadsAndLeavesFilesAlone) {

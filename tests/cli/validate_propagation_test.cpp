@@ -1,7 +1,9 @@
 // `liestat validate propagation`: its tables, and what the program writes.
 
 #include <cli/show/propagation_validation.hpp>
+#include <experiments/interruption.hpp>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -51,6 +53,60 @@ TEST(ValidatePropagation, aFailureIsShown) {
 TEST(ValidatePropagation, tablesAreNoWiderThanATerminal) {
   std::istringstream lines(formatPropagationTables(validatePropagation(small(50))));
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+}
+
+TEST(ValidatePropagation, aRunThatIsStoppedIsPartial) {
+  TrialsOfRun& run = trials_of_run;
+  run.stop = false, run.planned = 0, run.done = 0;
+  PropagationValidation validation = small(20000);
+  validation.features = {Propagated::rotation};
+  validation.spreads = {0.01, 0.1};
+  const std::vector<PropagationRow> rows = validatePropagation(validation, [&](std::uint64_t done, std::uint64_t all) {
+    if (4 * done > 3 * all) run.stop = true;
+  });
+  ASSERT_TRUE(run.incomplete());
+  EXPECT_EQ(run.planned, 40000U);
+  EXPECT_GT(run.done, 30000U);
+  const std::string text = formatPropagationTables(rows);
+  const std::string last = fmt::format(
+      "partial: {} of 40000 trials were done, and 14 of 14 rows in the promised domain "
+      "pass so far\nINTERRUPTED\n",
+      run.done.load());
+  EXPECT_TRUE(text.ends_with(last)) << text;
+  for (const PropagationRow& row : rows) {
+    EXPECT_EQ(row.report.trials, row.experiment.spread == 0.01 ? 20000 : run.done - 20000);
+  }
+  // The trials that were done are the first ones of the whole run.
+  run.stop = false;
+  validation.trials = rows.back().report.trials;
+  const std::vector<PropagationRow> shorter = validatePropagation(validation);
+  EXPECT_EQ(shorter.back().report.index, rows.back().report.index);
+
+  // Without a trial there is no row.
+  run.stop = true, run.planned = 0, run.done = 0;
+  EXPECT_TRUE(validatePropagation(validation).empty());
+  EXPECT_EQ(run.done, 0U);
+  run.stop = false;
+}
+
+TEST(ValidatePropagationProgram, anInterruptLeavesWhatWasComputed) {
+  const TemporaryDirectory directory;
+  // timeout sends it; hours are left. A run that takes longer to begin says that it computed nothing.
+  const ProgramResult result = runProgram(
+      {"timeout", "--preserve-status", "-s", "INT", "1.5", LIESTAT_PROGRAM, "validate", "propagation", "--trials",
+       "100000000", "--feature", "rotation", "--operation", "inverse", "--json", "out.json", "--report", "report"},
+      directory.path().string());
+  EXPECT_EQ(result.status, 130) << result.errors;
+  EXPECT_NE(result.errors.find("liestat: interrupted"), std::string::npos) << result.errors;
+  if (result.errors.find("nothing to write") != std::string::npos) return;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  EXPECT_EQ(json["passed"], false);
+  EXPECT_EQ(json["interrupted"], true);
+  EXPECT_EQ(json["trials_planned"], 700000000U);
+  EXPECT_EQ(json["trials_done"], json["rows"][0]["trials"]);
+  EXPECT_EQ(json["rows"].size(), 1U);
+  EXPECT_NE(contentOf(directory / "report/index.html").find("<p class=\"verdict bad\">✗ INTERRUPTED: partial: "),
+            std::string::npos);
 }
 
 TEST(ValidatePropagationProgram, writesRowsAndAReport) {
