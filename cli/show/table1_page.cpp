@@ -81,7 +81,7 @@ std::string formatTable1(const std::vector<Table1Row>& rows) {
     text += fmt::format("FAILED {}, {}: {} of {} scenes came out otherwise than the corrected table says\n", row.name,
                         row.noisy ? "with noise" : "exact", row.wrong, row.scenes);
   }
-  return text + "\n" + verdictLines(tally(rows), "recognised as the corrected table says");
+  return text + "\n" + verdictLines(tally(rows), "of the corrected table");
 }
 
 JsonObject toJson(const Table1Row& row) {
