@@ -39,6 +39,29 @@ struct AveragedHessian {
 
 namespace detail {
 
+/// The lower factor of the region's covariance in the coordinates over which a Hessian is averaged; NaN if it has none.
+template <Metric M>
+auto regionFactor(const SquareOf<M>& covariance) {
+  constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
+  using Matrix = Eigen::Matrix<double, K, K>;
+  Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
+  region.diagonal().array() += least_region * least_region;
+  return Matrix(lowerFactor<K>(region));
+}
+
+/// Whether the sums of a mean prove that findAveragedHessian averages nothing.
+template <Metric M>
+bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance) {
+  if constexpr (Factored<M>) {
+    return false;
+  } else if constexpr (compactFactor<M>() != CompactFactor::none) {
+    const auto L = regionFactor<M>(covariance);
+    return L.allFinite() && leastDistanceToCutLocus(mean) > 1.5 * longestReach<averaged_dimension<M>>(L);
+  } else {
+    return true;
+  }
+}
+
 template <Metric M, class R, class W>
 AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const MeanResult<M>& mean,
                                        const SquareOf<M>& covariance) {
@@ -63,9 +86,7 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
     using Vector = Eigen::Matrix<double, K, 1>;
     using Matrix = Eigen::Matrix<double, K, K>;
     result.averaged = true;
-    Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
-    region.diagonal().array() += least_region * least_region;
-    const Matrix L = lowerFactor<K>(region);
+    const Matrix L = regionFactor<M>(covariance);
     if (!L.allFinite()) {
       result.change = std::numeric_limits<double>::quiet_NaN();
       return result;

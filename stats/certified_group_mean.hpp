@@ -68,7 +68,7 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
     const Samples<Twin> twins(metricTwins<G>(samples));
-    const CertifiedMean<Twin> twin = findCertifiedMean<Twin>(executor, twins, weights, how);
+    const CertifiedMean<Twin> twin = meanWithCertificates<Twin>(executor, twins, weights, how);
     result.mean = from(fromTwin<G>(twin.mean.mean));
     result.uniqueness = {twin.uniqueness.unique,
                          {},

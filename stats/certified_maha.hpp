@@ -143,7 +143,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     // These are the types that certifiedMean uses, so that both share their instantiations.
     const Samples<Twin> twins(metricTwins<M>(features));
     const Samples<double> numbers(std::move(weights));
-    const auto twin = findCertifiedMean<Twin>(executor, twins, numbers, how);
+    const auto twin = meanWithCertificates<Twin>(executor, twins, numbers, how);
     result.cut_locus = twin.cut_locus;
     result.concentration = twin.concentration;
     twin_status = twin.status;

@@ -9,6 +9,7 @@
 #include <stats/covariance.hpp>
 #include <stats/cut_locus.hpp>
 #include <stats/detail/settled_covariance.hpp>
+#include <stats/detail/sum_certificates.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
@@ -88,9 +89,43 @@ SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const M
   return sandwich(mean, sum);
 }
 
+/// Completes `result`, whose mean is there, as findCertifiedMean does for a covariance from residuals, if the sums of the
+/// mean's last pass prove all of it. False otherwise; the rest of `result` is of no value then.
+template <Metric M>
+LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedMeanOptions<M>& options,
+                                     CertifiedMean<M>& result) {
+  const MeanResult<M>& mean = result.mean;
+  if (Factored<M> || !converged(mean.status) || !options.known_noise.empty()) return false;
+  if (mean.n <= static_cast<std::size_t>(ManifoldTraits<M>::DoF)) return false;
+  if (!std::isfinite(static_cast<double>(mean.cost)) || !(options.largest_hessian_change >= 0)) return false;
+  const std::optional<Concentration> concentration = concentrationBySums(mean, weights);
+  if (!concentration || !concentration->concentrated) return false;
+  result.concentration = *concentration;
+  result.uniqueness.minimiser = mean.mean;
+  result.uniqueness.cost = mean.cost;
+  if constexpr (compactFactor<M>() == CompactFactor::none) {
+    provesFlat(result.uniqueness);
+  } else if constexpr (has_compact_factor<M>) {
+    if (!isUniqueBySums(mean, options.uniqueness.tie_tolerance, result.uniqueness)) return false;
+    if (!isFarFromRivals(mean) && !haveNoNearTiesBySums(mean, weights, options.near_ties.significance)) return false;
+  } else {
+    return false;
+  }
+  const SquareOf<M> covariance = covarianceFromResiduals(mean, options.noise);
+  if (!covariance.allFinite()) return false;
+  const double width = averagingWidth(mean.n);
+  if (!isHessianSettledBySums<M>(mean, SquareOf<M>(ScalarOf<M>(width * width) * covariance))) return false;
+  if (!isFarFromCutLocusBySums<M>(mean, covariance, result.cut_locus)) return false;
+  result.estimate = Gaussian<M>{mean.mean, covariance};
+  result.status = Status::ok;
+  return true;
+}
+
+/// `first` is the mean of the same features and weights, by options.mean. Looks at the features again for whatever the sums
+/// of its last pass do not prove.
 template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W& weights,
-                                   const CertifiedMeanOptions<M>& options) {
+                                   const CertifiedMeanOptions<M>& options, const MeanResult<M>& first) {
   eigen_assert(haveOneSize(samples, weights));
   CertifiedMean<M> result;
   const auto without = [&](Status status, const char* reason) {
@@ -98,7 +133,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     result.reason = reason;
     return result;
   };
-  result.mean = frechetMean<M>(executor, samples, weights, options.mean);
+  result.mean = first;
   if (result.mean.n == 0) return without(Status::too_few, "there are no features");
   const bool known = !options.known_noise.empty();
   // If the noise is known and both noise and scatter are small, the test for the existence of a mean is skipped.
@@ -171,6 +206,16 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   return result;
 }
 
+/// The mean of features with its certificates, by the sums of its last pass if they prove all of them.
+template <Metric M, Executor E, class R, class W>
+CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const W& weights,
+                                      const CertifiedMeanOptions<M>& options) {
+  CertifiedMean<M> result;
+  result.mean = frechetMean<M>(executor, samples, weights, options.mean);
+  if (certifyBySums(weightSums(weights, result.mean.n), options, result)) return result;
+  return findCertifiedMean<M>(executor, samples, weights, options, result.mean);
+}
+
 }  // namespace detail
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, if that can
@@ -184,7 +229,11 @@ CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
     const auto features = detail::asSamples(samples);
-    return detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(features.size()), options);
+    CertifiedMean<M> result;
+    result.mean = detail::frechetMean<M>(executor, features, detail::UnitWeights{}, options.mean);
+    const std::size_t n = features.size();
+    if (detail::certifyBySums(detail::WeightSums::ofOnes(n), options, result)) return result;
+    return detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(n), options, result.mean);
   } else {
     return {};
   }
@@ -202,7 +251,7 @@ CertifiedMean<M> certifiedMean(const E& executor, R&& samples, W&& weights,
         [&](const auto& features, const auto& numbers, const detail::KeptRows& rows) {
           CertifiedMeanOptions<M> how = options;
           how.known_noise = rows.of(options.known_noise);
-          return detail::findCertifiedMean<M>(detail::erased(executor), features, numbers, how);
+          return detail::meanWithCertificates<M>(detail::erased(executor), features, numbers, how);
         },
         [] { return detail::without<CertifiedMean<M>>(Status::not_applicable, detail::bad_weights_reason); });
   } else {

@@ -12,6 +12,7 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/detail/search_space.hpp>
+#include <stats/detail/sum_certificates.hpp>
 #include <stats/mean.hpp>
 
 #include <algorithm>
@@ -19,6 +20,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <ranges>
 #include <tuple>
 #include <vector>
@@ -127,24 +129,35 @@ Concentration findConcentration(const R& samples, const W& weights, const M& mea
   return result;
 }
 
-/// The same from the sums of a mean's last pass, so that no logarithm is taken again, where they decide.
+/// From the sums of a mean's last pass, so that no logarithm is taken again; none if they do not decide.
+template <Metric M>
+std::optional<Concentration> concentrationBySums(const MeanResult<M>& mean, const WeightSums& weights) {
+  if constexpr (Factored<M>) {
+    return {};
+  } else if constexpr (has_compact_factor<M>) {
+    if (!converged(mean.status)) return {};
+    constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
+    ScatterOfAngles angles;
+    angles.sum = static_cast<double>(mean.scatter.template block<K, K>(begin, begin).trace());
+    angles.weight = weights.sum, angles.squared_weight = weights.squares, angles.n = weights.n;
+    // The plain sum is not among those of the mean; it matters only where the weighted one is too large.
+    angles.plain = weights.ones ? angles.sum : std::numeric_limits<double>::infinity();
+    const Concentration result = angles.judge(uniformLaw<M>());
+    if (!weights.ones && !result.concentrated) return {};
+    return result;
+  } else {
+    return Concentration{};
+  }
+}
+
+/// The same, where they do not decide from the data.
 template <Metric M, class R, class W>
 Concentration findConcentration(const R& samples, const W& weights, const MeanResult<M>& mean) {
   if constexpr (!Factored<M> && has_compact_factor<M>) {
     if (converged(mean.status)) {
-      constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
-      ScatterOfAngles angles;
-      angles.sum = static_cast<double>(mean.scatter.template block<K, K>(begin, begin).trace());
-      bool equal = true;
-      for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
-        const double p = static_cast<double>(weights[i]);
-        angles.weight += p, angles.squared_weight += p * p, angles.n += p != 0;
-        equal = equal && p == 1;
-      }
-      // The plain sum is not among those of the mean; it matters only where the weighted one is too large.
-      angles.plain = equal ? angles.sum : std::numeric_limits<double>::infinity();
-      const Concentration result = angles.judge(uniformLaw<M>());
-      if (equal || result.concentrated) return result;
+      const std::optional<Concentration> known =
+          concentrationBySums(mean, weightSums(weights, std::ranges::size(samples)));
+      if (known) return *known;
     }
   }
   return findConcentration(samples, weights, mean.mean);

@@ -126,6 +126,25 @@ double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
   return solver.eigenvalues()[K - 1];
 }
 
+/// Whether the sums of a mean prove that findCutLocusNearby finds no mass; the window that it reports.
+template <Metric M>
+bool isFarFromCutLocusBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, CutLocusMass& result) {
+  if constexpr (Factored<M>) {
+    return false;
+  } else if constexpr (has_kinks<M>) {
+    constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
+    using Matrix = Eigen::Matrix<double, K, K>;
+    const Matrix block = covariance.template block<K, K>(begin, begin).template cast<double>();
+    // The mean may be anywhere in its confidence region, three standard deviations wide; gaps change at most twice as
+    // fast as it moves. No less than 0.2 rad, or there is nothing to estimate a density from.
+    const double widest = 36 * block.trace() <= 0.04 ? 0 : std::max(0.0, largestEigenvalue<K>(block));
+    result.window = std::max(6 * std::sqrt(widest), 0.2);
+    return 2 * leastDistanceToCutLocus(mean) >= result.window && mean.hessian.allFinite();
+  } else {
+    return true;
+  }
+}
+
 template <Metric M, class R, class W>
 CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanResult<M>& mean,
                                 const SquareOf<M>& covariance) {
@@ -140,18 +159,9 @@ CutLocusMass findCutLocusNearby(const R& samples, const W& weights, const MeanRe
                                        factorMean<i>(SerialExecutor{}, samples, weights, mean), block));
     });
   } else if constexpr (has_kinks<M>) {
-    constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
-    using Matrix = Eigen::Matrix<double, K, K>;
-    const Matrix block = covariance.template block<K, K>(begin, begin).template cast<double>();
-    // The mean may be anywhere in its confidence region, three standard deviations wide; gaps change at most twice as
-    // fast as it moves. No less than 0.2 rad, or there is nothing to estimate a density from.
-    const double sd = std::sqrt(std::max(0.0, largestEigenvalue<K>(block)));
-    const double window = std::max(6 * sd, 0.2);
-    if (2 * leastDistanceToCutLocus(mean) >= window && mean.hessian.allFinite()) {
-      result.window = window;
-      return result;
+    if (!isFarFromCutLocusBySums(mean, covariance, result)) {
+      result = findCutLocusMass(samples, weights, mean, result.window);
     }
-    result = findCutLocusMass(samples, weights, mean, window);
   }
   return result;
 }

@@ -61,6 +61,10 @@ struct MeanResult {
   ScalarOf<M> largest_distance = 0;                          ///< max d(mean, x_i)
   ScalarOf<M> smallest_gap =  ///< for a quotient: smallest angular distance to the cut locus
       std::numeric_limits<ScalarOf<M>>::infinity();
+  /// The angles θ_i of rotations, directions and the like from the mean, of frames those of the rotations alone: the
+  /// largest, rad, and Σ p_i θ_i⁴. Zero if the traits of M name no compact factor.
+  ScalarOf<M> largest_angle = 0;
+  double angle_fourth_moment = 0;
 
   /// Σ p_i z_i z_iᵀ / Σ p_i: the dispersion of the features about their mean.
   SquareOf<M> dispersion() const { return scatter / ScalarOf<M>(sum_of_weights); }
@@ -154,6 +158,8 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
   result.squared_weight_scatter = pass.scatter.squared;
   result.largest_distance = pass.scatter.largest;
   result.smallest_gap = pass.scatter.smallest_gap;
+  result.largest_angle = pass.scatter.largest_angle;
+  result.angle_fourth_moment = pass.scatter.fourth;
   return result;
 }
 

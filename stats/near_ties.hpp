@@ -7,8 +7,9 @@
 //     z = Σ e_i/(√n sd(e_i))
 // is Student's t with n - 1 degrees of freedom where the truth has no preference. Where the noise is known the sum of
 // e_i/variance is a log-likelihood ratio, and speaks for itself. A minimum within the 99 % region of the mean is no
-// rival: the covariance covers it. Rivals are found by descents from data and along the principal axes of the scatter,
-// without a proof that there are no others.
+// rival: the covariance covers it. For clouds the moments of the angles prove that there is no rival
+// (stats/detail/sum_certificates.hpp). Otherwise rivals are found by descents from data and along the principal axes of
+// the scatter, without a proof that there are no others.
 #pragma once
 
 #include <stats/covariance.hpp>
@@ -18,6 +19,7 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/any_executor.hpp>
 #include <stats/detail/weights.hpp>
+#include <stats/detail/sum_certificates.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
@@ -97,6 +99,18 @@ struct Part {
   }
 };
 
+/// Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it: their
+/// cut loci are this far from the mean, rad.
+template <Metric M>
+double farFromRivals() {
+  return 2.0 / 3 * static_cast<double>(ManifoldTraits<M>::injectivityRadius());
+}
+/// Whether they are known to be.
+template <Metric M>
+bool isFarFromRivals(const MeanResult<M>& mean) {
+  return leastDistanceToCutLocus(mean) >= farFromRivals<M>();
+}
+
 /// The noise of the data where it is not known.
 struct NoNoise {};
 
@@ -142,13 +156,14 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       }
     });
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
-    // Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
     using Vector = Eigen::Matrix<double, K, 1>;
     const Eigen::Matrix<double, K, K> region = covariance.template block<K, K>(begin, begin).template cast<double>();
-    const double radius = static_cast<double>(T::injectivityRadius());
-    if (leastDistanceToCutLocus(mean) >= 2.0 / 3 * radius) return ties;
-    if (!(distanceToCutLocus(samples, mean.mean) < 2.0 / 3 * radius)) return ties;
+    if (isFarFromRivals(mean)) return ties;
+    if constexpr (has_compact_factor<M> && !known_noise) {
+      if (haveNoNearTiesBySums(mean, weightSums(weights, n), options.significance)) return ties;
+    }
+    if (!(distanceToCutLocus(samples, mean.mean) < farFromRivals<M>())) return ties;
     const auto squaredAngle = [](const typename T::Group& to_y, const M& x) {
       const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
       return static_cast<double>(z.dot(T::metricWeights().cwiseProduct(z)));

@@ -11,6 +11,7 @@
 //   circle      SO(2), Frame2, RxSO2: all minima by sorting, exact
 //   global      branch and bound on SO(3), its quotients and S² (stats/detail/branch_and_bound.hpp)
 //   factors     of a product each factor's minimum is certified by itself
+// The first two are tried with what the passes for the mean have seen, before the data are looked at again.
 // Which of them serve a manifold is said by its traits (compact_factor, factors; lie/concepts.hpp); the first needs
 // distances alone. Needs Eigen alone. Data never throws: what is not finite is not_certified.
 #pragma once

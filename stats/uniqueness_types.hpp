@@ -53,7 +53,9 @@ struct UniquenessResult {
   bool improved = false;     ///< the given mean is not the minimum: `minimiser` is lower
   ScalarOf<M> cost = 0;      ///< C at the minimiser
   std::vector<M> rivals;     ///< the other minimisers of equal cost that were found
-  double r_star = 0;         ///< radius about the minimiser in which it is the only minimum, rad
+  /// r*, the radius about the minimiser in which the criterion is convex and has no other minimum, rad (localRadius());
+  /// for directions in a cloud a lower bound of it.
+  double r_star = 0;
   std::size_t cells = 0;     ///< of the global search; 0: it was not needed
   const char* proof = "";    ///< which certificate holds, in words
   bool more_rivals = false;  ///< ambiguous, and `rivals` are not all: they form a continuum, or the search ended early

@@ -135,15 +135,16 @@ double longestReach(const Eigen::Matrix<double, K, K>& L) {
   return L.norm() * NormalNodes<K>::instance().longest();
 }
 
-/// No more than distanceToCutLocus, from what the passes for a mean have seen: exact for quotients, for others at most
-/// that of the farthest datum in the whole distance. Minus infinity if nothing is known.
+/// No more than distanceToCutLocus, from what the passes for a mean have seen: exact for manifolds that name their
+/// compact factor, for others that of the farthest datum. Minus infinity if nothing is known.
 template <Metric M>
 double leastDistanceToCutLocus(const MeanResult<M>& mean) {
   if (Factored<M> || !converged(mean.status)) return -std::numeric_limits<double>::infinity();
   if constexpr (Quotient<M>) {
     return 0.5 * static_cast<double>(mean.smallest_gap);
   } else {
-    return static_cast<double>(ManifoldTraits<M>::injectivityRadius()) - static_cast<double>(mean.largest_distance);
+    const auto farthest = has_compact_factor<M> ? mean.largest_angle : mean.largest_distance;
+    return static_cast<double>(ManifoldTraits<M>::injectivityRadius()) - static_cast<double>(farthest);
   }
 }
 

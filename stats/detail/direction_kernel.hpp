@@ -68,7 +68,7 @@ struct DirectionKernel {
     const S* weights = nullptr;
     std::size_t count = 0;
     S reference[3] = {};
-    S cost, largest, defect, weight;
+    S cost, largest, largest_angle, fourth, defect, weight;
     S gradient[3];                       ///< Σ p h u
     S across;                            ///< Σ p h c
     S along[6], scatter[6], squared[6];  ///< Σ p g u uᵀ, Σ p h² u uᵀ, Σ p² h² u uᵀ
@@ -144,7 +144,9 @@ struct DirectionKernel {
         hc *= p;
         LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) gu[a] *= p;
       }
-      residuals.add(v, angle.h * angle.h * s2, p);
+      const P angle2 = angle.h * angle.h * s2;
+      residuals.addAngle(angle2, p);
+      residuals.add(v, angle2, p);
       across += hc;
       addOuter(along, u, gu, std::make_index_sequence<6>());
     }
@@ -161,7 +163,7 @@ struct PlanarKernel {
     const S* weights = nullptr;
     std::size_t count = 0;
     S reference[4] = {};
-    S cost, largest, defect, weight, gradient[k], scatter[entries], squared[entries];
+    S cost, largest, largest_angle, fourth, defect, weight, gradient[k], scatter[entries], squared[entries];
   };
 
   template <InstructionSet Set>
@@ -191,12 +193,13 @@ struct PlanarKernel {
         P v[k], p(S(1));
         v[k - 1] = angle.h * s;
         P length2 = v[k - 1] * v[k - 1];
+        if constexpr (Weighted) p = P::load(data[numbers] + j);
+        residuals.addAngle(length2, p);
         if constexpr (Frame) {
           v[0] = P::load(data[2] + j) - y[2];
           v[1] = P::load(data[3] + j) - y[3];
           length2 += v[0] * v[0] + v[1] * v[1];
         }
-        if constexpr (Weighted) p = P::load(data[numbers] + j);
         residuals.add(v, length2, p);
       }
     }
@@ -214,7 +217,7 @@ struct PointKernel {
     const S* weights = nullptr;
     std::size_t count = 0;
     S reference[N] = {};
-    S cost, largest, defect = 0, weight, gradient[N], scatter[entries], squared[entries];
+    S cost, largest, largest_angle, fourth, defect = 0, weight, gradient[N], scatter[entries], squared[entries];
   };
 
   template <InstructionSet Set>

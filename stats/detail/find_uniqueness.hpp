@@ -4,6 +4,7 @@
 
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/searched_manifold.hpp>
+#include <stats/detail/sum_certificates.hpp>
 #include <stats/detail/uniqueness_circle.hpp>
 #include <stats/mean.hpp>
 
@@ -26,6 +27,14 @@ auto factorMean(const E& executor, const R& samples, const W& weights, const Mea
   MeanOptions<F> options;
   options.start = std::get<I>(ManifoldTraits<M>::factors(mean.mean));
   return frechetMean<F>(executor, FactorRange<I, M, R>{samples}, weights, options);
+}
+
+/// On a flat manifold there is nothing to look for.
+template <Metric M>
+void provesFlat(UniquenessResult<M>& result) {
+  result.r_star = std::numeric_limits<double>::infinity();
+  result.unique = Uniqueness::unique;
+  result.proof = "the manifold is flat";
 }
 
 template <Metric M, Executor E, class R, class W>
@@ -100,11 +109,10 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
   if constexpr (Factored<M>) {
     return uniquenessByFactors(executor, samples, weights, mean, options);
   } else if constexpr (compactFactor<M>() == CompactFactor::none) {
-    result.r_star = std::numeric_limits<double>::infinity();
-    result.unique = Uniqueness::unique;
-    result.proof = "the manifold is flat";
+    provesFlat(result);
     return result;
   } else if constexpr (compactFactor<M>() == CompactFactor::circle) {
+    if (isUniqueBySums(mean, options.tie_tolerance, result)) return result;
     return circleUniqueness(executor, samples, weights, mean, options);
   } else if constexpr (compactFactor<M>() == CompactFactor::unknown) {
     // A user's manifold: the theorem holds for its whole distance.
@@ -114,18 +122,8 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
     }
     return result;
   } else {
+    if (isUniqueBySums(mean, options.tie_tolerance, result)) return result;
     using Space = decltype(searchSpace<M>());
-    // The first certificate of the search, where the passes for the mean have seen all that it asks for: the largest
-    // angle, and the radius up to which no datum's term is concave, which ends at the nearest cut locus.
-    if constexpr (Space::convex_to_cut_locus && std::is_same_v<ScalarOf<M>, double> &&
-                  (Quotient<M> || ManifoldTraits<M>::DoF == compact_dimension<M>)) {
-      if (converged(mean.status) && mean.largest_distance < aPrioriRadius<M>() * (1 - 1e-9)) {
-        result.r_star = Quotient<M> ? 0.5 * mean.smallest_gap : pi - mean.largest_distance;
-        result.unique = Uniqueness::unique;
-        result.proof = "the data lie in a ball about the mean that is small enough";
-        return result;
-      }
-    }
     return SearchedManifold<M, Space, E, R, W>(executor, samples, weights, mean).certify(options);
   }
 }

@@ -48,7 +48,8 @@ class SimpleSums : public TangentSums<M> {
 
  public:
   using Base = TangentSums<M>;
-  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest;
+  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest,
+      Base::largest_angle, Base::fourth;
   using typename Base::Square, typename Base::Tangent;
 
   /// As RotationSums::add; false also for directions and plane rotations opposite to y.
@@ -70,7 +71,11 @@ class SimpleSums : public TangentSums<M> {
   template <bool Scatter, class Arguments>
   void addSums(const Arguments& a, const M& y) {
     cost += a.cost, weight += static_cast<double>(a.weight);
-    if constexpr (Scatter) largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
+    if constexpr (Scatter) {
+      largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
+      largest_angle = std::max(largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
+      fourth += static_cast<double>(a.fourth);
+    }
     if constexpr (HasDirectionSums<M>) {
       using Matrix3 = Eigen::Matrix<S, 3, 3>;
       const Eigen::Matrix<S, 3, 2> axes = T::placement(y).matrix().template leftCols<2>();

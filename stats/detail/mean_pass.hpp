@@ -2,6 +2,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/compact_part.hpp>
 #include <stats/detail/packing.hpp>
 #include <stats/detail/kernel_sums.hpp>
 #include <stats/detail/weights_of_one.hpp>
@@ -49,12 +50,16 @@ template <Homogeneous M>
 struct ScatterSums {
   SquareOf<M> scatter = SquareOf<M>::Zero(), squared = SquareOf<M>::Zero();
   ScalarOf<M> largest = 0, smallest_gap = std::numeric_limits<ScalarOf<M>>::infinity();
+  ScalarOf<M> largest_angle = 0;  ///< of the compact part, if the traits name it
+  double fourth = 0;              ///< Σ p θ⁴ of those angles
 
   void operator+=(const ScatterSums& other) {
     scatter += other.scatter;
     squared += other.squared;
     largest = std::max(largest, other.largest);
     smallest_gap = std::min(smallest_gap, other.smallest_gap);
+    largest_angle = std::max(largest_angle, other.largest_angle);
+    fourth += other.fourth;
   }
 };
 
@@ -86,12 +91,12 @@ struct MeanPass {
   }
   std::vector<double> pack() const {
     return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
-                  scatter.largest, scatter.smallest_gap);
+                  scatter.largest, scatter.smallest_gap, scatter.largest_angle, scatter.fourth);
   }
   static MeanPass unpack(std::span<const double> list) {
     MeanPass p;
     unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
-               p.scatter.largest, p.scatter.smallest_gap);
+               p.scatter.largest, p.scatter.smallest_gap, p.scatter.largest_angle, p.scatter.fourth);
     return p;
   }
 };
@@ -124,6 +129,11 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
       pass.scatter.scatter += outer;
       if constexpr (weighted) pass.scatter.squared += p * outer;
       pass.scatter.largest = std::max(pass.scatter.largest, S(sqrt(squared_distance)));
+      if constexpr (has_compact_factor<M>) {
+        const S angle2 = z.template segment<compact_dimension<M>>(T::compact_begin).squaredNorm();
+        pass.scatter.largest_angle = std::max(pass.scatter.largest_angle, S(sqrt(angle2)));
+        pass.scatter.fourth += weights[i] * static_cast<double>(angle2) * static_cast<double>(angle2);
+      }
       if constexpr (Quotient<M>) {
         pass.scatter.smallest_gap = std::min(pass.scatter.smallest_gap, T::nearestRepresentative(at_mean).gap());
       }
@@ -141,7 +151,9 @@ bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, con
     constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
     if (!sums.template add<weighted, Scatter>(set, samples, weights, range.begin, range.end, y)) return false;
     pass.sums = {sums.cost, sums.gradient, sums.hessian, sums.weight};
-    if constexpr (Scatter) pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap};
+    if constexpr (Scatter) {
+      pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap, sums.largest_angle, sums.fourth};
+    }
     return true;
   } else {
     return false;

@@ -37,17 +37,29 @@ LIESTAT_ALWAYS_INLINE P unitScale(const P& excess) {
 }
 
 /// The sums that every mean makes of its residuals v: Σ p |v|², Σ p v, and with Scatter the largest |v|², Σ p v vᵀ and
-/// Σ p² v vᵀ, these by their lower triangles. Without Weighted all p are one.
+/// Σ p² v vᵀ, these by their lower triangles, and of the angles θ the largest θ² and Σ p θ⁴. Without Weighted all p are
+/// one.
 template <class P, std::size_t K, bool Weighted, bool Scatter>
 struct ResidualSums {
   using S = typename P::Scalar;
   static constexpr std::size_t entries = K * (K + 1) / 2;
   P cost = P::zero(), largest = P::zero(), weight = P::zero(), gradient[K], scatter[entries], squared[entries];
+  P largest_angle = P::zero(), fourth = P::zero();
 
   LIESTAT_ALWAYS_INLINE ResidualSums() {
     LIESTAT_UNROLL for (P& x : gradient) x = P::zero();
     LIESTAT_UNROLL for (P& x : scatter) x = P::zero();
     LIESTAT_UNROLL for (P& x : squared) x = P::zero();
+  }
+  LIESTAT_ALWAYS_INLINE void addAngle(const P& angle2, const P& p) {
+    if constexpr (Scatter) {
+      largest_angle = larger(angle2, largest_angle);
+      if constexpr (Weighted) {
+        fourth += angle2 * angle2 * p;
+      } else {
+        fourth += angle2 * angle2;
+      }
+    }
   }
   LIESTAT_ALWAYS_INLINE void add(const P (&v)[K], const P& length2, const P& p) {
     P weighted[K], weighted_length2 = length2;
@@ -71,6 +83,8 @@ struct ResidualSums {
     arguments.weight = Weighted ? sumOf(weight) : static_cast<S>(arguments.count);
     arguments.cost = S(0.5) * sumOf(cost);
     arguments.largest = largestOf(largest);
+    arguments.largest_angle = largestOf(largest_angle);
+    arguments.fourth = sumOf(fourth);
     for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
     for (std::size_t a = 0; a < entries; ++a) {
       arguments.scatter[a] = sumOf(scatter[a]);

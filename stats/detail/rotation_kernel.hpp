@@ -30,6 +30,7 @@ struct RotationKernel {
     S reference[7] = {};  ///< y, laid out like a feature
     /// Σ in the axes of y for rotations, in those of the world for translations.
     S cost, largest, defect, weight, gradient[k], hessian[6], scatter[entries], squared[entries];
+    S largest_angle, fourth;  ///< of the rotations: the largest squared angle, Σ p θ⁴
     /// For quotients, roughly: the cosine of half the distance to the cut locus of each feature, and the largest.
     S gap_cosines[HalfTurns != 0 && Scatter ? max_count : 1], largest_gap_cosine;
   };
@@ -167,6 +168,7 @@ struct RotationKernel {
 
       constexpr std::size_t r0 = Frame ? 3 : 0;
       P v[k], length2 = f * f * u2;
+      residuals.addAngle(length2, p);
       LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) v[r0 + i] = sign_f * q[i];
       if constexpr (Frame) {
         LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {

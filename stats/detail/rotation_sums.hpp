@@ -50,7 +50,8 @@ struct TangentSums {
   double weight = 0;
   Tangent gradient = Tangent::Zero();
   Square hessian = Square::Zero(), scatter = Square::Zero(), squared = Square::Zero();
-  S largest = 0, smallest_gap = std::numeric_limits<S>::infinity();
+  S largest = 0, largest_angle = 0, smallest_gap = std::numeric_limits<S>::infinity();
+  double fourth = 0;
 
   bool isFinite() const { return std::isfinite(cost) && gradient.allFinite() && hessian.allFinite(); }
 };
@@ -67,7 +68,7 @@ class RotationSums : public TangentSums<M> {
  public:
   using Base = TangentSums<M>;
   using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest,
-      Base::smallest_gap;
+      Base::largest_angle, Base::smallest_gap, Base::fourth;
   using typename Base::Square, typename Base::Tangent;
 
   /// Sums over the features begin … end-1; Weighted false takes all weights as one. False, and nothing of value in the
@@ -106,6 +107,8 @@ class RotationSums : public TangentSums<M> {
       scatter += symmetricFromTriangle<Square>(a.scatter);
       squared += symmetricFromTriangle<Square>(a.squared);
       largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
+      largest_angle = std::max(largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
+      fourth += static_cast<double>(a.fourth);
     }
   }
   /// The kernel's cosine is for choosing: the angle itself is worked out for the few features that may have the least.
