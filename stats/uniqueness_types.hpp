@@ -50,9 +50,9 @@ struct UniquenessResult {
   Uniqueness unique = Uniqueness::not_certified;
   /// The best minimum that was found: the given mean, unless `improved`.
   M minimiser = ManifoldTraits<M>::origin();
-  bool improved = false;     ///< the given mean is not the minimum: `minimiser` is lower
-  ScalarOf<M> cost = 0;      ///< C at the minimiser
-  std::vector<M> rivals;     ///< the other minimisers of equal cost that were found
+  bool improved = false;  ///< the given mean is not the minimum: `minimiser` is lower
+  ScalarOf<M> cost = 0;   ///< C at the minimiser
+  std::vector<M> rivals;  ///< the other minimisers of equal cost that were found
   /// r*, the radius about the minimiser in which the criterion is convex and has no other minimum, rad (localRadius());
   /// for directions in a cloud a lower bound of it.
   double r_star = 0;

@@ -65,12 +65,12 @@ struct AngleSums {
   double mean_square = 0;  ///< Σ p θ²/Σ p
   double fourth = 0;       ///< Σ p θ⁴/Σ p
   double largest = 0;
-  /// A radius in which the criterion is strictly convex along every geodesic from the mean: r* of means.md, section 5.2,
-  /// for directions a lower bound of it. Zero or less if none is known.
+  /// A radius in which the criterion is strictly convex along every geodesic from the mean: r* of
+  /// docs/theory/means.md, section 5.2, for directions a lower bound of it. Zero or less if none is known.
   double convex = 0;
   double single = 0;  ///< a radius in which the mean is the only critical point
   double injectivity = 0;
-  double shift = 0;  ///< the last step: no more than this is the mean away from where the sums were taken
+  double shift = 0;         ///< the last step: no more than this is the mean away from where the sums were taken
   bool small_ball = false;  ///< the data lie in the ball about the mean in which theirs is the only mean
   bool sphere = false;
 
