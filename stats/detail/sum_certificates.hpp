@@ -170,7 +170,7 @@ class ExcessBound {
 /// Sets `result` and returns true if the sums prove that a converged mean is the only one.
 template <Metric M>
 bool isUniqueBySums(const MeanResult<M>& mean, double tie_tolerance, UniquenessResult<M>& result) {
-  if (!converged(mean.status) || !(mean.residual < largest_shift)) return false;
+  if (!converged(mean.status) || !(mean.residual < largest_shift) || !(mean.sum_of_weights > 0)) return false;
   const AngleSums angles = angleSums(mean);
   const double eps = static_cast<double>(std::numeric_limits<ScalarOf<M>>::epsilon());
   const double tie = std::max(tie_tolerance, 64 * eps) + angle_margin<ScalarOf<M>>;
