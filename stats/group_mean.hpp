@@ -103,9 +103,10 @@ template <HasPoseSums G, Executor E, class R, class W>
 bool poseBarycentre(const E& executor, const R& samples, const W& weights, const std::optional<G>& start,
                     GroupMeanResult<G>& result) {
   using S = ScalarOf<G>;
-  using Rotation = SO3<S>;
+  using Rotation = typename RotationOfPose<G>::type;
+  constexpr int d = G::Dim, angles_begin = d, rotation_dof = G::DoF - d;
   MeanOptions<Rotation> options;
-  if (start) options.start = start->so3();
+  if (start) options.start = RotationOfPose<G>::of(*start);
   const auto rotation = frechetMean<Rotation>(executor, RotationPart<G, R>{samples}, weights, options);
   if (rotation.status != Status::ok) return false;
   // A system about any of the translations; one of them, so that nothing cancels far from the origin.
@@ -113,7 +114,7 @@ bool poseBarycentre(const E& executor, const R& samples, const W& weights, const
   const PoseSums<G> first = poseSums<false>(executor, samples, weights, y);
   if (first.refused > 0) return false;
   y = y * G(Rotation(),
-            detail::inverse<S, 3>(first.jacobian.template topLeftCorner<3, 3>()) * first.sum.template head<3>());
+            detail::inverse<S, d>(first.jacobian.template topLeftCorner<d, d>()) * first.sum.template head<d>());
   result.tolerance = automaticTolerance<S>(1 + static_cast<double>(y.log().norm()));
   result.iterations = rotation.iterations;
   const PoseSums<G> sums =
@@ -121,9 +122,10 @@ bool poseBarycentre(const E& executor, const R& samples, const W& weights, const
   if (sums.refused > 0 || result.status != Status::ok) return false;
   ScatterOfAngles angles;
   angles.weight = sums.weight, angles.squared_weight = sums.squared_weight;
-  angles.sum = static_cast<double>(sums.scatter.template bottomRightCorner<3, 3>().trace());
+  angles.sum =
+      static_cast<double>(sums.scatter.template block<rotation_dof, rotation_dof>(angles_begin, angles_begin).trace());
   angles.plain = sums.squared_angle, angles.n = static_cast<double>(result.n);
-  result.concentration.worsen(angles.judge(rotationLaw(0)));
+  result.concentration.worsen(angles.judge(rotation_dof == 1 ? circleLaw() : rotationLaw(0)));
   return true;
 }
 

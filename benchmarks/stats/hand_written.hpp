@@ -162,6 +162,49 @@ inline HandWrittenMean<HandWrittenFrame, 6> handWrittenBarycentre(const std::vec
   return result;
 }
 
+/// A motion of the plane: (cos, sin) as a complex number, and a translation.
+struct HandWrittenMotion {
+  Eigen::Vector2d rotation = Eigen::Vector2d(1, 0), translation = Eigen::Vector2d::Zero();
+};
+
+/// The same barycentre of motions of the plane.
+inline HandWrittenMean<HandWrittenMotion, 3> handWrittenBarycentre(const std::vector<HandWrittenMotion>& motions) {
+  const auto turned = [](const Eigen::Vector2d& z, const Eigen::Vector2d& v) {
+    return Eigen::Vector2d(z[0] * v[0] - z[1] * v[1], z[1] * v[0] + z[0] * v[1]);
+  };
+  // θ/2 cot θ/2, by the angle's series near zero.
+  const auto cotangent = [](double angle) {
+    const double half = 0.5 * angle;
+    return std::abs(half) < 1e-4 ? 1 - half * half / 3 : half / std::tan(half);
+  };
+  const auto residual = [&](const HandWrittenMotion& m, const HandWrittenMotion& x) {
+    const Eigen::Vector2d back(m.rotation[0], -m.rotation[1]), z = turned(back, x.rotation);
+    const double angle = std::atan2(z[1], z[0]);
+    const Eigen::Vector2d rho =
+        turned(Eigen::Vector2d(cotangent(angle), -0.5 * angle), turned(back, x.translation - m.translation));
+    return Eigen::Vector3d(rho[0], rho[1], angle);
+  };
+  HandWrittenMean<HandWrittenMotion, 3> result;
+  result.mean = motions.front();
+  for (double step = 1; step > HandWritten::tolerance && result.iterations < HandWritten::max_iterations;) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const HandWrittenMotion& x : motions) sum += residual(result.mean, x);
+    sum /= static_cast<double>(motions.size());
+    const double c = cotangent(sum[2]), s = -0.5 * sum[2], scale = 1 / (c * c + s * s);
+    const Eigen::Vector2d t = turned(Eigen::Vector2d(scale * c, -scale * s), sum.head<2>());
+    result.mean.translation += turned(result.mean.rotation, t);
+    result.mean.rotation =
+        turned(result.mean.rotation, Eigen::Vector2d(std::cos(sum[2]), std::sin(sum[2]))).normalized();
+    step = sum.norm();
+    ++result.iterations;
+  }
+  for (const HandWrittenMotion& x : motions) {
+    const Eigen::Vector3d z = residual(result.mean, x);
+    result.covariance += z * z.transpose();
+  }
+  return result;
+}
+
 /// Unit vectors; the residuals are those in space, tangent to the sphere at the mean.
 inline HandWrittenMean<Eigen::Vector3d, 3> handWrittenMeanDirection(const std::vector<Eigen::Vector3d>& directions) {
   const auto residual = [](const Eigen::Vector3d& y, const Eigen::Vector3d& x) -> Eigen::Vector3d {

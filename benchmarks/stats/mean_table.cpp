@@ -87,6 +87,17 @@ int print() {
           return result.iterations;
         },
         [](const auto& d) { return handWrittenBarycentre(d); });
+    row<SE2d>(
+        "SE2, group", n,
+        [](const SE2d& x) {
+          return HandWrittenMotion{x.unit_complex(), x.translation()};
+        },
+        [](const std::vector<SE2d>& data) {
+          const GroupMeanResult<SE2d> result = groupMean(data);
+          keep(result.covarianceFromResiduals());
+          return result.iterations;
+        },
+        [](const auto& d) { return handWrittenBarycentre(d); });
   }
   return 0;
 }

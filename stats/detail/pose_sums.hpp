@@ -1,4 +1,5 @@
-// The sums of the exponential barycentre of SE(3) from the kernels of stats/detail/group_kernel.hpp.
+// The sums of the exponential barycentres of SE(3) and SE(2) from the kernels of stats/detail/group_kernel.hpp and
+// stats/detail/planar_group_kernel.hpp.
 #pragma once
 
 #include <lie/se3.hpp>
@@ -6,6 +7,7 @@
 #include <stats/detail/feature_layout.hpp>
 #include <stats/detail/group_kernel.hpp>
 #include <stats/detail/packing.hpp>
+#include <stats/detail/planar_group_kernel.hpp>
 #include <stats/detail/rotation_sums.hpp>
 
 #include <algorithm>
@@ -13,13 +15,39 @@
 #include <concepts>
 #include <cstddef>
 #include <span>
+#include <type_traits>
 #include <vector>
+
+namespace liestat {
+
+// Of the units without motions of the plane these headers ask for nothing more than the name.
+template <class Scalar_, int Options_>
+class SO2;
+template <class Scalar_, int Options_>
+class SE2;
+
+}  // namespace liestat
 
 namespace liestat::detail {
 
-/// SE(3) as the library keeps it, in double and float.
+/// SE(2) as the library keeps it, in double and float.
 template <class G>
-concept HasPoseSums = std::same_as<G, SE3<double>> || std::same_as<G, SE3<float>>;
+concept HasPlanarPoseSums = std::same_as<G, SE2<double, 0>> || std::same_as<G, SE2<float, 0>>;
+/// SE(3) and SE(2).
+template <class G>
+concept HasPoseSums = std::same_as<G, SE3<double>> || std::same_as<G, SE3<float>> || HasPlanarPoseSums<G>;
+
+/// The rotations of poses.
+template <class G>
+struct RotationOfPose {
+  using type = SO3<typename G::Scalar>;
+  static type of(const G& x) { return x.so3(); }
+};
+template <HasPlanarPoseSums G>
+struct RotationOfPose<G> {
+  using type = SO2<typename G::Scalar, 0>;
+  static type of(const G& x) { return x.so2(); }
+};
 
 /// The rotations of poses, as features of their own.
 template <HasPoseSums G, class R>
@@ -28,9 +56,9 @@ struct RotationPart {
   const R& samples;
 
   std::size_t size() const { return std::ranges::size(samples); }
-  SO3<S> operator[](std::size_t i) const { return G(samples[i]).so3(); }
+  typename RotationOfPose<G>::type operator[](std::size_t i) const { return RotationOfPose<G>::of(samples[i]); }
   Layout<const S> layout() const requires ContiguousFeatures<R, G> {
-    return FeatureBlock<G, 7, 1>().layout(samples, 0, size());
+    return FeatureBlock<G, G::num_parameters, 1>().layout(samples, 0, size());
   }
 };
 
@@ -39,8 +67,10 @@ struct RotationPart {
 template <HasPoseSums G>
 struct PoseSums {
   using S = typename G::Scalar;
-  using Tangent = Eigen::Matrix<S, 6, 1>;
-  using Square = Eigen::Matrix<S, 6, 6>;
+  using Tangent = Eigen::Matrix<S, G::DoF, 1>;
+  using Square = Eigen::Matrix<S, G::DoF, G::DoF>;
+  static constexpr bool planar = HasPlanarPoseSums<G>;
+  static constexpr std::size_t numbers = G::num_parameters;
   Tangent sum = Tangent::Zero();  ///< Σ p z
   Square jacobian = Square::Zero(), scatter = Square::Zero();
   double weight = 0, squared_weight = 0, squared_angle = 0;
@@ -62,12 +92,18 @@ struct PoseSums {
 
   template <bool Weighted, bool Full, class R, class W>
   void add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const G& y) {
-    using Kernel = PoseKernel<S, Weighted, Full>;
+    using Kernel = std::conditional_t<planar, PlanarPoseKernel<S, Weighted, Full>, PoseKernel<S, Weighted, Full>>;
     typename Kernel::Arguments arguments;
-    for (std::size_t c = 0; c < 7; ++c) arguments.reference[c] = y.data()[c];
-    runOnFeatures<Kernel, G, 7, Weighted>(set, samples, weights, begin, end, arguments, [&](std::size_t) {
+    for (std::size_t c = 0; c < numbers; ++c) arguments.reference[c] = y.data()[c];
+    runOnFeatures<Kernel, G, numbers, Weighted>(set, samples, weights, begin, end, arguments, [&](std::size_t) {
       if (!(arguments.defect < largest_excess<S>)) refused = 1;
-      addSums<Full>(arguments, y);
+      weight += static_cast<double>(arguments.weight), squared_weight += static_cast<double>(arguments.squared_weight);
+      if constexpr (Full) squared_angle += static_cast<double>(arguments.squared_angle);
+      if constexpr (planar) {
+        addPlanarSums<Full>(arguments, y);
+      } else {
+        addSums<Full>(arguments, y);
+      }
       return true;
     });
   }
@@ -90,9 +126,7 @@ struct PoseSums {
     diagonal = turned(diagonal);
     jacobian.template topLeftCorner<3, 3>() += diagonal;
     jacobian.template bottomRightCorner<3, 3>() += diagonal;
-    weight += static_cast<double>(a.weight), squared_weight += static_cast<double>(a.squared_weight);
     if constexpr (Full) {
-      squared_angle += static_cast<double>(a.squared_angle);
       jacobian.template topRightCorner<3, 3>() +=
           turned(symmetricFromTriangle<Matrix3>(a.mixed) - S(0.5) * SO3<S>::hat(rho));
       Square outer = symmetricFromTriangle<Square>(a.scatter);
@@ -103,6 +137,27 @@ struct PoseSums {
         outer.template middleCols<3>(i) = (outer.template middleCols<3>(i) * to_body.transpose()).eval();
       }
       scatter += outer;
+    }
+  }
+  template <bool Full, class Arguments>
+  void addPlanarSums(const Arguments& a, const G& y) {
+    using Vector2 = Eigen::Matrix<S, 2, 1>;
+    Square to_body = Square::Identity();
+    const S cosine = y.data()[0], sine = y.data()[1];
+    to_body(0, 0) = to_body(1, 1) = cosine, to_body(0, 1) = sine, to_body(1, 0) = -sine;
+    const auto turned = [&](const S* v) -> Vector2 {
+      return Vector2(cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0]);
+    };
+    const Vector2 rho = turned(a.rho);
+    sum += Tangent(rho[0], rho[1], a.theta);
+    // Σ p V⁻¹, the same in all axes.
+    jacobian(0, 0) += a.weight - a.excess, jacobian(1, 1) += a.weight - a.excess;
+    jacobian(0, 1) += S(0.5) * a.theta, jacobian(1, 0) -= S(0.5) * a.theta;
+    jacobian(2, 2) += a.weight;
+    if constexpr (Full) {
+      const Vector2 mixed = turned(a.mixed);
+      jacobian(0, 2) += mixed[0] - S(0.5) * rho[1], jacobian(1, 2) += mixed[1] + S(0.5) * rho[0];
+      scatter += to_body * (symmetricFromTriangle<Square>(a.scatter) * to_body.transpose()).eval();
     }
   }
 };
