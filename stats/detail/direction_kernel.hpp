@@ -168,44 +168,73 @@ struct PlanarKernel {
 
   template <InstructionSet Set>
   LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
-    using P = Pack<Set, S>;
-    constexpr std::size_t block = 64;
-    alignas(64) S data[numbers + 1][block];
+    Run<Pack<Set, S>>::all(arguments);
+  }
+
+ private:
+  /// Cosine and sine of the angle from y, the translation, the weight.
+  static constexpr std::size_t columns = numbers + 1, block = 64;
+
+  template <class P>
+  struct Run {
     ResidualSums<P, k, Weighted, Scatter> residuals;
     P defect = P::zero();
-    const S(&y)[4] = arguments.reference;
-    for (std::size_t i = 0; i < arguments.count; i += block) {
-      const std::size_t count = std::min(arguments.count - i, block);
-      loadColumns<Set, numbers>(arguments.features, 0, i, count, data);
-      if constexpr (Weighted) std::memcpy(data[numbers], arguments.weights + i, count * sizeof(S));
-      for (std::size_t j = count; j % P::size != 0; ++j) {
-        for (std::size_t c = 0; c < numbers; ++c) data[c][j] = y[c];
-        data[numbers][j] = 0;
-      }
-      for (std::size_t j = 0; j < count; j += P::size) {
-        const P a = P::load(data[0] + j), b = P::load(data[1] + j);
-        const P excess = a * a + b * b - S(1), scale = unitScale(excess);
-        defect = larger(absolute(excess), defect);
-        const P c = scale * (a * y[0] + b * y[1]), s = scale * (b * y[0] - a * y[1]);
-        AngleOverSine<P> angle;
-        angle.template evaluate<true, false, false>(c, s * s, any_rotation<S>);
-        defect = larger(angle.antipode, defect);
-        P v[k], p(S(1));
-        v[k - 1] = angle.h * s;
-        P length2 = v[k - 1] * v[k - 1];
-        if constexpr (Weighted) p = P::load(data[numbers] + j);
-        residuals.addAngle(length2, p);
-        if constexpr (Frame) {
-          v[0] = P::load(data[2] + j) - y[2];
-          v[1] = P::load(data[3] + j) - y[3];
-          length2 += v[0] * v[0] + v[1] * v[1];
+
+    LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
+      alignas(64) S data[columns][block];
+      Run sums;
+      const S(&y)[4] = arguments.reference;
+      for (std::size_t i = 0; i < arguments.count; i += block) {
+        const std::size_t count = std::min(arguments.count - i, block);
+        loadColumns<P::set, numbers>(arguments.features, 0, i, count, data);
+        if constexpr (Weighted) std::memcpy(data[numbers], arguments.weights + i, count * sizeof(S));
+        for (std::size_t j = count; j % P::size != 0; ++j) {
+          for (std::size_t c = 0; c < numbers; ++c) data[c][j] = y[c];
+          data[numbers][j] = 0;
         }
-        residuals.add(v, length2, p);
+        P least(S(1));
+        for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, y, least);
+        const S least_cosine = -largestOf(-least);
+        if (least_cosine > static_cast<S>(small_rotation_cosine)) {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, y, small_rotation<S>);
+        } else if (least_cosine > S(0)) {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, y, any_rotation<S>);
+        } else {
+          for (std::size_t j = 0; j < count; j += P::size) sums.template add<true>(data, j, y, any_rotation<S>);
+        }
       }
+      sums.residuals.finish(arguments);
+      arguments.defect = largestOf(sums.defect);
     }
-    residuals.finish(arguments);
-    arguments.defect = largestOf(defect);
-  }
+    LIESTAT_ALWAYS_INLINE void turn(S (&data)[columns][block], std::size_t j, const S (&y)[4], P& least) {
+      const P a = P::load(data[0] + j), b = P::load(data[1] + j);
+      const P excess = a * a + b * b - S(1), scale = unitScale(excess);
+      defect = larger(absolute(excess), defect);
+      const P c = scale * (a * y[0] + b * y[1]);
+      least = smaller(c, least);
+      c.store(data[0] + j);
+      (scale * (b * y[0] - a * y[1])).store(data[1] + j);
+    }
+    template <bool Wide, class Polynomials>
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const S (&y)[4],
+                                   const Polynomials& polynomials) {
+      const P c = P::load(data[0] + j), s = P::load(data[1] + j);
+      AngleOverSine<P> angle;
+      angle.template evaluate<Wide, false, false>(c, s * s, polynomials);
+      defect = larger(angle.antipode, defect);
+      P v[k], p(S(1));
+      v[k - 1] = angle.h * s;
+      P length2 = v[k - 1] * v[k - 1];
+      if constexpr (Weighted) p = P::load(data[numbers] + j);
+      residuals.addAngle(length2, p);
+      if constexpr (Frame) {
+        v[0] = P::load(data[2] + j) - y[2];
+        v[1] = P::load(data[3] + j) - y[3];
+        length2 += v[0] * v[0] + v[1] * v[1];
+      }
+      residuals.add(v, length2, p);
+    }
+  };
 };
 
 /// Points of N coordinates less those of the reference.

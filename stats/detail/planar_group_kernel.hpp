@@ -27,11 +27,11 @@ struct PlanarPoseKernel {
     std::size_t count = 0;
     S reference[4] = {};
     S defect, weight, squared_weight;
-    S rho[2], theta;   ///< Σ p ρ, Σ p θ
-    S excess;          ///< Σ p (1 - c)
-    S mixed[2];        ///< Σ p (1 - c)/θ ρ
-    S scatter[6];      ///< Σ p z zᵀ, z = (ρ, θ)
-    S squared_angle;   ///< Σ θ², without weights
+    S rho[2], theta;  ///< Σ p ρ, Σ p θ
+    S excess;         ///< Σ p (1 - c)
+    S mixed[2];       ///< Σ p (1 - c)/θ ρ
+    S scatter[6];     ///< Σ p z zᵀ, z = (ρ, θ)
+    S squared_angle;  ///< Σ θ², without weights
   };
 
   template <InstructionSet Set>
