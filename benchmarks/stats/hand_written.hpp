@@ -267,6 +267,31 @@ inline HandWrittenMean<Eigen::Quaterniond, 3> handWrittenMaha(const std::vector<
   return result;
 }
 
+/// The same of points.
+inline HandWrittenMean<Eigen::Vector3d, 3> handWrittenMaha(const std::vector<Eigen::Vector3d>& points,
+                                                           const std::vector<Eigen::Matrix3d>& covariances) {
+  HandWrittenMean<Eigen::Vector3d, 3> result;
+  std::vector<Eigen::Matrix3d> information;
+  information.reserve(covariances.size());
+  for (const Eigen::Matrix3d& c : covariances) information.push_back(c.llt().solve(Eigen::Matrix3d::Identity()));
+  result.mean = points.front();
+  Eigen::Matrix3d H;
+  for (double step = 1; step > HandWritten::tolerance && result.iterations < HandWritten::max_iterations;) {
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    H.setZero();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      g += information[i] * (result.mean - points[i]);
+      H += information[i];
+    }
+    const Eigen::Vector3d delta = -H.llt().solve(g);
+    result.mean += delta;
+    step = delta.norm();
+    ++result.iterations;
+  }
+  result.covariance = H.inverse();
+  return result;
+}
+
 /// The same of frames.
 inline HandWrittenMean<HandWrittenFrame, 6> handWrittenMaha(
     const std::vector<HandWrittenFrame>& frames, const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {

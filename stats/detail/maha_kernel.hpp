@@ -21,24 +21,24 @@
 
 namespace liestat::detail {
 
-/// Measurements lie in groups of eight, in a group number after number: the quaternion, the translation, and the lower
+/// Measurements lie in groups of 64 bytes a number, in a group number after number: the quaternion, the translation, and the lower
 /// triangle of the information, row by row.
-template <bool Frame>
+template <class S, bool Frame>
 struct MahaKernel {
-  static constexpr std::size_t k = Frame ? 6 : 3, entries = k * (k + 1) / 2, parameters = Frame ? 7 : 4, lanes = 8,
-                               numbers = parameters + entries, group_size = numbers * lanes;
+  static constexpr std::size_t k = Frame ? 6 : 3, entries = k * (k + 1) / 2, parameters = Frame ? 7 : 4,
+                               lanes = 64 / sizeof(S), numbers = parameters + entries, group_size = numbers * lanes;
   struct Arguments {
-    const double* groups = nullptr;
+    const S* groups = nullptr;
     std::size_t count = 0;  ///< groups
-    double reference[7] = {};
-    double to_y[3][3] = {};  ///< R_yᵀ
-    double cost, gradient[k], gauss_newton[entries];
-    double curvature[9];  ///< Σ (∂Jᵀ a/∂z) J, row by row
+    S reference[7] = {};
+    S to_y[3][3] = {};  ///< R_yᵀ
+    S cost, gradient[k], gauss_newton[entries];
+    S curvature[9];  ///< Σ (∂Jᵀ a/∂z) J, row by row
   };
 
   template <InstructionSet Set>
   LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
-    Run<Pack<Set>>::all(arguments);
+    Run<Pack<Set, S>>::all(arguments);
   }
 
  private:
@@ -54,39 +54,39 @@ struct MahaKernel {
     LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
       Run sums;
       for (std::size_t i = 0; i < arguments.count; ++i) {
-        const double* const group = arguments.groups + i * group_size;
+        const S* const group = arguments.groups + i * group_size;
         for (std::size_t j = 0; j < lanes; j += P::size) sums.add(arguments, group + j);
       }
-      arguments.cost = 0.5 * sumOf(sums.cost);
+      arguments.cost = S(0.5) * sumOf(sums.cost);
       for (std::size_t a = 0; a < k; ++a) arguments.gradient[a] = sumOf(sums.gradient[a]);
       for (std::size_t a = 0; a < entries; ++a) arguments.gauss_newton[a] = sumOf(sums.gauss_newton[a]);
       for (std::size_t a = 0; a < 9; ++a) arguments.curvature[a] = sumOf(sums.curvature[a]);
     }
 
-    LIESTAT_ALWAYS_INLINE static P number(const double* p, std::size_t which) { return P::load(p + which * lanes); }
+    LIESTAT_ALWAYS_INLINE static P number(const S* p, std::size_t which) { return P::load(p + which * lanes); }
     /// Index in the lower triangle of row i, column j of a symmetric matrix.
     static constexpr std::size_t entry(std::size_t i, std::size_t j) {
       return i >= j ? i * (i + 1) / 2 + j : entry(j, i);
     }
 
-    LIESTAT_ALWAYS_INLINE void add(const Arguments& arguments, const double* p) {
-      const double a = arguments.reference[0], b = arguments.reference[1], c = arguments.reference[2],
-                   d = arguments.reference[3];
+    LIESTAT_ALWAYS_INLINE void add(const Arguments& arguments, const S* p) {
+      const S a = arguments.reference[0], b = arguments.reference[1], c = arguments.reference[2],
+              d = arguments.reference[3];
       const P x0 = number(p, 0), x1 = number(p, 1), x2 = number(p, 2), x3 = number(p, 3);
       // x⁻¹ y.
       P u[3] = {x3 * a - x0 * d + (x2 * b - x1 * c), x3 * b - x1 * d + (x0 * c - x2 * a),
                 x3 * c - x2 * d + (x1 * a - x0 * b)};
       const P real = x0 * a + x1 * b + (x2 * c + x3 * d);
-      const auto back = real < 0.0;
+      const auto back = real < S(0);
       LIESTAT_UNROLL for (P& e : u) e = select(back, -e, e);
       const P w = absolute(real);
 
-      const auto& polynomials = any_rotation<double>;
-      const P variable = (1.0 - w) * (1 / polynomials.range) - 1.0;
+      const auto& polynomials = any_rotation<S>;
+      const P variable = (S(1) - w) * static_cast<S>(1 / polynomials.range) - S(1);
       const P f = evaluatePolynomial(polynomials.log, variable),
               g = evaluatePolynomial(polynomials.exact_hessian, variable),
               slope = evaluatePolynomial(polynomials.hessian_slope, variable);
-      const P u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], half = 0.5 * f, diagonal = 1.0 - g * u2;
+      const P u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2], half = S(0.5) * f, diagonal = S(1) - g * u2;
       P gu[3], hu[3], z[k], J[3][3], R[3][3];
       constexpr std::size_t r = Frame ? 3 : 0;
       LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) gu[i] = g * u[i], hu[i] = half * u[i], z[r + i] = f * u[i];
@@ -97,7 +97,7 @@ struct MahaKernel {
       if constexpr (Frame) {
         P twice[3], wu[3];
         LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) twice[i] = u[i] + u[i], wu[i] = w * twice[i];
-        const P scalar = 1.0 - 2.0 * u2;
+        const P scalar = S(1) - S(2) * u2;
         R[0][0] = scalar + twice[0] * u[0], R[1][1] = scalar + twice[1] * u[1], R[2][2] = scalar + twice[2] * u[2];
         R[0][1] = twice[0] * u[1] - wu[2], R[1][0] = twice[0] * u[1] + wu[2];
         R[0][2] = twice[0] * u[2] + wu[1], R[2][0] = twice[0] * u[2] - wu[1];
@@ -131,16 +131,16 @@ struct MahaKernel {
         addCongruence<3, 0>(p, J, R);
       }
 
-      const P inverse_f = 1.0 / f, first = g * inverse_f;
+      const P inverse_f = S(1) / f, first = g * inverse_f;
       const P ua = u[0] * ar[0] + u[1] * ar[1] + u[2] * ar[2];
-      const P second = (slope * f - 4.0 * g * g) * (0.5 * inverse_f);
+      const P second = (slope * f - S(4) * g * g) * (S(0.5) * inverse_f);
       // Row i of ∂Jᵀ a/∂z is first u_i aᵀ + row_i uᵀ + first (u·a) e_iᵀ + half of [a].
       P M[3][3], fu[3], row[3];
       LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {
         fu[i] = first * u[i];
         row[i] = second * (u[i] * ua - u2 * ar[i]) - (first + first) * ar[i];
       }
-      const P fua = first * ua, h0 = 0.5 * ar[0], h1 = 0.5 * ar[1], h2 = 0.5 * ar[2];
+      const P fua = first * ua, h0 = S(0.5) * ar[0], h1 = S(0.5) * ar[1], h2 = S(0.5) * ar[2];
       M[0][0] = fu[0] * ar[0] + row[0] * u[0] + fua;
       M[1][1] = fu[1] * ar[1] + row[1] * u[1] + fua;
       M[2][2] = fu[2] * ar[2] + row[2] * u[2] + fua;
@@ -156,7 +156,7 @@ struct MahaKernel {
 
     /// The block at (row, column) of the Gauss–Newton matrix: Aᵀ B C; of a diagonal block the lower triangle.
     template <std::size_t row, std::size_t column>
-    LIESTAT_ALWAYS_INLINE void addCongruence(const double* p, const P (&A)[3][3], const P (&C)[3][3]) {
+    LIESTAT_ALWAYS_INLINE void addCongruence(const S* p, const P (&A)[3][3], const P (&C)[3][3]) {
       P BC[3][3];
       LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {
         const P b0 = number(p, parameters + entry(row + i, column)),

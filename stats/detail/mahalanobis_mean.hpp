@@ -60,7 +60,7 @@ struct MahaProblem {
   std::vector<SquareOf<M>> information = {};
   /// The measurements for kernels, where there are such for these; then there is no information above.
   MahaGroups<M> groups = {};
-  bool by_kernels = HasMahaGroups<M> && at == CovarianceAt::measured && !likelihood;
+  bool by_kernels = HasMahaGroups<M> && (MahaModelsCoincide<M> || at == CovarianceAt::measured) && !likelihood;
 
   void reserve(std::size_t n) {
     if constexpr (HasMahaGroups<M>) {
@@ -83,13 +83,17 @@ struct MahaProblem {
     information.push_back(factor.inverse());
   }
 
+  /// True where the sums have the exact Hessian: the manifold's, or the kernel's.
+  bool hasHessian(const MahaSums<M>& sums) const { return second_order || (by_kernels && sums.hessian.allFinite()); }
+
   /// One measurement's part of the sums at y.
-  void add(std::size_t i, const M& y, MahaSums<M>& sums) const {
+  void add(std::size_t i, const M& y, MahaSums<M>& sums) const { add(i, information[i], y, sums); }
+  /// The same with its information B.
+  void add(std::size_t i, SquareOf<M> B, const M& y, MahaSums<M>& sums) const {
     const M& x = samples[i].mean;
     const bool measured = at == CovarianceAt::measured;
     const ErrorVector<M> e = measured ? errorVector(x, y) : errorVector(y, x);
     const SquareOf<M>& J = measured ? e.by_feature : e.by_base;
-    SquareOf<M> B = information[i];
     TangentOf<M> a = B * e.z;
     sums.cost += S(0.5) * e.z.dot(a);
     const SquareOf<M> BJ = B * J;
@@ -118,7 +122,12 @@ struct MahaProblem {
   MahaSums<M> evaluate(const E& executor, const M& y) const {
     MahaSums<M> sums;
     if (by_kernels) {
-      if constexpr (HasMahaGroups<M>) sums = groups.template evaluate<MahaSums<M>>(executor, y);
+      if constexpr (HasMahaGroups<M>) {
+        const auto general = [&](std::size_t i, MahaSums<M>& s) {
+          add(i, Cholesky<S, T::DoF>(samples[i].covariance).inverse(), y, s);
+        };
+        sums = groups.template evaluate<MahaSums<M>, second_order>(executor, y, general);
+      }
     } else {
       sums =
           sumOverData<MahaSums<M>>(executor, information.size(), [&](std::size_t i, MahaSums<M>& s) { add(i, y, s); });
@@ -133,6 +142,7 @@ struct MahaProblem {
     if constexpr (second_order) {
       return sums.hessian;
     } else {
+      if (hasHessian(sums)) return sums.hessian;
       using std::cbrt;
       const S h = cbrt(std::numeric_limits<S>::epsilon());
       SquareOf<M> H;
@@ -195,7 +205,7 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
   while (result.iterations < options.max_iterations) {
     TangentOf<M> step;
     bool newton = false;
-    if (MahaProblem<M, R>::second_order && options.method == MahaMethod::newton) {
+    if (options.method == MahaMethod::newton && problem.hasHessian(sums)) {
       const Cholesky<S, T::DoF> factor(sums.hessian);
       newton = factor.ok();
       if (newton) step = -factor.solve(sums.gradient);
