@@ -64,6 +64,9 @@ void handWritten(benchmark::State& state, Convert convert) {
   state.counters["iterations"] = iterations;
 }
 
+void handWrittenPoint(benchmark::State& state) {
+  handWritten<Eigen::Vector3d>(state, [](const Eigen::Vector3d& x) { return x; });
+}
 void handWrittenRotation(benchmark::State& state) {
   handWritten<SO3d>(state, [](const SO3d& x) { return Eigen::Quaterniond(x.unit_quaternion()); });
 }
@@ -75,6 +78,7 @@ void handWrittenFrame(benchmark::State& state) {
 
 constexpr CovarianceAt measured = CovarianceAt::measured, estimated = CovarianceAt::estimated;
 BENCHMARK(maha<Eigen::Vector3d, measured>)->Name("MAHA/point")->Apply(sizes);
+BENCHMARK(handWrittenPoint)->Name("hand_written/point")->Apply(sizes);
 BENCHMARK(maha<SO3d, measured>)->Name("MAHA/rotation")->Apply(sizes);
 BENCHMARK(handWrittenRotation)->Name("hand_written/rotation")->Apply(sizes);
 BENCHMARK(maha<Frame3d, measured>)->Name("MAHA/frame/measured")->Apply(sizes);

@@ -36,7 +36,9 @@ class MahaKernels : public testing::Test {
     return A * A.transpose() + S(0.01) * SquareOf<M>::Identity();
   }
   std::vector<Gaussian<M>> ring(const M& y, double angle, std::size_t n) {
-    constexpr int begin = k == 6 && !std::is_same_v<M, Eigen::Matrix<S, 6, 1>> ? 3 : std::is_same_v<M, Frame2<S>> ? 2 : 0;
+    constexpr int begin = k == 6 && !std::is_same_v<M, Eigen::Matrix<S, 6, 1>> ? 3
+                          : std::is_same_v<M, Frame2<S>>                       ? 2
+                                                                               : 0;
     std::vector<Gaussian<M>> data;
     for (std::size_t i = 0; i < n; ++i) {
       TangentOf<M> v = normal(1);
