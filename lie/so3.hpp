@@ -97,7 +97,7 @@ struct So3Math {
     S scale, w;
   };
   static EIGEN_ALWAYS_INLINE Logarithm logarithm(const Params& q) {
-    // Of any norm: products leave it a little off one.
+    // The quaternion may have any norm: products leave it slightly off one.
     const S inverse_norm = inverseNorm(S(q[0] * q[0] + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3])));
     const S signed_inverse = select(q[3] < S(0), S(-inverse_norm), inverse_norm);
     const S w = q[3] * signed_inverse;

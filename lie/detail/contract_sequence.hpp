@@ -53,7 +53,7 @@ class ContractSequence {
   std::vector<std::uint64_t> steps_;  ///< of each coordinate, in units of 2^-64
 };
 
-/// What the coordinates of a tangent space mean, and how far the angle goes.
+/// Meaning of the coordinates of a tangent space, and the range of the angle.
 struct ContractCoordinates {
   std::vector<bool> angular;      ///< a whole turn along it comes back
   std::vector<bool> logarithmic;  ///< matrices grow exponentially along it

@@ -47,7 +47,7 @@ inline void checkCompactFactor(const ManifoldOperations& m, ContractReport& repo
   bench.exact("compact_factor says how many numbers compactCoordinates has", fits ? 0 : infinity, {});
   if (!fits) return;
   const auto angle = [&](const Vector& a, const Vector& b) { return detail::compactAngle(s.compact_factor, a, b); };
-  // Of a quotient the nearest representative counts.
+  // On a quotient the nearest representative counts.
   const auto nearest = [&](const Point& x, const Vector& to) {
     double least = angle(s.compactCoordinates(x), to);
     for (const int i : m.representatives)

@@ -26,7 +26,7 @@ EssentialParts<S> essentialParts(const Eigen::Matrix<S, 3, 3>& E) {
   using std::sqrt;
   using Vector3 = Eigen::Matrix<S, 3, 1>;
   using Matrix3 = Eigen::Matrix<S, 3, 3>;
-  // Of norm √2, as [d] R has.
+  // The Frobenius norm becomes √2, that of [d] R.
   const Matrix3 unit = E * (S(1) / sqrt(S(0.5) * E.squaredNorm()));
   const Matrix3 cofactors = detail::cofactors(unit);
   Vector3 longest = cofactors.col(0);

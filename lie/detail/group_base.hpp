@@ -11,7 +11,7 @@
 
 namespace liestat::detail {
 
-/// What Eigen makes of an operation between two scalars: double and Jet give Jet.
+/// The scalar that Eigen gives an operation between two scalars: double and Jet give Jet.
 template <class A, class B>
 using CommonScalar = typename Eigen::ScalarBinaryOpTraits<A, B>::ReturnType;
 

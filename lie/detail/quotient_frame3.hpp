@@ -5,7 +5,7 @@
 
 namespace liestat {
 
-/// Which representative of a quotient feature is nearest to the origin.
+/// The index of the representative of a quotient feature that is nearest to the origin.
 template <class Scalar>
 struct RepresentativeChoice {
   int index = 0;            ///< 0 = as stored, else the half-turn about axis index - 1 (x, y, z)

@@ -11,7 +11,7 @@
 namespace liestat::detail {
 
 /// f and g on w >= 1 - 2 range: log and exact_hessian reach the rounding of their scalar; newton_hessian, good to eight
-/// digits, is for steps whose Hessian nobody sees.
+/// digits, is for steps whose Hessian is not returned.
 template <std::size_t Log, std::size_t Exact, std::size_t Newton>
 struct RotationPolynomials {
   double range;

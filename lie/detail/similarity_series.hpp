@@ -90,13 +90,13 @@ inline constexpr int similarity_doublings = 5;
 template <class S>
 inline constexpr std::size_t similarity_terms = is_single_precision<S> ? 10 : 18;
 
-/// Whether the series holds without doubling.
+/// True if the series holds without doubling.
 template <class S>
 inline auto inUnitDisc(const S& sigma, const S& t) {
   return sigma * sigma + t < S(1);
 }
 
-/// Whether the angle is far enough from zero for the closed forms.
+/// True if the angle is far enough from zero for the closed forms.
 template <class S>
 inline auto isFarTurned(const S& t) {
   return S(64) < t;

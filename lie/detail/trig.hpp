@@ -92,7 +92,7 @@ LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const
   return evaluatePolynomial<N>(c, x);
 }
 
-/// Of a power series as many terms as the scalar's precision can see.
+/// A power series in x, with as many terms as the scalar's precision resolves.
 template <class S, std::size_t SingleTerms, std::size_t N>
 LIESTAT_ALWAYS_INLINE S series(const std::array<double, N>& c, const S& x) {
   return evaluatePolynomial < is_single_precision<S> ? SingleTerms : N > (c, x);
