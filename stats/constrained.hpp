@@ -199,8 +199,8 @@ class ConstrainedEstimator {
     return std::get<I>(states_).expectedSquare(i, result_.covariance.template cast<double>());
   }
   /// How much of a measurement's equations the parameter fits by itself, tr(S_i⁻¹ C_i Λ C_iᵀ)/p_i: their mean is the
-  /// number of free parameters over that of equations. At 1 the correction of the measurement says nothing of its error,
-  /// and nobody else vouches for it. 0 without equations.
+  /// number of free parameters over that of equations. At 1 the correction of the measurement says nothing about its
+  /// error, and no other measurement checks it. 0 without equations.
   template <std::size_t I = 0>
   double leverage(std::size_t i) const {
     const int p = std::get<I>(states_).equationsOf(i);

@@ -12,7 +12,7 @@
 
 namespace liestat {
 
-/// What measurementError() returns.
+/// The result of measurementError().
 template <Homogeneous M>
 struct MeasurementError {
   double squared = 0;  ///< ‖m̃ - m‖²_Q; of an inlier of the true parameter χ² with `equations` degrees of freedom

@@ -1,4 +1,4 @@
-// Which of two models of the same measurements to believe: the tests of support and of cost between a model and one that
+// The choice between two models of the same measurements: the tests of support and of cost between a model and one that
 // contains it, and the criteria that they are measured against. Needs Eigen alone; the exact F test is in
 // stats/model_choice_f_test.hpp.
 //
@@ -18,7 +18,7 @@
 
 namespace liestat {
 
-/// How a model fits some measurements. Two fits are compared over the same measurements.
+/// The fit of a model to some measurements. Two fits are compared over the same measurements.
 struct ModelFit {
   double chi2 = 0;            ///< 2 L², the sum of squared errors in units of the noise
   std::size_t equations = 0;  ///< Σ p_i, of the measurements that the sum is over
@@ -37,7 +37,7 @@ struct ExponentialPhi {
   double operator()(double r, double r_general) const { return std::exp(-kappa * (r - r_general) / r); }
 };
 
-/// Whether the general model fits better by more than its freedom explains, L²'/r' < Φ(r, r') L²/r, (36). False where it
+/// True if the general model fits better by more than its freedom explains, L²'/r' < Φ(r, r') L²/r, (36). False where it
 /// has no fewer residual degrees of freedom, or one of the two has none.
 template <class Phi>
 bool fitRejects(const ModelFit& specific, const ModelFit& general, const Phi& phi) {
@@ -75,7 +75,7 @@ struct SupportTest {
   double guard = 9;
   double probability = 0.999;  ///< with which chance explains no more
 
-  /// How many such measurements chance and the freedom of the general model explain: ⌈f/p'⌉ + Binom⁻¹(P; far, π'), f its
+  /// The number of such measurements that chance and the freedom of the general model explain: ⌈f/p'⌉ + Binom⁻¹(P; far, π'), f its
   /// freedom beyond the specific model, π' the share of random measurements that it takes for inliers.
   std::size_t explained(std::size_t far, int freedom, int general_equations, double share) const {
     return static_cast<std::size_t>((std::max(0, freedom) + general_equations - 1) / general_equations) +
@@ -121,7 +121,7 @@ inline double fitKappa(std::span<const LabelledPair> pairs) {
   return kappa;
 }
 
-/// What the criteria below know of a model: squared errors of all measurements in units of the noise, the dimension of a
+/// The data of a model that the criteria below use: squared errors of all measurements in units of the noise, the dimension of a
 /// measurement and that of the set of true ones, d = n_i - p_i.
 struct CriterionInput {
   std::span<const double> errors;

@@ -51,7 +51,7 @@ struct Relevance {
   }
 };
 
-/// How many errors are below a threshold: the report's S_A, the score of RANSAC.
+/// The number of errors below a threshold: the report's S_A, the score of RANSAC.
 struct InlierCount {
   double threshold;
   static constexpr double lowest = 0;

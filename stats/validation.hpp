@@ -45,7 +45,7 @@
 
 namespace liestat {
 
-/// How many trials, and which.
+/// The number of trials and their seed.
 struct ValidationOptions {
   std::size_t trials = 1000;
   std::uint64_t seed = 0;

@@ -49,7 +49,7 @@ struct TrialStatistic {
 /// How far from perfect an estimator may be and still pass. Zero asks for the law itself, which a covariance of first
 /// order in the noise can only satisfy up to a certain number of trials.
 struct ValidationTolerance {
-  double index = 0;             ///< relative deviation of the validation index
+  double index = 0;             ///< relative error of the validation index
   double ks = 0;                ///< Kolmogorov-Smirnov distance between the true law of mu2 and the reference law
   double failure_fraction = 0;  ///< probability that a trial fails
   /// How much more often than due, 0.1 %, mu2 may exceed the 99.9 % quantile of the law. A covariance of first order is

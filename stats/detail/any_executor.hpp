@@ -1,4 +1,4 @@
-// One type for all executors of one process: an estimator that is dear to compile is instantiated once, whoever runs it.
+// One type for all executors of one process: an estimator that is slow to compile is instantiated once, whoever runs it.
 #pragma once
 
 #include <stats/executor.hpp>
@@ -50,7 +50,7 @@ class AnyExecutor {
   std::function<Part(std::size_t, const Map&, const Combine&)> reduce_;
 };
 
-/// The executor as estimators that are dear to compile see it.
+/// The executor as estimators that are slow to compile see it.
 template <Executor E>
 decltype(auto) erased(const E& executor) {
   if constexpr (InProcessExecutor<E> && !std::is_same_v<E, AnyExecutor>) {
