@@ -48,8 +48,8 @@ struct TwoViewMotionOptions {
 };
 
 /// The physical parameters of an estimated motion, and their covariance (first order). Directions and normals are three
-/// numbers of norm one, whose covariance has rank two; rotations are rotation vectors, whose deviations are those of the
-/// rotation's error in the axes of the first camera, R·Exp(e).
+/// numbers of norm one, whose covariance has rank two; rotations are rotation vectors, whose standard deviations are those
+/// of the rotation's error in the axes of the first camera, R·Exp(e).
 struct PhysicalParameters {
   std::vector<std::string> names;
   std::vector<std::string> units;  ///< px, rad or none
