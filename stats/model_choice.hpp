@@ -75,8 +75,9 @@ struct SupportTest {
   double guard = 9;
   double probability = 0.999;  ///< with which chance explains no more
 
-  /// The number of such measurements that chance and the freedom of the general model explain: ⌈f/p'⌉ + Binom⁻¹(P; far, π'), f its
-  /// freedom beyond the specific model, π' the share of random measurements that it takes for inliers.
+  /// The number of such measurements that chance and the freedom of the general model explain:
+  /// ⌈f/p'⌉ + Binom⁻¹(P; far, π'), f its freedom beyond the specific model, π' the share of random measurements that it
+  /// takes for inliers.
   std::size_t explained(std::size_t far, int freedom, int general_equations, double share) const {
     return static_cast<std::size_t>((std::max(0, freedom) + general_equations - 1) / general_equations) +
            binomialQuantile(probability, far, share);
@@ -121,8 +122,8 @@ inline double fitKappa(std::span<const LabelledPair> pairs) {
   return kappa;
 }
 
-/// The data of a model that the criteria below use: squared errors of all measurements in units of the noise, the dimension of a
-/// measurement and that of the set of true ones, d = n_i - p_i.
+/// The data of a model that the criteria below use: squared errors of all measurements in units of the noise, the
+/// dimension of a measurement and that of the set of true ones, d = n_i - p_i.
 struct CriterionInput {
   std::span<const double> errors;
   int measurement_dimension = 1, equations = 1, free_parameters = 0;
