@@ -37,7 +37,7 @@ struct ImuOptions {
   }
 };
 
-/// Declares --imu, --noise, both biases, --scheme and --largest-gap. `bias` says what a bias is taken for that is not
+/// Declares --imu, --noise, both biases, --scheme and --max-gap. `bias` says what a bias is taken for that is not
 /// given.
 inline void addImuOptions(const Command& command, ImuOptions& options, const std::string& bias) {
   command.option("--imu", options.file, "EuRoC's imu0/data.csv, or CSV with t,wx,wy,wz,ax,ay,az ('-': standard input)")
@@ -51,8 +51,8 @@ inline void addImuOptions(const Command& command, ImuOptions& options, const std
   command.option("--accelerometer-bias", options.accelerometer_bias, "m/s^2, x,y,z" + bias).list(3, 3);
   command.choice<ImuScheme>("--scheme", options.scheme,
                             {{"averaged", ImuScheme::averaged}, {"held", ImuScheme::held}, {"cubic", ImuScheme::cubic}},
-                            "Of integration: averaged (default), held, cubic");
-  command.option("--largest-gap", options.largest_gap, "s between two readings (default 0.1)").positive();
+                            "Integration scheme: averaged (default), held, cubic");
+  command.option("--max-gap", options.largest_gap, "s between two readings (default 0.1)").positive();
 }
 
 }  // namespace liestat::cli

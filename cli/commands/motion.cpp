@@ -253,11 +253,11 @@ void addMotionCommand(const CommandList& app) {
   command.option("--image-times", input.image_times, "EuRoC's cam0/data.csv, or CSV frame,t_s (default: a column t_s)");
   command.option("--gyroscope-noise", input.gyroscope_noise, "rad/s/rtHz (default: the calibration's)").positive();
   command.option("--gyroscope-bias", input.gyroscope_bias, "rad/s, x,y,z in the sensor's axes (default 0)").list(3, 3);
-  command.option("--largest-gap", input.largest_gap, "s between two readings (default 0.1)").positive();
+  command.option("--max-gap", input.largest_gap, "s between two readings (default 0.1)").positive();
   command.flag("--bias", options->bias, "The gyroscope's bias is a state of the filter");
   command.option("--bias-sigma", options->bias_sigma, "rad/s: of the bias at the start (default 0.02)").positive();
   command.option("--truth", options->truth, "CSV frame,t_s,R00..R22,cx,cy,cz of the camera, to compare with");
-  command.option("--least-motion", options->least_motion, "m: directions of less are not compared (default 0.1)")
+  command.option("--min-motion", options->least_motion, "m: directions of less are not compared (default 0.1)")
       .notNegative();
   command.choice(
       "--flow", options->flow,

@@ -127,7 +127,7 @@ int runCommand(Options options, const Invocation& invocation) {
 void addSimulateHandEyeCommand(const CommandList& simulate) {
   auto options = std::make_shared<Options>();
   const Command command =
-      simulate.add("hand-eye", "Poses of a gripper and of the camera on it, wrong ones among them, for hand-eye");
+      simulate.add("hand-eye", "Poses of a gripper and of the camera on it, including wrong ones, for hand-eye");
   command.option("--output", options->output, "Directory for a.csv, b.csv (a.txt, b.txt) and truth.json").required();
   command.flag("--overwrite", options->overwrite, "Replace files of these names");
   command.option("--format", options->format, "csv with covariances (default), or tum without").oneOf({"csv", "tum"});

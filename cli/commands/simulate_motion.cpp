@@ -95,7 +95,7 @@ std::string commandOf(const Options& options, bool inertial) {
   if (!options.gyroscope_bias.empty()) words.emplace_back("--bias");
   if (scene.outliers > 0) words.emplace_back("--outliers");
   if (scene.sigma > 0) add("--sigma", fmt::format("{:g}", scene.sigma));
-  add("--truth", options.path("truth.csv")), add("--least-motion", "0");
+  add("--truth", options.path("truth.csv")), add("--min-motion", "0");
   std::vector<const char*> pointers;
   for (const std::string& word : words) pointers.push_back(word.c_str());
   return commandLine(static_cast<int>(pointers.size()), pointers.data());

@@ -112,7 +112,7 @@ int runCommand(Options options, const Invocation& invocation) {
 
 void addSimulateTwoViewCommand(const CommandList& simulate) {
   auto options = std::make_shared<Options>();
-  const Command command = simulate.add("two-view", "Matches between two images, wrong ones among them, for two-view");
+  const Command command = simulate.add("two-view", "Matches between two images, including wrong ones, for two-view");
   command.option("--output", options->output, "CSV file x1,y1,x2,y2,inlier ('-': standard output)").required();
   command.option("--truth", options->truth, "JSON file of the motion");
   command.flag("--overwrite", options->overwrite, "Replace files of these names");

@@ -108,7 +108,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
 void addTwoViewCommand(const CommandList& program) {
   auto options = std::make_shared<Options>();
   const Command command =
-      program.add("two-view", "How the camera moved between two images, from matches, wrong ones among them");
+      program.add("two-view", "How the camera moved between two images, from matches of which some may be wrong");
   command.option("file", options->file, "CSV with the columns x1,y1,x2,y2 (px); '-' is standard input").required();
   command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv of the camera, px (default: not known)").list(4, 4);
   command.option("--second-intrinsics", options->second_intrinsics, "The same of the second image's (default: equal)")

@@ -159,7 +159,7 @@ void addViInitCommand(const CommandList& app) {
   VisualInertialOptions& how = options->how;
   InitialisationOptions& steps = how.initialisation;
   const Command command =
-      app.add("vi-init", "Velocity, gravity and scale out of a camera and an inertial sensor, without a first guess");
+      app.add("vi-init", "Velocity, gravity and scale from a camera and an inertial sensor, without an initial guess");
   addImuOptions(command, options->imu, ": as it is expected (default 0)");
   command.option("--tracks", options->tracks, "CSV with frame,track,u,v and, without --image-times, t_s").required();
   command.option("--image-times", options->image_times, "EuRoC's cam0/data.csv, or CSV with frame,t_s");
@@ -177,15 +177,15 @@ void addViInitCommand(const CommandList& app) {
       .range(1e-3, 1e4);
   command.option("--image-rate", how.image_rate, "Hz: images that are used, at most (default 10; 0: all)")
       .range(0., 1e4);
-  command.option("--features", how.max_features, "A window, at most (default 50; 0: all)");
-  command.option("--least-observations", how.min_observations, "Of a feature in a window (default 4)")
+  command.option("--features", how.max_features, "Most features of a window (default 50; 0: all)");
+  command.option("--min-observations", how.min_observations, "Fewest observations of a feature in a window (default 4)")
       .range(std::size_t{2}, std::size_t{1000});
   command.option("--gravity", options->gravity, "|G|, m/s^2 (default 9.81)").range(1e-3, 1e3);
   command.flag("--free-gravity", options->free_gravity, "|G| is not known");
-  command.option("--gyroscope-deviation", steps.prior.gyroscope_sigma, "rad/s, of its expected bias (default 0.1)")
+  command.option("--gyroscope-bias-sigma", steps.prior.gyroscope_sigma, "rad/s, of its expected bias (default 0.1)")
       .range(1e-9, 10.);
   command
-      .option("--accelerometer-deviation", steps.prior.accelerometer_sigma,
+      .option("--accelerometer-bias-sigma", steps.prior.accelerometer_sigma,
               "m/s^2, of its expected bias (default 0.15)")
       .range(1e-9, 100.);
   command.flag("--known-biases", options->known_biases, "Biases are as they are expected: nothing is estimated");
@@ -199,7 +199,7 @@ void addViInitCommand(const CommandList& app) {
   command.option("--begin", how.begin, "s since the first reading, or the file's seconds (default: the first image)");
   command.option("--end", how.end, "The same (default: the last image)");
   command.option("--truth", options->truth, "EuRoC's ground truth, to compare with");
-  command.option("--seed", steps.consensus.seed, "Of the consensus");
+  command.option("--seed", steps.consensus.seed, "Seed of the consensus");
   command.option("--json", options->json, "Write everything to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });

@@ -189,8 +189,8 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
   if (!result.fusions.empty()) {
     text +=
         "\nDisjoint windows together, at the last image of each stretch; chi2 and its p say\nwhether they agree; then "
-        "deviations of gravity and the biases";
-    text += with_truth ? ", and what is off:\n" : ":\n";
+        "standard deviations of gravity and of the biases";
+    text += with_truth ? ",\nand what is off:\n" : ":\n";
     text += fusionTable(result, with_truth);
     text += contradictionsInWords(result.fusions);
   }

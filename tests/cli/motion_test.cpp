@@ -86,7 +86,7 @@ TEST(MotionCommand, realGyroscopeWithFewTracks) {
                                     "484.49985,484.49985,321.68048,247.48145",
                                     "--truth",
                                     stem + "_poses.csv",
-                                    "--least-motion",
+                                    "--min-motion",
                                     "0.01",
                                     "--rates",
                                     stem + "_poses.csv",
@@ -144,7 +144,7 @@ class Simulated {
                                    *this / "calibration.yaml",
                                    "--truth",
                                    *this / "truth.csv",
-                                   "--least-motion",
+                                   "--min-motion",
                                    "0",
                                    "--json",
                                    *this / "out.json"};
@@ -387,8 +387,8 @@ TEST(MotionCommand, ReadingsWithAGap) {
   EXPECT_NE(gap["frames"][30]["no_gyroscope"].get<std::string>().find("no reading from 3.020000 to 3.490000 s"),
             std::string::npos);
   EXPECT_LT(directionError(gap), 0.8);
-  EXPECT_EQ(
-      files.json({"--imu", files / "gap.csv", "--sigma", "1", "--largest-gap", "0.6"})["frames_without_gyroscope"], 0);
+  EXPECT_EQ(files.json({"--imu", files / "gap.csv", "--sigma", "1", "--max-gap", "0.6"})["frames_without_gyroscope"],
+            0);
   // An end before that of the images.
   files.write("short.csv", without(files.content("imu.csv"), 4.01, 100));
   const Json early = files.json({"--imu", files / "short.csv", "--sigma", "1"});
@@ -772,7 +772,7 @@ TEST(MotionCommand, ReportOfLargeRotationShowsTheDisplacedMinimum) {
                               30, 3);
   const std::string page = scene.directory / "page";
   const ProgramResult result =
-      run(scene.words({"--report", page, "--report-frame", "25", "--sigma", "0.3", "--least-motion", "0.01"}));
+      run(scene.words({"--report", page, "--report-frame", "25", "--sigma", "0.3", "--min-motion", "0.01"}));
   ASSERT_EQ(result.status, 0) << result.errors;
   Rows rows = rowsOf(contentOf(page + "/residual.csv"));
   const auto offset = [&](const std::string& flow) {

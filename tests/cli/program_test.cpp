@@ -131,7 +131,7 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
                                                     {"mean", "f.csv", "--budget", "-1"},
                                                     {"validate", "means", "--seed", "-1"},
                                                     {"validate", "means", "--spread", "1,-nan"},
-                                                    {"vi-init", "--imu", "i", "--tracks", "t", "--largest-gap", "nan"},
+                                                    {"vi-init", "--imu", "i", "--tracks", "t", "--max-gap", "nan"},
                                                     {"simulate", "vi", "--output", "d", "--box", "1,nan,1"},
                                                     {"motion"},
                                                     {"motion", "t.csv", "--sigma", "-1"},

@@ -189,7 +189,7 @@ TEST(ViInit, WhatCannotBeUsedIsSaid) {
   const Json gap = Json::parse(contentOf(directory / "gap.json"));
   EXPECT_EQ(gap.at("windows")[0].at("status"), "gap");
   EXPECT_EQ(gap.at("tracks_seen_once"), 1);
-  outcome = with({"--image-times", "times.csv", "--window", "0.2", "--largest-gap", "5", "--json", "few.json"});
+  outcome = with({"--image-times", "times.csv", "--window", "0.2", "--max-gap", "5", "--json", "few.json"});
   EXPECT_EQ(outcome.status, 3) << "hardly any feature: no answer, and no crash";
   EXPECT_EQ(Json::parse(contentOf(directory / "few.json")).at("windows")[0].at("status"), "no_features");
   EXPECT_NE(on({"--image-times", "times.csv"}).errors.find("no camera is known"), std::string::npos);
