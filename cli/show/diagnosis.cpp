@@ -134,7 +134,7 @@ std::string formatDiagnosis(const DiagnosisOutput& output) {
     for (std::size_t k = 0; k < std::min<std::size_t>(6, d.fits.size()); ++k) {
       const HypothesisFit& f = d.fits[k];
       if (std::isinf(f.log_likelihood)) break;
-      table.row({number(-f.log_likelihood, 4), number(f.nees_ratio, 3), optionOf(f.convention),
+      table.row({number(0 - f.log_likelihood, 4), number(f.nees_ratio, 3), optionOf(f.convention),
                  f.fault == MatrixFault::none ? "" : name(f.fault)});
     }
     text += table.str();
