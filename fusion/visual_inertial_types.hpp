@@ -82,6 +82,8 @@ struct VisualInertialOptions {
   /// observations; the accelerometer's bias is estimated in closed form in windows of two seconds and more, because it
   /// is not told in less (docs/theory/visual_inertial.md, section 3.5).
   InitialisationOptions initialisation = {};
+  /// Asked before each window; once it says true, no further window is estimated.
+  std::function<bool()> stop = {};
 };
 
 /// One window.
@@ -153,6 +155,7 @@ struct VisualInertialResult {
   std::vector<FusedStretch> stretches;
   double bearing_noise = 0;        ///< rad, the median of the observations
   std::size_t images_outside = 0;  ///< that the readings do not cover
+  std::size_t windows_left = 0;    ///< that were not estimated, because of options.stop
 };
 
 }  // namespace liestat

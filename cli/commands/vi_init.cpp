@@ -7,6 +7,7 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
+#include <experiments/interruption.hpp>
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
 
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <span>
@@ -128,15 +130,20 @@ NoiseCalibration calibrate(const VisualInertialRecording& measured, const Visual
 int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
   VisualInertialRecording measured = measurementsOf(recording, options);
-  const VisualInertialOptions how = optionsOf(recording, options);
+  VisualInertialOptions how = optionsOf(recording, options);
   std::optional<NoiseCalibration> noise;
   if (options.calibrate_noise) {
     noise = calibrate(measured, how);
     measured.noise = noise->noise;
   }
-  VisualInertialResult found = withProgressBar("vi-init", [&](const auto& progress) {
+  how.stop = experiments::runStopped;
+  VisualInertialResult found = runTrials("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
   });
+  if (found.windows.empty() && found.windows_left > 0) {
+    std::fputs("liestat: interrupted before the first window ended: there is nothing to write\n", stderr);
+    return exit_interrupted;
+  }
   refuseFault(found, measured, recording.imu.start_ns, how, command_name);
   ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
   result.biases_given = options.known_biases || options.true_biases;
@@ -149,6 +156,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     writeJson(options.json, object);
   }
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
+  if (result.windows_left > 0) return exit_interrupted;
   return result.trusted() ? exit_fine : exit_not_trusted;
 }
 

@@ -98,7 +98,7 @@ bool ViInitResult::trusted() const {
   // Stretches without a second window have nothing to contradict.
   const bool fused =
       fusions.empty() || std::any_of(fusions.begin(), fusions.end(), [](const ViFusion& f) { return f.ok(); });
-  return okWindows() > 0 && fused;
+  return windows_left == 0 && okWindows() > 0 && fused;
 }
 
 ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& recording, std::optional<double> gravity) {
@@ -106,6 +106,7 @@ ViInitResult compareWithTruth(VisualInertialResult found, const ViRecording& rec
   result.gravity = gravity;
   result.bearing_noise = found.bearing_noise;
   result.images_outside = found.images_outside;
+  result.windows_left = found.windows_left;
   for (InitialisedWindow& window : found.windows) {
     ViWindow& w = result.windows.emplace_back();
     static_cast<InitialisedWindow&>(w) = std::move(window);

@@ -55,9 +55,10 @@ struct ViInitResult {
   double bearing_noise = 0;               ///< rad
   std::size_t images_outside = 0;         ///< that the readings do not cover
   std::size_t observations_outside = 0;   ///< pixels that the lens' model can't explain
+  std::size_t windows_left = 0;           ///< not estimated, because of an interrupt
 
   std::size_t okWindows() const;
-  /// A window is ok, and where windows were fused, those of a stretch agree.
+  /// Nothing was interrupted, a window is ok, and where windows were fused, those of a stretch agree.
   bool trusted() const;
 };
 

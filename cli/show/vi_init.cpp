@@ -161,6 +161,10 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
   const bool with_truth = !recording.truth.empty();
   std::string text = windowTable(result, with_truth);
   const ViInitSummary summary(result);
+  if (result.windows_left > 0) {
+    text += fmt::format("\ninterrupted: {} of {} windows\n", result.windows.size(),
+                        result.windows.size() + result.windows_left);
+  }
   text += fmt::format("\n{} windows:", result.windows.size());
   for (const auto& [status, count] : summary.statuses) text += fmt::format(" {} {}", count, status);
   text += "\n";

@@ -153,6 +153,7 @@ void setViInit(JsonObject& object, const ViRecording& recording, const ViInitRes
   object.set("camera_pose_assumed", recording.pose_assumed);
   object.set("tracks_seen_once", recording.tracks.seen_once).set("images_outside", result.images_outside);
   object.set("observations_outside", result.observations_outside).set("bearing_noise", result.bearing_noise);
+  if (result.windows_left > 0) object.set("interrupted", true).set("windows_left", result.windows_left);
   object.set("gravity", result.gravity);
   object.set("noise_calibration", result.noise ? std::optional(toJson(*result.noise)) : std::nullopt);
   const ViInitSummary summary(result);

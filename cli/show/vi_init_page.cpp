@@ -283,10 +283,11 @@ void writeViInitReport(const std::string& directory, const std::string& command_
   const bool with_truth = !recording.truth.empty();
   Report report(directory, "Visual-inertial initialisation");
   const std::size_t ok = result.okWindows(), n = result.windows.size();
-  report.verdict(result.trusted(), result.trusted() ? fmt::format("{} of {} windows are ok.", ok, n)
-                                   : ok == 0
-                                       ? fmt::format("Not to be trusted: none of {} windows is ok.", n)
-                                       : "Not to be trusted: the windows contradict each other in every stretch.");
+  report.verdict(result.trusted(),
+                 result.trusted()          ? fmt::format("{} of {} windows are ok.", ok, n)
+                 : result.windows_left > 0 ? fmt::format("Interrupted: {} of {} windows.", n, n + result.windows_left)
+                 : ok == 0                 ? fmt::format("Not to be trusted: none of {} windows is ok.", n)
+                                           : "Not to be trusted: the windows contradict each other in every stretch.");
   report.code(command_line);
   report.code(viInitTable(recording, result));
   report.section("Trajectory");

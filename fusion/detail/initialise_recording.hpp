@@ -41,6 +41,10 @@ initialiseRecording(const VisualInertialRecording& recording, const VisualInerti
   if (windows.empty()) result.fault = FaultKind::too_few_images;
   ImuBias<double> bias = options.initialisation.prior.mean;
   for (const std::vector<std::size_t>& images : windows) {
+    if (options.stop && options.stop()) {
+      result.windows_left = windows.size() - result.windows.size();
+      break;
+    }
     if (progress) progress(result.windows.size(), windows.size());
     result.windows.push_back(run.estimate(images, bias, result.windows.size()));
     // Biases hardly change from window to window.

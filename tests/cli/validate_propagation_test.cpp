@@ -91,11 +91,19 @@ TEST(ValidatePropagation, aRunThatIsStoppedIsPartial) {
 
 TEST(ValidatePropagationProgram, anInterruptLeavesWhatWasComputed) {
   const TemporaryDirectory directory;
-  // timeout sends it; hours are left. A run that takes longer to begin says that it computed nothing.
-  const ProgramResult result = runProgram(
-      {"timeout", "--preserve-status", "-s", "INT", "1.5", LIESTAT_PROGRAM, "validate", "propagation", "--trials",
-       "100000000", "--feature", "rotation", "--operation", "inverse", "--json", "out.json", "--report", "report"},
-      directory.path().string());
+  // timeout sends it; hours are left. A run that takes longer to begin says that it computed nothing. Where the tests run
+  // in the background interrupts are ignored, and the program would heed that.
+  const ProgramResult result = runProgram({"env",         "--default-signal=INT",
+                                           "timeout",     "--preserve-status",
+                                           "-s",          "INT",
+                                           "1.5",         LIESTAT_PROGRAM,
+                                           "validate",    "propagation",
+                                           "--trials",    "100000000",
+                                           "--feature",   "rotation",
+                                           "--operation", "inverse",
+                                           "--json",      "out.json",
+                                           "--report",    "report"},
+                                          directory.path().string());
   EXPECT_EQ(result.status, 130) << result.errors;
   EXPECT_NE(result.errors.find("liestat: interrupted"), std::string::npos) << result.errors;
   if (result.errors.find("nothing to write") != std::string::npos) return;

@@ -78,6 +78,23 @@ TEST(VisualInertial, InitialisesARecording) {
   EXPECT_EQ(again.stretches[0].chi2, all.chi2);
 }
 
+TEST(VisualInertial, StopsBetweenWindows) {
+  const Flight flight;
+  VisualInertialOptions options{.stride = 2.2, .stretch = 0};
+  const auto all = initialiseRecording(flight.recording, options);
+  ASSERT_EQ(all.windows.size(), 3u);
+  EXPECT_EQ(all.windows_left, 0u);
+  for (const std::size_t most : {0u, 1u, 2u}) {
+    std::size_t asked = 0;
+    options.stop = [&] { return asked++ >= most; };
+    const auto part = initialiseRecording(flight.recording, options);
+    EXPECT_FALSE(part.fault);
+    ASSERT_EQ(part.windows.size(), most);
+    EXPECT_EQ(part.windows_left, 3 - most);
+    for (std::size_t i = 0; i < most; ++i) EXPECT_EQ(part.windows[i].refined->cost, all.windows[i].refined->cost);
+  }
+}
+
 TEST(VisualInertial, KnownBiasesAreNotEstimated) {
   const Flight flight;
   VisualInertialOptions options{.window = 2, .end = 2.05};
