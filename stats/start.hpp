@@ -6,6 +6,7 @@
 
 #include <lie/detail/part_tuple.hpp>
 #include <lie/manifold.hpp>
+#include <stats/detail/factor_range.hpp>
 #include <stats/detail/kernel_sums.hpp>
 #include <stats/detail/moment_kernel.hpp>
 #include <stats/detail/weights_of_one.hpp>
@@ -61,20 +62,6 @@ M bestOfSeveral(InstructionSet set, const R& samples, const W& weights, std::siz
   }
   return samples[best];
 }
-
-/// The factors of M, as a std::tuple.
-template <Factored M>
-using FactorsOf = std::decay_t<decltype(ManifoldTraits<M>::factors(std::declval<const M&>()))>;
-
-/// The I-th factors of a range of features, as they are asked for.
-template <std::size_t I, Factored M, class R>
-struct FactorRange {
-  const R& samples;
-  std::size_t size() const { return std::ranges::size(samples); }
-  std::tuple_element_t<I, FactorsOf<M>> operator[](std::size_t k) const {
-    return std::get<I>(ManifoldTraits<M>::factors(samples[k]));
-  }
-};
 
 /// Manifolds whose start is the mean itself: linear spaces.
 template <Homogeneous M>

@@ -3,8 +3,9 @@
 
 #include <lie/manifold.hpp>
 #include <stats/detail/compact_part.hpp>
-#include <stats/detail/packing.hpp>
+#include <stats/detail/factor_range.hpp>
 #include <stats/detail/kernel_sums.hpp>
+#include <stats/detail/packing.hpp>
 #include <stats/detail/weights_of_one.hpp>
 #include <stats/executor.hpp>
 
@@ -14,7 +15,9 @@
 #include <limits>
 #include <ranges>
 #include <span>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace liestat::detail {
@@ -142,6 +145,43 @@ void addTerms(const R& samples, const W& weights, const M& y, const ChunkRange& 
   if constexpr (Scatter && !weighted) pass.scatter.squared = pass.scatter.scatter;
 }
 
+template <bool Scatter, Metric M, class R, class W>
+bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
+                     MeanPass<M>& pass);
+
+/// The terms of the I-th factors of products: cost, gradient and Hessian are those of the factors. The scatter is not: it
+/// has blocks of two factors.
+template <std::size_t I, Metric M, class R, class W>
+void addTermsOfFactor(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
+                      MeanPass<M>& pass, int& begin) {
+  using Factor = std::tuple_element_t<I, FactorsOf<M>>;
+  constexpr int k = ManifoldTraits<Factor>::DoF;
+  const FactorRange<I, M, R> factors{samples};
+  const Factor at = std::get<I>(ManifoldTraits<M>::factors(y));
+  MeanPass<Factor> part;
+  if (!addTermsByPacks<false>(set, factors, weights, at, range, part)) {
+    part = {};
+    addTerms<false>(factors, weights, at, range, part);
+  }
+  pass.sums.cost += part.sums.cost;
+  pass.sums.gradient.template segment<k>(begin) = part.sums.gradient;
+  pass.sums.hessian.template block<k, k>(begin, begin) = part.sums.hessian;
+  pass.sums.weight = part.sums.weight;
+  begin += k;
+}
+
+/// Products one of whose factors has a kernel.
+template <class M>
+constexpr bool hasFactorSums() {
+  if constexpr (Factored<M>) {
+    return []<class... Factor>(std::type_identity<std::tuple<Factor...>>) {
+      return ((HasKernelSums<Factor> || hasFactorSums<Factor>()) || ...);
+    }(std::type_identity<FactorsOf<M>>());
+  } else {
+    return false;
+  }
+}
+
 /// The same several features at a time, for the manifolds that have it; false where that does not apply to the data.
 template <bool Scatter, Metric M, class R, class W>
 bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
@@ -154,6 +194,13 @@ bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, con
     if constexpr (Scatter) {
       pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap, sums.largest_angle, sums.fourth};
     }
+    return true;
+  } else if constexpr (hasFactorSums<M>() && !Scatter) {
+    int begin = 0;
+    [&]<std::size_t... I>(std::index_sequence<I...>) {
+      (addTermsOfFactor<I>(set, samples, weights, y, range, pass, begin), ...);
+    }
+    (std::make_index_sequence<std::tuple_size_v<FactorsOf<M>>>{});
     return true;
   } else {
     return false;

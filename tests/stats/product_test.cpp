@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace {
@@ -42,6 +44,53 @@ TYPED_TEST(ProductTest, MeanIsThatOfTheParts) {
   const SquareOf<M> covariance = covarianceFromResiduals(whole);
   EXPECT_LE((M::template covarianceBlock<0, 0>(covariance) - covarianceFromResiduals(first)).norm(), 1e-12);
   EXPECT_LE((M::template covarianceBlock<1, 1>(covariance) - covarianceFromResiduals(second)).norm(), 1e-12);
+}
+
+// Sums by the kernels of the factors against the product's own operations, for every set of instructions.
+template <class M>
+void compareSums(double spread) {
+  const auto samples = scattered<M>(203, spread);
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < samples.size(); ++i) weights.push_back(0.5 + 0.01 * static_cast<double>(i));
+  const detail::Samples<M> features(samples);
+  const detail::Samples<double> numbers(weights);
+  const M y = exp(samples[3], TangentOf<M>(TangentOf<M>::Constant(static_cast<ScalarOf<M>>(0.1 * spread))));
+  const ChunkRange range{5, 203};
+  const double eps = static_cast<double>(std::numeric_limits<ScalarOf<M>>::epsilon());
+  detail::MeanPass<M> expected, weighted;
+  detail::addTerms<false>(features, detail::UnitWeights{}, y, range, expected);
+  detail::addTerms<false>(features, numbers, y, range, weighted);
+  const auto isNear = [&](const detail::MeanPass<M>& a, const detail::MeanPass<M>& b) {
+    // Residuals are differences of coordinates of size one, known to their rounding.
+    const double rounding = 20 * eps * b.sums.weight;
+    EXPECT_NEAR(a.sums.cost, b.sums.cost, rounding * spread);
+    EXPECT_LE((a.sums.gradient - b.sums.gradient).norm(), rounding);
+    // Without the scatter kernels take a Hessian for the next step, from shorter polynomials.
+    EXPECT_LE((a.sums.hessian - b.sums.hessian).norm(), 3e-7 * b.sums.weight + rounding);
+    EXPECT_NEAR(a.sums.weight, b.sums.weight, rounding);
+  };
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (set > supportedInstructionSet()) continue;
+    SCOPED_TRACE(name(set));
+    detail::MeanPass<M> part, part_weighted;
+    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, detail::UnitWeights{}, y, range, part));
+    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, numbers, y, range, part_weighted));
+    isNear(part, expected);
+    isNear(part_weighted, weighted);
+  }
+}
+TEST(Product, SumsByFactorsAreItsOwn) {
+  for (double spread = 1e-6; spread < 1; spread *= 10) {
+    SCOPED_TRACE(spread);
+    compareSums<Product<SO3d, S2d, Vector2d>>(spread);
+    compareSums<Product<Vector2d, SemiOrientedFrame3d>>(spread);
+    compareSums<Product<SO3f, SO2f>>(spread);
+  }
+  // One that is not finite is seen by the factor's own operations.
+  using M = Product<SO3d, Vector2d>;
+  auto samples = scattered<M>(20, 0.3);
+  samples[7].get<1>()[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(mean(samples).status, Status::not_converged);
 }
 
 // The frame's order of blocks is (translation, rotation).
