@@ -153,12 +153,15 @@ class InertialScene {
   void drawMotion(CounterRng& random) {
     using M = SceneMotion;
     const M kind = options_.motion;
-    start_ = SO3d::exp(3 * random.uniform(0, 1) * random.unitVector<3>());
+    // One draw in an expression: in which order the operands of a product are evaluated is the compiler's choice.
+    const Eigen::Vector3d turned = random.unitVector<3>();
+    start_ = SO3d::exp(3 * random.uniform(0, 1) * turned);
     velocity_ = random.unitVector<3>();
     acceleration_ = Eigen::Vector3d::Zero();
     const Eigen::Vector3d line = random.unitVector<3>(), normal = random.unitVector<3>();
     if (kind == M::constant_acceleration) {
-      acceleration_ = options_.acceleration * 1.7 * random.uniform(0.7, 1.3) * random.unitVector<3>();
+      const Eigen::Vector3d direction = random.unitVector<3>();
+      acceleration_ = options_.acceleration * 1.7 * random.uniform(0.7, 1.3) * direction;
       if (options_.level_acceleration) acceleration_.z() = 0;
     }
     if (kind == M::free_fall) acceleration_ = -g * Eigen::Vector3d::UnitZ();
@@ -199,7 +202,8 @@ class InertialScene {
     const Eigen::Vector3d along = random.unitVector<3>(), plane = random.unitVector<3>();
     for (std::size_t i = 0; i < options_.features; ++i) {
       // A cone of 80 degrees, 2 to 8 m away.
-      Eigen::Vector3d direction = ahead + 0.7 * random.uniform(0, 1) * random.unitVector<3>();
+      const Eigen::Vector3d aside = random.unitVector<3>();
+      const Eigen::Vector3d direction = ahead + 0.7 * random.uniform(0, 1) * aside;
       Eigen::Vector3d p = centre + options_.far * random.uniform(2, 8) * direction.normalized();
       if (options_.layout == SceneLayout::coplanar) p = position(0) + flatten(p - position(0), normal_);
       if (options_.layout == SceneLayout::plane) p = centre + 4 * ahead + 2 * flatten(random.normalVector<3>(), plane);

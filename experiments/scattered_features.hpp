@@ -73,14 +73,21 @@ class FisherLaw {
     } else if constexpr (std::is_same_v<F, SO2d>) {
       return SO2d(circle_.draw(rng));
     } else if constexpr (std::is_same_v<F, Frame2d>) {
-      return Frame2d(SO2d(circle_.draw(rng)), rng.normalVector<2>());
+      const Eigen::Vector2d translation = rng.normalVector<2>();
+      return Frame2d(SO2d(circle_.draw(rng)), translation);
     } else if constexpr (std::is_same_v<F, SO3d>) {
-      return SO3d::exp(rotation_.draw(rng) * rng.unitVector<3>());
+      return drawRotation(rng);
     } else if constexpr (std::is_same_v<F, Eigen::Vector3d>) {
       return rng.normalVector<3>();
     } else {
-      return F(SO3d::exp(rotation_.draw(rng) * rng.unitVector<3>()), rng.normalVector<3>());
+      const Eigen::Vector3d translation = rng.normalVector<3>();
+      return F(drawRotation(rng), translation);
     }
+  }
+  /// One draw in an expression: in which order the operands of a product are evaluated is the compiler's choice.
+  SO3d drawRotation(CounterRng& rng) const {
+    const Eigen::Vector3d axis = rng.unitVector<3>();
+    return SO3d::exp(rotation_.draw(rng) * axis);
   }
 
   double kappa_;
