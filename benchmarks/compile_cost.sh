@@ -74,7 +74,7 @@ headers() {
     printf '%s\n' "$@"
     return
   fi
-  # What the library stands on comes first, to compare with.
+  # Eigen comes first, to compare with.
   printf 'Eigen/Core\nEigen/Geometry\nEigen/Dense\n'
   {
     sed -e 's/#.*//' -e '/^ *$/d' "$root/tests/headers.txt" | awk '{ print $1 }'

@@ -3,6 +3,7 @@
 #include <experiments/conic_scene.hpp>
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
+#include <experiments/part_of_run.hpp>
 #include <experiments/rotated_pairs.hpp>
 #include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
@@ -290,18 +291,7 @@ std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validatio
   trials_of_run.planned += plans.size() * validation.trials;
   std::vector<EstimatorRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options{
-        .trials = validation.trials,
-        .seed = validation.seed,
-        .chunk_size = 16,
-        .progress =
-            [&](std::size_t done, std::size_t of) {
-              const double share = static_cast<double>(done) / static_cast<double>(of);
-              if (progress) {
-                progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost) / all), 1000000);
-              }
-            },
-        .stop = runStopped};
+    const ValidationOptions options = trialsOf(validation, 16, {before, plan.cost, all}, progress);
     std::vector<ReferenceLaw> laws;
     for (const RowPlan& row : plan.rows) laws.push_back(ReferenceLaw::chiSquared(row.dof));
     auto reports =

@@ -2,6 +2,7 @@
 
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
+#include <experiments/part_of_run.hpp>
 #include <fusion/hand_eye.hpp>
 #include <stats/propagation.hpp>
 #include <stats/validation.hpp>
@@ -234,18 +235,7 @@ std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation,
   trials_of_run.planned += plans.size() * validation.trials;
   std::vector<HandEyeRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options{
-        .trials = validation.trials,
-        .seed = validation.seed,
-        .chunk_size = 4,
-        .progress =
-            [&](std::size_t done, std::size_t of) {
-              const double share = static_cast<double>(done) / static_cast<double>(of);
-              if (progress) {
-                progress(static_cast<std::uint64_t>(1e6 * (before + share * plan.cost()) / all), 1000000);
-              }
-            },
-        .stop = runStopped};
+    const ValidationOptions options = trialsOf(validation, 4, {before, plan.cost(), all}, progress);
     const bool independent = plan.row.formulation == Formulation::motions;
     const int n = static_cast<int>(plan.row.pairs), open = openDimension(plan.row.motion);
     auto reports = validateAll(

@@ -2,6 +2,7 @@
 
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
+#include <experiments/part_of_run.hpp>
 #include <experiments/recording.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <stats/random.hpp>
@@ -100,16 +101,7 @@ std::vector<PreintegrationRow> validatePreintegration(
   for (const PreintegrationRow& row : rows) all += row.window;
   trials_of_run.planned += rows.size() * validation.trials;
   for (PreintegrationRow& row : rows) {
-    const ValidationOptions options{
-        .trials = validation.trials,
-        .seed = validation.seed,
-        .chunk_size = 16,
-        .progress =
-            [&](std::size_t done, std::size_t of) {
-              const double share = static_cast<double>(done) / static_cast<double>(of);
-              if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * row.window) / all), 1000000);
-            },
-        .stop = runStopped};
+    const ValidationOptions options = trialsOf(validation, 16, {before, row.window, all}, progress);
     std::vector<ValidationReport> reports =
         validateAll(ProgramExecutor{validation.threads}, options,
                     std::vector<ReferenceLaw>{ReferenceLaw::chiSquared(degreesOfFreedom(row.check))},

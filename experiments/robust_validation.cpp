@@ -3,6 +3,7 @@
 #include <experiments/conic_scene.hpp>
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
+#include <experiments/part_of_run.hpp>
 #include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/homography_solvers.hpp>
@@ -329,18 +330,7 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
   trials_of_run.planned += cases.size() * validation.trials;
   RobustValidationResult result;
   for (const Case& one : cases) {
-    const ValidationOptions options{
-        .trials = validation.trials,
-        .seed = validation.seed,
-        .chunk_size = 4,
-        .progress =
-            [&](std::size_t done, std::size_t of) {
-              const double share = static_cast<double>(done) / static_cast<double>(of);
-              if (progress) {
-                progress(static_cast<std::uint64_t>(1e6 * (before + share * costOf(one)) / all), 1000000);
-              }
-            },
-        .stop = runStopped};
+    const ValidationOptions options = trialsOf(validation, 4, {before, costOf(one), all}, progress);
     const bool conic = one.structure == RobustStructure::conic;
     const int k = conic ? ConicModel::free_parameters : PlaneModel::free_parameters;
     const int equations = conic ? ConicModel::equations : PlaneModel::equations;

@@ -49,7 +49,7 @@ auto regionFactor(const SquareOf<M>& covariance) {
   return Matrix(lowerFactor<K>(region));
 }
 
-/// Whether the sums of a mean prove that findAveragedHessian averages nothing.
+/// True if the sums of a mean prove that findAveragedHessian averages nothing.
 template <Metric M>
 bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance) {
   if constexpr (Factored<M>) {

@@ -126,7 +126,7 @@ double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
   return solver.eigenvalues()[K - 1];
 }
 
-/// Whether the sums of a mean prove that findCutLocusNearby finds no mass; the window that it reports.
+/// True if the sums of a mean prove that findCutLocusNearby finds no mass; `result` then has the window that it reports.
 template <Metric M>
 bool isFarFromCutLocusBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, CutLocusMass& result) {
   if constexpr (Factored<M>) {

@@ -105,7 +105,7 @@ template <Metric M>
 double farFromRivals() {
   return 2.0 / 3 * static_cast<double>(ManifoldTraits<M>::injectivityRadius());
 }
-/// Whether they are known to be.
+/// True if no cut locus is nearer to the mean than that, by what its last pass has seen.
 template <Metric M>
 bool isFarFromRivals(const MeanResult<M>& mean) {
   return leastDistanceToCutLocus(mean) >= farFromRivals<M>();

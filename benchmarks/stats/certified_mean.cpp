@@ -1,4 +1,4 @@
-// What the certificates of a mean cost: the time of certifiedMean over that of mean with its covariance, in turns.
+// The cost of a mean's certificates: the time of certifiedMean over that of mean with its covariance, in turns.
 // Prints Markdown, µs a call. Spread 0.2 rad (m) in each coordinate.
 #include "../inputs.hpp"
 #include "interleaved.hpp"

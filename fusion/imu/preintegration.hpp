@@ -249,7 +249,7 @@ class Preintegration {
     duration_ += h;
   }
 
-  /// What errors of the rate and of the force during a step of one second do, [h² D2 R; G1 R; h D1 R] and
+  /// The effect of errors of the rate and of the force during a step, over its seconds: [h² D2 R; G1 R; h D1 R] and
   /// [h G2 R; 0; G1 R], transposed, with G1 = I + b K + c K² and G2 = I/2 + c K + d K², K = [θ], and D1, D2 the derivatives
   /// of G1 f and G2 f by θ. All of them are made of Rᵀ and its products with skew matrices, for Rᵀ θ and Rᵀ f are what is
   /// measured.

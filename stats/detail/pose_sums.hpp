@@ -20,7 +20,7 @@
 
 namespace liestat {
 
-// Of the units without motions of the plane these headers ask for nothing more than the name.
+// The name alone: units without motions of the plane need no more of these classes.
 template <class Scalar_, int Options_>
 class SO2;
 template <class Scalar_, int Options_>

@@ -89,7 +89,7 @@ inline double convexRadiusOnSphere(double largest, double mean_angle) {
   const auto meanSlope = [&](double r) {
     return (1 - far) * SphereSpace::transverse(r) + far * SphereSpace::transverse(largest + r);
   };
-  // Of data in a hemisphere no term is concave up to `low`.
+  // No term is concave up to `low` if the data lie in a hemisphere.
   const bool hemisphere = largest < 0.5 * pi;
   double low = hemisphere ? 0.5 * pi - largest : 0;
   const double high = hemisphere ? 0.5 * pi : (pi - largest) * (1 - 1e-9);
@@ -188,8 +188,8 @@ bool isUniqueBySums(const MeanResult<M>& mean, double tie_tolerance, UniquenessR
   return true;
 }
 
-/// Whether the sums prove that the differences e_i between the costs of any other minimum and of the mean would have a
-/// sum that is significant by Student's law; scatter of the weights' squares as in MeanResult.
+/// True if the sums prove that there are no near ties: for any other minimum the differences e_i of its costs from those of
+/// the mean have a sum that is significant by Student's law.
 template <Metric M>
 bool haveNoNearTiesBySums(const MeanResult<M>& mean, const WeightSums& weights, double significance) {
   if (!converged(mean.status) || !(mean.residual < largest_shift) || !(weights.n >= 2)) return false;

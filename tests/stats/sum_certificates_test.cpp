@@ -125,8 +125,8 @@ TYPED_TEST(SumCertificates, agreeWithThoseThatLookAtTheData) {
   }
 }
 
-/// What the proofs stand on: the excess of the criterion at ρ, divided by ρ and the sum of the weights, is no less than
-/// the bound, and so is Student's statistic of the differences.
+/// The excess of the criterion at ρ, divided by ρ and the sum of the weights, is no less than the bound, and neither is
+/// Student's statistic of the differences: the proofs follow from these two.
 TYPED_TEST(SumCertificates, boundTheCriterionAndStudentsStatistic) {
   using M = TypeParam;
   if constexpr (detail::compactFactor<M>() != CompactFactor::none) {
