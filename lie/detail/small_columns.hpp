@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <type_traits>
 
 namespace liestat::detail {
@@ -21,7 +22,7 @@ struct ColumnLanes {
 #else
   static constexpr int lanes = std::is_same_v<S, float> ? 4 : 2;
 #endif
-  static constexpr int vectors = 4 / lanes;
+  static constexpr std::size_t vectors = 4 / lanes;
   typedef S Vector __attribute__((vector_size(lanes * sizeof(S)), aligned(16)));
 
   Vector v[vectors];
