@@ -42,6 +42,8 @@ struct UniquenessOptions {
   std::size_t max_rivals = 16;  ///< the search stops when it has found so many
   /// Is told from time to time, by the calling thread, which part of the budget is spent.
   std::function<void(double)> progress = {};
+  /// Asked again and again, by the calling thread; once it says true, the search ends as if the budget were spent.
+  std::function<bool()> stop = {};
 };
 
 /// What uniqueness() returns.

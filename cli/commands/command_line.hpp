@@ -22,7 +22,7 @@ enum ExitCode : int {
   exit_not_trusted = 3,    ///< the estimate exists but is not to be trusted
   exit_undecidable = 4,    ///< doctor: several conventions explain the errors
   exit_inconsistent = 5,   ///< doctor: the errors do not follow the covariances, or no convention explains them
-  exit_interrupted = 130,  ///< an interrupt stopped a validation; what was computed is written
+  exit_interrupted = 130,  ///< an interrupt stopped the command; what was computed is written
 };
 
 /// The circumstances of a command's run, besides its options.

@@ -3,6 +3,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
+#include <experiments/interruption.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -29,8 +30,14 @@ int runCommand(const Options& options, const Invocation& invocation) {
     const auto done = static_cast<std::uint64_t>(1000 * fraction);
     if (done > progress.done()) progress.advance(done - progress.done());
   };
-  MeanAnalysis analysis = analyseMean(measurements, how);
+  how.stop = experiments::runStopped;
+  MeanAnalysis analysis = [&] {
+    const StopOnInterrupt watch;
+    return analyseMean(measurements, how);
+  }();
   progress.finish();
+  const bool interrupted = experiments::runStopped();
+  if (interrupted) analysis.notes.emplace_back("interrupted: the search for other means did not go on");
   compareBlocks(analysis, measurements, how);
   if (how.inflate && !analysis.time_blocks) {
     throw InputError("liestat mean", 0, "--inflate, but blocks of time cannot be compared",
@@ -40,12 +47,14 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.json != "-") printLines(formatMean(options.input.file, measurements, analysis));
   if (!options.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
+    if (interrupted) object.set("interrupted", true);
     setMeanFields(object, options.input.file, measurements, analysis);
     writeJson(options.json, object);
   }
   if (!options.report.empty()) {
     writeMeanReport(options.report, invocation.command_line, options.input.file, measurements, analysis);
   }
+  if (interrupted) return exit_interrupted;
   const bool trusted = analysis.status == Status::ok || analysis.status == Status::not_applicable;
   return trusted ? exit_fine : exit_not_trusted;
 }

@@ -26,6 +26,7 @@ inline constexpr bool is_group = !Metric<M>;
 UniquenessOptions uniquenessOptions(const AnalysisOptions& options) {
   UniquenessOptions how;
   how.progress = options.progress;
+  how.stop = options.stop;
   how.branch_and_bound = options.certify;
   how.budget = options.budget;
   return how;

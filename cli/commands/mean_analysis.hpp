@@ -86,6 +86,7 @@ struct AnalysisOptions {
   int threads = 0;                                  ///< 0: all
   bool charts = false;                              ///< for a report
   std::function<void(double)> progress = {};        ///< is told which part of that budget is spent
+  std::function<bool()> stop = {};                  ///< ends that search once it says true
   bool inflate = false;                             ///< multiply the covariance by the factor of compareBlocks()
 };
 

@@ -37,7 +37,8 @@ class SearchedManifold final : public SearchedMean<Space> {
                                                               .branch_and_bound = options.branch_and_bound,
                                                               .budget = options.budget,
                                                               .max_rivals = options.max_rivals,
-                                                              .progress = options.progress})
+                                                              .progress = options.progress,
+                                                              .stop = options.stop})
                                       .run();
     return {verdict.unique, base_.mean,    improved_,     base_.cost,         rivals_,
             verdict.r_star, verdict.cells, verdict.proof, verdict.more_rivals};

@@ -75,6 +75,7 @@ struct SearchOptions {
   std::size_t budget;  ///< looks at features and bins of them
   std::size_t max_rivals;
   const std::function<void(double)>& progress;  ///< is told which part of the budget is spent
+  const std::function<bool()>& stop;
 };
 
 /// What a search says about the base.
@@ -246,6 +247,7 @@ class UniquenessSearch {
         explore(cell);
       });
       tell(looks_ + search.looks());
+      if (options_.stop && options_.stop()) break;
     }
     verdict_.cells += search.cells();
     looks_ += search.looks();

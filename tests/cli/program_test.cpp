@@ -315,6 +315,23 @@ TEST_F(Program, TwoAntipodalRotationsAreAmbiguous) {
   EXPECT_EQ(contentOf(directory_ / "report/mean.csv").find("rivals"), std::string::npos);
 }
 
+TEST_F(Program, AnInterruptEndsTheSearchForOtherMeansAndLeavesTheMean) {
+  // Forty frames without orientation, all over the rotations: the search outlasts every patience. Where the tests run in
+  // the background interrupts are ignored, and the program would heed that.
+  directory_.write("f.csv", rotations(40, 1.2));
+  const ProgramResult result = runProgram(
+      {"env", "--default-signal=INT", "timeout", "--preserve-status", "-s", "INT", "2", LIESTAT_PROGRAM, "mean", "f.csv",
+       "--feature", "non-oriented-frame", "--budget", "1000000000000", "--json", "out.json", "--report", "report"},
+      directory_.path().string());
+  EXPECT_EQ(result.status, 130) << result.errors;
+  const Json json = Json::parse(contentOf(directory_ / "out.json"));
+  EXPECT_EQ(json["interrupted"], true);
+  EXPECT_EQ(json["unique"], "not_certified");
+  EXPECT_EQ(json["mean"]["rotation_vector"].size(), 3U);
+  EXPECT_NE(contentOf(directory_ / "report/index.html").find("interrupted: the search for other means did not go on"),
+            std::string::npos);
+}
+
 TEST_F(Program, IdenticalMeasurements) {
   std::string text = "qx,qy,qz,qw\n";
   for (int i = 0; i < 20; ++i) text += "0.5,0.5,0.5,0.5\n";

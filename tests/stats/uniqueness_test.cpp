@@ -387,6 +387,24 @@ TEST(BranchAndBound, aSmallBudgetIsNotACertificate) {
   EXPECT_EQ(undecided, 10u);
 }
 
+TEST(BranchAndBound, stopEndsTheSearchWithoutACertificate) {
+  for (std::uint64_t trial = 0; trial < 5; ++trial) {
+    const auto samples = scattered<NonOrientedFrame3d>(trial, 30, 1);
+    const auto base = mean(samples);
+    std::size_t asked = 0;
+    const auto stopped = uniqueness(samples, base, {.stop = [&asked] { return ++asked == 20; }});
+    EXPECT_EQ(asked, 20u) << "asked again after it said true";
+    EXPECT_EQ(stopped.unique, Uniqueness::not_certified);
+    EXPECT_GT(stopped.cells, 0u);
+    // A stop that never comes changes nothing.
+    const auto whole = uniqueness(samples, base);
+    const auto watched = uniqueness(samples, base, {.stop = [] { return false; }});
+    EXPECT_EQ(watched.unique, whole.unique);
+    EXPECT_EQ(watched.cells, whole.cells);
+    EXPECT_GT(whole.cells, stopped.cells);
+  }
+}
+
 TEST(BranchAndBound, weightsCountAsRepetitions) {
   for (std::uint64_t trial = 0; trial < 5; ++trial) {
     const auto samples = scattered<SO3d>(trial, 12, 1.2);
