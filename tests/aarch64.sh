@@ -34,4 +34,5 @@ one() {
   fi
 }
 export -f one
+# shellcheck disable=SC2016 # expanded by the inner shell
 printf '%s\n' "$@" | xargs -P "${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}" -I{} bash -c 'one "$1"' aarch64 {}
