@@ -188,7 +188,9 @@ struct liestat::ManifoldTraits<Turned> : ManifoldTraits<Product<SO3d, Vector3d>>
   static P whole(const Turned& x) { return P(x.rotation, x.point); }
   static Turned of(const P& x) { return {x.get<0>(), x.get<1>()}; }
   static std::tuple<SO3d, Vector3d> factors(const Turned& x) { return {x.rotation, x.point}; }
-  static Turned fromFactors(const std::tuple<SO3d, Vector3d>& parts) { return {std::get<0>(parts), std::get<1>(parts)}; }
+  static Turned fromFactors(const std::tuple<SO3d, Vector3d>& parts) {
+    return {std::get<0>(parts), std::get<1>(parts)};
+  }
   static Turned origin() { return {}; }
   static Turned act(const Group& f, const Turned& x) { return of(Base::act(f, whole(x))); }
   static Group placement(const Turned& x) { return Base::placement(whole(x)); }
