@@ -92,13 +92,20 @@ concept Quotient = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::representativeJacobian(0) } -> std::convertible_to<typename ManifoldTraits<M>::Square>;
 };
 
-/// A manifold whose traits decompose it: factors(x) is a std::tuple of features of other manifolds, fromFactors(tuple)
-/// is its inverse, and if there is a metric the squared distance is the sum of those of the factors, whose tangent
-/// coordinates are concatenated in the order of the tuple. Means, their starts and their certificates of uniqueness are
-/// then those of the factors.
+/// A manifold whose traits decompose it: factors(x) is a std::tuple of features of other manifolds (a reference that it
+/// returns is to a part of x), fromFactors(tuple) is its inverse, and if there is a metric the squared distance is the
+/// sum of those of the factors, whose tangent coordinates are concatenated in the order of the tuple. Means, their
+/// starts and their certificates of uniqueness are then those of the factors.
 template <class M>
 concept Factored = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::fromFactors(ManifoldTraits<M>::factors(x)) } -> std::convertible_to<M>;
+};
+
+/// The same with `frames_of_factors = true` in its traits: the frame at x consists of those of the factors at theirs, as
+/// in products, whose placement is made of the factors'. Then the sums of a mean are those of the factors, too.
+template <class M>
+concept HasFramesOfFactors = Factored<M> && requires {
+  requires ManifoldTraits<M>::frames_of_factors;
 };
 
 // Further properties of a manifold that statistics use. All of them are optional: without them means start at the best

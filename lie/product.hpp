@@ -160,6 +160,7 @@ struct ProductManifold : std::conditional_t<(Quotient<Ms> || ...), ProductRepres
 
   static constexpr bool trivial_isotropy = (HasTrivialIsotropy<Ms> && ...);
   static constexpr bool covariance_models_coincide = (CovarianceModelsCoincide<Ms> && ...);
+  static constexpr bool frames_of_factors = true;
   /// The parts, in whose criteria that of the product separates, and back.
   static const std::tuple<Ms...>& factors(const M& x) { return x.parts(); }
   static M fromFactors(const std::tuple<Ms...>& parts) { return M(parts); }

@@ -45,7 +45,7 @@ M bestOfSeveral(InstructionSet set, const R& samples, const W& weights, std::siz
     if constexpr (HasKernelSums<M>) {
       typename KernelSumsOf<M>::type sums;
       constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
-      if (sums.template add<weighted, false>(set, judging, weight, 0, judges, y)) return sums.cost;
+      if (sums.template add<weighted, KernelPass::step>(set, judging, weight, 0, judges, y)) return sums.cost;
     }
     const typename T::Group to_y = T::placement(y).inverse();
     S cost(0);

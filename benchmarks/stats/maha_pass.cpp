@@ -50,12 +50,16 @@ int print() {
   row<S2d>("directions", n);
   row<SO3d>("rotations", n);
   row<Frame3d>("frames", n);
+  row<SemiOrientedFrame3d>("semi-oriented", n);
+  row<NonOrientedFrame3d>("non-oriented", n);
   row<Eigen::Vector3f>("points, float", n);
   row<SO2f>("plane rot., float", n);
   row<Frame2f>("plane fr., float", n);
   row<S2f>("directions, float", n);
   row<SO3f>("rotations, float", n);
   row<Frame3f>("frames, float", n);
+  row<SemiOrientedFrame3f>("semi-or., float", n);
+  row<NonOrientedFrame3f>("non-or., float", n);
   return 0;
 }
 

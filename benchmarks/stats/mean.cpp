@@ -105,6 +105,9 @@ HandWrittenFrame toHandWritten(const Eigen::Matrix<double, 7, 1>& p) {
   handWritten<S2d>(
       "direction", [](const S2d& x) { return Vector3d(x.unit_vector()); },
       [](const auto& data) { return handWrittenMeanDirection(data); });
+  suite<Product<SO3d, Vector3d>>("rotation_with_point");
+  suite<Product<SO3d, SO3d>>("two_rotations");
+  suite<Product<Frame3d, S2d>>("frame_with_direction");
   return true;
 }();
 

@@ -60,7 +60,7 @@ struct AngleOverSine {
 };
 
 /// Unit vectors x about the reference y. All sums are in the axes of the space.
-template <class S, bool Weighted, bool Scatter>
+template <class S, bool Weighted, KernelPass Pass>
 struct DirectionKernel {
   static constexpr std::size_t max_count = 1024;
   struct Arguments {
@@ -72,6 +72,9 @@ struct DirectionKernel {
     S gradient[3];                       ///< Σ p h u
     S across;                            ///< Σ p h c
     S along[6], scatter[6], squared[6];  ///< Σ p g u uᵀ, Σ p h² u uᵀ, Σ p² h² u uᵀ
+    /// In the tangent plane at y, whose two `axes` stand one after the other.
+    ResidualColumns<S> residuals = nullptr;
+    S axes[6] = {};
   };
 
   template <InstructionSet Set>
@@ -85,7 +88,7 @@ struct DirectionKernel {
 
   template <class P>
   struct Run {
-    ResidualSums<P, 3, Weighted, Scatter> residuals;
+    ResidualSums<P, 3, Weighted, Pass == KernelPass::last> residuals;
     P defect = P::zero(), across = P::zero(), along[6];
 
     LIESTAT_ALWAYS_INLINE Run() { LIESTAT_UNROLL for (P& x : along) x = P::zero(); }
@@ -105,11 +108,14 @@ struct DirectionKernel {
         for (std::size_t j = 0; j < count; j += P::size) sums.project(data, j, arguments.reference, least);
         const S least_cosine = -largestOf(-least);
         if (least_cosine > static_cast<S>(small_rotation_cosine)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, small_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<false>(data, j, arguments, i, small_rotation<S>);
         } else if (least_cosine > S(0)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, any_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<false>(data, j, arguments, i, any_rotation<S>);
         } else {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<true>(data, j, any_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<true>(data, j, arguments, i, any_rotation<S>);
         }
       }
       const std::size_t surplus = (P::size - arguments.count % P::size) % P::size;
@@ -131,11 +137,12 @@ struct DirectionKernel {
       c.store(data[3] + j);
     }
     template <bool Wide, class Polynomials>
-    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Polynomials& polynomials) {
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Arguments& arguments,
+                                   std::size_t i, const Polynomials& polynomials) {
       const P u[3] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j)}, c = P::load(data[3] + j);
       const P s2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
       AngleOverSine<P> angle;
-      angle.template evaluate<Wide, true, Scatter>(c, s2, polynomials);
+      angle.template evaluate<Wide, true, Pass != KernelPass::step>(c, s2, polynomials);
       defect = larger(angle.antipode, defect);
       P v[3], gu[3], hc = angle.h * c, p(S(1));
       LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) v[a] = angle.h * u[a], gu[a] = angle.g * u[a];
@@ -149,13 +156,21 @@ struct DirectionKernel {
       residuals.add(v, angle2, p);
       across += hc;
       addOuter(along, u, gu, std::make_index_sequence<6>());
+      if constexpr (Pass == KernelPass::residuals) {
+        const S* const e = arguments.axes;
+        P z[2];
+        LIESTAT_UNROLL for (std::size_t a = 0; a < 2; ++a) {
+          z[a] = e[3 * a] * v[0] + e[3 * a + 1] * v[1] + e[3 * a + 2] * v[2];
+        }
+        storeResiduals(z, arguments.residuals, i + j);
+      }
     }
   };
 };
 
 /// Plane rotations (cos, sin) about the reference, and with Frame their translations less that of the reference, in
 /// the axes of the plane.
-template <class S, bool Frame, bool Weighted, bool Scatter>
+template <class S, bool Frame, bool Weighted, KernelPass Pass>
 struct PlanarKernel {
   static constexpr std::size_t max_count = 1024, k = Frame ? 3 : 1, entries = k * (k + 1) / 2, numbers = Frame ? 4 : 2;
   struct Arguments {
@@ -164,6 +179,7 @@ struct PlanarKernel {
     std::size_t count = 0;
     S reference[4] = {};
     S cost, largest, largest_angle, fourth, defect, weight, gradient[k], scatter[entries], squared[entries];
+    ResidualColumns<S> residuals = nullptr;  ///< in the frame of the reference
   };
 
   template <InstructionSet Set>
@@ -177,7 +193,7 @@ struct PlanarKernel {
 
   template <class P>
   struct Run {
-    ResidualSums<P, k, Weighted, Scatter> residuals;
+    ResidualSums<P, k, Weighted, Pass == KernelPass::last> residuals;
     P defect = P::zero();
 
     LIESTAT_ALWAYS_INLINE static void all(Arguments& arguments) {
@@ -196,11 +212,14 @@ struct PlanarKernel {
         for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, y, least);
         const S least_cosine = -largestOf(-least);
         if (least_cosine > static_cast<S>(small_rotation_cosine)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, y, small_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<false>(data, j, arguments, i, small_rotation<S>);
         } else if (least_cosine > S(0)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<false>(data, j, y, any_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<false>(data, j, arguments, i, any_rotation<S>);
         } else {
-          for (std::size_t j = 0; j < count; j += P::size) sums.template add<true>(data, j, y, any_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size)
+            sums.template add<true>(data, j, arguments, i, any_rotation<S>);
         }
       }
       sums.residuals.finish(arguments);
@@ -216,8 +235,9 @@ struct PlanarKernel {
       (scale * (b * y[0] - a * y[1])).store(data[1] + j);
     }
     template <bool Wide, class Polynomials>
-    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const S (&y)[4],
-                                   const Polynomials& polynomials) {
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Arguments& arguments,
+                                   std::size_t i, const Polynomials& polynomials) {
+      const S(&y)[4] = arguments.reference;
       const P c = P::load(data[0] + j), s = P::load(data[1] + j);
       AngleOverSine<P> angle;
       angle.template evaluate<Wide, false, false>(c, s * s, polynomials);
@@ -233,12 +253,20 @@ struct PlanarKernel {
         length2 += v[0] * v[0] + v[1] * v[1];
       }
       residuals.add(v, length2, p);
+      if constexpr (Pass == KernelPass::residuals) {
+        if constexpr (Frame) {
+          const P a = v[0], b = v[1];
+          v[0] = y[0] * a + y[1] * b;
+          v[1] = y[0] * b - y[1] * a;
+        }
+        storeResiduals(v, arguments.residuals, i + j);
+      }
     }
   };
 };
 
 /// Points of N coordinates less those of the reference.
-template <class S, std::size_t N, bool Weighted, bool Scatter>
+template <class S, std::size_t N, bool Weighted, KernelPass Pass>
 struct PointKernel {
   static constexpr std::size_t max_count = 1024, entries = N * (N + 1) / 2;
   struct Arguments {
@@ -247,6 +275,7 @@ struct PointKernel {
     std::size_t count = 0;
     S reference[N] = {};
     S cost, largest, largest_angle, fourth, defect = 0, weight, gradient[N], scatter[entries], squared[entries];
+    ResidualColumns<S> residuals = nullptr;
   };
 
   template <InstructionSet Set>
@@ -254,7 +283,7 @@ struct PointKernel {
     using P = Pack<Set, S>;
     constexpr std::size_t block = 64;
     alignas(64) S data[N + 1][block];
-    ResidualSums<P, N, Weighted, Scatter> residuals;
+    ResidualSums<P, N, Weighted, Pass == KernelPass::last> residuals;
     for (std::size_t i = 0; i < arguments.count; i += block) {
       const std::size_t count = std::min(arguments.count - i, block);
       loadColumns<Set, N>(arguments.features, 0, i, count, data);
@@ -271,6 +300,7 @@ struct PointKernel {
         }
         if constexpr (Weighted) p = P::load(data[N] + j);
         residuals.add(v, length2, p);
+        if constexpr (Pass == KernelPass::residuals) storeResiduals(v, arguments.residuals, i + j);
       }
     }
     residuals.finish(arguments);

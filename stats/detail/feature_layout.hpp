@@ -58,6 +58,10 @@ class FeatureBlock {
       const M* const first = std::to_address(std::ranges::begin(samples)) + begin;
       return {parametersOf(*first), sizeof(M) / sizeof(S), 1};
     } else {
+      if constexpr (requires { samples.layoutFrom(begin); }) {
+        const Layout<const S> features = samples.layoutFrom(begin);
+        if (features.data != nullptr) return features;
+      }
       for (std::size_t i = 0; i < count; ++i) {
         const M& x = samples[begin + i];
         const S* const p = parametersOf(x);

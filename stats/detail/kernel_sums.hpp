@@ -35,14 +35,14 @@ class SimpleSums : public TangentSums<M> {
   static constexpr int k = T::DoF;
   static constexpr std::size_t numbers = T::ChordalMoments::Sums::linear;
 
-  template <bool Weighted, bool Scatter>
+  template <bool Weighted, KernelPass Pass>
   static auto kernel() {
     if constexpr (HasDirectionSums<M>) {
-      return std::type_identity<DirectionKernel<S, Weighted, Scatter>>();
+      return std::type_identity<DirectionKernel<S, Weighted, Pass>>();
     } else if constexpr (HasPlanarSums<M>) {
-      return std::type_identity<PlanarKernel<S, k == 3, Weighted, Scatter>>();
+      return std::type_identity<PlanarKernel<S, k == 3, Weighted, Pass>>();
     } else {
-      return std::type_identity<PointKernel<S, numbers, Weighted, Scatter>>();
+      return std::type_identity<PointKernel<S, numbers, Weighted, Pass>>();
     }
   }
 
@@ -53,15 +53,20 @@ class SimpleSums : public TangentSums<M> {
   using typename Base::Square, typename Base::Tangent;
 
   /// As RotationSums::add; false also for directions and plane rotations opposite to y.
-  template <bool Weighted, bool Scatter, class R, class W>
-  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y) {
-    using Kernel = typename decltype(kernel<Weighted, Scatter>())::type;
+  template <bool Weighted, KernelPass Pass, class R, class W>
+  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y,
+           ResidualColumns<S> residuals = nullptr) {
+    using Kernel = typename decltype(kernel<Weighted, Pass>())::type;
     typename Kernel::Arguments arguments;
     for (std::size_t c = 0; c < numbers; ++c) arguments.reference[c] = parametersOf(y)[c];
+    arguments.residuals = residuals;
+    if constexpr (HasDirectionSums<M> && Pass == KernelPass::residuals) {
+      Eigen::Map<Eigen::Matrix<S, 3, 2>>(arguments.axes) = T::placement(y).matrix().template leftCols<2>();
+    }
     return runOnFeatures<Kernel, M, numbers, Weighted>(set, samples, weights, begin, end, arguments,
                                                        [&](std::size_t) {
                                                          if (!(arguments.defect < largest_excess<S>)) return false;
-                                                         addSums<Scatter>(arguments, y);
+                                                         addSums<Pass == KernelPass::last>(arguments, y);
                                                          return true;
                                                        }) &&
            this->isFinite();

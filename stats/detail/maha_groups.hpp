@@ -26,6 +26,10 @@ template <class Scalar_, int Options_>
 class S2;
 template <class Scalar_, int Options_>
 class Frame2;
+template <class Scalar_, int Options_>
+class SemiOrientedFrame3;
+template <class Scalar_, int Options_>
+class NonOrientedFrame3;
 
 }  // namespace liestat
 
@@ -42,6 +46,16 @@ struct MahaKernelOf<SO3<S, 0>> {
 template <PackScalar S>
 struct MahaKernelOf<Frame3<S, 0>> {
   using type = MahaKernel<S, true>;
+  static constexpr std::size_t unit = 4;
+};
+template <PackScalar S>
+struct MahaKernelOf<SemiOrientedFrame3<S, 0>> {
+  using type = MahaKernel<S, true, halfTurns<SemiOrientedFrame3<S, 0>>()>;
+  static constexpr std::size_t unit = 4;
+};
+template <PackScalar S>
+struct MahaKernelOf<NonOrientedFrame3<S, 0>> {
+  using type = MahaKernel<S, true, halfTurns<NonOrientedFrame3<S, 0>>()>;
   static constexpr std::size_t unit = 4;
 };
 template <PackScalar S>
@@ -125,7 +139,7 @@ class MahaGroups<M> {
   }
 
   /// Sums of the type Sums, with members cost, gradient, gauss_newton and hessian, at y; general(i, sums) adds the
-  /// measurement i where a kernel refuses: at half a turn from y. There the Hessian is NaN if it is not one of those
+  /// measurement i where a kernel refuses: at half a turn from y, on the cut locus of a quotient. There the Hessian is NaN if it is not one of those
   /// that the general formulas have.
   template <class Sums, bool GeneralHessian, Executor E, class General>
   Sums evaluate(const E& executor, const M& y, const General& general) const {
@@ -148,7 +162,7 @@ class MahaGroups<M> {
             }
           }
           runKernel<Kernel>(set, arguments);
-          if constexpr (planar || direction) {
+          if constexpr (planar || direction || Quotient<M>) {
             if (arguments.defect > 0) {
               Sums sums;
               for (std::size_t i = range.begin * lanes; i < std::min(range.end * lanes, size_); ++i) general(i, sums);

@@ -29,6 +29,23 @@ LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[
   ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
 }
 
+/// What a kernel collects besides cost, gradient and Hessian.
+enum class KernelPass {
+  step,      ///< nothing; the Hessian is good to eight digits, as Newton's method needs it
+  last,      ///< the scatter; the Hessian is exact
+  residuals  ///< the residuals of a factor of a product, for the scatter of the product; the Hessian is exact
+};
+/// Features per call, at most, whose residuals are stored: one column for each coordinate of the tangent space.
+inline constexpr std::size_t residual_block = 256;
+template <class S>
+using ResidualColumns = S (*)[residual_block];
+
+template <class P, std::size_t K>
+LIESTAT_ALWAYS_INLINE void storeResiduals(const P (&z)[K], ResidualColumns<typename P::Scalar> columns,
+                                          std::size_t feature) {
+  LIESTAT_UNROLL for (std::size_t c = 0; c < K; ++c) z[c].store(columns[c] + feature);
+}
+
 /// 1/√(1 + excess), to second order.
 template <class P>
 LIESTAT_ALWAYS_INLINE P unitScale(const P& excess) {

@@ -17,8 +17,9 @@
 namespace liestat::detail {
 
 /// Features modulo half-turns about the axes whose bits are set, 1 for x, 2 for y, 4 for z.
-template <class S, bool Frame, unsigned HalfTurns, bool Weighted, bool Scatter>
+template <class S, bool Frame, unsigned HalfTurns, bool Weighted, KernelPass Pass>
 struct RotationKernel {
+  static constexpr bool exact = Pass != KernelPass::step;
   static constexpr std::size_t k = Frame ? 6 : 3, entries = k * (k + 1) / 2;
   /// Features per call, at most.
   static constexpr std::size_t max_count = 1024;
@@ -32,7 +33,10 @@ struct RotationKernel {
     S cost, largest, defect, weight, gradient[k], hessian[6], scatter[entries], squared[entries];
     S largest_angle, fourth;  ///< of the rotations: the largest squared angle, Σ p θ⁴
     /// For quotients, roughly: the cosine of half the distance to the cut locus of each feature, and the largest.
-    S gap_cosines[HalfTurns != 0 && Scatter ? max_count : 1], largest_gap_cosine;
+    S gap_cosines[HalfTurns != 0 && exact ? max_count : 1], largest_gap_cosine;
+    /// In the frame of y, to whose axes `to_reference` turns translations: a matrix, row by row.
+    ResidualColumns<S> residuals = nullptr;
+    S to_reference[9] = {};
   };
 
   template <InstructionSet Set>
@@ -46,7 +50,7 @@ struct RotationKernel {
 
   template <class P>
   struct Run {
-    ResidualSums<P, k, Weighted, Scatter> residuals;
+    ResidualSums<P, k, Weighted, Pass == KernelPass::last> residuals;
     P defect = P::zero(), largest_gap_cosine = P(S(-1)), hessian[6];
 
     LIESTAT_ALWAYS_INLINE Run() { LIESTAT_UNROLL for (P& x : hessian) x = P::zero(); }
@@ -60,15 +64,15 @@ struct RotationKernel {
         P cosine(S(1));
         for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, arguments, i, cosine);
         if (-largestOf(-cosine) > static_cast<S>(small_rotation_cosine)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, small_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, arguments, i, small_rotation<S>);
         } else {
-          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, any_rotation<S>);
+          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, arguments, i, any_rotation<S>);
         }
       }
       sums.residuals.finish(arguments);
       arguments.defect = largestOf(sums.defect);
       for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
-      if constexpr (HalfTurns != 0 && Scatter) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
+      if constexpr (HalfTurns != 0 && exact) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
     }
 
     LIESTAT_ALWAYS_INLINE static void load(const Arguments& arguments, std::size_t i, std::size_t count,
@@ -104,7 +108,7 @@ struct RotationKernel {
                 a * x + b * y + (c * z + d * s)};
       if constexpr (HalfTurns != 0) {
         const P gap_cosine = nearest(q);
-        if constexpr (Scatter) {
+        if constexpr (exact) {
           // The lanes beyond the last feature hold y, and store nothing.
           const std::size_t rest = arguments.count - i - j;
           if (rest >= P::size) {
@@ -129,7 +133,7 @@ struct RotationKernel {
       if constexpr ((HalfTurns & 1) != 0) take(absolute(x), best, second, q, w, z, -y, -x);
       if constexpr ((HalfTurns & 2) != 0) take(absolute(y), best, second, q, -z, w, x, -y);
       if constexpr ((HalfTurns & 4) != 0) take(absolute(z), best, second, q, y, -x, w, -z);
-      if constexpr (Scatter) {
+      if constexpr (exact) {
         const P sines = absolute((S(1) - best * best) * (S(1) - second * second));
         return best * second + sines * inverseSquareRoot(sines);
       }
@@ -145,7 +149,8 @@ struct RotationKernel {
     }
 
     template <class Polynomials>
-    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Polynomials& polynomials) {
+    LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Arguments& arguments,
+                                   std::size_t i, const Polynomials& polynomials) {
       const P q[4] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j), P::load(data[3] + j)};
       const P xx = q[0] * q[0], yy = q[1] * q[1], zz = q[2] * q[2], u2 = xx + yy + zz;
       const P excess = u2 + q[3] * q[3] - S(1), scale = unitScale(excess);
@@ -156,7 +161,7 @@ struct RotationKernel {
       P p(S(1));
       if constexpr (Weighted) p = P::load(data[4] + j);
       P g = scale * scale;
-      if constexpr (Scatter) {
+      if constexpr (exact) {
         g *= evaluatePolynomial(polynomials.exact_hessian, variable);
       } else {
         g *= evaluatePolynomial(polynomials.newton_hessian, variable);
@@ -169,14 +174,22 @@ struct RotationKernel {
       constexpr std::size_t r0 = Frame ? 3 : 0;
       P v[k], length2 = f * f * u2;
       residuals.addAngle(length2, p);
-      LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) v[r0 + i] = sign_f * q[i];
+      LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) v[r0 + c] = sign_f * q[c];
       if constexpr (Frame) {
-        LIESTAT_UNROLL for (std::size_t i = 0; i < 3; ++i) {
-          v[i] = P::load(data[6 + i] + j);
-          length2 += v[i] * v[i];
+        LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) {
+          v[c] = P::load(data[6 + c] + j);
+          length2 += v[c] * v[c];
         }
       }
       residuals.add(v, length2, p);
+      if constexpr (Pass == KernelPass::residuals) {
+        if constexpr (Frame) {
+          const P x = v[0], y = v[1], z = v[2];
+          const S* const r = arguments.to_reference;
+          LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) v[c] = r[3 * c] * x + r[3 * c + 1] * y + r[3 * c + 2] * z;
+        }
+        storeResiduals(v, arguments.residuals, i + j);
+      }
     }
   };
 };

@@ -74,19 +74,26 @@ class RotationSums : public TangentSums<M> {
   /// Sums over the features begin … end-1; Weighted false takes all weights as one. False, and nothing of value in the
   /// sums, if a quaternion is not a unit one to 1e-5 (float: 1e-3) or something is not finite: then the general
   /// formulas say what comes out.
-  template <bool Weighted, bool Scatter, class R, class W>
-  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y) {
-    using Kernel = RotationKernel<S, frame, halfTurns<M>(), Weighted, Scatter>;
+  /// The residuals of at most residual_block features are stored where the pass asks for them.
+  template <bool Weighted, KernelPass Pass, class R, class W>
+  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y,
+           ResidualColumns<S> residuals = nullptr) {
+    using Kernel = RotationKernel<S, frame, halfTurns<M>(), Weighted, Pass>;
+    constexpr bool scatter_too = Pass == KernelPass::last;
     typename Kernel::Arguments arguments;
     for (int i = 0; i < (frame ? 7 : 4); ++i) arguments.reference[i] = T::parameters(y)[i];
+    arguments.residuals = residuals;
+    if constexpr (frame && Pass == KernelPass::residuals) {
+      Eigen::Map<Eigen::Matrix<S, 3, 3, Eigen::RowMajor>>(arguments.to_reference) = toAxesOf(y);
+    }
     const bool good = runOnFeatures < Kernel, M, frame ? 7 : 4,
                Weighted > (set, samples, weights, begin, end, arguments, [&](std::size_t i) {
                  if (!(arguments.defect < largest_excess<S>)) return false;
-                 addSums<Scatter>(arguments);
-                 if constexpr (Scatter && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y);
+                 addSums<scatter_too>(arguments);
+                 if constexpr (Kernel::exact && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y);
                  return true;
                });
-    if constexpr (frame) toReference<Scatter>(y);
+    if constexpr (frame) toReference<scatter_too>(y);
     return good && this->isFinite();
   }
 
@@ -125,11 +132,14 @@ class RotationSums : public TangentSums<M> {
       threshold = std::max(threshold, std::cos(S(0.5) * smallest_gap) - margin);
     }
   }
+  static Eigen::Matrix<S, 3, 3> toAxesOf(const M& y) {
+    const S* const q = T::parameters(y);
+    return So3Math<S>::matrix(Eigen::Matrix<S, 4, 1>(-q[0], -q[1], -q[2], q[3]));
+  }
   /// Translations from the axes of the world to those of y.
   template <bool Scatter>
   void toReference(const M& y) {
-    const S* const q = T::parameters(y);
-    const Eigen::Matrix<S, 3, 3> to_y = So3Math<S>::matrix(Eigen::Matrix<S, 4, 1>(-q[0], -q[1], -q[2], q[3]));
+    const Eigen::Matrix<S, 3, 3> to_y = toAxesOf(y);
     gradient.template head<3>() = (to_y * gradient.template head<3>()).eval();
     if constexpr (Scatter) {
       for (Square* m : {&scatter, &squared}) {

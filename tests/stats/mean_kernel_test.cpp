@@ -86,8 +86,8 @@ class MeanKernel : public testing::Test {
                const detail::MeanPass<M>& general) {
     const ChunkRange all{0, features.size()};
     detail::MeanPass<M> packs, packs_alone;
-    ASSERT_TRUE(detail::addTermsByPacks<true>(set, features, p, y, all, packs));
-    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, p, y, all, packs_alone));
+    ASSERT_TRUE(detail::addTermsByPacks<detail::KernelPass::last>(set, features, p, y, all, packs));
+    ASSERT_TRUE(detail::addTermsByPacks<detail::KernelPass::step>(set, features, p, y, all, packs_alone));
     // Vectors of length one and shorter, n of them: rounding grows with the sum of the weights, and tiny residuals
     // have the rounding of the quaternions that they come from. The scale of a square is the largest residual's.
     const double weight = general.sums.weight, length = general.scatter.largest, near = tolerance * weight;
@@ -166,9 +166,10 @@ TYPED_TEST(MeanKernel, leaves_quaternions_far_from_unit_to_the_general_formulas)
   const detail::UnitWeights p;
   for (const InstructionSet set : instructionSets()) {
     detail::MeanPass<TypeParam> pass;
-    EXPECT_EQ(detail::addTermsByPacks<true>(set, features, p, y, {0, features.size()}, pass), !constrained)
+    EXPECT_EQ(detail::addTermsByPacks<detail::KernelPass::last>(set, features, p, y, {0, features.size()}, pass),
+              !constrained)
         << name(set);
-    EXPECT_TRUE(detail::addTermsByPacks<true>(set, features, p, y, {0, 50}, pass)) << name(set);
+    EXPECT_TRUE(detail::addTermsByPacks<detail::KernelPass::last>(set, features, p, y, {0, 50}, pass)) << name(set);
   }
 }
 
@@ -261,7 +262,8 @@ void compareFloat(double sigma) {
   for (const InstructionSet set : instructionSets()) {
     SCOPED_TRACE(name(set));
     detail::MeanPass<F> packs;
-    ASSERT_TRUE(detail::addTermsByPacks<true>(set, features, detail::UnitWeights{}, y, {0, features.size()}, packs));
+    ASSERT_TRUE(detail::addTermsByPacks<detail::KernelPass::last>(set, features, detail::UnitWeights{}, y,
+                                                                  {0, features.size()}, packs));
     EXPECT_NEAR(static_cast<double>(packs.sums.cost), general.sums.cost,
                 40 * eps_f * n * (length + eps_f) * (1 + length));
     EXPECT_LE((packs.sums.gradient.template cast<double>() - general.sums.gradient).norm(),

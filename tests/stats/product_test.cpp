@@ -73,8 +73,9 @@ void compareSums(double spread) {
     if (set > supportedInstructionSet()) continue;
     SCOPED_TRACE(name(set));
     detail::MeanPass<M> part, part_weighted;
-    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, detail::UnitWeights{}, y, range, part));
-    ASSERT_TRUE(detail::addTermsByPacks<false>(set, features, numbers, y, range, part_weighted));
+    ASSERT_TRUE(
+        detail::addTermsByPacks<detail::KernelPass::step>(set, features, detail::UnitWeights{}, y, range, part));
+    ASSERT_TRUE(detail::addTermsByPacks<detail::KernelPass::step>(set, features, numbers, y, range, part_weighted));
     isNear(part, expected);
     isNear(part_weighted, weighted);
   }
