@@ -1,5 +1,6 @@
 #include <experiments/two_view_rules.hpp>
 
+#include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace liestat::experiments {
 namespace {
@@ -65,20 +67,29 @@ const std::vector<Rule>& rules() {
 
 }  // namespace
 
+double TwoViewRuleRow::share(std::size_t motion) const {
+  return static_cast<double>(right[motion]) / static_cast<double>(trials[motion]);
+}
 double TwoViewRuleRow::average() const {
-  double sum = 0;
-  for (const std::size_t r : right) sum += static_cast<double>(r);
-  return sum / static_cast<double>(trials * right.size());
+  const auto sum = [](const OfMotions& list) {
+    return static_cast<double>(std::accumulate(list.begin(), list.end(), std::size_t{0}));
+  };
+  return sum(right) / sum(trials);
 }
 std::size_t TwoViewRuleRow::worst() const {
-  return static_cast<std::size_t>(std::min_element(right.begin(), right.end()) - right.begin());
+  std::size_t worst = 0;
+  for (std::size_t k = 1; k < right.size(); ++k) {
+    if (share(k) < share(worst)) worst = k;
+  }
+  return worst;
 }
 
 std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& comparison,
                                                 const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
   std::vector<TwoViewRuleRow> rows;
-  for (const Rule& rule : rules()) rows.push_back({rule.name, comparison.trials, {}});
+  for (const Rule& rule : rules()) rows.push_back({rule.name, {}, {}});
   const std::uint64_t all = comparison.trials * default_two_view_motions.size();
+  trials_of_run.planned += all;
   std::uint64_t before = 0;
   for (std::size_t k = 0; k < default_two_view_motions.size(); ++k) {
     const TwoViewSceneOptions options{.motion = default_two_view_motions[k],
@@ -90,28 +101,34 @@ std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& com
     const ValidationOptions how{.trials = comparison.trials,
                                 .seed = comparison.seed,
                                 .chunk_size = 4,
-                                .progress = [&](std::size_t done, std::size_t) {
-                                  if (progress) progress(before + done, all);
-                                }};
-    validateAll(ProgramExecutor{comparison.threads}, how, {ReferenceLaw::chiSquared(1)},
-                [&](CounterRng&, std::uint64_t number) {
-                  const std::uint64_t seed = comparison.seed * 1000003 + number;
-                  const TwoViewScene scene(options, seed);
-                  const double sigma = options.sigma / options.focal_length;
-                  const TwoViewImages images{{sigma, sigma},
-                                             Eigen::Vector2d(options.width, options.height) / options.focal_length};
-                  Search search(twoViewModels(images), {.seed = seed, .all_models = true});
-                  search.add(scene.matches);
-                  while (search.iterate()) {
-                  }
-                  for (std::size_t r = 0; r < rules().size(); ++r) {
-                    const std::size_t m = rules()[r].choose(search, sigma);
-                    right[number * rules().size() + r] = search.models()[m]->name() == nameOf(options.motion);
-                  }
-                  return std::vector<TrialOutcome>{TrialOutcome{}};
-                });
+                                .progress =
+                                    [&](std::size_t done, std::size_t) {
+                                      if (progress) progress(before + done, all);
+                                    },
+                                .stop = runStopped};
+    const auto reports =
+        validateAll(ProgramExecutor{comparison.threads}, how, {ReferenceLaw::chiSquared(1)},
+                    [&](CounterRng&, std::uint64_t number) {
+                      const std::uint64_t seed = comparison.seed * 1000003 + number;
+                      const TwoViewScene scene(options, seed);
+                      const double sigma = options.sigma / options.focal_length;
+                      const TwoViewImages images{{sigma, sigma},
+                                                 Eigen::Vector2d(options.width, options.height) / options.focal_length};
+                      Search search(twoViewModels(images), {.seed = seed, .all_models = true});
+                      search.add(scene.matches);
+                      while (search.iterate()) {
+                      }
+                      for (std::size_t r = 0; r < rules().size(); ++r) {
+                        const std::size_t m = rules()[r].choose(search, sigma);
+                        right[number * rules().size() + r] = search.models()[m]->name() == nameOf(options.motion);
+                      }
+                      return std::vector<TrialOutcome>{TrialOutcome{}};
+                    });
     before += comparison.trials;
-    for (std::size_t i = 0; i < right.size(); ++i) rows[i % rows.size()].right[k] += right[i] != 0;
+    const std::size_t done = reports[0].trials;
+    if (!countTrials(done)) return k == 0 ? std::vector<TwoViewRuleRow>{} : rows;
+    for (std::size_t i = 0; i < done * rows.size(); ++i) rows[i % rows.size()].right[k] += right[i] != 0;
+    for (TwoViewRuleRow& row : rows) row.trials[k] = done;
   }
   return rows;
 }

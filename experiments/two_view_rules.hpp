@@ -23,14 +23,17 @@ struct TwoViewRuleComparison {
 
 /// How often a rule chose the right model.
 struct TwoViewRuleRow {
+  using OfMotions = std::array<std::size_t, default_two_view_motions.size()>;
   std::string rule;
-  std::size_t trials = 0;                                            ///< a motion
-  std::array<std::size_t, default_two_view_motions.size()> right{};  ///< of each motion
-  double average() const;                                            ///< share of right choices over all motions
-  std::size_t worst() const;                                         ///< number of the motion with the fewest
+  OfMotions trials{}, right{};
+  double share(std::size_t motion) const;  ///< of right choices; NaN without a trial
+  double average() const;                  ///< share of right choices over the trials of all motions
+  std::size_t worst() const;               ///< number of the motion with the smallest share
 };
 
-/// The default rule first; then tests with other bounds, the information criterion, GRIC and the geometric AIC.
+/// The default rule first; then tests with other bounds, the information criterion, GRIC and the geometric AIC. No rows
+/// after an interrupt (experiments/interruption.hpp) before the first trial; later it leaves the first trials of the first
+/// motions.
 std::vector<TwoViewRuleRow> compareTwoViewRules(
     const TwoViewRuleComparison& comparison,
     const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});

@@ -26,7 +26,7 @@ constexpr const char* doctor_name = "liestat doctor";
 
 struct DoctorOptions {
   std::vector<std::string> files;
-  std::string json, align;
+  std::string json, report, align;
   TrajectoryInputOptions input;
   bool no_truth = false, plan = false, runs = false, everything = false;
   std::optional<double> at;
@@ -121,6 +121,7 @@ void diagnose(const DoctorOptions& o, const std::vector<DiagnosedPose>& poses, c
 int runDoctor(DoctorOptions o, const Invocation& invocation) {
   o.input.settle();
   DiagnosisOutput output;
+  DiagnosedFile file;
   output.mode = o.plan ? "plan" : o.no_truth ? "chain" : "diagnosis";
   DiagnosisOptions options;
   options.alpha = o.alpha;
@@ -136,7 +137,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     estimates.pop_back();
   }
   if (!has_truth && estimates.size() > 1) throw InputError(doctor_name, 0, "several estimates", "one without a truth");
-  std::vector<DiagnosedPose> poses;
+  std::vector<DiagnosedPose>& poses = file.poses;
   TextFile text;
   if (isGraph(estimates.front(), o.input.estimate.format, text)) {
     if (o.no_truth) throw InputError(text.name, 0, "edges, and --no-truth", "a trajectory, or the true vertices");
@@ -159,6 +160,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     }
     output.what = "edges", output.files = {graph.name};
     options.hypotheses = possible(std::nullopt, CovarianceContent::information);
+    file.assumed.content = CovarianceContent::information;
     // Successive edges are independent measurements.
     options.alignment = AlignmentModel::none;
   } else {
@@ -175,6 +177,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
       const Trajectory estimate = readWithCovariances(path, o.input.estimate);
       output.files.push_back(estimate.name);
       order = estimate.fixed_order;
+      file.times.by_time = estimate.hasTimes();
       if (estimate.stated_convention) {
         output.notes.push_back(fmt::format("{} states {}", estimate.covariance_source,
                                            conventionName(*estimate.stated_convention, false)));
@@ -187,13 +190,16 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
         for (std::size_t i = 0; i < estimate.size(); ++i) {
           list.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
         }
+        if (estimate.hasTimes()) at = estimate.times;
       }
       runs.push_back(list), times.push_back(at);
     }
     options.hypotheses = possible(order, std::nullopt);
+    file.assumed.order = order.value_or(file.assumed.order);
     output.what = "poses";
     if (runs.size() == 1) {
       poses = runs[0];
+      file.times.values = times[0];
     } else {
       // One residual of each run, at one time: they are independent of each other.
       double last = std::numeric_limits<double>::infinity();
@@ -212,12 +218,18 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     }
   }
   diagnose(o, poses, options, output);
+  file.alignment = options.alignment;
+  if (file.times.values.empty()) {
+    file.times.by_time = false;
+    for (std::size_t i = 0; i < poses.size(); ++i) file.times.values.push_back(static_cast<double>(i));
+  }
   if (o.json != "-") printLines(formatDiagnosis(output));
   if (!o.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
     setDiagnosis(object, output);
     writeJson(o.json, object);
   }
+  if (!o.report.empty()) writeDiagnosisReport(o.report, invocation.command_line, output, file);
   return exitCodeOf(output);
 }
 
@@ -244,6 +256,7 @@ void addDoctorCommand(const CommandList& program) {
   command.option("--at", o->at, "With several runs: the time of their residuals, s (default: the last common one)");
   command.option("--alpha", o->alpha, "Probability of rejecting the true convention (default 0.001)").range(1e-12, 0.5);
   command.option("--json", o->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", o->report, "Write a page with plots into this directory");
   command.run([o](const Invocation& invocation) { return runDoctor(*o, invocation); });
 }
 

@@ -25,10 +25,25 @@ constexpr double most_windows = 1e6;
 
 struct Options {
   ImuOptions imu;
-  std::string calibration, truth, json;
+  std::string calibration, truth, json, report;
   std::optional<double> begin, end, window;
   double gravity = 9.81;
 };
+
+/// The growth of the standard deviations from the beginning of the first window with a result.
+void followGrowth(PreintegratedReadings& readings, const PreintegrationResult& result, RecordingOptions<double> how) {
+  constexpr std::size_t steps = 50;
+  const auto first = std::find_if(result.windows.begin(), result.windows.end(),
+                                  [](const PreintegratedWindow& w) { return w.result.ok(); });
+  if (first == result.windows.end() || !result.with_noise) return;
+  readings.growth_begin = first->begin;
+  how.preintegration.bias = first->bias;
+  for (std::size_t i = 1; i <= steps; ++i) {
+    const double duration = first->result.motion.duration() * static_cast<double>(i) / steps;
+    const auto part = preintegrate<double>(readings.imu.samples, first->begin, first->begin + duration, how);
+    if (part.ok()) readings.growth.push_back(deviationsOf(part.motion));
+  }
+}
 
 int runCommand(const Options& options, const Invocation& invocation) {
   const ImuFile imu = readImu(options.imu.file);
@@ -68,6 +83,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     const double until = i + 1 == count && !options.window ? end : w.begin + length;
     const auto first = truthAt(truth, w.begin), last = truthAt(truth, until);
     if (!options.imu.hasBias()) how.preintegration.bias = first ? first->bias : ImuBias<double>{};
+    w.bias = how.preintegration.bias;
     w.result = preintegrate<double>(imu.samples, w.begin, until, how);
     if (const Fault& fault = w.result.fault; fault && fault.index < imu.samples.size()) {
       w.fault_end = imu.samples[fault.index].time;
@@ -91,6 +107,11 @@ int runCommand(const Options& options, const Invocation& invocation) {
     setPreintegration(object, result);
     writeJson(options.json, object);
   }
+  if (!options.report.empty()) {
+    PreintegratedReadings readings{imu, options.imu.file, begin, end, options.imu.largest_gap, noise};
+    followGrowth(readings, result, how);
+    writePreintegrationReport(options.report, invocation.command_line, result, readings);
+  }
   const bool any =
       std::any_of(windows.begin(), windows.end(), [](const PreintegratedWindow& w) { return w.result.ok(); });
   return any ? exit_fine : exit_not_trusted;
@@ -111,6 +132,7 @@ void addPreintegrateCommand(const CommandList& app) {
   command.option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
   command.option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
+  command.option("--report", options->report, "Write a page with plots into this directory");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -37,7 +37,8 @@ struct SplitResult {
 std::size_t fewestMeasurements(const Measurements& measurements, const SplitOptions& options);
 
 /// All splits of measurements of which there are enough. The order of the rows, or their times, is the order in time.
-/// `advance` is called twice a split, on any thread.
+/// `advance` is called twice a split, on any thread. An interrupt (experiments/interruption.hpp) leaves the first splits of
+/// each kind, perhaps none.
 SplitResult splitMeasurements(
     const Measurements& measurements, const SplitSettings& settings, const std::function<void()>& advance = [] {});
 

@@ -1,5 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/measurement_options.hpp>
+#include <cli/commands/validation_command.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/io/output_file.hpp>
 #include <cli/io/stereo.hpp>
@@ -15,7 +16,10 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
 namespace liestat::cli {
 namespace {
@@ -46,7 +50,9 @@ FileSplit splitFile(const Options& options) {
   split.covariance_at_matters = measurements.covariance_at_matters;
   split.covariance_at = measurements.covariance_at;
   split.notes = measurements.notes;
+  const StopOnInterrupt watch;
   Progress bar("validate split", 2 * options.settings.split.splits);
+  experiments::trials_of_run.planned += 2 * options.settings.split.splits;
   split.result = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
   split.random = split.result.random;
   split.by_blocks = split.result.by_blocks;
@@ -82,32 +88,46 @@ LandmarkSplits splitStereo(const Options& options) {
   all.source = prefix;
   all.settings = options.settings.split;
   all.surveyed = !survey.empty();
-  std::vector<SplitSeries> random, by_blocks;
-  Progress bar("validate split", 2 * options.settings.split.splits * landmarks.size());
+  std::vector<std::pair<std::size_t, Measurements>> enough;  // of each landmark that can be split, and its track
   for (const LandmarkMeasurements& landmark : landmarks) {
-    const Measurements measurements = measurementsOf(landmark, options.input.options);
+    Measurements measurements = measurementsOf(landmark, options.input.options);
     all.criterion = measurements.criterion;
     all.known_noise = measurements.known_noise;
     if (measurements.size() < fewestMeasurements(measurements, options.settings.split)) {
       ++all.skipped;
-      continue;
+    } else {
+      enough.emplace_back(landmark.track, std::move(measurements));
     }
-    AnalysisOptions how;
-    how.threads = options.settings.threads;
-    LandmarkSplit& row = all.landmarks.emplace_back();
-    row.track = landmark.track;
-    row.split = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
-    row.whole = analyseMean(measurements, how);
-    if (landmark.track < survey.size()) row.survey = survey[landmark.track];
-    random.push_back(row.split.random);
-    by_blocks.push_back(row.split.by_blocks);
   }
-  if (all.landmarks.empty()) {
+  if (enough.empty()) {
     throw InputError(prefix + "_tracks.csv", 0, "no landmark was seen often enough to be split",
                      fmt::format("{} observations of one", options.settings.split.blocks));
   }
+  std::vector<SplitSeries> random, by_blocks;
+  const StopOnInterrupt watch;
+  Progress bar("validate split", 2 * options.settings.split.splits * enough.size());
+  experiments::trials_of_run.planned += 2 * options.settings.split.splits * enough.size();
+  for (const auto& [track, measurements] : enough) {
+    if (experiments::runStopped()) break;
+    const SplitResult split = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
+    if (split.random.distances.empty()) continue;
+    AnalysisOptions how;
+    how.threads = options.settings.threads;
+    LandmarkSplit& row = all.landmarks.emplace_back();
+    row.track = track;
+    row.split = split;
+    row.whole = analyseMean(measurements, how);
+    if (track < survey.size()) row.survey = survey[track];
+    random.push_back(split.random);
+    if (!split.by_blocks.distances.empty()) by_blocks.push_back(split.by_blocks);
+  }
+  if (random.empty()) return all;  // an interrupt came first
   all.random = pooled(random);
-  all.by_blocks = pooled(by_blocks);
+  if (by_blocks.empty()) {
+    all.by_blocks.index = std::numeric_limits<double>::quiet_NaN(), all.by_blocks.dof = all.random.dof;
+  } else {
+    all.by_blocks = pooled(by_blocks);
+  }
   all.description = fmt::format("{}: {} landmarks seen by a stereo camera, {} with too few observations left out",
                                 prefix, landmarks.size(), all.skipped);
   return all;
@@ -115,10 +135,11 @@ LandmarkSplits splitStereo(const Options& options) {
 
 template <class Split>
 int show(const Split& split, const Options& options, const Invocation& invocation) {
+  if (endedBeforeTrials()) return exit_interrupted;
   if (options.json != "-") printLines(formatSplit(split));
   if (!options.json.empty()) writeJson(options.json, toJson(split, invocation.command_line));
   if (!options.report.empty()) writeSplitReport(options.report, invocation.command_line, split);
-  return split.passed() ? exit_fine : exit_validation_failed;
+  return exitCode(split.passed());
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {

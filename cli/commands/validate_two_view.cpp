@@ -56,16 +56,20 @@ int compareRules(const Options& options, const Invocation& invocation) {
   comparison.seed = options.validation.seed, comparison.threads = options.validation.threads;
   comparison.matches = options.validation.matches, comparison.outliers = options.validation.outliers;
   comparison.sigma = options.sigma.value_or(comparison.sigma);
-  const std::vector<TwoViewRuleRow> rows = withProgressBar(
-      "validate two-view", [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
+  const std::vector<TwoViewRuleRow> rows =
+      runTrials("validate two-view", [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
+  if (endedBeforeTrials()) return exit_interrupted;
   if (options.output.json != "-") printLines(formatTwoViewRules(rows));
   if (!options.output.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line, comparison.seed);
     std::vector<JsonObject> list;
     for (const TwoViewRuleRow& row : rows) list.push_back(toJson(row));
-    writeJson(options.output.json, object.set("rules", list));
+    writeJson(options.output.json, setInterrupted(object).set("rules", list));
   }
-  return exit_fine;
+  if (!options.output.report.empty()) {
+    writeTwoViewRulesReport(options.output.report, invocation.command_line, rows);
+  }
+  return exitCode(true);
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {

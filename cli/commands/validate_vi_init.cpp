@@ -68,6 +68,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.threads = options.threads;
   const std::vector<ViInitRow> rows =
       runTrials("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
+  if (endedBeforeTrials()) return exit_interrupted;
   if (rows.empty()) throw InputError("--window", 0, "none of these checks has windows of this length");
   return publish(
       options.output, invocation, options.seed, run_false_alarm, rows, formatViInitTables,

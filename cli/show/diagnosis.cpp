@@ -21,21 +21,6 @@ std::vector<std::string> namesOfConventions(const std::vector<Convention>& list)
   return names;
 }
 
-std::string headline(const DiagnosisOutput& output) {
-  if (output.diagnosis) {
-    const ConventionDiagnosis& d = *output.diagnosis;
-    std::string word = name(d.verdict);
-    if (d.verdict != DiagnosisVerdict::identified) {
-      std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
-    }
-    return fmt::format("{}: {}\n", word, d.reason);
-  }
-  const ChainDiagnosis& c = *output.chain;
-  if (!c.is_chain) return fmt::format("UNDECIDABLE: {}\n", c.reason);
-  if (c.accepted.size() == 1) return fmt::format("identified: {}\n", describe(c.accepted.front()));
-  return fmt::format("UNDECIDABLE: {}\n", c.reason);
-}
-
 std::string acceptedInWords(const std::vector<Convention>& accepted) {
   constexpr std::size_t most = 12;
   std::string text;
@@ -85,6 +70,22 @@ std::string planInWords(const DiagnosisOutput& output) {
 
 }  // namespace
 
+std::string verdictOf(const DiagnosisOutput& output) {
+  if (output.diagnosis) {
+    const ConventionDiagnosis& d = *output.diagnosis;
+    std::string word = name(d.verdict);
+    if (d.verdict != DiagnosisVerdict::identified) {
+      std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::toupper(c); });
+    }
+    return fmt::format("{}: {}", word, d.reason);
+  }
+  if (!output.chain) return {};
+  const ChainDiagnosis& c = *output.chain;
+  if (!c.is_chain) return fmt::format("UNDECIDABLE: {}", c.reason);
+  if (c.accepted.size() == 1) return fmt::format("identified: {}", describe(c.accepted.front()));
+  return fmt::format("UNDECIDABLE: {}", c.reason);
+}
+
 int exitCodeOf(const DiagnosisOutput& output) {
   if (output.mode == "plan") return exit_fine;
   if (output.diagnosis) {
@@ -105,7 +106,7 @@ std::string formatDiagnosis(const DiagnosisOutput& output) {
   if (output.mode == "plan") {
     text = planInWords(output);
   } else {
-    text = headline(output);
+    text = verdictOf(output) + "\n";
     const std::vector<Convention>& accepted = output.diagnosis ? output.diagnosis->accepted : output.chain->accepted;
     text += acceptedInWords(accepted);
     text += "\n";

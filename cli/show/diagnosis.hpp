@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cli/show/json.hpp>
+#include <cli/show/pose_errors.hpp>
 #include <fusion/convention_diagnosis.hpp>
 
 #include <cstddef>
@@ -23,10 +24,24 @@ struct DiagnosisOutput {
   std::vector<PlanRow> plan;
 };
 
+/// The poses that were diagnosed, for the plots.
+struct DiagnosedFile {
+  std::vector<DiagnosedPose> poses;
+  TimesOfPoses times;
+  AlignmentModel alignment = AlignmentModel::none;
+  Convention
+      assumed;  ///< in which the file would be read without a diagnosis: the library's own, as far as the format allows
+};
+
 /// The exit code: 0 identified and consistent, 4 undecidable, 5 inconsistent or none.
 int exitCodeOf(const DiagnosisOutput& output);
 
 std::string formatDiagnosis(const DiagnosisOutput& output);
 void setDiagnosis(JsonObject& object, const DiagnosisOutput& output);
+void writeDiagnosisReport(const std::string& directory, const std::string& command_line, const DiagnosisOutput& output,
+                          const DiagnosedFile& file);
+
+/// The verdict in one line. Empty for a plan.
+std::string verdictOf(const DiagnosisOutput& output);
 
 }  // namespace liestat::cli

@@ -5,6 +5,7 @@
 #include <cli/io/result_zip.hpp>
 #include <cli/io/text.hpp>
 #include <cli/show/page.hpp>
+#include <cli/show/pose_errors.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
 
@@ -271,47 +272,22 @@ Plot trajectoryPlot(const EvaluationOutput& output) {
 }
 
 Plot errorPlot(const EvaluatedEstimate& e, std::size_t number_of) {
-  Plot plot{
+  return {
       .name = fmt::format("errors_{}", number_of),
       .caption = fmt::format("Errors of {} after the weighted alignment, in the body's axes, with the band of three "
                              "standard deviations that the covariances and the alignment give.",
                              e.name),
+      .panels = errorPanels(e.consistency.errors, {e.times, e.by_time}),
       .columns = 3};
-  constexpr std::array labels{"x, m", "y, m", "z, m", "rotation x, deg", "rotation y, deg", "rotation z, deg"};
-  for (int k = 0; k < 6; ++k) {
-    Series band{.name = "3 sd", .style = Style::filled_curve}, error{.name = "error"};
-    const double unit = k < 3 ? 1 : degrees;
-    for (std::size_t i = 0; i < e.consistency.errors.size(); ++i) {
-      const PoseError& p = e.consistency.errors[i];
-      const double sigma = 3 * unit * std::sqrt(p.covariance(k, k));
-      if (!std::isfinite(sigma)) continue;
-      band.x.push_back(e.times[i]), band.low.push_back(-sigma), band.high.push_back(sigma);
-      error.x.push_back(e.times[i]), error.y.push_back(unit * p.error[k]);
-    }
-    plot.panels.push_back({.x = {.label = e.by_time ? "time, s" : "row"},
-                           .y = {.label = labels[static_cast<std::size_t>(k)]},
-                           .series = {band, error}});
-  }
-  return plot;
 }
 
 Plot neesPlot(const EvaluatedEstimate& e, std::size_t number_of) {
-  Series points{.name = "NEES", .style = Style::points};
-  for (std::size_t i = 0; i < e.consistency.errors.size(); ++i) {
-    points.x.push_back(e.times[i]), points.y.push_back(e.consistency.errors[i].nees);
-  }
-  const double low = chiSquaredQuantile(0.025, 6), high = chiSquaredThreshold(0.025, 6);
-  const Panel panel{
-      .x = {.label = e.by_time ? "time, s" : "row"},
-      .y = {.label = "NEES of a pose", .logarithmic = true},
-      .series = {points},
-      .references = {{ReferenceLine::Direction::horizontal, low}, {ReferenceLine::Direction::horizontal, high}}};
-  return {
-      .name = fmt::format("nees_{}", number_of),
-      .caption = fmt::format("NEES of each pose of {}; 95 % of them lie between the dotted lines, {} and {}, if the "
-                             "covariances are right.",
-                             e.name, number(low, 3), number(high, 3)),
-      .panels = {panel}};
+  const TimesOfPoses times{e.times, e.by_time};
+  Panel panel = neesPanel(times);
+  panel.series = {neesSeries("NEES", e.consistency.errors, times)};
+  return {.name = fmt::format("nees_{}", number_of),
+          .caption = fmt::format("NEES of each pose of {}; {}", e.name, neesBounds()),
+          .panels = {panel}};
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ constexpr std::string_view style_sheet = R"css(
 * { box-sizing: border-box; }
 body { margin: 0 auto; max-width: 75rem; padding: 2.5rem 1.25rem 4rem; background: var(--page); color: var(--ink);
   font: 16px/1.55 "Helvetica Neue", Helvetica, Arial, sans-serif; }
-h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 1.5rem; padding-bottom: .6rem; border-bottom: 2px solid var(--rule); }
+h1 { font-size: 1.7rem; line-height: 1.25; overflow-wrap: anywhere; margin: 0 0 1.5rem; padding-bottom: .6rem; border-bottom: 2px solid var(--rule); }
 h2 { font-size: 1.2rem; margin: 2.5rem 0 .8rem; }
 p { max-width: 46rem; margin: 0 0 1rem; }
 a { color: var(--link); }
@@ -51,7 +51,7 @@ figure { margin: 1.5rem 0 2rem; }
 }
 .plot text { font-family: Helvetica, Arial, sans-serif; }
 figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
-.verdict { border: 2px solid; border-radius: 6px; padding: .6rem .9rem; max-width: none; font-weight: 600; }
+.verdict { overflow-wrap: anywhere; border: 2px solid; border-radius: 6px; padding: .6rem .9rem; max-width: none; font-weight: 600; }
 .good { border-color: #2e8b57; }
 .bad { border-color: #c8452f; }
 .contents { columns: 2; padding-left: 1.2rem; max-width: 46rem; }

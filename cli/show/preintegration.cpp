@@ -7,9 +7,6 @@
 #include <fmt/format.h>
 
 namespace liestat::cli {
-namespace {
-
-using experiments::quantile;
 
 std::string statusOf(const Fault& fault) {
   switch (fault.kind) {
@@ -31,10 +28,14 @@ std::string statusOf(const Fault& fault) {
   return "unknown";
 }
 
-Eigen::Vector3d standardDeviations(const PreintegratedWindow& w, int block) {
-  return w.result.motion.gaussian().covariance.diagonal().segment<3>(3 * block).cwiseSqrt();
+IncrementDeviations deviationsOf(const Preintegration<double>& motion) {
+  const Eigen::Matrix<double, 9, 1> sd = motion.gaussian().covariance.diagonal().cwiseSqrt();
+  return {motion.duration(), sd.segment<3>(3).maxCoeff(), sd.tail<3>().maxCoeff(), sd.head<3>().maxCoeff()};
 }
-double largest(const Eigen::Vector3d& v) { return v.maxCoeff(); }
+
+namespace {
+
+using experiments::quantile;
 
 JsonObject toJson(const PreintegratedWindow& w, bool with_noise) {
   JsonObject o;
@@ -58,36 +59,6 @@ JsonObject toJson(const PreintegratedWindow& w, bool with_noise) {
     if (with_noise) o.set("squared_distance", w.squared_distance);
   }
   return o;
-}
-
-std::string windowTable(const std::vector<PreintegratedWindow>& windows, bool with_noise, bool with_truth) {
-  std::vector<std::string> headers = {"begin s", "duration", "turn deg", "velocity m/s", "position m"};
-  if (with_noise) headers.insert(headers.end(), {"sd turn deg", "sd velocity", "sd position"});
-  if (with_truth) headers.insert(headers.end(), {"error deg", "error m/s", "error m"});
-  Table table(headers);
-  for (const PreintegratedWindow& w : windows) {
-    const SE23d& x = w.result.motion.increment();
-    if (!w.result.ok()) {
-      table.row({number(w.begin, 9), statusOf(w.result.fault)});
-      continue;
-    }
-    std::vector<std::string> cells = {number(w.begin, 9), number(w.result.motion.duration()),
-                                      number(degrees * x.so3().log().norm()), number(x.velocity().norm()),
-                                      number(x.translation().norm())};
-    if (with_noise) {
-      for (const double sd : {degrees * largest(standardDeviations(w, 1)), largest(standardDeviations(w, 2)),
-                              largest(standardDeviations(w, 0))}) {
-        cells.push_back(number(sd, 3));
-      }
-    }
-    if (with_truth && w.error) {
-      for (const double e :
-           {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
-        cells.push_back(number(e, 3));
-    }
-    table.row(cells);
-  }
-  return table.str();
 }
 
 /// Where the readings of windows without a result fail.
@@ -124,9 +95,46 @@ std::string errorSummary(const std::vector<PreintegratedWindow>& windows, bool w
 
 }  // namespace
 
+std::vector<std::string> preintegrationHeaders(const PreintegrationResult& result) {
+  std::vector<std::string> headers = {"begin s", "duration", "turn deg", "velocity m/s", "position m"};
+  if (result.with_noise) headers.insert(headers.end(), {"sd turn deg", "sd velocity", "sd position"});
+  if (result.with_truth) headers.insert(headers.end(), {"error deg", "error m/s", "error m"});
+  return headers;
+}
+
+std::vector<std::vector<std::string>> preintegrationRows(const PreintegrationResult& result) {
+  std::vector<std::vector<std::string>> rows;
+  for (const PreintegratedWindow& w : result.windows) {
+    const SE23d& x = w.result.motion.increment();
+    if (!w.result.ok()) {
+      rows.push_back({number(w.begin, 9), statusOf(w.result.fault)});
+      continue;
+    }
+    std::vector<std::string> cells = {number(w.begin, 9), number(w.result.motion.duration()),
+                                      number(degrees * x.so3().log().norm()), number(x.velocity().norm()),
+                                      number(x.translation().norm())};
+    if (result.with_noise) {
+      const IncrementDeviations sd = deviationsOf(w.result.motion);
+      for (const double value : {degrees * sd.rotation, sd.velocity, sd.position}) cells.push_back(number(value, 3));
+    }
+    if (result.with_truth && w.error) {
+      for (const double e :
+           {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
+        cells.push_back(number(e, 3));
+    }
+    rows.push_back(cells);
+  }
+  return rows;
+}
+
+std::string preintegrationRemarks(const PreintegrationResult& result) {
+  return faultLines(result.windows) + errorSummary(result.windows, result.with_noise);
+}
+
 std::string formatPreintegration(const PreintegrationResult& result) {
-  return windowTable(result.windows, result.with_noise, result.with_truth) + faultLines(result.windows) +
-         errorSummary(result.windows, result.with_noise);
+  Table table(preintegrationHeaders(result));
+  for (const std::vector<std::string>& cells : preintegrationRows(result)) table.row(cells);
+  return table.str() + preintegrationRemarks(result);
 }
 
 void setPreintegration(JsonObject& object, const PreintegrationResult& result) {

@@ -4,6 +4,8 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
+#include <cli/show/validation.hpp>
+#include <experiments/interruption.hpp>
 
 #include <fmt/format.h>
 
@@ -14,6 +16,7 @@ namespace liestat::cli {
 namespace {
 
 std::string seriesInWords(const char* what, const SplitSeries& s) {
+  if (s.distances.empty()) return fmt::format("{:<22} none was done\n", what);
   return fmt::format("{:<22} index {} (expected {} +- {}), p = {}\n", what, number(s.index), number(s.dof),
                      number(s.standardError(), 2), number(s.pValue(), 2));
 }
@@ -58,6 +61,14 @@ std::vector<std::vector<std::string>> halfRows(const FileSplit& split) {
 
 std::string adviceOf(const SplitOutcome& outcome) {
   const SplitSeries& blocks = outcome.by_blocks;
+  const experiments::TrialsOfRun& run = experiments::trials_of_run;
+  if (run.incomplete()) {
+    std::string text = fmt::format("INTERRUPTED: {} of {} splits were done", run.done.load(), run.planned.load());
+    if (blocks.distances.empty()) return text + ", none of them by blocks of time, from which the verdict comes.";
+    return text +
+           fmt::format(". Halves made of blocks of time differ by {} times the expected squared distance so far.",
+                       number(blocks.factor(), 3));
+  }
   if (outcome.passed()) {
     return fmt::format(
         "PASSED: halves made of blocks of time agree as well as their covariances say (factor {}, 95 %: {} to {}). "
@@ -100,8 +111,8 @@ JsonObject splitEnvelope(const SplitOutcome& outcome, const std::string& command
   o.set("random", toJson(outcome.random)).set("by_blocks", toJson(outcome.by_blocks));
   o.set("inflation", outcome.by_blocks.factor()).set("inflation_low", outcome.by_blocks.factorLow());
   o.set("inflation_high", outcome.by_blocks.factorHigh());
-  o.set("false_alarm", split_false_alarm).set("passed", outcome.passed());
-  return o;
+  o.set("false_alarm", split_false_alarm);
+  return setVerdict(o, outcome.passed());
 }
 
 void plotSplits(Report& report, const SplitOutcome& outcome) {
@@ -117,11 +128,13 @@ void plotSplits(Report& report, const SplitOutcome& outcome) {
     p.references = {{.direction = ReferenceLine::Direction::vertical, .at = s.dof}};
     return p;
   };
-  report.plot(
-      {.name = "splits",
-       .caption = "Squared distances of the two halves' means under both covariances, over the splits; the line "
-                  "is what is expected on average.",
-       .panels = {panel("Halves at random", outcome.random), panel("Halves of blocks of time", outcome.by_blocks)}});
+  std::vector<Panel> panels = {panel("Halves at random", outcome.random)};
+  if (!outcome.by_blocks.distances.empty()) panels.push_back(panel("Halves of blocks of time", outcome.by_blocks));
+  report.plot({.name = "splits",
+               .caption =
+                   "Squared distances of the two halves' means under both covariances, over the splits; the line "
+                   "is what is expected on average.",
+               .panels = panels});
 }
 
 std::string formatSplit(const FileSplit& split) {

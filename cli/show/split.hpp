@@ -6,6 +6,7 @@
 #include <cli/commands/mean_analysis.hpp>
 #include <cli/show/json.hpp>
 #include <cli/commands/split.hpp>
+#include <experiments/interruption.hpp>
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -27,7 +28,8 @@ struct SplitOutcome {
   SplitSeries random, by_blocks;
   bool known_noise = true;
 
-  bool passed() const { return !(by_blocks.pValue() < split_false_alarm); }
+  /// Not after an interrupt.
+  bool passed() const { return !experiments::trials_of_run.incomplete() && !(by_blocks.pValue() < split_false_alarm); }
 };
 
 /// The measurements of one file.
@@ -72,7 +74,7 @@ void writeSplitReport(const std::string& directory, const std::string& command_l
 
 /// Parts of these views: the last lines, the fields in JSON and the plots that both have.
 std::string splitVerdict(const SplitOutcome& outcome);
-/// Its last paragraph in one line: PASSED or FAILED, and what follows from that.
+/// Its last paragraph in one line: PASSED, FAILED or INTERRUPTED, and what follows from that.
 std::string adviceOf(const SplitOutcome& outcome);
 JsonObject splitEnvelope(const SplitOutcome& outcome, const std::string& command_line);
 void plotSplits(Report& report, const SplitOutcome& outcome);

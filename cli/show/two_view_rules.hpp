@@ -14,4 +14,8 @@ std::string formatTwoViewRules(const std::vector<experiments::TwoViewRuleRow>& r
 /// One rule as JSON.
 JsonObject toJson(const experiments::TwoViewRuleRow& row);
 
+/// The page with its plots.
+void writeTwoViewRulesReport(const std::string& directory, const std::string& command_line,
+                             const std::vector<experiments::TwoViewRuleRow>& rows);
+
 }  // namespace liestat::cli

@@ -23,12 +23,14 @@ std::string verdictCell(const std::optional<bool>& passed) {
 }
 
 JsonObject& setVerdict(JsonObject& o, bool passed) {
+  o.set("passed", passed && !trials_of_run.incomplete());
+  return setInterrupted(o);
+}
+
+JsonObject& setInterrupted(JsonObject& o) {
   const TrialsOfRun& run = trials_of_run;
-  if (!run.incomplete()) return o.set("passed", passed);
-  return o.set("passed", false)
-      .set("interrupted", true)
-      .set("trials_done", run.done.load())
-      .set("trials_planned", run.planned.load());
+  if (!run.incomplete()) return o;
+  return o.set("interrupted", true).set("trials_done", run.done.load()).set("trials_planned", run.planned.load());
 }
 
 bool endedBeforeTrials() {
@@ -37,11 +39,15 @@ bool endedBeforeTrials() {
   return true;
 }
 
+std::string interruptedLines(const std::string& units, const std::string& so_far) {
+  return fmt::format("partial: {} of {} {} were done{}\nINTERRUPTED\n", trials_of_run.done.load(),
+                     trials_of_run.planned.load(), units, so_far);
+}
+
 std::string verdictLines(const Tally& tally, const std::string& where) {
   if (trials_of_run.incomplete()) {
-    return fmt::format("partial: {} of {} trials were done, and {} of {} rows {} pass so far\nINTERRUPTED\n",
-                       trials_of_run.done.load(), trials_of_run.planned.load(), tally.judged - tally.failed,
-                       tally.judged, where);
+    return interruptedLines(
+        "trials", fmt::format(", and {} of {} rows {} pass so far", tally.judged - tally.failed, tally.judged, where));
   }
   if (tally.judged == 0) return fmt::format("no row is {}: nothing was judged\nFAILED\n", where);
   return fmt::format("{} of {} rows {} pass; false alarms: one in {:g} runs\n{}\n", tally.judged - tally.failed,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -51,6 +52,20 @@ struct Files {
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
+};
+
+/// The page of a run, and the files beside it.
+struct Page {
+  TemporaryDirectory directory;
+  std::string html;
+  Page(Words words, int exit_code) {
+    words.insert(words.end(), {"--report", directory / "page"});
+    const ProgramOutput out = run(words);
+    EXPECT_EQ(out.exit_code, exit_code) << out.error;
+    html = contentOf(directory / "page/index.html");
+  }
+  std::string csv(const std::string& name) const { return contentOf(directory / "page/" + name + ".csv"); }
+  bool has(const std::string& name) const { return std::filesystem::exists(directory / "page/" + name + ".csv"); }
 };
 
 TEST(DoctorCommand, NamesTheConvention) {
@@ -115,6 +130,9 @@ TEST(DoctorCommand, SeveralRunsAreOneResidualEach) {
   EXPECT_NE(std::find(found["accepted"].begin(), found["accepted"].end(), "right"), found["accepted"].end());
   EXPECT_LT(found["accepted"].size(), 10U);
   EXPECT_EQ(found["n"], 30);
+  const Page page(words, 4);
+  EXPECT_TRUE(contains(page.html, "<p class=\"verdict bad\">✗ UNDECIDABLE: ")) << page.html.substr(0, 3000);
+  EXPECT_TRUE(page.has("errors"));
 }
 
 TEST(DoctorCommand, EdgesOfAGraph) {
@@ -148,6 +166,70 @@ TEST(DoctorCommand, EdgesOfAGraph) {
   EXPECT_EQ(found["what"], "edges");
   ASSERT_EQ(found["accepted"].size(), 1U) << found["reason"];
   EXPECT_EQ(found["accepted"][0], "g2o-full,unit=half");
+  const Page page({"doctor", graph, truth}, 0);
+  EXPECT_TRUE(contains(page.csv("errors"), "3 sd, g2o-full,unit=half"));
+  EXPECT_TRUE(contains(page.csv("errors"), "\"3 sd, g2o-full\",")) << "the information that the format fixes stays";
+}
+
+TEST(DoctorReport, ShowsTheConventionsAndTheErrorsBeforeAndAfter) {
+  const Files files(convention(Perturbation::world_axes));
+  const Page page(files.words(), 0);
+  EXPECT_TRUE(contains(page.html, "</h1>\n<p class=\"verdict good\">✓ identified: ")) << page.html.substr(0, 3000);
+  EXPECT_TRUE(contains(page.html, "<th scope=\"col\">--cov-from</th>"));
+  EXPECT_TRUE(contains(page.html, "<td>ros-fixed</td>"));
+  const std::string errors = page.csv("errors");
+  EXPECT_TRUE(contains(errors, "3 sd, ros-fixed")) << "after";
+  EXPECT_TRUE(contains(errors, "3 sd, right")) << "before";
+  EXPECT_TRUE(contains(page.csv("conventions"), "explain the errors"));
+  EXPECT_TRUE(page.has("calibration"));
+  // In one of the two rows the index is that of the right convention: near one.
+  const std::string row = "<td>ros-fixed</td><td class=\"number\">150</td><td class=\"number\">";
+  const std::size_t begin = page.html.find(row);
+  ASSERT_NE(begin, std::string::npos);
+  const Json found = json(files.words(), 0);
+  const double index = std::stod(page.html.substr(begin + row.size()));
+  EXPECT_NEAR(index, found["hypotheses"][0]["nees_ratio"].get<double>(), 0.01);
+}
+
+TEST(DoctorReport, OneReadingWhereTheAssumedOneIsRight) {
+  const Files files(convention(Perturbation::right));
+  const Page page(files.words(), 0);
+  EXPECT_FALSE(contains(page.html, "dashed: as"));
+  EXPECT_FALSE(contains(page.csv("errors"), "ros-fixed"));
+}
+
+TEST(DoctorReport, InconsistentDeadReckoningAndPlan) {
+  const Files scaled(convention(Perturbation::left), false, 0.25);
+  EXPECT_TRUE(contains(Page(scaled.words(), 5).html, "<p class=\"verdict bad\">✗ INCONSISTENT: "));
+  const Files files(convention(Perturbation::right, RotationUnit::half_angle), true);
+  const Page with(files.words(), 0);
+  EXPECT_TRUE(contains(with.html, "Neighbouring errors are correlated"));
+  EXPECT_TRUE(contains(with.html, "Chain condition</h2>"));
+  EXPECT_TRUE(contains(with.csv("errors"), "3 sd, right,unit=half"));
+  const Words alone{"doctor", files.estimate, "--format", "tum", "--cov-layout", "full36"};
+  Words words = alone;
+  words.push_back("--no-truth");
+  const Page without(words, 0);
+  EXPECT_TRUE(contains(without.csv("deviations"), "right,unit=half"));
+  EXPECT_FALSE(without.has("errors")) << "there is no truth";
+  words = alone;
+  words.push_back("--plan");
+  const Page plan(words, 0);
+  EXPECT_TRUE(contains(plan.html, "<p class=\"verdict good\">✓ With its 150 poses this file tells "));
+  EXPECT_TRUE(contains(plan.html, "poses needed"));
+}
+
+TEST(DoctorReport, AnAlignedEstimate) {
+  const Files files(convention(Perturbation::right, RotationUnit::half_angle));
+  const Page page(files.words({"--align", "se3"}), 0);
+  EXPECT_TRUE(contains(page.csv("errors"), "3 sd, right,unit=half"));
+}
+
+TEST(DoctorReport, StandardOutputIsNoDirectory) {
+  const Files files(convention(Perturbation::right));
+  const ProgramOutput out = run(files.words({"--report", "-"}));
+  EXPECT_EQ(out.exit_code, 2);
+  EXPECT_TRUE(contains(out.error, "a directory is expected")) << out.error;
 }
 
 TEST(DoctorCommand, BadInputIsSaid) {

@@ -102,6 +102,55 @@ Outcome preintegrate(const TemporaryDirectory& directory, std::vector<std::strin
   return run;
 }
 
+TEST(PreintegrateReport, ShowsIncrementsTheirDeviationsAndTheReadings) {
+  const TemporaryDirectory directory;
+  std::string text = "t,wx,wy,wz,ax,ay,az\n";
+  for (int i = 0; i <= 200; ++i) text += std::to_string(10 + 0.05 * i) + ",0,0,0.5,0,0,3\n";
+  directory.write("f.csv", text);
+  const Outcome run =
+      preintegrate(directory, {"--imu", "f.csv", "--noise", "0.001,0.01", "--window", "2", "--report", "page"});
+  ASSERT_EQ(run.status, 0) << run.errors;
+  const std::string page = contentOf(directory / "page/index.html");
+  EXPECT_NE(page.find("<p class=\"verdict good\">✓ ok: all of the 5 windows have an increment.</p>"),
+            std::string::npos);
+  for (const char* text_of_page : {"<th scope=\"col\" class=\"number\">sd turn deg</th>", "Growth of the standard",
+                                   "median rate, Hz", "<td class=\"number\">20</td>"}) {
+    EXPECT_NE(page.find(text_of_page), std::string::npos) << text_of_page;
+  }
+  for (const char* file : {"increments", "growth", "readings"}) {
+    EXPECT_TRUE(std::filesystem::exists(directory / "page/" + file + ".csv")) << file;
+  }
+  EXPECT_FALSE(std::filesystem::exists(directory / "page/errors.csv")) << "there is no truth";
+  // The growth ends with the window's own deviation.
+  const std::string growth = contentOf(directory / "page/growth.csv");
+  const std::size_t second = growth.find("\n\n");
+  const std::string end = growth.substr(growth.rfind('\n', second - 1) + 1, 60);
+  const double sd = std::sqrt(run.json["windows"][0]["covariance"][5][5].get<double>()) * 180 / 3.14159265358979323846;
+  ASSERT_EQ(end.substr(0, 4), ",,2,") << end;
+  EXPECT_NEAR(std::stod(end.substr(4)), sd, 1e-6 * sd) << end;
+}
+
+TEST(PreintegrateReport, SaysWhichWindowsHaveNone) {
+  const TemporaryDirectory directory;
+  std::string text = "t,wx,wy,wz,ax,ay,az\n";
+  for (int i = 0; i <= 100; ++i) {
+    if (i < 50 || i > 60) text += std::to_string(0.05 * i) + ",0,0,0.5,0,0,3\n";
+  }
+  directory.write("f.csv", text);
+  Outcome run = preintegrate(directory, {"--imu", "f.csv", "--window", "1", "--report", "page"});
+  ASSERT_EQ(run.status, 0) << run.errors;
+  std::string page = contentOf(directory / "page/index.html");
+  EXPECT_NE(page.find("<p class=\"verdict bad\">✗ INCOMPLETE: 2 of 5 windows have no increment"), std::string::npos);
+  EXPECT_NE(page.find("<td>gap</td>"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(directory / "page/growth.csv")) << "the noise is not known";
+  run = preintegrate(directory, {"--imu", "f.csv", "--report", "page"});
+  EXPECT_EQ(run.status, 3);
+  EXPECT_NE(contentOf(directory / "page/index.html").find("✗ NOT TO BE TRUSTED: "), std::string::npos);
+  run = preintegrate(directory, {"--imu", "f.csv", "--report", "-"});
+  EXPECT_EQ(run.status, 2);
+  EXPECT_NE(run.errors.find("a directory is expected"), std::string::npos) << run.errors;
+}
+
 TEST(Preintegrate, AConstantForceForTwoSeconds) {
   const TemporaryDirectory directory;
   std::string text = "t,wx,wy,wz,ax,ay,az\n";

@@ -1,11 +1,17 @@
 // `liestat validate two-view`: what it judges, its tables, and what the program writes.
 
+#include <cli/show/two_view_rules.hpp>
 #include <cli/show/two_view_validation.hpp>
+#include <experiments/interruption.hpp>
+#include <experiments/two_view_rules.hpp>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -112,6 +118,71 @@ TEST(ValidateTwoViewProgram, writesRowsAndAReport) {
   EXPECT_EQ(json["rows"][0]["dof"], 3);
   EXPECT_EQ(json["choices"][1]["chosen"]["translation"].get<int>(), 5);
   EXPECT_NE(contentOf(directory / "report/index.html").find("</html>"), std::string::npos);
+}
+
+TEST(TwoViewRules, anInterruptLeavesTheFirstTrials) {
+  TrialsOfRun& run = trials_of_run;
+  run.stop = false, run.planned = 0, run.done = 0;
+  TwoViewRuleComparison comparison;
+  comparison.trials = 40, comparison.matches = 40, comparison.threads = 1;
+  // Among the trials of the first motion, a few of which are under way together.
+  const std::vector<TwoViewRuleRow> rows =
+      compareTwoViewRules(comparison, [&](std::uint64_t, std::uint64_t) { run.stop = true; });
+  ASSERT_TRUE(run.incomplete());
+  const std::size_t done = run.done;
+  EXPECT_EQ(run.planned, 360U);
+  EXPECT_GE(done, 8U);
+  EXPECT_LT(done, 40U);
+  const std::string text = formatTwoViewRules(rows);
+  EXPECT_TRUE(text.ends_with(fmt::format("\npartial: {} of 360 trials were done\nINTERRUPTED\n", done))) << text;
+  // The same as those of a shorter run, which is stopped after its first motion.
+  run.stop = false, comparison.trials = done, comparison.threads = 2;
+  const std::vector<TwoViewRuleRow> shorter =
+      compareTwoViewRules(comparison, [&](std::uint64_t now, std::uint64_t) { run.stop = now >= done; });
+  ASSERT_EQ(rows.size(), shorter.size());
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    EXPECT_EQ(rows[r].trials, TwoViewRuleRow::OfMotions{done});
+    EXPECT_EQ(rows[r].trials, shorter[r].trials);
+    EXPECT_EQ(rows[r].right, shorter[r].right) << rows[r].rule;
+    EXPECT_EQ(rows[r].worst(), 0U);
+  }
+  run.stop = true, run.planned = 0, run.done = 0;
+  EXPECT_TRUE(compareTwoViewRules(comparison).empty());
+  run.stop = false;
+}
+
+TEST(ValidateTwoViewProgram, comparesRules) {
+  const TemporaryDirectory directory;
+  const ProgramResult result = runProgram(
+      {LIESTAT_PROGRAM, "validate", "two-view", "--rules", "--trials", "2", "--json", "out.json", "--report", "report"},
+      directory.path().string());
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  ASSERT_EQ(json["rules"].size(), 11U);
+  EXPECT_EQ(json["rules"][0]["trials"], 2);
+  EXPECT_EQ(json["rules"][0]["right"].size(), 9U);
+  EXPECT_FALSE(json.contains("interrupted"));
+  const std::string page = contentOf(directory / "report/index.html");
+  EXPECT_NE(page.find("✓ The default rule chooses the right model in "), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(directory / "report/rules.csv"));
+}
+
+TEST(ValidateTwoViewProgram, anInterruptLeavesWhatWasCompared) {
+  const TemporaryDirectory directory;
+  // As in validate_propagation_test.cpp.
+  const ProgramResult result =
+      runProgram({"env", "--default-signal=INT", "timeout", "--preserve-status", "-s", "INT", "1.5", LIESTAT_PROGRAM,
+                  "validate", "two-view", "--rules", "--trials", "100000", "--json", "out.json", "--report", "report"},
+                 directory.path().string());
+  EXPECT_EQ(result.status, 130) << result.errors;
+  EXPECT_NE(result.errors.find("liestat: interrupted"), std::string::npos) << result.errors;
+  if (result.errors.find("nothing to write") != std::string::npos) return;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  EXPECT_EQ(json["interrupted"], true);
+  EXPECT_EQ(json["trials_planned"], 900000U);
+  EXPECT_EQ(json["trials_done"], json["rules"][0]["trials"]);
+  EXPECT_NE(contentOf(directory / "report/index.html").find("<p class=\"verdict bad\">✗ INTERRUPTED: partial: "),
+            std::string::npos);
 }
 
 TEST(ValidateTwoViewProgram, refusesWhatItDoesNotKnow) {

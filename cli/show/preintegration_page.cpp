@@ -1,0 +1,271 @@
+#include <cli/show/preintegration.hpp>
+
+#include <cli/show/outline.hpp>
+#include <cli/show/page.hpp>
+#include <cli/show/table.hpp>
+#include <cli/show/units.hpp>
+#include <experiments/summary.hpp>
+#include <stats/laws.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+/// Rows of the table of windows; the plots' CSV has all.
+constexpr std::size_t most_rows = 200;
+
+/// A part of an increment: its name, its unit, and how many of it make the unit that is computed in.
+struct IncrementPart {
+  const char *name, *unit;
+  double scale;
+  double IncrementDeviations::*deviation;
+  int begin;  ///< of its block in the nine coordinates
+};
+constexpr std::array increment_parts{IncrementPart{"rotation", "deg", degrees, &IncrementDeviations::rotation, 3},
+                                     IncrementPart{"velocity", "m/s", 1, &IncrementDeviations::velocity, 6},
+                                     IncrementPart{"position", "m", 1, &IncrementDeviations::position, 0}};
+
+std::size_t countOk(const PreintegrationResult& result) {
+  return static_cast<std::size_t>(std::count_if(result.windows.begin(), result.windows.end(),
+                                                [](const PreintegratedWindow& w) { return w.result.ok(); }));
+}
+
+/// The errors against the truth as the covariances see them.
+struct DistancesToTruth {
+  double mean = 0;
+  std::size_t n = 0;
+  double p = 1;  ///< probability of so large a mean, if the noise of the calibration is true
+};
+DistancesToTruth distancesOf(const PreintegrationResult& result) {
+  DistancesToTruth d;
+  double sum = 0;
+  for (const PreintegratedWindow& w : result.windows) {
+    if (w.error && result.with_noise) sum += w.squared_distance, ++d.n;
+  }
+  if (d.n == 0) return d;
+  d.mean = sum / static_cast<double>(d.n);
+  // Windows do not overlap, and neither does their noise.
+  d.p = chiSquaredSurvival(sum, 9 * static_cast<double>(d.n));
+  return d;
+}
+constexpr double distance_false_alarm = 1e-5;
+
+bool isGood(const PreintegrationResult& result) {
+  return countOk(result) == result.windows.size() && !(distancesOf(result).p < distance_false_alarm);
+}
+
+std::string preintegrationVerdict(const PreintegrationResult& result) {
+  const std::size_t ok = countOk(result), all = result.windows.size();
+  if (ok == 0) return "NOT TO BE TRUSTED: no window has an increment, as the readings have faults.";
+  const DistancesToTruth distances = distancesOf(result);
+  std::string text;
+  if (ok < all) {
+    text = fmt::format("INCOMPLETE: {} of {} windows have no increment, as the readings have faults.", all - ok, all);
+  } else {
+    text = isGood(result) ? "ok: " : "INCONSISTENT with the truth: ";
+    text += all == 1 ? "the window has an increment" : fmt::format("all of the {} windows have an increment", all);
+    text += isGood(result) ? "." : ", but the errors are larger than the noise of the calibration explains.";
+  }
+  if (distances.n > 0) {
+    text += fmt::format(" The squared distance to the truth is {} in the mean, 9 expected.", number(distances.mean));
+  }
+  return text;
+}
+
+void showWindows(Report& report, const PreintegrationResult& result) {
+  report.section("Windows");
+  std::vector<std::string> headers = preintegrationHeaders(result);
+  // A page has the room for the units that the terminal leaves out.
+  for (std::string& header : headers) {
+    header += header == "duration" ? " s" : header == "sd velocity" ? " m/s" : header == "sd position" ? " m" : "";
+  }
+  std::vector<std::vector<std::string>> rows = preintegrationRows(result);
+  const std::size_t all = rows.size();
+  if (all > most_rows) rows.resize(most_rows);
+  std::string caption = "Lengths of the increments";
+  if (result.with_noise) caption += ", the largest of their standard deviations along the axes";
+  if (result.with_truth) caption += ", lengths of their errors";
+  if (all > most_rows) caption += fmt::format("; the first {} of {} windows", most_rows, all);
+  report.table(headers, rows, caption + ".");
+  const std::string remarks = preintegrationRemarks(result);
+  if (!remarks.empty()) report.code(remarks.substr(remarks.find_first_not_of('\n')));
+}
+
+void showIncrements(Report& report, const PreintegrationResult& result) {
+  if (countOk(result) < 2) return;
+  report.section("Increments");
+  // Bars of more windows would cover each other.
+  const bool bars = result.with_noise && result.windows.size() <= 1000;
+  Plot plot{.name = "increments",
+            .caption = bars ? "Length of each window's increment, with the largest of its standard deviations."
+                            : "Length of each window's increment.",
+            .columns = 3};
+  for (const IncrementPart& part : increment_parts) {
+    Series points{.style = bars ? Style::errorbars : Style::points};
+    for (const PreintegratedWindow& w : result.windows) {
+      if (!w.result.ok()) continue;
+      const SE23d& x = w.result.motion.increment();
+      const double length = part.scale * (part.begin == 3   ? x.so3().log().norm()
+                                          : part.begin == 6 ? x.velocity().norm()
+                                                            : x.translation().norm());
+      points.x.push_back(w.begin), points.y.push_back(length);
+      if (!bars) continue;
+      const double sd = part.scale * deviationsOf(w.result.motion).*part.deviation;
+      points.low.push_back(length - sd), points.high.push_back(length + sd);
+    }
+    plot.panels.push_back({.x = {.label = "beginning of the window, s"},
+                           .y = {.label = fmt::format("{}, {}", part.name, part.unit)},
+                           .series = {points}});
+  }
+  report.plot(plot);
+}
+
+void showGrowth(Report& report, const PreintegratedReadings& readings) {
+  report.section("Growth of the standard deviations");
+  const ImuNoise<double>& noise = readings.noise;
+  report.paragraph(fmt::format(
+      "Predicted from the densities of noise: gyroscope {:g} rad/s/√Hz, accelerometer {:g} m/s²/√Hz, walks of their "
+      "biases {:g} rad/s²/√Hz and {:g} m/s³/√Hz.",
+      noise.gyroscope, noise.accelerometer, noise.gyroscope_walk, noise.accelerometer_walk));
+  Plot plot{
+      .name = "growth",
+      .caption = fmt::format("The largest standard deviation along the axes of an increment that begins at {} s, by "
+                             "its duration.",
+                             number(readings.growth_begin, 6)),
+      .columns = 3};
+  for (const IncrementPart& part : increment_parts) {
+    Series line;
+    for (const IncrementDeviations& d : readings.growth) {
+      line.x.push_back(d.duration), line.y.push_back(part.scale * d.*part.deviation);
+    }
+    plot.panels.push_back({.x = {.label = "duration, s", .low = 0.0},
+                           .y = {.label = fmt::format("sd of {}, {}", part.name, part.unit), .low = 0.0},
+                           .series = {line}});
+  }
+  report.plot(plot);
+}
+
+void showErrors(Report& report, const PreintegrationResult& result) {
+  if (std::none_of(result.windows.begin(), result.windows.end(), [](const auto& w) { return w.error.has_value(); })) {
+    return;
+  }
+  report.section("Errors against the truth");
+  Plot plot{.name = "errors",
+            .caption = result.with_noise
+                           ? "Errors of each window along the axes of the body at its end, with the band of "
+                             "three standard deviations."
+                           : "Errors of each window along the axes of the body at its end.",
+            .columns = 3};
+  for (const IncrementPart& part : increment_parts) {
+    for (int k = 0; k < 3; ++k) {
+      Series band{.name = "3 sd", .style = Style::filled_curve}, error{.name = "error", .style = Style::points};
+      for (const PreintegratedWindow& w : result.windows) {
+        if (!w.error) continue;
+        error.x.push_back(w.begin), error.y.push_back(part.scale * (*w.error)[part.begin + k]);
+        if (!result.with_noise) continue;
+        const double variance = w.result.motion.gaussian().covariance(part.begin + k, part.begin + k);
+        const double reach = 3 * part.scale * std::sqrt(variance);
+        band.x.push_back(w.begin), band.low.push_back(-reach), band.high.push_back(reach);
+      }
+      Panel panel{.x = {.label = "beginning of the window, s"},
+                  .y = {.label = fmt::format("{} {}, {}", part.name, "xyz"[k], part.unit)}};
+      // A band needs two windows.
+      if (band.x.size() > 1) panel.series.push_back(outlineOf(band));
+      panel.series.push_back(error);
+      plot.panels.push_back(panel);
+    }
+  }
+  report.plot(plot);
+  if (!result.with_noise) return;
+  const double low = chiSquaredQuantile(0.025, 9), high = chiSquaredThreshold(0.025, 9);
+  Series points{.style = Style::points};
+  for (const PreintegratedWindow& w : result.windows) {
+    if (w.error) points.x.push_back(w.begin), points.y.push_back(w.squared_distance);
+  }
+  Panel panel{.x = {.label = "beginning of the window, s"},
+              .y = {.label = "squared distance to the truth", .logarithmic = true},
+              .series = {points}};
+  for (const double at : {low, high}) panel.references.push_back({ReferenceLine::Direction::horizontal, at});
+  report.plot(
+      {.name = "distances",
+       .caption = fmt::format("Squared Mahalanobis distance of each window to the truth; 95 % of them lie between "
+                              "the dotted lines, {} and {}, if the noise of the calibration is true.",
+                              number(low, 3), number(high, 3)),
+       .panels = {panel}});
+}
+
+void showReadings(Report& report, const PreintegratedReadings& readings) {
+  report.section("Readings");
+  std::vector<double> intervals;  // ms
+  Series rate{.name = "gyroscope"}, force{.name = "accelerometer"}, interval{.style = Style::points};
+  double largest = 0, largest_at = 0;
+  std::size_t gaps = 0, n = 0;
+  const ImuSample<double>* before = nullptr;
+  for (const ImuSample<double>& s : readings.imu.samples) {
+    if (s.time < readings.begin || s.time > readings.end) continue;
+    ++n;
+    rate.x.push_back(s.time), rate.y.push_back(s.angular_rate.norm());
+    force.x.push_back(s.time), force.y.push_back(s.specific_force.norm());
+    if (before != nullptr) {
+      const double step = s.time - before->time;
+      intervals.push_back(1000 * step);
+      interval.x.push_back(s.time), interval.y.push_back(1000 * step);
+      gaps += step > readings.largest_gap;
+      if (step > largest) largest = step, largest_at = before->time;
+    }
+    before = &s;
+  }
+  const double median = experiments::quantile(intervals, 0.5);
+  report.table(
+      {"readings", "duration, s", "median interval, ms", "median rate, Hz", "largest interval, ms", "at, s", "gaps"},
+      {{fmt::format("{}", n), number(readings.end - readings.begin, 6), number(median), number(1000 / median),
+        number(1000 * largest), number(largest_at, 6), fmt::format("{}", gaps)}},
+      fmt::format("Readings of {}; a gap is an interval above {:g} ms (--max-gap) and discards the windows that it "
+                  "touches.",
+                  readings.source, 1000 * readings.largest_gap));
+  // Both the intervals and the bound are seen.
+  double low = 1000 * readings.largest_gap, high = low;
+  for (const double step : intervals) low = std::min(low, step), high = std::max(high, step);
+  const Axis time{.label = "time, s", .low = readings.begin, .high = readings.end};
+  Panel panels[] = {
+      {.title = "Angular rate", .x = time, .y = {.label = "length, rad/s", .low = 0.0}, .series = {outlineOf(rate)}},
+      {.title = "Specific force", .x = time, .y = {.label = "length, m/s²", .low = 0.0}, .series = {outlineOf(force)}},
+      {.title = "Intervals",
+       .x = time,
+       .y = {.label = "since the reading before, ms", .low = 0.8 * low, .high = 1.25 * high, .logarithmic = true},
+       .series = {outlineOf(interval)},
+       .references = {{ReferenceLine::Direction::horizontal, 1000 * readings.largest_gap}}}};
+  report.plot(
+      {.name = "readings",
+       .caption =
+           "Readings as the sensor gives them, biases and gravity included; of long recordings the smallest and the "
+           "largest of each thousandth is drawn. The dotted line is the largest interval that is accepted.",
+       .panels = {std::begin(panels), std::end(panels)},
+       .columns = 3});
+}
+
+}  // namespace
+
+void writePreintegrationReport(const std::string& directory, const std::string& command_line,
+                               const PreintegrationResult& result, const PreintegratedReadings& readings) {
+  Report report(directory, "Preintegrated motions of " + readings.source);
+  report.verdict(isGood(result), preintegrationVerdict(result));
+  report.code(command_line);
+  showIncrements(report, result);
+  if (readings.growth.size() > 1) showGrowth(report, readings);
+  showErrors(report, result);
+  showReadings(report, readings);
+  showWindows(report, result);
+  report.write();
+}
+
+}  // namespace liestat::cli

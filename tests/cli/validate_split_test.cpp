@@ -1,0 +1,131 @@
+// `liestat validate split` after an interrupt.
+
+#include <cli/commands/measurement_options.hpp>
+#include <cli/commands/split.hpp>
+#include <cli/io/run_program.hpp>
+#include <cli/show/split.hpp>
+#include <cli/temporary_directory.hpp>
+#include <experiments/interruption.hpp>
+#include <stats/random.hpp>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace liestat::cli {
+namespace {
+
+using Json = nlohmann::json;
+
+/// Points with covariances, in the order of time.
+std::string pointsFile(std::size_t n) {
+  CounterRng rng(5);
+  std::string text = "x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n";
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Vector3d x = rng.normalVector<3>();
+    text += fmt::format("{},{},{},1,0,0,1,0,1\n", x[0], x[1], x[2]);
+  }
+  return text;
+}
+
+struct StoppedSplits {
+  Measurements measurements;
+  SplitSettings settings;
+
+  StoppedSplits() {
+    const TemporaryDirectory directory;
+    MeasurementInput input;
+    input.file = directory.write("f.csv", pointsFile(60));
+    measurements = input.read("test");
+    settings.threads = 1;
+    settings.split.splits = 20;
+  }
+  ~StoppedSplits() { start(0); }
+  SplitResult run(std::size_t splits) {
+    settings.split.splits = splits;
+    start(splits);
+    return splitMeasurements(measurements, settings);
+  }
+  /// An interrupt comes after so many splits of both kinds.
+  SplitResult stoppedAfter(std::size_t count) {
+    settings.split.splits = 20;
+    start(20);
+    std::size_t done = 0;
+    return splitMeasurements(measurements, settings, [&] { experiments::trials_of_run.stop = ++done >= count; });
+  }
+  void start(std::size_t splits) const {
+    experiments::TrialsOfRun& run = experiments::trials_of_run;
+    run.stop = false, run.done = 0, run.planned = 2 * splits;
+  }
+  /// The lines on the terminal, as they are now.
+  std::string textOf(const SplitResult& result) const {
+    FileSplit split;
+    split.feature = measurements.feature;
+    split.criterion = measurements.criterion;
+    split.settings = settings.split;
+    split.result = result;
+    split.random = result.random;
+    split.by_blocks = result.by_blocks;
+    return formatSplit(split);
+  }
+};
+
+std::vector<double> firstOf(const std::vector<double>& list, std::size_t n) {
+  return {list.begin(), list.begin() + static_cast<std::ptrdiff_t>(n)};
+}
+
+TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
+  StoppedSplits splits;
+  const SplitResult whole = splits.run(20), seven = splits.run(7);
+  const SplitResult early = splits.stoppedAfter(7);
+  EXPECT_EQ(experiments::trials_of_run.done, 7U);
+  EXPECT_EQ(early.random.distances, firstOf(whole.random.distances, 7));
+  EXPECT_EQ(early.random.effective_dof, seven.random.effective_dof);
+  EXPECT_NE(early.random.effective_dof, whole.random.effective_dof);
+  EXPECT_TRUE(early.by_blocks.distances.empty());
+  EXPECT_EQ(early.merged.mean.point, whole.merged.mean.point);
+  const std::string text = splits.textOf(early);
+  EXPECT_NE(text.find("halves of 10 blocks    none was done\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nINTERRUPTED: 7 of 40 splits were done, none of them by blocks of time,"), std::string::npos)
+      << text;
+
+  const SplitResult late = splits.stoppedAfter(27);
+  EXPECT_EQ(late.random.distances, whole.random.distances);
+  EXPECT_EQ(late.random.effective_dof, whole.random.effective_dof);
+  EXPECT_EQ(late.by_blocks.distances, firstOf(whole.by_blocks.distances, 7));
+  EXPECT_EQ(late.by_blocks.effective_dof, seven.by_blocks.effective_dof);
+  EXPECT_NE(splits.textOf(late).find("\nINTERRUPTED: 27 of 40 splits were done. Halves"), std::string::npos);
+
+  // One that comes after the last split interrupts nothing.
+  const SplitResult ended = splits.stoppedAfter(40);
+  EXPECT_EQ(ended.by_blocks.distances, whole.by_blocks.distances);
+  EXPECT_NE(splits.textOf(ended).find("\nPASSED: "), std::string::npos);
+}
+
+TEST(ValidateSplitProgram, anInterruptLeavesWhatWasComputed) {
+  const TemporaryDirectory directory;
+  directory.write("f.csv", pointsFile(2000));
+  // As in validate_propagation_test.cpp.
+  const ProgramResult result =
+      runProgram({"env", "--default-signal=INT", "timeout", "--preserve-status", "-s", "INT", "1.5", LIESTAT_PROGRAM,
+                  "validate", "split", "f.csv", "--splits", "1000000", "--json", "out.json", "--report", "report"},
+                 directory.path().string());
+  EXPECT_EQ(result.status, 130) << result.errors;
+  EXPECT_NE(result.errors.find("liestat: interrupted"), std::string::npos) << result.errors;
+  if (result.errors.find("nothing to write") != std::string::npos) return;
+  const Json json = Json::parse(contentOf(directory / "out.json"));
+  EXPECT_EQ(json["passed"], false);
+  EXPECT_EQ(json["interrupted"], true);
+  EXPECT_EQ(json["trials_planned"], 2000000U);
+  EXPECT_EQ(json["trials_done"], json["random"]["splits"].get<int>() + json["by_blocks"]["splits"].get<int>());
+  EXPECT_EQ(json["merged"]["n"], 2000);
+  EXPECT_NE(contentOf(directory / "report/index.html").find("<p class=\"verdict bad\">✗ INTERRUPTED: "),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace liestat::cli
