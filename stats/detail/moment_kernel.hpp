@@ -85,8 +85,8 @@ struct ResidualSums {
     arguments.largest = largestOf(largest);
     arguments.largest_angle = largestOf(largest_angle);
     arguments.fourth = sumOf(fourth);
-    for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
-    for (std::size_t a = 0; a < entries; ++a) {
+    LIESTAT_UNROLL for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
+    LIESTAT_UNROLL for (std::size_t a = 0; a < entries; ++a) {
       arguments.scatter[a] = sumOf(scatter[a]);
       arguments.squared[a] = Weighted ? sumOf(squared[a]) : arguments.scatter[a];
     }
@@ -101,7 +101,13 @@ struct MomentKernel {
     Layout<const S> features;
     const S* weights = nullptr;
     std::size_t count = 0;
-    Sums sums;
+    S product[Sums::entries > 0 ? Sums::entries : 1], sum[Sums::linear > 0 ? Sums::linear : 1], weight;
+
+    void addTo(Sums& sums) const {
+      for (std::size_t i = 0; i < Sums::entries; ++i) sums.product[i] += product[i];
+      for (std::size_t i = 0; i < Sums::linear; ++i) sums.sum[i] += sum[i];
+      sums.weight += weight, sums.count += static_cast<S>(count);
+    }
   };
 
   template <InstructionSet Set>
@@ -116,13 +122,13 @@ struct MomentKernel {
     S weight = 0;
     for (std::size_t i = 0; i < arguments.count; i += block) {
       const std::size_t count = std::min(arguments.count - i, block);
-      loadAll<Set, 0>(arguments.features, i, count, data);
+      loadAll<P, 0>(arguments.features, i, count, data);
       if constexpr (Weighted) {
         std::memcpy(data[columns - 1], arguments.weights + i, count * sizeof(S));
         for (std::size_t j = 0; j < count; ++j) weight += data[columns - 1][j];
       }
-      for (std::size_t j = count; j % P::size != 0; ++j) {
-        for (std::size_t c = 0; c < columns; ++c) data[c][j] = 0;
+      if constexpr (Weighted) {
+        for (std::size_t j = count; j % P::size != 0; ++j) data[columns - 1][j] = 0;
       }
       for (std::size_t j = 0; j < count; j += P::size) {
         P c[outer + linear], weighted[outer + linear];
@@ -135,23 +141,23 @@ struct MomentKernel {
         LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) sum[a] += weighted[outer + a];
       }
     }
-    for (std::size_t a = 0; a < entries; ++a) arguments.sums.product[a] = sumOf(product[a]);
-    for (std::size_t a = 0; a < linear; ++a) arguments.sums.sum[a] = sumOf(sum[a]);
-    arguments.sums.count = static_cast<S>(arguments.count);
-    arguments.sums.weight = Weighted ? weight : arguments.sums.count;
+    LIESTAT_UNROLL for (std::size_t a = 0; a < entries; ++a) arguments.product[a] = sumOf(product[a]);
+    LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) arguments.sum[a] = sumOf(sum[a]);
+    arguments.weight = Weighted ? weight : static_cast<S>(arguments.count);
   }
 
  private:
   /// Four columns at a time while there are four, then the rest.
-  template <InstructionSet Set, std::size_t first, std::size_t columns, std::size_t block>
+  template <class P, std::size_t first, std::size_t columns, std::size_t block>
   LIESTAT_ALWAYS_INLINE static void loadAll(const Layout<const S>& from, std::size_t begin, std::size_t count,
                                             S (&data)[columns][block]) {
     constexpr std::size_t left = Sums::outer + Sums::linear - first;
+    const S zeros[4] = {};
     if constexpr (left >= 4) {
-      loadColumns<Set, 4>(from, first, begin, count, data + first);
-      loadAll<Set, first + 4>(from, begin, count, data);
+      loadFilled<P, 4>(from, first, begin, count, zeros, data + first);
+      loadAll<P, first + 4>(from, begin, count, data);
     } else if constexpr (left > 0) {
-      loadColumns<Set, left>(from, first, begin, count, data + first);
+      loadFilled<P, left>(from, first, begin, count, zeros, data + first);
     }
   }
 };
@@ -174,7 +180,7 @@ auto parameterSums(InstructionSet set, const R& samples, const W& weights, std::
   typename Kernel::Arguments arguments;
   runOnFeatures<Kernel, M, Sums::outer + Sums::linear, Weighted>(set, samples, weights, begin, end, arguments,
                                                                  [&](std::size_t) {
-                                                                   sums += arguments.sums;
+                                                                   arguments.addTo(sums);
                                                                    return true;
                                                                  });
   return sums;

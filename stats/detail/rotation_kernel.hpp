@@ -67,30 +67,30 @@ struct RotationKernel {
       }
       sums.residuals.finish(arguments);
       arguments.defect = largestOf(sums.defect);
-      for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
       if constexpr (HalfTurns != 0 && Scatter) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
     }
 
     LIESTAT_ALWAYS_INLINE static void load(const Arguments& arguments, std::size_t i, std::size_t count,
                                            S (&data)[columns][block]) {
-      constexpr InstructionSet set = P::set;
-      loadColumns<set, 4>(arguments.features, 0, i, count, data);
+      // The last pack is filled up with y itself, which adds nothing.
+      const S* const y = arguments.reference;
+      loadFilled<P, 4>(arguments.features, 0, i, count, y, data);
+      const std::size_t end = (count + P::size - 1) / P::size * P::size;
       if constexpr (Frame) {
         if (arguments.features.component == 1) {
           // Four numbers at a time: w again, and the translation.
-          loadColumns<set, 4>(arguments.features, 3, i, count, data + 5);
+          loadFilled<P, 4>(arguments.features, 3, i, count, y + 3, data + 5);
         } else {
-          loadColumns<set, 3>(arguments.features, 4, i, count, data + 6);
+          loadFilled<P, 3>(arguments.features, 4, i, count, y + 4, data + 6);
         }
-        for (std::size_t c = 0; c < 3; ++c) {
-          for (std::size_t j = 0; j < count; ++j) data[6 + c][j] -= arguments.reference[4 + c];
+        for (std::size_t j = 0; j < end; j += P::size) {
+          LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) (P::load(data[6 + c] + j) - y[4 + c]).store(data[6 + c] + j);
         }
       }
-      if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
-      // The last pack is filled up with y itself, which adds nothing.
-      for (std::size_t j = count; j % P::size != 0; ++j) {
-        for (std::size_t c = 0; c < 4; ++c) data[c][j] = arguments.reference[c];
-        for (std::size_t c = 4; c < columns; ++c) data[c][j] = 0;
+      if constexpr (Weighted) {
+        std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
+        for (std::size_t j = count; j < end; ++j) data[4][j] = 0;
       }
     }
 
