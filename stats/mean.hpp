@@ -105,17 +105,18 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
   M y = options.start ? *options.start : startOfMean<M>(executor, samples, weights);
   // In a flat space the start is the mean already.
   bool with_scatter = !options.start && starts_at_mean<M>;
-  // If the last step was Newton's: where it began, the step of eq. (4) from there, and the cost that it may reach.
+  // If the last step was Newton's: where it began, the step of eq. (4) from there times the weights, and the cost that it
+  // may reach.
   bool newton = false;
   M before = y;
-  TangentOf<M> fixed_point;
+  TangentOf<M> weighted_step;
   S most(0);
   // Each pass is made where it stays: to copy its sums costs as much as those of ten features.
   for (;;) {
     const MeanPass<M> pass = meanPass(executor, samples, weights, y, with_scatter);
     const MeanSums<M>& sums = pass.sums;
     if (newton && !(sums.cost <= most)) {
-      y = exp(before, fixed_point);
+      y = exp(before, TangentOf<M>(weighted_step / S(sums.weight)));
       newton = with_scatter = false;
       continue;
     }
@@ -124,17 +125,17 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
     M next = y;
     bool last = iterations >= options.max_iterations;
     if (!last) {
-      fixed_point = sums.gradient.cwiseQuotient(metric) / S(sums.weight);
-      TangentOf<M> step = fixed_point;
-      newton = false;
-      if (options.method == MeanMethod::newton) {
-        TangentOf<M> candidate;
+      TangentOf<M> step;
+      newton = options.method == MeanMethod::newton && solveStep(sums.hessian, sums.gradient, step);
+      if (newton) {
+        residual = norm(step);
         // Outside the injectivity radius a Newton step has lost its meaning.
-        newton = solveStep(sums.hessian, sums.gradient, candidate) && candidate.allFinite() &&
-                 norm(candidate) < static_cast<double>(T::injectivityRadius());
-        if (newton) step = candidate;
+        newton = std::isfinite(residual) && residual < static_cast<double>(T::injectivityRadius());
       }
-      residual = norm(step);
+      if (!newton) {
+        step = sums.gradient.cwiseQuotient(metric) / S(sums.weight);
+        residual = norm(step);
+      }
       last = !std::isfinite(residual) || !std::isfinite(static_cast<double>(sums.cost));
       if (!last) {
         ++iterations;
@@ -173,7 +174,8 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
     previous_residual = residual;
     if (newton) {
       // Eq. (4) decreases C by at least ½ Σp |δ|²; Newton's step is kept if it does as well, up to rounding.
-      const S guaranteed = S(0.5) * S(sums.weight) * fixed_point.dot(metric.cwiseProduct(fixed_point));
+      weighted_step = sums.gradient.cwiseQuotient(metric);
+      const S guaranteed = S(0.5) * weighted_step.dot(sums.gradient) / S(sums.weight);
       const S rounding = S(8) * std::numeric_limits<S>::epsilon() * sums.cost;
       most = sums.cost - guaranteed + rounding;
       before = y;

@@ -20,9 +20,7 @@ struct Symmetric4 {
   static constexpr std::size_t entries = 10;
   S lower[entries] = {};
 
-  static constexpr std::size_t entry(std::size_t i, std::size_t j) {
-    return i < j ? entry(j, i) : i * (i + 1) / 2 + j;
-  }
+  static constexpr std::size_t entry(std::size_t i, std::size_t j) { return i < j ? entry(j, i) : i * (i + 1) / 2 + j; }
   S trace() const { return (lower[0] + lower[2]) + (lower[5] + lower[9]); }
   /// scale A².
   EIGEN_ALWAYS_INLINE Symmetric4 square(const S& scale) const {
@@ -31,10 +29,9 @@ struct Symmetric4 {
     for (std::size_t i = 0; i < 4; ++i) {
 #pragma GCC unroll 4
       for (std::size_t j = 0; j <= i; ++j) {
-        result.lower[entry(i, j)] = scale * ((lower[entry(i, 0)] * lower[entry(0, j)] +
-                                              lower[entry(i, 1)] * lower[entry(1, j)]) +
-                                             (lower[entry(i, 2)] * lower[entry(2, j)] +
-                                              lower[entry(i, 3)] * lower[entry(3, j)]));
+        result.lower[entry(i, j)] =
+            scale * ((lower[entry(i, 0)] * lower[entry(0, j)] + lower[entry(i, 1)] * lower[entry(1, j)]) +
+                     (lower[entry(i, 2)] * lower[entry(2, j)] + lower[entry(i, 3)] * lower[entry(3, j)]));
       }
     }
     return result;

@@ -86,7 +86,8 @@ struct PoseKernel {
       arguments.weight = Weighted ? sumOf(sums.weight) : static_cast<S>(arguments.count);
       arguments.squared_weight = Weighted ? sumOf(sums.squared_weight) : arguments.weight;
       arguments.squared_angle = sumOf(sums.squared_angle);
-      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) arguments.rho[a] = sumOf(sums.rho[a]), arguments.phi[a] = sumOf(sums.phi[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) arguments.rho[a] = sumOf(sums.rho[a]),
+                                                         arguments.phi[a] = sumOf(sums.phi[a]);
       LIESTAT_UNROLL for (std::size_t a = 0; a < 6; ++a) arguments.outer[a] = sumOf(sums.outer[a]);
       if constexpr (Full) {
         for (std::size_t a = 0; a < 6; ++a) arguments.mixed[a] = sumOf(sums.mixed[a]);

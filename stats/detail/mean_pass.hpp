@@ -131,7 +131,8 @@ bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, con
                      MeanPass<M>& pass) {
   if constexpr (HasKernelSums<M>) {
     constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
-    return KernelSumsOf<M>::type::template add<weighted, Scatter>(set, samples, weights, range.begin, range.end, y, pass);
+    return KernelSumsOf<M>::type::template add<weighted, Scatter>(set, samples, weights, range.begin, range.end, y,
+                                                                  pass);
   } else if constexpr (hasFactorSums<M>() && !Scatter) {
     int begin = 0;
     [&]<std::size_t... I>(std::index_sequence<I...>) {

@@ -70,7 +70,8 @@ class RotationSums {
                Weighted > (set, samples, weights, begin, end, arguments, [&](std::size_t i) {
                  if (!(arguments.defect < largest_excess<S>)) return false;
                  addSums<Scatter>(arguments, pass);
-                 if constexpr (Scatter && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y, pass.scatter.smallest_gap);
+                 if constexpr (Scatter && halfTurns<M>() != 0)
+                   closestToCutLocus(arguments, samples, i, y, pass.scatter.smallest_gap);
                  return true;
                });
     if constexpr (frame) toReference<Scatter>(y, pass);
