@@ -86,6 +86,14 @@ struct So3Math {
   static Params exp(const Tangent& v) {
     const HalfAngle<S> h = halfAngle(squaredNorm(v));
     const S s = S(0.5) * h.sinc;
+#if defined(__GNUC__)
+    // Products read quaternions in packets.
+    if constexpr (std::is_same_v<S, double>) {
+      Params q;
+      storeInLanes(s * v[0], s * v[1], s * v[2], h.cos, q.data());
+      return q;
+    }
+#endif
     return Params(s * v[0], s * v[1], s * v[2], h.cos);
   }
   static Tangent log(const Params& q) {

@@ -55,8 +55,11 @@ bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covari
   if constexpr (Factored<M>) {
     return false;
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
-    const auto L = regionFactor<M>(covariance);
-    return L.allFinite() && leastDistanceToCutLocus(mean) > 1.5 * longestReach<averaged_dimension<M>>(L);
+    // The norm of the region's factor needs no factor. A region that has none has a trace too large, or none.
+    constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
+    const double squares =
+        static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) + K * least_region * least_region;
+    return leastDistanceToCutLocus(mean) > 1.5 * std::sqrt(squares) * NormalNodes<K>::instance().longest();
   } else {
     return true;
   }

@@ -44,16 +44,16 @@ struct CertifiedMeanOptions {
 /// A mean with its certificates and its covariance.
 template <Metric M>
 struct CertifiedMean {
-  MeanResult<M> mean;  ///< the improved one if the search found a lower minimum
-  UniquenessResult<M> uniqueness;
-  Concentration concentration;
-  std::vector<NearTie<M>> near_ties;  ///< other minima that the measurements do not exclude, the nearest tie first
-  CutLocusMass cut_locus;
+  MeanResult<M> mean = {};  ///< the improved one if the search found a lower minimum
+  UniquenessResult<M> uniqueness = {};
+  Concentration concentration = {};
+  std::vector<NearTie<M>> near_ties = {};  ///< other minima that the measurements do not exclude, the nearest tie first
+  CutLocusMass cut_locus = {};
   /// The relative decrease of the Hessian averaged over the confidence region (averagedHessian) from that at the mean;
   /// the covariance is that of the averaged one.
   double hessian_change = 0;
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
-  std::optional<Gaussian<M>> estimate;
+  std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
   const char* reason = "";  ///< why there is no estimate, in words
 };
@@ -210,10 +210,11 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
 template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const W& weights,
                                       const CertifiedMeanOptions<M>& options) {
-  CertifiedMean<M> result;
-  result.mean = frechetMean<M>(executor, samples, weights, options.mean);
-  if (certifyBySums(weightSums(weights, result.mean.n), options, result)) return result;
-  return findCertifiedMean<M>(executor, samples, weights, options, result.mean);
+  CertifiedMean<M> result{.mean = frechetMean<M>(executor, samples, weights, options.mean)};
+  if (!certifyBySums(weightSums(weights, result.mean.n), options, result)) {
+    result = findCertifiedMean<M>(executor, samples, weights, options, result.mean);
+  }
+  return result;
 }
 
 }  // namespace detail
@@ -229,11 +230,12 @@ CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
     const auto features = detail::asSamples(samples);
-    CertifiedMean<M> result;
-    result.mean = detail::frechetMean<M>(executor, features, detail::UnitWeights{}, options.mean);
     const std::size_t n = features.size();
-    if (detail::certifyBySums(detail::WeightSums::ofOnes(n), options, result)) return result;
-    return detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(n), options, result.mean);
+    CertifiedMean<M> result{.mean = detail::frechetMean<M>(executor, features, detail::UnitWeights{}, options.mean)};
+    if (!detail::certifyBySums(detail::WeightSums::ofOnes(n), options, result)) {
+      result = detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(n), options, result.mean);
+    }
+    return result;
   } else {
     return {};
   }

@@ -26,7 +26,7 @@ namespace detail {
 /// H⁻¹ W S W H⁻¹; NaN where H is not positive definite.
 template <Metric M>
 SquareOf<M> sandwich(const MeanResult<M>& result, const SquareOf<M>& S) {
-  const Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> factor(result.hessian);
+  const DiagonalCholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> factor(result.hessian);
   const SquareOf<M> G = factor.solve(SquareOf<M>(ManifoldTraits<M>::metricWeights().asDiagonal()));
   return congruence(G, S);
 }

@@ -114,16 +114,19 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
   return result;
 }
 
-/// In closed form where there is one.
+/// The largest eigenvalue of a symmetric matrix; of three by the trigonometric solution of the characteristic equation.
 template <int K>
 double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>> solver;
   if constexpr (K == 3) {
-    solver.computeDirect(A, Eigen::EigenvaluesOnly);
+    const double mean = (A(0, 0) + A(1, 1) + A(2, 2)) / 3;
+    const double a = A(0, 0) - mean, d = A(1, 1) - mean, f = A(2, 2) - mean, l = A(1, 0), m = A(2, 0), n = A(2, 1);
+    const double size2 = (a * a + d * d + f * f + 2 * (l * l + m * m + n * n)) / 6, size = std::sqrt(size2);
+    if (!(size > 0)) return mean;
+    const double half_determinant = 0.5 * (a * (d * f - n * n) - l * (l * f - n * m) + m * (l * n - d * m));
+    return mean + 2 * size * std::cos(std::acos(std::clamp(half_determinant / (size2 * size), -1.0, 1.0)) / 3);
   } else {
-    solver.compute(A, Eigen::EigenvaluesOnly);
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>>(A, Eigen::EigenvaluesOnly).eigenvalues()[K - 1];
   }
-  return solver.eigenvalues()[K - 1];
 }
 
 /// True if the sums of a mean prove that findCutLocusNearby finds no mass; `result` then has the window that it reports.

@@ -90,77 +90,98 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
                                             const MeanOptions<M>& options) {
   using T = ManifoldTraits<M>;
   using S = ScalarOf<M>;
-  MeanResult<M> result;
-  result.n = std::ranges::size(samples);
-  if (result.n == 0) return result;
+  const std::size_t n = std::ranges::size(samples);
+  if (n == 0) return {};
 
   const TangentOf<M> metric = T::metricWeights();
-  M y = options.start ? *options.start : startOfMean<M>(executor, samples, weights);
-  // In a flat space the start is the mean already.
-  MeanPass<M> pass = meanPass(executor, samples, weights, y, !options.start && starts_at_mean<M>);
-  result.tolerance = options.tolerance.value_or(automaticTolerance<S>(dataScale(y, pass.sums)));
-  result.status = Status::not_converged;
   const auto norm = [&](const TangentOf<M>& v) {
     using std::sqrt;
     return static_cast<double>(sqrt(v.dot(metric.cwiseProduct(v))));
   };
-
-  double previous_residual = std::numeric_limits<double>::infinity();
-  while (result.iterations < options.max_iterations) {
+  Status status = Status::not_converged;
+  int iterations = 0;
+  double residual = 0, previous_residual = std::numeric_limits<double>::infinity();
+  std::optional<double> tolerance = options.tolerance;
+  M y = options.start ? *options.start : startOfMean<M>(executor, samples, weights);
+  // In a flat space the start is the mean already.
+  bool with_scatter = !options.start && starts_at_mean<M>;
+  // If the last step was Newton's: where it began, the step of eq. (4) from there times the weights, and the cost that it
+  // may reach.
+  bool newton = false;
+  M before = y;
+  TangentOf<M> weighted_step;
+  S most(0);
+  // Each pass is made where it stays: to copy its sums costs as much as those of ten features.
+  for (;;) {
+    const MeanPass<M> pass = meanPass(executor, samples, weights, y, with_scatter);
     const MeanSums<M>& sums = pass.sums;
-    const TangentOf<M> fixed_point = sums.gradient.cwiseQuotient(metric) / S(sums.weight);
-    TangentOf<M> step = fixed_point;
-    bool newton = false;
-    if (options.method == MeanMethod::newton) {
-      const Cholesky<S, T::DoF> factor(sums.hessian);
-      if (factor.ok()) {
-        const TangentOf<M> candidate = factor.solve(sums.gradient);
+    if (newton && !(sums.cost <= most)) {
+      y = exp(before, TangentOf<M>(weighted_step / S(sums.weight)));
+      newton = with_scatter = false;
+      continue;
+    }
+    if (!tolerance) tolerance = automaticTolerance<S>(dataScale(y, sums));
+
+    M next = y;
+    bool last = iterations >= options.max_iterations;
+    if (!last) {
+      TangentOf<M> step;
+      newton = options.method == MeanMethod::newton && solveStep(sums.hessian, sums.gradient, step);
+      if (newton) {
+        residual = norm(step);
         // Outside the injectivity radius a Newton step has lost its meaning.
-        newton = candidate.allFinite() && norm(candidate) < static_cast<double>(T::injectivityRadius());
-        if (newton) step = candidate;
+        newton = std::isfinite(residual) && residual < static_cast<double>(T::injectivityRadius());
+      }
+      if (!newton) {
+        step = sums.gradient.cwiseQuotient(metric) / S(sums.weight);
+        residual = norm(step);
+      }
+      last = !std::isfinite(residual) || !std::isfinite(static_cast<double>(sums.cost));
+      if (!last) {
+        ++iterations;
+        next = exp(y, step);
+        last = residual <= *tolerance;
+        if (last) status = Status::ok;
       }
     }
-    result.residual = norm(step);
-    if (!std::isfinite(result.residual) || !std::isfinite(static_cast<double>(sums.cost))) break;
-    ++result.iterations;
-    const M next = exp(y, step);
-    if (result.residual <= result.tolerance) {
-      // The sums remain those of the point before, which is the mean to the tolerance: no pass over the data for that.
-      y = next;
-      result.status = Status::ok;
-      break;
+    if (last) {
+      // After a step below the tolerance the sums remain those of the point before, which is the mean to the tolerance:
+      // no pass over the data for that.
+      const auto resultWith = [&](const MeanPass<M>& p) -> MeanResult<M> {
+        return {next,
+                status,
+                iterations,
+                residual,
+                *tolerance,
+                n,
+                p.sums.weight,
+                p.sums.cost,
+                p.sums.hessian,
+                p.scatter.scatter,
+                p.scatter.squared,
+                p.scatter.largest,
+                p.scatter.smallest_gap,
+                p.scatter.largest_angle,
+                p.scatter.fourth};
+      };
+      return pass.has_scatter ? resultWith(pass) : resultWith(meanPass<true>(executor, samples, weights, next));
     }
+
     // The next step's length: the square of this one by Newton's method (a small multiple of it: clouds are nearly
     // symmetric), the same fraction of it as it is of the previous one by eq. (4).
-    const double expected =
-        newton ? 1e-4 * result.residual * result.residual : result.residual * (result.residual / previous_residual);
-    previous_residual = result.residual;
-    MeanPass<M> next_pass = meanPass(executor, samples, weights, next, expected <= result.tolerance);
+    const double expected = newton ? 1e-4 * residual * residual : residual * (residual / previous_residual);
+    with_scatter = expected <= *tolerance;
+    previous_residual = residual;
     if (newton) {
       // Eq. (4) decreases C by at least ½ Σp |δ|²; Newton's step is kept if it does as well, up to rounding.
-      const S guaranteed = S(0.5) * S(sums.weight) * fixed_point.dot(metric.cwiseProduct(fixed_point));
+      weighted_step = sums.gradient.cwiseQuotient(metric);
+      const S guaranteed = S(0.5) * weighted_step.dot(sums.gradient) / S(sums.weight);
       const S rounding = S(8) * std::numeric_limits<S>::epsilon() * sums.cost;
-      if (!(next_pass.sums.cost <= sums.cost - guaranteed + rounding)) {
-        y = exp(y, fixed_point);
-        pass = meanPass(executor, samples, weights, y, false);
-        continue;
-      }
+      most = sums.cost - guaranteed + rounding;
+      before = y;
     }
-    y = next, pass = next_pass;
+    y = next;
   }
-
-  if (!pass.has_scatter) pass = meanPass<true>(executor, samples, weights, y);
-  result.mean = y;
-  result.cost = pass.sums.cost;
-  result.hessian = pass.sums.hessian;
-  result.sum_of_weights = pass.sums.weight;
-  result.scatter = pass.scatter.scatter;
-  result.squared_weight_scatter = pass.scatter.squared;
-  result.largest_distance = pass.scatter.largest;
-  result.smallest_gap = pass.scatter.smallest_gap;
-  result.largest_angle = pass.scatter.largest_angle;
-  result.angle_fourth_moment = pass.scatter.fourth;
-  return result;
 }
 
 /// States in one sentence why a range of features has no Fréchet mean; `ok` if it has one.

@@ -43,9 +43,11 @@ M bestOfSeveral(InstructionSet set, const R& samples, const W& weights, std::siz
   }
   const auto cost_at = [&](const M& y) {
     if constexpr (HasKernelSums<M>) {
-      typename KernelSumsOf<M>::type sums;
+      MeanPass<M> pass;
       constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
-      if (sums.template add<weighted, KernelPass::step>(set, judging, weight, 0, judges, y)) return sums.cost;
+      if (KernelSumsOf<M>::type::template add<weighted, KernelPass::step>(set, judging, weight, 0, judges, y, pass)) {
+        return pass.sums.cost;
+      }
     }
     const typename T::Group to_y = T::placement(y).inverse();
     S cost(0);

@@ -13,26 +13,61 @@
 
 namespace liestat::detail {
 
+/// A symmetric 4×4 matrix by its lower triangle, row by row, as kernels make it: number by number, for which nothing waits
+/// that has been stored so.
+template <class S>
+struct Symmetric4 {
+  static constexpr std::size_t entries = 10;
+  S lower[entries] = {};
+
+  static constexpr std::size_t entry(std::size_t i, std::size_t j) { return i < j ? entry(j, i) : i * (i + 1) / 2 + j; }
+  S trace() const { return (lower[0] + lower[2]) + (lower[5] + lower[9]); }
+  /// scale A².
+  EIGEN_ALWAYS_INLINE Symmetric4 square(const S& scale) const {
+    Symmetric4 result;
+#pragma GCC unroll 4
+    for (std::size_t i = 0; i < 4; ++i) {
+#pragma GCC unroll 4
+      for (std::size_t j = 0; j <= i; ++j) {
+        result.lower[entry(i, j)] =
+            scale * ((lower[entry(i, 0)] * lower[entry(0, j)] + lower[entry(i, 1)] * lower[entry(1, j)]) +
+                     (lower[entry(i, 2)] * lower[entry(2, j)] + lower[entry(i, 3)] * lower[entry(3, j)]));
+      }
+    }
+    return result;
+  }
+  EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 4, 1> operator*(const Eigen::Matrix<S, 4, 1>& v) const {
+    const auto row = [&](std::size_t i) -> S {
+      return (lower[entry(i, 0)] * v[0] + lower[entry(i, 1)] * v[1]) +
+             (lower[entry(i, 2)] * v[2] + lower[entry(i, 3)] * v[3]);
+    };
+    return Eigen::Matrix<S, 4, 1>(row(0), row(1), row(2), row(3));
+  }
+};
+
 /// Unit eigenvector of the largest eigenvalue of a symmetric positive semi-definite 4×4 matrix, by repeated squaring of
 /// the normalised matrix: its powers tend to the projector on the dominant eigenvectors. Ties give one of them.
 template <class S>
-Eigen::Matrix<S, 4, 1> dominantEigenvector(Eigen::Matrix<S, 4, 4> A) {
+Eigen::Matrix<S, 4, 1> dominantEigenvector(Symmetric4<S> A) {
   using std::sqrt;
-  const auto trace = [&] { return A(0, 0) + A(1, 1) + (A(2, 2) + A(3, 3)); };
-  for (int i = 0; i < 24; ++i) {
-    const S sum = trace();
-    if (!(sum > S(0))) break;
-    const S scale = S(1) / sum;
-    A = (A * (A * (scale * scale)).eval()).eval();
-    // The trace of the square of a matrix of trace one is one minus twice the share of the other eigenvalues, which the
-    // square has squared: nothing is left to do.
-    if (S(1) - trace() < S(0.1) * sqrt(std::numeric_limits<S>::epsilon())) break;
+  S trace = A.trace();
+  for (int i = 0; i < 24 && trace > S(0); ++i) {
+    const S scale = S(1) / trace;
+    A = A.square(S(scale * scale));
+    trace = A.trace();
+    // The trace of the square of a matrix of trace one is one minus twice the share of the other eigenvalues. The square
+    // has squared that share, and the products below leave its sixth power.
+    if (S(1) - trace < S(0.004)) break;
   }
-  int column = 0;
-  for (int i = 1; i < 4; ++i) {
-    if (A(i, i) > A(column, column)) column = i;
+  std::size_t largest = 0;
+  for (std::size_t i = 1; i < 4; ++i) {
+    if (A.lower[A.entry(i, i)] > A.lower[A.entry(largest, largest)]) largest = i;
   }
-  return A.col(column).normalized();
+  const Eigen::Matrix<S, 4, 1> column(A.lower[A.entry(largest, 0)], A.lower[A.entry(largest, 1)],
+                                      A.lower[A.entry(largest, 2)], A.lower[A.entry(largest, 3)]);
+  const Eigen::Matrix<S, 4, 1> v = A * (A * column);
+  const S scale = S(1) / sqrt((v[0] * v[0] + v[1] * v[1]) + (v[2] * v[2] + v[3] * v[3]));
+  return Eigen::Matrix<S, 4, 1>(scale * v[0], scale * v[1], scale * v[2], scale * v[3]);
 }
 
 /// Sums over many features that kernels make of their parameters c: Σ p c cᵀ of the first `outer` of them, as a lower
@@ -70,23 +105,20 @@ struct QuaternionMoments {
   using S = typename M::Scalar;
   static constexpr int vectors = M::num_parameters - 4;
   using Sums = ParameterSums<S, 4, static_cast<std::size_t>(vectors)>;
-  Eigen::Matrix<S, 4, 4> rotation = Eigen::Matrix<S, 4, 4>::Zero();
+  Symmetric4<S> rotation;
   Eigen::Matrix<S, vectors, 1> vector = Eigen::Matrix<S, vectors, 1>::Zero();
   S weight = S(0);
 
   void add(const M& x, const S& p) {
     const Eigen::Matrix<S, 4, 1> q = x.params().template head<4>();
-    rotation.noalias() += p * q * q.transpose();
+    for (int i = 0, e = 0; i < 4; ++i) {
+      for (int j = 0; j <= i; ++j, ++e) rotation.lower[e] += p * q[i] * q[j];
+    }
     weight += p;
     vector += p * x.params().template tail<vectors>();
   }
   void add(const Sums& s) {
-    for (int i = 0, e = 0; i < 4; ++i) {
-      for (int j = 0; j <= i; ++j, ++e) {
-        rotation(i, j) += s.product[e];
-        if (j < i) rotation(j, i) += s.product[e];
-      }
-    }
+    for (std::size_t e = 0; e < Sums::entries; ++e) rotation.lower[e] += s.product[e];
     for (int i = 0; i < vectors; ++i) vector[i] += s.sum[i];
     weight += s.weight;
   }

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <type_traits>
 
 namespace liestat::detail {
 
@@ -48,6 +49,31 @@ LIESTAT_ALWAYS_INLINE void transpose(FourNumbers<S> (&r)[4]) {
   r[2].v = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   r[3].v = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
+/// The columns of as many rows of four numbers as a register holds.
+LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[4],
+                                         Pack<InstructionSet::avx2, double> (&columns)[4]) {
+  FourNumbers<double> r[4];
+  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k].load(row[k]);
+  transpose(r);
+  LIESTAT_UNROLL for (std::size_t c = 0; c < 4; ++c) columns[c].v = r[c].v;
+}
+LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[8],
+                                         Pack<InstructionSet::avx512, double> (&columns)[4]) {
+  Pack<InstructionSet::avx512, double> r[4], a, b, c, d;
+  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) {
+    FourNumbers<double> low, high;
+    low.load(row[k]), high.load(row[k + 4]);
+    r[k].v = __builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+  a.v = __builtin_shufflevector(r[0].v, r[1].v, 0, 8, 2, 10, 4, 12, 6, 14);
+  b.v = __builtin_shufflevector(r[0].v, r[1].v, 1, 9, 3, 11, 5, 13, 7, 15);
+  c.v = __builtin_shufflevector(r[2].v, r[3].v, 0, 8, 2, 10, 4, 12, 6, 14);
+  d.v = __builtin_shufflevector(r[2].v, r[3].v, 1, 9, 3, 11, 5, 13, 7, 15);
+  columns[0].v = __builtin_shufflevector(a.v, c.v, 0, 1, 8, 9, 4, 5, 12, 13);
+  columns[1].v = __builtin_shufflevector(b.v, d.v, 0, 1, 8, 9, 4, 5, 12, 13);
+  columns[2].v = __builtin_shufflevector(a.v, c.v, 2, 3, 10, 11, 6, 7, 14, 15);
+  columns[3].v = __builtin_shufflevector(b.v, d.v, 2, 3, 10, 11, 6, 7, 14, 15);
+}
 #endif
 
 /// Components first … first + N - 1 of the elements begin … begin + count - 1 into N columns of B numbers.
@@ -73,6 +99,42 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
 #endif
   for (; j < count; ++j) {
     for (std::size_t c = 0; c < N; ++c) columns[c][j] = *from.at(begin + j, first + c);
+  }
+}
+
+/// Whether loadRows serves registers of this kind.
+template <class P>
+inline constexpr bool loads_rows =
+    LIESTAT_HAS_SHUFFLES&& P::set != InstructionSet::baseline&& std::is_same_v<typename P::Scalar, double>;
+
+/// Components first … first + 3 of the element `begin` and those after it, of which there are `left`, in one register each,
+/// from an array of elements (component is 1); the lanes beyond the last are filled up with the numbers `fill`. Rows are
+/// transposed in registers: one that is read back just after its numbers have been stored one by one would wait for them.
+template <class P, class S>
+LIESTAT_ALWAYS_INLINE void loadRows(const Layout<const S>& from, std::size_t first, std::size_t begin, std::size_t left,
+                                    const S* fill, P (&columns)[4]) {
+  if constexpr (loads_rows<P>) {
+    const S *const start = from.at(begin, first), *row[P::size];
+    if (left >= P::size) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
+        row[k] = start + static_cast<std::ptrdiff_t>(k) * from.element;
+      }
+    } else {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
+        row[k] = k < left ? start + static_cast<std::ptrdiff_t>(k) * from.element : fill;
+      }
+    }
+    transposeRows(row, columns);
+  }
+}
+
+/// As loadColumns, and fills the last register of each column up with the numbers `fill`.
+template <class P, std::size_t N, class S, std::size_t B>
+LIESTAT_ALWAYS_INLINE void loadFilled(const Layout<const S>& from, std::size_t first, std::size_t begin,
+                                      std::size_t count, const S* fill, S (*columns)[B]) {
+  loadColumns<P::set, N>(from, first, begin, count, columns);
+  for (std::size_t j = count; j % P::size != 0; ++j) {
+    for (std::size_t c = 0; c < N; ++c) columns[c][j] = fill[c];
   }
 }
 

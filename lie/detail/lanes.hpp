@@ -56,6 +56,17 @@ EIGEN_ALWAYS_INLINE S polynomialInLanes(const std::array<double, N>& c, const S&
   }
 }
 
+/// Four numbers to memory as registers hold them, for readers that take them back so.
+EIGEN_ALWAYS_INLINE void storeInLanes(double a, double b, double c, double d, double* to) {
+#if defined(__AVX__)
+  const DoubleLanes all = {a, b, c, d};
+  std::memcpy(to, &all, sizeof all);
+#else
+  const DoublePair low = {a, b}, high = {c, d};
+  std::memcpy(to, &low, sizeof low), std::memcpy(to + 2, &high, sizeof high);
+#endif
+}
+
 #if defined(__AVX__)
 /// The product of quaternions x y z w: the second one's coordinates in the order and with the signs that each coordinate
 /// of the first one multiplies.

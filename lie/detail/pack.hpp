@@ -13,6 +13,7 @@
 #include <cstring>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 // g++ contracts products and sums into fused operations by itself, clang within one expression only, unless told.
 #if defined(__clang__)
@@ -187,19 +188,50 @@ struct Pack {
     return Pack(static_cast<S>(static_cast<long long>(a.v)));
 #endif
   }
+  /// Halves are added to each other in registers, down to two numbers.
   LIESTAT_ALWAYS_INLINE friend S sumOf(const Pack& a) {
+#if LIESTAT_HAS_SHUFFLES
+    if constexpr (registerBytes(Set) > 16) {
+      Half low, high;
+      a.split(low, high, std::make_index_sequence<size / 2>());
+      return sumOf(low + high);
+    } else if constexpr (size == 4) {
+      return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]);
+    } else {
+      return a.v[0] + a.v[1];
+    }
+#else
     S lanes[size], sum = 0;
     a.store(lanes);
     for (const S x : lanes) sum += x;
     return sum;
+#endif
   }
   LIESTAT_ALWAYS_INLINE friend S largestOf(const Pack& a) {
+#if LIESTAT_HAS_SHUFFLES
+    if constexpr (registerBytes(Set) > 16) {
+      Half low, high;
+      a.split(low, high, std::make_index_sequence<size / 2>());
+      return largestOf(larger(high, low));
+    }
+#endif
     S lanes[size];
     a.store(lanes);
     S largest = lanes[0];
     for (const S x : lanes) largest = x > largest ? x : largest;
     return largest;
   }
+
+#if LIESTAT_HAS_SHUFFLES
+ private:
+  using Half = Pack<Set == InstructionSet::avx512 ? InstructionSet::avx2 : InstructionSet::baseline, S>;
+
+  template <std::size_t... Lane>
+  LIESTAT_ALWAYS_INLINE void split(Half& low, Half& high, std::index_sequence<Lane...>) const {
+    low.v = __builtin_shufflevector(v, v, static_cast<int>(Lane)...);
+    high.v = __builtin_shufflevector(v, v, static_cast<int>(Lane + size / 2)...);
+  }
+#endif
 };
 
 }  // namespace liestat::detail

@@ -110,6 +110,53 @@ class Cholesky {
   bool ok_ = false;
 };
 
+/// The factors A = L D Lᵀ of a symmetric matrix, of which the lower triangle is read: without the square roots of
+/// Cholesky's, which wait for each other. Where A is not positive definite, ok() is false and all results are NaN.
+template <class S, int N>
+class DiagonalCholesky {
+ public:
+  using Matrix = Eigen::Matrix<S, N, N>;
+
+  explicit DiagonalCholesky(const Matrix& A) {
+    S scaled[static_cast<std::size_t>(N)];  // row i of L D
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < i; ++j) {
+        scaled[j] = A(i, j);
+        for (int k = 0; k < j; ++k) scaled[j] -= scaled[k] * L_(j, k);
+      }
+      S pivot = A(i, i);
+      for (int j = 0; j < i; ++j) {
+        L_(i, j) = scaled[j] * inverse_pivots_[j];
+        pivot -= scaled[j] * L_(i, j);
+      }
+      // Written so that NaN is no success either.
+      ok_ = ok_ && pivot > S(0);
+      inverse_pivots_[i] = ok_ ? S(1) / pivot : std::numeric_limits<S>::quiet_NaN();
+    }
+  }
+
+  bool ok() const { return ok_; }
+  /// A⁻¹ B.
+  template <int K>
+  Eigen::Matrix<S, N, K> solve(Eigen::Matrix<S, N, K> X) const {
+    for (int c = 0; c < K; ++c) {
+      for (int i = 1; i < N; ++i) {
+        for (int k = 0; k < i; ++k) X(i, c) -= L_(i, k) * X(k, c);
+      }
+      for (int i = N - 1; i >= 0; --i) {
+        X(i, c) *= inverse_pivots_[i];
+        for (int k = i + 1; k < N; ++k) X(i, c) -= L_(k, i) * X(k, c);
+      }
+    }
+    return X;
+  }
+
+ private:
+  Matrix L_;
+  Eigen::Matrix<S, N, 1> inverse_pivots_;
+  bool ok_ = true;
+};
+
 /// A square root B of a symmetric matrix that may be singular, B Bᵀ = A: Pᵀ L √D by LDLᵀ with the largest pivot first.
 /// Pivots below zero, which rounding makes, count as zero. The lower triangle is read.
 template <class S, int N>
@@ -170,6 +217,28 @@ EIGEN_ALWAYS_INLINE Eigen::Matrix<S, 3, 3> cofactors(const Eigen::Matrix<S, 3, 3
   Eigen::Matrix<S, 3, 3> result;
   result << M.col(1).cross(M.col(2)), M.col(2).cross(M.col(0)), M.col(0).cross(M.col(1));
   return result;
+}
+
+/// x = A⁻¹ b, false if A is not positive definite; for iterations that correct the rounding of their steps. The lower
+/// triangle is read. Three equations by cofactors, whose one division makes them the fastest to finish.
+template <class S, int N>
+bool solveStep(const Eigen::Matrix<S, N, N>& A, const Eigen::Matrix<S, N, 1>& b, Eigen::Matrix<S, N, 1>& x) {
+  if constexpr (N == 3) {
+    const S a = A(0, 0), d = A(1, 1), f = A(2, 2), l = A(1, 0), m = A(2, 0), n = A(2, 1);
+    const S c00 = d * f - n * n, c10 = m * n - l * f, c20 = l * n - m * d;
+    const S c11 = a * f - m * m, c21 = l * m - a * n, c22 = a * d - l * l;
+    const S determinant = a * c00 + (l * c10 + m * c20);
+    if (!(a > S(0) && c22 > S(0) && determinant > S(0))) return false;
+    const S scale = S(1) / determinant;
+    x[0] = (c00 * b[0] + (c10 * b[1] + c20 * b[2])) * scale;
+    x[1] = (c11 * b[1] + (c10 * b[0] + c21 * b[2])) * scale;
+    x[2] = (c22 * b[2] + (c20 * b[0] + c21 * b[1])) * scale;
+    return true;
+  } else {
+    const DiagonalCholesky<S, N> factor(A);
+    if (factor.ok()) x = factor.template solve<1>(b);
+    return factor.ok();
+  }
 }
 
 /// A⁻¹ by Gauss' and Jordan's elimination with row pivots; infinite or NaN where A is singular.

@@ -122,7 +122,7 @@ struct DirectionKernel {
       sums.residuals.finish(arguments);
       arguments.across = sumOf(sums.across) - (Weighted ? S(0) : static_cast<S>(surplus));
       arguments.defect = largestOf(sums.defect);
-      for (std::size_t a = 0; a < 6; ++a) arguments.along[a] = sumOf(sums.along[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 6; ++a) arguments.along[a] = sumOf(sums.along[a]);
     }
     /// Replaces unit vectors x by x - c y and c.
     LIESTAT_ALWAYS_INLINE void project(S (&data)[columns][block], std::size_t j, const S (&y)[3], P& least) {

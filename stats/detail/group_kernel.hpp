@@ -86,8 +86,9 @@ struct PoseKernel {
       arguments.weight = Weighted ? sumOf(sums.weight) : static_cast<S>(arguments.count);
       arguments.squared_weight = Weighted ? sumOf(sums.squared_weight) : arguments.weight;
       arguments.squared_angle = sumOf(sums.squared_angle);
-      for (std::size_t a = 0; a < 3; ++a) arguments.rho[a] = sumOf(sums.rho[a]), arguments.phi[a] = sumOf(sums.phi[a]);
-      for (std::size_t a = 0; a < 6; ++a) arguments.outer[a] = sumOf(sums.outer[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 3; ++a) arguments.rho[a] = sumOf(sums.rho[a]),
+                                                         arguments.phi[a] = sumOf(sums.phi[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 6; ++a) arguments.outer[a] = sumOf(sums.outer[a]);
       if constexpr (Full) {
         for (std::size_t a = 0; a < 6; ++a) arguments.mixed[a] = sumOf(sums.mixed[a]);
         for (std::size_t a = 0; a < 21; ++a) arguments.scatter[a] = sumOf(sums.scatter[a]);

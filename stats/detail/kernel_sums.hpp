@@ -29,9 +29,11 @@ concept HasPointSums = HasMomentsLike<M, FlatMoments> && Metric<M> &&(ManifoldTr
 /// Σ over some features about a reference y, in the frame of y, like RotationSums.
 template <class M>
   requires(HasDirectionSums<M> || HasPlanarSums<M> || HasPointSums<M>)
-class SimpleSums : public TangentSums<M> {
+class SimpleSums {
   using T = ManifoldTraits<M>;
   using S = typename T::Scalar;
+  using Tangent = typename T::Tangent;
+  using Square = typename T::Square;
   static constexpr int k = T::DoF;
   static constexpr std::size_t numbers = T::ChordalMoments::Sums::linear;
 
@@ -47,15 +49,10 @@ class SimpleSums : public TangentSums<M> {
   }
 
  public:
-  using Base = TangentSums<M>;
-  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest,
-      Base::largest_angle, Base::fourth;
-  using typename Base::Square, typename Base::Tangent;
-
   /// As RotationSums::add; false also for directions and plane rotations opposite to y.
   template <bool Weighted, KernelPass Pass, class R, class W>
-  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y,
-           ResidualColumns<S> residuals = nullptr) {
+  static bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end,
+                  const M& y, MeanPass<M>& pass, ResidualColumns<S> residuals = nullptr) {
     using Kernel = typename decltype(kernel<Weighted, Pass>())::type;
     typename Kernel::Arguments arguments;
     for (std::size_t c = 0; c < numbers; ++c) arguments.reference[c] = parametersOf(y)[c];
@@ -66,20 +63,22 @@ class SimpleSums : public TangentSums<M> {
     return runOnFeatures<Kernel, M, numbers, Weighted>(set, samples, weights, begin, end, arguments,
                                                        [&](std::size_t) {
                                                          if (!(arguments.defect < largest_excess<S>)) return false;
-                                                         addSums<Pass == KernelPass::last>(arguments, y);
+                                                         addSums<Pass == KernelPass::last>(arguments, y, pass);
                                                          return true;
                                                        }) &&
-           this->isFinite();
+           isFinite(pass.sums);
   }
 
  private:
   template <bool Scatter, class Arguments>
-  void addSums(const Arguments& a, const M& y) {
-    cost += a.cost, weight += static_cast<double>(a.weight);
+  static void addSums(const Arguments& a, const M& y, MeanPass<M>& pass) {
+    MeanSums<M>& sums = pass.sums;
+    ScatterSums<M>& scatter = pass.scatter;
+    sums.cost += a.cost, sums.weight += static_cast<double>(a.weight);
     if constexpr (Scatter) {
-      largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
-      largest_angle = std::max(largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
-      fourth += static_cast<double>(a.fourth);
+      scatter.largest = std::max(scatter.largest, static_cast<S>(std::sqrt(a.largest)));
+      scatter.largest_angle = std::max(scatter.largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
+      scatter.fourth += static_cast<double>(a.fourth);
     }
     if constexpr (HasDirectionSums<M>) {
       using Matrix3 = Eigen::Matrix<S, 3, 3>;
@@ -87,9 +86,9 @@ class SimpleSums : public TangentSums<M> {
       const auto inPlane = [&](const S* triangle) -> Square {
         return axes.transpose() * (symmetricFromTriangle<Matrix3>(triangle) * axes).eval();
       };
-      gradient += axes.transpose() * Eigen::Map<const Eigen::Matrix<S, 3, 1>>(a.gradient);
-      hessian += inPlane(a.along) + a.across * Square::Identity();
-      if constexpr (Scatter) scatter += inPlane(a.scatter), squared += inPlane(a.squared);
+      sums.gradient += axes.transpose() * Eigen::Map<const Eigen::Matrix<S, 3, 1>>(a.gradient);
+      sums.hessian += inPlane(a.along) + a.across * Square::Identity();
+      if constexpr (Scatter) scatter.scatter += inPlane(a.scatter), scatter.squared += inPlane(a.squared);
     } else {
       // Translations are in the axes of the world.
       Square axes = Square::Identity();
@@ -100,9 +99,9 @@ class SimpleSums : public TangentSums<M> {
       const auto inFrame = [&](const S* triangle) -> Square {
         return axes.transpose() * (symmetricFromTriangle<Square>(triangle) * axes).eval();
       };
-      gradient += axes.transpose() * Eigen::Map<const Tangent>(a.gradient);
-      hessian.diagonal().array() += a.weight;
-      if constexpr (Scatter) scatter += inFrame(a.scatter), squared += inFrame(a.squared);
+      sums.gradient += axes.transpose() * Eigen::Map<const Tangent>(a.gradient);
+      sums.hessian.diagonal().array() += a.weight;
+      if constexpr (Scatter) scatter.scatter += inFrame(a.scatter), scatter.squared += inFrame(a.squared);
     }
   }
 };

@@ -5,7 +5,7 @@
 #include <stats/detail/compact_part.hpp>
 #include <stats/detail/factor_range.hpp>
 #include <stats/detail/kernel_sums.hpp>
-#include <stats/detail/packing.hpp>
+#include <stats/detail/mean_sums.hpp>
 #include <stats/detail/scatter_kernel.hpp>
 #include <stats/detail/weights_of_one.hpp>
 #include <stats/executor.hpp>
@@ -15,7 +15,6 @@
 #include <cstddef>
 #include <limits>
 #include <ranges>
-#include <span>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -33,40 +32,6 @@ bool haveOneSize(const R& samples, const W& weights) {
   }
 }
 
-/// What one pass over the data returns at a candidate mean.
-template <Homogeneous M>
-struct MeanSums {
-  ScalarOf<M> cost = 0;
-  TangentOf<M> gradient = TangentOf<M>::Zero();  ///< Σ p_i W z_i, minus the gradient of C
-  SquareOf<M> hessian = SquareOf<M>::Zero();
-  double weight = 0;
-
-  void operator+=(const MeanSums& other) {
-    cost += other.cost;
-    gradient += other.gradient;
-    hessian += other.hessian;
-    weight += other.weight;
-  }
-};
-
-/// Further sums that the covariances need, at the mean.
-template <Homogeneous M>
-struct ScatterSums {
-  SquareOf<M> scatter = SquareOf<M>::Zero(), squared = SquareOf<M>::Zero();
-  ScalarOf<M> largest = 0, smallest_gap = std::numeric_limits<ScalarOf<M>>::infinity();
-  ScalarOf<M> largest_angle = 0;  ///< of the compact part, if the traits name it
-  double fourth = 0;              ///< Σ p θ⁴ of those angles
-
-  void operator+=(const ScatterSums& other) {
-    scatter += other.scatter;
-    squared += other.squared;
-    largest = std::max(largest, other.largest);
-    smallest_gap = std::min(smallest_gap, other.smallest_gap);
-    largest_angle = std::max(largest_angle, other.largest_angle);
-    fourth += other.fourth;
-  }
-};
-
 /// Σ over the data in fixed chunks combined in order: same bits on any executor.
 template <class Sums, Executor E, class Term>
 Sums sumOverData(const E& executor, std::size_t n, const Term& term) {
@@ -81,29 +46,6 @@ Sums sumOverData(const E& executor, std::size_t n, const Term& term) {
       },
       [](Sums& a, const Sums& b) { a += b; });
 }
-
-/// What one pass over the data collects; the scatter only where it is asked for.
-template <Homogeneous M>
-struct MeanPass {
-  MeanSums<M> sums;
-  ScatterSums<M> scatter;
-  bool has_scatter = false;
-
-  void operator+=(const MeanPass& other) {
-    sums += other.sums;
-    scatter += other.scatter;
-  }
-  std::vector<double> pack() const {
-    return packed(sums.cost, sums.gradient, sums.hessian, sums.weight, scatter.scatter, scatter.squared,
-                  scatter.largest, scatter.smallest_gap, scatter.largest_angle, scatter.fourth);
-  }
-  static MeanPass unpack(std::span<const double> list) {
-    MeanPass p;
-    unpackInto(list, p.sums.cost, p.sums.gradient, p.sums.hessian, p.sums.weight, p.scatter.scatter, p.scatter.squared,
-               p.scatter.largest, p.scatter.smallest_gap, p.scatter.largest_angle, p.scatter.fourth);
-    return p;
-  }
-};
 
 struct IgnoreTerm {
   template <class... T>
@@ -277,22 +219,15 @@ constexpr bool hasFactorSums() {
   }
 }
 
-/// The same several features at a time, for the manifolds that have it; false where that does not apply to the data,
-/// never of a product one of whose factors has a kernel.
+/// The same several features at a time, to the sums of an empty pass, for the manifolds that have it. False, and nothing
+/// of value in the pass, where that does not apply to the data; never of a product one of whose factors has a kernel.
 template <KernelPass Pass, Metric M, class R, class W>
 bool addTermsByPacks(InstructionSet set, const R& samples, const W& weights, const M& y, const ChunkRange& range,
                      MeanPass<M>& pass, [[maybe_unused]] ResidualColumns<ScalarOf<M>> residuals) {
   if constexpr (HasKernelSums<M>) {
-    typename KernelSumsOf<M>::type sums;
     constexpr bool weighted = !std::is_same_v<W, UnitWeights>;
-    if (!sums.template add<weighted, Pass>(set, samples, weights, range.begin, range.end, y, residuals)) return false;
-    pass.sums = {sums.cost, sums.gradient, sums.hessian, sums.weight};
-    if constexpr (Pass == KernelPass::last) {
-      pass.scatter = {sums.scatter, sums.squared, sums.largest, sums.smallest_gap, sums.largest_angle, sums.fourth};
-    } else {
-      pass.scatter.smallest_gap = sums.smallest_gap;
-    }
-    return true;
+    return KernelSumsOf<M>::type::template add<weighted, Pass>(set, samples, weights, range.begin, range.end, y, pass,
+                                                               residuals);
   } else if constexpr (hasFactorSums<M>()) {
     if constexpr (Pass == KernelPass::last) {
       addTermsWithScatter(set, samples, weights, y, range, pass);
@@ -316,7 +251,10 @@ MeanPass<M> meanPass(const E& executor, const R& samples, const W& weights, cons
         const ChunkRange range = chunkRange(n, chunks, chunk);
         if (!addTermsByPacks < Scatter ? KernelPass::last
                                        : KernelPass::step > (set, samples, weights, y, range, part)) {
-          if constexpr (!hasFactorSums<M>()) addTerms<Scatter>(samples, weights, y, range, part);
+          if constexpr (!hasFactorSums<M>()) {
+            part = {};
+            addTerms<Scatter>(samples, weights, y, range, part);
+          }
         }
         return part;
       },

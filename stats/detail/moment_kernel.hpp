@@ -102,8 +102,8 @@ struct ResidualSums {
     arguments.largest = largestOf(largest);
     arguments.largest_angle = largestOf(largest_angle);
     arguments.fourth = sumOf(fourth);
-    for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
-    for (std::size_t a = 0; a < entries; ++a) {
+    LIESTAT_UNROLL for (std::size_t a = 0; a < K; ++a) arguments.gradient[a] = sumOf(gradient[a]);
+    LIESTAT_UNROLL for (std::size_t a = 0; a < entries; ++a) {
       arguments.scatter[a] = sumOf(scatter[a]);
       arguments.squared[a] = Weighted ? sumOf(squared[a]) : arguments.scatter[a];
     }
@@ -118,59 +118,80 @@ struct MomentKernel {
     Layout<const S> features;
     const S* weights = nullptr;
     std::size_t count = 0;
-    Sums sums;
+    S product[Sums::entries > 0 ? Sums::entries : 1], sum[Sums::linear > 0 ? Sums::linear : 1], weight;
+
+    void addTo(Sums& sums) const {
+      for (std::size_t i = 0; i < Sums::entries; ++i) sums.product[i] += product[i];
+      for (std::size_t i = 0; i < Sums::linear; ++i) sums.sum[i] += sum[i];
+      sums.weight += weight, sums.count += static_cast<S>(count);
+    }
   };
 
   template <InstructionSet Set>
   LIESTAT_ALWAYS_INLINE static void run(Arguments& arguments) {
     using P = Pack<Set, S>;
-    constexpr std::size_t outer = Sums::outer, linear = Sums::linear, entries = Sums::entries, block = 64;
-    constexpr std::size_t columns = (outer + linear + 3) / 4 * 4 + 1;
-    alignas(64) S data[columns][block];
-    P product[entries > 0 ? entries : 1], sum[linear > 0 ? linear : 1];
-    LIESTAT_UNROLL for (P& x : product) x = P::zero();
-    LIESTAT_UNROLL for (P& x : sum) x = P::zero();
-    S weight = 0;
+    Run<P> sums;
+    alignas(64) S data[numbers + 1][block];
     for (std::size_t i = 0; i < arguments.count; i += block) {
       const std::size_t count = std::min(arguments.count - i, block);
-      loadAll<Set, 0>(arguments.features, i, count, data);
       if constexpr (Weighted) {
-        std::memcpy(data[columns - 1], arguments.weights + i, count * sizeof(S));
-        for (std::size_t j = 0; j < count; ++j) weight += data[columns - 1][j];
+        std::memcpy(data[numbers], arguments.weights + i, count * sizeof(S));
+        for (std::size_t j = count; j % P::size != 0; ++j) data[numbers][j] = 0;
       }
-      for (std::size_t j = count; j % P::size != 0; ++j) {
-        for (std::size_t c = 0; c < columns; ++c) data[c][j] = 0;
+      if (loads_rows<P> && numbers >= 4 && arguments.features.component == 1) {
+        sums.template addAll<true>(data, arguments.features, i, count);
+      } else {
+        sums.template addAll<false>(data, arguments.features, i, count);
       }
+    }
+    LIESTAT_UNROLL for (std::size_t a = 0; a < entries; ++a) arguments.product[a] = sumOf(sums.product[a]);
+    LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) arguments.sum[a] = sumOf(sums.sum[a]);
+    arguments.weight = Weighted ? sumOf(sums.weight) : static_cast<S>(arguments.count);
+  }
+
+ private:
+  static constexpr std::size_t outer = Sums::outer, linear = Sums::linear, numbers = outer + linear,
+                               entries = Sums::entries, block = 64;
+
+  template <class P>
+  struct Run {
+    P product[entries > 0 ? entries : 1], sum[linear > 0 ? linear : 1], weight = P::zero();
+
+    LIESTAT_ALWAYS_INLINE Run() {
+      LIESTAT_UNROLL for (P& x : product) x = P::zero();
+      LIESTAT_UNROLL for (P& x : sum) x = P::zero();
+    }
+    /// Features i …: by rows of four numbers, the last four of them again where they are not a multiple of four, else by
+    /// way of columns. The lanes beyond the last feature are zero.
+    template <bool ByRows>
+    LIESTAT_ALWAYS_INLINE void addAll(S (&data)[numbers + 1][block], const Layout<const S>& features, std::size_t i,
+                                      std::size_t count) {
+      const S zeros[numbers] = {};
+      if constexpr (!ByRows) loadFilled<P, numbers>(features, 0, i, count, zeros, data);
       for (std::size_t j = 0; j < count; j += P::size) {
-        P c[outer + linear], weighted[outer + linear];
-        LIESTAT_UNROLL for (std::size_t a = 0; a < outer + linear; ++a) {
-          c[a] = P::load(data[a] + j);
-          weighted[a] = c[a];
-          if constexpr (Weighted) weighted[a] *= P::load(data[columns - 1] + j);
+        P c[numbers], weighted[numbers];
+        if constexpr (ByRows && numbers >= 4) {
+          P last[4], four[4];
+          loadRows(features, numbers - 4, i + j, count - j, zeros, last);
+          LIESTAT_UNROLL for (std::size_t first = 0; first + 4 < numbers; first += 4) {
+            loadRows(features, first, i + j, count - j, zeros, four);
+            LIESTAT_UNROLL for (std::size_t a = 0; a < 4; ++a) c[first + a] = four[a];
+          }
+          LIESTAT_UNROLL for (std::size_t a = 0; a < 4; ++a) c[numbers - 4 + a] = last[a];
+        } else {
+          LIESTAT_UNROLL for (std::size_t a = 0; a < numbers; ++a) c[a] = P::load(data[a] + j);
+        }
+        LIESTAT_UNROLL for (std::size_t a = 0; a < numbers; ++a) weighted[a] = c[a];
+        if constexpr (Weighted) {
+          const P p = P::load(data[numbers] + j);
+          weight += p;
+          LIESTAT_UNROLL for (std::size_t a = 0; a < numbers; ++a) weighted[a] *= p;
         }
         addOuter(product, c, weighted, std::make_index_sequence<entries>());
         LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) sum[a] += weighted[outer + a];
       }
     }
-    for (std::size_t a = 0; a < entries; ++a) arguments.sums.product[a] = sumOf(product[a]);
-    for (std::size_t a = 0; a < linear; ++a) arguments.sums.sum[a] = sumOf(sum[a]);
-    arguments.sums.count = static_cast<S>(arguments.count);
-    arguments.sums.weight = Weighted ? weight : arguments.sums.count;
-  }
-
- private:
-  /// Four columns at a time while there are four, then the rest.
-  template <InstructionSet Set, std::size_t first, std::size_t columns, std::size_t block>
-  LIESTAT_ALWAYS_INLINE static void loadAll(const Layout<const S>& from, std::size_t begin, std::size_t count,
-                                            S (&data)[columns][block]) {
-    constexpr std::size_t left = Sums::outer + Sums::linear - first;
-    if constexpr (left >= 4) {
-      loadColumns<Set, 4>(from, first, begin, count, data + first);
-      loadAll<Set, first + 4>(from, begin, count, data);
-    } else if constexpr (left > 0) {
-      loadColumns<Set, left>(from, first, begin, count, data + first);
-    }
-  }
+  };
 };
 
 /// Chordal moments that kernels can make.
@@ -191,7 +212,7 @@ auto parameterSums(InstructionSet set, const R& samples, const W& weights, std::
   typename Kernel::Arguments arguments;
   runOnFeatures<Kernel, M, Sums::outer + Sums::linear, Weighted>(set, samples, weights, begin, end, arguments,
                                                                  [&](std::size_t) {
-                                                                   sums += arguments.sums;
+                                                                   arguments.addTo(sums);
                                                                    return true;
                                                                  });
   return sums;

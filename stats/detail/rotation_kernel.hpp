@@ -60,9 +60,16 @@ struct RotationKernel {
       Run sums;
       for (std::size_t i = 0; i < arguments.count; i += block) {
         const std::size_t count = arguments.count - i < block ? arguments.count - i : block;
-        load(arguments, i, count, data);
         P cosine(S(1));
-        for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, arguments, i, cosine);
+        if (loads_rows<P> && arguments.features.component == 1) {
+          sums.template turnAll<true>(data, arguments, i, count, cosine);
+        } else {
+          sums.template turnAll<false>(data, arguments, i, count, cosine);
+        }
+        if constexpr (Weighted) {
+          std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
+          for (std::size_t j = count; j % P::size != 0; ++j) data[4][j] = 0;
+        }
         if (-largestOf(-cosine) > static_cast<S>(small_rotation_cosine)) {
           for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, arguments, i, small_rotation<S>);
         } else {
@@ -71,39 +78,48 @@ struct RotationKernel {
       }
       sums.residuals.finish(arguments);
       arguments.defect = largestOf(sums.defect);
-      for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
+      LIESTAT_UNROLL for (std::size_t a = 0; a < 6; ++a) arguments.hessian[a] = sumOf(sums.hessian[a]);
       if constexpr (HalfTurns != 0 && exact) arguments.largest_gap_cosine = largestOf(sums.largest_gap_cosine);
     }
 
-    LIESTAT_ALWAYS_INLINE static void load(const Arguments& arguments, std::size_t i, std::size_t count,
-                                           S (&data)[columns][block]) {
-      constexpr InstructionSet set = P::set;
-      loadColumns<set, 4>(arguments.features, 0, i, count, data);
-      if constexpr (Frame) {
-        if (arguments.features.component == 1) {
-          // Four numbers at a time: w again, and the translation.
-          loadColumns<set, 4>(arguments.features, 3, i, count, data + 5);
-        } else {
-          loadColumns<set, 3>(arguments.features, 4, i, count, data + 6);
-        }
-        for (std::size_t c = 0; c < 3; ++c) {
-          for (std::size_t j = 0; j < count; ++j) data[6 + c][j] -= arguments.reference[4 + c];
-        }
+    /// The columns of features i …, relative to y: by rows, else by way of the columns themselves. The last pack is filled
+    /// up with y itself, which adds nothing. cosine becomes the least |w|.
+    template <bool ByRows>
+    LIESTAT_ALWAYS_INLINE void turnAll(S (&data)[columns][block], Arguments& arguments, std::size_t i,
+                                       std::size_t count, P& cosine) {
+      const Layout<const S> features = arguments.features;
+      const S* const y = arguments.reference;
+      if constexpr (!ByRows) {
+        loadFilled<P, 4>(features, 0, i, count, y, data);
+        if constexpr (Frame) loadFilled<P, 3>(features, 4, i, count, y + 4, data + 6);
       }
-      if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
-      // The last pack is filled up with y itself, which adds nothing.
-      for (std::size_t j = count; j % P::size != 0; ++j) {
-        for (std::size_t c = 0; c < 4; ++c) data[c][j] = arguments.reference[c];
-        for (std::size_t c = 4; c < columns; ++c) data[c][j] = 0;
+      const P reference[4] = {P(y[0]), P(y[1]), P(y[2]), P(y[3])};
+      for (std::size_t j = 0; j < count; j += P::size) {
+        P q[4];
+        if constexpr (ByRows) {
+          loadRows(features, 0, i + j, count - j, y, q);
+        } else {
+          LIESTAT_UNROLL for (std::size_t c = 0; c < 4; ++c) q[c] = P::load(data[c] + j);
+        }
+        turn(q, reference, data, j, arguments, i, cosine);
+        if constexpr (Frame) {
+          // Four numbers at a time: w again, and the translation.
+          P t[4];
+          if constexpr (ByRows) {
+            loadRows(features, 3, i + j, count - j, y + 3, t);
+          } else {
+            LIESTAT_UNROLL for (std::size_t c = 1; c < 4; ++c) t[c] = P::load(data[5 + c] + j);
+          }
+          LIESTAT_UNROLL for (std::size_t c = 1; c < 4; ++c)(t[c] - y[3 + c]).store(data[5 + c] + j);
+        }
       }
     }
 
-    /// Replaces quaternions q by y⁻¹q, of quotients the nearest representative; cosine becomes the least |w|.
-    LIESTAT_ALWAYS_INLINE void turn(S (&data)[columns][block], std::size_t j, Arguments& arguments, std::size_t i,
-                                    P& cosine) {
-      const P x = P::load(data[0] + j), y = P::load(data[1] + j), z = P::load(data[2] + j), s = P::load(data[3] + j);
-      const S a = arguments.reference[0], b = arguments.reference[1], c = arguments.reference[2],
-              d = arguments.reference[3];
+    /// Replaces quaternions q by y⁻¹q, of quotients the nearest representative.
+    LIESTAT_ALWAYS_INLINE void turn(const P (&feature)[4], const P (&reference)[4], S (&data)[columns][block],
+                                    std::size_t j, Arguments& arguments, std::size_t i, P& cosine) {
+      const P &x = feature[0], &y = feature[1], &z = feature[2], &s = feature[3];
+      const P &a = reference[0], &b = reference[1], &c = reference[2], &d = reference[3];
       P q[4] = {d * x - a * s + (c * y - b * z), d * y - b * s + (a * z - c * x), d * z - c * s + (b * x - a * y),
                 a * x + b * y + (c * z + d * s)};
       if constexpr (HalfTurns != 0) {

@@ -3,14 +3,13 @@
 
 #include <lie/so3.hpp>
 #include <stats/detail/feature_layout.hpp>
+#include <stats/detail/mean_sums.hpp>
 #include <stats/detail/rotation_kernel.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
-#include <limits>
-#include <vector>
 
 namespace liestat::detail {
 
@@ -39,45 +38,32 @@ Square symmetricFromTriangle(const S* entries) {
   return m;
 }
 
-/// The sums of a pass, in the frame of its reference.
+/// Whether the sums of a kernel are finite, all of them: the cost bounds the residuals, and the weight the rest.
 template <class M>
-struct TangentSums {
-  using S = typename ManifoldTraits<M>::Scalar;
-  using Tangent = typename ManifoldTraits<M>::Tangent;
-  using Square = typename ManifoldTraits<M>::Square;
-
-  S cost = 0;
-  double weight = 0;
-  Tangent gradient = Tangent::Zero();
-  Square hessian = Square::Zero(), scatter = Square::Zero(), squared = Square::Zero();
-  S largest = 0, largest_angle = 0, smallest_gap = std::numeric_limits<S>::infinity();
-  double fourth = 0;
-
-  bool isFinite() const { return std::isfinite(cost) && gradient.allFinite() && hessian.allFinite(); }
-};
+bool isFinite(const MeanSums<M>& sums) {
+  return std::isfinite(sums.cost) && std::isfinite(sums.weight);
+}
 
 /// Σ over some features about a reference y, in the frame of y. The Hessian is exact where the scatter is asked for,
 /// else good to eight digits, as Newton's method needs it.
 template <HasRotationSums M>
-class RotationSums : public TangentSums<M> {
+class RotationSums {
   using T = ManifoldTraits<M>;
   using S = typename T::Scalar;
   static constexpr int k = T::DoF;
   static constexpr bool frame = k == 6;
 
- public:
-  using Base = TangentSums<M>;
-  using Base::cost, Base::weight, Base::gradient, Base::hessian, Base::scatter, Base::squared, Base::largest,
-      Base::largest_angle, Base::smallest_gap, Base::fourth;
-  using typename Base::Square, typename Base::Tangent;
+  using Tangent = typename T::Tangent;
+  using Square = typename T::Square;
 
-  /// Sums over the features begin … end-1; Weighted false takes all weights as one. False, and nothing of value in the
-  /// sums, if a quaternion is not a unit one to 1e-5 (float: 1e-3) or something is not finite: then the general
-  /// formulas say what comes out.
-  /// The residuals of at most residual_block features are stored where the pass asks for them.
+ public:
+  /// Adds the sums over the features begin … end-1 to those of an empty pass; Weighted false takes all weights as one.
+  /// False, and nothing of value in the pass, if a quaternion is not a unit one to 1e-5 (float: 1e-3) or something is not
+  /// finite: then the general formulas say what comes out. The residuals of at most residual_block features are stored
+  /// where the pass asks for them.
   template <bool Weighted, KernelPass Pass, class R, class W>
-  bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end, const M& y,
-           ResidualColumns<S> residuals = nullptr) {
+  static bool add(InstructionSet set, const R& samples, const W& weights, std::size_t begin, std::size_t end,
+                  const M& y, MeanPass<M>& pass, ResidualColumns<S> residuals = nullptr) {
     using Kernel = RotationKernel<S, frame, halfTurns<M>(), Weighted, Pass>;
     constexpr bool scatter_too = Pass == KernelPass::last;
     typename Kernel::Arguments arguments;
@@ -89,38 +75,42 @@ class RotationSums : public TangentSums<M> {
     const bool good = runOnFeatures < Kernel, M, frame ? 7 : 4,
                Weighted > (set, samples, weights, begin, end, arguments, [&](std::size_t i) {
                  if (!(arguments.defect < largest_excess<S>)) return false;
-                 addSums<scatter_too>(arguments);
-                 if constexpr (Kernel::exact && halfTurns<M>() != 0) closestToCutLocus(arguments, samples, i, y);
+                 addSums<scatter_too>(arguments, pass);
+                 if constexpr (Kernel::exact && halfTurns<M>() != 0)
+                   closestToCutLocus(arguments, samples, i, y, pass.scatter.smallest_gap);
                  return true;
                });
-    if constexpr (frame) toReference<scatter_too>(y);
-    return good && this->isFinite();
+    if constexpr (frame) toReference<scatter_too>(y, pass);
+    return good && isFinite(pass.sums);
   }
 
  private:
   template <bool Scatter, class Arguments>
-  void addSums(const Arguments& a) {
+  static void addSums(const Arguments& a, MeanPass<M>& pass) {
+    MeanSums<M>& sums = pass.sums;
     constexpr int r0 = frame ? 3 : 0;
-    cost += a.cost;
-    weight += static_cast<double>(a.weight);
-    for (int i = 0; i < k; ++i) gradient[i] += a.gradient[i];
-    const S *h = a.hessian, trace = h[0] + h[3] + h[5];
-    Eigen::Matrix<S, 3, 3> rotation;
-    rotation << h[0], h[1], h[2], h[1], h[3], h[4], h[2], h[4], h[5];
-    rotation.diagonal().array() += a.weight - trace;
-    hessian.template block<3, 3>(r0, r0) += rotation;
-    if constexpr (frame) hessian.template topLeftCorner<3, 3>().diagonal().array() += a.weight;
-    if constexpr (Scatter) {
-      scatter += symmetricFromTriangle<Square>(a.scatter);
-      squared += symmetricFromTriangle<Square>(a.squared);
-      largest = std::max(largest, static_cast<S>(std::sqrt(a.largest)));
-      largest_angle = std::max(largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
-      fourth += static_cast<double>(a.fourth);
-    }
+    sums.cost += a.cost;
+    sums.weight += static_cast<double>(a.weight);
+    for (int i = 0; i < k; ++i) sums.gradient[i] += a.gradient[i];
+    const S *h = a.hessian, rest = a.weight - (h[0] + h[3] + h[5]);
+    Square& H = sums.hessian;
+    H(r0, r0) += h[0] + rest, H(r0 + 1, r0 + 1) += h[3] + rest, H(r0 + 2, r0 + 2) += h[5] + rest;
+    H(r0 + 1, r0) += h[1], H(r0 + 2, r0) += h[2], H(r0 + 2, r0 + 1) += h[4];
+    H(r0, r0 + 1) += h[1], H(r0, r0 + 2) += h[2], H(r0 + 1, r0 + 2) += h[4];
+    if constexpr (frame) H.template topLeftCorner<3, 3>().diagonal().array() += a.weight;
+    if constexpr (Scatter) addScatter(a, pass.scatter);
+  }
+  template <class Arguments>
+  static void addScatter(const Arguments& a, ScatterSums<M>& sums) {
+    sums.scatter += symmetricFromTriangle<Square>(a.scatter);
+    sums.squared += symmetricFromTriangle<Square>(a.squared);
+    sums.largest = std::max(sums.largest, static_cast<S>(std::sqrt(a.largest)));
+    sums.largest_angle = std::max(sums.largest_angle, static_cast<S>(std::sqrt(a.largest_angle)));
+    sums.fourth += static_cast<double>(a.fourth);
   }
   /// The kernel's cosine is for choosing: the angle itself is worked out for the few features that may have the least.
   template <class Arguments, class R>
-  void closestToCutLocus(const Arguments& a, const R& samples, std::size_t begin, const M& y) {
+  static void closestToCutLocus(const Arguments& a, const R& samples, std::size_t begin, const M& y, S& smallest_gap) {
     const typename T::Group to_y = T::placement(y).inverse();
     const S margin = S(1e-4);
     S threshold = a.largest_gap_cosine - margin;
@@ -138,11 +128,12 @@ class RotationSums : public TangentSums<M> {
   }
   /// Translations from the axes of the world to those of y.
   template <bool Scatter>
-  void toReference(const M& y) {
+  static void toReference(const M& y, MeanPass<M>& pass) {
     const Eigen::Matrix<S, 3, 3> to_y = toAxesOf(y);
+    Tangent& gradient = pass.sums.gradient;
     gradient.template head<3>() = (to_y * gradient.template head<3>()).eval();
     if constexpr (Scatter) {
-      for (Square* m : {&scatter, &squared}) {
+      for (Square* m : {&pass.scatter.scatter, &pass.scatter.squared}) {
         m->template topRows<3>() = (to_y * m->template topRows<3>()).eval();
         m->template leftCols<3>() = (m->template leftCols<3>() * to_y.transpose()).eval();
       }

@@ -89,18 +89,26 @@ inline double convexRadiusOnSphere(double largest, double mean_angle) {
   const auto meanSlope = [&](double r) {
     return (1 - far) * SphereSpace::transverse(r) + far * SphereSpace::transverse(largest + r);
   };
-  // No term is concave up to `low` if the data lie in a hemisphere.
-  const bool hemisphere = largest < 0.5 * pi;
-  double low = hemisphere ? 0.5 * pi - largest : 0;
-  const double high = hemisphere ? 0.5 * pi : (pi - largest) * (1 - 1e-9);
-  double at_low = hemisphere ? (1 - far) * SphereSpace::transverse(low) : meanSlope(low);
-  const double at_high = meanSlope(high);
-  if (!(at_low > 0)) return low;
-  if (at_high > 0) return high;
-  for (int i = 0; i < 2 && at_low > 0; ++i) {
-    if (i > 0) at_low = meanSlope(low);
-    low += (high - low) * std::max(0.0, at_low) / (at_low - at_high);
+  double low = 0, high = 0, at_low = 0, at_high = 0;
+  if (largest < 0.5 * pi) {
+    // No term is concave up to `low` if the data lie in a hemisphere. One tangent serves both ends: t cot t vanishes at a
+    // right angle.
+    const double tangent = std::tan(largest);
+    low = 0.5 * pi - largest, high = 0.5 * pi;
+    at_low = (1 - far) * low * tangent, at_high = -far * (0.5 * pi + largest) * tangent;
+    if (!(at_low > 0)) return low;
+    low += largest * at_low / (at_low - at_high);
+    const double next = std::tan(low);
+    at_low = (1 - far) * low / next + far * (largest + low) * (1 - tangent * next) / (tangent + next);
+  } else {
+    high = (pi - largest) * (1 - 1e-9);
+    at_low = meanSlope(low), at_high = meanSlope(high);
+    if (!(at_low > 0)) return low;
+    if (at_high > 0) return high;
+    low += (high - low) * at_low / (at_low - at_high);
+    at_low = meanSlope(low);
   }
+  if (at_low > 0) low += (high - low) * at_low / (at_low - at_high);
   return low * (1 - 1e-9);
 }
 
