@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 
 namespace liestat::detail {
@@ -75,9 +76,14 @@ EIGEN_ALWAYS_INLINE void quaternionProductInLanes(const double* a, const double*
   std::memcpy(&q, b, sizeof q);
   const DoubleLanes x = __builtin_shufflevector(q, q, 3, 2, 1, 0), y = __builtin_shufflevector(q, q, 2, 3, 0, 1),
                     z = __builtin_shufflevector(q, q, 1, 0, 3, 2);
-  const double ax = a[0], ay = a[1], az = a[2];
-  const DoubleLanes r = (q * a[3] + x * DoubleLanes{ax, -ax, ax, -ax}) +
-                        (y * DoubleLanes{ay, ay, -ay, -ay} + z * DoubleLanes{-az, az, az, -az});
+  // Signs are bits of the shuffled factor, so that the other one's coordinates go to all lanes as they are loaded.
+  typedef long long Signs __attribute__((vector_size(32)));
+  constexpr long long minus = std::numeric_limits<long long>::min();
+  const auto with = [](const DoubleLanes& lanes, const Signs& signs) {
+    return reinterpret_cast<DoubleLanes>(reinterpret_cast<Signs>(lanes) ^ signs);
+  };
+  const DoubleLanes r = (q * a[3] + with(x, Signs{0, minus, 0, minus}) * a[0]) +
+                        (with(y, Signs{0, 0, minus, minus}) * a[1] + with(z, Signs{minus, 0, 0, minus}) * a[2]);
   std::memcpy(product, &r, sizeof r);
 }
 #endif
