@@ -5,8 +5,9 @@
 # A path begins with a folder of the project (lie/so3.hpp, examples/fuse_poses, cli/io/); a program may be named without
 # .cpp, a pattern such as lie/*.hpp needs one match. A link is [text](page.md), with or without #heading. A citation is
 # page.md, section 4.2 (or sections 4 and 4.2), the page relative to ROOT or to docs, with a heading of each number; it may
-# go on in the next line. What leads nowhere is printed with file and line, and the exit code is 1. Before that the checks
-# are tried on files with planted mistakes, each of which they must find.
+# go on in the next line. Bold text must not begin with code or a formula, which Doxygen does not recognise. What is wrong
+# is printed with file and line, and the exit code is 1. Before that the checks are tried on files with planted mistakes,
+# each of which they must find.
 set -eu
 
 # check ROOT PAGES…: prints what is wrong, and fails if anything is.
@@ -38,6 +39,11 @@ check() {
         wrong=1
       fi
     done < <(grep -noP '(?<=[^[])\]\((?!https?:)[^) ]+' "$page")
+    while IFS=: read -r line path; do
+      echo "${page#"$root"/}:$line: the site shows ** as it stands before $path"
+      wrong=1
+      # shellcheck disable=SC2016 # a pattern
+    done < <(grep -noP '(?<![\w*])\*\*(?=[`$])[`$][^`$]*[`$]?' "$page")
   done
   return $wrong
 }
@@ -114,10 +120,11 @@ Elsewhere: `build/release/lie/other.hpp`, https://example.org/lie/other.hpp
 <lie/planted_too.hpp>
 [lost](planted.md)
 [lost](page.md#planted)
+**`bold`** and 2**`n`
 END
 if ! found=$(check "$planted" "$planted/docs/page.md"); then :; fi
-if [ "$(cut -d: -f2 <<< "$found" | sort -n | xargs)" != "4 5 6 7 8" ]; then
-  echo "the check itself is wrong; of the planted lines 4 to 8 it says:"
+if [ "$(cut -d: -f2 <<< "$found" | sort -n | xargs)" != "4 5 6 7 8 9" ]; then
+  echo "the check itself is wrong; of the planted lines 4 to 9 it says:"
   echo "$found"
   exit 1
 fi
