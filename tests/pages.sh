@@ -39,10 +39,10 @@ check() {
         wrong=1
       fi
     done < <(grep -noP '(?<=[^[])\]\((?!https?:)[^) ]+' "$page")
+    # shellcheck disable=SC2016 # a pattern
     while IFS=: read -r line path; do
       echo "${page#"$root"/}:$line: the site shows ** as it stands before $path"
       wrong=1
-      # shellcheck disable=SC2016 # a pattern
     done < <(grep -noP '(?<![\w*])\*\*(?=[`$])[`$][^`$]*[`$]?' "$page")
   done
   return $wrong
