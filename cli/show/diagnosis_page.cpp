@@ -48,7 +48,7 @@ Reading readingOf(const DiagnosedFile& file, const Convention& convention, bool 
   return reading;
 }
 
-/// Whether plots can show errors of this reading.
+/// True if plots can show errors of this reading.
 bool hasErrors(const Reading& reading) {
   const std::vector<PoseError>& errors = reading.consistency.errors;
   return std::any_of(errors.begin(), errors.end(), [](const PoseError& e) { return std::isfinite(e.nees); });

@@ -21,7 +21,7 @@ inline Series outlineOf(const Series& series, std::size_t spans = 1000) {
   for (auto* list : {&outline.x, &outline.y, &outline.low, &outline.high}) list->clear();
   for (std::size_t k = 0; k < spans; ++k) {
     const std::size_t begin = k * n / spans, end = (k + 1) * n / spans;
-    // Of the first value alone, if none is finite.
+    // They stay at the first value if none is finite.
     std::size_t least = begin, most = begin;
     const std::vector<double>&low = is_band ? series.low : series.y, &high = is_band ? series.high : series.y;
     for (std::size_t i = begin; i < end; ++i) {

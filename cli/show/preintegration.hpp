@@ -28,7 +28,7 @@ struct PreintegratedWindow {
 struct IncrementDeviations {
   double duration = 0, rotation = 0, velocity = 0, position = 0;  ///< s, rad, m/s, m
 };
-/// Of a motion with noise.
+/// Standard deviations of a motion with noise.
 IncrementDeviations deviationsOf(const Preintegration<double>& motion);
 
 struct PreintegrationResult {

@@ -102,7 +102,7 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
   }
 }
 
-/// Whether loadRows serves registers of this kind.
+/// True if loadRows serves registers of this kind.
 template <class P>
 inline constexpr bool loads_rows =
     LIESTAT_HAS_SHUFFLES&& P::set != InstructionSet::baseline&& std::is_same_v<typename P::Scalar, double>;

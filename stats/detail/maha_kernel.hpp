@@ -13,7 +13,7 @@
 //
 //   ∂Jᵀ a/∂z = ½ [a] + g/f ((u·a) I + u aᵀ - 2 a uᵀ) + k (u (u·a) - |u|² a) uᵀ,  k = (-g' f - 4 g²)/(2 f).
 //
-// Of frames modulo half-turns, u and w are those of the nearest representative y h of y. With K the signs of h on the
+// Frames modulo half-turns have the u and w of the nearest representative y h of y. With K the signs of h on the
 // axes of y, J K stands for J and K ∂Jᵀ a/∂z for ∂Jᵀ a/∂z; the translation does not change.
 #pragma once
 

@@ -11,7 +11,7 @@
 
 namespace liestat::detail {
 
-/// What one pass over the data returns at a candidate mean.
+/// The sums that one pass over the data returns at a candidate mean.
 template <Homogeneous M>
 struct MeanSums {
   ScalarOf<M> cost = 0;
@@ -45,7 +45,7 @@ struct ScatterSums {
   }
 };
 
-/// What one pass over the data collects; the scatter only where it is asked for.
+/// The sums of one pass over the data; the scatter only where it is asked for.
 template <Homogeneous M>
 struct MeanPass {
   MeanSums<M> sums;

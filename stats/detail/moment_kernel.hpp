@@ -29,7 +29,7 @@ LIESTAT_ALWAYS_INLINE void addOuter(P (&sums)[N], const P (&a)[K], const P (&b)[
   ((sums[Entry] += a[triangleRow(Entry)] * b[triangleColumn(Entry)]), ...);
 }
 
-/// What a kernel collects besides cost, gradient and Hessian.
+/// The sums that a kernel collects besides cost, gradient and Hessian.
 enum class KernelPass {
   step,      ///< nothing; the Hessian is good to eight digits, as Newton's method needs it
   last,      ///< the scatter; the Hessian is exact

@@ -38,7 +38,7 @@ Square symmetricFromTriangle(const S* entries) {
   return m;
 }
 
-/// Whether the sums of a kernel are finite, all of them: the cost bounds the residuals, and the weight the rest.
+/// True if all sums of a kernel are finite: the cost bounds the residuals, and the weight the rest.
 template <class M>
 bool isFinite(const MeanSums<M>& sums) {
   return std::isfinite(sums.cost) && std::isfinite(sums.weight);
