@@ -3,6 +3,8 @@
 #include <lie/so3.hpp>
 #include <stats/maha.hpp>
 
+#include <support/instruction_sets.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,6 +16,7 @@
 namespace {
 
 using namespace liestat;
+using test::instructionSets;
 
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
@@ -72,8 +75,7 @@ TYPED_TEST(MahaKernelSums, agree_at_every_decade_of_the_angle) {
       const auto general = this->problem(data, false).evaluate(SerialExecutor{}, y);
       const auto kernels = this->problem(data, true);
       ASSERT_TRUE(kernels.by_kernels);
-      for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-        if (set > supportedInstructionSet()) continue;
+      for (const InstructionSet set : instructionSets()) {
         SCOPED_TRACE(name(set));
         useInstructionSet(set);
         const auto sums = kernels.evaluate(SerialExecutor{}, y);

@@ -3,12 +3,14 @@
 #include <lie/lie.hpp>
 #include <stats/maha.hpp>
 
+#include <support/instruction_sets.hpp>
+#include <support/thread_for_each_chunk.hpp>
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <future>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -17,20 +19,8 @@
 namespace {
 
 using namespace liestat;
-
-struct ThreadForEachChunk {
-  template <class Map, class Combine>
-  detail::ChunkResult<Map> reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
-    std::vector<std::future<detail::ChunkResult<Map>>> results;
-    for (std::size_t c = 0; c < n_chunks; ++c) {
-      results.push_back(std::async(std::launch::async, [&map, c] { return map(c); }));
-    }
-    if (n_chunks == 0) return {};
-    detail::ChunkResult<Map> sum = results[0].get();
-    for (std::size_t c = 1; c < n_chunks; ++c) detail::combineInto(combine, sum, results[c].get());
-    return sum;
-  }
-};
+using test::instructionSets;
+using test::ThreadForEachChunk;
 
 template <class M>
 class MahaQuotientKernels : public testing::Test {
@@ -76,8 +66,7 @@ class MahaQuotientKernels : public testing::Test {
     // Terms as large as the information, 100, times vectors as long as π.
     const double near = 200 * 100 * eps * static_cast<double>(data.size());
     const InstructionSet before = instructionSet();
-    for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-      if (set > supportedInstructionSet()) continue;
+    for (const InstructionSet set : instructionSets()) {
       SCOPED_TRACE(name(set));
       useInstructionSet(set);
       const auto sums = kernels.evaluate(SerialExecutor{}, y);

@@ -3,6 +3,8 @@
 #include <lie/lie.hpp>
 #include <stats/maha.hpp>
 
+#include <support/instruction_sets.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,6 +16,7 @@
 namespace {
 
 using namespace liestat;
+using test::instructionSets;
 
 template <class M>
 class MahaKernels : public testing::Test {
@@ -77,8 +80,7 @@ class MahaKernels : public testing::Test {
     const auto expected = general.evaluate(SerialExecutor{}, y);
     const SquareOf<M> second = hessian(data, y, general, expected);
     const InstructionSet before = instructionSet();
-    for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-      if (set > supportedInstructionSet()) continue;
+    for (const InstructionSet set : instructionSets()) {
       SCOPED_TRACE(name(set));
       useInstructionSet(set);
       const auto sums = kernels.evaluate(SerialExecutor{}, y);

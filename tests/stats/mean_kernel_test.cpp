@@ -2,6 +2,8 @@
 #include <lie/lie.hpp>
 #include <stats/mean.hpp>
 
+#include <support/instruction_sets.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,17 +16,9 @@
 namespace {
 
 using namespace liestat;
+using test::instructionSets;
 
 constexpr double eps = std::numeric_limits<double>::epsilon();
-
-/// Those of this processor.
-std::vector<InstructionSet> instructionSets() {
-  std::vector<InstructionSet> sets;
-  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-    if (set <= supportedInstructionSet()) sets.push_back(set);
-  }
-  return sets;
-}
 
 template <class M>
 constexpr int num_parameters = static_cast<int>(sizeof(M) / sizeof(ScalarOf<M>)) - (sizeof(M) == 64 ? 1 : 0);

@@ -3,14 +3,15 @@
 #include <lie/lie.hpp>
 #include <stats/mean.hpp>
 
+#include <support/instruction_sets.hpp>
 #include <support/product_samples.hpp>
+#include <support/thread_for_each_chunk.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstddef>
 #include <deque>
-#include <future>
 #include <limits>
 #include <vector>
 
@@ -20,32 +21,10 @@ using namespace liestat;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using liestat_test::scattered;
+using test::instructionSets;
+using test::ThreadForEachChunk;
 
 using Vector9d = Eigen::Matrix<double, 9, 1>;
-
-std::vector<InstructionSet> instructionSets() {
-  std::vector<InstructionSet> sets;
-  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-    if (set <= supportedInstructionSet()) sets.push_back(set);
-  }
-  return sets;
-}
-
-/// Every chunk on a thread of its own.
-struct ThreadForEachChunk {
-  template <class Map, class Combine>
-  detail::ChunkResult<Map> reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
-    std::vector<std::future<detail::ChunkResult<Map>>> results;
-    for (std::size_t c = 0; c < n_chunks; ++c) {
-      results.push_back(std::async(std::launch::async, [&map, c] { return map(c); }));
-    }
-    if (n_chunks == 0) return {};
-    detail::ChunkResult<Map> sum = results[0].get();
-    for (std::size_t c = 1; c < n_chunks; ++c) detail::combineInto(combine, sum, results[c].get());
-    return sum;
-  }
-};
-static_assert(Executor<ThreadForEachChunk>);
 
 template <class M>
 class ProductKernel : public testing::Test {

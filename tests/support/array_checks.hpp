@@ -2,6 +2,7 @@
 #pragma once
 
 #include <lie/arrays.hpp>
+#include <support/instruction_sets.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,15 +16,6 @@
 #include <vector>
 
 namespace liestat::test {
-
-/// The sets that this processor supports.
-inline std::vector<InstructionSet> instructionSets() {
-  std::vector<InstructionSet> sets;
-  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
-    if (set <= supportedInstructionSet()) sets.push_back(set);
-  }
-  return sets;
-}
 
 /// Fixes the instruction set for its lifetime.
 class InstructionSetGuard {
