@@ -6,6 +6,7 @@
 #include <lie/instruction_set.hpp>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <type_traits>
 
@@ -49,7 +50,8 @@ LIESTAT_ALWAYS_INLINE void transpose(FourNumbers<S> (&r)[4]) {
   r[2].v = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   r[3].v = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
-/// The columns of as many rows of four numbers as a register holds.
+/// The columns of as many rows of four numbers as a register holds: of an array of rows, or of rows that follow one
+/// another without a gap.
 LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[4],
                                          Pack<InstructionSet::avx2, double> (&columns)[4]) {
   FourNumbers<double> r[4];
@@ -57,22 +59,37 @@ LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[4],
   transpose(r);
   LIESTAT_UNROLL for (std::size_t c = 0; c < 4; ++c) columns[c].v = r[c].v;
 }
-LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[8],
-                                         Pack<InstructionSet::avx512, double> (&columns)[4]) {
-  Pack<InstructionSet::avx512, double> r[4], a, b, c, d;
-  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) {
-    FourNumbers<double> low, high;
-    low.load(row[k]), high.load(row[k + 4]);
-    r[k].v = __builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7);
-  }
+LIESTAT_ALWAYS_INLINE void transposeRows(const double* rows, Pack<InstructionSet::avx2, double> (&columns)[4]) {
+  const double* const row[4] = {rows, rows + 4, rows + 8, rows + 12};
+  transposeRows(row, columns);
+}
+/// The same, of rows 2k and 2k + 1 in the register k.
+LIESTAT_ALWAYS_INLINE void transposePairs(const Pack<InstructionSet::avx512, double> (&r)[4],
+                                          Pack<InstructionSet::avx512, double> (&columns)[4]) {
+  Pack<InstructionSet::avx512, double> a, b, c, d;
   a.v = __builtin_shufflevector(r[0].v, r[1].v, 0, 8, 2, 10, 4, 12, 6, 14);
   b.v = __builtin_shufflevector(r[0].v, r[1].v, 1, 9, 3, 11, 5, 13, 7, 15);
   c.v = __builtin_shufflevector(r[2].v, r[3].v, 0, 8, 2, 10, 4, 12, 6, 14);
   d.v = __builtin_shufflevector(r[2].v, r[3].v, 1, 9, 3, 11, 5, 13, 7, 15);
-  columns[0].v = __builtin_shufflevector(a.v, c.v, 0, 1, 8, 9, 4, 5, 12, 13);
-  columns[1].v = __builtin_shufflevector(b.v, d.v, 0, 1, 8, 9, 4, 5, 12, 13);
-  columns[2].v = __builtin_shufflevector(a.v, c.v, 2, 3, 10, 11, 6, 7, 14, 15);
-  columns[3].v = __builtin_shufflevector(b.v, d.v, 2, 3, 10, 11, 6, 7, 14, 15);
+  columns[0].v = __builtin_shufflevector(a.v, c.v, 0, 4, 1, 5, 8, 12, 9, 13);
+  columns[1].v = __builtin_shufflevector(b.v, d.v, 0, 4, 1, 5, 8, 12, 9, 13);
+  columns[2].v = __builtin_shufflevector(a.v, c.v, 2, 6, 3, 7, 10, 14, 11, 15);
+  columns[3].v = __builtin_shufflevector(b.v, d.v, 2, 6, 3, 7, 10, 14, 11, 15);
+}
+LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[8],
+                                         Pack<InstructionSet::avx512, double> (&columns)[4]) {
+  Pack<InstructionSet::avx512, double> r[4];
+  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) {
+    FourNumbers<double> low, high;
+    low.load(row[2 * k]), high.load(row[2 * k + 1]);
+    r[k].v = __builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+  transposePairs(r, columns);
+}
+LIESTAT_ALWAYS_INLINE void transposeRows(const double* rows, Pack<InstructionSet::avx512, double> (&columns)[4]) {
+  Pack<InstructionSet::avx512, double> r[4];
+  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = Pack<InstructionSet::avx512, double>::load(rows + 8 * k);
+  transposePairs(r, columns);
 }
 #endif
 
@@ -107,6 +124,12 @@ template <class P>
 inline constexpr bool loads_rows =
     LIESTAT_HAS_SHUFFLES&& P::set != InstructionSet::baseline&& std::is_same_v<typename P::Scalar, double>;
 
+/// Asks for what a kernel will read a page after the number at p: the processor by itself reads ahead too little for
+/// kernels that take less time than their data take from memory.
+LIESTAT_ALWAYS_INLINE void prefetch(const void* p) {
+  __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(p) + 4096));
+}
+
 /// Components first … first + 3 of the element `begin` and those after it, of which there are `left`, in one register each,
 /// from an array of elements (component is 1); the lanes beyond the last are filled up with the numbers `fill`. Rows are
 /// transposed in registers: one that is read back just after its numbers have been stored one by one would wait for them.
@@ -115,9 +138,15 @@ LIESTAT_ALWAYS_INLINE void loadRows(const Layout<const S>& from, std::size_t fir
                                     const S* fill, P (&columns)[4]) {
   if constexpr (loads_rows<P>) {
     const S *const start = from.at(begin, first), *row[P::size];
+    if (left >= P::size && from.element == 4) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; k += 2) prefetch(start + 4 * k);
+      transposeRows(start, columns);
+      return;
+    }
     if (left >= P::size) {
       LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
         row[k] = start + static_cast<std::ptrdiff_t>(k) * from.element;
+        if (first == 0) prefetch(row[k]);
       }
     } else {
       LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {

@@ -137,7 +137,12 @@ struct RotationKernel {
           largest_gap_cosine = larger(gap_cosine, largest_gap_cosine);
         }
       }
-      cosine = smaller(absolute(q[3]), cosine);
+      // To unit length and w >= 0 here already: what waits for the polynomials' variable is long enough without it.
+      const P excess = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]) - S(1), scale = unitScale(excess);
+      defect = larger(absolute(excess), defect);
+      const P signed_scale = select(q[3] < S(0), -scale, scale);
+      LIESTAT_UNROLL for (std::size_t l = 0; l < 4; ++l) q[l] *= signed_scale;
+      cosine = smaller(q[3], cosine);
       LIESTAT_UNROLL for (std::size_t l = 0; l < 4; ++l) q[l].store(data[l] + j);
     }
 
@@ -169,20 +174,19 @@ struct RotationKernel {
                                    std::size_t i, const Polynomials& polynomials) {
       const P q[4] = {P::load(data[0] + j), P::load(data[1] + j), P::load(data[2] + j), P::load(data[3] + j)};
       const P xx = q[0] * q[0], yy = q[1] * q[1], zz = q[2] * q[2], u2 = xx + yy + zz;
-      const P excess = u2 + q[3] * q[3] - S(1), scale = unitScale(excess);
-      defect = larger(absolute(excess), defect);
-      const P variable = (S(1) - scale * absolute(q[3])) * static_cast<S>(1 / polynomials.range) - S(1);
-      const P f = scale * evaluatePolynomial(polynomials.log, variable);
-      const P sign_f = select(q[3] < S(0), -f, f);
-      P p(S(1));
-      if constexpr (Weighted) p = P::load(data[4] + j);
-      P g = scale * scale;
+      const double slope = -1 / polynomials.range;
+      const P variable = q[3] * static_cast<S>(slope) + static_cast<S>(-1 - slope);
+      const P f = evaluatePolynomial(polynomials.log, variable);
+      P p(S(1)), g;
       if constexpr (exact) {
-        g *= evaluatePolynomial(polynomials.exact_hessian, variable);
+        g = evaluatePolynomial(polynomials.exact_hessian, variable);
       } else {
-        g *= evaluatePolynomial(polynomials.newton_hessian, variable);
+        g = evaluatePolynomial(polynomials.newton_hessian, variable);
       }
-      if constexpr (Weighted) g *= p;
+      if constexpr (Weighted) {
+        p = P::load(data[4] + j);
+        g *= p;
+      }
       const P gx = g * q[0], gy = g * q[1];
       hessian[0] += g * xx, hessian[1] += gx * q[1], hessian[2] += gx * q[2];
       hessian[3] += g * yy, hessian[4] += gy * q[2], hessian[5] += g * zz;
@@ -190,7 +194,7 @@ struct RotationKernel {
       constexpr std::size_t r0 = Frame ? 3 : 0;
       P v[k], length2 = f * f * u2;
       residuals.addAngle(length2, p);
-      LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) v[r0 + c] = sign_f * q[c];
+      LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) v[r0 + c] = f * q[c];
       if constexpr (Frame) {
         LIESTAT_UNROLL for (std::size_t c = 0; c < 3; ++c) {
           v[c] = P::load(data[6 + c] + j);
