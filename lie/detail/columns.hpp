@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 
 namespace liestat::detail {
 
@@ -50,6 +51,59 @@ LIESTAT_ALWAYS_INLINE void transpose(FourNumbers<S> (&r)[4]) {
   r[2].v = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   r[3].v = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
+/// Lane l is lane Index::of(l) of a, or of b where that is P::size or more.
+template <class Index, class P, std::size_t... Lane>
+LIESTAT_ALWAYS_INLINE P permuted(const P& a, const P& b, std::index_sequence<Lane...>) {
+  P x;
+  x.v = __builtin_shufflevector(a.v, b.v, Index::of(Lane)...);
+  return x;
+}
+template <class Index, class P>
+LIESTAT_ALWAYS_INLINE P permuted(const P& a, const P& b) {
+  return permuted<Index>(a, b, std::make_index_sequence<P::size>());
+}
+/// Components Half and Half + 1 of the rows of four numbers in two registers, one after the other; and one register of
+/// rows again of these and the other two components, from row First on.
+template <std::size_t size, std::size_t Component>
+struct TwoOfFour {
+  static constexpr int of(std::size_t l) {
+    const std::size_t half = size / 2, row = l % half, number = 4 * row + Component + l / half;
+    return static_cast<int>(number);
+  }
+};
+template <std::size_t size, std::size_t First>
+struct FourOfTwo {
+  static constexpr int of(std::size_t l) {
+    const std::size_t half = size / 2, component = l % 4, row = First + l / 4;
+    return static_cast<int>(component / 2 * size + component % 2 * half + row);
+  }
+};
+/// The first or the second halves of two registers.
+template <std::size_t size, std::size_t Half>
+struct Halves {
+  static constexpr int of(std::size_t l) {
+    const std::size_t half = size / 2;
+    return static_cast<int>(l / half * size + Half * half + l % half);
+  }
+};
+/// The columns of the rows of four numbers that stand in four registers one after the other, and the way back; for
+/// instructions that take any two registers' numbers in any order.
+template <class P>
+LIESTAT_ALWAYS_INLINE void rowsToColumns(const P (&r)[4], P (&columns)[4]) {
+  constexpr std::size_t size = P::size;
+  const P xy = permuted<TwoOfFour<size, 0>>(r[0], r[1]), zw = permuted<TwoOfFour<size, 2>>(r[0], r[1]),
+          XY = permuted<TwoOfFour<size, 0>>(r[2], r[3]), ZW = permuted<TwoOfFour<size, 2>>(r[2], r[3]);
+  columns[0] = permuted<Halves<size, 0>>(xy, XY), columns[1] = permuted<Halves<size, 1>>(xy, XY);
+  columns[2] = permuted<Halves<size, 0>>(zw, ZW), columns[3] = permuted<Halves<size, 1>>(zw, ZW);
+}
+template <class P>
+LIESTAT_ALWAYS_INLINE void columnsToRows(const P& x, const P& y, const P& z, const P& w, P (&r)[4]) {
+  constexpr std::size_t size = P::size, rows = size / 4;
+  const P xy = permuted<Halves<size, 0>>(x, y), zw = permuted<Halves<size, 0>>(z, w),
+          XY = permuted<Halves<size, 1>>(x, y), ZW = permuted<Halves<size, 1>>(z, w);
+  r[0] = permuted<FourOfTwo<size, 0>>(xy, zw), r[1] = permuted<FourOfTwo<size, rows>>(xy, zw);
+  r[2] = permuted<FourOfTwo<size, 0>>(XY, ZW), r[3] = permuted<FourOfTwo<size, rows>>(XY, ZW);
+}
 /// The columns of as many rows of four numbers as a register holds: of an array of rows, or of rows that follow one
 /// another without a gap.
 LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[4],
@@ -63,19 +117,6 @@ LIESTAT_ALWAYS_INLINE void transposeRows(const double* rows, Pack<InstructionSet
   const double* const row[4] = {rows, rows + 4, rows + 8, rows + 12};
   transposeRows(row, columns);
 }
-/// The same, of rows 2k and 2k + 1 in the register k.
-LIESTAT_ALWAYS_INLINE void transposePairs(const Pack<InstructionSet::avx512, double> (&r)[4],
-                                          Pack<InstructionSet::avx512, double> (&columns)[4]) {
-  Pack<InstructionSet::avx512, double> a, b, c, d;
-  a.v = __builtin_shufflevector(r[0].v, r[1].v, 0, 8, 2, 10, 4, 12, 6, 14);
-  b.v = __builtin_shufflevector(r[0].v, r[1].v, 1, 9, 3, 11, 5, 13, 7, 15);
-  c.v = __builtin_shufflevector(r[2].v, r[3].v, 0, 8, 2, 10, 4, 12, 6, 14);
-  d.v = __builtin_shufflevector(r[2].v, r[3].v, 1, 9, 3, 11, 5, 13, 7, 15);
-  columns[0].v = __builtin_shufflevector(a.v, c.v, 0, 4, 1, 5, 8, 12, 9, 13);
-  columns[1].v = __builtin_shufflevector(b.v, d.v, 0, 4, 1, 5, 8, 12, 9, 13);
-  columns[2].v = __builtin_shufflevector(a.v, c.v, 2, 6, 3, 7, 10, 14, 11, 15);
-  columns[3].v = __builtin_shufflevector(b.v, d.v, 2, 6, 3, 7, 10, 14, 11, 15);
-}
 LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[8],
                                          Pack<InstructionSet::avx512, double> (&columns)[4]) {
   Pack<InstructionSet::avx512, double> r[4];
@@ -84,12 +125,12 @@ LIESTAT_ALWAYS_INLINE void transposeRows(const double* const (&row)[8],
     low.load(row[2 * k]), high.load(row[2 * k + 1]);
     r[k].v = __builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7);
   }
-  transposePairs(r, columns);
+  rowsToColumns(r, columns);
 }
 LIESTAT_ALWAYS_INLINE void transposeRows(const double* rows, Pack<InstructionSet::avx512, double> (&columns)[4]) {
   Pack<InstructionSet::avx512, double> r[4];
   LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = Pack<InstructionSet::avx512, double>::load(rows + 8 * k);
-  transposePairs(r, columns);
+  rowsToColumns(r, columns);
 }
 #endif
 

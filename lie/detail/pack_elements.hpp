@@ -76,10 +76,28 @@ LIESTAT_ALWAYS_INLINE void interleave(FourNumbers<S> (&r)[2]) {
   r[1].v = __builtin_shufflevector(x, y, 2, 6, 3, 7);
 }
 
-/// Components c … c + 3 of a pack of elements, one behind the other in each.
+/// Registers whose instructions take any two registers' numbers in any order.
+template <class P>
+inline constexpr bool permutes = P::set == InstructionSet::avx512 && P::size >= 8;
+
+/// Rows k size / 4 … of a pack in its register k.
 template <class P>
 LIESTAT_ALWAYS_INLINE void loadFour(const Layout<const typename P::Scalar>& from, std::size_t i, std::size_t c, P* x) {
   FourNumbers<typename P::Scalar> rows[P::size / 4][4];
+  if constexpr (permutes<P>) {
+    constexpr std::size_t n = P::size / 4;
+    P r[4], columns[4];
+    if (from.element == 4) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = P::load(from.at(i, c) + k * P::size);
+    } else {
+      FourNumbers<typename P::Scalar> row[P::size];
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) row[k].load(from.at(i + k, c));
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = joined<P>(row + k * n, 1);
+    }
+    rowsToColumns(r, columns);
+    LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) x[k] = columns[k];
+    return;
+  }
   LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
     LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].load(from.at(i + 4 * part + k, c));
     transpose(rows[part]);
@@ -89,6 +107,19 @@ LIESTAT_ALWAYS_INLINE void loadFour(const Layout<const typename P::Scalar>& from
 template <class P>
 LIESTAT_ALWAYS_INLINE void storeFour(const P& x, const P& y, const P& z, const P& w, std::size_t c,
                                      const Layout<typename P::Scalar>& to, std::size_t i) {
+  if constexpr (permutes<P>) {
+    constexpr std::size_t n = P::size / 4;
+    P r[4];
+    columnsToRows(x, y, z, w, r);
+    if (to.element == 4) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k].store(to.at(i, c) + k * P::size);
+    } else {
+      FourNumbers<typename P::Scalar> row[P::size];
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) split(r[k], row + k * n, 1);
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) row[k].store(to.at(i + k, c));
+    }
+    return;
+  }
   FourNumbers<typename P::Scalar> rows[P::size / 4][4];
   split(x, &rows[0][0], 4), split(y, &rows[0][1], 4), split(z, &rows[0][2], 4), split(w, &rows[0][3], 4);
   LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
@@ -96,9 +127,41 @@ LIESTAT_ALWAYS_INLINE void storeFour(const P& x, const P& y, const P& z, const P
     LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].store(to.at(i + 4 * part + k, c));
   }
 }
+
+/// Component Component of elements of N numbers one behind the other, which two registers hold from number First on, the
+/// first of them what comes before; lanes whose number is in neither keep that of the first register.
+template <std::size_t size, std::size_t N, std::size_t Component, std::size_t Second>
+struct EveryNth {
+  static constexpr int of(std::size_t l) {
+    const std::size_t number = N * l + Component;
+    if (Second == 1) return static_cast<int>(number < 2 * size ? number : 0);
+    return static_cast<int>(number < Second * size ? l : number - (Second - 1) * size);
+  }
+};
+/// Register Register of the elements again, from its components Second - 1 and Second, or what the earlier ones gave.
+template <std::size_t size, std::size_t N, std::size_t Register, std::size_t Second>
+struct Interleaved {
+  static constexpr int of(std::size_t l) {
+    const std::size_t number = Register * size + l, element = number / N, component = number % N;
+    if (component == Second) return static_cast<int>(size + element);
+    return static_cast<int>(Second == 1 && component == 0 ? element : Second == 1 ? 0 : l);
+  }
+};
 /// Elements of two or three numbers, one behind the other.
 template <class P, std::size_t N>
 LIESTAT_ALWAYS_INLINE void loadDense(const typename P::Scalar* from, P (&x)[N]) {
+  if constexpr (permutes<P>) {
+    constexpr std::size_t size = P::size;
+    P r[N];
+    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) r[k] = P::load(from + k * size);
+    x[0] = permuted<EveryNth<size, N, 0, 1>>(r[0], r[1]), x[1] = permuted<EveryNth<size, N, 1, 1>>(r[0], r[1]);
+    if constexpr (N == 3) {
+      x[2] = permuted<EveryNth<size, N, 2, 1>>(r[0], r[1]);
+      x[0] = permuted<EveryNth<size, N, 0, 2>>(x[0], r[2]), x[1] = permuted<EveryNth<size, N, 1, 2>>(x[1], r[2]);
+      x[2] = permuted<EveryNth<size, N, 2, 2>>(x[2], r[2]);
+    }
+    return;
+  }
   FourNumbers<typename P::Scalar> rows[P::size / 4][N];
   LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
     LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) rows[part][k].load(from + 4 * (part * N + k));
@@ -108,6 +171,18 @@ LIESTAT_ALWAYS_INLINE void loadDense(const typename P::Scalar* from, P (&x)[N]) 
 }
 template <class P, std::size_t N>
 LIESTAT_ALWAYS_INLINE void storeDense(const P (&x)[N], typename P::Scalar* to) {
+  if constexpr (permutes<P>) {
+    constexpr std::size_t size = P::size;
+    P r[N];
+    r[0] = permuted<Interleaved<size, N, 0, 1>>(x[0], x[1]), r[1] = permuted<Interleaved<size, N, 1, 1>>(x[0], x[1]);
+    if constexpr (N == 3) {
+      r[2] = permuted<Interleaved<size, N, 2, 1>>(x[0], x[1]);
+      r[0] = permuted<Interleaved<size, N, 0, 2>>(r[0], x[2]), r[1] = permuted<Interleaved<size, N, 1, 2>>(r[1], x[2]);
+      r[2] = permuted<Interleaved<size, N, 2, 2>>(r[2], x[2]);
+    }
+    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) r[k].store(to + k * size);
+    return;
+  }
   FourNumbers<typename P::Scalar> rows[P::size / 4][N];
   LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) split(x[k], &rows[0][k], N);
   LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
