@@ -43,7 +43,7 @@ struct PackQuaternion {
 
   LIESTAT_ALWAYS_INLINE PackQuaternion conjugate() const { return {-u, w}; }
   LIESTAT_ALWAYS_INLINE friend P dot(const PackQuaternion& a, const PackQuaternion& b) {
-    return a.w * b.w + dot(a.u, b.u);
+    return (a.u.x * b.u.x + a.u.y * b.u.y) + (a.u.z * b.u.z + a.w * b.w);
   }
   LIESTAT_ALWAYS_INLINE friend PackQuaternion product(const PackQuaternion& a, const PackQuaternion& b) {
     const PackQuaternion q{{a.w * b.u.x + a.u.x * b.w + (a.u.y * b.u.z - a.u.z * b.u.y),

@@ -62,23 +62,24 @@ template <class Index, class P>
 LIESTAT_ALWAYS_INLINE P permuted(const P& a, const P& b) {
   return permuted<Index>(a, b, std::make_index_sequence<P::size>());
 }
-/// Components Half and Half + 1 of the rows of four numbers in two registers, one after the other; and one register of
-/// rows again of these and the other two components, from row First on.
+/// For `permuted`: of rows of four numbers in two registers, components Component and Component + 1, one column after the
+/// other.
 template <std::size_t size, std::size_t Component>
 struct TwoOfFour {
   static constexpr int of(std::size_t l) {
-    const std::size_t half = size / 2, row = l % half, number = 4 * row + Component + l / half;
-    return static_cast<int>(number);
+    const std::size_t half = size / 2;
+    return static_cast<int>(4 * (l % half) + Component + l / half);
   }
 };
+/// The way back: rows from First on of four columns, two in each register.
 template <std::size_t size, std::size_t First>
 struct FourOfTwo {
   static constexpr int of(std::size_t l) {
-    const std::size_t half = size / 2, component = l % 4, row = First + l / 4;
-    return static_cast<int>(component / 2 * size + component % 2 * half + row);
+    const std::size_t half = size / 2, component = l % 4;
+    return static_cast<int>(component / 2 * size + component % 2 * half + First + l / 4);
   }
 };
-/// The first or the second halves of two registers.
+/// The first halves of two registers, or the second.
 template <std::size_t size, std::size_t Half>
 struct Halves {
   static constexpr int of(std::size_t l) {

@@ -78,58 +78,65 @@ LIESTAT_ALWAYS_INLINE void interleave(FourNumbers<S> (&r)[2]) {
 
 /// Registers whose instructions take any two registers' numbers in any order.
 template <class P>
-inline constexpr bool permutes = P::set == InstructionSet::avx512 && P::size >= 8;
+inline constexpr bool permutes = P::set == InstructionSet::avx512&& P::size >= 8;
 
-/// Rows k size / 4 … of a pack in its register k.
+/// Components c … c + 3 of a pack of elements, one behind the other in each.
 template <class P>
 LIESTAT_ALWAYS_INLINE void loadFour(const Layout<const typename P::Scalar>& from, std::size_t i, std::size_t c, P* x) {
-  FourNumbers<typename P::Scalar> rows[P::size / 4][4];
+  using Row = FourNumbers<typename P::Scalar>;
   if constexpr (permutes<P>) {
-    constexpr std::size_t n = P::size / 4;
     P r[4], columns[4];
     if (from.element == 4) {
-      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = P::load(from.at(i, c) + k * P::size);
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) {
+        const auto* const rows = from.at(i, c) + k * P::size;
+        r[k] = P::load(rows);
+        prefetch(rows);
+      }
     } else {
-      FourNumbers<typename P::Scalar> row[P::size];
-      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) row[k].load(from.at(i + k, c));
-      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = joined<P>(row + k * n, 1);
+      Row row[P::size];
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
+        row[k].load(from.at(i + k, c));
+        if (c == 0) prefetch(from.at(i + k, c));
+      }
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k] = joined<P>(row + k * (P::size / 4), 1);
     }
     rowsToColumns(r, columns);
     LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) x[k] = columns[k];
-    return;
+  } else {
+    Row rows[P::size / 4][4];
+    LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].load(from.at(i + 4 * part + k, c));
+      transpose(rows[part]);
+    }
+    LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) x[k] = joined<P>(&rows[0][k], 4);
   }
-  LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
-    LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].load(from.at(i + 4 * part + k, c));
-    transpose(rows[part]);
-  }
-  LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) x[k] = joined<P>(&rows[0][k], 4);
 }
 template <class P>
 LIESTAT_ALWAYS_INLINE void storeFour(const P& x, const P& y, const P& z, const P& w, std::size_t c,
                                      const Layout<typename P::Scalar>& to, std::size_t i) {
+  using Row = FourNumbers<typename P::Scalar>;
   if constexpr (permutes<P>) {
-    constexpr std::size_t n = P::size / 4;
     P r[4];
     columnsToRows(x, y, z, w, r);
     if (to.element == 4) {
       LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) r[k].store(to.at(i, c) + k * P::size);
     } else {
-      FourNumbers<typename P::Scalar> row[P::size];
-      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) split(r[k], row + k * n, 1);
+      Row row[P::size];
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) split(r[k], row + k * (P::size / 4), 1);
       LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) row[k].store(to.at(i + k, c));
     }
-    return;
-  }
-  FourNumbers<typename P::Scalar> rows[P::size / 4][4];
-  split(x, &rows[0][0], 4), split(y, &rows[0][1], 4), split(z, &rows[0][2], 4), split(w, &rows[0][3], 4);
-  LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
-    transpose(rows[part]);
-    LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].store(to.at(i + 4 * part + k, c));
+  } else {
+    Row rows[P::size / 4][4];
+    split(x, &rows[0][0], 4), split(y, &rows[0][1], 4), split(z, &rows[0][2], 4), split(w, &rows[0][3], 4);
+    LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
+      transpose(rows[part]);
+      LIESTAT_UNROLL for (std::size_t k = 0; k < 4; ++k) rows[part][k].store(to.at(i + 4 * part + k, c));
+    }
   }
 }
 
-/// Component Component of elements of N numbers one behind the other, which two registers hold from number First on, the
-/// first of them what comes before; lanes whose number is in neither keep that of the first register.
+/// For `permuted`: component Component of elements of N numbers that stand one behind the other in N registers. Second 1
+/// takes it from registers 0 and 1, Second 2 from what came of that and register 2.
 template <std::size_t size, std::size_t N, std::size_t Component, std::size_t Second>
 struct EveryNth {
   static constexpr int of(std::size_t l) {
@@ -138,7 +145,7 @@ struct EveryNth {
     return static_cast<int>(number < Second * size ? l : number - (Second - 1) * size);
   }
 };
-/// Register Register of the elements again, from its components Second - 1 and Second, or what the earlier ones gave.
+/// The way back: register Register, by Second 1 of components 0 and 1, by Second 2 of what came of that and component 2.
 template <std::size_t size, std::size_t N, std::size_t Register, std::size_t Second>
 struct Interleaved {
   static constexpr int of(std::size_t l) {
@@ -160,14 +167,14 @@ LIESTAT_ALWAYS_INLINE void loadDense(const typename P::Scalar* from, P (&x)[N]) 
       x[0] = permuted<EveryNth<size, N, 0, 2>>(x[0], r[2]), x[1] = permuted<EveryNth<size, N, 1, 2>>(x[1], r[2]);
       x[2] = permuted<EveryNth<size, N, 2, 2>>(x[2], r[2]);
     }
-    return;
+  } else {
+    FourNumbers<typename P::Scalar> rows[P::size / 4][N];
+    LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
+      LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) rows[part][k].load(from + 4 * (part * N + k));
+      separate(rows[part]);
+    }
+    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) x[k] = joined<P>(&rows[0][k], N);
   }
-  FourNumbers<typename P::Scalar> rows[P::size / 4][N];
-  LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
-    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) rows[part][k].load(from + 4 * (part * N + k));
-    separate(rows[part]);
-  }
-  LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) x[k] = joined<P>(&rows[0][k], N);
 }
 template <class P, std::size_t N>
 LIESTAT_ALWAYS_INLINE void storeDense(const P (&x)[N], typename P::Scalar* to) {
@@ -181,13 +188,13 @@ LIESTAT_ALWAYS_INLINE void storeDense(const P (&x)[N], typename P::Scalar* to) {
       r[2] = permuted<Interleaved<size, N, 2, 2>>(r[2], x[2]);
     }
     LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) r[k].store(to + k * size);
-    return;
-  }
-  FourNumbers<typename P::Scalar> rows[P::size / 4][N];
-  LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) split(x[k], &rows[0][k], N);
-  LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
-    interleave(rows[part]);
-    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) rows[part][k].store(to + 4 * (part * N + k));
+  } else {
+    FourNumbers<typename P::Scalar> rows[P::size / 4][N];
+    LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) split(x[k], &rows[0][k], N);
+    LIESTAT_UNROLL for (std::size_t part = 0; part < P::size / 4; ++part) {
+      interleave(rows[part]);
+      LIESTAT_UNROLL for (std::size_t k = 0; k < N; ++k) rows[part][k].store(to + 4 * (part * N + k));
+    }
   }
 }
 #endif

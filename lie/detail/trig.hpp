@@ -69,13 +69,13 @@ LIESTAT_ALWAYS_INLINE S everyNth(const std::array<double, N>& c, const S& y) {
 }
 
 /// Σ c_k x^k over the first `terms` coefficients, in chains of operations that don't wait for one another: Horner's
-/// single chain takes four times as long as its multiplications. Four chains for one number; two for a register of
-/// them, several of which are under way at a time.
+/// single chain takes four times as long as its multiplications. Four chains for one number; for a register
+/// of them, several of which are under way at a time, two where they are short.
 template <std::size_t terms, class S, std::size_t N>
 LIESTAT_ALWAYS_INLINE S evaluatePolynomial(const std::array<double, N>& c, const S& x) {
   static_assert(terms >= 4 && terms <= N);
   const S x2 = x * x;
-  if constexpr (requires { typename S::Mask; }) {
+  if constexpr (terms < 16 && requires { typename S::Mask; }) {
     return everyNth<0, 2, terms>(c, x2) + everyNth<1, 2, terms>(c, x2) * x;
   } else {
 #if defined(__GNUC__)
