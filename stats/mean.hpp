@@ -18,6 +18,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <ranges>
 #include <type_traits>
@@ -72,9 +73,11 @@ struct MeanResult {
 
 namespace detail {
 
-/// Magnitude of the features' coordinates at y and of the spread, to which rounding errors are proportional.
+/// Magnitude of the features' coordinates at y and of the spread, to which rounding errors are proportional; of a
+/// compact space a bound.
 template <Metric M>
 double dataScale(const M& y, const MeanSums<M>& sums) {
+  if constexpr (has_compact_factor<M> && compact_dimension<M> == ManifoldTraits<M>::DoF) return 1 + 2 * std::numbers::pi;
   const double spread = sums.weight > 0 ? std::sqrt(2 * static_cast<double>(sums.cost) / sums.weight) : 0;
   return 1 + spread + static_cast<double>(ManifoldTraits<M>::logOrigin(y).norm());
 }
@@ -94,9 +97,12 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
   if (n == 0) return {};
 
   const TangentOf<M> metric = T::metricWeights();
+  // Number by number, as v has been stored: a register of them would wait.
   const auto norm = [&](const TangentOf<M>& v) {
     using std::sqrt;
-    return static_cast<double>(sqrt(v.dot(metric.cwiseProduct(v))));
+    S sum(0);
+    for (int i = 0; i < T::DoF; ++i) sum += metric[i] * v[i] * v[i];
+    return static_cast<double>(sqrt(sum));
   };
   Status status = Status::not_converged;
   int iterations = 0;
