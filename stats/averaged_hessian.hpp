@@ -51,14 +51,14 @@ auto regionFactor(const SquareOf<M>& covariance) {
 
 /// True if the sums of a mean prove that findAveragedHessian averages nothing.
 template <Metric M>
-bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance) {
+bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, double width = 1) {
   if constexpr (Factored<M>) {
     return false;
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
     // The norm of the region's factor needs no factor. A region that has none has a trace too large, or none.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
-    const double squares =
-        static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) + K * least_region * least_region;
+    const double squares = width * width * static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) +
+                           K * least_region * least_region;
     return leastDistanceToCutLocus(mean) > 1.5 * std::sqrt(squares) * NormalNodes<K>::instance().longest();
   } else {
     return true;

@@ -98,9 +98,7 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
   if (Factored<M> || !converged(mean.status) || !options.known_noise.empty()) return false;
   if (mean.n <= static_cast<std::size_t>(ManifoldTraits<M>::DoF)) return false;
   if (!std::isfinite(static_cast<double>(mean.cost)) || !(options.largest_hessian_change >= 0)) return false;
-  const std::optional<Concentration> concentration = concentrationBySums(mean, weights);
-  if (!concentration || !concentration->concentrated) return false;
-  result.concentration = *concentration;
+  if (!concentrationBySums(mean, weights, result.concentration) || !result.concentration.concentrated) return false;
   result.uniqueness.minimiser = mean.mean;
   result.uniqueness.cost = mean.cost;
   if constexpr (compactFactor<M>() == CompactFactor::none) {
@@ -111,12 +109,14 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
   } else {
     return false;
   }
-  const SquareOf<M> covariance = covarianceFromResiduals(mean, options.noise);
-  if (!covariance.allFinite()) return false;
-  const double width = averagingWidth(mean.n);
-  if (!isHessianSettledBySums<M>(mean, SquareOf<M>(ScalarOf<M>(width * width) * covariance))) return false;
-  if (!isFarFromCutLocusBySums<M>(mean, covariance, result.cut_locus)) return false;
-  result.estimate = Gaussian<M>{mean.mean, covariance};
+  const SquareOf<M>& covariance =
+      result.estimate.emplace(mean.mean, covarianceFromResiduals(mean, options.noise)).covariance;
+  // Finite variances have finite covariances.
+  if (!std::isfinite(static_cast<double>(covariance.trace())) ||
+      !isHessianSettledBySums<M>(mean, covariance, averagingWidth(mean.n)) ||
+      !isFarFromCutLocusBySums<M>(mean, covariance, result.cut_locus)) {
+    return false;
+  }
   result.status = Status::ok;
   return true;
 }

@@ -20,7 +20,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <ranges>
 #include <tuple>
 #include <vector>
@@ -129,24 +128,24 @@ Concentration findConcentration(const R& samples, const W& weights, const M& mea
   return result;
 }
 
-/// From the sums of a mean's last pass, so that no logarithm is taken again; none if they do not decide.
+/// From the sums of a mean's last pass, so that no logarithm is taken again; false if they do not decide.
 template <Metric M>
-std::optional<Concentration> concentrationBySums(const MeanResult<M>& mean, const WeightSums& weights) {
+bool concentrationBySums(const MeanResult<M>& mean, const WeightSums& weights, Concentration& result) {
   if constexpr (Factored<M>) {
-    return {};
+    return false;
   } else if constexpr (has_compact_factor<M>) {
-    if (!converged(mean.status)) return {};
+    if (!converged(mean.status)) return false;
     constexpr int K = compact_dimension<M>, begin = ManifoldTraits<M>::compact_begin;
     ScatterOfAngles angles;
     angles.sum = static_cast<double>(mean.scatter.template block<K, K>(begin, begin).trace());
     angles.weight = weights.sum, angles.squared_weight = weights.squares, angles.n = weights.n;
     // The plain sum is not among those of the mean; it matters only where the weighted one is too large.
     angles.plain = weights.ones ? angles.sum : std::numeric_limits<double>::infinity();
-    const Concentration result = angles.judge(uniformLaw<M>());
-    if (!weights.ones && !result.concentrated) return {};
-    return result;
+    result = angles.judge(uniformLaw<M>());
+    return weights.ones || result.concentrated;
   } else {
-    return Concentration{};
+    result = {};
+    return true;
   }
 }
 
@@ -155,9 +154,8 @@ template <Metric M, class R, class W>
 Concentration findConcentration(const R& samples, const W& weights, const MeanResult<M>& mean) {
   if constexpr (!Factored<M> && has_compact_factor<M>) {
     if (converged(mean.status)) {
-      const std::optional<Concentration> known =
-          concentrationBySums(mean, weightSums(weights, std::ranges::size(samples)));
-      if (known) return *known;
+      Concentration known;
+      if (concentrationBySums(mean, weightSums(weights, std::ranges::size(samples)), known)) return known;
     }
   }
   return findConcentration(samples, weights, mean.mean);

@@ -77,7 +77,8 @@ namespace detail {
 /// compact space a bound.
 template <Metric M>
 double dataScale(const M& y, const MeanSums<M>& sums) {
-  if constexpr (has_compact_factor<M> && compact_dimension<M> == ManifoldTraits<M>::DoF) return 1 + 2 * std::numbers::pi;
+  if constexpr (has_compact_factor<M> && compact_dimension<M> == ManifoldTraits<M>::DoF)
+    return 1 + 2 * std::numbers::pi;
   const double spread = sums.weight > 0 ? std::sqrt(2 * static_cast<double>(sums.cost) / sums.weight) : 0;
   return 1 + spread + static_cast<double>(ManifoldTraits<M>::logOrigin(y).norm());
 }
