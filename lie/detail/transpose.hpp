@@ -48,49 +48,59 @@ template <class Index, class P>
 LIESTAT_ALWAYS_INLINE P permuted(const P& a, const P& b) {
   return permuted<Index>(a, b, std::make_index_sequence<P::size>());
 }
-/// For `permuted`: of rows of four numbers in two registers, components Component and Component + 1, one column after the
-/// other.
-template <std::size_t size, std::size_t Component>
-struct TwoOfFour {
+/// For `permuted`: every second number of each 128 bits of two registers, in turns, of the lower halves of these bits or
+/// of the upper ones; `width` numbers are 128 bits. The instruction for it takes least time.
+template <std::size_t size, std::size_t width, bool upper>
+struct Unpacked {
   static constexpr int of(std::size_t l) {
-    const std::size_t half = size / 2;
-    return static_cast<int>(4 * (l % half) + Component + l / half);
+    const std::size_t k = l % width, number = l - k + k / 2 + (upper ? width / 2 : 0);
+    return static_cast<int>(k % 2 * size + number);
   }
 };
-/// The way back: rows from First on of four columns, two in each register.
-template <std::size_t size, std::size_t First>
-struct FourOfTwo {
-  static constexpr int of(std::size_t l) {
-    const std::size_t half = size / 2, component = l % 4;
-    return static_cast<int>(component / 2 * size + component % 2 * half + First + l / 4);
+/// Then, column `component` of rows of four numbers in registers 0, 1, 2, 3, of which 0 and 1, and 2 and 3, have been
+/// unpacked.
+template <std::size_t size, std::size_t width, std::size_t component>
+struct ColumnOfUnpacked {
+  static constexpr int of(std::size_t row) {
+    const std::size_t rows = size / 4, number = 4 * (row % rows) + component, k = number % (width / 2);
+    return static_cast<int>(row / (2 * rows) * size + number / width * width + 2 * k + row / rows % 2);
   }
 };
-/// The first halves of two registers, or the second.
-template <std::size_t size, std::size_t Half>
-struct Halves {
+/// The way back: what is to be unpacked to rows of registers 2 pair and 2 pair + 1, from columns 0 and 2, or 1 and 3.
+template <std::size_t size, std::size_t width, std::size_t pair>
+struct PackedRows {
   static constexpr int of(std::size_t l) {
-    const std::size_t half = size / 2;
-    return static_cast<int>(l / half * size + Half * half + l % half);
+    const std::size_t rows = size / 4, k = l % width, number = l - k + 2 * (k % (width / 2));
+    const std::size_t row = (2 * pair + k / (width / 2)) * rows + number / 4;
+    return static_cast<int>(number % 4 / 2 * size + row);
   }
 };
 /// The columns of the rows of four numbers that stand in four registers one after the other, and the way back; for
 /// instructions that take any two registers' numbers in any order.
 template <class P>
 LIESTAT_ALWAYS_INLINE void rowsToColumns(const P (&r)[4], P (&columns)[4]) {
-  constexpr std::size_t size = P::size;
-  const P xy = permuted<TwoOfFour<size, 0>>(r[0], r[1]), zw = permuted<TwoOfFour<size, 2>>(r[0], r[1]),
-          XY = permuted<TwoOfFour<size, 0>>(r[2], r[3]), ZW = permuted<TwoOfFour<size, 2>>(r[2], r[3]);
-  columns[0] = permuted<Halves<size, 0>>(xy, XY), columns[1] = permuted<Halves<size, 1>>(xy, XY);
-  columns[2] = permuted<Halves<size, 0>>(zw, ZW), columns[3] = permuted<Halves<size, 1>>(zw, ZW);
+  constexpr std::size_t size = P::size, width = 16 / sizeof(typename P::Scalar);
+  using Lower = Unpacked<size, width, false>;
+  using Upper = Unpacked<size, width, true>;
+  const P a[2] = {permuted<Lower>(r[0], r[1]), permuted<Upper>(r[0], r[1])},
+          b[2] = {permuted<Lower>(r[2], r[3]), permuted<Upper>(r[2], r[3])};
+  constexpr auto half = [](std::size_t component) { return component % width / (width / 2); };
+  columns[0] = permuted<ColumnOfUnpacked<size, width, 0>>(a[half(0)], b[half(0)]);
+  columns[1] = permuted<ColumnOfUnpacked<size, width, 1>>(a[half(1)], b[half(1)]);
+  columns[2] = permuted<ColumnOfUnpacked<size, width, 2>>(a[half(2)], b[half(2)]);
+  columns[3] = permuted<ColumnOfUnpacked<size, width, 3>>(a[half(3)], b[half(3)]);
 }
 template <class P>
 LIESTAT_ALWAYS_INLINE void columnsToRows(const P& x, const P& y, const P& z, const P& w, P (&r)[4]) {
-  constexpr std::size_t size = P::size, rows = size / 4;
-  const P xy = permuted<Halves<size, 0>>(x, y), zw = permuted<Halves<size, 0>>(z, w),
-          XY = permuted<Halves<size, 1>>(x, y), ZW = permuted<Halves<size, 1>>(z, w);
-  r[0] = permuted<FourOfTwo<size, 0>>(xy, zw), r[1] = permuted<FourOfTwo<size, rows>>(xy, zw);
-  r[2] = permuted<FourOfTwo<size, 0>>(XY, ZW), r[3] = permuted<FourOfTwo<size, rows>>(XY, ZW);
+  constexpr std::size_t size = P::size, width = 16 / sizeof(typename P::Scalar);
+  using Lower = Unpacked<size, width, false>;
+  using Upper = Unpacked<size, width, true>;
+  const P xz = permuted<PackedRows<size, width, 0>>(x, z), yw = permuted<PackedRows<size, width, 0>>(y, w),
+          XZ = permuted<PackedRows<size, width, 1>>(x, z), YW = permuted<PackedRows<size, width, 1>>(y, w);
+  r[0] = permuted<Lower>(xz, yw), r[1] = permuted<Upper>(xz, yw);
+  r[2] = permuted<Lower>(XZ, YW), r[3] = permuted<Upper>(XZ, YW);
 }
+
 /// Registers whose instructions take any two registers' numbers in any order.
 template <class P>
 inline constexpr bool permutes = P::set == InstructionSet::avx512&& P::size >= 8;
