@@ -19,7 +19,9 @@ constexpr long double arccosineSeries(long double sigma, int derivative) {
     long double factor = 1;
     for (int d = 0; d < derivative; ++d) factor *= static_cast<long double>(n - d) / 2;
     if (n > derivative) power *= sigma;
-    if (n >= derivative) sum += factor * c * power;
+    const long double term = factor * c * power;
+    if (n >= derivative) sum += term;
+    if (n > 2 * derivative && term < 1e-22L * sum) break;
   }
   return sum;
 }

@@ -138,11 +138,13 @@ struct MomentKernel {
         std::memcpy(data[numbers], arguments.weights + i, count * sizeof(S));
         for (std::size_t j = count; j % P::size != 0; ++j) data[numbers][j] = 0;
       }
-      if (loads_rows<P> && numbers >= 4 && arguments.features.component == 1) {
-        sums.template addAll<true>(data, arguments.features, i, count);
-      } else {
-        sums.template addAll<false>(data, arguments.features, i, count);
+      if constexpr (loads_rows<P> && numbers >= 4) {
+        if (arguments.features.component == 1) {
+          sums.template addAll<true>(data, arguments.features, i, count);
+          continue;
+        }
       }
+      sums.template addAll<false>(data, arguments.features, i, count);
     }
     LIESTAT_UNROLL for (std::size_t a = 0; a < entries; ++a) arguments.product[a] = sumOf(sums.product[a]);
     LIESTAT_UNROLL for (std::size_t a = 0; a < linear; ++a) arguments.sum[a] = sumOf(sums.sum[a]);
@@ -170,7 +172,7 @@ struct MomentKernel {
       if constexpr (!ByRows) loadFilled<P, numbers>(features, 0, i, count, zeros, data);
       for (std::size_t j = 0; j < count; j += P::size) {
         P c[numbers], weighted[numbers];
-        if constexpr (ByRows && numbers >= 4) {
+        if constexpr (ByRows) {
           P last[4], four[4];
           loadRows(features, numbers - 4, i + j, count - j, zeros, last);
           LIESTAT_UNROLL for (std::size_t first = 0; first + 4 < numbers; first += 4) {

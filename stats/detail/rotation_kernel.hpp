@@ -16,6 +16,11 @@
 
 namespace liestat::detail {
 
+/// True if kernels have a case of its own for small rotations: not for processors without AVX2, whose users are too few
+/// for what it takes to compile.
+template <class P>
+inline constexpr bool has_small_rotations = LIESTAT_HAS_DISPATCH == 0 || P::set != InstructionSet::baseline;
+
 /// Features modulo half-turns about the axes whose bits are set, 1 for x, 2 for y, 4 for z.
 template <class S, bool Frame, unsigned HalfTurns, bool Weighted, KernelPass Pass>
 struct RotationKernel {
@@ -61,19 +66,22 @@ struct RotationKernel {
       for (std::size_t i = 0; i < arguments.count; i += block) {
         const std::size_t count = arguments.count - i < block ? arguments.count - i : block;
         P cosine(S(1));
-        if (loads_rows<P> && arguments.features.component == 1) {
-          sums.template turnAll<true>(data, arguments, i, count, cosine);
-        } else {
-          sums.template turnAll<false>(data, arguments, i, count, cosine);
+        bool turned = false;
+        if constexpr (loads_rows<P>) {
+          turned = arguments.features.component == 1;
+          if (turned) sums.template turnAll<true>(data, arguments, i, count, cosine);
         }
+        if (!turned) sums.template turnAll<false>(data, arguments, i, count, cosine);
         if constexpr (Weighted) {
           std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
           for (std::size_t j = count; j % P::size != 0; ++j) data[4][j] = 0;
         }
-        if (-largestOf(-cosine) > static_cast<S>(small_rotation_cosine)) {
-          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, arguments, i, small_rotation<S>);
+        bool small = false;
+        if constexpr (has_small_rotations<P>) small = -largestOf(-cosine) > static_cast<S>(small_rotation_cosine);
+        if (small) {
+          if constexpr (has_small_rotations<P>) sums.addAll(data, count, arguments, i, small_rotation<S>);
         } else {
-          for (std::size_t j = 0; j < count; j += P::size) sums.add(data, j, arguments, i, any_rotation<S>);
+          sums.addAll(data, count, arguments, i, any_rotation<S>);
         }
       }
       sums.residuals.finish(arguments);
@@ -169,6 +177,11 @@ struct RotationKernel {
       q[2] = select(better, z, q[2]), q[3] = select(better, w, q[3]);
     }
 
+    template <class Polynomials>
+    LIESTAT_ALWAYS_INLINE void addAll(const S (&data)[columns][block], std::size_t count, const Arguments& arguments,
+                                      std::size_t i, const Polynomials& polynomials) {
+      for (std::size_t j = 0; j < count; j += P::size) add(data, j, arguments, i, polynomials);
+    }
     template <class Polynomials>
     LIESTAT_ALWAYS_INLINE void add(const S (&data)[columns][block], std::size_t j, const Arguments& arguments,
                                    std::size_t i, const Polynomials& polynomials) {
