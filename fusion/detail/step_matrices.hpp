@@ -22,7 +22,7 @@ struct StepCoefficients {
   S b, c, d, b_slope, c_slope, d_slope;
 
   explicit StepCoefficients(const S& t) {
-    // The rates of a vehicle turn by hundredths of a radian in a sample: five terms are exact for a quarter.
+    // The rates of a vehicle turn by hundredths of a radian in a sample: six terms are exact for a quarter.
     if (t < S(0.0625)) {
       evaluate<6>(t);
     } else {

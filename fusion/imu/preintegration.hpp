@@ -60,7 +60,7 @@ class Preintegration {
     const Vector3 force = specific_force - options_.bias.accelerometer;
     // All that follows in the axes of the start.
     const detail::StepVectors<S> step(R * rotation, R * force);
-    const detail::StepCoefficients<S> k(step.squared_angle);
+    const detail::StepCoefficients<S> k(rotation.squaredNorm());
     const Vector3 velocity = h * (step.force + k.b * step.once + k.c * step.twice);
     const Vector3 position = (h * h) * (S(0.5) * step.force + k.c * step.once + k.d * step.twice);
     advance(h, R, rotation, force, position, velocity, step, k);
@@ -74,7 +74,8 @@ class Preintegration {
     const Matrix3 R = increment_.so3().matrix();
     const Vector3 force = specific_force - options_.bias.accelerometer;
     const detail::StepVectors<S> step(R * rotation, R * force);
-    advance(h, R, rotation, force, R * position, R * velocity, step, detail::StepCoefficients<S>(step.squared_angle));
+    advance(h, R, rotation, force, R * position, R * velocity, step,
+            detail::StepCoefficients<S>(rotation.squaredNorm()));
   }
 
   /// Seconds.
@@ -212,6 +213,10 @@ class Preintegration {
   /// the axes of the start of the interval.
   void advance(const S& h, const Matrix3& R, const Vector3& rotation, const Vector3& force, const Vector3& position,
                const Vector3& velocity, const detail::StepVectors<S>& step, const detail::StepCoefficients<S>& k) {
+    // First what the next reading waits for: a processor looks ahead by less than a reading's instructions.
+    increment_.translation() += h * Vector3(increment_.velocity()) + position;
+    increment_.velocity() += velocity;
+    increment_.so3() *= SO3<S>::exp(rotation);
     carry(h, position, velocity);
     const BiasBlocks response = readingResponse(h, R, rotation, force, step, k);
     if (has_walk_) drift(response.scaled(-h, -h), duration_);
@@ -242,10 +247,6 @@ class Preintegration {
     c.vr.addProduct(vg, response.gr);
     c.vv.addProduct(vg, response.gv);
     step.addSymmetric(c.vv, accelerometer, turned * accelerometer);
-
-    increment_.translation() += h * Vector3(increment_.velocity()) + position;
-    increment_.velocity() += velocity;
-    increment_.so3() *= SO3<S>::exp(rotation);
     duration_ += h;
   }
 
