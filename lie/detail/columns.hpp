@@ -81,10 +81,14 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
       P x[N];
       if constexpr (N == 4) {
         loadRows(from, first, begin + j, P::size, static_cast<const S*>(nullptr), x);
-      } else if constexpr (N > 1) {
-        loadDense(from.at(begin + j, first), x);
       } else {
-        x[0] = P::load(from.at(begin + j, first));
+        const S* const numbers = from.at(begin + j, first);
+        LIESTAT_UNROLL for (std::size_t k = 0; k < N * P::size; k += 64 / sizeof(S)) prefetch(numbers + k);
+        if constexpr (N > 1) {
+          loadDense(numbers, x);
+        } else {
+          x[0] = P::load(numbers);
+        }
       }
       LIESTAT_UNROLL for (std::size_t c = 0; c < N; ++c) x[c].store(columns[c] + j);
     }
