@@ -124,7 +124,7 @@ class ArrayView {
   /// components: how many numbers an element has, for the operations' assertions; 0 leaves them out.
   ArrayView(T* data, std::size_t size, std::ptrdiff_t element_stride, std::ptrdiff_t component_stride = 1,
             std::size_t components = 0)
-      : layout_{data, element_stride, component_stride}, size_(size), components_(components) {}
+      : layout_{data, element_stride, component_stride, 0}, size_(size), components_(components) {}
   /// The same memory, to read.
   template <class U>
     requires(std::is_const_v<T>&& std::is_same_v<U, Scalar>)

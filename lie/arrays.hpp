@@ -53,6 +53,7 @@ template <class S>
 Layout<const S> operandLayout(const ArrayView<const S>& operand) {
   Layout<const S> layout = operand.layout();
   if (operand.size() == 1) layout.element = 0;
+  if (layout.element > 0) layout.ahead = readAhead<S>(operand.size() * static_cast<std::size_t>(layout.element));
   return layout;
 }
 

@@ -19,6 +19,7 @@ template <class T>
 struct Layout {
   T* data = nullptr;
   std::ptrdiff_t element = 0, component = 1;
+  std::ptrdiff_t ahead = 0;  ///< by how many numbers kernels ask for elements before they read them
 
   LIESTAT_ALWAYS_INLINE T* at(std::size_t i, std::size_t c) const {
     return data + static_cast<std::ptrdiff_t>(i) * element + static_cast<std::ptrdiff_t>(c) * component;
@@ -29,11 +30,20 @@ struct Layout {
 template <class P>
 inline constexpr bool loads_rows = LIESTAT_HAS_SHUFFLES&& P::set != InstructionSet::baseline;
 
-/// Asks for what a kernel will read a page after the number at p: the processor by itself reads ahead too little for
-/// kernels that take less time than their data take from memory.
-LIESTAT_ALWAYS_INLINE void prefetch([[maybe_unused]] const void* p) {
+/// How far ahead kernels ask for the elements of an array of so many numbers, in numbers: the processor by itself reads
+/// ahead too little for kernels that take less time than their data take from memory. Not of small arrays: to look for a
+/// page beyond their end that is not there takes longer than they do.
+template <class S>
+constexpr std::ptrdiff_t readAhead(std::size_t numbers) {
+  return numbers * sizeof(S) < 65536 ? 0 : static_cast<std::ptrdiff_t>(4096 / sizeof(S));
+}
+template <class S>
+LIESTAT_ALWAYS_INLINE void prefetch([[maybe_unused]] const S* p, [[maybe_unused]] std::ptrdiff_t ahead) {
 #if defined(__GNUC__)
-  __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(p) + 4096));
+  // No pointer beyond the array is made of it.
+  const auto bytes = ahead * static_cast<std::ptrdiff_t>(sizeof(S));
+  __builtin_prefetch(
+      reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(p) + static_cast<std::uintptr_t>(bytes)));
 #endif
 }
 
@@ -46,14 +56,14 @@ LIESTAT_ALWAYS_INLINE void loadRows(const Layout<const S>& from, std::size_t fir
   if constexpr (LIESTAT_HAS_SHUFFLES && P::size >= 4) {
     const S *const start = from.at(begin, first), *row[P::size];
     if (left >= P::size && from.element == 4) [[likely]] {
-      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; k += 16 / sizeof(S)) prefetch(start + 4 * k);
+      LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; k += 16 / sizeof(S)) prefetch(start + 4 * k, from.ahead);
       transposeRows(start, columns);
       return;
     }
     if (left >= P::size) [[likely]] {
       LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
         row[k] = start + static_cast<std::ptrdiff_t>(k) * from.element;
-        if (first == 0) prefetch(row[k]);
+        if (first == 0) prefetch(row[k], from.ahead);
       }
     } else {
       LIESTAT_UNROLL for (std::size_t k = 0; k < P::size; ++k) {
@@ -83,7 +93,7 @@ LIESTAT_ALWAYS_INLINE void loadColumns(const Layout<const S>& from, std::size_t 
         loadRows(from, first, begin + j, P::size, static_cast<const S*>(nullptr), x);
       } else {
         const S* const numbers = from.at(begin + j, first);
-        LIESTAT_UNROLL for (std::size_t k = 0; k < N * P::size; k += 64 / sizeof(S)) prefetch(numbers + k);
+        LIESTAT_UNROLL for (std::size_t k = 0; k < N * P::size; k += 64 / sizeof(S)) prefetch(numbers + k, from.ahead);
         if constexpr (N > 1) {
           loadDense(numbers, x);
         } else {

@@ -42,7 +42,8 @@ struct FactorRange {
     const auto* const begin = reinterpret_cast<const S*>(feature);
     constexpr std::less<const S*> before;
     const bool inside = !before(first, begin) && before(first, begin + sizeof(M) / sizeof(S));
-    return {inside ? first : nullptr, sizeof(M) / sizeof(S), 1};
+    constexpr std::size_t element = sizeof(M) / sizeof(S);
+    return {inside ? first : nullptr, element, 1, readAhead<S>(size() * element)};
   }
 };
 

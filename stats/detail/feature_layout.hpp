@@ -56,7 +56,8 @@ class FeatureBlock {
       return features;
     } else if constexpr (ContiguousFeatures<R, M> && sizeof(M) % sizeof(S) == 0) {
       const M* const first = std::to_address(std::ranges::begin(samples)) + begin;
-      return {parametersOf(*first), sizeof(M) / sizeof(S), 1};
+      constexpr std::size_t element = sizeof(M) / sizeof(S);
+      return {parametersOf(*first), element, 1, readAhead<S>(std::ranges::size(samples) * element)};
     } else {
       if constexpr (requires { samples.layoutFrom(begin); }) {
         const Layout<const S> features = samples.layoutFrom(begin);
@@ -67,7 +68,7 @@ class FeatureBlock {
         const S* const p = parametersOf(x);
         for (std::size_t c = 0; c < numbers; ++c) copies_[i * numbers + c] = p[c];
       }
-      return {copies_, numbers, 1};
+      return {copies_, numbers, 1, 0};
     }
   }
 
