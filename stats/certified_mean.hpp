@@ -211,7 +211,10 @@ template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const W& weights,
                                       const CertifiedMeanOptions<M>& options) {
   CertifiedMean<M> result{.mean = frechetMean<M>(executor, samples, weights, options.mean)};
-  if (!certifyBySums(weightSums(weights, result.mean.n), options, result)) {
+  // In a flat space no certificate depends on the weights.
+  constexpr bool flat = compactFactor<M>() == CompactFactor::none;
+  const WeightSums sums = flat ? WeightSums::ofOnes(result.mean.n) : weightSums(weights, result.mean.n);
+  if (!certifyBySums(sums, options, result)) {
     result = findCertifiedMean<M>(executor, samples, weights, options, result.mean);
   }
   return result;
