@@ -110,7 +110,7 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
     return false;
   }
   const SquareOf<M>& covariance =
-      result.estimate.emplace(mean.mean, covarianceFromResiduals(mean, options.noise)).covariance;
+      result.estimate.emplace(Gaussian<M>{mean.mean, covarianceFromResiduals(mean, options.noise)}).covariance;
   // Finite variances have finite covariances.
   if (!std::isfinite(static_cast<double>(covariance.trace())) ||
       !isHessianSettledBySums<M>(mean, covariance, averagingWidth(mean.n)) ||
