@@ -40,10 +40,10 @@ constexpr std::ptrdiff_t readAhead(std::size_t numbers) {
 template <class S>
 LIESTAT_ALWAYS_INLINE void prefetch([[maybe_unused]] const S* p, [[maybe_unused]] std::ptrdiff_t ahead) {
 #if defined(__GNUC__)
-  // No pointer beyond the array is made of it.
-  const auto bytes = ahead * static_cast<std::ptrdiff_t>(sizeof(S));
-  __builtin_prefetch(
-      reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(p) + static_cast<std::uintptr_t>(bytes)));
+  // No pointer beyond the array: an address is not one.
+  const std::uintptr_t address =
+      reinterpret_cast<std::uintptr_t>(p) + static_cast<std::uintptr_t>(ahead * static_cast<std::ptrdiff_t>(sizeof(S)));
+  __builtin_prefetch(reinterpret_cast<const void*>(address));  // NOLINT(performance-no-int-to-ptr)
 #endif
 }
 
