@@ -74,7 +74,7 @@ struct MeanResult {
 namespace detail {
 
 /// Magnitude of the features' coordinates at y and of the spread, to which rounding errors are proportional; of a
-/// compact space a bound.
+/// compact space in double a bound, whose errors are far below any tolerance.
 template <Metric M>
 double dataScale(const M& y, const MeanSums<M>& sums) {
   if constexpr (has_compact_factor<M> && compact_dimension<M> == ManifoldTraits<M>::DoF)
