@@ -77,8 +77,9 @@ namespace detail {
 /// compact space in double a bound, whose errors are far below any tolerance.
 template <Metric M>
 double dataScale(const M& y, const MeanSums<M>& sums) {
-  if constexpr (has_compact_factor<M> && compact_dimension<M> == ManifoldTraits<M>::DoF)
-    return 1 + 2 * std::numbers::pi;
+  if constexpr (std::is_same_v<ScalarOf<M>, double> && has_compact_factor<M>) {
+    if constexpr (compact_dimension<M> == ManifoldTraits<M>::DoF) return 1 + 2 * std::numbers::pi;
+  }
   const double spread = sums.weight > 0 ? std::sqrt(2 * static_cast<double>(sums.cost) / sums.weight) : 0;
   return 1 + spread + static_cast<double>(ManifoldTraits<M>::logOrigin(y).norm());
 }
