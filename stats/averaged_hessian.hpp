@@ -49,9 +49,9 @@ auto regionFactor(const SquareOf<M>& covariance) {
   return Matrix(lowerFactor<K>(region));
 }
 
-/// True if the sums of a mean prove that findAveragedHessian averages nothing.
+/// True if the sums of a mean prove that findAveragedHessian averages nothing over `width` times the region of a covariance.
 template <Metric M>
-bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, double width = 1) {
+bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, double width) {
   if constexpr (Factored<M>) {
     return false;
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {

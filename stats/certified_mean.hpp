@@ -17,6 +17,7 @@
 #include <stats/status.hpp>
 #include <stats/uniqueness.hpp>
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <ranges>

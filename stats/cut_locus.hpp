@@ -115,7 +115,7 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
 }
 
 /// cos(acos(x)/3) for x in [-1, 1], the largest root y of 4 y³ - 3 y = x. With t = √((1 + x)/2) and y = ½ + t s the
-/// equation is 2 t s³ + 3 s² = 1, and two steps of Newton's method for s from a parabola in t reach the rounding.
+/// equation is 2 t s³ + 3 s² = 1, which two steps of Newton's method for s from a parabola in t solve to 2e-13.
 inline double cosineOfThird(double x) {
   const double t = std::sqrt(0.5 * (1 + x));
   double s = 0.57735 + t * (-0.1044 + t * 0.02705);

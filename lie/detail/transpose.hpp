@@ -49,7 +49,7 @@ LIESTAT_ALWAYS_INLINE P permuted(const P& a, const P& b) {
   return permuted<Index>(a, b, std::make_index_sequence<P::size>());
 }
 /// For `permuted`: every second number of each 128 bits of two registers, in turns, of the lower halves of these bits or
-/// of the upper ones; `width` numbers are 128 bits. The instruction for it takes least time.
+/// of the upper ones; `width` numbers are 128 bits. No other permutation takes less time.
 template <std::size_t size, std::size_t width, bool upper>
 struct Unpacked {
   static constexpr int of(std::size_t l) {
