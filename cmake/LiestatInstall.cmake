@@ -3,7 +3,7 @@
 # architecture, so they live under share/ and the installed tree may be moved.
 include(CMakePackageConfigHelpers)
 
-foreach(room lie stats fusion)
+foreach(room lie stats fusion report)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${room})
     install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp"
             PATTERN "compiled/*.cpp")

@@ -21,7 +21,7 @@ struct JudgedReport {
   ValidationReport report;
   std::optional<ValidationTolerance> promise;  ///< absent outside the domain of the documentation: shown, not judged
   std::optional<bool> passed;                  ///< whether it passed, where there is a promise
-  Verdict verdict = Verdict::passed;           ///< the same with the reason
+  ValidationVerdict verdict = ValidationVerdict::passed;           ///< the same with the reason
   std::vector<HistogramBin> histogram;         ///< of the squared distances, with the law's density
   double tail = 0;                             ///< fraction of distances beyond the law's 99.9 % quantile
 
@@ -36,7 +36,7 @@ struct JudgedReport {
   void judge(double false_alarm) {
     if (!promise) return;
     verdict = report.verdict(false_alarm, *promise);
-    passed = verdict == Verdict::passed;
+    passed = verdict == ValidationVerdict::passed;
   }
 
   /// Gives back the memory of the distances: a hundred rows of a million would fill it.

@@ -28,18 +28,18 @@ bool exceeds(const std::vector<double>& sorted, double bound, double probability
   return !(binomialSurvival(beyond, sorted.size(), std::min(1., probability)) >= false_alarm);
 }
 
-Verdict judgeErrors(const std::vector<double>& sorted, const ViInitPromise& promise, double false_alarm) {
+ValidationVerdict judgeErrors(const std::vector<double>& sorted, const ViInitPromise& promise, double false_alarm) {
   const double share = false_alarm / 4, n = static_cast<double>(promise.note_windows);
-  if (exceeds(sorted, promise.median, 0.5, share)) return Verdict::median_too_large;
-  if (exceeds(sorted, promise.p95, 0.05, share)) return Verdict::quantile_too_large;
+  if (exceeds(sorted, promise.median, 0.5, share)) return ValidationVerdict::median_too_large;
+  if (exceeds(sorted, promise.p95, 0.05, share)) return ValidationVerdict::quantile_too_large;
   // The prototype's figures are those of some windows themselves: four standard errors of their ranks.
   if (exceeds(sorted, promise.note_median, 0.5 + 4 * std::sqrt(0.25 / n), share)) {
-    return Verdict::median_too_large;
+    return ValidationVerdict::median_too_large;
   }
   if (exceeds(sorted, promise.note_p95, 0.05 + 4 * std::sqrt(0.05 * 0.95 / n), share)) {
-    return Verdict::quantile_too_large;
+    return ValidationVerdict::quantile_too_large;
   }
-  return Verdict::passed;
+  return ValidationVerdict::passed;
 }
 
 void evaluateErrors(ViInitRow& row, std::vector<double> values, double false_alarm) {
@@ -66,9 +66,9 @@ void evaluateChiSquared(ViInitRow& row, const ViInitValues& values, double false
   row.value_se = std::sqrt(2 / all);
   if (!row.promise) return;
   if (!(chiSquaredSurvival(cost / (1 + row.promise->deviation), all) >= false_alarm / 2)) {
-    row.verdict = Verdict::index_too_large;
+    row.verdict = ValidationVerdict::index_too_large;
   } else if (!(chiSquaredCdf(cost / (1 - row.promise->deviation), all) >= false_alarm / 2)) {
-    row.verdict = Verdict::index_too_small;
+    row.verdict = ValidationVerdict::index_too_small;
   }
 }
 
@@ -80,7 +80,7 @@ void evaluateFraction(ViInitRow& row, const std::vector<double>& values, double 
   row.value_se = std::sqrt(promised * (1 - promised) / n);
   const std::size_t wrong = values.size() - static_cast<std::size_t>(exact);
   if (row.promise && !(binomialSurvival(wrong, values.size(), 1 - promised) >= false_alarm)) {
-    row.verdict = Verdict::success_too_seldom;
+    row.verdict = ValidationVerdict::success_too_seldom;
   }
 }
 
@@ -104,7 +104,7 @@ void evaluate(ViInitRow& row, const ViInitValues& values, int dof, double false_
       evaluateFraction(row, values.value, false_alarm);
       break;
   }
-  if (row.promise) row.passed = row.verdict == Verdict::passed;
+  if (row.promise) row.passed = row.verdict == ValidationVerdict::passed;
 }
 
 }  // namespace liestat::experiments

@@ -131,7 +131,7 @@ struct ViInitRow {
   double value_se = std::numeric_limits<double>::quiet_NaN();  ///< its standard error if the promise is kept
   std::optional<ViInitPromise> promise;
   std::optional<bool> passed;         ///< whether it passed, where there is a promise
-  Verdict verdict = Verdict::passed;  ///< the same with the reason
+  ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
 };
 
 /// The promise made about a row, if there is one.

@@ -71,7 +71,7 @@ struct Coverage {
 };
 
 /// What is said of an estimator.
-enum class Verdict {
+enum class ValidationVerdict {
   passed,
   no_trial_succeeded,
   too_many_failures,
@@ -86,54 +86,54 @@ enum class Verdict {
 };
 
 /// The name used in files and messages.
-constexpr const char* name(Verdict verdict) {
+constexpr const char* name(ValidationVerdict verdict) {
   switch (verdict) {
-    case Verdict::passed:
+    case ValidationVerdict::passed:
       return "passed";
-    case Verdict::no_trial_succeeded:
+    case ValidationVerdict::no_trial_succeeded:
       return "no_trial_succeeded";
-    case Verdict::too_many_failures:
+    case ValidationVerdict::too_many_failures:
       return "too_many_failures";
-    case Verdict::index_too_large:
+    case ValidationVerdict::index_too_large:
       return "index_too_large";
-    case Verdict::index_too_small:
+    case ValidationVerdict::index_too_small:
       return "index_too_small";
-    case Verdict::wrong_law:
+    case ValidationVerdict::wrong_law:
       return "wrong_law";
-    case Verdict::heavy_tail:
+    case ValidationVerdict::heavy_tail:
       return "heavy_tail";
-    case Verdict::median_too_large:
+    case ValidationVerdict::median_too_large:
       return "median_too_large";
-    case Verdict::quantile_too_large:
+    case ValidationVerdict::quantile_too_large:
       return "quantile_too_large";
-    case Verdict::success_too_seldom:
+    case ValidationVerdict::success_too_seldom:
       return "success_too_seldom";
   }
   return "unknown";
 }
 
 /// Why an estimator did not pass, in a few words; empty for one that passed.
-constexpr const char* reason(Verdict verdict) {
+constexpr const char* reason(ValidationVerdict verdict) {
   switch (verdict) {
-    case Verdict::passed:
+    case ValidationVerdict::passed:
       return "";
-    case Verdict::no_trial_succeeded:
+    case ValidationVerdict::no_trial_succeeded:
       return "no trial succeeded";
-    case Verdict::too_many_failures:
+    case ValidationVerdict::too_many_failures:
       return "too many trials failed";
-    case Verdict::index_too_large:
+    case ValidationVerdict::index_too_large:
       return "the index is too large: covariances are too small";
-    case Verdict::index_too_small:
+    case ValidationVerdict::index_too_small:
       return "the index is too small: covariances are too large";
-    case Verdict::wrong_law:
+    case ValidationVerdict::wrong_law:
       return "the distances do not follow the law";
-    case Verdict::heavy_tail:
+    case ValidationVerdict::heavy_tail:
       return "too many distances are far beyond the law";
-    case Verdict::median_too_large:
+    case ValidationVerdict::median_too_large:
       return "the median of the errors is larger than promised";
-    case Verdict::quantile_too_large:
+    case ValidationVerdict::quantile_too_large:
       return "the 95 % quantile of the errors is larger than promised";
-    case Verdict::success_too_seldom:
+    case ValidationVerdict::success_too_seldom:
       return "the right answer was found too seldom";
   }
   return "unknown";
@@ -184,27 +184,27 @@ struct ValidationReport {
   ///   their own mean may have no variance;
   /// - the Kolmogorov-Smirnov statistic is out of bounds;
   /// - more distances are beyond the law's 99.9 % quantile than 0.1 % + tolerance.tail explains, if tail is not zero.
-  Verdict verdict(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
-    if (size() == 0) return Verdict::no_trial_succeeded;
+  ValidationVerdict verdict(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
+    if (size() == 0) return ValidationVerdict::no_trial_succeeded;
     const double share = false_alarm / (2 + (tolerance.failure_fraction > 0) + (tolerance.tail > 0));
     // Written so that NaN (a law that does not exist) fails.
     if (!(binomialSurvival(failures, trials, std::min(1., tolerance.failure_fraction)) >= share)) {
-      return Verdict::too_many_failures;
+      return ValidationVerdict::too_many_failures;
     }
     const bool bounded = tolerance.tail > 0;
     if (!(indexPValue(tolerance.index, bounded) >= share)) {
-      return chi2Sum(bounded) > static_cast<double>(dof) * static_cast<double>(size()) ? Verdict::index_too_large
-                                                                                       : Verdict::index_too_small;
+      return chi2Sum(bounded) > static_cast<double>(dof) * static_cast<double>(size()) ? ValidationVerdict::index_too_large
+                                                                                       : ValidationVerdict::index_too_small;
     }
-    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= share)) return Verdict::wrong_law;
+    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= share)) return ValidationVerdict::wrong_law;
     if (bounded && !(binomialSurvival(tailCount(), size(), std::min(1., 1 - tail_level + tolerance.tail)) >= share)) {
-      return Verdict::heavy_tail;
+      return ValidationVerdict::heavy_tail;
     }
-    return Verdict::passed;
+    return ValidationVerdict::passed;
   }
-  /// Whether verdict() is Verdict::passed.
+  /// Whether verdict() is ValidationVerdict::passed.
   bool passed(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
-    return verdict(false_alarm, tolerance) == Verdict::passed;
+    return verdict(false_alarm, tolerance) == ValidationVerdict::passed;
   }
 
   /// Two-sided p-value of the index when its expectation is anywhere within law.mean()·(1 ± tolerance) (for Hotelling's
@@ -307,8 +307,8 @@ inline std::string table(const ValidationReport& report, double false_alarm = 1e
   text += reportLine("K-S distance", report.ks_statistic, 0, "p = " + formatted(report.ks_p_value, 2));
   text += "  iterations        " + formatted(report.mean_iterations, 4, 11) + std::string(14, ' ') + "at most " +
           std::to_string(report.max_iterations) + '\n';
-  const Verdict verdict = report.verdict(false_alarm, tolerance);
-  return text + (verdict == Verdict::passed ? "passed" : std::string("FAILED: ") + reason(verdict)) + '\n';
+  const ValidationVerdict verdict = report.verdict(false_alarm, tolerance);
+  return text + (verdict == ValidationVerdict::passed ? "passed" : std::string("FAILED: ") + reason(verdict)) + '\n';
 }
 
 /// Prints table() with a false-alarm probability of 1e-5 and no tolerance.

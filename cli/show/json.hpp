@@ -1,5 +1,7 @@
 #pragma once
 
+#include <report/describe.hpp>
+
 #include <Eigen/Core>
 #include <concepts>
 #include <cstddef>
@@ -53,6 +55,35 @@ class JsonObject {
   template <class T>
   JsonObject& set(std::string_view key, const std::optional<T>& value) {
     return value ? set(key, *value) : set(key, nullptr);
+  }
+
+  /// Sets the fields of a described result, beside those that are set already.
+  template <Described T>
+  JsonObject& fieldsOf(const T& result) {
+    describe(*this, result);
+    return *this;
+  }
+  /// A field of describe(): this is a visitor.
+  template <class T>
+  JsonObject& operator()(const char* key, const T& value, const char* = "", const char* = "") {
+    if constexpr (Described<T>) {
+      return set(key, JsonObject().fieldsOf(value));
+    } else if constexpr (requires { value.has_value(); }) {
+      return value ? (*this)(key, *value) : set(key, nullptr);
+    } else if constexpr (requires { requires Described<typename T::value_type>; }) {
+      std::vector<JsonObject> list;
+      for (const auto& element : value) list.push_back(JsonObject().fieldsOf(element));
+      return set(key, list);
+    } else if constexpr (requires {
+                           requires std::integral<typename T::value_type> &&
+                               !std::same_as<typename T::value_type, char>;
+                           value.size();
+                           value.begin();
+                         }) {
+      return set(key, std::vector<double>(value.begin(), value.end()));
+    } else {
+      return set(key, value);
+    }
   }
 
   /// The object as text, one field a line; lists of plain values and flat objects inside lists stand on one line.

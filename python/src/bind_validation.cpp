@@ -15,7 +15,7 @@ py::dict report(const DoubleArray& distances, std::size_t exceptions, int dof, i
   const ValidationReport report = liestat::detail::summarize(sample, law);
   const ValidationTolerance tolerance{
       .index = index_tolerance, .ks = ks_tolerance, .failure_fraction = failure_fraction, .tail = tail};
-  const Verdict verdict = report.verdict(false_alarm, tolerance);
+  const ValidationVerdict verdict = report.verdict(false_alarm, tolerance);
   py::dict d;
   d["trials"] = report.trials;
   d["failures"] = report.failures;
@@ -31,7 +31,7 @@ py::dict report(const DoubleArray& distances, std::size_t exceptions, int dof, i
   d["coverage"] = coverage;
   d["verdict"] = text(name(verdict));
   d["reason"] = text(reason(verdict));
-  d["passed"] = verdict == Verdict::passed;
+  d["passed"] = verdict == ValidationVerdict::passed;
   d["table"] = table(report, false_alarm, tolerance);
   return d;
 }

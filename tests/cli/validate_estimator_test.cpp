@@ -30,7 +30,7 @@ TEST(ValidateEstimator, tablesFitTheTerminalAndEndInTheVerdict) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   rows[0].passed = false;
-  rows[0].verdict = Verdict::index_too_small;
+  rows[0].verdict = ValidationVerdict::index_too_small;
   text = formatEstimatorTables(rows);
   EXPECT_NE(text.find("FAILED conic criterion: the index is too small"), std::string::npos) << text;
   EXPECT_EQ(text.find("PASSED"), std::string::npos);

@@ -44,7 +44,7 @@ TEST(ValidatePropagation, aFailureIsShown) {
   row.method = experiment.methods[0];
   row.setReport(reports[0]);
   row.passed = false;
-  row.verdict = Verdict::index_too_large;
+  row.verdict = ValidationVerdict::index_too_large;
   const std::string text = formatPropagationTables({row});
   EXPECT_NE(text.find("FAILED pose compose spread 1: the index is too large"), std::string::npos) << text;
   EXPECT_NE(text.find(" !\n"), std::string::npos) << text;

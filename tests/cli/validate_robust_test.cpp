@@ -31,7 +31,7 @@ TEST(ValidateRobust, tablesFitTheTerminalAndEndInTheVerdict) {
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   result.rows[1].found_passed = false;
   result.rows[2].passed = false;
-  result.rows[2].verdict = Verdict::heavy_tail;
+  result.rows[2].verdict = ValidationVerdict::heavy_tail;
   text = formatRobustTables(result);
   EXPECT_NE(text.find("FAILED conic, 0 % outliers, truncated_cost: found in 4 of 4 trials, 99 % are promised"),
             std::string::npos)

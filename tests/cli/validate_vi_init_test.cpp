@@ -45,12 +45,12 @@ TEST(ValidateViInit, aTableNamesWhatFailed) {
     for (ViInitRow& row : rows) {
       if (!row.promise) continue;
       row.passed = false;
-      row.verdict = Verdict::too_many_failures;
+      row.verdict = ValidationVerdict::too_many_failures;
     }
     const std::string text = formatViInitTables(rows);
     EXPECT_NE(text.find("\nFAILED\n"), std::string::npos) << text;
     EXPECT_NE(text.find("FAILED " + name(check)), std::string::npos) << text;
-    EXPECT_NE(text.find(reason(Verdict::too_many_failures)), std::string::npos) << text;
+    EXPECT_NE(text.find(reason(ValidationVerdict::too_many_failures)), std::string::npos) << text;
   }
 }
 

@@ -51,7 +51,7 @@ TEST(EstimatorValidation, AWrongNoiseFails) {
     for (const EstimatorRow& row : validateEstimator(validation)) {
       if (!row.promise) continue;
       EXPECT_FALSE(row.passed.value_or(true)) << name(row.experiment) << " " << name(row.quantity);
-      EXPECT_EQ(row.verdict, factor > 1 ? Verdict::index_too_large : Verdict::index_too_small);
+      EXPECT_EQ(row.verdict, factor > 1 ? ValidationVerdict::index_too_large : ValidationVerdict::index_too_small);
     }
   }
 }

@@ -96,7 +96,7 @@ TEST(RobustValidation, AWrongNoiseFails) {
   RobustValidationResult result = validateRobust(validation);
   for (const RobustRow& row : result.rows) {
     EXPECT_FALSE(row.passed.value_or(true)) << name(row.structure);
-    EXPECT_EQ(row.verdict, Verdict::index_too_large) << name(row.structure);
+    EXPECT_EQ(row.verdict, ValidationVerdict::index_too_large) << name(row.structure);
   }
   EXPECT_EQ(tally(result.rows).failed, 2U);
   // Of errors twice as large 20 % (one equation) and 31 % (two): nine tenths of the inliers are never kept.

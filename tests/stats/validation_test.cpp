@@ -79,7 +79,7 @@ auto chiSquaredTrial(double factor = 1) {
 TEST(Validation, exactCovariancePasses) {
   const ValidationReport report = run({}, ReferenceLaw::chiSquared(3));
   EXPECT_TRUE(report.passed()) << report;
-  EXPECT_EQ(report.verdict(), Verdict::passed);
+  EXPECT_EQ(report.verdict(), ValidationVerdict::passed);
   EXPECT_EQ(report.trials, 4000u);
   EXPECT_EQ(report.size(), 4000u);
   EXPECT_EQ(report.failures, 0u);
@@ -99,11 +99,11 @@ TEST(Validation, exactCovariancePasses) {
 TEST(Validation, wrongCovarianceFails) {
   const ValidationReport large = run({.claim = 1.3}, ReferenceLaw::chiSquared(3));
   EXPECT_FALSE(large.passed());
-  EXPECT_EQ(large.verdict(), Verdict::index_too_small);
+  EXPECT_EQ(large.verdict(), ValidationVerdict::index_too_small);
   EXPECT_NEAR(large.index, 3 / 1.3, 5 * large.index_se);
   const ValidationReport small = run({.claim = 1 / 1.3}, ReferenceLaw::chiSquared(3));
   EXPECT_FALSE(small.passed());
-  EXPECT_EQ(small.verdict(), Verdict::index_too_large);
+  EXPECT_EQ(small.verdict(), ValidationVerdict::index_too_large);
   EXPECT_NEAR(small.index, 3 * 1.3, 5 * small.index_se);
 }
 
@@ -122,7 +122,7 @@ TEST(Validation, rightMeanAndWrongShapeFails) {
       serial, {.trials = 4000}, ReferenceLaw::chiSquared(3),
       [](CounterRng& rng, std::uint64_t) { return TrialOutcome{.mu2 = 3 * rng.normalVector<1>().squaredNorm()}; });
   EXPECT_GT(report.index_p_value, 1e-3);
-  EXPECT_EQ(report.verdict(), Verdict::wrong_law);
+  EXPECT_EQ(report.verdict(), ValidationVerdict::wrong_law);
 }
 
 TEST(Validation, toleranceForgivesASystematicDeviation) {
@@ -264,7 +264,7 @@ TEST(Validation, countsFailuresOfEveryKind) {
   EXPECT_EQ(report.exceptions, 100u);
   EXPECT_EQ(report.size(), 500u);
   EXPECT_NEAR(report.index, 3, 4.5 * report.index_se_expected);
-  EXPECT_EQ(report.verdict(), Verdict::too_many_failures);
+  EXPECT_EQ(report.verdict(), ValidationVerdict::too_many_failures);
   EXPECT_TRUE(report.passed(1e-5, {.failure_fraction = 0.5})) << report;
   EXPECT_FALSE(report.passed(1e-5, {.failure_fraction = 0.42})) << "5.1 standard errors";
 }
@@ -314,10 +314,10 @@ TEST(Validation, aTailWithoutMeanIsCountedAndNotAveraged) {
       return TrialOutcome{.mu2 = rng.uniform() < share ? 16 / rng.uniform() : chi};
     });
   };
-  EXPECT_EQ(report(0.004, 1).verdict(1e-5, counted), Verdict::passed);
-  EXPECT_EQ(report(0.01, 1).verdict(1e-5, counted), Verdict::heavy_tail);
-  EXPECT_EQ(report(0, 1.15).verdict(1e-5, counted), Verdict::index_too_large);
-  EXPECT_EQ(report(0, 0.88).verdict(1e-5, counted), Verdict::index_too_small);
+  EXPECT_EQ(report(0.004, 1).verdict(1e-5, counted), ValidationVerdict::passed);
+  EXPECT_EQ(report(0.01, 1).verdict(1e-5, counted), ValidationVerdict::heavy_tail);
+  EXPECT_EQ(report(0, 1.15).verdict(1e-5, counted), ValidationVerdict::index_too_large);
+  EXPECT_EQ(report(0, 0.88).verdict(1e-5, counted), ValidationVerdict::index_too_small);
 }
 
 TEST(Validation, theBoundedIndexKeepsTheLawsExpectation) {
@@ -343,7 +343,7 @@ TEST(Validation, anEstimatorThatAlwaysFailsGivesAReport) {
   EXPECT_TRUE(std::isnan(report.index));
   EXPECT_TRUE(std::isnan(report.ks_p_value));
   EXPECT_TRUE(std::isnan(report.coverage[0].observed));
-  EXPECT_EQ(report.verdict(1e-5, {1, 1, 1}), Verdict::no_trial_succeeded);
+  EXPECT_EQ(report.verdict(1e-5, {1, 1, 1}), ValidationVerdict::no_trial_succeeded);
   std::ostringstream text;
   text << report;
   EXPECT_NE(text.str().find("FAILED: no trial succeeded"), std::string::npos);
@@ -492,10 +492,10 @@ TEST(Validation, statisticsHaveMeanAndStandardDeviation) {
 }
 
 TEST(Validation, verdictsHaveNamesAndReasons) {
-  EXPECT_STREQ(name(Verdict::passed), "passed");
-  EXPECT_STREQ(reason(Verdict::passed), "");
-  for (int i = 1; i <= static_cast<int>(Verdict::success_too_seldom); ++i) {
-    const auto verdict = static_cast<Verdict>(i);
+  EXPECT_STREQ(name(ValidationVerdict::passed), "passed");
+  EXPECT_STREQ(reason(ValidationVerdict::passed), "");
+  for (int i = 1; i <= static_cast<int>(ValidationVerdict::success_too_seldom); ++i) {
+    const auto verdict = static_cast<ValidationVerdict>(i);
     EXPECT_STRNE(name(verdict), "unknown") << i;
     EXPECT_GT(std::string(reason(verdict)).size(), 10u) << i;
   }
