@@ -33,12 +33,11 @@ from ._gaussians import (
     sample,
     validate,
 )
-from ._results import ConfidenceRegion, Law, MeanResult
+from ._results import ConfidenceRegion, Law, MeanResult, Result
 from ._sensors import (
     VI_BLOCKS,
     Camera,
     InitialisedWindow,
-    Result,
     evaluate_trajectory,
     hand_eye,
     motion,

@@ -1,10 +1,54 @@
 """Results of estimators."""
 
 import html
+import warnings
 
 import numpy as np
 
 from . import _core
+
+
+class Result:
+    """A result with named parts, which are attributes; `keys()` lists them. The names are those of the program's JSON.
+
+    `renamed` are former names of parts, here and in the results inside: they work, with a DeprecationWarning.
+    """
+
+    def __init__(self, title, *, renamed=None, **parts):
+        self._title = title
+        self._renamed = renamed or {}
+        self.__dict__.update(parts)
+
+    @classmethod
+    def of(cls, title, parts, renamed=None):
+        """A dictionary of the extension's, dictionaries inside it being results as well."""
+
+        def wrapped(name, value):
+            if isinstance(value, dict):
+                return Result.of(name.replace("_", " "), value, renamed)
+            if isinstance(value, list):
+                return [wrapped(name, element) for element in value]
+            return value
+
+        return cls(title, renamed=renamed, **{name: wrapped(name, value) for name, value in parts.items()})
+
+    def keys(self):
+        """Names of the parts."""
+        return [name for name in self.__dict__ if not name.startswith("_")]
+
+    def __getitem__(self, name):
+        return self.__dict__[name] if name in self.__dict__ else getattr(self, name)
+
+    def __getattr__(self, name):
+        new = self.__dict__.get("_renamed", {}).get(name)
+        if new in self.__dict__:
+            warnings.warn(f"liestat: the part {name!r} is called {new!r} now", DeprecationWarning, stacklevel=2)
+            return self.__dict__[new]
+        raise AttributeError(f"no part {name!r}; there are {', '.join(self.keys())}")
+
+    def __repr__(self):
+        status = self.__dict__.get("status")
+        return f"<{self._title}{'' if status is None else f': {status}'}; {', '.join(self.keys())}>"
 
 
 class Law:

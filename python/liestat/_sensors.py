@@ -9,29 +9,8 @@ from . import _core
 from ._gaussians import Gaussian
 from ._manifolds import S2, SE3, SE23, SO3
 from ._operate import as_numbers, require_finite
+from ._results import Result
 from ._statistics import _covariances
-
-
-class Result:
-    """A result with named parts, which are attributes; `keys()` lists them."""
-
-    def __init__(self, title, **parts):
-        self._title = title
-        self.__dict__.update(parts)
-
-    def keys(self):
-        """Names of the parts."""
-        return [name for name in self.__dict__ if not name.startswith("_")]
-
-    def __getitem__(self, name):
-        return self.__dict__[name]
-
-    def __getattr__(self, name):
-        raise AttributeError(f"no part {name!r}; there are {', '.join(self.keys())}")
-
-    def __repr__(self):
-        status = self.__dict__.get("status")
-        return f"<{self._title}{'' if status is None else f': {status}'}; {', '.join(self.keys())}>"
 
 
 def _numbers(value, name, tail):

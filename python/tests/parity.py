@@ -1,0 +1,78 @@
+"""The program's JSON and a result of the module, field by field. Both show what the library describes, so that they have
+the same fields and the same values, to the last bit."""
+
+import json
+import math
+import os
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+import liestat
+
+PROGRAM = os.environ.get("LIESTAT_PROGRAM", "")
+# Fields that belong to a run of the program.
+ENVELOPE = {"schema_version", "program", "version", "command_line", "file", "seed"}
+
+
+def program(*arguments, codes=(0,)):
+    """The JSON of a run of the program that ends with one of these exit codes; `exit_code` is its own."""
+    with tempfile.TemporaryDirectory() as directory:
+        path = os.path.join(directory, "result.json")
+        run = subprocess.run([PROGRAM, *map(str, arguments), "--json", path], capture_output=True, text=True)
+        if run.returncode not in codes:
+            raise AssertionError(f"exit code {run.returncode}, expected one of {codes}: {run.stderr}")
+        with open(path, encoding="utf-8") as file:
+            result = json.load(file)
+    result["exit_code"] = run.returncode
+    return result
+
+
+def plain(value):
+    """A value of the module as JSON would have it."""
+    if isinstance(value, liestat.Result):
+        return {name: plain(value[name]) for name in value.keys()}
+    if isinstance(value, dict):
+        return {name: plain(v) for name, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+@unittest.skipUnless(PROGRAM, "LIESTAT_PROGRAM is not set: ./run python sets it")
+class ParityTest(unittest.TestCase):
+    """`assert_equal_results(json, result, series)`: the fields are equal in name and value. `series` are names of fields
+    that only the module has: one row for each pose, frame or window, which the program writes to its report."""
+
+    maxDiff = None
+
+    def assert_equal_results(self, program_json, result, series=(), path=""):
+        ours, theirs = plain(result), dict(program_json)
+        for name in ENVELOPE | {"exit_code"}:
+            theirs.pop(name, None)
+        for name in series:
+            self.assertIn(name, ours, f"{path}: the series {name}")
+            ours.pop(name)
+        self._compare(theirs, ours, path)
+
+    def _compare(self, theirs, ours, path):
+        if isinstance(theirs, dict):
+            self.assertIsInstance(ours, dict, path)
+            self.assertEqual(sorted(theirs), sorted(ours), f"fields of {path or 'the result'}")
+            for name, value in theirs.items():
+                self._compare(value, ours[name], f"{path}.{name}")
+        elif isinstance(theirs, list):
+            self.assertIsInstance(ours, list, path)
+            self.assertEqual(len(theirs), len(ours), path)
+            for i, value in enumerate(theirs):
+                self._compare(value, ours[i], f"{path}[{i}]")
+        else:
+            self.assertEqual(theirs, ours, path)
