@@ -96,7 +96,7 @@ class HandEyeScene {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
   SE3d X, Y;                                       ///< gripper_T_camera, base_T_target
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< of the motion, where it has one, in the gripper's frame
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< axis of the motion, where it has one, in the gripper's frame
   std::vector<PosePair> pairs, truth;
   std::vector<bool> inlier;
 
@@ -258,7 +258,7 @@ class HandEyeScene {
           B = B * SE3d(SO3d::exp((5 + 10 * u) * degree * turned), (0.02 + 0.06 * v) * direction);
           break;
         case HandEyeOutliers::flips: {
-          // Of C = camera_T_target: the normal of the target is mirrored at the line of sight.
+          // The normal of the target in C = camera_T_target is mirrored at the line of sight.
           const SE3d C = B.inverse();
           const Eigen::Vector3d sight = C.translation().normalized(), normal = C.so3() * Eigen::Vector3d(0, 0, 1);
           const Eigen::Vector3d mirrored = 2 * sight.dot(normal) * sight - normal;

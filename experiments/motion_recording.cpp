@@ -44,7 +44,7 @@ class TrackNames {
 
 /// The motion of one interval, s seconds long.
 struct Interval {
-  Eigen::Vector3d rotation, velocity;  ///< of the points, per second
+  Eigen::Vector3d rotation, velocity;  ///< velocities of the points, per second
 
   SE3d after(double s) const {
     const Eigen::Vector3d turned = s * rotation;

@@ -69,15 +69,15 @@ class MotionScene {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< V, per frame
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();     ///< Ω of the last interval, rad per frame
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< T of the last interval
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();       ///< of the ball (orbit)
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();         ///< of the gyroscope, rad per frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();       ///< centre of the ball (orbit)
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();         ///< gyroscope's bias, rad per frame
   std::size_t frame = 0;
   std::vector<MotionTrack> observed;     ///< all tracks that the present frame sees
   std::vector<MotionTrack> tracks;       ///< those of them that the next frame sees too
-  std::vector<PointPair> pairs;          ///< of the last interval
+  std::vector<PointPair> pairs;          ///< matches of the last interval
   std::vector<std::size_t> pair_tracks;  ///< the track of each pair
-  std::vector<double> depths;            ///< of the pairs, at the first frame
-  std::vector<bool> inlier;              ///< of the pairs
+  std::vector<double> depths;            ///< depth of each pair at the first frame
+  std::vector<bool> inlier;              ///< true for right pairs
   GyroscopeRotation gyroscope;
 
   MotionScene(const MotionSceneOptions& scene_options, std::uint64_t seed, std::uint64_t trial = 0)

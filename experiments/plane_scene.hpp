@@ -21,7 +21,7 @@ namespace liestat::experiments {
 
 struct PlaneSceneOptions {
   std::size_t planes = 3;
-  std::size_t matches = 60;   ///< of each plane
+  std::size_t matches = 60;   ///< on each plane
   std::size_t outliers = 60;  ///< wrong matches
   double sigma = 0.5;         ///< standard deviation of each coordinate (px)
 };

@@ -127,7 +127,7 @@ class Tracker {
   std::vector<bool> is_tracked_;
   std::vector<std::size_t> seen_in_a_row_;  // up to the last image looked at
   std::size_t looked_at_ = 0;
-  std::vector<State> states_;  // of the tracks
+  std::vector<State> states_;  // one a track
 };
 
 }  // namespace

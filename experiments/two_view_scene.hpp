@@ -107,7 +107,7 @@ struct TwoViewSceneOptions {
   double outliers = 0.2;  ///< share of the matches, rounded to a whole number of them
   double sigma = 0.5;     ///< standard deviation of each image coordinate, in both images (px)
   double width = 640, height = 480, focal_length = 600;  ///< px
-  double min_depth = 3, max_depth = 9;                   ///< of the points, or of the plane on the optical axis (m)
+  double min_depth = 3, max_depth = 9;  ///< depth of the points, or of the plane on the optical axis (m)
 };
 
 /// A motion and the matches that show it.
@@ -117,13 +117,13 @@ class TwoViewScene {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();      ///< rotation of the camera, where the motion has one
   Eigen::Vector3d t = Eigen::Vector3d::Zero();          ///< its translation (m)
   double focal_ratio = 1;                               ///< f'/f
-  double focal_scale = 1;                               ///< of both views, in units of the coordinates
+  double focal_scale = 1;                               ///< f of both views, in units of the coordinates
   Eigen::Vector3d vertical = Eigen::Vector3d::UnitY();  ///< in the first camera's frame; R·vertical in the second's
   /// The plane n·x = d in the first camera's frame, of `homography`.
   Eigen::Vector3d plane_normal = Eigen::Vector3d::UnitZ();
   double plane_distance = 1;                        ///< m
-  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< of motions with a homography; det H > 0
-  Eigen::Matrix3d F = Eigen::Matrix3d::Zero();      ///< of epipolar motions, ‖F‖² = 2
+  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< for motions with a homography; det H > 0
+  Eigen::Matrix3d F = Eigen::Matrix3d::Zero();      ///< for epipolar motions, ‖F‖² = 2
   std::vector<Eigen::Vector4d> matches;             ///< normalised, with noise
   std::vector<Eigen::Vector4d> pixels;              ///< the same in px, origin at a corner of the image
   std::vector<Eigen::Vector4d> exact;               ///< normalised, without noise; outliers as in matches
@@ -169,7 +169,7 @@ class TwoViewScene {
 
  private:
   static constexpr double degree = 3.14159265358979323846 / 180;
-  Eigen::Matrix<double, 2, 3> affine_second_ = Eigen::Matrix<double, 2, 3>::Zero();  // of affine_epipolar
+  Eigen::Matrix<double, 2, 3> affine_second_ = Eigen::Matrix<double, 2, 3>::Zero();  // second camera in affine_epipolar
   Eigen::Vector2d affine_shift_ = Eigen::Vector2d::Zero();
 
   /// Uniform between two numbers, with a sign.

@@ -23,7 +23,7 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
   return 100 * std::abs(*middle - 1);
 }
 
-/// What biases had walked to by a time.
+/// The biases to which a random walk has come at a time.
 ImuBias<double> biasAt(const std::vector<ImuBias<double>>& walked, const std::vector<ImuSample<double>>& readings,
                        double time) {
   const auto next = std::find_if(readings.begin(), readings.end() - 1, [&](const auto& s) { return s.time >= time; });

@@ -81,7 +81,7 @@ struct HandEyeHintOptions {
 struct HandEyeHint {
   HandEyeReading reading;
   double chi2_per_degree = 0;  ///< with covariances as given
-  double p = 0;                ///< of a χ² as large; NaN where the noise is not known
+  double p = 0;                ///< probability of a χ² as large; NaN where the noise is not known
   std::size_t outliers = 0;
   bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
 };

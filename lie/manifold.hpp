@@ -1,4 +1,4 @@
-// What follows from the atomic operations of lie/concepts.hpp, once, for every manifold: exp, log, distance and their
+// Operations derived, once for every manifold, from the atomic ones of lie/concepts.hpp: exp, log, distance and their
 // Jacobians at any point, and the traits of a group that acts on itself.
 //
 // Tangent vectors at x are coordinates in the frame that placement(x) carries there (for a group: body frame,

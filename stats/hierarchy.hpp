@@ -164,7 +164,7 @@ class Hierarchy {
   }
   /// Grows with every change of estimates, inliers or verdicts.
   std::uint64_t revision() const { return revision_; }
-  /// What is known of a model, by its number in models().
+  /// State of a model, by its number in models().
   const State& state(std::size_t model) const { return states_[model]; }
   const std::vector<State>& states() const { return states_; }
   std::size_t nullModel() const { return null_; }
@@ -229,7 +229,7 @@ class Hierarchy {
   }
 
  private:
-  /// Of the models that are not rejected, the most specific ones, and of those the best.
+  /// The best of the most specific models that are not rejected.
   template <class Survives>
   std::size_t bestOf(const Survives& survives) const {
     std::vector<std::size_t> chosen;

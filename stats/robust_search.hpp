@@ -76,7 +76,7 @@ struct RobustSearchOptions {
   int polish_rounds = 4;  ///< at most; fewer where the score does not rise
 };
 
-/// What a search has found. Without a parameter nothing fitted yet.
+/// The result of a search. Without a parameter nothing fitted yet.
 template <class Parameter>
 struct RobustEstimate {
   std::optional<Parameter> parameter;

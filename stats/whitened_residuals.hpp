@@ -45,7 +45,7 @@ inline constexpr double residual_test_level = 1e-3;
 /// The outcome of one test. NaN where it does not apply (too few residuals, or a covariance that is not positive definite).
 struct ResidualTest {
   double statistic = detail::not_a_number;
-  double dof = detail::not_a_number;  ///< of χ²; expected number for the tail, NaN for the lag test
+  double dof = detail::not_a_number;  ///< degrees of freedom of χ²; expected number for the tail, NaN for the lag test
   double p = detail::not_a_number;    ///< probability of a statistic at least as extreme, two-sided for NEES and lag
 
   bool applies() const { return p == p; }

@@ -12,7 +12,7 @@ namespace liestat::cli {
 namespace {
 
 constexpr double letter_width = 7, letter_gap = 9, line_height = 20;  // px, of 12 px letters
-constexpr double most_digits = 6;                                     // of a label
+constexpr double most_digits = 6;                                     // in a label
 
 std::string labelOf(double value) { return fmt::format("{:.6g}", value == 0 ? 0 : value); }
 

@@ -40,8 +40,8 @@ struct MotionCandidate {
 /// The motion's problem less the noise in it.
 struct NoiseShare {
   Triangle root;
-  std::vector<double> shares;  ///< of noise in what is known of each direction of the motion, descending, 0 to about 1
-  std::vector<Motion> directions;  ///< these directions, their last entry 0
+  std::vector<double> shares;      ///< noise fraction of the information on each direction, descending, 0 to about 1
+  std::vector<Motion> directions;  ///< directions of the motion, their last entry 0
 };
 
 class ClosedFormSolver {

@@ -227,9 +227,9 @@ class EpipolarProblem {
     return sum;
   }
 
-  std::vector<double> weight;      ///< of tracks
+  std::vector<double> weight;      ///< weight of each track
   std::vector<double> square;      ///< Σ r² of a track, as linearise() left it
-  std::vector<std::size_t> count;  ///< of these residuals
+  std::vector<std::size_t> count;  ///< number of these residuals
   /// The mean square of a track's residuals, infinite for one without.
   double meanSquare(std::size_t i) const {
     return count[i] > 0 ? square[i] / static_cast<double>(count[i]) : std::numeric_limits<double>::infinity();

@@ -53,7 +53,7 @@ class UprightModel : public EpipolarTypeModel {
   }
 
  private:
-  /// Of the four poses two keep the vertical; of these the one with most matches in front.
+  /// The pose with most matches in front, among those two of four that keep the vertical.
   Essentiald poseOf(const Eigen::Matrix3d& E, std::span<const Measurement> matches) const {
     const auto poses = posesOfEssential(E);
     const auto counts = poseByCheirality(E, matches).counts;

@@ -145,7 +145,7 @@ class ReducedSystem {
   }
   /// The block of the inverse for the given blocks of unknowns, row by row.
   std::vector<double> inverse(const std::vector<int>& blocks) const {
-    // Of Uᵀ U it is Yᵀ Y with Uᵀ Y = E, the unknowns' unit vectors.
+    // (Uᵀ U)⁻¹ = Yᵀ Y with Uᵀ Y = E, the unknowns' unit vectors.
     const std::size_t m = 3 * blocks.size();
     std::vector<double> result(m * m);
     std::vector<std::vector<double>> Y(m);

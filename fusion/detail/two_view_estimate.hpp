@@ -1,4 +1,4 @@
-// What the models of two-view motion have in common: the estimate of the parameter under the constraints of each model.
+// Members shared by the models of two-view motion: estimating the parameter under the constraints of each model.
 #pragma once
 
 #include <fusion/detail/two_view_constraints.hpp>
@@ -70,7 +70,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   return result;
 }
 
-/// What each model of the lattice says of itself.
+/// Name, parents and dimensions of a model of the lattice.
 struct TwoViewModelCard {
   std::string name;
   std::vector<std::string> parents;

@@ -154,7 +154,7 @@ class RecordingRun {
 
   /// A window's meeting with those before it.
   struct Meeting {
-    std::size_t window;  ///< of the result's
+    std::size_t window;  ///< index in the result's windows
     WindowFusion::Meeting outcome;
   };
   /// Fuses a stretch; returns its meetings.

@@ -34,10 +34,10 @@ struct EpipolarBiasResult {
   /// parallax that is too small or too even to be seen is not in it: the bias is then off by speed over distance.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   std::vector<std::size_t> inliers, outliers;  ///< ascending; a drift along the epipolar lines is not seen
-  std::vector<double> residuals;               ///< of each track, RMS in sigmas; infinite in neither list
+  std::vector<double> residuals;               ///< RMS of each track, in sigmas; infinite in neither list
   /// Other biases for which many tracks agree, the best first: what else to try where this one turns out to be wrong.
   std::vector<Eigen::Vector3d> others;
-  std::size_t pairs_used = 0;  ///< of images
+  std::size_t pairs_used = 0;  ///< pairs of images
   int starts = 0, iterations = 0;
   int integrations = 0;  ///< how often the readings were integrated anew
 
@@ -172,7 +172,7 @@ struct RobustInitialisation {
   EpipolarBiasResult epipolar;                         ///< where it began
   std::optional<SecondMotion> second;                  ///< where status is ambiguous
   std::optional<RefinementResult> rest;                ///< where result.status is stationary and the noise is known
-  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
+  FusionStatus bias_status = FusionStatus::bad_input;  ///< status of the last estimate with the motion
   std::size_t hypotheses = 0;
   int rounds = 0;
   int integrations = 0;  ///< how often the readings were integrated anew

@@ -61,7 +61,7 @@ struct TwoViewRobustResult {
 /// ũ' ~ H ũ.
 struct RobustHomography : TwoViewRobustResult {
   Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< ‖H‖² = 3; the third coordinate of H ũ is positive
-  /// Of the entries of H, column after column; of rank 8.
+  /// Covariance of the entries of H, column after column; rank 8.
   Eigen::Matrix<double, 9, 9> covariance =
       Eigen::Matrix<double, 9, 9>::Constant(std::numeric_limits<double>::quiet_NaN());
 };
@@ -69,7 +69,7 @@ struct RobustHomography : TwoViewRobustResult {
 /// ũ'ᵀ F ũ = 0.
 struct RobustFundamental : TwoViewRobustResult {
   Eigen::Matrix3d F = Eigen::Matrix3d::Zero();  ///< det F = 0, ‖F‖² = 2, of either sign
-  /// Of the entries of F, column after column; of rank 7.
+  /// Covariance of the entries of F, column after column; rank 7.
   Eigen::Matrix<double, 9, 9> covariance =
       Eigen::Matrix<double, 9, 9>::Constant(std::numeric_limits<double>::quiet_NaN());
 };

@@ -86,7 +86,7 @@ inline void checkIsotropy(const ManifoldOperations& m, ContractReport& report, c
   });
 }
 
-/// What follows from invariants 4 and 7: the Jacobians of the action by the feature and by the transformation.
+/// Consequences of invariants 4 and 7: the Jacobians of the action by the feature and by the transformation.
 inline void checkActionJacobians(const ManifoldOperations& m, ContractReport& report,
                                  const ContractOptions& options = {}) {
   using Vector = ManifoldOperations::Vector;

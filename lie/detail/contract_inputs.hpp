@@ -1,5 +1,5 @@
-// What the contract's checks share: differences of functions, how large an error rounding explains, and a bench that
-// runs a check over the decades of the angle.
+// Helpers shared by the contract's checks: differences of functions, how large an error rounding explains, and a bench
+// that runs a check over the decades of the angle.
 #pragma once
 
 #include <lie/detail/contract_record.hpp>

@@ -14,9 +14,9 @@
 
 namespace liestat::detail {
 
-/// What one pass over the data says about the ball of radius ρ about a point.
+/// Bounds from one pass over the data on the ball of radius ρ about a point.
 struct BallBound {
-  double lower = 0;       ///< of the criterion in the ball
+  double lower = 0;       ///< lower bound of the criterion in the ball
   double centre = 0;      ///< the criterion at the centre; with bins, at least it
   std::size_t looks = 0;  ///< at data and bins
 };

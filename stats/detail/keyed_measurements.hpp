@@ -97,7 +97,7 @@ class KeyedMeasurements {
 
   std::vector<Entry> entries_;
   std::vector<Measurement> measurements_;
-  std::unordered_map<std::uint64_t, std::uint64_t> counts_;  // of equal measurements
+  std::unordered_map<std::uint64_t, std::uint64_t> counts_;  // number of equal measurements, by content
   std::unordered_map<Id, std::uint64_t> keys_;
   Id next_ = 0;
 };

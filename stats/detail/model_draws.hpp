@@ -21,7 +21,7 @@ namespace liestat::detail {
 
 inline constexpr int most_equations = 32;
 
-/// What the squared error of a measurement with 0 to 32 equations exceeds with the given probability.
+/// The squared errors that a measurement with 0 to 32 equations exceeds with the given probability.
 inline std::vector<double> errorThresholds(double probability) {
   std::vector<double> thresholds(1, 0.0);
   for (std::size_t p = 1; p <= most_equations; ++p) {
@@ -35,7 +35,7 @@ inline std::vector<double> errorThresholds(double probability) {
   return thresholds;
 }
 
-/// What a measurement adds to a score, as an integer, so that sums do not depend on their order.
+/// A measurement's contribution to a score, as an integer, so that sums do not depend on their order.
 inline std::int64_t scoreOf(HypothesisScore score, double squared_error, double threshold) {
   const double part = score == HypothesisScore::relevance ? Relevance{2 * threshold}.contribution(squared_error)
                       : score == HypothesisScore::inliers ? InlierCount{threshold}.contribution(squared_error)

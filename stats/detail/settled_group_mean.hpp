@@ -16,7 +16,7 @@ namespace liestat::detail {
 template <LieGroup G>
 struct SettledGroupMean {
   SquareOf<G> covariance;
-  double change = 0;  ///< of the equations' derivative
+  double change = 0;  ///< relative change of the equations' derivative
   bool settled = false;
 };
 

@@ -18,7 +18,7 @@ namespace liestat::detail {
 template <Homogeneous M>
 struct SettledMaha {
   SquareOf<M> covariance;
-  double change = 0;  ///< of the Hessian
+  double change = 0;  ///< relative change of the Hessian
   bool settled = false;
 };
 

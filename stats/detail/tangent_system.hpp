@@ -12,8 +12,8 @@
 
 namespace liestat::detail {
 
-/// What P linear equations C δ = d leave free of N unknowns. Singular values of C with rows of length one that are below
-/// 5e-8 count as zero, so the scale of an equation does not matter; of redundant ones the least squares count.
+/// The null space and solution of P linear equations C δ = d in N unknowns. Singular values of C with unit rows that are
+/// below 5e-8 count as zero, so the scale of an equation does not matter; redundant ones are met in least squares.
 template <int N, int P>
 class ConstraintBasis {
  public:
