@@ -84,7 +84,7 @@ class InertialScene {
     build();
   }
 
-  ClosedFormWindow window;                ///< what the camera and the inertial sensor measure
+  ClosedFormWindow window;                ///< measurements of camera and inertial sensor
   Eigen::Vector3d velocity, gravity;      ///< V (m/s), G (m/s²) in the body's axes at the first image
   std::vector<Eigen::Vector3d> features;  ///< P_i in the body's axes at the first image, from its origin (m)
   std::vector<double> times;              ///< times of the images (s), the first 0

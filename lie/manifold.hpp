@@ -59,8 +59,8 @@ struct VolumeElement {
 
 }  // namespace detail
 
-/// What every ManifoldTraits specialisation derives from: names, and the defaults of a manifold whose isotropy is
-/// trivial (a placement that is smooth everywhere, tangent coordinates equal to those of the group).
+/// Base of every ManifoldTraits specialisation: names, and the defaults of a manifold whose isotropy is trivial (a
+/// placement that is smooth everywhere, tangent coordinates equal to those of the group).
 template <class M, class Group_>
 struct TrivialIsotropy {
   using Group = Group_;

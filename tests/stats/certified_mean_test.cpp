@@ -1,4 +1,4 @@
-// What certifiedMean promises of nearly ambiguous features and of needless refusals, and the parts that it stands on.
+// Promises of certifiedMean on nearly ambiguous features and needless refusals, and the parts that it stands on.
 // Thinned rows; the whole tables are `liestat validate means --full`. Bounds are four standard errors of the stated
 // trials; seeds are fixed.
 
