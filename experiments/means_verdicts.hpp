@@ -35,11 +35,11 @@ struct VerdictCell {
 
 /// Bounds promised for a cell's rates; absent bounds are not judged.
 struct VerdictPromise {
-  std::optional<double> most_outside;    ///< ok, and the truth outside of the 95 % region
-  std::optional<double> least_coverage;  ///< of those that are ok, where they are half of all
-  std::optional<double> least_kept, most_kept;
-  std::optional<double> most_ambiguous, most_ill_defined;
-  std::optional<double> most_wrong;  ///< ok, and the mean on the wrong side
+  std::optional<double> max_outside;   ///< ok, and the truth outside of the 95 % region
+  std::optional<double> min_coverage;  ///< of those that are ok, where they are half of all
+  std::optional<double> min_kept, max_kept;
+  std::optional<double> max_ambiguous, max_ill_defined;
+  std::optional<double> max_wrong;  ///< ok, and the mean on the wrong side
 };
 /// The promise of docs/uniqueness.md for a cell.
 VerdictPromise promiseOf(const VerdictCell& cell);

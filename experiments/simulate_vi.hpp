@@ -38,7 +38,7 @@ struct ViSceneOptions {
   std::size_t landmarks = 2000;       ///< points, uniform over the faces
   std::size_t features = 40;          ///< at most so many tracks an image
   std::size_t shortest_track = 4;     ///< images; no landmark is taken up that will be lost before
-  double least_depth = 0.3;           ///< m along the optical axis
+  double min_depth = 0.3;             ///< m along the optical axis
   std::optional<Eigen::Vector3d> box; /**< lengths of its edges, m, its middle that of the motion; by default 10 x 10 x
                                          4, or where the motion needs it, its extent and 2 m */
   double outliers = 0;                ///< fraction of the tracks that drift away from their landmark

@@ -122,12 +122,12 @@ class HandEyeExplanation {
   }
 
  private:
-  static constexpr std::size_t most_pairs = 40;
+  static constexpr std::size_t max_pairs = 40;
 
   /// Not more than are needed, spread over their contents, so that their order does not matter.
   static std::vector<PosePair> some(std::span<const PosePair> given) {
     std::vector<PosePair> pairs(given.begin(), given.end());
-    const std::size_t step = (pairs.size() + most_pairs - 1) / most_pairs;
+    const std::size_t step = (pairs.size() + max_pairs - 1) / max_pairs;
     if (step < 2) return pairs;
     std::sort(pairs.begin(), pairs.end(), [](const PosePair& x, const PosePair& y) {
       const auto p = x.b.mean.params(), q = y.b.mean.params();

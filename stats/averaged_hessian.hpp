@@ -45,7 +45,7 @@ auto regionFactor(const SquareOf<M>& covariance) {
   constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
   using Matrix = Eigen::Matrix<double, K, K>;
   Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
-  region.diagonal().array() += least_region * least_region;
+  region.diagonal().array() += min_region_sigma * min_region_sigma;
   return Matrix(lowerFactor<K>(region));
 }
 
@@ -58,8 +58,8 @@ bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covari
     // The norm of the region's factor needs no factor. A region that has none has a trace too large, or none.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
     const double squares = width * width * static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) +
-                           K * least_region * least_region;
-    return leastDistanceToCutLocus(mean) > 1.5 * std::sqrt(squares) * NormalNodes<K>::instance().longest();
+                           K * min_region_sigma * min_region_sigma;
+    return leastDistanceToCutLocus(mean) > cut_locus_margin * std::sqrt(squares) * NormalNodes<K>::instance().longest();
   } else {
     return true;
   }
@@ -94,8 +94,8 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
       result.change = std::numeric_limits<double>::quiet_NaN();
       return result;
     }
-    if (leastDistanceToCutLocus(mean) > 1.5 * longestReach<K>(L) ||
-        distanceToCutLocus(samples, mean.mean) > 1.5 * reachOf<K>(L)) {
+    if (leastDistanceToCutLocus(mean) > cut_locus_margin * longestReach<K>(L) ||
+        distanceToCutLocus(samples, mean.mean) > cut_locus_margin * reachOf<K>(L)) {
       result.averaged = false;
       return result;
     }

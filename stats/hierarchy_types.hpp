@@ -90,7 +90,7 @@ struct HierarchyOptions {
   HypothesisScore score = HypothesisScore::relevance;
   /// Draws of a model end when a better sample has come with this probability, at the share of inliers found ...
   double confidence = 0.999;
-  double least_share = 0.25;     ///< ... or at this share, if that is larger
+  double min_share = 0.25;       ///< ... or at this share, if that is larger
   std::size_t max_draws = 2000;  ///< ... or here
   /// Of so many hypotheses of a model, the best ones, the estimate is made; that with the best score is taken.
   std::size_t refined_hypotheses = 5;

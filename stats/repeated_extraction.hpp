@@ -152,7 +152,7 @@ class RepeatedExtraction {
     const auto& model = *models_[structure.model];
     const int usual = model.equations(), here = model.equationsOf(measurements_[i]);
     const auto known = [&](int equations) {
-      return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::most_equations))];
+      return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::max_equations))];
     };
     return here == usual ? structure.state.threshold : structure.state.threshold * known(here) / known(usual);
   }

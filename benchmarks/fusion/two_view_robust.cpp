@@ -255,7 +255,7 @@ void hypothesis(benchmark::State& state, TwoViewMotion motion, double outliers) 
   RobustSearchOptions options;
   options.inlier_threshold = threshold;
   options.rejection_risk = 1e-3;
-  options.least_score = TruncatedCost{threshold}(errors);
+  options.min_score = TruncatedCost{threshold}(errors);
   options.local_optimisation = false;
   RobustSearch search(model, TruncatedCost{threshold}, options);
   for (auto _ : state) search.iterate();

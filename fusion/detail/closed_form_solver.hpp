@@ -22,6 +22,10 @@ inline constexpr double exact_noise = 1e-9;
 /// Quantile of χ² with one degree of freedom at 0.95: what two costs differ by when the data tell minimisers apart.
 inline constexpr double chi_squared_1_95 = 3.841458820694124;
 
+/// The least depth that weights assume: in metres, and as a fraction of the median depth. A feature that one pass puts
+/// next to the camera would otherwise outweigh all others in the next (docs/theory/visual_inertial.md, section 3.4).
+inline constexpr double min_weighted_depth = 0.2, min_weighted_depth_ratio = 0.01;
+
 inline double median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -72,7 +76,7 @@ class ClosedFormSolver {
     forEachRay([&](std::size_t i, Ray& ray) {
       depths.push_back(std::abs(ray.u.dot(relativePosition(table_.images[ray.image], solution.P[i], solution.y))));
     });
-    const double floor = std::max(0.2, 0.01 * median(depths));
+    const double floor = std::max(min_weighted_depth, min_weighted_depth_ratio * median(depths));
     std::size_t k = 0;
     forEachRay([&](std::size_t, Ray& ray) { ray.weight = ray.precision / (sigma_ * std::max(depths[k++], floor)); });
   }

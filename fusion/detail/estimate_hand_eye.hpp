@@ -50,7 +50,7 @@ class HandEyeRun {
     fitAll(all);
     // Where the noise is not known, wrong pairs may have been taken for noise.
     const bool suspicious = !options_.known_noise || *std::max_element(errors_.begin(), errors_.end()) > options_.gate;
-    if (options_.find_outliers && pairs_.size() >= least_for_search && suspicious) findOutliers();
+    if (options_.find_outliers && pairs_.size() >= min_pairs_for_search && suspicious) findOutliers();
     estimate();
     return std::move(result_);
   }
@@ -58,7 +58,7 @@ class HandEyeRun {
  private:
   static constexpr int parameters = world ? 12 : 6;
   /// With fewer, three pairs and one more that agree by chance would be a majority.
-  static constexpr std::size_t least_for_search = 6;
+  static constexpr std::size_t min_pairs_for_search = 6;
   /// The median of χ²₆.
   static constexpr double median_error = 5.348120627447116;
 

@@ -27,12 +27,12 @@ namespace liestat::detail {
 
 /// The outcome of the test.
 struct RestParallax {
-  bool tested = false;     ///< false: too few tracks with four images, or times
-  double sigma = 0;        ///< a bearing's standard deviation at relative sigma one (rad), from the tracks' own scatter
-  double explained = 0;    ///< χ² that a path explains, in units of sigma²
-  double limit = 0;        ///< 0.995 quantile of `explained` under noise alone
-  double least_speed = 0;  ///< m/s for each metre of depth: less in the least visible direction may go unseen
-  std::size_t tracks = 0;  ///< that were used; others scatter too much, or have too few images
+  bool tested = false;   ///< false: too few tracks with four images, or times
+  double sigma = 0;      ///< a bearing's standard deviation at relative sigma one (rad), from the tracks' own scatter
+  double explained = 0;  ///< χ² that a path explains, in units of sigma²
+  double limit = 0;      ///< 0.995 quantile of `explained` under noise alone
+  double unseen_speed = 0;  ///< m/s for each metre of depth: less in the least visible direction may go unseen
+  std::size_t tracks = 0;   ///< that were used; others scatter too much, or have too few images
 
   bool atRest() const { return tested && explained <= limit; }
 };
@@ -75,7 +75,7 @@ class RestParallaxTest {
     // The parameter of non-centrality λ for which no more than 0.005 stay below: mean + λ - z √(variance + 4 λ) = limit.
     const double z = normal_quantile, gap = result.limit - mean;
     const double lambda = gap + 2 * z * z + z * std::sqrt(4 * gap + 4 * z * z + variance);
-    result.least_speed = std::sqrt(lambda / leastInformation()) * sigma_;
+    result.unseen_speed = std::sqrt(lambda / leastInformation()) * sigma_;
     return result;
   }
 
@@ -177,9 +177,7 @@ class RestParallaxTest {
     const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
     std::nth_element(ratio.begin(), middle, ratio.end());
     const double typical = *middle;
-    const auto isRough = [typical](const Track& track) {
-      return track.rough > typical * (track.degrees + 5 * std::sqrt(2 * track.degrees) + 12);
-    };
+    const auto isRough = [typical](const Track& track) { return track.rough > typical * noiseLimit(track.degrees); };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), isRough), tracks_.end());
     double squares = 0, degrees = 0;
     for (const Track& track : tracks_) {

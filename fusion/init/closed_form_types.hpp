@@ -91,6 +91,16 @@ enum class CovarianceContent {
   image_noise_bias_prior  ///< image noise and the prior of the accelerometer's bias
 };
 
+namespace detail {
+
+/// The largest χ² that counts as noise: five standard deviations above the mean, and 12 more because χ² is skewed where
+/// the degrees of freedom are few. Noise exceeds it with a probability below 1e-5, whatever their number.
+inline double noiseLimit(double degrees_of_freedom) {
+  return degrees_of_freedom + 5 * std::sqrt(2 * degrees_of_freedom) + 12;
+}
+
+}  // namespace detail
+
 /// Never an unmarked wrong answer: solutions are there where the data determine them, see status.
 struct ClosedFormResult {
   FusionStatus status = FusionStatus::bad_input;

@@ -50,7 +50,7 @@ struct ConsensusOptions {
 /// drift independently of each other agree on one by chance in less than one window of a hundred (docs/closed_form.md).
 struct SecondMotionOptions {
   bool search = true;
-  double least_part = 0.2;       ///< of all tracks must agree on it,
+  double min_part = 0.2;         ///< of all tracks must agree on it,
   std::size_t beyond_drawn = 3;  ///< and so many more than a hypothesis is made of
 };
 

@@ -130,8 +130,7 @@ struct RefinementResult {
   /// Whether the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
   /// alone, with its thousands of bearings, hardly sees a bias.
   bool consistent() const {
-    const double dof = static_cast<double>(degrees_of_freedom);
-    return cost <= dof + 5 * std::sqrt(2 * dof) + 12 && prior_p >= 1e-4;
+    return cost <= detail::noiseLimit(static_cast<double>(degrees_of_freedom)) && prior_p >= 1e-4;
   }
   /// Whether there are states with their covariance, be it a large one.
   bool converged() const {
@@ -145,7 +144,9 @@ struct RefinementResult {
 // initialiseRobustly(), in robust_initialisation.hpp
 
 /// Fused windows (window_fusion.hpp) that are as far apart with less than this probability contradict each other.
-inline constexpr double least_p_of_fusion = 1e-3;
+inline constexpr double min_p_of_fusion = 1e-3;
+/// The former name of min_p_of_fusion.
+inline constexpr double least_p_of_fusion = min_p_of_fusion;
 
 /// Tracks that do not agree with the first motion but with another, and what they say. Indices are the window's.
 struct SecondMotion {

@@ -89,7 +89,7 @@ class WindowFusion {
   /// Whether there is a state.
   bool hasState() const { return windows_ > 0; }
   /// Whether there is one and the windows do not contradict each other.
-  bool ok() const { return hasState() && p() >= least_p_of_fusion; }
+  bool ok() const { return hasState() && p() >= min_p_of_fusion; }
   /// At the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }

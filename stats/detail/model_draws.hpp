@@ -19,12 +19,12 @@
 
 namespace liestat::detail {
 
-inline constexpr int most_equations = 32;
+inline constexpr int max_equations = 32;
 
 /// The squared errors that a measurement with 0 to 32 equations exceeds with the given probability.
 inline std::vector<double> errorThresholds(double probability) {
   std::vector<double> thresholds(1, 0.0);
-  for (std::size_t p = 1; p <= most_equations; ++p) {
+  for (std::size_t p = 1; p <= max_equations; ++p) {
     double low = 0, high = 1e4;
     for (int k = 0; k < 100; ++k) {
       const double middle = 0.5 * (low + high);
@@ -166,7 +166,7 @@ class ModelDraws {
     std::vector<Hypothesis> hypotheses;
   };
   void count(Hypothesis& hypothesis, const Measurement& measurement, double error, int sign) const {
-    const int equations = std::clamp(model_->equationsOf(measurement), 0, most_equations);
+    const int equations = std::clamp(model_->equationsOf(measurement), 0, max_equations);
     const double threshold = thresholds_[static_cast<std::size_t>(equations)];
     hypothesis.score += sign * scoreOf(score_, error, threshold);
     if (error < threshold) hypothesis.inliers += static_cast<std::size_t>(sign);

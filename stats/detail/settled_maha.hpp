@@ -55,7 +55,7 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
       settled.settled = false;
       const auto L = angularRegion<K>(settled.covariance, angular, averaging_width);
       if (!L.allFinite()) return settled;
-      if (clearance > 1.5 * reachOf<K>(L)) {
+      if (clearance > cut_locus_margin * reachOf<K>(L)) {
         settled.settled = true;
         return settled;
       }

@@ -140,7 +140,7 @@ TEST(SimulateVi, TracksPointAtTheirLandmarks) {
         last(files.tracks.track_ids.size());
     for (const PixelObservation& o : files.tracks.observations) {
       const Vector3d p = files.inCamera(o);
-      EXPECT_GT(p.z(), scene.least_depth);
+      EXPECT_GT(p.z(), scene.min_depth);
       const auto bearing = files.camera().camera.bearing({o.u, o.v});
       ASSERT_TRUE(bearing);
       // Half a nanosecond of the stamps' rounding turns a camera at 3 rad/s and 1 m/s by 2e-9 rad.

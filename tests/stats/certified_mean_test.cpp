@@ -217,7 +217,7 @@ TEST(AveragedHessian, ofOneDatumNearTheCutLocusIsItsDensity) {
   at.mean = SO2d(0.0);
   at.n = 100, at.sum_of_weights = 100;
   at.hessian(0, 0) = 100;
-  const double variance = sd * sd - detail::least_region * detail::least_region;
+  const double variance = sd * sd - detail::min_region_sigma * detail::min_region_sigma;
   const auto averaged = averagedHessian(samples, at, SquareOf<SO2d>(SquareOf<SO2d>::Constant(variance)));
   const double density = std::exp(-0.5 * s * s / (sd * sd)) / (sd * std::sqrt(2 * pi));
   EXPECT_TRUE(averaged.averaged);

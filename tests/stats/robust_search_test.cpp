@@ -275,10 +275,10 @@ TEST(RobustSearch, LessThanTheLeastScoreIsNothing) {
     const TruncatedCost rule{threshold};
     // Uniform points: the best line has some ten of 500 near it.
     const auto noise = lineScene<LineModelOfSome>(0, 500, seed);
-    EXPECT_FALSE(searched(noise, rule, {.seed = seed, .least_score = 50}).best().parameter);
+    EXPECT_FALSE(searched(noise, rule, {.seed = seed, .min_score = 50}).best().parameter);
     EXPECT_TRUE(searched(noise, rule, {.seed = seed}).best().parameter);
     const auto model = lineScene<LineModelOfSome>(150, 350, seed);
-    const auto a = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6, .least_score = 50}),
+    const auto a = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6, .min_score = 50}),
                b = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6});
     EXPECT_EQ(a.best().draw, b.best().draw);
     EXPECT_EQ(a.best().score, b.best().score);
