@@ -4,6 +4,7 @@
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/scattered_features.hpp>
+#include <lie/units.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/laws.hpp>
 #include <stats/random.hpp>
@@ -36,7 +37,7 @@ class Sampler {
     TangentOf<M> e = rng.template normalVector<k>();
     if (cell_.law == VerdictLaw::clouds) {
       TangentOf<M> side = TangentOf<M>::Zero();
-      side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * pi / 180;
+      side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * units::degree;
       return exp(exp(ManifoldTraits<M>::origin(), side), TangentOf<M>(0.05 * e));
     }
     for (int j = 0; j < angles; ++j) {

@@ -22,6 +22,7 @@
 
 #include <lie/detail/trig.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
@@ -168,7 +169,6 @@ class TwoViewScene {
   }
 
  private:
-  static constexpr double degree = 3.14159265358979323846 / 180;
   Eigen::Matrix<double, 2, 3> affine_second_ = Eigen::Matrix<double, 2, 3>::Zero();  // second camera in affine_epipolar
   Eigen::Vector2d affine_shift_ = Eigen::Vector2d::Zero();
 
@@ -188,7 +188,7 @@ class TwoViewScene {
   }
   static Eigen::Matrix3d turnInSpace(CounterRng& random, double low, double high) {
     const Eigen::Vector3d axis = random.unitVector<3>();
-    return SO3d::exp(Eigen::Vector3d(random.uniform(low, high) * degree * axis)).matrix();
+    return SO3d::exp(Eigen::Vector3d(random.uniform(low, high) * units::degree * axis)).matrix();
   }
   /// A length between two numbers, in a uniform direction.
   template <int N>
@@ -198,7 +198,7 @@ class TwoViewScene {
   }
   Eigen::Vector2d shift(CounterRng& random) const { return displacement<2>(random, 8, 40) / options.focal_length; }
   static Eigen::Matrix2d zoomedTurn(CounterRng& random) {
-    const double angle = either(random, 3, 15) * degree;
+    const double angle = either(random, 3, 15) * units::degree;
     return ratio(random, 1.08, 1.3) * turn(angle);
   }
   Eigen::Vector2d uniformInImage(CounterRng& random) const {
@@ -231,7 +231,7 @@ class TwoViewScene {
         H.topLeftCorner<2, 2>() *= focal_ratio;
         break;
       case TwoViewMotion::retinal_displacement:
-        H.topLeftCorner<2, 2>() = turn(either(random, 3, 15) * degree);
+        H.topLeftCorner<2, 2>() = turn(either(random, 3, 15) * units::degree);
         H.topRightCorner<2, 1>() = shift(random);
         break;
       case TwoViewMotion::rotation:
@@ -267,7 +267,7 @@ class TwoViewScene {
         H.topRightCorner<2, 1>() = shift(random);
         break;
       case TwoViewMotion::affine: {
-        const Eigen::Matrix2d axes = turn(random.uniform(0, 180) * degree);
+        const Eigen::Matrix2d axes = turn(random.uniform(0, 180) * units::degree);
         const Eigen::Vector2d stretch(ratio(random, 1.1, 1.3), 1);
         H.topLeftCorner<2, 2>() = zoomedTurn(random) * axes * stretch.asDiagonal() * axes.transpose();
         H.topRightCorner<2, 1>() = shift(random);

@@ -1,3 +1,4 @@
+#include <experiments/summary.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace liestat::experiments {
 namespace {
@@ -18,9 +20,7 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
     if (found[i].allFinite()) ratio.push_back(found[i].norm() / scene.features[i].norm());
   }
   if (ratio.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
-  std::nth_element(ratio.begin(), middle, ratio.end());
-  return 100 * std::abs(*middle - 1);
+  return 100 * std::abs(quantile(std::move(ratio), 0.5) - 1);
 }
 
 /// The biases to which a random walk has come at a time.

@@ -4,6 +4,7 @@
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
 #include <fusion/detail/closed_form_ranks.hpp>
+#include <fusion/detail/median.hpp>
 #include <fusion/init/sphere_least_squares.hpp>
 
 #include <Eigen/Core>
@@ -25,13 +26,6 @@ inline constexpr double chi_squared_1_95 = 3.841458820694124;
 /// The least depth that weights assume: in metres, and as a fraction of the median depth. A feature that one pass puts
 /// next to the camera would otherwise outweigh all others in the next (docs/theory/visual_inertial.md, section 3.4).
 inline constexpr double min_weighted_depth = 0.2, min_weighted_depth_ratio = 0.01;
-
-inline double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// A minimiser in scaled unknowns.
 struct MotionCandidate {

@@ -62,7 +62,7 @@ inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, 
 }
 
 /// Standard deviation of a bias, relative to its prior, above which the data do not count as information on it: an
-/// improvement of 2 % is no more than the prior itself (docs/closed_form.md, section Status).
+/// improvement of 2 % is no more than the prior itself (docs/closed_form.md).
 inline constexpr double prior_dominates = 0.98;
 
 /// True if it is the prior that says what the accelerometer's bias is: the data improve one of its three directions at

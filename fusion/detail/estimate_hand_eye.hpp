@@ -5,6 +5,7 @@
 #include <fusion/detail/hand_eye_problem.hpp>
 #include <fusion/detail/hand_eye_refine.hpp>
 #include <fusion/detail/hand_eye_starts.hpp>
+#include <fusion/detail/median.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/random.hpp>
 
@@ -119,11 +120,6 @@ class HandEyeRun {
       errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::max());
     }
     return errors;
-  }
-  static double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
   }
   static Indices below(const std::vector<double>& errors, double bound) {
     Indices list;

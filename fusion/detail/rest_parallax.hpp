@@ -9,6 +9,7 @@
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/detail/median.hpp>
 #include <lie/detail/small_matrix.hpp>
 
 #include <Eigen/Core>
@@ -174,9 +175,7 @@ class RestParallaxTest {
       const double ninth = 2 / (9 * track.degrees);
       ratio.push_back(track.rough / track.degrees / std::pow(1 - ninth, 3));
     }
-    const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
-    std::nth_element(ratio.begin(), middle, ratio.end());
-    const double typical = *middle;
+    const double typical = median(std::move(ratio));
     const auto isRough = [typical](const Track& track) { return track.rough > typical * noiseLimit(track.degrees); };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), isRough), tracks_.end());
     double squares = 0, degrees = 0;
