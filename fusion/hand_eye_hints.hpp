@@ -74,7 +74,7 @@ struct HandEyeHintOptions {
   HandEyeReading reading = {};  ///< the one that the result was made with
   /// True if the covariances may have been meant otherwise; false where they come from a model and not from a file.
   bool doubt_a = true, doubt_b = true;
-  HandEyeOptions estimate = {};  ///< those that the result was made with
+  HandEyeOptions estimate = {};  ///< options of the estimate
 };
 
 /// Another reading that fits.

@@ -44,9 +44,9 @@ struct NoiseCalibration {
   /// The densities with the factors: each its own where they are separable or not one (common_p below 0.05), else the
   /// common one; as they were given unless ok.
   ImuNoise<double> noise;
-  std::size_t windows = 0, meetings = 0;  ///< that took part
+  std::size_t windows = 0, meetings = 0;  ///< used
   double chi2 = 0;                        ///< meetings, with the densities as they were given
-  double calibrated_chi2 = 0;             ///< and with those of `noise`
+  double calibrated_chi2 = 0;             ///< meetings, with the densities of `noise`
   std::size_t degrees_of_freedom = 0;     ///< degrees of freedom of both χ²
 };
 

@@ -97,7 +97,7 @@ struct HierarchyOptions {
   bool guided = false;
   /// Estimates every model, not only those that the search reaches, for criteria that compare all of them.
   bool all_models = false;
-  SupportTest support = {};                                                  ///< whether inliers could be chance
+  SupportTest support = {};
   std::function<double(double r, double r_general)> phi = ExponentialPhi{};  ///< Φ of (36)
   /// Returns a model's threshold on squared errors from its errors and number of equations. Empty: the quantile of χ²
   /// at 1 - `outlier_share`, for known noise.

@@ -93,8 +93,8 @@ struct FilterUpdate {
   double nis = 0;                            ///< NIS of all measurements that passed their gates; dense form: of any
   int degrees_of_freedom = 0;
   int iterations = 0;
-  std::size_t measurements = 0;  ///< that were used
-  std::size_t gated = 0;         ///< that were not
+  std::size_t measurements = 0;  ///< measurements used
+  std::size_t gated = 0;         ///< measurements left out by their gates
 
   bool ok() const { return status == FilterStatus::ok; }
 };

@@ -33,7 +33,7 @@ struct RestParallax {
   double explained = 0;  ///< χ² that a path explains, in units of sigma²
   double limit = 0;      ///< 0.995 quantile of `explained` under noise alone
   double unseen_speed = 0;  ///< m/s for each metre of depth: less in the least visible direction may go unseen
-  std::size_t tracks = 0;   ///< that were used; others scatter too much, or have too few images
+  std::size_t tracks = 0;   ///< tracks used; others scatter too much, or have too few images
 
   bool atRest() const { return tested && explained <= limit; }
 };

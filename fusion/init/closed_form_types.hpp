@@ -130,7 +130,7 @@ struct ClosedFormResult {
   std::size_t images_used = 0;  ///< images with an observation that was used
   std::size_t features_used = 0;
   std::size_t observations_used = 0;
-  std::size_t degrees_of_freedom = 0;  ///< those of the first solution's cost
+  std::size_t degrees_of_freedom = 0;  ///< degrees of freedom of the first solution's cost
 
   /// With stationary and noise: a uniform motion of more than so many m/s for each metre to the features, which would
   /// have shown in the tracks, is excluded (with a probability of 0.995); infinite: nothing is.

@@ -50,8 +50,8 @@ struct ConsensusOptions {
 /// drift independently of each other agree on one by chance in less than one window of a hundred (docs/closed_form.md).
 struct SecondMotionOptions {
   bool search = true;
-  double min_part = 0.2;         ///< of all tracks must agree on it,
-  std::size_t beyond_drawn = 3;  ///< and so many more than a hypothesis is made of
+  double min_part = 0.2;         ///< fraction of all tracks that must agree on it,
+  std::size_t beyond_drawn = 3;  ///< and their least number beyond the sample of a hypothesis
 };
 
 /// fusion/init/epipolar_gyroscope_bias.hpp

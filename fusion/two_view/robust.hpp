@@ -52,7 +52,7 @@ struct TwoViewRobustResult {
   std::vector<std::size_t> inliers;  ///< ascending
   double score = 0;                  ///< Σ max(0, 1 - e/threshold) over all matches, e their squared errors
   double chi2 = std::numeric_limits<double>::quiet_NaN();  ///< sum of the squared errors of the inliers
-  double confidence = 0;  ///< that a sample of right matches alone was drawn; below the option's if the draws ran out
+  double confidence = 0;  ///< probability that right matches alone were drawn once; below the option's if draws ran out
   std::size_t draws = 0;
 
   bool ok() const { return status == Status::ok; }

@@ -31,9 +31,9 @@ struct ContractInput {
 /// One invariant: of all inputs tried, the one that came nearest to its tolerance or exceeded it most.
 struct ContractCheck {
   std::string invariant;
-  double error = 0;      ///< that of the worst input; NaN where a result was not finite
-  double tolerance = 0;  ///< for that input
-  std::string input;     ///< that input
+  double error = 0;      ///< error of the worst input; NaN where a result was not finite
+  double tolerance = 0;  ///< tolerance for that input
+  std::string input;     ///< the worst input
   int cases = 0;         ///< how many inputs were tried
   bool ok() const { return error <= tolerance; }
 };

@@ -20,7 +20,7 @@ template <class S, bool Weighted>
 struct ScatterKernel {
   struct Arguments {
     ResidualColumns<S> residuals = nullptr;
-    const S* weights = nullptr;  ///< as many as a column has numbers
+    const S* weights = nullptr;  ///< one for each number of a column
     const S* metric = nullptr;   ///< weight of each column's square in the squared length
     std::size_t columns = 0, count = 0;
     /// The lower triangle of a matrix of columns × columns, row by row, to which nothing is added.
