@@ -36,7 +36,7 @@ struct VerdictCell {
 /// Bounds promised for a cell's rates; absent bounds are not judged.
 struct VerdictPromise {
   std::optional<double> max_outside;   ///< ok, and the truth outside of the 95 % region
-  std::optional<double> min_coverage;  ///< of those that are ok, where they are half of all
+  std::optional<double> min_coverage;  ///< fraction of ok results that hold the truth, where ok are half of all
   std::optional<double> min_kept, max_kept;
   std::optional<double> max_ambiguous, max_ill_defined;
   std::optional<double> max_wrong;  ///< ok, and the mean on the wrong side
