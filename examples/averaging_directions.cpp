@@ -1,6 +1,7 @@
 // The mean of directions: the normal of a wall from twelve measured normals, two of them good, with the cone in which
 // the true normal lies. Directions have two degrees of freedom and no preferred axes across them.
 #include <lie/s2.hpp>
+#include <lie/units.hpp>
 #include <stats/covariance.hpp>
 #include <stats/inference.hpp>
 #include <stats/sampling.hpp>
@@ -10,7 +11,7 @@
 
 int main() {
   using namespace liestat;
-  const double degree = EIGEN_PI / 180;
+  using units::degree;
   const S2d wall(Eigen::Vector3d(0.6, -0.3, 0.9));
 
   // Laser scans from afar are good to 3°, two from close by to 0.5°.

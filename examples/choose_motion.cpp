@@ -3,6 +3,7 @@
 
 #include <fusion/two_view/models.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/hierarchy.hpp>
 #include <stats/random.hpp>
 
@@ -52,12 +53,12 @@ int main() {
   std::printf("\nchosen: %s\n", search.models()[search.best()]->name().c_str());
   const auto& pose = found.estimate.parameter.pose;
   const auto& covariance = found.estimate.covariance;
-  const double degree = 180 / 3.14159265358979323846;
+  using units::degree;
   std::printf("direction off by %.2f degrees, standard deviations %.2f and %.2f\n",
-              degree * std::acos(std::min(1.0, pose.direction().unit_vector().dot(t.normalized()))),
-              degree * std::sqrt(covariance(0, 0)), degree * std::sqrt(covariance(1, 1)));
+              std::acos(std::min(1.0, pose.direction().unit_vector().dot(t.normalized()))) / degree,
+              std::sqrt(covariance(0, 0)) / degree, std::sqrt(covariance(1, 1)) / degree);
   std::printf("rotation off by %.3f degrees, standard deviations %.3f, %.3f, %.3f\n",
-              degree * (pose.so3().inverse() * R).log().norm(), degree * std::sqrt(covariance(2, 2)),
-              degree * std::sqrt(covariance(3, 3)), degree * std::sqrt(covariance(4, 4)));
+              (pose.so3().inverse() * R).log().norm() / degree, std::sqrt(covariance(2, 2)) / degree,
+              std::sqrt(covariance(3, 3)) / degree, std::sqrt(covariance(4, 4)) / degree);
   return search.models()[search.best()]->name() == "essential" ? 0 : 1;
 }

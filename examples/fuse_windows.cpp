@@ -92,7 +92,7 @@ void fly(double noise_factor) {
     const InertialState& x = s.state.mean;
     off(s.end, x.get<0>().unit_vector(), {x.get<2>(), accelerometerBias(x, s.gravity)});
   }
-  // What the densities would have to be for the windows to agree.
+  // The densities with which the windows would agree.
   const NoiseCalibration noise = calibrateNoise(recording, {.stride = 2.5});
   if (noise.status == FusionStatus::ok) {
     std::printf("  they agree with the densities times %.1f (95 %%: %.1f to %.1f)\n", noise.common.factor,

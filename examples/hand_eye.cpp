@@ -2,6 +2,7 @@
 
 #include <fusion/hand_eye.hpp>
 #include <lie/se3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <cmath>
@@ -10,7 +11,8 @@
 
 int main() {
   using namespace liestat;
-  const double mm = 1e-3, degree = 3.14159265358979323846 / 180;
+  using units::degree;
+  const double mm = 1e-3;
   CounterRng random(1);
 
   // The truth, and the noise of the robot (A) and of the camera's poses at the target (B), each in its own frame.

@@ -3,6 +3,7 @@
 // state and measurement, which nobody can solve for n.
 
 #include <lie/s2.hpp>
+#include <lie/units.hpp>
 #include <stats/implicit_ekf.hpp>
 #include <stats/random.hpp>
 
@@ -25,7 +26,8 @@ struct Orthogonal {
 }  // namespace
 
 int main() {
-  const double degree = 3.14159265358979323846 / 180, sigma = 0.02;
+  using units::degree;
+  const double sigma = 0.02;
   CounterRng random(1);
   Eigen::Vector3d truth = Eigen::Vector3d(0.2, -0.1, 1).normalized();
 

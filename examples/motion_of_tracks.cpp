@@ -3,18 +3,19 @@
 // gyroscope (docs/motion.md).
 #include <fusion/motion/subspace_filter.hpp>
 #include <fusion/motion/track_pairs.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <vector>
 
 namespace {
 
 using namespace liestat;
 
-constexpr double degree = std::numbers::pi / 180, focal_length = 500, sigma = 4 / focal_length;
+using units::degree;
+constexpr double focal_length = 500, sigma = 4 / focal_length;
 
 /// Twenty points in a ball of radius 0.5 at 1.5 m, which turns about its centre by 5° per frame.
 struct Turntable {

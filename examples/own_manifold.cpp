@@ -3,6 +3,7 @@
 // docs/adding_a_manifold.md goes through this file.
 #include <lie/se2.hpp>
 #include <lie/testing.hpp>
+#include <lie/units.hpp>
 #include <stats/covariance.hpp>
 #include <stats/maha.hpp>
 
@@ -20,11 +21,10 @@ struct RobotPose {
 // not simply the library's Frame2, where one metre does.
 template <>
 struct liestat::ManifoldTraits<RobotPose> : liestat::TrivialIsotropy<RobotPose, liestat::SE2d> {
-  static constexpr double degree = static_cast<double>(EIGEN_PI) / 180;
   static RobotPose fromGroup(const SE2d& g) {
-    return {g.translation().x(), g.translation().y(), g.so2().log()[0] / degree};
+    return {g.translation().x(), g.translation().y(), g.so2().log()[0] / liestat::units::degree};
   }
-  static SE2d toGroup(const RobotPose& p) { return SE2d(p.heading_degrees * degree, {p.x, p.y}); }
+  static SE2d toGroup(const RobotPose& p) { return SE2d(p.heading_degrees * liestat::units::degree, {p.x, p.y}); }
   static Square diagonal(const Eigen::Matrix2d& translation) {
     Square m = Square::Identity();
     m.topLeftCorner<2, 2>() = translation;
@@ -34,7 +34,7 @@ struct liestat::ManifoldTraits<RobotPose> : liestat::TrivialIsotropy<RobotPose, 
   // The atomic operations: action, placement, exponential map at the origin and its inverse.
   static RobotPose act(const SE2d& f, const RobotPose& p) { return fromGroup(f * toGroup(p)); }
   static SE2d placement(const RobotPose& p) { return toGroup(p); }
-  static RobotPose expOrigin(const Tangent& v) { return {v[0], v[1], v[2] / degree}; }
+  static RobotPose expOrigin(const Tangent& v) { return {v[0], v[1], v[2] / liestat::units::degree}; }
   static Tangent logOrigin(const RobotPose& p) { return {p.x, p.y, toGroup(p).so2().log()[0]}; }
   // Their derivatives, local frames at both ends: a step at expOrigin(v) is seen from a frame turned by v[2].
   static Square dexpOrigin(const Tangent& v) { return diagonal(SO2d(v[2]).matrix().transpose()); }

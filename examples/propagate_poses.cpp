@@ -5,6 +5,7 @@
 // range go through a function of our own, whose Jacobian ceres::Jet finds. All of it is compared with 2000 simulated
 // drives.
 #include <lie/se3.hpp>
+#include <lie/units.hpp>
 #include <stats/compat/jet.hpp>
 #include <stats/sampling.hpp>
 
@@ -45,7 +46,7 @@ int main() {
   }
 
   const Vector6 pose_sd = pose.covariance.diagonal().cwiseSqrt();
-  const Eigen::Vector3d degrees = pose_sd.tail<3>() * (180 / static_cast<double>(EIGEN_PI));
+  const Eigen::Vector3d degrees = pose_sd.tail<3>() / liestat::units::degree;
   const Eigen::Vector3d axes = where.covariance.diagonal().cwiseSqrt();
   std::printf("after %d motions, sd along the robot's axes: %.3f %.3f %.3f m, %.2f %.2f %.2f degrees\n", motions,
               pose_sd[0], pose_sd[1], pose_sd[2], degrees[0], degrees[1], degrees[2]);

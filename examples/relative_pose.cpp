@@ -4,6 +4,7 @@
 #include <fusion/two_view/robust.hpp>
 #include <fusion/two_view/two_view.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <cmath>
@@ -47,14 +48,14 @@ int main() {
 
   const Essentiald truth(R, t);
   const auto report = [&](const char* name, const Gaussian<Essentiald>& found, std::size_t inliers) {
-    const double degree = 180 / 3.14159265358979323846;
+    using units::degree;
     const auto error = log(found.mean, truth);
     std::printf(
         "%-9s %zu inliers, direction off by %.2f (sd %.2f, %.2f), rotation by %.3f (sd %.3f, %.3f, %.3f) degrees;",
-        name, inliers, degree * error.head<2>().norm(), degree * std::sqrt(found.covariance(0, 0)),
-        degree * std::sqrt(found.covariance(1, 1)), degree * error.tail<3>().norm(),
-        degree * std::sqrt(found.covariance(2, 2)), degree * std::sqrt(found.covariance(3, 3)),
-        degree * std::sqrt(found.covariance(4, 4)));
+        name, inliers, error.head<2>().norm() / degree, std::sqrt(found.covariance(0, 0)) / degree,
+        std::sqrt(found.covariance(1, 1)) / degree, error.tail<3>().norm() / degree,
+        std::sqrt(found.covariance(2, 2)) / degree, std::sqrt(found.covariance(3, 3)) / degree,
+        std::sqrt(found.covariance(4, 4)) / degree);
     const double squared = mahalanobisSquared(found, truth);
     std::printf(" squared distance of the truth %.1f, 5 expected\n", squared);
     return squared < 20.5;  // exceeded once in a thousand times

@@ -32,8 +32,8 @@ struct UnitLength {
   }
 };
 
-/// What a search must know: how many points determine a conic, which one they determine, and how far points are from
-/// it.
+/// The model that the search is given: how many points determine a conic, which one they determine, and how far points
+/// are from it.
 struct ConicModel {
   using Parameter = Conic;
   static constexpr std::size_t sample_size = 5;

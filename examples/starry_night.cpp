@@ -70,7 +70,7 @@ StereoCamera readCamera(const std::string& path) {
 MeasuredPoint triangulate(const StereoCamera& camera, double uL, double vL, double uR, double vR) {
   const Eigen::Vector4d& variance = camera.variance;
   const double disparity = uL - uR, depth = camera.fu * camera.b / disparity;
-  const double share = variance[3] / (variance[1] + variance[3]);  // of the left row
+  const double share = variance[3] / (variance[1] + variance[3]);  // weight of the left row
   const Eigen::Vector3d ray((uL - camera.cu) / camera.fu, (share * vL + (1 - share) * vR - camera.cv) / camera.fv, 1);
   Eigen::Matrix<double, 3, 4> J;
   J.col(0) = -depth / disparity * ray + depth / camera.fu * Eigen::Vector3d::UnitX();

@@ -17,14 +17,14 @@ constexpr int n = 6;
 constexpr double noise_sd = 0.02, offset_sd = 0.05;  // m
 using Ranges = Eigen::Matrix<double, n, 1>;
 
-/// What the harness draws: the truth, and what the estimator gets to see.
+/// A draw of the harness: the truth, and what the estimator gets to see.
 struct Scene {
   Eigen::Vector2d truth;
   Eigen::Matrix<double, 2, n> beacons;
   Ranges ranges;
 };
 
-/// What the harness wants back; `converged` and `iterations` are used because they are there.
+/// The result that the harness expects; `converged` and `iterations` are optional and used because they are there.
 struct Estimate {
   Eigen::Vector2d mean;
   Eigen::Matrix2d covariance;

@@ -218,7 +218,7 @@ struct NoisyClosedFormCase {
   const char* name;  ///< its own
   InertialSceneOptions scene;
   std::vector<FusionStatus> expected;
-  double share = 0.97;  ///< of the windows that must be among these, at least
+  double share = 0.97;  ///< at least this fraction of the windows must end with one of these
   bool bias = false;    ///< the bias of the accelerometer is an unknown too
   double bias_sigma = 0.1;
 };

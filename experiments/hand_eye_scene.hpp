@@ -15,6 +15,7 @@
 
 #include <fusion/hand_eye.hpp>
 #include <lie/se3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
@@ -96,7 +97,7 @@ class HandEyeScene {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
   SE3d X, Y;                                       ///< gripper_T_camera, base_T_target
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< of the motion, where it has one, in the gripper's frame
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< axis of the motion, where it has one, in the gripper's frame
   std::vector<PosePair> pairs, truth;
   std::vector<bool> inlier;
 
@@ -127,8 +128,6 @@ class HandEyeScene {
   }
 
  private:
-  static constexpr double degree = std::numbers::pi / 180;
-
   /// Uniform in a cube.
   Eigen::Vector3d vector(double half_width) {
     Eigen::Vector3d v;
@@ -142,7 +141,7 @@ class HandEyeScene {
   }
   /// target_T_camera: the camera looks at the target, turned by a rotation.
   SE3d camera() {
-    const SO3d R = SO3d::rotX(std::numbers::pi) * turn(60 * degree);
+    const SO3d R = SO3d::rotX(std::numbers::pi) * turn(60 * units::degree);
     const double distance = draw_.uniform(0.4, 0.7);
     Eigen::Vector3d target_in_camera(0, 0, distance);
     for (int i = 0; i < 2; ++i) target_in_camera[i] = draw_.uniform(-0.05, 0.05);
@@ -183,13 +182,13 @@ class HandEyeScene {
 
   /// A motion of the gripper in its own frame.
   SE3d motion(const Eigen::Vector3d& point) {
-    const double angle = draw_.uniform(-60 * degree, 60 * degree);
+    const double angle = draw_.uniform(-60 * units::degree, 60 * units::degree);
     const Eigen::Vector3d shift = vector(0.3);
     switch (options_.motion) {
       case HandEyeMotion::general:
-        return SE3d(turn(60 * degree), shift);
+        return SE3d(turn(60 * units::degree), shift);
       case HandEyeMotion::about_point:
-        return about(turn(60 * degree), point);
+        return about(turn(60 * units::degree), point);
       case HandEyeMotion::half_turns: {
         const Eigen::Vector3d any = draw_.unitVector<3>();
         return SE3d(SO3d::exp(std::numbers::pi * any), shift);
@@ -210,7 +209,7 @@ class HandEyeScene {
   static SE3d about(const SO3d& R, const Eigen::Vector3d& point) { return SE3d(R, point - R * point); }
 
   void setCovariances(PosePair& pair) const {
-    const double mm = 1e-3 * options_.noise_factor, deg = degree * options_.noise_factor;
+    const double mm = 1e-3 * options_.noise_factor, deg = units::degree * options_.noise_factor;
     const auto diagonal = [](const Vector6& sigmas) -> Matrix6 { return sigmas.cwiseAbs2().asDiagonal(); };
     const auto equal = [&](double t, double r) { return diagonal((Vector6() << t, t, t, r, r, r).finished()); };
     switch (options_.noise) {
@@ -255,17 +254,17 @@ class HandEyeScene {
           B = SE3d(SO3d::exp(u * std::numbers::pi * turned), (0.2 + v) * direction);
           break;
         case HandEyeOutliers::mild:
-          B = B * SE3d(SO3d::exp((5 + 10 * u) * degree * turned), (0.02 + 0.06 * v) * direction);
+          B = B * SE3d(SO3d::exp((5 + 10 * u) * units::degree * turned), (0.02 + 0.06 * v) * direction);
           break;
         case HandEyeOutliers::flips: {
-          // Of C = camera_T_target: the normal of the target is mirrored at the line of sight.
+          // The normal of the target in C = camera_T_target is mirrored at the line of sight.
           const SE3d C = B.inverse();
           const Eigen::Vector3d sight = C.translation().normalized(), normal = C.so3() * Eigen::Vector3d(0, 0, 1);
           const Eigen::Vector3d mirrored = 2 * sight.dot(normal) * sight - normal;
           const Eigen::Vector3d cross = normal.cross(mirrored);
           const double angle = std::atan2(cross.norm(), normal.dot(mirrored));
           // Both solutions of a target that is seen frontally are nearly one: no pair to be found.
-          if (angle < 10 * degree) {
+          if (angle < 10 * units::degree) {
             inlier[i] = true;
             break;
           }
@@ -274,7 +273,7 @@ class HandEyeScene {
           break;
         }
         case HandEyeOutliers::cluster:
-          B = B * SE3d(SO3d::exp(20 * degree * common_axis), 0.1 * common_direction);
+          B = B * SE3d(SO3d::exp(20 * units::degree * common_axis), 0.1 * common_direction);
           break;
       }
     }

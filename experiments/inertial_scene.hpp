@@ -33,8 +33,8 @@ namespace liestat::experiments {
 /// How the body moves. Those that vary accelerate by four sines of 0.2 to 1 Hz on top of a velocity of 1 m/s.
 enum class SceneMotion {
   varying,                ///< in all directions
-  constant_acceleration,  ///< of 1.2 to 2.2 times InertialSceneOptions::acceleration
-  constant_velocity,      ///< of 1 m/s
+  constant_acceleration,  ///< 1.2 to 2.2 times InertialSceneOptions::acceleration
+  constant_velocity,      ///< 1 m/s
   stationary,             ///< it turns, but does not move
   straight,               ///< varying, along a line
   planar,                 ///< varying, in a plane
@@ -63,7 +63,7 @@ struct InertialSceneOptions {
   double acceleration = 1.5;                         ///< m/s², RMS per axis of the varying part
   double turn_rate = 0.5;                            ///< rad/s, RMS per axis
   Eigen::Vector3d camera = Eigen::Vector3d::Zero();  ///< p_c: its centre in the body (m)
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();    ///< of the accelerometer (m/s²), left in S_j
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();    ///< accelerometer's bias (m/s²), left in S_j
   bool level_acceleration = false;                   ///< constant acceleration at a right angle to gravity
   std::size_t on_object = 0;                         ///< the first features are on a body that moves uniformly
   double object_speed = 0.5;                         ///< m/s, in a direction that is drawn
@@ -84,11 +84,11 @@ class InertialScene {
     build();
   }
 
-  ClosedFormWindow window;                ///< what the camera and the inertial sensor measure
+  ClosedFormWindow window;                ///< measurements of camera and inertial sensor
   Eigen::Vector3d velocity, gravity;      ///< V (m/s), G (m/s²) in the body's axes at the first image
   std::vector<Eigen::Vector3d> features;  ///< P_i in the body's axes at the first image, from its origin (m)
-  std::vector<double> times;              ///< of the images (s), the first 0
-  /// Of the body with the first features, in the body's axes at the first image (m/s).
+  std::vector<double> times;              ///< times of the images (s), the first 0
+  /// Velocity of the body with the first features, in the body's axes at the first image (m/s).
   Eigen::Vector3d object_velocity = Eigen::Vector3d::Zero();
 
   /// In the world: m, m/s, m/s².

@@ -21,9 +21,9 @@ struct JudgedReport {
   ValidationReport report;
   std::optional<ValidationTolerance> promise;  ///< absent outside the domain of the documentation: shown, not judged
   std::optional<bool> passed;                  ///< whether it passed, where there is a promise
-  ValidationVerdict verdict = ValidationVerdict::passed;           ///< the same with the reason
-  std::vector<HistogramBin> histogram;         ///< of the squared distances, with the law's density
-  double tail = 0;                             ///< fraction of distances beyond the law's 99.9 % quantile
+  ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
+  std::vector<HistogramBin> histogram;                    ///< squared distances, with the law's density
+  double tail = 0;                                        ///< fraction of distances beyond the law's 99.9 % quantile
 
   /// Takes the report over, with its histogram and tail; the verdict is left open.
   void setReport(ValidationReport of) {

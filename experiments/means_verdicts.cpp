@@ -4,6 +4,7 @@
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <experiments/scattered_features.hpp>
+#include <lie/units.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/laws.hpp>
 #include <stats/random.hpp>
@@ -36,7 +37,7 @@ class Sampler {
     TangentOf<M> e = rng.template normalVector<k>();
     if (cell_.law == VerdictLaw::clouds) {
       TangentOf<M> side = TangentOf<M>::Zero();
-      side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * pi / 180;
+      side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * units::degree;
       return exp(exp(ManifoldTraits<M>::origin(), side), TangentOf<M>(0.05 * e));
     }
     for (int j = 0; j < angles; ++j) {
@@ -115,15 +116,15 @@ void compare(VerdictRow& row, const char* what, const std::optional<double>& bou
 void giveVerdict(VerdictRow& row) {
   const VerdictPromise& p = row.promise;
   const double trials = static_cast<double>(row.cell.trials);
-  compare(row, "ok but outside", p.most_outside, row.rate(row.outside), trials, true);
+  compare(row, "ok but outside", p.max_outside, row.rate(row.outside), trials, true);
   if (2 * row.ok >= row.cell.trials) {
-    compare(row, "coverage", p.least_coverage, row.coverage(), static_cast<double>(row.ok), false);
+    compare(row, "coverage", p.min_coverage, row.coverage(), static_cast<double>(row.ok), false);
   }
-  compare(row, "kept", p.least_kept, row.rate(row.ok), trials, false);
-  compare(row, "kept", p.most_kept, row.rate(row.ok), trials, true);
-  compare(row, "ambiguous", p.most_ambiguous, row.rate(row.ambiguous), trials, true);
-  compare(row, "ill-defined", p.most_ill_defined, row.rate(row.ill_defined), trials, true);
-  compare(row, "wrong side", p.most_wrong, row.rate(row.wrong), trials, true);
+  compare(row, "kept", p.min_kept, row.rate(row.ok), trials, false);
+  compare(row, "kept", p.max_kept, row.rate(row.ok), trials, true);
+  compare(row, "ambiguous", p.max_ambiguous, row.rate(row.ambiguous), trials, true);
+  compare(row, "ill-defined", p.max_ill_defined, row.rate(row.ill_defined), trials, true);
+  compare(row, "wrong side", p.max_wrong, row.rate(row.wrong), trials, true);
 }
 
 }  // namespace
@@ -147,32 +148,32 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
   const double x = cell.parameter;
   VerdictPromise promise;
   if (cell.law == VerdictLaw::clouds) {
-    if (x >= 174) promise.most_wrong = 0.01;
+    if (x >= 174) promise.max_wrong = 0.01;
     // Directions that lie on opposite sides of a mean are as scattered as uniform ones while they are few.
-    if (x <= 160 && cell.feature == Feature::rotation) promise.most_ambiguous = promise.most_ill_defined = 0;
+    if (x <= 160 && cell.feature == Feature::rotation) promise.max_ambiguous = promise.max_ill_defined = 0;
     return promise;
   }
-  promise.most_outside = 0.07;
-  promise.least_coverage = 0.93;
+  promise.max_outside = 0.07;
+  promise.min_coverage = 0.93;
   if (cell.law == VerdictLaw::fisher) {
-    if (x == 0) promise.most_kept = 0.02;
+    if (x == 0) promise.max_kept = 0.02;
     const bool direction = cell.feature == Feature::direction;
-    if (cell.n >= 10 && (x >= 20 || (x >= 4 && !quotient))) promise.least_kept = 0.95;
-    if (direction && cell.n >= 30 && x >= 2) promise.least_kept = 0.95;
+    if (cell.n >= 10 && (x >= 20 || (x >= 4 && !quotient))) promise.min_kept = 0.95;
+    if (direction && cell.n >= 30 && x >= 2) promise.min_kept = 0.95;
     return promise;
   }
   if (cell.law == VerdictLaw::report && cell.feature == Feature::rotation && x == 1) {
     if (cell.n >= 30) {
-      promise.least_kept = 0.98;
+      promise.min_kept = 0.98;
     } else {
-      promise.most_ambiguous = 0.05, promise.most_ill_defined = 0.08;
+      promise.max_ambiguous = 0.05, promise.max_ill_defined = 0.08;
     }
   }
   if (cell.law == VerdictLaw::report && quotient && x == 1) {
     // Beyond any expansion: few are kept, and their coverage is not promised.
-    promise.least_coverage = std::nullopt;
+    promise.min_coverage = std::nullopt;
   }
-  if (cell.law == VerdictLaw::isotropic && quotient && x <= 0.5 && cell.n >= 30) promise.least_kept = 0.90;
+  if (cell.law == VerdictLaw::isotropic && quotient && x <= 0.5 && cell.n >= 30) promise.min_kept = 0.90;
   return promise;
 }
 

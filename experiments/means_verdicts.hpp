@@ -15,7 +15,7 @@ namespace liestat::experiments {
 /// regions of those that it hands out hold the truth. Where `validate means` judges the formulas on means that were
 /// started at the truth, this judges the front door, with its own starts and its own refusals.
 
-/// What the features of a cell are drawn from.
+/// The law from which the features of a cell are drawn.
 enum class VerdictLaw {
   fisher,     ///< the matrix Fisher law with F = κ/2 · I, von Mises and Fisher's on directions; of frames N(0, 1) m
   report,     ///< normal in the chart, the report's standard deviations (0.3, 0.6, 0.9) rad times the parameter
@@ -33,25 +33,25 @@ struct VerdictCell {
   std::size_t n = 10, trials = 400;
 };
 
-/// What is promised of a cell's rates; absent bounds are not.
+/// Bounds promised for a cell's rates; absent bounds are not judged.
 struct VerdictPromise {
-  std::optional<double> most_outside;    ///< ok, and the truth outside of the 95 % region
-  std::optional<double> least_coverage;  ///< of those that are ok, where they are half of all
-  std::optional<double> least_kept, most_kept;
-  std::optional<double> most_ambiguous, most_ill_defined;
-  std::optional<double> most_wrong;  ///< ok, and the mean on the wrong side
+  std::optional<double> max_outside;   ///< ok, and the truth outside of the 95 % region
+  std::optional<double> min_coverage;  ///< fraction of ok results that hold the truth, where ok are half of all
+  std::optional<double> min_kept, max_kept;
+  std::optional<double> max_ambiguous, max_ill_defined;
+  std::optional<double> max_wrong;  ///< ok, and the mean on the wrong side
 };
 /// The promise of docs/uniqueness.md for a cell.
 VerdictPromise promiseOf(const VerdictCell& cell);
 
-/// What became of the trials of a cell.
+/// Counts of the outcomes of a cell's trials.
 struct VerdictRow {
   VerdictCell cell;
   VerdictPromise promise;
   std::size_t ok = 0, ambiguous = 0, ill_defined = 0;
-  std::size_t outside = 0;        ///< of those that are ok
-  std::size_t wrong = 0;          ///< of those that are ok: the mean of two clouds on the other side
-  std::size_t plain_outside = 0;  ///< of all: the region of the first-order covariance, which nothing withholds
+  std::size_t outside = 0;        ///< ok, but the truth outside the 95 % region
+  std::size_t wrong = 0;          ///< ok, but the mean of two clouds on the other side
+  std::size_t plain_outside = 0;  ///< the same of all trials, with the first-order covariance, which nothing withholds
   std::optional<bool> passed;     ///< within four standard errors of every bound
   std::string failure = {};       ///< which bound was not kept
 

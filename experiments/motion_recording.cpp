@@ -1,17 +1,15 @@
 #include <experiments/motion_recording.hpp>
 
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <tuple>
 
 namespace liestat::experiments {
 namespace {
-
-constexpr double degree_in_rad = std::numbers::pi / 180;
 
 /// Follows the points of a scene under the names that they have in a file.
 class TrackNames {
@@ -44,7 +42,7 @@ class TrackNames {
 
 /// The motion of one interval, s seconds long.
 struct Interval {
-  Eigen::Vector3d rotation, velocity;  ///< of the points, per second
+  Eigen::Vector3d rotation, velocity;  ///< velocities of the points, per second
 
   SE3d after(double s) const {
     const Eigen::Vector3d turned = s * rotation;
@@ -63,7 +61,7 @@ MotionRecording recordMotion(const MotionRecordingOptions& options) {
   recording.camera.camera.width = recording.camera.camera.height = static_cast<int>(std::lround(width));
   recording.camera.imu_T_cam = SE3d(recording.camera.imu_T_cam.so3(), Eigen::Vector3d(Eigen::Vector3d::Zero()));
   const SO3d imu_R_camera = recording.camera.imu_T_cam.so3();
-  const double sigma = scene_options.gyroscope_sigma * degree_in_rad;
+  const double sigma = scene_options.gyroscope_sigma * units::degree;
   recording.noise = adis16448;
   recording.noise.gyroscope = sigma / std::sqrt(dt);
   recording.noise.gyroscope_walk = 0;

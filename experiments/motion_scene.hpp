@@ -15,6 +15,7 @@
 #include <fusion/motion/types.hpp>
 #include <lie/detail/trig.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
@@ -69,15 +70,15 @@ class MotionScene {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< V, per frame
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();     ///< Ω of the last interval, rad per frame
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< T of the last interval
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();       ///< of the ball (orbit)
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();         ///< of the gyroscope, rad per frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();       ///< centre of the ball (orbit)
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();         ///< gyroscope's bias, rad per frame
   std::size_t frame = 0;
   std::vector<MotionTrack> observed;     ///< all tracks that the present frame sees
   std::vector<MotionTrack> tracks;       ///< those of them that the next frame sees too
-  std::vector<PointPair> pairs;          ///< of the last interval
+  std::vector<PointPair> pairs;          ///< matches of the last interval
   std::vector<std::size_t> pair_tracks;  ///< the track of each pair
-  std::vector<double> depths;            ///< of the pairs, at the first frame
-  std::vector<bool> inlier;              ///< of the pairs
+  std::vector<double> depths;            ///< depth of each pair at the first frame
+  std::vector<bool> inlier;              ///< true for right pairs
   GyroscopeRotation gyroscope;
 
   MotionScene(const MotionSceneOptions& scene_options, std::uint64_t seed, std::uint64_t trial = 0)
@@ -89,7 +90,7 @@ class MotionScene {
     drawMotion();
     for (std::size_t i = 0; i < options.points; ++i) tracks.push_back(freshTrack(motionOf(1)));
     observed = tracks;
-    const double s = options.gyroscope_bias * degree;
+    const double s = options.gyroscope_bias * units::degree;
     const Eigen::Vector3d unit = inertial_.normalVector<3>();
     bias = s * unit;
   }
@@ -103,9 +104,9 @@ class MotionScene {
   double toldSigma() const { return (told_sigma > 0 ? told_sigma : options.sigma) / options.focal_length; }
   /// Ω of an interval, rad per frame; the first is 1.
   Eigen::Vector3d rotationOf(std::size_t of_frame) const {
-    if (options.world != MotionWorld::turning) return options.rotation * degree * axis_;
+    if (options.world != MotionWorld::turning) return options.rotation * units::degree * axis_;
     const double angle = 2 * std::numbers::pi * static_cast<double>(of_frame) / 40;
-    return options.rotation * degree * (std::cos(angle) * axis_ + std::sin(angle) * second_axis_);
+    return options.rotation * units::degree * (std::cos(angle) * axis_ + std::sin(angle) * second_axis_);
   }
 
   /// The next frame. Every track of a frame is seen in the next one too: there are `points` pairs in each interval.
@@ -135,15 +136,13 @@ class MotionScene {
         observed.push_back(track);
       }
     }
-    const double s = options.gyroscope_sigma * degree;
+    const double s = options.gyroscope_sigma * units::degree;
     const Eigen::Vector3d unit = inertial_.normalVector<3>();
     gyroscope.rotation = rotation + bias + s * unit;
     gyroscope.covariance = s * s * Eigen::Matrix3d::Identity();
   }
 
  private:
-  static constexpr double degree = std::numbers::pi / 180;
-
   /// The motion of an interval.
   struct Motion {
     Eigen::Matrix3d R;

@@ -8,6 +8,7 @@
 
 #include <experiments/two_view_pairs.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
@@ -21,14 +22,14 @@ namespace liestat::experiments {
 
 struct PlaneSceneOptions {
   std::size_t planes = 3;
-  std::size_t matches = 60;   ///< of each plane
+  std::size_t matches = 60;   ///< on each plane
   std::size_t outliers = 60;  ///< wrong matches
   double sigma = 0.5;         ///< standard deviation of each coordinate (px)
 };
 
 /// The matches, of the family adelaide.
 inline TwoViewPair simulatePlanes(const PlaneSceneOptions& options, std::uint64_t seed) {
-  constexpr double f = 800, width = 1024, height = 768, degree = 3.14159265358979323846 / 180;
+  constexpr double f = 800, width = 1024, height = 768;
   CounterRng rng(seed, 0, 7);
   TwoViewPair pair;
   pair.family = PairFamily::adelaide;
@@ -41,7 +42,7 @@ inline TwoViewPair simulatePlanes(const PlaneSceneOptions& options, std::uint64_
     pair.matches.emplace_back(first.x(), first.y(), second.x(), second.y());
     pair.labels.push_back(label);
   };
-  const double angle = rng.uniform(2, 6) * degree;
+  const double angle = rng.uniform(2, 6) * units::degree;
   const Eigen::Vector3d axis = rng.unitVector<3>();
   const Eigen::Matrix3d R = SO3d::exp(Eigen::Vector3d(angle * axis)).matrix();
   const double length = rng.uniform(0.4, 0.8);
@@ -53,7 +54,7 @@ inline TwoViewPair simulatePlanes(const PlaneSceneOptions& options, std::uint64_
   for (std::size_t k = 0; k < options.planes; ++k) {
     const double left = strip * static_cast<double>(k);
     const Eigen::Vector3d middle = ray(left + 0.5 * strip, 0.5 * height).normalized();
-    const double distance = rng.uniform(3, 8), tilt = (k % 2 == 0 ? 1 : -1) * rng.uniform(20, 50) * degree;
+    const double distance = rng.uniform(3, 8), tilt = (k % 2 == 0 ? 1 : -1) * rng.uniform(20, 50) * units::degree;
     const Eigen::Vector3d sideways = middle.cross(Eigen::Vector3d::UnitY()).normalized();
     const Eigen::Vector3d normal = std::cos(tilt) * middle + std::sin(tilt) * sideways;
     const double offset = distance * normal.dot(middle);

@@ -34,7 +34,7 @@ struct PixelObservation {
   std::size_t track = 0;  ///< counts the tracks from 0
   double u = 0;
   double v = 0;
-  std::size_t line = 0;  ///< of the file that it was read from; 0: of none
+  std::size_t line = 0;  ///< line in the file that it was read from; 0: none
 };
 
 /// A camera and where it sits on the inertial sensor.

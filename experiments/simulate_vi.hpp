@@ -38,11 +38,11 @@ struct ViSceneOptions {
   std::size_t landmarks = 2000;       ///< points, uniform over the faces
   std::size_t features = 40;          ///< at most so many tracks an image
   std::size_t shortest_track = 4;     ///< images; no landmark is taken up that will be lost before
-  double least_depth = 0.3;           ///< m along the optical axis
+  double min_depth = 0.3;             ///< m along the optical axis
   std::optional<Eigen::Vector3d> box; /**< lengths of its edges, m, its middle that of the motion; by default 10 x 10 x
                                          4, or where the motion needs it, its extent and 2 m */
   double outliers = 0;                ///< fraction of the tracks that drift away from their landmark
-  double drift = 8;                   ///< of those, by a random walk of this standard deviation, pixels an image
+  double drift = 8;                   ///< standard deviation of their random walk, pixels an image
   std::uint64_t seed = 1;
 };
 
@@ -57,7 +57,7 @@ struct SyntheticImuOptions {
 /// These densities, all times a factor.
 ImuNoise<double> scaled(const ImuNoise<double>& noise, double factor);
 
-/// What a calibration leaves of the biases: drawn with standard deviations of 0.01 rad/s and 0.05 m/s² in each axis.
+/// Biases that remain after a calibration, drawn with standard deviations of 0.01 rad/s and 0.05 m/s² in each axis.
 ImuBias<double> calibratedBias(std::uint64_t seed);
 
 /// The point that a track of the simulated images shows.
@@ -78,7 +78,7 @@ struct SimulatedRecording {
   std::vector<SimulatedTrack> tracks;
   CameraCalibration camera;
   std::optional<ImuNoise<double>> noise;  ///< the densities that the calibration is to have
-  Eigen::Vector3d box_centre, box;        ///< of the landmarks, m
+  Eigen::Vector3d box_centre, box;        ///< centre and size of the landmarks' box, m
 };
 
 /// A motion to try things with: sines of 0.2 to 1 Hz in every direction, some 1.5 m/s² and 0.5 rad/s RMS an axis.

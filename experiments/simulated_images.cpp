@@ -65,7 +65,7 @@ class Tracker {
 
   std::optional<Eigen::Vector2d> pixelOf(const SE3d& cam_T_world, const Eigen::Vector3d& landmark) const {
     const Eigen::Vector3d p = cam_T_world * landmark;
-    if (!(p.z() > options_.least_depth)) return std::nullopt;
+    if (!(p.z() > options_.min_depth)) return std::nullopt;
     const auto pixel = camera_.project(p);
     return pixel && camera_.sees(*pixel) ? pixel : std::nullopt;
   }
@@ -127,7 +127,7 @@ class Tracker {
   std::vector<bool> is_tracked_;
   std::vector<std::size_t> seen_in_a_row_;  // up to the last image looked at
   std::size_t looked_at_ = 0;
-  std::vector<State> states_;  // of the tracks
+  std::vector<State> states_;  // one a track
 };
 
 }  // namespace
@@ -153,7 +153,7 @@ void addImages(const std::vector<SE3d>& world_T_body, const ViSceneOptions& opti
   const Eigen::Vector3d extent = high - low;
   recording.box_centre = 0.5 * (low + high);
   recording.box = options.box.value_or(Eigen::Vector3d(10, 10, 4).cwiseMax(extent + Eigen::Vector3d::Constant(2)));
-  const Eigen::Vector3d least = extent + Eigen::Vector3d::Constant(2 * options.least_depth);
+  const Eigen::Vector3d least = extent + Eigen::Vector3d::Constant(2 * options.min_depth);
   if (!((recording.box - least).minCoeff() >= 0)) {
     throw ImpossibleMotion(fmt::format("the box of {:g} x {:g} x {:g} m has no room for the motion", recording.box.x(),
                                        recording.box.y(), recording.box.z()),

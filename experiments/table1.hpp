@@ -30,14 +30,14 @@ const std::vector<Table1Entry>& table1Entries();
 /// Where the paper is corrected, or something is added to it: a letter and what is true.
 struct Table1Correction {
   char letter;
-  bool corrects;  ///< what the paper says; else it is an addition
+  bool corrects;  ///< true: a correction that the paper names; false: an addition
   const char* text;
 };
 const std::vector<Table1Correction>& table1Corrections();
 
 /// The outcome of one case: the statuses and solutions that its scenes were recognised to have.
 struct Table1Row {
-  std::size_t entry = 0;  ///< of table1Entries()
+  std::size_t entry = 0;  ///< index in table1Entries()
   std::string name, corrections;
   bool noisy = false;
   std::size_t images = 0, features = 0, scenes = 0;

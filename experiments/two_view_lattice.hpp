@@ -32,7 +32,7 @@ inline std::optional<TwoViewNode> nodeOf(TwoViewMotion motion) {
   }
 }
 
-/// What the models know of the images of a scene.
+/// Noise and size of a scene's images, as the models take them.
 inline TwoViewImages imagesOf(const TwoViewSceneOptions& o) {
   const double sigma = o.sigma / o.focal_length;
   return {{sigma, sigma}, Eigen::Vector2d(o.width, o.height) / o.focal_length};

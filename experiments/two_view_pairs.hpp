@@ -1,5 +1,5 @@
-// What the hierarchy of two-view motion makes of real pairs of images whose truth is known in part: `liestat validate
-// two-view --pairs DIR`. Four kinds of pairs, by the folder that they are in:
+// Validation of the two-view hierarchy on real pairs of images whose truth is known in part: `liestat validate two-view
+// --pairs DIR`. Four kinds of pairs, by the folder that they are in:
 //
 //   homogr         a plane or a rotation; validation points, which satisfy a homography
 //   kusvod2        scenes in depth; validation points, which satisfy a fundamental matrix
@@ -40,7 +40,7 @@ struct TwoViewPair {
   PairFamily family = PairFamily::homogr;
   std::string name;
   std::vector<Eigen::Vector4d> matches;  ///< tentative
-  /// Of each match, where the family has labels: the structure that it belongs to, 0 for a wrong match.
+  /// Structure of each match, where the family has labels; 0 for a wrong match.
   std::vector<std::size_t> labels;
   std::vector<Eigen::Vector4d> validation;  ///< right matches that no estimate sees
   /// A corner of both images, and width and height (px).
@@ -49,7 +49,7 @@ struct TwoViewPair {
 
 struct TwoViewPairsValidation {
   double sigma = 1;       ///< px
-  std::size_t runs = 10;  ///< of each pair; medians are over these
+  std::size_t runs = 10;  ///< runs a pair; medians are over these
   std::uint64_t seed = 1;
   int threads = 0;
   /// Whether matches that others contradict (fusion/two_view/contradictions.hpp) take part.
@@ -92,9 +92,9 @@ struct PairStructures {
 struct PairPlane {
   std::string name;
   std::size_t matches = 0, labelled = 0;  ///< and right ones
-  double inliers = 0, right = 0;          ///< of the homography, medians, and those that are labelled right
-  double label_error = 0;                 ///< median distance (px) of right matches from it
-  std::size_t supported = 0, runs = 0;    ///< runs that found a homography that chance does not explain
+  double inliers = 0, right = 0;  ///< medians: inliers of the homography, and those of them that are labelled right
+  double label_error = 0;         ///< median distance (px) of right matches from it
+  std::size_t supported = 0, runs = 0;  ///< runs that found a homography that chance does not explain
 };
 
 /// A promise about all pairs of a kind, a count with its bound; or a count to compare it with, which is not judged.

@@ -17,7 +17,7 @@ namespace {
 
 using Search = Hierarchy<Eigen::Vector4d, TwoViewMotionModel>;
 
-/// What a rule is called, and the number of the model that it chooses.
+/// A rule's name, and the number of the model that it chooses.
 struct Rule {
   const char* name;
   std::function<std::size_t(const Search&, double sigma)> choose;

@@ -26,7 +26,7 @@ struct TwoViewRuleRow {
   using OfMotions = std::array<std::size_t, default_two_view_motions.size()>;
   std::string rule;
   OfMotions trials{}, right{};
-  double share(std::size_t motion) const;  ///< of right choices; NaN without a trial
+  double share(std::size_t motion) const;  ///< fraction of right choices; NaN without a trial
   double average() const;                  ///< share of right choices over the trials of all motions
   std::size_t worst() const;               ///< number of the motion with the smallest share
 };

@@ -22,6 +22,7 @@
 
 #include <lie/detail/trig.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
@@ -107,7 +108,7 @@ struct TwoViewSceneOptions {
   double outliers = 0.2;  ///< share of the matches, rounded to a whole number of them
   double sigma = 0.5;     ///< standard deviation of each image coordinate, in both images (px)
   double width = 640, height = 480, focal_length = 600;  ///< px
-  double min_depth = 3, max_depth = 9;                   ///< of the points, or of the plane on the optical axis (m)
+  double min_depth = 3, max_depth = 9;  ///< depth of the points, or of the plane on the optical axis (m)
 };
 
 /// A motion and the matches that show it.
@@ -117,13 +118,13 @@ class TwoViewScene {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();      ///< rotation of the camera, where the motion has one
   Eigen::Vector3d t = Eigen::Vector3d::Zero();          ///< its translation (m)
   double focal_ratio = 1;                               ///< f'/f
-  double focal_scale = 1;                               ///< of both views, in units of the coordinates
+  double focal_scale = 1;                               ///< f of both views, in units of the coordinates
   Eigen::Vector3d vertical = Eigen::Vector3d::UnitY();  ///< in the first camera's frame; R·vertical in the second's
   /// The plane n·x = d in the first camera's frame, of `homography`.
   Eigen::Vector3d plane_normal = Eigen::Vector3d::UnitZ();
   double plane_distance = 1;                        ///< m
-  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< of motions with a homography; det H > 0
-  Eigen::Matrix3d F = Eigen::Matrix3d::Zero();      ///< of epipolar motions, ‖F‖² = 2
+  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< for motions with a homography; det H > 0
+  Eigen::Matrix3d F = Eigen::Matrix3d::Zero();      ///< for epipolar motions, ‖F‖² = 2
   std::vector<Eigen::Vector4d> matches;             ///< normalised, with noise
   std::vector<Eigen::Vector4d> pixels;              ///< the same in px, origin at a corner of the image
   std::vector<Eigen::Vector4d> exact;               ///< normalised, without noise; outliers as in matches
@@ -168,8 +169,7 @@ class TwoViewScene {
   }
 
  private:
-  static constexpr double degree = 3.14159265358979323846 / 180;
-  Eigen::Matrix<double, 2, 3> affine_second_ = Eigen::Matrix<double, 2, 3>::Zero();  // of affine_epipolar
+  Eigen::Matrix<double, 2, 3> affine_second_ = Eigen::Matrix<double, 2, 3>::Zero();  // second camera in affine_epipolar
   Eigen::Vector2d affine_shift_ = Eigen::Vector2d::Zero();
 
   /// Uniform between two numbers, with a sign.
@@ -188,7 +188,7 @@ class TwoViewScene {
   }
   static Eigen::Matrix3d turnInSpace(CounterRng& random, double low, double high) {
     const Eigen::Vector3d axis = random.unitVector<3>();
-    return SO3d::exp(Eigen::Vector3d(random.uniform(low, high) * degree * axis)).matrix();
+    return SO3d::exp(Eigen::Vector3d(random.uniform(low, high) * units::degree * axis)).matrix();
   }
   /// A length between two numbers, in a uniform direction.
   template <int N>
@@ -198,7 +198,7 @@ class TwoViewScene {
   }
   Eigen::Vector2d shift(CounterRng& random) const { return displacement<2>(random, 8, 40) / options.focal_length; }
   static Eigen::Matrix2d zoomedTurn(CounterRng& random) {
-    const double angle = either(random, 3, 15) * degree;
+    const double angle = either(random, 3, 15) * units::degree;
     return ratio(random, 1.08, 1.3) * turn(angle);
   }
   Eigen::Vector2d uniformInImage(CounterRng& random) const {
@@ -231,7 +231,7 @@ class TwoViewScene {
         H.topLeftCorner<2, 2>() *= focal_ratio;
         break;
       case TwoViewMotion::retinal_displacement:
-        H.topLeftCorner<2, 2>() = turn(either(random, 3, 15) * degree);
+        H.topLeftCorner<2, 2>() = turn(either(random, 3, 15) * units::degree);
         H.topRightCorner<2, 1>() = shift(random);
         break;
       case TwoViewMotion::rotation:
@@ -267,7 +267,7 @@ class TwoViewScene {
         H.topRightCorner<2, 1>() = shift(random);
         break;
       case TwoViewMotion::affine: {
-        const Eigen::Matrix2d axes = turn(random.uniform(0, 180) * degree);
+        const Eigen::Matrix2d axes = turn(random.uniform(0, 180) * units::degree);
         const Eigen::Vector2d stretch(ratio(random, 1.1, 1.3), 1);
         H.topLeftCorner<2, 2>() = zoomedTurn(random) * axes * stretch.asDiagonal() * axes.transpose();
         H.topRightCorner<2, 1>() = shift(random);

@@ -6,6 +6,7 @@
 #include <fusion/imu/readings.hpp>
 #include <experiments/inertial_scene.hpp>
 #include <experiments/vi_init_trials.hpp>
+#include <lie/units.hpp>
 #include <stats/gaussian.hpp>
 
 #include <Eigen/Core>
@@ -24,7 +25,7 @@ inline constexpr ImuNoise<double> vi_init_walking_imu{
 /// The errors of a velocity and a gravity in the body's axes at the first image.
 inline ViErrors viErrors(const Eigen::Vector3d& velocity, const Eigen::Vector3d& gravity, const InertialScene& truth) {
   const double angle = std::atan2(gravity.cross(truth.gravity).norm(), gravity.dot(truth.gravity));
-  return {(velocity - truth.velocity).norm(), angle * 180 / static_cast<double>(EIGEN_PI),
+  return {(velocity - truth.velocity).norm(), angle / units::degree,
           100 * std::abs(velocity.norm() / truth.velocity.norm() - 1)};
 }
 

@@ -10,7 +10,7 @@ namespace liestat::experiments {
 /// The values of one row: one a trial, NaN or infinite where it was lost.
 struct ViInitValues {
   std::vector<double> value;
-  std::vector<double> dof;  ///< of χ²; else empty
+  std::vector<double> dof;  ///< degrees of freedom of each χ²; empty for other quantities
 };
 
 /// Fills in a row from the values of its trials, and judges it if anything is promised. `dof`: of a distance.

@@ -78,7 +78,7 @@ std::optional<ViInitPromise> distances(const ViInitRow& row) {
   if (row.check == Check::consistency || row.check == Check::walk) {
     promise.tolerance = {.index = 0.03, .ks = 0.02, .failure_fraction = 0.005, .tail = 0.002};
   } else if (row.check == Check::rest) {
-    // What is not called stationary is lost: a hundredth may be.
+    // A window at rest that is not called stationary counts as lost: a hundredth may be.
     promise.tolerance = {.index = 0.04, .ks = 0.03, .failure_fraction = 0.01, .tail = 0.003};
   } else if (row.quantity == Quantity::nees_all) {
     // Gravity and bias share a direction that is known far better than either: there the sphere's curvature counts.

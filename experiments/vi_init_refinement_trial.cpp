@@ -1,3 +1,4 @@
+#include <experiments/summary.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace liestat::experiments {
 namespace {
@@ -18,12 +20,10 @@ double scaleOfFeatures(const std::vector<Eigen::Vector3d>& found, const Inertial
     if (found[i].allFinite()) ratio.push_back(found[i].norm() / scene.features[i].norm());
   }
   if (ratio.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
-  std::nth_element(ratio.begin(), middle, ratio.end());
-  return 100 * std::abs(*middle - 1);
+  return 100 * std::abs(quantile(std::move(ratio), 0.5) - 1);
 }
 
-/// What biases had walked to by a time.
+/// The biases to which a random walk has come at a time.
 ImuBias<double> biasAt(const std::vector<ImuBias<double>>& walked, const std::vector<ImuSample<double>>& readings,
                        double time) {
   const auto next = std::find_if(readings.begin(), readings.end() - 1, [&](const auto& s) { return s.time >= time; });

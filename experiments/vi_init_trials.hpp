@@ -41,11 +41,11 @@ using ViInitTrial = Outcome (*)(const ViInitWindow& window, double noise, Counte
 
 /// A refined window: squared Mahalanobis distances of the truth, and errors.
 struct RefinementOutcome {
-  double nees_v = std::numeric_limits<double>::quiet_NaN();           ///< of V, 3 degrees of freedom
-  double nees_v_g = std::numeric_limits<double>::quiet_NaN();         ///< of V and gravity, 5
-  double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< of V, gravity and both biases, 11
-  double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< of the state at the last image, 9
-  double nees_at_last = std::numeric_limits<double>::quiet_NaN();     ///< of it, gravity and the biases there, 17
+  double nees_v = std::numeric_limits<double>::quiet_NaN();           ///< V, 3 degrees of freedom
+  double nees_v_g = std::numeric_limits<double>::quiet_NaN();         ///< V and gravity, 5
+  double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< V, gravity and both biases, 11
+  double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< state at the last image, 9
+  double nees_at_last = std::numeric_limits<double>::quiet_NaN();     ///< that state, gravity and the biases there, 17
   ViChiSquared chi2;
   ViErrors errors;
   double scale_of_features = std::numeric_limits<double>::infinity();  ///< %: median of their distances, off 1
@@ -57,7 +57,7 @@ RefinementOutcome walkTrial(const ViInitWindow& window, double noise, CounterRng
 
 /// A window solved in closed form, under its covariance.
 struct ClosedFormOutcome {
-  double nees_v_g = std::numeric_limits<double>::quiet_NaN();  ///< of V and gravity, 5 degrees of freedom
+  double nees_v_g = std::numeric_limits<double>::quiet_NaN();  ///< V and gravity, 5 degrees of freedom
   double nees_all = std::numeric_limits<double>::quiet_NaN();  ///< with the accelerometer's bias, 8; NaN without it
   ViChiSquared chi2;
 };
@@ -81,13 +81,13 @@ GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& window, double noise
 
 /// At rest, without turns, biases drawn from their priors.
 struct RestOutcome {
-  bool stationary = false;                                 ///< what it was called
-  double nees = std::numeric_limits<double>::quiet_NaN();  ///< of gravity and both biases, 8 degrees of freedom
+  bool stationary = false;                                 ///< verdict of the estimator: right
+  double nees = std::numeric_limits<double>::quiet_NaN();  ///< gravity and both biases, 8 degrees of freedom
 };
 RestOutcome restTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 /// A uniform motion, which to an inertial sensor is rest.
 struct SlowOutcome {
-  bool stationary = false;  ///< what it was called, and is not
+  bool stationary = false;  ///< verdict of the estimator: wrong
   bool excluded = false;    ///< it was, and the result says that so fast a motion would have been seen
 };
 /// At 1 m/s among features this many times 2 to 8 m away: to images that is one as much slower among features 2 to 8 m

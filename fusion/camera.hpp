@@ -46,7 +46,7 @@ struct Camera {
   double cu = 0, cv = 0;  ///< principal point, pixels
   Distortion distortion = Distortion::none;
   Eigen::Vector4d coefficients = Eigen::Vector4d::Zero();  ///< see Distortion
-  int width = 0, height = 0;                               ///< of the image, pixels; 0: not known
+  int width = 0, height = 0;                               ///< image size in pixels; 0: unknown
 
   /// The pixel (u, v) that sees a point in the camera's axes (any unit of length), whether the image reaches that far
   /// or not. None for a point behind the camera (an equidistant lens sees beyond 90 degrees, up to where its polynomial

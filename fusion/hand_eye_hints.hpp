@@ -74,14 +74,14 @@ struct HandEyeHintOptions {
   HandEyeReading reading = {};  ///< the one that the result was made with
   /// True if the covariances may have been meant otherwise; false where they come from a model and not from a file.
   bool doubt_a = true, doubt_b = true;
-  HandEyeOptions estimate = {};  ///< those that the result was made with
+  HandEyeOptions estimate = {};  ///< options of the estimate
 };
 
 /// Another reading that fits.
 struct HandEyeHint {
   HandEyeReading reading;
   double chi2_per_degree = 0;  ///< with covariances as given
-  double p = 0;                ///< of a χ² as large; NaN where the noise is not known
+  double p = 0;                ///< probability of a χ² as large; NaN where the noise is not known
   std::size_t outliers = 0;
   bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
 };
@@ -122,12 +122,12 @@ class HandEyeExplanation {
   }
 
  private:
-  static constexpr std::size_t most_pairs = 40;
+  static constexpr std::size_t max_pairs = 40;
 
   /// Not more than are needed, spread over their contents, so that their order does not matter.
   static std::vector<PosePair> some(std::span<const PosePair> given) {
     std::vector<PosePair> pairs(given.begin(), given.end());
-    const std::size_t step = (pairs.size() + most_pairs - 1) / most_pairs;
+    const std::size_t step = (pairs.size() + max_pairs - 1) / max_pairs;
     if (step < 2) return pairs;
     std::sort(pairs.begin(), pairs.end(), [](const PosePair& x, const PosePair& y) {
       const auto p = x.b.mean.params(), q = y.b.mean.params();

@@ -27,15 +27,15 @@ struct NoiseFactor {
   bool isTold() const { return high < 6 * low; }
 };
 
-/// What calibrateNoise() returns.
+/// The result of calibrateNoise().
 struct NoiseCalibration {
   /// ok; undetermined: too few windows meet, or any factor explains them; not_converged: the factors do not settle;
   /// bad_input: see fault.
   FusionStatus status = FusionStatus::bad_input;
   Fault fault;
-  /// Of each density, its walk included. One that is not told stays as near to 1 as its interval lets it.
+  /// Factor of each density, its walk included. One that is not told stays as near to 1 as its interval lets it.
   NoiseFactor gyroscope, accelerometer;
-  /// Of both together, if they are one; likewise.
+  /// Common factor of both densities, if they share one; likewise.
   NoiseFactor common;
   /// The probability that two factors explain the meetings so much better than one, if they are one.
   double common_p = 1;
@@ -44,10 +44,10 @@ struct NoiseCalibration {
   /// The densities with the factors: each its own where they are separable or not one (common_p below 0.05), else the
   /// common one; as they were given unless ok.
   ImuNoise<double> noise;
-  std::size_t windows = 0, meetings = 0;  ///< that took part
-  double chi2 = 0;                        ///< of the meetings with the densities as they were given
-  double calibrated_chi2 = 0;             ///< and with those of `noise`
-  std::size_t degrees_of_freedom = 0;     ///< of either
+  std::size_t windows = 0, meetings = 0;  ///< used
+  double chi2 = 0;                        ///< meetings, with the densities as they were given
+  double calibrated_chi2 = 0;             ///< meetings, with the densities of `noise`
+  std::size_t degrees_of_freedom = 0;     ///< degrees of freedom of both χ²
 };
 
 /// Calibrates the densities of a recording's inertial sensor by its windows. Options as for initialiseRecording();

@@ -183,8 +183,8 @@ enum class TangentPart {
   rotation,     ///< rad
   velocity,     ///< m/s
   log_scale,    ///< natural logarithm of a scale
-  point,        ///< of R^n: m, or whatever unit the coordinates have
-  direction     ///< of S²: rad
+  point,        ///< in R^n: m, or whatever unit the coordinates have
+  direction     ///< on S²: rad
 };
 
 /// The name used in files and messages.

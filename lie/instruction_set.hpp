@@ -18,7 +18,7 @@ namespace liestat {
 
 /// Sets of instructions, each with all of those before it.
 enum class InstructionSet {
-  baseline,  ///< what every processor of the architecture has: SSE2, NEON; registers of 16 bytes
+  baseline,  ///< every processor of the architecture: SSE2, NEON; registers of 16 bytes
   avx2,      ///< AVX2 and FMA; registers of 32 bytes
   avx512     ///< AVX-512 F, DQ, BW and VL; registers of 64 bytes
 };

@@ -1,4 +1,4 @@
-// What follows from the atomic operations of lie/concepts.hpp, once, for every manifold: exp, log, distance and their
+// Operations derived, once for every manifold, from the atomic ones of lie/concepts.hpp: exp, log, distance and their
 // Jacobians at any point, and the traits of a group that acts on itself.
 //
 // Tangent vectors at x are coordinates in the frame that placement(x) carries there (for a group: body frame,
@@ -59,8 +59,8 @@ struct VolumeElement {
 
 }  // namespace detail
 
-/// What every ManifoldTraits specialisation derives from: names, and the defaults of a manifold whose isotropy is
-/// trivial (a placement that is smooth everywhere, tangent coordinates equal to those of the group).
+/// Base of every ManifoldTraits specialisation: names, and the defaults of a manifold whose isotropy is trivial (a
+/// placement that is smooth everywhere, tangent coordinates equal to those of the group).
 template <class M, class Group_>
 struct TrivialIsotropy {
   using Group = Group_;

@@ -51,7 +51,7 @@ class Translation {
 
 namespace detail {
 
-/// What a flat space has in common, M a vector or a translation: no curvature, derivatives that are identities.
+/// Traits shared by flat spaces, M a vector or a translation: no curvature, derivatives that are identities.
 template <class M, class S, int N>
 struct FlatManifold : TrivialIsotropy<M, Translation<S, N>> {
   using Base = TrivialIsotropy<M, Translation<S, N>>;

@@ -1,10 +1,10 @@
-// SE23: extended poses of R^3, SE_2(3): rotation, position and velocity as one Lie group. The state of an inertial
-// sensor, and what its measurements integrate to (Barrau and Bonnabel 2017; Brossard et al. 2022).
+// SE23: extended poses of R^3, the Lie group SE_2(3) of rotation, position and velocity: the state of an inertial
+// sensor, and the increment of preintegrated measurements (Barrau and Bonnabel 2017; Brossard et al. 2022).
 //
 // Storage        qx qy qz qw px py pz vx vy vz; the first seven numbers are an SE3
 // Tangent        (position m, rotation rad, velocity m/s), body frame: x·Exp(v)
 // Matrix form    5×5 matrix [R p v; 0 1 0; 0 0 1]; hat(ρ, φ, ν) = [[φ] ρ ν; 0 0 0; 0 0 0]
-// Action         on points of R^3: R x + p; velocities are only turned
+// Action         on points of R^3: R x + p; the velocity takes no part
 // Identity       (0, 0, 0, 1, 0, 0, 0, 0, 0, 0)
 // Metric         none that is bi-invariant: means by groupMean or MAHA
 // Bad input      NaN in, NaN out; quaternions are normalised on construction
@@ -15,8 +15,8 @@
 namespace liestat {
 namespace detail {
 
-/// Mathematics of SE_2(3) on (quaternion, position, velocity); tangent (ρ, φ, ν). Position and velocity each behave as
-/// the translation of SE(3) does; they do not mix.
+/// Mathematics of SE_2(3) on (quaternion, position, velocity); tangent (ρ, φ, ν). Position and velocity each
+/// transform as the translation of SE(3) does, independently of each other.
 template <class S>
 struct Se23Math {
   using Scalar = S;
@@ -86,7 +86,7 @@ struct Se23Math {
     t << m.template block<3, 1>(0, 3), Rotation::vee(m.template topLeftCorner<3, 3>()), m.template block<3, 1>(0, 4);
     return t;
   }
-  /// [D P 0; 0 D 0; 0 V D], the form of every matrix on the algebra.
+  /// The block form [D P 0; 0 D 0; 0 V D] of Adj, ad and the Jacobians.
   static Square blocks(const Matrix3& D, const Matrix3& P, const Matrix3& V) {
     const Matrix3 zero = Matrix3::Zero();
     Square m;
@@ -134,7 +134,7 @@ struct Se23Math {
 template <class Scalar_, int Options_ = 0>
 class SE23;
 
-/// Interface of SE23 over owned or viewed memory: so3() and translation() as SE3 has them, pose() and velocity().
+/// Interface of SE23 over owned or viewed memory: so3() and translation() as in SE3, pose() and velocity().
 template <class Derived>
 class SE23Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> {
   using Base = detail::GroupBase<Derived>;
@@ -145,10 +145,10 @@ class SE23Base : public detail::PoseAccess<Derived, detail::GroupBase<Derived>> 
   using Base::operator*;
   using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
 
-  /// Rotation and position, viewed in place.
+  /// The pose, rotation and position, viewed in place.
   Eigen::Map<const SE3<Scalar>> pose() const { return Eigen::Map<const SE3<Scalar>>(data()); }
   detail::PartView<Derived, SE3<Scalar>> pose() { return detail::PartView<Derived, SE3<Scalar>>(data()); }
-  /// The velocity (m/s), viewed in place, in the axes in which the position is.
+  /// The velocity (m/s) in the axes of the position, viewed in place.
   Eigen::Map<const Vector3> velocity() const { return Eigen::Map<const Vector3>(data() + 7); }
   detail::PartView<Derived, Vector3> velocity() { return detail::PartView<Derived, Vector3>(data() + 7); }
 };
@@ -183,7 +183,7 @@ class SE23 : public SE23Base<SE23<Scalar_, Options_>> {
       : SE23(SO3<Scalar_>(R), position, velocity) {}
   template <class D>
   SE23(const SE3Base<D>& pose, const Vector3& velocity) : SE23(pose.so3(), Vector3(pose.translation()), velocity) {}
-  /// From a matrix of the form matrix(), rotation part orthogonal up to rounding.
+  /// From a 5×5 matrix as matrix() returns it, with a rotation part that is orthogonal up to rounding.
   explicit SE23(const Matrix5& T)
       : SE23(Matrix3(T.template topLeftCorner<3, 3>()), Vector3(T.template block<3, 1>(0, 3)),
              Vector3(T.template block<3, 1>(0, 4))) {}

@@ -99,7 +99,7 @@ struct SimpleManifold : detail::SimpleChordalMoments<M, Model, toModel, fromMode
     return Traits::hessianHalfSquaredDistance(z);
   }
 
-  // What the model's traits say besides.
+  // Optional members of the model's traits.
   static auto transvection(const M& x) requires requires(const Model& y) { Traits::transvection(y); }
   { return Traits::transvection(toModel(x)); }
   static auto transvectionJacobian() requires requires { Traits::transvectionJacobian(); }

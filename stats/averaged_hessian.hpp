@@ -1,12 +1,11 @@
-// The Hessian of a mean's criterion averaged over the region in which the truth is believed to be. Needs Eigen alone.
+// The Hessian of a mean's criterion averaged over the confidence region of the mean. Needs Eigen alone.
 //
-// A covariance H⁻¹ S H⁻¹ takes the slope of the gradient at the mean for the slope across the whole region between mean
-// and truth. Among scattered data these differ. Where two geodesics to a datum are equally long the gradient jumps, and
-// no Hessian of a sample sees it (docs/theory/means.md, section 7.5); on the sphere the curvature diverges towards the
-// antipode; and of several places the minimum of a sample is found where the criterion happens to be steep. So the
-// slope is measured: with v ~ N(0, C), g(v) the gradient at exp(mean, v), E[g(v) vᵀ] C⁻¹ is the average of the Hessian
-// over that normal law (Stein's identity; docs/theory/means.md, section 7.6), kinks and all. It needs nothing but log,
-// and weighs the effect of data near the cut locus on the estimate, not their mass.
+// A covariance H⁻¹ S H⁻¹ assumes that the slope of the gradient at the mean holds between mean and truth. With
+// scattered data it does not: the gradient jumps where two geodesics to a datum are equally long, which the Hessian of
+// a sample never contains (docs/theory/means.md, section 7.5); the curvature of the sphere diverges towards the
+// antipode; and the minimum of a sample tends to lie where its criterion is steep by chance. The Hessian averaged over
+// v ~ N(0, C) accounts for all three. By Stein's identity it is E[g(v) vᵀ] C⁻¹, g(v) the gradient at exp(mean, v),
+// kinks included (section 7.6): it needs log alone, and data near the cut locus count by their effect on the gradient.
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
@@ -27,39 +26,39 @@
 
 namespace liestat {
 
-/// What averagedHessian() returns.
+/// The result of averagedHessian().
 template <Metric M>
 struct AveragedHessian {
-  SquareOf<M> hessian = SquareOf<M>::Zero();  ///< that at the mean where it was not averaged
-  /// 1 - the least eigenvalue relative to the Hessian at the mean: 0 unchanged, 1 the criterion is flat; NaN where that
-  /// Hessian is not positive definite.
+  SquareOf<M> hessian = SquareOf<M>::Zero();  ///< the averaged Hessian, or that at the mean if not averaged
+  /// 1 - the least eigenvalue relative to the Hessian at the mean: 0 unchanged, 1 a flat criterion; NaN if that Hessian
+  /// is not positive definite.
   double change = 0;
-  bool averaged = false;  ///< false: no datum's cut locus is near the region, and nothing was done
+  bool averaged = false;  ///< false: the cut loci of all data are far from the region
 };
 
 namespace detail {
 
-/// The lower factor of the region's covariance in the coordinates over which a Hessian is averaged; NaN if it has none.
+/// The lower Cholesky factor of the region's covariance in the coordinates that are averaged over; NaN if it has none.
 template <Metric M>
 auto regionFactor(const SquareOf<M>& covariance) {
   constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
   using Matrix = Eigen::Matrix<double, K, K>;
   Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
-  region.diagonal().array() += least_region * least_region;
+  region.diagonal().array() += min_region_sigma * min_region_sigma;
   return Matrix(lowerFactor<K>(region));
 }
 
-/// True if the sums of a mean prove that findAveragedHessian averages nothing over `width` times the region of a covariance.
+/// True if the sums of a mean prove that findAveragedHessian does not average over `width` times a covariance's region.
 template <Metric M>
 bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, double width) {
   if constexpr (Factored<M>) {
     return false;
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
-    // The norm of the region's factor needs no factor. A region that has none has a trace too large, or none.
+    // The Frobenius norm of the factor is the root of the trace. If there is no factor, the trace is too large or NaN.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
     const double squares = width * width * static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) +
-                           K * least_region * least_region;
-    return leastDistanceToCutLocus(mean) > 1.5 * std::sqrt(squares) * NormalNodes<K>::instance().longest();
+                           K * min_region_sigma * min_region_sigma;
+    return leastDistanceToCutLocus(mean) > cut_locus_margin * std::sqrt(squares) * NormalNodes<K>::instance().longest();
   } else {
     return true;
   }
@@ -94,8 +93,8 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
       result.change = std::numeric_limits<double>::quiet_NaN();
       return result;
     }
-    if (leastDistanceToCutLocus(mean) > 1.5 * longestReach<K>(L) ||
-        distanceToCutLocus(samples, mean.mean) > 1.5 * reachOf<K>(L)) {
+    if (leastDistanceToCutLocus(mean) > cut_locus_margin * longestReach<K>(L) ||
+        distanceToCutLocus(samples, mean.mean) > cut_locus_margin * reachOf<K>(L)) {
       result.averaged = false;
       return result;
     }
@@ -129,7 +128,7 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
     }
     const Matrix relative = factor.halfSolve(Matrix(factor.halfSolve(slope).transpose()));
     result.change = 1 - Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[0];
-    // Of many data the ratio is carried over to the Hessian of all.
+    // A thinned sample gives the relative change, which is applied to the Hessian of all data.
     Matrix averaged = slope;
     if (stride > 1) {
       const Matrix all = mean.hessian.template block<K, K>(begin, begin).template cast<double>();
@@ -143,9 +142,9 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
 
 }  // namespace detail
 
-/// The Hessian of ½ Σ p_i d²(·, x_i) averaged over the normal law about the mean of the given covariance (local frame,
-/// rad², no less than 0.05 rad wide): the slope of the gradient across that region. Metric manifolds; of frames the
-/// rotation's block, of products each factor by itself. Of more than 4096 data every m-th is taken.
+/// The Hessian of ½ Σ p_i d²(·, x_i) averaged over the normal distribution about the mean with the given covariance
+/// (local frame, rad²; 0.05 rad are added to it in quadrature). Metric manifolds; frames average the rotation's block,
+/// products each factor by itself. More than 4096 data are thinned to every m-th. Bad weights: `change` is NaN.
 template <detail::AnyRange R, class M = detail::MetricInSignature<R>>
 AveragedHessian<M> averagedHessian(R&& samples, const MeanResult<std::type_identity_t<M>>& mean,
                                    const SquareOf<M>& covariance) {

@@ -35,7 +35,7 @@ struct Concentration {
 
   /// Less than a quarter of the scatter of uniform features: few of them are near the cut locus of their mean.
   bool isModest() const { return mean_square <= 0.25 * uniform; }
-  /// Of the factors of a product the most scattered counts.
+  /// Keeps the more scattered of two factors of a product.
   void worsen(const Concentration& factor) {
     if (concentrated != factor.concentrated ? concentrated
                                             : !(factor.mean_square * uniform <= mean_square * factor.uniform)) {

@@ -60,7 +60,7 @@ struct LinearConstraint {
 
 namespace detail {
 
-/// What stands for all measurements, as a list of one, or a range with an element for each.
+/// A list of one element that stands for all measurements, or a range with an element for each.
 template <class T>
 struct OneOrMany {
   using type = T;
@@ -178,7 +178,7 @@ class ConstrainedEstimator {
     if (result_.end == ConstrainedEnd::running) finish(ConstrainedEnd::stopped);
   }
 
-  /// What has been reached. Covariance and distances are those of the end.
+  /// The state reached so far. Covariance and distances are set once the iteration has ended.
   const ConstrainedResult<Q>& result() const { return result_; }
   /// The corrected measurements of channel `I`, and one with the covariance of its error.
   template <std::size_t I = 0>
@@ -193,7 +193,7 @@ class ConstrainedEstimator {
   auto correctedCovariance(std::size_t i) const {
     return std::get<I>(states_).covarianceOf(i, result_.covariance.template cast<double>());
   }
-  /// What ‖m̃_i - m_i‖²_{Q_i} is expected to be: p_i - tr(S_i⁻¹ C_i Λ C_iᵀ).
+  /// E‖m̃_i - m_i‖²_{Q_i} = p_i - tr(S_i⁻¹ C_i Λ C_iᵀ).
   template <std::size_t I = 0>
   double expectedCorrection(std::size_t i) const {
     return std::get<I>(states_).expectedSquare(i, result_.covariance.template cast<double>());

@@ -1,4 +1,4 @@
-// What a constrained estimate takes and returns. The estimator is in stats/constrained.hpp; readers of results need
+// Options and results of constrained estimation. The estimator is in stats/constrained.hpp; readers of results need
 // this header alone.
 #pragma once
 
@@ -84,8 +84,8 @@ struct ConstraintDerivatives {
   Eigen::Matrix<double, P, N> by_parameter;
 };
 
-/// What is believed of the parameter before: its value and the information matrix of its error in the local frame,
-/// positive semi-definite.
+/// Prior of the parameter: its value and the information matrix of its error in the local frame, positive
+/// semi-definite.
 template <Homogeneous Q>
 struct ParameterPrior {
   Q mean = ManifoldTraits<Q>::origin();
@@ -120,10 +120,10 @@ struct ConstrainedResult {
   /// E² of (13) and (17): the squared distance from what was estimated to the equations linearised there.
   double equation_error = std::numeric_limits<double>::quiet_NaN();
   int free_parameters = 0;                          ///< dimension of what the constraints leave free
-  int equations = 0;                                ///< of the measurements, independent ones
+  int equations = 0;                                ///< independent equations of the measurements
   int dropped_equations = 0;                        ///< redundant without having said so, or with a gradient of zero
-  int constraints = 0;                              ///< of the parameter, independent ones
-  int dropped_constraints = 0;                      ///< of the parameter: redundant, or with a gradient of zero
+  int constraints = 0;                              ///< independent constraints of the parameter
+  int dropped_constraints = 0;                      ///< redundant, or with a gradient of zero
   std::size_t measurements = 0, uninformative = 0;  ///< all; those whose free directions take up all their equations
   int iterations = 0;
   bool used_curvature = false;

@@ -18,6 +18,7 @@
 #include <lie/detail/small_products.hpp>
 #include <lie/euler.hpp>
 #include <lie/se3.hpp>
+#include <lie/units.hpp>
 #include <stats/gaussian.hpp>
 
 #include <cmath>
@@ -178,7 +179,7 @@ constexpr double unitsPerRadian(RotationUnit unit) {
     case RotationUnit::double_angle:
       return 2;
     case RotationUnit::degree:
-      return 180 / static_cast<double>(EIGEN_PI);
+      return 1 / units::degree;
     default:
       return 1;
   }

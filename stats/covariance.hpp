@@ -15,7 +15,7 @@
 
 namespace liestat {
 
-/// What a covariance from residuals assumes of the weights.
+/// Assumption of a covariance from residuals about the weights.
 enum class ResidualNoise {
   scaled,  ///< Cov(z_i) = Σ/p_i with one unknown Σ: exact small-sample law (Hotelling)
   any      ///< any independent noise: consistent for many data only

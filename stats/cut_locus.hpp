@@ -31,7 +31,7 @@ struct CutLocusMass {
   /// Largest relative change of the Hessian by the kinks of the squared distance (see cutLocusMass).
   double hessian_change = 0;
 
-  /// Of the factors of a product the one that has more of it counts.
+  /// Keeps the larger change of two factors of a product.
   void worsen(const CutLocusMass& factor) {
     if (!std::isnan(hessian_change) && !(factor.hessian_change < hessian_change)) *this = factor;
   }

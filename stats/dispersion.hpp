@@ -23,7 +23,7 @@ struct FarthestFeature {
   std::size_t index = 0;  ///< in the range; the first of those that are equal but for rounding
 };
 
-/// What dispersionAbout() returns.
+/// The result of dispersionAbout().
 template <Homogeneous M>
 struct Dispersion {
   SquareOf<M> covariance = SquareOf<M>::Zero();  ///< Σ p_i z_i z_iᵀ / Σ p_i, z_i = log(y, x_i)

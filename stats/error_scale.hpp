@@ -56,7 +56,7 @@ inline ErrorThreshold histogramThreshold(std::span<const double> errors, double 
   return none;
 }
 
-/// What scaleFromMoments() returns. Without a root T is NaN.
+/// The result of scaleFromMoments(). Without a root T is NaN.
 struct MomentScale {
   double T = std::numeric_limits<double>::quiet_NaN();  ///< squared, as that of Relevance
   std::size_t kept = 0;                                 ///< errors below it
@@ -85,7 +85,7 @@ inline MomentScale scaleFromMoments(std::span<const double> errors, const Moment
   }
   std::sort(e.begin(), e.end());
   MomentScale found;
-  double sum[4] = {};  // of the powers of the errors below T, in units of the k-th
+  double sum[4] = {};  // power sums of the errors below T, in units of the k-th
   for (std::size_t k = 0; k < e.size(); ++k) {
     const double unit = e[k], shrink = k > 0 && unit > 0 ? e[k - 1] / unit : 1;
     for (int n = 0; n < 4; ++n) sum[n] = sum[n] * std::pow(shrink, n) + 1;

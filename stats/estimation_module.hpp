@@ -240,7 +240,7 @@ class EstimationModule {
     if (now->progress == HierarchyState::terminated && !std::exchange(was_terminated_, true)) send(options_.terminated);
   }
 
-  // Of the thread that runs the module.
+  // Used by the thread that runs the module alone.
   Factory factory_;
   Options options_;
   mutable std::mutex mutex_;
@@ -250,13 +250,13 @@ class EstimationModule {
   std::set<Key> changed_;  // since the last step
   std::shared_ptr<const Output> output_;
   std::atomic<ModuleControl> control_ = ModuleControl::stopped;
-  // Of the thread that runs the module again.
+  // Used by the thread that runs the module alone, again.
   Search search_;
   std::map<Key, Id> ids_;
   std::unordered_map<Id, Key> keys_;
   std::size_t wait_ = 0;                    // steps before inputs are taken in again
   std::optional<std::uint64_t> published_;  // the revision of output_
-  // What was signalled.
+  // State of the signals.
   std::optional<std::string> found_;
   bool was_below_ = false, was_terminated_ = false;
 };

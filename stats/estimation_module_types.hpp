@@ -1,4 +1,4 @@
-// What an estimation module takes and returns. The module is in stats/estimation_module.hpp.
+// Inputs and outputs of an estimation module. The module is in stats/estimation_module.hpp.
 #pragma once
 
 #include <stats/hierarchy_types.hpp>
@@ -26,8 +26,8 @@ constexpr const char* name(ModuleControl control) {
 template <class Parameter>
 struct ModuleOutput {
   HierarchyState progress = HierarchyState::initial;
-  std::string fault = {};        ///< what is wrong with the models; nothing is then estimated
-  std::size_t measurements = 0;  ///< that were there, inliers or not
+  std::string fault = {};        ///< why the models are invalid; nothing is then estimated
+  std::size_t measurements = 0;  ///< all that were there, inliers or not
   std::string model = {};        ///< chosen, the null model while there is nothing else
   /// Status, parameter, information and covariance, D² (`chi2`), E² (`equation_error`). Empty while there is no estimate.
   std::optional<ModelEstimate<Parameter>> estimate = {};
@@ -49,7 +49,7 @@ struct ModuleOptions {
   Signal model_found = {};    ///< a supported model is chosen, another one than before or after a new state
   Signal terminated = {};     ///< nothing is left to do; again after new inputs
   Signal cost_below = {};     ///< the criterion of a supported model has fallen below `cost_threshold`
-  double cost_threshold = 0;  ///< of the normalised criterion; 0: no such signal
+  double cost_threshold = 0;  ///< bound on the normalised criterion; 0: no such signal
 };
 
 }  // namespace liestat

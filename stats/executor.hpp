@@ -50,7 +50,7 @@ constexpr ChunkRange chunkRange(std::size_t n, std::size_t n_chunks, std::size_t
 
 namespace detail {
 
-/// What a chunk's map returns, by value.
+/// The return type of a chunk's map, by value.
 template <class Map>
 using ChunkResult = std::remove_cvref_t<std::invoke_result_t<Map&, std::size_t>>;
 

@@ -12,7 +12,7 @@
 
 namespace liestat {
 
-/// What groupMean() returns. Matrices are in the body frame at the mean.
+/// The result of groupMean(). Matrices are in the body frame at the mean.
 template <LieGroup G>
 struct GroupMeanResult {
   G mean;
@@ -23,7 +23,7 @@ struct GroupMeanResult {
   double sum_of_weights = 0;
   SquareOf<G> scatter = SquareOf<G>::Zero();   ///< Σ p_i z_i z_iᵀ
   SquareOf<G> jacobian = SquareOf<G>::Zero();  ///< Σ p_i J_l⁻¹(z_i): minus the derivative of Σ p_i z_i
-  Concentration concentration;                 ///< of the rotations, the most scattered where there are several
+  Concentration concentration;  ///< concentration of the rotations, the most scattered where there are several
 
   /// Σ p_i z_i z_iᵀ / Σ p_i
   SquareOf<G> dispersion() const { return scatter / ScalarOf<G>(sum_of_weights); }

@@ -164,7 +164,7 @@ class Hierarchy {
   }
   /// Grows with every change of estimates, inliers or verdicts.
   std::uint64_t revision() const { return revision_; }
-  /// What is known of a model, by its number in models().
+  /// State of a model, by its number in models().
   const State& state(std::size_t model) const { return states_[model]; }
   const std::vector<State>& states() const { return states_; }
   std::size_t nullModel() const { return null_; }
@@ -229,7 +229,7 @@ class Hierarchy {
   }
 
  private:
-  /// Of the models that are not rejected, the most specific ones, and of those the best.
+  /// The best of the most specific models that are not rejected.
   template <class Survives>
   std::size_t bestOf(const Survives& survives) const {
     std::vector<std::size_t> chosen;
@@ -295,12 +295,12 @@ class Hierarchy {
   void checkLimits() {
     for (const auto& model : models_) {
       if (!fault_.empty()) return;
-      if (model->sampleSize() > detail::most_sampled) {
+      if (model->sampleSize() > detail::max_sampled) {
         fault_ = model->name() + " has minimal samples of " + std::to_string(model->sampleSize()) + ", " +
-                 std::to_string(detail::most_sampled) + " at most are drawn";
-      } else if (model->equations() < 1 || model->equations() > detail::most_equations) {
+                 std::to_string(detail::max_sampled) + " at most are drawn";
+      } else if (model->equations() < 1 || model->equations() > detail::max_equations) {
         fault_ = model->name() + " has " + std::to_string(model->equations()) + " equations, they are 1 to " +
-                 std::to_string(detail::most_equations);
+                 std::to_string(detail::max_equations);
       }
     }
     const bool is_share = options_.outlier_share > 0 && options_.outlier_share < 1;
@@ -308,7 +308,7 @@ class Hierarchy {
   }
 
   double knownThreshold(int equations) const {
-    return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::most_equations))];
+    return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::max_equations))];
   }
   /// The threshold for one measurement, from that of measurements with the usual number of equations.
   double limitOf(std::size_t m, double threshold, std::size_t i) const {
@@ -362,7 +362,7 @@ class Hierarchy {
     if (s == 0) return 1;
     const double found =
         draws_[m].hasBest() ? static_cast<double>(draws_[m].best().inliers) / static_cast<double>(size()) : 0;
-    return std::min(options_.max_draws, sampleCount(std::max(found, options_.least_share), s, options_.confidence));
+    return std::min(options_.max_draws, sampleCount(std::max(found, options_.min_share), s, options_.confidence));
   }
   typename Draws::Guide guideOf(std::size_t m, std::size_t draw) const {
     typename Draws::Guide guide;

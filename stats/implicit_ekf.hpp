@@ -84,17 +84,17 @@ struct ImplicitEkfOptions {
   double max_inconsistency = 3;
 };
 
-/// What an update did. NIS is the normalised innovation squared at the prior, hᵀ S⁻¹ h: it follows χ² with
+/// The result of an update. NIS is the normalised innovation squared at the prior, hᵀ S⁻¹ h: it follows χ² with
 /// `degrees_of_freedom`, the rank of S, where state and noise are what they are said to be.
 template <Homogeneous X>
 struct FilterUpdate {
   FilterStatus status = FilterStatus::ok;
   TangentOf<X> step = TangentOf<X>::Zero();  ///< in the frame at the prior's mean; what was or would have been applied
-  double nis = 0;                            ///< of all measurements that passed their gates; dense form: of any
+  double nis = 0;                            ///< NIS of all measurements that passed their gates; dense form: of any
   int degrees_of_freedom = 0;
   int iterations = 0;
-  std::size_t measurements = 0;  ///< that were used
-  std::size_t gated = 0;         ///< that were not
+  std::size_t measurements = 0;  ///< measurements used
+  std::size_t gated = 0;         ///< measurements left out by their gates
 
   bool ok() const { return status == FilterStatus::ok; }
 };
@@ -105,7 +105,7 @@ struct DenseFilterUpdate : FilterUpdate<X> {
   Eigen::Matrix<double, P, 1> innovation = Eigen::Matrix<double, P, 1>::Zero();  ///< h at the prior
   /// S at the prior; singular where equations are redundant.
   Eigen::Matrix<double, P, P> innovation_covariance = Eigen::Matrix<double, P, P>::Zero();
-  double inconsistency = 0;  ///< of redundant equations, in standard deviations; 0 without any
+  double inconsistency = 0;  ///< largest contradiction of redundant equations, in standard deviations; 0 without any
 };
 
 namespace detail {
@@ -176,7 +176,7 @@ bool isFinite(const Gaussian<X>& g) {
 
 }  // namespace detail
 
-/// What updateAll() hands to its argument: sums over independent measurements, linear in their number.
+/// The argument of updateAll()'s callback: sums over independent measurements, linear in their number.
 template <Homogeneous X>
 class InformationSums {
  public:

@@ -1,4 +1,4 @@
-// What maha() of stats/maha.hpp is told and what it returns.
+// Options and results of maha() of stats/maha.hpp.
 #pragma once
 
 #include <lie/manifold.hpp>
@@ -35,7 +35,7 @@ struct MahaOptions {
   bool likelihood = false;
 };
 
-/// What maha() returns. Matrices are in the local frame at the mean.
+/// The result of maha(). Matrices are in the local frame at the mean.
 template <Homogeneous M>
 struct MahaResult {
   M mean = ManifoldTraits<M>::origin();

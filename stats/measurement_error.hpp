@@ -1,4 +1,4 @@
-// The error of a measurement under a parameter that was estimated without it: how far it must be corrected to meet its
+// The error of a measurement under a given parameter: the size of the correction with which the measurement meets its
 // equations (Viéville, Lingrand and Gaspard 2000, (22) to (24), with derivatives by the measurement). Robust search
 // classifies inliers and outliers by it.
 #pragma once
@@ -15,20 +15,19 @@ namespace liestat {
 /// The result of measurementError().
 template <Homogeneous M>
 struct MeasurementError {
-  double squared = 0;  ///< ‖m̃ - m‖²_Q; of an inlier of the true parameter χ² with `equations` degrees of freedom
-  double remaining =
-      0;  ///< ‖c(m̃)‖² in units of the noise, the second term of (24): how far the steps were from the end
-  int equations = 0;  ///< independent ones
-  M corrected = ManifoldTraits<M>::origin();
+  double squared = 0;  ///< ‖m̃ - m‖²_Q; χ² with `equations` degrees of freedom for an inlier of the true parameter
+  double remaining = 0;  ///< ‖c(m̃)‖² in units of the noise, second term of (24): zero once the steps have converged
+  int equations = 0;     ///< number of independent equations
+  M corrected = ManifoldTraits<M>::origin();  ///< m̃
 
-  /// Per equation, (24).
+  /// Squared error per equation, (24).
   double normalised() const { return equations > 0 ? squared / equations : 0; }
 };
 
-/// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which is what a search needs; two or three
-/// classify where equations are curved. A measurement without equations (gradients of zero, or free in all of them) has
-/// none and no error; numbers that are not finite and a noise that is not valid give NaN. Where an equation does not hold
-/// and all coordinates that it depends on are exact the error is infinite.
+/// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which suffices for a search; strongly curved
+/// equations need two or three. A measurement without equations (zero gradients, or free in all of them) has the error
+/// zero. NaN for input that is not finite and for invalid noise; infinite if an equation is violated and all
+/// coordinates that it depends on are exact.
 template <Homogeneous Q, Homogeneous M, NoiseModel Noise, class Equation>
 MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise, const Equation& equation,
                                      int steps = 1) {

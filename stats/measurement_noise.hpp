@@ -93,7 +93,7 @@ struct SemidefiniteParts {
       }
     }
     if (!scaled.allFinite() || skewed > 1e-6) return;
-    // Of a symmetric matrix singular vectors are eigenvectors, u = -v where the eigenvalue is negative.
+    // Singular vectors of a symmetric matrix are eigenvectors, with u = -v where the eigenvalue is negative.
     const SmallSvd svd(BasicSmallMatrix<N>::template of<N, N>(scaled));
     const double least = 10 * N * std::numeric_limits<double>::epsilon() * svd.value(0);
     valid = true;

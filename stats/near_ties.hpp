@@ -48,7 +48,7 @@ struct NearTie {
   double log_likelihood_ratio = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// What nearTies() takes for a rival.
+/// Criteria by which nearTies() accepts a rival.
 struct NearTieOptions {
   double significance = 0.00135;  ///< one-sided, of Student's law; that of three standard deviations of a normal one
   double log_likelihood_ratio = 4.5;  ///< where the noise is known: less is a rival; half of three squared
@@ -83,7 +83,7 @@ std::vector<M> startsOfRivals(const R& samples, const MeanResult<M>& mean) {
   return starts;
 }
 
-/// Of very many data every m-th with its weight, for descents that end near a minimum of all; else nothing.
+/// Every m-th of very many data with its weight, for descents that end near a minimum of all; else nothing.
 template <Metric M>
 struct Part {
   std::vector<M> features;
@@ -114,7 +114,7 @@ bool isFarFromRivals(const MeanResult<M>& mean) {
 /// The noise of the data where it is not known.
 struct NoNoise {};
 
-/// Of a product: that of the I-th factor.
+/// The noise of the I-th factor of a product.
 template <std::size_t I, Metric M, class Noise>
 struct FactorNoise {
   const Noise& noise;

@@ -1,5 +1,5 @@
-// What becomes of a covariance when features are composed, inverted, compared, moved, or put into any differentiable
-// function (first order; composeFourthOrder for more).
+// Propagation of covariance: features composed, inverted, compared, moved, or put into any differentiable function
+// (first order; composeFourthOrder for more).
 //
 // Errors are in the library's convention, x·Exp(e) with e ~ N(0, Σ) in the local frame, at the inputs and at the
 // result. First order means that the result's error is the linear image of the inputs' errors: right up to relative
@@ -89,8 +89,8 @@ template <class G, class P>
     return {f * p, linear * G::Dx_exp_x_times_point_at_0(p), linear};
   }
 
-/// What a user's function returned, as a feature of its own: Eigen's expressions and views are evaluated, a number is a
-/// point of the line.
+/// The return value of a user's function as a feature of its own: Eigen's expressions and views are evaluated, a number
+/// is a point of the line.
 template <class S, class R>
 auto asFeature(const R& result) {
   if constexpr (std::is_same_v<R, S>) {

@@ -30,7 +30,7 @@ struct RepeatedExtractionOptions {
   int rounds = 5;
 };
 
-/// What was found: a model and its inliers.
+/// A structure that was found: a model and its inliers.
 template <class Parameter>
 struct ExtractedStructure {
   std::size_t model = 0;  ///< its number in the list of models
@@ -71,7 +71,7 @@ class RepeatedExtraction {
   }
   bool terminated() const { return ended_; }
 
-  /// What has been found so far, in the order in which it was.
+  /// The structures found so far, in order of their discovery.
   const std::vector<Structure>& structures() const { return structures_; }
   /// The measurements that no structure has, by their places in the caller's order.
   std::vector<std::size_t> rest() const { return placesOf(none); }
@@ -152,7 +152,7 @@ class RepeatedExtraction {
     const auto& model = *models_[structure.model];
     const int usual = model.equations(), here = model.equationsOf(measurements_[i]);
     const auto known = [&](int equations) {
-      return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::most_equations))];
+      return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::max_equations))];
     };
     return here == usual ? structure.state.threshold : structure.state.threshold * known(here) / known(usual);
   }

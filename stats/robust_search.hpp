@@ -70,13 +70,13 @@ struct RobustSearchOptions {
   double rejection_risk = 0;
   /// Hypotheses that score no more than this are nothing: they never become the best, and are given up early before
   /// there is any.
-  double least_score = -std::numeric_limits<double>::infinity();
+  double min_score = -std::numeric_limits<double>::infinity();
   /// Improve each hypothesis that is better than those before it by the model's polish(), where it has one.
   bool local_optimisation = true;
   int polish_rounds = 4;  ///< at most; fewer where the score does not rise
 };
 
-/// What a search has found. Without a parameter nothing fitted yet.
+/// The result of a search. Without a parameter nothing fitted yet.
 template <class Parameter>
 struct RobustEstimate {
   std::optional<Parameter> parameter;
@@ -199,7 +199,7 @@ class RobustSearch {
   /// The j-th look takes 6/(πj)² of the risk, which adds up to all of it.
   bool isHopeless([[maybe_unused]] const Parameter& parameter, [[maybe_unused]] CounterRng& rng) {
     if constexpr (rejects) {
-      const double to_beat = std::max(unpolished_, options_.least_score);
+      const double to_beat = std::max(unpolished_, options_.min_score);
       if (!options_.early_rejection || !(to_beat > -std::numeric_limits<double>::infinity())) return false;
       const std::size_t n = model_->size();
       const double all = static_cast<double>(n), range = 1 - Rule::lowest;
@@ -237,7 +237,7 @@ class RobustSearch {
     } else {
       estimate.score = rule_(errors_);
     }
-    if (!(estimate.score > std::max(to_beat, options_.least_score))) return false;
+    if (!(estimate.score > std::max(to_beat, options_.min_score))) return false;
     listInliers(errors_, estimate.inliers);
     estimate.parameter = parameter;
     estimate.refined = false;

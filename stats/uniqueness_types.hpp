@@ -1,4 +1,4 @@
-// What uniqueness() of stats/uniqueness.hpp is told and what it returns.
+// Options and results of uniqueness() of stats/uniqueness.hpp.
 #pragma once
 
 #include <lie/manifold.hpp>
@@ -9,7 +9,7 @@
 
 namespace liestat {
 
-/// What is known about the minimum of the criterion.
+/// Uniqueness of the criterion's minimum.
 enum class Uniqueness {
   unique,        ///< proven: no other feature has as small a cost
   ambiguous,     ///< there are others of equal cost, up to the tolerance
@@ -33,7 +33,7 @@ constexpr const char* name(Uniqueness uniqueness) {
 struct UniquenessOptions {
   /// Search globally where the cheap certificates fail: microseconds for tight data, some seconds at the budget.
   bool branch_and_bound = true;
-  /// Of the search: so many looks from a cell at a datum, or at a bin of data where there are thousands, each some 20 to
+  /// Limit of the search: looks from a cell at a datum, or at a bin of data where there are thousands, each some 20 to
   /// 40 ns. Ten data are searched by millions of cells, a thousand by tens of thousands.
   std::size_t budget = 100'000'000;
   /// Minima are rivals if their costs differ by less than this, relative (at least 64 eps of the scalar), and they are
@@ -46,7 +46,7 @@ struct UniquenessOptions {
   std::function<bool()> stop = {};
 };
 
-/// What uniqueness() returns.
+/// The result of uniqueness().
 template <Homogeneous M>
 struct UniquenessResult {
   Uniqueness unique = Uniqueness::not_certified;
@@ -58,7 +58,7 @@ struct UniquenessResult {
   /// r*, the radius about the minimiser in which the criterion is convex and has no other minimum, rad (localRadius());
   /// for directions in a cloud a lower bound of it.
   double r_star = 0;
-  std::size_t cells = 0;     ///< of the global search; 0: it was not needed
+  std::size_t cells = 0;     ///< cells of the global search; 0: it was not needed
   const char* proof = "";    ///< which certificate holds, in words
   bool more_rivals = false;  ///< ambiguous, and `rivals` are not all: they form a continuum, or the search ended early
 };

@@ -1,4 +1,4 @@
-// What a Monte-Carlo validation found: the distances with their statistics, and the verdict on the covariance (needs
+// Report of a Monte-Carlo validation: the distances with their statistics, and the verdict on the covariance (needs
 // Boost.Math). stats/validation.hpp makes such reports.
 //
 // Source: X. Pennec, "Computing the mean of geometric features", INRIA RR-3371, 1998, section 5.2 (validation index).
@@ -19,7 +19,7 @@
 
 namespace liestat {
 
-/// What one trial says. A trial has failed if it says so, or if mu2 is not a finite number ≥ 0.
+/// The outcome of one trial. A trial has failed if it says so, or if mu2 is not a finite number ≥ 0.
 ///
 /// Further numbers of which the report shall give mean and standard deviation (norms of errors, logarithms of ratios)
 /// are members of a type derived from this, which lists them. Not finite: absent in this trial. Failed trials: ignored.
@@ -60,17 +60,17 @@ struct ValidationTolerance {
   double tail = 0;
 };
 
-/// What ValidationTolerance::tail is about.
+/// Level of the quantile that ValidationTolerance::tail refers to.
 inline constexpr double tail_level = 0.999;
 
 /// Observed frequency of mu2 ≤ the quantile of the reference law at `level`.
 struct Coverage {
   double level = 0;
   double observed = 0;
-  double standard_error = 0;  ///< of `observed` under the reference law (binomial)
+  double standard_error = 0;  ///< binomial standard error of `observed` under the reference law
 };
 
-/// What is said of an estimator.
+/// Verdict on an estimator.
 enum class ValidationVerdict {
   passed,
   no_trial_succeeded,
@@ -79,7 +79,7 @@ enum class ValidationVerdict {
   index_too_small,  ///< covariances are too large
   wrong_law,        ///< the Kolmogorov-Smirnov distance is too large
   heavy_tail,       ///< too many distances beyond the law's 99.9 % quantile
-  // What is promised of errors, which follow no law.
+  // Bounds on errors, which follow no law.
   median_too_large,
   quantile_too_large,  ///< the 95 % quantile
   success_too_seldom   ///< the right answer was not found often enough
@@ -147,10 +147,10 @@ struct HistogramBin {
   double expected = 0;  ///< the mean density of the reference law over the bin
 };
 
-/// What a validation run found. Numbers that cannot be computed (no trial succeeded; a law without variance) are NaN or
-/// infinite.
+/// The result of a validation run. Numbers that cannot be computed (no trial succeeded; a law without variance) are NaN
+/// or infinite.
 struct ValidationReport {
-  ReferenceLaw law = ReferenceLaw::chiSquared(0);   ///< what mu2 was expected to follow
+  ReferenceLaw law = ReferenceLaw::chiSquared(0);   ///< expected law of mu2
   int dof = 0;                                      ///< the law's dimension k
   std::size_t trials = 0;                           ///< all
   std::size_t failures = 0;                         ///< those among them that gave no distance
@@ -159,14 +159,14 @@ struct ValidationReport {
   double index_se = detail::not_a_number;           ///< standard error of I, from the sample
   double index_se_expected = detail::not_a_number;  ///< the same from the law; √(2k/N) for χ²
   double index_p_value = detail::not_a_number;      ///< two-sided, exact, see passed()
-  double variance = detail::not_a_number;           ///< of mu2; law.variance() is expected
+  double variance = detail::not_a_number;           ///< variance of mu2; law.variance() is expected
   double ks_statistic = detail::not_a_number;       ///< Kolmogorov-Smirnov distance of the sample from the law
   double ks_p_value = detail::not_a_number;         ///< its p-value
   std::array<Coverage, 4> coverage = {};            ///< at 50, 90, 95 and 99 %
   double mean_iterations = detail::not_a_number;    ///< over all trials
   int max_iterations = 0;
   std::vector<double> mu2;         ///< the distances of the trials that did not fail, ascending
-  double equivalent_chi2_sum = 0;  ///< of ReferenceLaw::equivalentChiSquared over mu2
+  double equivalent_chi2_sum = 0;  ///< sum of ReferenceLaw::equivalentChiSquared over mu2
 
   /// Number of distances N.
   std::size_t size() const { return mu2.size(); }
@@ -193,10 +193,12 @@ struct ValidationReport {
     }
     const bool bounded = tolerance.tail > 0;
     if (!(indexPValue(tolerance.index, bounded) >= share)) {
-      return chi2Sum(bounded) > static_cast<double>(dof) * static_cast<double>(size()) ? ValidationVerdict::index_too_large
-                                                                                       : ValidationVerdict::index_too_small;
+      return chi2Sum(bounded) > static_cast<double>(dof) * static_cast<double>(size())
+                 ? ValidationVerdict::index_too_large
+                 : ValidationVerdict::index_too_small;
     }
-    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= share)) return ValidationVerdict::wrong_law;
+    if (!(kolmogorovPValue(size(), std::max(0., ks_statistic - tolerance.ks)) >= share))
+      return ValidationVerdict::wrong_law;
     if (bounded && !(binomialSurvival(tailCount(), size(), std::min(1., 1 - tail_level + tolerance.tail)) >= share)) {
       return ValidationVerdict::heavy_tail;
     }
@@ -261,7 +263,7 @@ template <class Outcome>
 struct ValidationReportOf : ValidationReport {
   std::array<TrialStatistic, Outcome::statistics.size()> statistics = {};
 
-  /// Of one of the members that Outcome::statistics lists; of another: no trial gave it.
+  /// Statistic of a member that Outcome::statistics lists; for another one, as if no trial had given it.
   TrialStatistic of(double Outcome::*member) const {
     for (std::size_t i = 0; i < statistics.size(); ++i) {
       if (Outcome::statistics[i] == member) return statistics[i];

@@ -45,7 +45,7 @@ inline constexpr double residual_test_level = 1e-3;
 /// The outcome of one test. NaN where it does not apply (too few residuals, or a covariance that is not positive definite).
 struct ResidualTest {
   double statistic = detail::not_a_number;
-  double dof = detail::not_a_number;  ///< of χ²; expected number for the tail, NaN for the lag test
+  double dof = detail::not_a_number;  ///< degrees of freedom of χ²; expected number for the tail, NaN for the lag test
   double p = detail::not_a_number;    ///< probability of a statistic at least as extreme, two-sided for NEES and lag
 
   bool applies() const { return p == p; }
@@ -141,7 +141,7 @@ inline ResidualTest lagTest(std::span<const Eigen::Matrix<double, 6, 1>> z, cons
 }
 
 /// The number of residuals from which on Bartlett's factor keeps the level of the likelihood ratio.
-inline constexpr std::size_t least_for_covariance_test = 15;
+inline constexpr std::size_t min_for_covariance_test = 15;
 
 }  // namespace detail
 
@@ -196,7 +196,7 @@ inline WhitenedResidualTests testWhitenedResiduals(std::span<const PoseResidual>
   tests.rotation = detail::neesTest(rotation, 3 * n - fitted.rotation);
   const double mean = n * tests.whitened_mean.squaredNorm();
   tests.mean = {mean, 6, chiSquaredSurvival(mean, 6)};
-  if (tests.n >= detail::least_for_covariance_test) {
+  if (tests.n >= detail::min_for_covariance_test) {
     const detail::Cholesky<double, 6> root(moment);
     const double bartlett = 1 - (13 - 2. / 7) / (6 * n);
     const double ratio = root.ok() ? n * (moment.trace() - root.logDeterminant() - 6) * bartlett : detail::infinity;

@@ -10,6 +10,7 @@
 //   failed       scenes without an estimate (not finite), if any; they are left out of the errors
 #include <experiments/hand_eye_scene.hpp>
 #include <fusion/hand_eye.hpp>
+#include <lie/units.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -20,7 +21,6 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -118,7 +118,7 @@ void measure(benchmark::State& state, const HandEyeSceneOptions& options, const 
   for (std::size_t i = 0; i < problems.size(); ++i) {
     if (!answers[i].params().allFinite()) continue;
     const SE3d truth = problems[i].scene.nearestTruth(answers[i]);
-    const double angle = (answers[i].so3().inverse() * truth.so3()).log().norm() * 180 / std::numbers::pi;
+    const double angle = (answers[i].so3().inverse() * truth.so3()).log().norm() / units::degree;
     rotation += angle * angle, worst = std::max(worst, angle);
     translation += (answers[i].translation() - truth.translation()).squaredNorm();
     ++n;

@@ -16,6 +16,7 @@
 #include <fusion/detail/robust_two_view.hpp>
 #include <fusion/two_view/pose.hpp>
 #include <fusion/two_view/robust.hpp>
+#include <lie/units.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -93,10 +94,9 @@ Errors errorsOfFundamental(const TwoViewScene& scene, const Answer& a) {
 }
 Errors errorsOfPose(const TwoViewScene& scene, const Answer& a) {
   if (a.R.isZero()) return {};
-  constexpr double degrees = 180 / 3.14159265358979323846;
   const Eigen::Vector3d t = a.t.normalized(), truth = scene.t.normalized();
-  return {degrees * Eigen::AngleAxisd(Eigen::Matrix3d(a.R * scene.R.transpose())).angle(),
-          degrees * std::atan2(t.cross(truth).norm(), t.dot(truth))};
+  return {Eigen::AngleAxisd(Eigen::Matrix3d(a.R * scene.R.transpose())).angle() / units::degree,
+          std::atan2(t.cross(truth).norm(), t.dot(truth)) / units::degree};
 }
 
 double median(std::vector<double> values) {
@@ -255,7 +255,7 @@ void hypothesis(benchmark::State& state, TwoViewMotion motion, double outliers) 
   RobustSearchOptions options;
   options.inlier_threshold = threshold;
   options.rejection_risk = 1e-3;
-  options.least_score = TruncatedCost{threshold}(errors);
+  options.min_score = TruncatedCost{threshold}(errors);
   options.local_optimisation = false;
   RobustSearch search(model, TruncatedCost{threshold}, options);
   for (auto _ : state) search.iterate();

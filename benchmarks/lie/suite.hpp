@@ -37,7 +37,7 @@ void operation(const std::string& name, const std::shared_ptr<std::vector<In>>& 
   });
 }
 
-/// What every Lie group offers.
+/// The operations that every Lie group offers.
 template <LieGroup G>
 void groupSuite(const std::string& name) {
   using Tangent = typename G::Tangent;
@@ -69,7 +69,7 @@ void groupSuite(const std::string& name) {
   operation(name + "/rightJacobianInverse", tangents, [](const Tangent& v) { return G::rightJacobianInverse(v); });
 }
 
-/// What every manifold offers, and what follows from it at any point.
+/// The operations that every manifold offers, with those that lie/manifold.hpp derives from them at any point.
 template <Homogeneous M>
 void manifoldSuite(const std::string& name) {
   using T = ManifoldTraits<M>;

@@ -1,6 +1,6 @@
-// What a careful user writes with Eigen alone: the baselines of the benchmarks of the means. Fixed-size types, nothing
-// recomputed that could be kept, logarithms through atan2 so that all angles come out right; the report's fixed point
-// (eq. 4) from the first measurement until the step is below the tolerance, then the covariance of the residuals.
+// Means as a careful user writes them with Eigen alone: the baselines of the benchmarks of the means. Fixed-size types,
+// nothing recomputed that could be kept, logarithms through atan2 so that all angles come out right; the report's fixed
+// point (eq. 4) from the first measurement until the step is below the tolerance, then the covariance of the residuals.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -1,4 +1,4 @@
-// What the mean and its covariance cost beside the same by hand in Eigen alone, in turns: the README's table. Prints
+// Cost of the mean and its covariance beside the same by hand in Eigen alone, in turns: the README's table. Prints
 // Markdown. State the spread, the tolerance and the iterations with any ratio.
 #include "../inputs.hpp"
 #include "hand_written.hpp"

@@ -20,7 +20,7 @@ using namespace experiments;
 namespace {
 
 constexpr const char* command_name = "liestat simulate motion";
-constexpr double most_observations = 1e8, most_readings = 1e8;
+constexpr double max_observations = 1e8, max_readings = 1e8;
 constexpr const char* motion_files[] = {"tracks.csv", "truth.csv", "rates.csv", "imu.csv", "calibration.yaml"};
 
 struct Options {
@@ -108,9 +108,9 @@ int runCommand(Options options) {
   }
   const double seconds = static_cast<double>(how.frames) / how.frame_rate, readings = seconds * how.imu_rate;
   const double observations = static_cast<double>(how.frames) * static_cast<double>(how.scene.points);
-  if (readings > most_readings || observations > most_observations) {
+  if (readings > max_readings || observations > max_observations) {
     throw InputError(command_name, 0, fmt::format("{:.3g} observations and {:.3g} readings", observations, readings),
-                     fmt::format("{:g} and {:g} at most", most_observations, most_readings));
+                     fmt::format("{:g} and {:g} at most", max_observations, max_readings));
   }
   if (!options.gyroscope_bias.empty()) {
     how.gyroscope_bias << options.gyroscope_bias[0], options.gyroscope_bias[1], options.gyroscope_bias[2];

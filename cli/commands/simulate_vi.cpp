@@ -21,8 +21,8 @@ namespace {
 
 constexpr const char* command_name = "liestat simulate vi";
 /// Where the clock of a recording without a truth begins, ns since 1970; and what is too small to be such a time.
-constexpr std::int64_t usual_start_ns = 1600000000000000000, least_start_ns = 1000000000000000;
-constexpr double most_readings = 1e8, most_looks = 1e10;
+constexpr std::int64_t usual_start_ns = 1600000000000000000, min_start_ns = 1000000000000000;
+constexpr double max_readings = 1e8, max_looks = 1e10;
 
 struct Options {
   std::string truth, imu, output;
@@ -56,9 +56,9 @@ std::optional<Eigen::Vector3d> given(const std::vector<double>& list) {
 void checkSize(const Options& options, double duration) {
   const double readings = duration * options.imu_rate;
   const double looks = duration * options.scene.image_rate * static_cast<double>(options.scene.landmarks);
-  if (readings <= most_readings && looks <= most_looks) return;
+  if (readings <= max_readings && looks <= max_looks) return;
   throw InputError(command_name, 0, fmt::format("{:.3g} readings, and {:.3g} looks at a landmark", readings, looks),
-                   fmt::format("{:g} and {:g} at most", most_readings, most_looks));
+                   fmt::format("{:g} and {:g} at most", max_readings, max_looks));
 }
 
 SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
@@ -108,7 +108,7 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
       throw InputError(file.name, 0, complaint.found(), complaint.expected());
     }
     // A simulator's clock may begin at zero; stamps so small are not known for nanoseconds.
-    if (start_ns < least_start_ns) start_ns = usual_start_ns;
+    if (start_ns < min_start_ns) start_ns = usual_start_ns;
   }
   const double begin = options.begin.value_or(options.truth.empty() ? 0 : motion->begin());
   const double end = options.end.value_or(options.truth.empty() ? 20 : motion->end());

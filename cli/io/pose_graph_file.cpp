@@ -151,7 +151,7 @@ class GraphReader {
   bool ignore_unknown_;
   double norm_tolerance_;
   PoseGraph graph_;
-  Trajectory scratch_;  ///< what the rows' readers count
+  Trajectory scratch_;  ///< receives covariances and counts from the readers that it shares with trajectories
   std::vector<std::string_view> fields_;
 };
 

@@ -28,7 +28,7 @@ struct GraphEdge {
 
 /// The vertices and edges of a file. Planar ones are rotated about z and have z = 0; their matrices know x, y and yaw.
 struct PoseGraph {
-  std::string name;    ///< of the file in messages
+  std::string name;    ///< the file's name, for messages
   std::string format;  ///< g2o or toro
   bool planar = false;
   std::vector<GraphVertex> vertices;

@@ -21,7 +21,7 @@ struct PosePairOptions {
 struct PoseRows {
   std::size_t a = 0, b = 0;            ///< from 0
   std::size_t line_a = 0, line_b = 0;  ///< in the files
-  std::optional<double> time;          ///< of the row of the first file
+  std::optional<double> time;          ///< time stamp of the first file's row (s)
 };
 
 struct PosePairs {

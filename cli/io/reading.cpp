@@ -15,6 +15,7 @@
 #include <cli/io/input_error.hpp>
 #include <cli/io/numeric_table.hpp>
 #include <cli/io/rotation_matrix.hpp>
+#include <lie/units.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -155,7 +156,7 @@ class FeatureReader {
     }
     if (places_.rotation_vector[0] != absent) {
       const Eigen::Vector3d r =
-          (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * readVector(places_.rotation_vector);
+          (options_.angles == AngleUnit::degrees ? units::degree : 1.0) * readVector(places_.rotation_vector);
       const double angle = r.stableNorm();
       // Beyond this the angle modulo a turn is rounding, not data.
       if (!(angle < 1e6))
@@ -183,7 +184,7 @@ class FeatureReader {
                          "radians, or --degrees; --radians takes them as they are");
       }
       if (!(largest < 1e6)) throw InputError(name_, line_, fmt::format("an angle is {:.6g}", largest), "radians");
-      const Eigen::Vector3d rad = (options_.angles == AngleUnit::degrees ? std::numbers::pi / 180 : 1.0) * angles;
+      const Eigen::Vector3d rad = (options_.angles == AngleUnit::degrees ? units::degree : 1.0) * angles;
       return Eigen::Quaterniond(Eigen::AngleAxisd(rad[2], Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(rad[1], Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(rad[0], Eigen::Vector3d::UnitX()));

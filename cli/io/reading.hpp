@@ -21,9 +21,9 @@ using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 struct FeatureFile {
   /// The kind of each row: the first feature of the table with exactly the file's parts.
   experiments::Feature kind = experiments::Feature::point;
-  std::vector<Eigen::Quaterniond> rotations;  ///< of unit norm
+  std::vector<Eigen::Quaterniond> rotations;  ///< unit quaternions
   std::vector<Eigen::Vector3d> positions;     ///< points, or translations of frames
-  std::vector<Eigen::Vector3d> directions;    ///< of unit norm
+  std::vector<Eigen::Vector3d> directions;    ///< unit vectors
   std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
   std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
   std::vector<Covariance> covariances;  ///< positive definite, translation before rotation; empty if the file has none

@@ -9,7 +9,7 @@ namespace liestat::cli {
 struct ProgramResult {
   bool found = false;  ///< false: it is not installed
   int status = -1;     ///< its exit code, 128 and more for a signal
-  std::string errors;  ///< what it wrote to standard error
+  std::string errors;  ///< its standard error
 };
 
 /// Runs a program found by PATH in a directory and waits for it. No shell takes part. It reads nothing from standard

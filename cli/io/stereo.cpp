@@ -7,13 +7,13 @@
 namespace liestat::cli {
 
 std::optional<MeasuredPoint> triangulate(const StereoCamera& camera, const StereoObservation& observation,
-                                         double least_disparity) {
+                                         double min_disparity) {
   eigen_assert(camera.pixel_variance.has_value());
   const Eigen::Vector4d variance = camera.pixel_variance.value_or(Eigen::Vector4d::Ones());
   const double disparity = observation.uL - observation.uR;
-  if (!(disparity >= least_disparity)) return std::nullopt;
+  if (!(disparity >= min_disparity)) return std::nullopt;
   const double depth = camera.fu * camera.b / disparity;
-  const double share = variance[3] / (variance[1] + variance[3]);  // of the left row
+  const double share = variance[3] / (variance[1] + variance[3]);  // weight of the left row
   const double x = (observation.uL - camera.cu) / camera.fu;
   const double y = (share * observation.vL + (1 - share) * observation.vR - camera.cv) / camera.fv;
   const Eigen::Vector3d ray(x, y, 1);
@@ -34,7 +34,7 @@ MeasuredPoint toWorld(const CameraPose& pose, const MeasuredPoint& in_camera) {
 
 std::vector<LandmarkMeasurements> backProject(const std::vector<StereoObservation>& observations,
                                               const std::vector<CameraPose>& poses, const StereoCamera& camera,
-                                              double least_disparity) {
+                                              double min_disparity) {
   std::unordered_map<std::size_t, const CameraPose*> pose_of;
   for (const CameraPose& pose : poses) pose_of.emplace(pose.frame, &pose);
 
@@ -45,7 +45,7 @@ std::vector<LandmarkMeasurements> backProject(const std::vector<StereoObservatio
   for (const StereoObservation& observation : ordered) {
     const auto pose = pose_of.find(observation.frame);
     if (pose == pose_of.end()) continue;
-    const std::optional<MeasuredPoint> point = triangulate(camera, observation, least_disparity);
+    const std::optional<MeasuredPoint> point = triangulate(camera, observation, min_disparity);
     if (!point) continue;
     LandmarkMeasurements& landmark = by_track[observation.track];
     landmark.track = observation.track;

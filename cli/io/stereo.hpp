@@ -19,9 +19,9 @@ using MeasuredPoint = Gaussian<Eigen::Vector3d>;
 /// The point that a rectified stereo pair sees, in the coordinates of the left camera: depth fu·b/disparity, and the
 /// two rows averaged by their variances. The covariance is the pixels', through the derivative of that (first order,
 /// which holds as long as the disparity is many of its standard deviations). The camera must have pixel variances.
-/// Empty where the disparity is below `least_disparity` px.
+/// Empty where the disparity is below `min_disparity` px.
 std::optional<MeasuredPoint> triangulate(const StereoCamera& camera, const StereoObservation& observation,
-                                         double least_disparity = 1);
+                                         double min_disparity = 1);
 
 /// A point in camera coordinates, put into the world by a pose that is taken as exact.
 MeasuredPoint toWorld(const CameraPose& pose, const MeasuredPoint& in_camera);
@@ -38,6 +38,6 @@ struct LandmarkMeasurements {
 /// observations in frames without a pose and those of too small a disparity.
 std::vector<LandmarkMeasurements> backProject(const std::vector<StereoObservation>& observations,
                                               const std::vector<CameraPose>& poses, const StereoCamera& camera,
-                                              double least_disparity = 1);
+                                              double min_disparity = 1);
 
 }  // namespace liestat::cli

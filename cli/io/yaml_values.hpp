@@ -57,14 +57,14 @@ std::vector<double> numbers(const NamedNode& list, const std::string& expected);
 SE3d rigidMotion(const NamedNode& matrix);
 
 /// The size of a calibration, bytes; yaml-cpp would take minutes for what is larger.
-inline constexpr std::size_t most_yaml = 1000000;
+inline constexpr std::size_t max_yaml = 1000000;
 
 /// Calls a function with the file's root; what yaml-cpp throws becomes an InputError.
 template <class Function>
 auto withRoot(std::string_view text, const std::string& name, Function&& function) {
-  if (text.size() > most_yaml) {
+  if (text.size() > max_yaml) {
     throw InputError(name, 0, "this YAML file has " + std::to_string(text.size()) + " bytes",
-                     "a calibration, of at most " + std::to_string(most_yaml));
+                     "a calibration, of at most " + std::to_string(max_yaml));
   }
   // OpenCV's directive is none of YAML's; as a comment it keeps the numbers of the lines.
   std::string yaml(text);

@@ -12,7 +12,7 @@ namespace liestat::cli {
 namespace {
 
 constexpr double letter_width = 7, letter_gap = 9, line_height = 20;  // px, of 12 px letters
-constexpr double most_digits = 6;                                     // of a label
+constexpr double max_digits = 6;                                      // in a label
 
 std::string labelOf(double value) { return fmt::format("{:.6g}", value == 0 ? 0 : value); }
 
@@ -47,7 +47,7 @@ Ticks multiples(double low, double high, double step) {
   Ticks ticks;
   ticks.step = step;
   const double largest = std::max(std::abs(low), std::abs(high));
-  if (std::floor(std::log10(largest)) - std::floor(std::log10(step)) + 1 > most_digits) {
+  if (std::floor(std::log10(largest)) - std::floor(std::log10(step)) + 1 > max_digits) {
     ticks.offset = roundestNear(0.5 * (low + high), 3 * (high - low));
   }
   const double slack = 1e-9 * step;
@@ -84,12 +84,12 @@ bool isRange(double low, double high) {
          width > 1e-12 * std::max(std::abs(low), std::abs(high));
 }
 
-Ticks linearTicks(double low, double high, const AxisOnPaper& paper, double least_step) {
+Ticks linearTicks(double low, double high, const AxisOnPaper& paper, double min_step) {
   if (!isRange(low, high)) return {};
   const double scale = paper.length / (high - low);
-  const double most_marks = paper.horizontal ? 9 : 8;
+  const double max_marks = paper.horizontal ? 9 : 8;
   const auto position = [&](double value) { return (value - low) * scale; };
-  return firstThatFits(std::max((high - low) / most_marks, least_step), [&](double step) {
+  return firstThatFits(std::max((high - low) / max_marks, min_step), [&](double step) {
     Ticks ticks = multiples(low, high, step);
     const bool fit = fits(ticks.marks, paper, position);
     return std::pair(std::move(ticks), fit);

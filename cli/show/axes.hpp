@@ -30,8 +30,8 @@ struct AxisOnPaper {
 /// True if an axis from low to high can be drawn: finite, low < high, and the marks between them are different numbers.
 bool isRange(double low, double high);
 
-/// Marks at the multiples of a step 1, 2 or 5 · 10ᵏ, at least `least_step`, between low < high.
-Ticks linearTicks(double low, double high, const AxisOnPaper& paper, double least_step = 0);
+/// Marks at the multiples of a step 1, 2 or 5 · 10ᵏ, at least `min_step`, between low < high.
+Ticks linearTicks(double low, double high, const AxisOnPaper& paper, double min_step = 0);
 
 /// Marks between 0 < low < high on a logarithmic axis: at 1, 2, 5 · 10ᵏ, else at powers of ten, else at every second one
 /// and so on; on an axis shorter than a decade at the multiples of a step.

@@ -198,10 +198,10 @@ std::string axisText(std::string_view letter, const Axis& axis, const Range& ran
   return script + (axis.numbers ? tickText(letter, ticks) : fmt::format("set {}tics auto\n", letter));
 }
 
-Ticks ticksOf(const Axis& axis, const Range& range, const AxisOnPaper& paper, double least_step = 0) {
+Ticks ticksOf(const Axis& axis, const Range& range, const AxisOnPaper& paper, double min_step = 0) {
   if (!range.given()) return {};
   const double low = std::min(range.low, range.high), high = std::max(range.low, range.high);
-  return axis.logarithmic ? logarithmicTicks(low, high, paper) : linearTicks(low, high, paper, least_step);
+  return axis.logarithmic ? logarithmicTicks(low, high, paper) : linearTicks(low, high, paper, min_step);
 }
 
 /// Width and height of the area inside a panel's axes, px, about.

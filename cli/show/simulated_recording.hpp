@@ -6,8 +6,8 @@
 
 namespace liestat::cli {
 
-/// What `liestat simulate vi` has made and where it wrote it, in lines for the terminal. `as_recorded`: the readings are
-/// not simulated.
+/// The simulated recording of `liestat simulate vi` and the files it was written to, in lines for the terminal.
+/// `as_recorded`: the readings are not simulated.
 std::string formatSimulatedRecording(const experiments::SimulatedRecording& recording,
                                      const experiments::ViSceneOptions& scene, bool as_recorded,
                                      const std::string& directory);

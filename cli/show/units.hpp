@@ -2,13 +2,12 @@
 #pragma once
 
 #include <lie/concepts.hpp>
-
-#include <numbers>
+#include <lie/units.hpp>
 
 namespace liestat::cli {
 
 /// Degrees of a radian.
-inline constexpr double degrees = 180 / std::numbers::pi;
+inline constexpr double degrees = 1 / units::degree;
 
 /// A unit that is shown, and how many of it make the unit that is computed in (rad, m).
 struct Unit {

@@ -157,7 +157,7 @@ class MeetingModel {
   /// The difference and the parts of its covariance S, whitened by S.
   struct Term {
     Eigen::Matrix<double, 11, 1> d;
-    double log_determinant;  ///< of S
+    double log_determinant;  ///< log det S
     Matrix11 rest, gyroscope, accelerometer;
   };
   /// The symmetric matrix with its eigenvalues raised to a bound.
@@ -297,7 +297,7 @@ calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOpt
   result.common_p = detail::probabilityOfRise(best_common.second - least, result.meetings);
   result.separable = result.gyroscope.isTold() && result.accelerometer.isTold();
   if (std::isinf(result.common.high)) return result;
-  // What is not told stays as it was, as far as that may be.
+  // A factor that the recording does not determine stays as close to 1 as its interval permits.
   const auto held = [](const NoiseFactor& factor) { return std::log(std::clamp(1., factor.low, factor.high)); };
   if (result.separable || result.common_p < 0.05) {
     // The other one goes with it.

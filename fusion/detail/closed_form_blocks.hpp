@@ -42,7 +42,7 @@ struct RayTable {
   std::vector<ScaledImage> images;  ///< all of the first camera, then all of the next
   std::size_t cameras = 1;
   std::vector<Ray> rays;
-  std::vector<std::size_t> begin{0};  ///< of the rays of each feature, and their end
+  std::vector<std::size_t> begin{0};  ///< first ray of each feature, and the end of the last
   std::vector<std::size_t> feature;   ///< its number in the window
 
   std::size_t features() const { return feature.size(); }

@@ -30,10 +30,14 @@ inline bool hasRival(const std::vector<MotionCandidate>& candidates) {
   return candidates.size() == 2 && candidates[1].cost - candidates[0].cost <= chi_squared_1_95;
 }
 
-/// True if the two gravities differ by what the biases differ.
+/// Relative difference of the changes of gravity and bias up to which two minimisers are mirror images: the changes are
+/// equal for exact data (docs/theory/visual_inertial.md, section 3.5), and noise moves each minimiser by itself.
+inline constexpr double mirror_tolerance = 0.2;
+
+/// True if the difference of the two gravities is that of the two biases.
 inline bool isMirror(const std::vector<MotionCandidate>& candidates) {
   const Eigen::Vector3d G = candidates[1].y.gravity() - candidates[0].y.gravity();
-  return (candidates[1].y.bias() - candidates[0].y.bias() - G).norm() < 0.2 * G.norm();
+  return (candidates[1].y.bias() - candidates[0].y.bias() - G).norm() < mirror_tolerance * G.norm();
 }
 
 /// The largest distance of the camera from t0 (m).

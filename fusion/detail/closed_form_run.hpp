@@ -45,6 +45,9 @@ class ClosedFormRun {
   using Candidate = MotionCandidate;
   /// Measured (docs/closed_form.md): at constant velocity or acceleration 0.91 and more in 1800 windows.
   static constexpr double lost_share = 0.8;
+  /// Distance, in standard deviations of the tilt, up to which the two solutions of a lost direction are one double root:
+  /// the tilt is predicted to first order, which near a double root is short of what noise moves it by.
+  static constexpr double double_root_sigmas = 5;
   using Status = FusionStatus;
 
   void solveExactly(const RankDiagnosis& ranks) {
@@ -167,7 +170,7 @@ class ClosedFormRun {
     if (!G) return false;
     const RestParallax parallax = RestParallaxTest(table_).run();
     if (!parallax.atRest()) return false;
-    result_.unseen_speed_per_depth = parallax.least_speed;
+    result_.unseen_speed_per_depth = parallax.unseen_speed;
     Candidate rest{Motion(solver_.bias()), {}};
     rest.y.set(rest.y.size - 4, *G);
     for (std::size_t i = 0; i < table_.features(); ++i) {
@@ -225,7 +228,7 @@ class ClosedFormRun {
       return Status::gravity_undetermined;
     }
     if (rival && solver_.bias() && isMirror(candidates_)) return Status::mirror_gravity;
-    if (lost && !(chord > 5 * result_.tilt_sigma)) return Status::double_root;
+    if (lost && !(chord > double_root_sigmas * result_.tilt_sigma)) return Status::double_root;
     if (rival) return Status::ambiguous;
     if (!(result_.tilt_sigma <= options_.closed_form.max_tilt_sigma)) return Status::gravity_undetermined;
     if (!(result_.scale_sigma <= options_.closed_form.max_scale_sigma)) return Status::scale_unobservable;
@@ -268,11 +271,8 @@ class ClosedFormRun {
         3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
     return rows > unknowns ? rows - unknowns : 0;
   }
-  /// Whether the first minimiser's cost is one of noise: five sigmas of χ², and the same for none.
-  bool isConsistent() const {
-    const double dof = static_cast<double>(degreesOfFreedom());
-    return candidates_[0].cost <= dof + 5 * std::sqrt(2 * dof) + 12;
-  }
+  /// Whether noise alone explains the first minimiser's cost.
+  bool isConsistent() const { return candidates_[0].cost <= noiseLimit(static_cast<double>(degreesOfFreedom())); }
 
   void report() {
     const double T = table_.window, g = solver_.gravityScale();

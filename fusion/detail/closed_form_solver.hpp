@@ -4,6 +4,7 @@
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
 #include <fusion/detail/closed_form_ranks.hpp>
+#include <fusion/detail/median.hpp>
 #include <fusion/init/sphere_least_squares.hpp>
 
 #include <Eigen/Core>
@@ -22,12 +23,9 @@ inline constexpr double exact_noise = 1e-9;
 /// Quantile of χ² with one degree of freedom at 0.95: what two costs differ by when the data tell minimisers apart.
 inline constexpr double chi_squared_1_95 = 3.841458820694124;
 
-inline double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+/// The least depth that weights assume: in metres, and as a fraction of the median depth. A feature that one pass puts
+/// next to the camera would otherwise outweigh all others in the next (docs/theory/visual_inertial.md, section 3.4).
+inline constexpr double min_weighted_depth = 0.2, min_weighted_depth_ratio = 0.01;
 
 /// A minimiser in scaled unknowns.
 struct MotionCandidate {
@@ -40,8 +38,8 @@ struct MotionCandidate {
 /// The motion's problem less the noise in it.
 struct NoiseShare {
   Triangle root;
-  std::vector<double> shares;  ///< of noise in what is known of each direction of the motion, descending, 0 to about 1
-  std::vector<Motion> directions;  ///< these directions, their last entry 0
+  std::vector<double> shares;      ///< noise fraction of the information on each direction, descending, 0 to about 1
+  std::vector<Motion> directions;  ///< directions of the motion, their last entry 0
 };
 
 class ClosedFormSolver {
@@ -72,7 +70,7 @@ class ClosedFormSolver {
     forEachRay([&](std::size_t i, Ray& ray) {
       depths.push_back(std::abs(ray.u.dot(relativePosition(table_.images[ray.image], solution.P[i], solution.y))));
     });
-    const double floor = std::max(0.2, 0.01 * median(depths));
+    const double floor = std::max(min_weighted_depth, min_weighted_depth_ratio * median(depths));
     std::size_t k = 0;
     forEachRay([&](std::size_t, Ray& ray) { ray.weight = ray.precision / (sigma_ * std::max(depths[k++], floor)); });
   }

@@ -61,12 +61,16 @@ inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, 
   if (!relative.empty()) result.scale_sigma = median(relative);
 }
 
+/// Standard deviation of a bias, relative to its prior, above which the data do not count as information on it: an
+/// improvement of 2 % is no more than the prior itself (docs/closed_form.md).
+inline constexpr double prior_dominates = 0.98;
+
 /// True if it is the prior that says what the accelerometer's bias is: the data improve one of its three directions at
 /// most (with |G| known one comes from its length).
 inline bool biasRestsOnPrior(const ClosedFormResult& result, const InitialisationOptions& options) {
   if (!std::isfinite(options.prior.accelerometer_sigma) || result.covariance.rows() != 9) return false;
   const SmallSvd svd(SmallMatrix::of<3, 3>(Eigen::Matrix3d(result.covariance.block<3, 3>(6, 6))));
-  return std::sqrt(svd.value(1)) > 0.98 * options.prior.accelerometer_sigma;
+  return std::sqrt(svd.value(1)) > prior_dominates * options.prior.accelerometer_sigma;
 }
 
 }  // namespace liestat::detail

@@ -1,6 +1,6 @@
-// How the estimators of fusion/ are compiled. Their headers declare them and, as long as nothing is said, include the
-// definitions, so that nothing has to be linked. With LIESTAT_COMPILED_FUSION defined the headers declare only: a unit
-// that calls an estimator compiles in a fraction of the time, and those of fusion/compiled/ hold them all.
+// LIESTAT_FUSION_INLINE, the linkage of the estimators of fusion/. By default their headers include the definitions, as
+// inline functions: nothing has to be linked. With LIESTAT_COMPILED_FUSION the headers only declare, which compiles in
+// a fraction of the time, and the program links the definitions of fusion/compiled/.
 #pragma once
 
 #ifdef LIESTAT_COMPILED_FUSION

@@ -47,7 +47,7 @@ class EpipolarModel : public EpipolarTypeModel {
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
     solver_(sample, solutions);
   }
-  /// Of an affine map there are affine epipolar geometries of any one direction of the lines.
+  /// An affine map determines an affine epipolar geometry up to the direction of its lines: one freedom.
   int freedomBeyond(const TwoViewModel& specific) const override {
     if (constraint_.family == EpipolarFamily::affine && specific.equations() == 2) return 1;
     return EpipolarTypeModel::freedomBeyond(specific);

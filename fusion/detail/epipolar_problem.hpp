@@ -119,7 +119,7 @@ class EpipolarProblem {
         weights += w;
         most = std::max(most, w);
       }
-      pair.used = weights > 2.5 * most;
+      pair.used = weights > min_full_matches * most;
       if (min > 0 && pair.used) {
         pair.used = invertPositive(H, inverse) && sum - g.dot(inverse * g) > 2 * min * min * weights;
       }
@@ -227,13 +227,17 @@ class EpipolarProblem {
     return sum;
   }
 
-  std::vector<double> weight;      ///< of tracks
+  std::vector<double> weight;      ///< weight of each track
   std::vector<double> square;      ///< Σ r² of a track, as linearise() left it
-  std::vector<std::size_t> count;  ///< of these residuals
+  std::vector<std::size_t> count;  ///< number of these residuals
   /// The mean square of a track's residuals, infinite for one without.
   double meanSquare(std::size_t i) const {
     return count[i] > 0 ? square[i] / static_cast<double>(count[i]) : std::numeric_limits<double>::infinity();
   }
+
+  /// A pair is used if its matches weigh more than so many of its best one. The direction of translation takes up two
+  /// equations: it needs a third match, and leaves tracks that are weighted down somewhat a part in it.
+  static constexpr double min_full_matches = 2.5;
 
  private:
   /// A pair whose translation is eliminated: after a step δb of the bias it is best at t - acrossᵀ (offset + gainᵀ δb).

@@ -1,4 +1,4 @@
-// What models of epipolar geometries have in common.
+// Members shared by the models of epipolar geometries.
 #pragma once
 
 #include <fusion/detail/two_view_estimate.hpp>
@@ -56,7 +56,7 @@ class EpipolarTypeModel : public TwoViewModel {
   int freeParameters() const override { return card_.free_parameters; }
   int equations() const override { return 1; }
   int measurementDimension() const override { return 4; }
-  /// What a homography moves has the epipolar geometries [e']× H, for any epipole e'.
+  /// Matches of a homography H satisfy [e']× H for any epipole e': two freedoms.
   int freedomBeyond(const TwoViewModel& specific) const override {
     const int more = std::max(0, freeParameters() - specific.freeParameters());
     return specific.equations() == 2 && freeParameters() > 2 ? 2 : more;

@@ -5,6 +5,7 @@
 #include <fusion/detail/hand_eye_problem.hpp>
 #include <fusion/detail/hand_eye_refine.hpp>
 #include <fusion/detail/hand_eye_starts.hpp>
+#include <fusion/detail/median.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/random.hpp>
 
@@ -50,7 +51,7 @@ class HandEyeRun {
     fitAll(all);
     // Where the noise is not known, wrong pairs may have been taken for noise.
     const bool suspicious = !options_.known_noise || *std::max_element(errors_.begin(), errors_.end()) > options_.gate;
-    if (options_.find_outliers && pairs_.size() >= least_for_search && suspicious) findOutliers();
+    if (options_.find_outliers && pairs_.size() >= min_pairs_for_search && suspicious) findOutliers();
     estimate();
     return std::move(result_);
   }
@@ -58,7 +59,7 @@ class HandEyeRun {
  private:
   static constexpr int parameters = world ? 12 : 6;
   /// With fewer, three pairs and one more that agree by chance would be a majority.
-  static constexpr std::size_t least_for_search = 6;
+  static constexpr std::size_t min_pairs_for_search = 6;
   /// The median of χ²₆.
   static constexpr double median_error = 5.348120627447116;
 
@@ -119,11 +120,6 @@ class HandEyeRun {
       errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::max());
     }
     return errors;
-  }
-  static double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
   }
   static Indices below(const std::vector<double>& errors, double bound) {
     Indices list;

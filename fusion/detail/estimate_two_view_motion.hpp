@@ -217,7 +217,7 @@ struct TwoViewInput {
   }
   static bool isDirection(const Eigen::Vector3d& v) { return v.allFinite() && !v.isZero(0); }
 
-  /// What an estimate says of the motion, by the matches that agree with it.
+  /// Fills the result with the motion of an estimate, using the matches that agree with it.
   void describe(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
                 std::span<const Eigen::Vector4d> agreeing, TwoViewMotionResult& result) const {
     const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();

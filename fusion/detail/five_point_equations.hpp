@@ -243,7 +243,7 @@ inline bool polishEssential(const std::array<Eigen::Vector3d, 5>& first, const s
       for (int k = i + 1; k < 5; ++k) s[i] -= a[i][k] * s[k];
     }
     const double square = s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3] + s[4] * s[4];
-    // What is far from a solution is none.
+    // A step as long as the pose itself does not come from near a solution.
     if (!(square < 1)) return false;
     t = (t + s[3] * p + s[4] * q).normalized();
     // Exp(ω) to second order, and a rotation: Cayley's form, as a quaternion.

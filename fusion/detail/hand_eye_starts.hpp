@@ -22,9 +22,9 @@ struct HandEyeMoments {
   double n = 0;
   Eigen::Matrix<double, 9, 9> rotations = Eigen::Matrix<double, 9, 9>::Zero();  ///< Σ R_B ⊗ R_A
   Eigen::Matrix3d translations = Eigen::Matrix3d::Zero();                       ///< Σ t_A t_Bᵀ, centred for AX = YB
-  Eigen::Matrix3d mean_rotation = Eigen::Matrix3d::Zero();                      ///< of A, not a rotation
+  Eigen::Matrix3d mean_rotation = Eigen::Matrix3d::Zero();                      ///< mean of R_A, not a rotation
   Eigen::Vector3d mean_a = Eigen::Vector3d::Zero(), mean_b = Eigen::Vector3d::Zero();
-  double rotation_variance = 0;  ///< of both poses together, mean of the axes, rad²
+  double rotation_variance = 0;  ///< mean variance of an axis, rad²: sum of both poses
 
   template <class Indices>
   HandEyeMoments(const std::vector<PosePair>& pairs, const Indices& indices, bool world) {
@@ -106,7 +106,7 @@ class HandEyeRotations {
 
  private:
   static double determinant(const Eigen::Matrix3d& M) { return M.col(0).cross(M.col(1)).dot(M.col(2)); }
-  /// Of AX = XB vec(R_X) is an eigenvector: of the symmetric part, shifted so that none is negative.
+  /// For AX = XB, vec(R_X) is an eigenvector of the symmetric part, shifted so that no eigenvalue is negative.
   static BasicSmallMatrix<9> matrix(const HandEyeMoments& moments, bool world) {
     using Matrix9 = Eigen::Matrix<double, 9, 9>;
     const Matrix9& K = moments.rotations;

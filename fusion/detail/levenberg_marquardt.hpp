@@ -1,5 +1,5 @@
-// Levenberg's and Marquardt's method: Gauss and Newton's steps, damped until the cost decreases. One loop for all
-// problems of fusion/.
+// Levenberg–Marquardt: Gauss–Newton steps with the damping raised until the cost decreases. One loop for all nonlinear
+// least-squares problems of fusion/.
 #pragma once
 
 #include <fusion/status.hpp>
@@ -11,30 +11,30 @@
 
 namespace liestat::detail {
 
-/// A problem that the method can solve, which stands somewhere and can look at one step from there.
+/// A least-squares problem with a current point and one candidate step from it.
 template <class P>
 concept DampedProblem = requires(P& problem, double damping) {
-  { problem.linearise() } -> std::convertible_to<double>;  ///< the cost (χ²) and the normal equations where it stands
-  { problem.solve(damping) } -> std::convertible_to<bool>;     ///< their step, diagonal times 1 + damping; false: none
-  { problem.costAfterStep() } -> std::convertible_to<double>;  ///< infinite or NaN where the step is not allowed
-  problem.accept();                                            ///< stands at the end of the step from now on
-  problem.reject();                                            ///< stays, as linearised
+  { problem.linearise() } -> std::convertible_to<double>;      ///< cost (χ²) and normal equations at the point
+  { problem.solve(damping) } -> std::convertible_to<bool>;     ///< step for a diagonal times 1 + damping; false: none
+  { problem.costAfterStep() } -> std::convertible_to<double>;  ///< infinite or NaN if the step is not allowed
+  problem.accept();                                            ///< moves the point to the end of the step
+  problem.reject();                                            ///< drops the step
 };
 
 struct DampedOptions {
   int max_iterations = 50;
-  double min_decrease = 1e-3;  ///< of the cost: below it, with little damping, it has converged
-  double damping = 1e-4;       ///< of the first step
+  double min_decrease = 1e-3;  ///< converged if the cost decreases by less, with damping below 1
+  double damping = 1e-4;       ///< initial damping
 };
 
-/// How a minimisation ended.
+/// The end of a minimisation.
 struct DampedSummary {
   double cost = std::numeric_limits<double>::infinity();
   int iterations = 0;
-  FusionStatus status = FusionStatus::not_converged;  ///< or ok
+  FusionStatus status = FusionStatus::not_converged;  ///< ok or not_converged
 };
 
-/// Minimises from where the problem stands, and leaves it at the best point that was found.
+/// Minimises from the problem's point and leaves it at the best point found; a cost that is not finite ends it at once.
 template <DampedProblem Problem>
 DampedSummary minimiseDamped(Problem& problem, const DampedOptions& options) {
   DampedSummary summary;
@@ -44,10 +44,10 @@ DampedSummary minimiseDamped(Problem& problem, const DampedOptions& options) {
     ++summary.iterations;
     const bool solved = problem.solve(damping);
     const double next = solved ? problem.costAfterStep() : std::numeric_limits<double>::infinity();
-    // Written so that NaN is no progress.
+    // The negation, so that NaN counts as no decrease.
     if (!(next < summary.cost)) {
       if (solved) problem.reject();
-      // At the minimum rounding decides.
+      // An increase within rounding: the point is at the minimum.
       if (next <= summary.cost + 1e-9 * (1 + summary.cost)) {
         summary.status = FusionStatus::ok;
         return summary;

@@ -75,11 +75,11 @@ struct EntrySums {
   Eigen::Matrix<double, 9, 1> vector() const { return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(gradient.data()); }
 };
 
-/// What a match adds to the normal equations: factors of its rows, and its point in the first image, corrected.
+/// Contribution of a match to the normal equations: factors of its rows, and its corrected point in the first image.
 template <class P>
 struct MatchTerms {
-  P rows[6];      ///< of a pair of rows
-  P gradient[3];  ///< of a row
+  P rows[6];      ///< one for each pair of rows
+  P gradient[3];  ///< one for each row
   P x, y;
 };
 
@@ -253,7 +253,7 @@ struct MatchLeverageKernel {
     }
   }
 };
-/// What a covariance of F's entries leaves open of the equations of all matches, in units of their noise.
+/// Leverage of each match: variance of its equation under a covariance of F's entries, in units of its noise.
 inline void columnLeverages(const EpipolarColumns& equation, const Eigen::Matrix<double, 9, 9>& covariance,
                             const MatchColumns& m, std::span<double> leverage) {
   MatchArguments<EpipolarColumns> a{

@@ -53,7 +53,7 @@ class UprightModel : public EpipolarTypeModel {
   }
 
  private:
-  /// Of the four poses two keep the vertical; of these the one with most matches in front.
+  /// The pose with most matches in front, among those two of four that keep the vertical.
   Essentiald poseOf(const Eigen::Matrix3d& E, std::span<const Measurement> matches) const {
     const auto poses = posesOfEssential(E);
     const auto counts = poseByCheirality(E, matches).counts;
@@ -119,16 +119,23 @@ class SharedFocalModel : public EpipolarTypeModel {
     parameter.focal_length = motion.focal_length;
     return parameter;
   }
-  /// Whether the matches tell the focal length: log f to 0.1, beyond which first order is not true, optical axes
-  /// that pass each other by three standard deviations, and more than one plane.
+  /// Largest standard deviation of log f for which the first-order covariance is still right; beyond it errors of ten
+  /// standard deviations were found (docs/two_view.md).
+  static constexpr double max_log_focal_sigma = 0.1;
+  /// Standard deviations by which F33 must differ from zero: where it is zero the optical axes meet and f is free.
+  static constexpr double min_axes_sigmas = 3;
+  /// Fraction of matches on one plane from which the others, which outliers may be, do not determine f.
+  static constexpr double max_planar_share = 0.9;
+
+  /// Whether the matches determine the focal length.
   bool isTold(const ModelEstimate<Parameter>& found, std::span<const Measurement> inliers) const {
-    if (!(found.covariance(5, 5) <= 0.1 * 0.1)) return false;
+    if (!(found.covariance(5, 5) <= max_log_focal_sigma * max_log_focal_sigma)) return false;
     const Eigen::Matrix<double, 1, 5> J = found.parameter.pose.essentialMatrixJacobian().row(entry(2, 2));
     const double apart = found.parameter.pose.essentialMatrix()(2, 2);
     const double variance = (J * found.covariance.topLeftCorner<5, 5>() * J.transpose())(0);
-    return apart * apart > 9 * variance && !isPlanar(inliers);
+    return apart * apart > min_axes_sigmas * min_axes_sigmas * variance && !isPlanar(inliers);
   }
-  /// Whether a homography explains nine tenths of the matches.
+  /// Whether a homography explains nearly all matches.
   bool isPlanar(std::span<const Measurement> inliers) const {
     constexpr double limit = 9.21;  // the 0.99 quantile of χ² with two degrees of freedom
     std::vector<Measurement> kept(inliers.begin(), inliers.end());
@@ -147,7 +154,7 @@ class SharedFocalModel : public EpipolarTypeModel {
       }
     }
     const auto on = std::count_if(errors.begin(), errors.end(), [](double e) { return e <= limit; });
-    return static_cast<double>(on) >= 0.9 * static_cast<double>(errors.size());
+    return static_cast<double>(on) >= max_planar_share * static_cast<double>(errors.size());
   }
 };
 

@@ -22,10 +22,10 @@ namespace liestat::detail {
 
 /// Up to nine residuals, in sigmas, with their derivatives by up to thirteen blocks of three shared unknowns.
 struct ResidualRows {
-  static constexpr int most = 9, most_blocks = 13;
+  static constexpr int most = 9, max_blocks = 13;
   int rows = 0, terms = 0;
-  std::array<int, most_blocks> block;
-  std::array<std::array<double, 3 * most_blocks>, most> by;  ///< [residual][3 · term + k]
+  std::array<int, max_blocks> block;
+  std::array<std::array<double, 3 * max_blocks>, most> by;  ///< [residual][3 · term + k]
   std::array<double, most> value;
 
   explicit ResidualRows(int count) : rows(count) {}
@@ -145,7 +145,7 @@ class ReducedSystem {
   }
   /// The block of the inverse for the given blocks of unknowns, row by row.
   std::vector<double> inverse(const std::vector<int>& blocks) const {
-    // Of Uᵀ U it is Yᵀ Y with Uᵀ Y = E, the unknowns' unit vectors.
+    // (Uᵀ U)⁻¹ = Yᵀ Y with Uᵀ Y = E, the unknowns' unit vectors.
     const std::size_t m = 3 * blocks.size();
     std::vector<double> result(m * m);
     std::vector<std::vector<double>> Y(m);

@@ -73,7 +73,7 @@ inline double probabilityUnderPrior(const Eigen::Vector3d& off, const Eigen::Mat
   return chiSquaredTail(factor.halfSolve<1>(Eigen::Vector3d(off / sigma)).squaredNorm(), 3);
 }
 
-/// What a covariance makes of an estimate.
+/// Sets prior_p, tilt_sigma and, of a converged estimate, the status, by covariance and prior.
 inline void judge(RefinementResult& result, const InitialisationOptions& options, bool at_rest) {
   const BiasPrior& prior = options.prior;
   using Block = InitialCovariance::Block;

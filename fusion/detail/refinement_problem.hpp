@@ -38,7 +38,7 @@ struct WalkingBiases {
 /// The rows of a motion between two images: the residual's covariance, whitened.
 struct MotionWeight {
   Eigen::Matrix<double, 9, 9> root;  ///< lower triangular, rootᵀ root = covariance⁻¹
-  /// What the walk of the biases to the end of the motion tells of the residual: E(residual | walk) = by_walk · walk.
+  /// Regression of the residual on the biases' walk to the end of the motion: E(residual | walk) = by_walk · walk.
   Eigen::Matrix<double, 9, 6> by_walk = Eigen::Matrix<double, 9, 6>::Zero();
   double gyroscope_walk = 0, accelerometer_walk = 0;  ///< standard deviations; 0: it does not walk
 
@@ -209,7 +209,7 @@ class RefinementProblem {
  private:
   /// Images but the first.
   int moved() const { return static_cast<int>(state_.X.size()) - 1; }
-  /// Of each of them, before all poses.
+  /// Blocks of each moved image that precede all poses.
   int blocksAhead() const { return 1 + walks_.gyroscope + walks_.accelerometer; }
   int poseBlocks() const { return 1 + blocksAhead() * moved(); }
   Eigen::Vector3d lever(const TrackedBearing& seen) const { return window_.cameras[seen.camera].translation(); }
@@ -230,7 +230,7 @@ class RefinementProblem {
     if (still_) cost += addStillness(state, system);
     Eigen::Matrix<double, 2, 3> by_d;
     std::size_t image = state.X.size();
-    Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // of the image last seen
+    Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // rotation into the body's axes at the last image seen
     for (const BearingObservation& seen : observations_) {
       if (seen.image != image) {
         image = seen.image;

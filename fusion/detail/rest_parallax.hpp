@@ -9,6 +9,7 @@
 #pragma once
 
 #include <fusion/detail/closed_form_blocks.hpp>
+#include <fusion/detail/median.hpp>
 #include <lie/detail/small_matrix.hpp>
 
 #include <Eigen/Core>
@@ -27,12 +28,12 @@ namespace liestat::detail {
 
 /// The outcome of the test.
 struct RestParallax {
-  bool tested = false;     ///< false: too few tracks with four images, or times
-  double sigma = 0;        ///< of a bearing of a relative sigma of one (rad): the tracks' own scatter
-  double explained = 0;    ///< by a path, in squares of that
-  double limit = 0;        ///< what noise explains with a probability of 0.005
-  double least_speed = 0;  ///< m/s for each metre of depth: less in the least visible direction may go unseen
-  std::size_t tracks = 0;  ///< that were used; others scatter too much, or have too few images
+  bool tested = false;   ///< false: too few tracks with four images, or times
+  double sigma = 0;      ///< a bearing's standard deviation at relative sigma one (rad), from the tracks' own scatter
+  double explained = 0;  ///< χ² that a path explains, in units of sigma²
+  double limit = 0;      ///< 0.995 quantile of `explained` under noise alone
+  double unseen_speed = 0;  ///< m/s for each metre of depth: less in the least visible direction may go unseen
+  std::size_t tracks = 0;   ///< tracks used; others scatter too much, or have too few images
 
   bool atRest() const { return tested && explained <= limit; }
 };
@@ -75,13 +76,13 @@ class RestParallaxTest {
     // The parameter of non-centrality λ for which no more than 0.005 stay below: mean + λ - z √(variance + 4 λ) = limit.
     const double z = normal_quantile, gap = result.limit - mean;
     const double lambda = gap + 2 * z * z + z * std::sqrt(4 * gap + 4 * z * z + variance);
-    result.least_speed = std::sqrt(lambda / leastInformation()) * sigma_;
+    result.unseen_speed = std::sqrt(lambda / leastInformation()) * sigma_;
     return result;
   }
 
  private:
   static constexpr int draws = 100;
-  static constexpr double normal_quantile = 2.5758293035489;  ///< of 0.995
+  static constexpr double normal_quantile = 2.5758293035489;  ///< the 0.995 quantile
 
   /// Normal numbers, always the same ones: SplitMix64 (Steele, Lea and Flood 2014) and Box and Muller's formula. The closed
   /// form's header needs Eigen alone.
@@ -101,10 +102,10 @@ class RestParallaxTest {
   };
 
   struct Track {
-    std::array<double, 4> s{};                   ///< across the direction: of the line (2), of the parabola (2)
-    std::array<double, 3> by_power{};            ///< of t: line; of t²: line, parabola
-    Eigen::Matrix<double, 2, 3> across, turned;  ///< by a path, by a rotation
-    double rough = 0, degrees = 0;               ///< what line and parabola leave, squared, of so many rows
+    std::array<double, 4> s{};                   ///< components across the direction: line (2), parabola (2)
+    std::array<double, 3> by_power{};            ///< component of t along the line; of t² along line and parabola
+    Eigen::Matrix<double, 2, 3> across, turned;  ///< derivatives by a path and by a rotation
+    double rough = 0, degrees = 0;               ///< squared residual of line and parabola, and its degrees of freedom
   };
 
   void addTrack(const RayTable& table, std::size_t i) {
@@ -122,7 +123,7 @@ class RestParallaxTest {
     }
     middle /= weights;
     mean.normalize();
-    double powers[4] = {};  // of τ - middle: sums of the second to the fourth, and its weights
+    double powers[4] = {};  // sums of (τ - middle)², to the fourth power, from [1]
     for (const Ray& ray : rays) {
       const double w = ray.precision * ray.precision, t = table.images[ray.image].tau - middle;
       powers[1] += w * t * t;
@@ -174,12 +175,8 @@ class RestParallaxTest {
       const double ninth = 2 / (9 * track.degrees);
       ratio.push_back(track.rough / track.degrees / std::pow(1 - ninth, 3));
     }
-    const auto middle = ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2);
-    std::nth_element(ratio.begin(), middle, ratio.end());
-    const double typical = *middle;
-    const auto isRough = [typical](const Track& track) {
-      return track.rough > typical * (track.degrees + 5 * std::sqrt(2 * track.degrees) + 12);
-    };
+    const double typical = median(std::move(ratio));
+    const auto isRough = [typical](const Track& track) { return track.rough > typical * noiseLimit(track.degrees); };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), isRough), tracks_.end());
     double squares = 0, degrees = 0;
     for (const Track& track : tracks_) {
@@ -193,7 +190,7 @@ class RestParallaxTest {
 
   using Vector12 = Eigen::Matrix<double, 12, 1>;
 
-  /// What a track's coefficients are by a rotation and a path: θ₁ t + θ₂ t² and v t + a t², with an inverse depth.
+  /// Coefficients of a track under a rotation and a path: θ₁ t + θ₂ t² and v t + a t², at an inverse depth of one.
   static std::array<double, 4> predicted(const Track& track, const Vector12& x, bool path) {
     const int from = path ? 6 : 0;
     const Eigen::Matrix<double, 2, 3>& J = path ? track.across : track.turned;
@@ -241,7 +238,7 @@ class RestParallaxTest {
     return x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3];
   }
 
-  /// What the best path explains beyond a rotation, without the tenth of the tracks that gain most.
+  /// χ² that the best path explains beyond a rotation, without the tenth of the tracks that gain most.
   double explained() const {
     const std::size_t n = tracks_.size();
     std::vector<double> weight(n, 1), depth(n), gain(n), before(n);

@@ -424,7 +424,7 @@ std::optional<RobustMatrix> robustMatrix(std::span<const Eigen::Vector4d> matche
   search_options.seed = options.seed;
   search_options.rejection_risk = 1e-3;
   // A wrong hypothesis fits its own sample, and others by chance.
-  search_options.least_score = static_cast<double>(Kind::sample_size) + by_chance + 3 * std::sqrt(by_chance);
+  search_options.min_score = static_cast<double>(Kind::sample_size) + by_chance + 3 * std::sqrt(by_chance);
   RobustSearch search(model, TruncatedCost{threshold}, search_options);
   // Right matches are those within χ²_{0.999}, less those that are by chance.
   std::vector<double> errors(n);

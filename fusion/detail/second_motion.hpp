@@ -41,7 +41,7 @@ inline std::optional<SecondMotion> secondMotion(const InertialWindow& window, co
                                                 const std::vector<std::size_t>& outliers,
                                                 const InitialisationOptions& options) {
   const double tracks = static_cast<double>(inliers.size() + outliers.size());
-  const std::size_t least = std::max(static_cast<std::size_t>(std::ceil(options.second_motion.least_part * tracks)),
+  const std::size_t least = std::max(static_cast<std::size_t>(std::ceil(options.second_motion.min_part * tracks)),
                                      options.consensus.features_drawn + options.second_motion.beyond_drawn);
   if (!first.hasMotion() || outliers.size() < least) return std::nullopt;
   InitialisationOptions how = options;

@@ -1,4 +1,4 @@
-// What the nine entries of H or F, or the pose, obey in each model of fusion/two_view/models.hpp.
+// Constraints on the nine entries of H or F, or on the pose, in each model of fusion/two_view/models.hpp.
 #pragma once
 
 #include <fusion/two_view/models.hpp>
@@ -74,7 +74,7 @@ class ConstraintRows {
   int next_ = 0;
 };
 
-/// What the entries of H obey in each model.
+/// Families of homographies, by the constraints on the entries of H.
 enum class HomographyFamily {
   retinal_translation,
   zoom,
@@ -142,8 +142,8 @@ struct HomographyConstraint {
   }
 };
 
-/// What the entries of F obey: those of a translation, F = [t]×, of two affine cameras, whose upper left part is zero, or
-/// det F = 0; ‖F‖² = 2.
+/// Families of epipolar geometries, by the constraints on F: F = [t]× of a translation, zero upper left part of two
+/// affine cameras, or det F = 0; ‖F‖² = 2.
 enum class EpipolarFamily { translation, affine, fundamental };
 
 struct EpipolarConstraint {

@@ -1,4 +1,4 @@
-// What the models of two-view motion have in common: the estimate of the parameter under the constraints of each model.
+// Members shared by the models of two-view motion: estimating the parameter under the constraints of each model.
 #pragma once
 
 #include <fusion/detail/two_view_constraints.hpp>
@@ -24,7 +24,7 @@ namespace liestat::detail {
 /// Matches of which the parameter fits so much by itself (ConstrainedEstimator::leverage) take no part. A wrong match that
 /// lies on its epipolar line by chance has often a parallax that no other one has: it agrees with all others, and moves
 /// the estimate by many of its standard deviations. Where all matches are few, three times their mean is the bound.
-inline constexpr double most_leverage = 0.5;
+inline constexpr double max_leverage = 0.5;
 
 /// The projection estimate; `finish` takes the parameter that was found into the result.
 template <class Q, class Constraint, class Equation, class Finish>
@@ -52,7 +52,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
     const double mean = static_cast<double>(found.free_parameters) / found.equations;
     Channel vouched_for{{}, {sigma}, {Equation{}}};
     for (std::size_t i = 0; i < matches.size(); ++i) {
-      if (estimator.leverage(i) > std::max(most_leverage, 3 * mean)) continue;
+      if (estimator.leverage(i) > std::max(max_leverage, 3 * mean)) continue;
       vouched_for.measurements.push_back(matches.measurements[i]);
     }
     if (vouched_for.size() == matches.size()) break;
@@ -70,7 +70,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   return result;
 }
 
-/// What each model of the lattice says of itself.
+/// Name, parents and dimensions of a model of the lattice.
 struct TwoViewModelCard {
   std::string name;
   std::vector<std::string> parents;

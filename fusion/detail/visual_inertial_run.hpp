@@ -1,6 +1,7 @@
 // How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
 #pragma once
 
+#include <fusion/detail/median.hpp>
 #include <fusion/detail/second_motion.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/consensus.hpp>
@@ -41,11 +42,7 @@ class RecordingRun {
       sigmas.push_back(seen.sigma);
       tracks_ = std::max(tracks_, seen.track + 1);
     }
-    if (!sigmas.empty()) {
-      const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-      std::nth_element(sigmas.begin(), middle, sigmas.end());
-      bearing_noise_ = *middle;
-    }
+    if (!sigmas.empty()) bearing_noise_ = median(std::move(sigmas));
     result.bearing_noise = bearing_noise_;
     for (const double time : times()) {
       covered_.push_back(!recording.readings.empty() && time >= recording.readings.front().time &&
@@ -154,7 +151,7 @@ class RecordingRun {
 
   /// A window's meeting with those before it.
   struct Meeting {
-    std::size_t window;  ///< of the result's
+    std::size_t window;  ///< index in the result's windows
     WindowFusion::Meeting outcome;
   };
   /// Fuses a stretch; returns its meetings.

@@ -26,7 +26,7 @@ struct WindowImage {
   double time = 0;                                                 ///< s since the first image
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< C_j: the body's axes in t0
   Eigen::Vector3d displacement = Eigen::Vector3d::Zero();          ///< S_j: twice integrated specific force (m)
-  Eigen::Matrix3d displacement_by_bias = Eigen::Matrix3d::Zero();  ///< of S_j, by the accelerometer's bias
+  Eigen::Matrix3d displacement_by_bias = Eigen::Matrix3d::Zero();  ///< ∂S_j/∂b of the accelerometer's bias
 };
 
 /// The image at the end of a motion that was integrated from the first image on (fusion/imu/preintegration.hpp).
@@ -66,7 +66,7 @@ struct ClosedFormFeature {
   bool depth_determined = false;  ///< false: no parallax; its position is then any point of its line in front
   double parallax = 0;            ///< rad, RMS of its directions about their mean after compensation of the rotation
   double residual = 0;        ///< rad, RMS over its observations; this and the parallax weighted by 1/relative_sigma²
-  double relative_sigma = 1;  ///< of its bearings: root of the harmonic mean of their squares
+  double relative_sigma = 1;  ///< root of the harmonic mean of its bearings' squared relative sigmas
   double depth_sigma = std::numeric_limits<double>::infinity();  ///< m, along its first bearing; image noise only
 };
 
@@ -90,6 +90,16 @@ enum class CovarianceContent {
   image_noise,            ///< image noise only: not the inertial sensor's noise, nor unmodelled biases
   image_noise_bias_prior  ///< image noise and the prior of the accelerometer's bias
 };
+
+namespace detail {
+
+/// The largest χ² that counts as noise: five standard deviations above the mean, and 12 more because χ² is skewed where
+/// the degrees of freedom are few. Noise exceeds it with a probability below 1e-5, whatever their number.
+inline double noiseLimit(double degrees_of_freedom) {
+  return degrees_of_freedom + 5 * std::sqrt(2 * degrees_of_freedom) + 12;
+}
+
+}  // namespace detail
 
 /// Never an unmarked wrong answer: solutions are there where the data determine them, see status.
 struct ClosedFormResult {
@@ -120,7 +130,7 @@ struct ClosedFormResult {
   std::size_t images_used = 0;  ///< images with an observation that was used
   std::size_t features_used = 0;
   std::size_t observations_used = 0;
-  std::size_t degrees_of_freedom = 0;  ///< of the first solution's cost
+  std::size_t degrees_of_freedom = 0;  ///< degrees of freedom of the first solution's cost
 
   /// With stationary and noise: a uniform motion of more than so many m/s for each metre to the features, which would
   /// have shown in the tracks, is excluded (with a probability of 0.995); infinite: nothing is.

@@ -19,9 +19,9 @@ namespace liestat {
 
 /// Indices are the window's. Features that fewer than two images have seen are in neither list.
 struct ConsensusResult {
-  ClosedFormResult result;                     ///< of the inliers; of all features where there is no consensus
+  ClosedFormResult result;                     ///< from the inliers; from all features where there is no consensus
   std::vector<std::size_t> inliers, outliers;  ///< ascending; no inliers: no consensus
-  std::size_t hypotheses = 0;                  ///< that were tried; 0: too few features to choose from, all are taken
+  std::size_t hypotheses = 0;                  ///< hypotheses tried; 0: too few features to choose from, all are taken
 
   /// Exactly one answer, which explains the data of the inliers.
   bool ok() const { return !inliers.empty() && result.ok(); }

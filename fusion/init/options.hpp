@@ -37,31 +37,31 @@ struct ClosedFormOptions {
 
 /// fusion/init/consensus.hpp
 struct ConsensusOptions {
-  double max_residual = 3;         ///< RMS angle of an inlier, in sigmas of a bearing
-  double misfit_sigmas = 5;        ///< of a feature's χ², beyond which it is dropped from the solution in the end
+  double max_residual = 3;   ///< RMS angle of an inlier, in sigmas of a bearing
+  double misfit_sigmas = 5;  ///< a feature whose χ² exceeds its mean by more sigmas is dropped from the final solution
   std::size_t features_drawn = 4;  ///< a hypothesis
   std::size_t max_hypotheses = 300;
   double confidence = 0.9999;    ///< drawing ends when an all-inlier sample was missed with 1 - this probability
-  std::size_t local_passes = 3;  ///< of solving again for those that agree with the best hypothesis so far
-  std::uint64_t seed = 1;        ///< of the draws: the same seed gives the same result
+  std::size_t local_passes = 3;  ///< times that inliers of the best hypothesis so far are solved for again
+  std::uint64_t seed = 1;        ///< the same seed gives the same draws and result
 };
 
 /// fusion/init/robust_initialisation.hpp: a second motion, among the tracks that do not agree with the first. Tracks that
 /// drift independently of each other agree on one by chance in less than one window of a hundred (docs/closed_form.md).
 struct SecondMotionOptions {
   bool search = true;
-  double least_part = 0.2;       ///< of all tracks must agree on it,
-  std::size_t beyond_drawn = 3;  ///< and so many more than a hypothesis is made of
+  double min_part = 0.2;         ///< fraction of all tracks that must agree on it,
+  std::size_t beyond_drawn = 3;  ///< and their least number beyond the sample of a hypothesis
 };
 
 /// fusion/init/epipolar_gyroscope_bias.hpp
 struct EpipolarBiasOptions {
   /// RMS by which the directions of a pair of images must move, beyond what a rotation explains, in sigmas.
   double min_parallax = 4;
-  double misfit_sigmas = 5;    ///< of a track's χ², beyond which it is rejected
+  double misfit_sigmas = 5;    ///< a track whose χ² exceeds its mean by more sigmas is rejected
   double min_consensus = 0.4;  ///< fraction of the tracks that must agree
   double max_sigma = 0.02;     ///< rad/s, predicted, of the bias's least known direction
-  int max_iterations = 30;     ///< of the last stage
+  int max_iterations = 30;     ///< in the last stage
 };
 
 /// fusion/init/gyroscope_bias.hpp
@@ -78,7 +78,7 @@ struct GyroscopeBiasOptions {
 /// fusion/init/refinement.hpp
 struct RefinementOptions {
   int max_iterations = 50;
-  double min_decrease = 1e-3;  ///< of the cost (χ²): below it, it has converged
+  double min_decrease = 1e-3;  ///< converged when the cost (χ²) decreases by less
   int max_integrations = 3;    ///< how often the readings are integrated anew for biases that have gone too far
 };
 
@@ -92,7 +92,7 @@ struct InitialisationOptions {
   /// Scales the standard deviations of the preintegrated motions in the refinement: data sheets tell the noise of a
   /// sensor at rest, and on real recordings errors are larger (scale factors, vibration, time stamps).
   double inertial_noise_factor = 1;
-  int max_rounds = 3;  ///< of consensus and gyroscope's bias, in initialiseRobustly()
+  int max_rounds = 3;  ///< initialiseRobustly(): alternations of consensus and gyroscope's bias
 
   ClosedFormOptions closed_form = {};
   ConsensusOptions consensus = {};

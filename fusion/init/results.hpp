@@ -34,10 +34,10 @@ struct EpipolarBiasResult {
   /// parallax that is too small or too even to be seen is not in it: the bias is then off by speed over distance.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   std::vector<std::size_t> inliers, outliers;  ///< ascending; a drift along the epipolar lines is not seen
-  std::vector<double> residuals;               ///< of each track, RMS in sigmas; infinite in neither list
+  std::vector<double> residuals;               ///< RMS of each track, in sigmas; infinite in neither list
   /// Other biases for which many tracks agree, the best first: what else to try where this one turns out to be wrong.
   std::vector<Eigen::Vector3d> others;
-  std::size_t pairs_used = 0;  ///< of images
+  std::size_t pairs_used = 0;  ///< pairs of images
   int starts = 0, iterations = 0;
   int integrations = 0;  ///< how often the readings were integrated anew
 
@@ -130,8 +130,7 @@ struct RefinementResult {
   /// Whether the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
   /// alone, with its thousands of bearings, hardly sees a bias.
   bool consistent() const {
-    const double dof = static_cast<double>(degrees_of_freedom);
-    return cost <= dof + 5 * std::sqrt(2 * dof) + 12 && prior_p >= 1e-4;
+    return cost <= detail::noiseLimit(static_cast<double>(degrees_of_freedom)) && prior_p >= 1e-4;
   }
   /// Whether there are states with their covariance, be it a large one.
   bool converged() const {
@@ -145,7 +144,9 @@ struct RefinementResult {
 // initialiseRobustly(), in robust_initialisation.hpp
 
 /// Fused windows (window_fusion.hpp) that are as far apart with less than this probability contradict each other.
-inline constexpr double least_p_of_fusion = 1e-3;
+inline constexpr double min_p_of_fusion = 1e-3;
+/// The former name of min_p_of_fusion.
+inline constexpr double least_p_of_fusion = min_p_of_fusion;
 
 /// Tracks that do not agree with the first motion but with another, and what they say. Indices are the window's.
 struct SecondMotion {
@@ -172,7 +173,7 @@ struct RobustInitialisation {
   EpipolarBiasResult epipolar;                         ///< where it began
   std::optional<SecondMotion> second;                  ///< where status is ambiguous
   std::optional<RefinementResult> rest;                ///< where result.status is stationary and the noise is known
-  FusionStatus bias_status = FusionStatus::bad_input;  ///< of the last estimate with the motion
+  FusionStatus bias_status = FusionStatus::bad_input;  ///< status of the last estimate with the motion
   std::size_t hypotheses = 0;
   int rounds = 0;
   int integrations = 0;  ///< how often the readings were integrated anew

@@ -1,6 +1,6 @@
-// What the windows of a recording say together: the direction of gravity, the velocity and the biases. Each window's
-// estimate meets what the windows before it have said, carried to its first image by the inertial sensor, in a
-// Mahalanobis mean of stats/; χ² says whether the two agree.
+// Fusion of the windows of a recording: the direction of gravity, the velocity and the biases. Each window's estimate
+// meets the fusion of the windows before it, carried to its first image by the inertial sensor, in a Mahalanobis mean
+// of stats/; χ² says whether the two agree.
 //
 //   liestat::WindowFusion fusion(9.81);  // |G|
 //   for (…) {  // disjoint windows, in the order of time, refined withSharedPrior(options, n)
@@ -67,8 +67,8 @@ class WindowFusion {
     /// the first window.
     double chi2 = 0;
     int degrees_of_freedom = 0;
-    /// What all before predict less what the window says, in the tangent space at the latter (to first order, of which
-    /// chi2 is the exact one), and the covariance that both together expect of it.
+    /// Prediction of the windows before minus the window's estimate, in the tangent space at the latter (to first
+    /// order; chi2 is exact), and the covariance that both together expect of it.
     Eigen::Matrix<double, 11, 1> difference = Eigen::Matrix<double, 11, 1>::Zero();
     detail::Matrix11 difference_covariance = detail::Matrix11::Zero();
   };
@@ -89,7 +89,7 @@ class WindowFusion {
   /// Whether there is a state.
   bool hasState() const { return windows_ > 0; }
   /// Whether there is one and the windows do not contradict each other.
-  bool ok() const { return hasState() && p() >= least_p_of_fusion; }
+  bool ok() const { return hasState() && p() >= min_p_of_fusion; }
   /// At the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }

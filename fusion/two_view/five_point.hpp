@@ -28,7 +28,7 @@ namespace detail {
 
 /// Another orthogonal basis of the same space: the product with a quaternion of no special direction.
 inline NineColumns<4> turnedBasis(const NineColumns<4>& b) {
-  constexpr double w = 0.31, x = 0.56, y = -0.42, z = 0.6436;  // of length one to 1e-3
+  constexpr double w = 0.31, x = 0.56, y = -0.42, z = 0.6436;  // |(w, x, y, z)| = 1 to 1e-3
   NineColumns<4> turned;
   turned.col(0) = w * b.col(0) - x * b.col(1) - y * b.col(2) - z * b.col(3);
   turned.col(1) = x * b.col(0) + w * b.col(1) - z * b.col(2) + y * b.col(3);

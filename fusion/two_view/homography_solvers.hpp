@@ -53,12 +53,12 @@ inline bool homographyOfFour(std::span<const Eigen::Vector4d> m, Eigen::Matrix3d
   }
   // Rounding of the coordinates counts as much as the extent.
   constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
-  const double least_d = 1e-9 * first + rounding * std::sqrt(first) * m[0].head<2>().cwiseAbs().sum();
-  const double least_e = 1e-9 * second + rounding * std::sqrt(second) * m[0].tail<2>().cwiseAbs().sum();
+  const double min_d = 1e-9 * first + rounding * std::sqrt(first) * m[0].head<2>().cwiseAbs().sum();
+  const double min_e = 1e-9 * second + rounding * std::sqrt(second) * m[0].tail<2>().cwiseAbs().sum();
   const double d3 = d[0] + d[1] + d[2], e3 = e[0] + e[1] + e[2];
-  bool good = std::abs(d3) > least_d && std::abs(e3) > least_e && d3 * e3 > 0;
+  bool good = std::abs(d3) > min_d && std::abs(e3) > min_e && d3 * e3 > 0;
   for (int i = 0; i < 3; ++i) {
-    good = good && std::abs(d[i]) > least_d && std::abs(e[i]) > least_e && d[i] * e[i] > 0;
+    good = good && std::abs(d[i]) > min_d && std::abs(e[i]) > min_e && d[i] * e[i] > 0;
   }
   if (!good) return false;
   // With p_i = (x_i, 1) the rows are p_j × p_k = (y_j - y_k, x_k - x_j, d_i).

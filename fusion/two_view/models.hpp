@@ -60,19 +60,19 @@ namespace liestat {
 struct TwoViewMotionModel {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Essentiald pose = Essentiald();  ///< second_T_first up to scale, on the side that most matches lie in front of
-  double focal_length = 1;         ///< of both views in the unit of the matches, of `shared focal length`
+  double focal_length = 1;         ///< f of both views in the unit of the matches, for `shared focal length`
 };
 
 using TwoViewModel = HierarchyModel<Eigen::Vector4d, TwoViewMotionModel>;
 
-/// What the models know of the images.
+/// Noise and size of the images, as the models take them.
 struct TwoViewImages {
-  MatchNoise noise = {};  ///< of the matches, in their unit
+  MatchNoise noise = {};  ///< noise of the matches, in their unit
   /// Width and height of the second image in that unit: by them a random match fits a model.
   Eigen::Vector2d size = Eigen::Vector2d::Ones();
 };
 
-/// What is known of the cameras.
+/// Prior knowledge of the cameras.
 enum class TwoViewCalibration {
   calibrated,   ///< coordinates are normalised
   uncalibrated  ///< centred, in any unit: rotation and essential are left out

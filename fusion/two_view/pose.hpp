@@ -73,7 +73,7 @@ inline int sideOf(const TwoViewPose& pose, const Eigen::Vector4d& match, double 
 struct CheiralPose {
   TwoViewPose pose;
   std::size_t in_front = 0;             ///< 0 where no pose has any
-  std::array<std::size_t, 4> counts{};  ///< of the poses in the order of posesOfEssential
+  std::array<std::size_t, 4> counts{};  ///< matches in front, for each pose in the order of posesOfEssential
 };
 /// The matches are in coordinates in which the cameras of E have the given focal lengths. Those whose rays are parallel
 /// to `min_parallax` count for no pose; the first of equals is chosen. Two of the four poses differ from the others by

@@ -52,7 +52,7 @@ struct TwoViewRobustResult {
   std::vector<std::size_t> inliers;  ///< ascending
   double score = 0;                  ///< Σ max(0, 1 - e/threshold) over all matches, e their squared errors
   double chi2 = std::numeric_limits<double>::quiet_NaN();  ///< sum of the squared errors of the inliers
-  double confidence = 0;  ///< that a sample of right matches alone was drawn; below the option's if the draws ran out
+  double confidence = 0;  ///< probability that right matches alone were drawn once; below the option's if draws ran out
   std::size_t draws = 0;
 
   bool ok() const { return status == Status::ok; }
@@ -61,7 +61,7 @@ struct TwoViewRobustResult {
 /// ũ' ~ H ũ.
 struct RobustHomography : TwoViewRobustResult {
   Eigen::Matrix3d H = Eigen::Matrix3d::Identity();  ///< ‖H‖² = 3; the third coordinate of H ũ is positive
-  /// Of the entries of H, column after column; of rank 8.
+  /// Covariance of the entries of H, column after column; rank 8.
   Eigen::Matrix<double, 9, 9> covariance =
       Eigen::Matrix<double, 9, 9>::Constant(std::numeric_limits<double>::quiet_NaN());
 };
@@ -69,7 +69,7 @@ struct RobustHomography : TwoViewRobustResult {
 /// ũ'ᵀ F ũ = 0.
 struct RobustFundamental : TwoViewRobustResult {
   Eigen::Matrix3d F = Eigen::Matrix3d::Zero();  ///< det F = 0, ‖F‖² = 2, of either sign
-  /// Of the entries of F, column after column; of rank 7.
+  /// Covariance of the entries of F, column after column; rank 7.
   Eigen::Matrix<double, 9, 9> covariance =
       Eigen::Matrix<double, 9, 9>::Constant(std::numeric_limits<double>::quiet_NaN());
 };

@@ -86,7 +86,7 @@ inline void checkIsotropy(const ManifoldOperations& m, ContractReport& report, c
   });
 }
 
-/// What follows from invariants 4 and 7: the Jacobians of the action by the feature and by the transformation.
+/// Consequences of invariants 4 and 7: the Jacobians of the action by the feature and by the transformation.
 inline void checkActionJacobians(const ManifoldOperations& m, ContractReport& report,
                                  const ContractOptions& options = {}) {
   using Vector = ManifoldOperations::Vector;
@@ -128,7 +128,7 @@ inline void checkPlacementJacobian(const ManifoldOperations& m, ContractReport& 
     const Matrix J = m.placementJacobian(x);
     // A placement turns over the distance to the point where it is not smooth, which shows in its Jacobian's size.
     const double room = 3 / std::max(3.0, J.norm());
-    if (room < detail::least_room) return;
+    if (room < detail::min_room) return;
     const Element f = m.placement(x);
     bench.derivative(
         "placementJacobian against differences", J,
@@ -154,7 +154,7 @@ inline void checkExpLogJacobians(const ManifoldOperations& m, ContractReport& re
   bench.overAll([&](const Vector& v) {
     const Point x = m.expOrigin(v);
     const double room = bench.room(x);
-    if (room < detail::least_room) return;
+    if (room < detail::min_room) return;
     bench.derivative(
         "principalChartJacobian against differences", m.principalChartJacobian(x),
         [&](const Vector& d) { return m.logOrigin(m.exp(x, d)); }, {{"x = expOrigin", v}}, room);
@@ -180,7 +180,7 @@ inline void checkErrorVector(const ManifoldOperations& m, ContractReport& report
                 detail::product(m.frameTransport(x, y), m.frameTransport(y, x)), bench.identity(),
                 {{"z", v}, {"y = expOrigin", w}}, condition * steep);
     const double room = bench.room(bench.between(y, x));
-    if (room < detail::least_room) return;
+    if (room < detail::min_room) return;
     bench.derivative(
         "errorVector by the feature against differences", by_feature,
         [&](const Vector& d) { return m.log(y, m.exp(x, d)); }, {{"z", v}, {"y = expOrigin", w}}, room);
@@ -205,7 +205,7 @@ inline void checkSecondDerivatives(const ManifoldOperations& m, ContractReport& 
   bench.overDomain([&](const Vector& z) {
     const Vector a = bench.generic();
     const double room = bench.room(m.expOrigin(z));
-    if (room < detail::least_room) return;
+    if (room < detail::min_room) return;
     bench.derivative(
         "dlogFeatureTransposed against differences", m.dlogFeatureTransposed(z, a),
         [&](const Vector& d) -> Vector {

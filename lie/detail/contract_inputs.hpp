@@ -1,5 +1,5 @@
-// What the contract's checks share: differences of functions, how large an error rounding explains, and a bench that
-// runs a check over the decades of the angle.
+// Helpers shared by the contract's checks: differences of functions, how large an error rounding explains, and a bench
+// that runs a check over the decades of the angle.
 #pragma once
 
 #include <lie/detail/contract_record.hpp>
@@ -117,7 +117,7 @@ class ContractRecorder {
 
 /// Points nearer than this to a cut locus are left to the checks that need no differences; a little less than the decade
 /// of 0.01, which is swept.
-inline constexpr double least_room = 0.0099;
+inline constexpr double min_room = 0.0099;
 
 /// Inputs for the checks of a manifold and of its group, and short names for what the checks do with them.
 class ContractBench : public ContractRecorder {

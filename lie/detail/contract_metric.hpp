@@ -70,7 +70,7 @@ inline void checkHessian(const ManifoldOperations& m, ContractReport& report, co
     const Vector w = bench.generic();
     const Point y = m.expOrigin(w), x = m.exp(y, v);
     const double room = bench.room(bench.between(y, x));
-    if (room < detail::least_room) return;
+    if (room < detail::min_room) return;
     const Matrix A = m.hessianHalfSquaredDistance(m.log(y, x));
     bench.equal("hessianHalfSquaredDistance is symmetric", A, detail::transposed(A), {{"z", v}},
                 std::max(1.0, A.norm()));

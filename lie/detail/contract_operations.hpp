@@ -88,7 +88,7 @@ ManifoldOperations::Group groupOperations() {
   return g;
 }
 
-/// What M's traits tell statistics.
+/// The operations that M's traits offer to statistics.
 template <Homogeneous M>
 ManifoldOperations::Statistics statisticsOperationsOf() {
   using T = ManifoldTraits<M>;

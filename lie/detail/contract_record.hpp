@@ -65,7 +65,7 @@ struct ManifoldOperations {
   } group;
 
   int dimension = 0;
-  double epsilon = 0;                ///< of the scalar
+  double epsilon = 0;                ///< ε of the scalar
   Function<Vector, Vector> rounded;  ///< to the nearest numbers of the scalar
 
   // Homogeneous.
@@ -81,7 +81,7 @@ struct ManifoldOperations {
   Function<Matrix, Point> placementJacobian;
   Function<bool, Point> isPlacementSmooth;
 
-  // What lie/manifold.hpp makes of these. The base's Jacobian takes dlogOrigin(p) itself.
+  // Derived by lie/manifold.hpp from these. The base's Jacobian takes dlogOrigin(p) itself.
   Function<Point, Point, Vector> exp;
   Function<Vector, Point, Point> log;
   Function<Matrix, Element, Point> actionFeatureJacobian, actionTransformationJacobian;
@@ -100,18 +100,18 @@ struct ManifoldOperations {
   std::vector<int> representatives;
   Function<Point, Point, int> representative;
   Function<Matrix, int> representativeJacobian;
-  Function<double, Point> representativeGap;  ///< of nearestRepresentative
+  Function<double, Point> representativeGap;  ///< gap of nearestRepresentative
 
   // Optional: derivatives of dlogOrigin (see checkSecondDerivatives).
   Function<Matrix, Vector, Vector> dlogFeatureTransposed, dlogBaseTransposed;
 
-  /// What the traits tell statistics; empty where they say nothing.
+  /// The operations that the traits offer to statistics; those that they lack are empty.
   struct Statistics {
     CompactFactor compact_factor = CompactFactor::unknown;
     int compact_begin = 0;
     Function<Vector, Point> compactCoordinates, parameters;
-    Function<std::vector<Point>, std::vector<Point>, Vector> chordalMean;  ///< of weighted points; one or, if they
-                                                                           ///< cancel, none
+    /// The mean of weighted points; none if they cancel.
+    Function<std::vector<Point>, std::vector<Point>, Vector> chordalMean;
     std::vector<TangentBlock> tangent_parts;
     Function<Point, Point> throughMetricTwin, throughFactors;  ///< there and back
     std::vector<int> factor_sizes;

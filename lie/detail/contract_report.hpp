@@ -1,5 +1,4 @@
-// What the contract's checkers (lie/testing.hpp) are asked and what they answer: options and a report, without a test
-// framework.
+// Options and report of the contract's checkers (lie/testing.hpp), without a test framework.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,14 +31,14 @@ struct ContractInput {
 /// One invariant: of all inputs tried, the one that came nearest to its tolerance or exceeded it most.
 struct ContractCheck {
   std::string invariant;
-  double error = 0;      ///< of the worst input; NaN where a result was not finite
-  double tolerance = 0;  ///< for that input
-  std::string input;     ///< that input
+  double error = 0;      ///< error of the worst input; NaN where a result was not finite
+  double tolerance = 0;  ///< tolerance for that input
+  std::string input;     ///< the worst input
   int cases = 0;         ///< how many inputs were tried
   bool ok() const { return error <= tolerance; }
 };
 
-/// What the checkers found.
+/// The results of the checkers.
 class ContractReport {
  public:
   const std::vector<ContractCheck>& checks() const { return checks_; }

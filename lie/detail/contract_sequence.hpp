@@ -50,7 +50,7 @@ class ContractSequence {
   std::uint64_t point_;
   std::size_t coordinate_ = 0;
   int prime_ = 1;
-  std::vector<std::uint64_t> steps_;  ///< of each coordinate, in units of 2^-64
+  std::vector<std::uint64_t> steps_;  ///< one for each coordinate, in units of 2^-64
 };
 
 /// Meaning of the coordinates of a tangent space, and the range of the angle.

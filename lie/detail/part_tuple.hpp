@@ -108,7 +108,7 @@ class PartTuple {
   using Scalar = typename PartOf<Part<0>>::Scalar;
   static_assert((std::is_same_v<Scalar, typename PartOf<Parts>::Scalar> && ...), "parts have one scalar type");
   static constexpr int DoF = (PartOf<Parts>::DoF + ...);
-  /// Of those parts that show their parameters.
+  /// Sum over the parts that show their parameters.
   static constexpr int num_parameters = (parameterCount<Parts>() + ...);
   using Tangent = Eigen::Matrix<Scalar, DoF, 1>;
   using Square = Eigen::Matrix<Scalar, DoF, DoF>;

@@ -25,8 +25,8 @@ constexpr int representativeCount() {
 template <class Scalar>
 struct ProductRepresentative {
   int index = 0;
-  Scalar least_gap = std::numeric_limits<double>::infinity();
-  Scalar gap() const { return least_gap; }  ///< the least of the quotient parts', rad
+  Scalar min_gap = std::numeric_limits<double>::infinity();
+  Scalar gap() const { return min_gap; }  ///< the least of the quotient parts', rad
 };
 
 /// Representatives of a product with a quotient among its parts. An index has one digit a part, the first part's
@@ -58,7 +58,7 @@ struct ProductRepresentatives {
       if constexpr (Quotient<P>) {
         const auto part = ManifoldTraits<P>::nearestRepresentative(x.template get<i>());
         const typename M::Scalar gap = part.gap();
-        choice.least_gap = select(gap < choice.least_gap, gap, choice.least_gap);
+        choice.min_gap = select(gap < choice.min_gap, gap, choice.min_gap);
         for (int d = 0; d < representativeCount<P>(); ++d) {
           if (ManifoldTraits<P>::representatives[d] == part.index) choice.index += d * place_value<i>;
         }

@@ -13,13 +13,13 @@ template <class S>
 struct ScaleRange {
   static constexpr double least = is_single_precision<S> ? 1e-5 : 1e-10;
   /// Logarithm of a scale that stays in the range after rounding: a little above the least.
-  static constexpr double least_logarithm = is_single_precision<S> ? -11.512915 : -23.0258509298;
+  static constexpr double min_logarithm = is_single_precision<S> ? -11.512915 : -23.0258509298;
 };
 
 /// The logarithm of a scale, at least and at most what the range admits.
 template <class S>
 inline S saturatedLogarithm(const S& sigma) {
-  const S low = static_cast<S>(ScaleRange<S>::least_logarithm), high = -low;
+  const S low = static_cast<S>(ScaleRange<S>::min_logarithm), high = -low;
   const S above = select(sigma < low, low, sigma);
   return select(above > high, high, above);
 }

@@ -180,7 +180,7 @@ inline SimilarityIntegrals<Element> similarityIntegrals(const S& sigma, const S&
 ///   [ω][υ][ω] = -d [ω],  [ω]²[υ] + [υ][ω]² = -t [υ] - d [ω],  d = ω·υ, t = |ω|².
 template <class S>
 struct CouplingForm {
-  S v, wv, vw, wwv, dw, dww;  ///< of [υ], [ω][υ], [υ][ω], [ω]²[υ], d[ω], d[ω]²
+  S v, wv, vw, wwv, dw, dww;  ///< coefficients of [υ], [ω][υ], [υ][ω], [ω]²[υ], d[ω], d[ω]²
 
   friend CouplingForm operator+(const CouplingForm& p, const CouplingForm& q) {
     return {p.v + q.v, p.wv + q.wv, p.vw + q.vw, p.wwv + q.wwv, p.dw + q.dw, p.dww + q.dww};

@@ -79,7 +79,7 @@ double angleToCutLocus(const R& features, const M& y) {
 }
 
 /// The factor of the law over whose angular coordinates a slope is taken, from a covariance of all coordinates, `width`
-/// standard deviations wide and no narrower than least_region.
+/// standard deviations wide and no narrower than min_region_sigma.
 template <int K, class Matrix, class List>
 Eigen::Matrix<double, K, K> angularRegion(const Matrix& covariance, const List& list, double width) {
   Eigen::Matrix<double, K, K> region;
@@ -89,7 +89,7 @@ Eigen::Matrix<double, K, K> angularRegion(const Matrix& covariance, const List& 
                      static_cast<double>(
                          covariance(list.index[static_cast<std::size_t>(a)], list.index[static_cast<std::size_t>(b)]));
     }
-    region(a, a) += least_region * least_region;
+    region(a, a) += min_region_sigma * min_region_sigma;
   }
   return lowerFactor<K>(region);
 }

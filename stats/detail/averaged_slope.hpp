@@ -18,7 +18,7 @@
 namespace liestat::detail {
 
 /// No region is taken to be narrower, rad, or there would be too few data in it to estimate a density from.
-inline constexpr double least_region = 0.05;
+inline constexpr double min_region_sigma = 0.05;
 /// More data are represented by every m-th of them.
 inline constexpr std::size_t most_averaged = 4096;
 
@@ -118,6 +118,11 @@ Eigen::Matrix<double, D, K> averagedDerivative(const Eigen::Matrix<double, K, K>
   }
   return X.transpose();
 }
+
+/// A Hessian is averaged unless the cut locus of every datum is farther from the mean than this many times the reach of
+/// the nodes. Inside the reach the gradient jumps; the half beyond it is for what bends before it jumps: the curvature
+/// diverges towards the antipode of the sphere (docs/theory/means.md, section 7.6).
+inline constexpr double cut_locus_margin = 1.5;
 
 /// How far the nodes reach.
 template <int K>

@@ -14,9 +14,9 @@
 
 namespace liestat::detail {
 
-/// What one pass over the data says about the ball of radius ρ about a point.
+/// Bounds from one pass over the data on the ball of radius ρ about a point.
 struct BallBound {
-  double lower = 0;       ///< of the criterion in the ball
+  double lower = 0;       ///< lower bound of the criterion in the ball
   double centre = 0;      ///< the criterion at the centre; with bins, at least it
   std::size_t looks = 0;  ///< at data and bins
 };
@@ -90,7 +90,7 @@ struct Profile {
 template <class Space>
 Profile profile(const PackedData<Space>& data, const typename Space::Point& y) {
   constexpr std::size_t many = 20000;
-  constexpr double grid = 0.004, least_gap = 1e-9, steps_an_octave = 32;
+  constexpr double grid = 0.004, min_gap = 1e-9, steps_an_octave = 32;
   Profile p;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   std::vector<std::pair<std::uint64_t, double>> rounded;
@@ -106,7 +106,7 @@ Profile profile(const PackedData<Space>& data, const typename Space::Point& y) {
       p.items.push_back({s.angle, s.second, item.weight});
     } else {
       const auto up = static_cast<std::uint64_t>(std::ceil(s.angle / grid));
-      const double octaves = std::log2(std::max(s.gap(), least_gap) / least_gap);
+      const double octaves = std::log2(std::max(s.gap(), min_gap) / min_gap);
       const auto down = static_cast<std::uint64_t>(octaves * steps_an_octave);
       rounded.emplace_back(up << 32 | down, item.weight);
     }
@@ -118,7 +118,7 @@ Profile profile(const PackedData<Space>& data, const typename Space::Point& y) {
     for (; i < rounded.size() && rounded[i].first == key; ++i) weight += rounded[i].second;
     const double angle = std::min(grid * static_cast<double>(key >> 32), p.largest);
     const auto down = static_cast<double>(key & 0xffffffffu);
-    const double gap = down > 0 ? least_gap * std::exp2(down / steps_an_octave) : 0;
+    const double gap = down > 0 ? min_gap * std::exp2(down / steps_an_octave) : 0;
     p.items.push_back({angle, angle + gap, weight});
   }
   p.mean_angle /= p.weight;

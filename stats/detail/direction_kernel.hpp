@@ -106,11 +106,11 @@ struct DirectionKernel {
         if constexpr (Weighted) std::memcpy(data[4], arguments.weights + i, count * sizeof(S));
         P least(S(1));
         for (std::size_t j = 0; j < count; j += P::size) sums.project(data, j, arguments.reference, least);
-        const S least_cosine = -largestOf(-least);
-        if (least_cosine > static_cast<S>(small_rotation_cosine)) {
+        const S min_cosine = -largestOf(-least);
+        if (min_cosine > static_cast<S>(small_rotation_cosine)) {
           for (std::size_t j = 0; j < count; j += P::size)
             sums.template add<false>(data, j, arguments, i, small_rotation<S>);
-        } else if (least_cosine > S(0)) {
+        } else if (min_cosine > S(0)) {
           for (std::size_t j = 0; j < count; j += P::size)
             sums.template add<false>(data, j, arguments, i, any_rotation<S>);
         } else {
@@ -210,11 +210,11 @@ struct PlanarKernel {
         }
         P least(S(1));
         for (std::size_t j = 0; j < count; j += P::size) sums.turn(data, j, y, least);
-        const S least_cosine = -largestOf(-least);
-        if (least_cosine > static_cast<S>(small_rotation_cosine)) {
+        const S min_cosine = -largestOf(-least);
+        if (min_cosine > static_cast<S>(small_rotation_cosine)) {
           for (std::size_t j = 0; j < count; j += P::size)
             sums.template add<false>(data, j, arguments, i, small_rotation<S>);
-        } else if (least_cosine > S(0)) {
+        } else if (min_cosine > S(0)) {
           for (std::size_t j = 0; j < count; j += P::size)
             sums.template add<false>(data, j, arguments, i, any_rotation<S>);
         } else {

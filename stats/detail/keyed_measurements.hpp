@@ -97,20 +97,20 @@ class KeyedMeasurements {
 
   std::vector<Entry> entries_;
   std::vector<Measurement> measurements_;
-  std::unordered_map<std::uint64_t, std::uint64_t> counts_;  // of equal measurements
+  std::unordered_map<std::uint64_t, std::uint64_t> counts_;  // number of equal measurements, by content
   std::unordered_map<Id, std::uint64_t> keys_;
   Id next_ = 0;
 };
 
-inline constexpr std::size_t most_sampled = 16;
+inline constexpr std::size_t max_sampled = 16;
 
-/// The `count` measurements, `most_sampled` at most, whose keys, mixed with that of the draw, are the smallest among those that `admitted` lets in:
+/// The `count` measurements, `max_sampled` at most, whose keys, mixed with that of the draw, are the smallest among those that `admitted` lets in:
 /// each set with the same probability, and the same set whatever else comes or goes but for what enters it. The last one
 /// has the largest mixed key, which is returned; fewer than `count`: all ones.
 template <class Measurement, class Admitted>
 std::uint64_t keyedSample(const KeyedMeasurements<Measurement>& from, std::uint64_t draw, std::size_t count,
                           std::vector<std::size_t>& sample, const Admitted& admitted) {
-  std::uint64_t keys[most_sampled];
+  std::uint64_t keys[max_sampled];
   std::size_t found = 0;
   sample.assign(count, 0);
   for (std::size_t i = 0; i < from.size(); ++i) {

@@ -47,7 +47,7 @@ concept HasSecondOrder = requires(const TangentOf<M>& z) {
   ManifoldTraits<M>::dlogBaseTransposed(z, z);
 };
 
-/// What maha() iterates on: the measurements with their information matrices.
+/// The problem that maha() iterates on: the measurements with their information matrices.
 template <Homogeneous M, class R>
 struct MahaProblem {
   using T = ManifoldTraits<M>;

@@ -32,7 +32,7 @@ template <Homogeneous M>
 struct ScatterSums {
   SquareOf<M> scatter = SquareOf<M>::Zero(), squared = SquareOf<M>::Zero();
   ScalarOf<M> largest = 0, smallest_gap = std::numeric_limits<ScalarOf<M>>::infinity();
-  ScalarOf<M> largest_angle = 0;  ///< of the compact part, if the traits name it
+  ScalarOf<M> largest_angle = 0;  ///< largest angle of the compact part, if the traits name it
   double fourth = 0;              ///< Σ p θ⁴ of those angles
 
   void operator+=(const ScatterSums& other) {

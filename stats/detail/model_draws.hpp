@@ -19,12 +19,12 @@
 
 namespace liestat::detail {
 
-inline constexpr int most_equations = 32;
+inline constexpr int max_equations = 32;
 
-/// What the squared error of a measurement with 0 to 32 equations exceeds with the given probability.
+/// The squared errors that a measurement with 0 to 32 equations exceeds with the given probability.
 inline std::vector<double> errorThresholds(double probability) {
   std::vector<double> thresholds(1, 0.0);
-  for (std::size_t p = 1; p <= most_equations; ++p) {
+  for (std::size_t p = 1; p <= max_equations; ++p) {
     double low = 0, high = 1e4;
     for (int k = 0; k < 100; ++k) {
       const double middle = 0.5 * (low + high);
@@ -35,7 +35,7 @@ inline std::vector<double> errorThresholds(double probability) {
   return thresholds;
 }
 
-/// What a measurement adds to a score, as an integer, so that sums do not depend on their order.
+/// A measurement's contribution to a score, as an integer, so that sums do not depend on their order.
 inline std::int64_t scoreOf(HypothesisScore score, double squared_error, double threshold) {
   const double part = score == HypothesisScore::relevance ? Relevance{2 * threshold}.contribution(squared_error)
                       : score == HypothesisScore::inliers ? InlierCount{threshold}.contribution(squared_error)
@@ -166,7 +166,7 @@ class ModelDraws {
     std::vector<Hypothesis> hypotheses;
   };
   void count(Hypothesis& hypothesis, const Measurement& measurement, double error, int sign) const {
-    const int equations = std::clamp(model_->equationsOf(measurement), 0, most_equations);
+    const int equations = std::clamp(model_->equationsOf(measurement), 0, max_equations);
     const double threshold = thresholds_[static_cast<std::size_t>(equations)];
     hypothesis.score += sign * scoreOf(score_, error, threshold);
     if (error < threshold) hypothesis.inliers += static_cast<std::size_t>(sign);

@@ -21,10 +21,10 @@ struct PackedData {
   struct Item {
     typename Space::Point point;
     double weight = 0;
-    double radius = 0;                 ///< of a bin: largest distance of its data from `point`
-    double scatter = 0;                ///< of a bin: Σ p d²(point, x)
-    double offset = 0;                 ///< of a bin: |Σ p log(point, x)|, next to nothing since `point` is the mean
-    std::uint32_t begin = 0, end = 0;  ///< of a bin: the items that it consists of
+    double radius = 0;                 ///< bins: largest distance of the data from `point`
+    double scatter = 0;                ///< bins: Σ p d²(point, x)
+    double offset = 0;                 ///< bins: |Σ p log(point, x)|, next to nothing since `point` is the mean
+    std::uint32_t begin = 0, end = 0;  ///< bins: the items that the bin consists of
   };
   Space space;
   std::vector<Item> items;
@@ -93,7 +93,7 @@ PackedData<Space> groupedData(const PackedData<Space>& data) {
   PackedData<Space> tree{data.space, {}, 0};
   split(0, static_cast<std::uint32_t>(order.size()), coarsest);
   tree.roots = runs.size();
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> parts;  // of each bin; first == second: its data themselves
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> parts;  // each bin's; first == second: its data themselves
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const Run run = runs[i];
     const auto first = static_cast<std::uint32_t>(runs.size());

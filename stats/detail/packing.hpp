@@ -37,7 +37,7 @@ void takeFrom(std::span<const double>& list, Eigen::PlainObjectBase<D>& m) {
   }
   list = list.subspan(static_cast<std::size_t>(m.size()));
 }
-/// What packed() made, into the same values.
+/// Unpacks a list that packed() made, into the same values.
 template <class... T>
 void unpackInto(std::span<const double> list, T&... values) {
   (takeFrom(list, values), ...);

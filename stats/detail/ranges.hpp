@@ -1,5 +1,5 @@
-// What the estimators take as data: any range that can be gone through more than once, of points of a manifold or of
-// what stands for them (PointTraits in lie/manifold.hpp), and any such range of numbers as weights.
+// Ranges that the estimators accept as data: any that can be gone through more than once, of points of a manifold or of
+// values that stand for them (PointTraits in lie/manifold.hpp), and any such range of numbers as weights.
 //
 // The estimators themselves see one type, Samples: random access to owning types, indexed by any integer. Values of
 // such a type in random-access memory are used where they are (std::vector, std::array, std::span, std::deque, a view

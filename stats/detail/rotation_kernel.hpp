@@ -36,7 +36,7 @@ struct RotationKernel {
     S reference[7] = {};  ///< y, laid out like a feature
     /// Σ in the axes of y for rotations, in those of the world for translations.
     S cost, largest, defect, weight, gradient[k], hessian[6], scatter[entries], squared[entries];
-    S largest_angle, fourth;  ///< of the rotations: the largest squared angle, Σ p θ⁴
+    S largest_angle, fourth;  ///< rotations: the largest squared angle, Σ p θ⁴
     /// For quotients, roughly: the cosine of half the distance to the cut locus of each feature, and the largest.
     S gap_cosines[HalfTurns != 0 && exact ? max_count : 1], largest_gap_cosine;
     /// In the frame of y, to whose axes `to_reference` turns translations: a matrix, row by row.

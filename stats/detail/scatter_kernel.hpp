@@ -20,8 +20,8 @@ template <class S, bool Weighted>
 struct ScatterKernel {
   struct Arguments {
     ResidualColumns<S> residuals = nullptr;
-    const S* weights = nullptr;  ///< as many as a column has numbers
-    const S* metric = nullptr;   ///< of each column: the weight of its square in the squared length
+    const S* weights = nullptr;  ///< one for each number of a column
+    const S* metric = nullptr;   ///< weight of each column's square in the squared length
     std::size_t columns = 0, count = 0;
     /// The lower triangle of a matrix of columns × columns, row by row, to which nothing is added.
     S *scatter = nullptr, *squared = nullptr;

@@ -23,8 +23,8 @@ template <Metric M>
 struct SettledCovariance {
   SquareOf<M> first;       ///< from the Hessian at the mean
   SquareOf<M> covariance;  ///< from the averaged one
-  SquareOf<M> hessian;     ///< that one
-  double change = 0;       ///< of the Hessian
+  SquareOf<M> hessian;     ///< the averaged Hessian
+  double change = 0;       ///< relative change of the Hessian
   bool settled = false;    ///< false: too large a change, or no end of the iteration
 };
 

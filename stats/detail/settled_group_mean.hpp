@@ -16,7 +16,7 @@ namespace liestat::detail {
 template <LieGroup G>
 struct SettledGroupMean {
   SquareOf<G> covariance;
-  double change = 0;  ///< of the equations' derivative
+  double change = 0;  ///< relative change of the equations' derivative
   bool settled = false;
 };
 
@@ -48,7 +48,7 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
       settled.settled = false;
       const auto L = angularRegion<K>(settled.covariance, angular, width);
       if (!L.allFinite()) return settled;
-      if (clearance > 1.5 * reachOf<K>(L)) {
+      if (clearance > cut_locus_margin * reachOf<K>(L)) {
         settled.settled = true;
         return settled;
       }

@@ -18,7 +18,7 @@ namespace liestat::detail {
 template <Homogeneous M>
 struct SettledMaha {
   SquareOf<M> covariance;
-  double change = 0;  ///< of the Hessian
+  double change = 0;  ///< relative change of the Hessian
   bool settled = false;
 };
 
@@ -55,7 +55,7 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
       settled.settled = false;
       const auto L = angularRegion<K>(settled.covariance, angular, averaging_width);
       if (!L.allFinite()) return settled;
-      if (clearance > 1.5 * reachOf<K>(L)) {
+      if (clearance > cut_locus_margin * reachOf<K>(L)) {
         settled.settled = true;
         return settled;
       }

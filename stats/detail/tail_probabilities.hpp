@@ -47,7 +47,7 @@ inline double chiSquaredTail(double x, std::size_t n) {
   const double half = 0.5 * x;
   const bool odd = n % 2 == 1;
   double tail = odd ? std::erfc(std::sqrt(half)) : std::exp(-half);
-  double log_factorial = odd ? std::lgamma(1.5) : 0;  // of k/2
+  double log_factorial = odd ? std::lgamma(1.5) : 0;  // log Γ(k/2 + 1)
   for (std::size_t k = odd ? 1 : 2; k < n; k += 2) {
     const double power = 0.5 * static_cast<double>(k);
     if (k > 2) log_factorial += std::log(power);

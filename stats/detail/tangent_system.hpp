@@ -12,8 +12,8 @@
 
 namespace liestat::detail {
 
-/// What P linear equations C δ = d leave free of N unknowns. Singular values of C with rows of length one that are below
-/// 5e-8 count as zero, so the scale of an equation does not matter; of redundant ones the least squares count.
+/// The null space and solution of P linear equations C δ = d in N unknowns. Singular values of C with unit rows that are
+/// below 5e-8 count as zero, so the scale of an equation does not matter; redundant ones are met in least squares.
 template <int N, int P>
 class ConstraintBasis {
  public:
@@ -138,7 +138,7 @@ class TangentSystem {
     for (int k = 0; k < free; ++k) {
       values_[k] = svd.value(k);
       if (indefinite) values_[k] = std::max(values_[k], 1e-6 * svd.value(0));
-      if (!(values_[k] > least_part * svd.value(0))) values_[k] = 0, ++null_dimension_;
+      if (!(values_[k] > min_ratio * svd.value(0))) values_[k] = 0, ++null_dimension_;
       for (int i = 0; i < free; ++i) axes_.row(k) += svd.v(k, i) * scale[i] * basis.row(i);
     }
   }
@@ -178,7 +178,7 @@ class TangentSystem {
 
  private:
   /// Information is a sum of squares: what is a smaller part of it is rounding.
-  static constexpr double least_part = 1e-13;
+  static constexpr double min_ratio = 1e-13;
 
   Square A_ = Square::Zero(), axes_ = Square::Zero();
   Step values_ = Step::Zero();

@@ -36,8 +36,8 @@ std::pair<typename Space::Point, double> enclosingBall(const PackedData<Space>& 
   return best;
 }
 
-/// What a search asks of the features whose mean it certifies, a few times each search. Points are seen from the base,
-/// which is the mean at first.
+/// The features whose mean a search certifies: their compact parts, and the iteration to which the search returns a few
+/// times. Points are seen from the base, which is the mean at first.
 template <class Space>
 class SearchedMean {
  public:
@@ -55,9 +55,9 @@ class SearchedMean {
   virtual PackedData<Space> data() const = 0;
   /// Iterates from a point of the search.
   virtual Found iterate(const Point& start) = 0;
-  /// What was found last becomes the base, a better minimum; there are no rivals yet.
+  /// Makes the result of the last iteration, a better minimum, the base; there are no rivals yet.
   virtual void takeAsBase() = 0;
-  /// What was found last is a rival of the base.
+  /// Adds the result of the last iteration to the rivals of the base.
   virtual void keepAsRival() = 0;
   /// The feature at a point is a rival of the base.
   virtual void addRival(const Point& point) = 0;
@@ -66,7 +66,7 @@ class SearchedMean {
   ~SearchedMean() = default;
 };
 
-/// What a search needs to know of the manifold and of the mean from which it starts.
+/// Properties of the manifold and of the mean from which a search starts, and the limits of the search.
 struct SearchOptions {
   double tie;              ///< costs that differ by less, relative, are equal
   double a_priori_radius;  ///< data in a smaller ball have one mean
@@ -78,7 +78,7 @@ struct SearchOptions {
   const std::function<bool()>& stop;
 };
 
-/// What a search says about the base.
+/// The search's verdict on the base.
 struct SearchVerdict {
   Uniqueness unique = Uniqueness::not_certified;
   double r_star = 0;
@@ -107,11 +107,11 @@ class UniquenessSearch {
  private:
   struct Minimum {
     Point point;
-    double cost;  ///< of the compact part
+    double cost;  ///< cost of the compact part
     ExcludedBall<Space> ball;
   };
 
-  /// What packing, ordering and grouping a datum cost, in looks.
+  /// Cost of packing, ordering and grouping a datum, in looks.
   static constexpr std::size_t looks_to_pack = 8;
 
   void setBase() {

@@ -26,7 +26,7 @@ struct ValidationSample {
   std::size_t trials = 0, failures = 0, exceptions = 0;
   double iterations = 0;
   int max_iterations = 0;
-  std::vector<std::vector<double>> statistics;  ///< of each, in the order of the outcome's list, those that are finite
+  std::vector<std::vector<double>> statistics;  ///< finite values of each member, in the order of the outcome's list
 
   template <class Outcome>
   void add(const Outcome& outcome) {

@@ -80,7 +80,7 @@ class KeptRows {
 
   /// The row of the i-th feature that is seen.
   std::size_t operator[](std::size_t i) const { return all_ ? i : rows_[i]; }
-  /// What belongs to the features that are seen; one value for all, and an empty list, stay as they are.
+  /// The elements that belong to the features that are seen; one value for all, and an empty list, stay as they are.
   template <class T>
   std::vector<T> of(const std::vector<T>& list) const {
     if (all_ || list.size() < 2) return list;

@@ -126,7 +126,7 @@ TEST(CalibrationFiles, FilesThatBelongTogether) {
             sensor + ": it has an IMU, as has " + sensor + ", expected one in all files");
 }
 
-// What is no calibration is refused before it costs minutes.
+// A large file that is no calibration is refused before it costs minutes.
 TEST(CalibrationFiles, LargeOnesAreRefusedAtOnce) {
   std::string text;
   for (int i = 0; text.size() <= 20000000; ++i) text += "key" + std::to_string(i) + ": 1\n";

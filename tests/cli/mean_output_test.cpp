@@ -1,4 +1,4 @@
-// What `liestat mean` says about a result: axes, digits, rivals, weights, rows that depend on each other.
+// Notes of `liestat mean` on a result: axes, digits, rivals, weights, rows that depend on each other.
 #include <cli/commands/mean_analysis.hpp>
 #include <cli/io/measurements.hpp>
 #include <cli/io/reading.hpp>

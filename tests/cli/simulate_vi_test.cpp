@@ -140,7 +140,7 @@ TEST(SimulateVi, TracksPointAtTheirLandmarks) {
         last(files.tracks.track_ids.size());
     for (const PixelObservation& o : files.tracks.observations) {
       const Vector3d p = files.inCamera(o);
-      EXPECT_GT(p.z(), scene.least_depth);
+      EXPECT_GT(p.z(), scene.min_depth);
       const auto bearing = files.camera().camera.bearing({o.u, o.v});
       ASSERT_TRUE(bearing);
       // Half a nanosecond of the stamps' rounding turns a camera at 3 rad/s and 1 m/s by 2e-9 rad.
@@ -214,7 +214,7 @@ TEST(SimulateVi, OutliersDrift) {
   const SplineTrajectory motion = builtInTrajectory(20, 5);
   const CameraCalibration camera = someCamera();
   const SimulatedRecording r = simulateMotion(motion, 0, 20, camera, {}, scene);
-  std::map<std::size_t, Eigen::Vector2d> drift;  // of each track in the image before
+  std::map<std::size_t, Eigen::Vector2d> drift;  // drift of each track in the image before
   double steps = 0, n = 0;
   for (const PixelObservation& o : r.observations) {
     const auto at = truthAt(r.truth, r.image_times[o.image]);
@@ -242,7 +242,7 @@ TEST(SimulateVi, OutliersDrift) {
   EXPECT_NEAR(static_cast<double>(count) / tracks, 0.4, 5 * std::sqrt(0.4 * 0.6 / tracks));
 }
 
-/// What an ImpossibleMotion says, empty if there was none.
+/// The message of an ImpossibleMotion, empty if there was none.
 template <class Action>
 std::string complaintOf(Action&& action) {
   try {

@@ -11,7 +11,7 @@ namespace {
 
 const StereoCamera camera{500, 510, 320, 240, 0.25, Eigen::Vector4d(1, 4, 2, 3)};
 
-/// What the pair sees of a point in camera coordinates.
+/// The pair's observation of a point in camera coordinates.
 StereoObservation project(const Eigen::Vector3d& p) {
   const double u = camera.fu * p.x() / p.z() + camera.cu, v = camera.fv * p.y() / p.z() + camera.cv;
   return {0, 0, u, v, u - camera.fu * camera.b / p.z(), v};

@@ -46,7 +46,7 @@ inline std::string contentOf(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-/// What an InputError says, empty if there was none.
+/// The message of an InputError, empty if there was none.
 template <class Action>
 std::string errorOf(Action&& action) {
   try {

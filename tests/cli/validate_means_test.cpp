@@ -1,4 +1,4 @@
-// What `liestat validate means` says of its verdict; the verdict itself: tests/experiments/means_validation_test.cpp.
+// Output of `liestat validate means` on its verdict; the verdict itself: tests/experiments/means_validation_test.cpp.
 
 #include <cli/show/means_validation.hpp>
 

@@ -99,7 +99,7 @@ TEST(ViInit, NoisyRecordingsWithUnknownBiasesAndWrongTracks) {
     nees.push_back(value(w, "nees"));
   }
   ASSERT_GE(ok + 2, windows.size());
-  // What the refinement reaches in two seconds with wide priors; see docs/closed_form.md.
+  // Accuracy of the refinement of two seconds with wide priors; see docs/closed_form.md.
   EXPECT_LE(median(speed), 0.05);
   EXPECT_LE(median(gravity), 0.02);
   EXPECT_LE(median(scale), 0.03);

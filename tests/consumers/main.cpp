@@ -1,4 +1,4 @@
-// What a newcomer's first program looks like, built in each way that the README offers.
+// A newcomer's first program, built in each way that the README offers.
 #include <Eigen/Core>
 #include <cstdio>
 #include <lie/so3.hpp>

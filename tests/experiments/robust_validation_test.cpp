@@ -91,7 +91,7 @@ TEST(RobustValidation, MoreOutliersAreShownAndNotJudged) {
 TEST(RobustValidation, AWrongNoiseFails) {
   RobustValidation validation = small(60, {0.2});
   validation.scores = {RobustScore::truncated_cost};
-  // Of errors 1.3 times as large 5 % are beyond the threshold: the structure is found, and distances are too large.
+  // 5 % of errors 1.3 times as large are beyond the threshold: the structure is found, and distances are too large.
   validation.noise_factor = 1.3;
   RobustValidationResult result = validateRobust(validation);
   for (const RobustRow& row : result.rows) {
@@ -99,7 +99,7 @@ TEST(RobustValidation, AWrongNoiseFails) {
     EXPECT_EQ(row.verdict, ValidationVerdict::index_too_large) << name(row.structure);
   }
   EXPECT_EQ(tally(result.rows).failed, 2U);
-  // Of errors twice as large 20 % (one equation) and 31 % (two): nine tenths of the inliers are never kept.
+  // 20 % (one equation) and 31 % (two) of errors twice as large are: nine tenths of the inliers are never kept.
   validation.noise_factor = 2;
   result = validateRobust(validation);
   for (const RobustRow& row : result.rows) EXPECT_FALSE(row.found_passed.value_or(true)) << name(row.structure);

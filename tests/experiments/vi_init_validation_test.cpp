@@ -65,7 +65,7 @@ TEST(ValidateViInit, whatIsNotPromisedIsNotJudged) {
   const auto rows = validateViInit(small({ViInitCheck::gyroscope_bias, ViInitCheck::drift}, 24));
   EXPECT_FALSE(find(rows, ViInitEstimator::bias_ignored, ViInitQuantity::scale).passed);
   EXPECT_FALSE(find(rows, ViInitEstimator::no_selection, ViInitQuantity::speed).passed);
-  // What is estimated or selected is worth it: the factors measured are 20 and 100.
+  // Estimation and selection are worth their cost: the factors measured are 20 and 100.
   EXPECT_GT(find(rows, ViInitEstimator::bias_ignored, ViInitQuantity::gravity).median,
             5 * find(rows, ViInitEstimator::bias_estimated, ViInitQuantity::gravity).median);
   EXPECT_GT(find(rows, ViInitEstimator::no_selection, ViInitQuantity::speed).median,
@@ -97,11 +97,11 @@ TEST(ValidateViInit, intervalsOfTheCalibrationMissNoiseThatNobodyTold) {
     const NoiseOutcome outcome = noiseTrial<4, 4>({2, 11, 40}, 2, rng);
     held += outcome.gyroscope + outcome.accelerometer + outcome.common;
   }
-  // Of 18, of which the promise is 16.
+  // 18 intervals, of which 16 are promised to hold the factor.
   EXPECT_LT(held, 9) << held;
 }
 
-// What can't be solved has no distance, and errors without bound: nothing of it is dropped.
+// A window that can't be solved has no distance and infinite errors: it is not dropped.
 TEST(ValidateViInit, lostWindowsAreMarked) {
   const ViInitWindow two_images{2, 2, 20};
   CounterRng rng(1);

@@ -126,7 +126,7 @@ TEST(BearingDeviation, BiasesAndRefinementAreConsistent) {
               rotation, outer, refined_index, cost / degrees);
   const double error = 4 * std::sqrt(6. / trials);
   EXPECT_NEAR(rotation, 3.1, error);
-  // Of image noise: the gyroscope's adds a tenth.
+  // The share of the image noise is 3; the gyroscope's adds a tenth.
   EXPECT_NEAR(outer, 3.2, error);
   // The accelerometer's bias is none: below what its prior expects.
   EXPECT_LE(refined_index, 5 + 4 * std::sqrt(10. / trials));

@@ -159,7 +159,7 @@ TEST(ClosedFormNoise, DecidesTheCases) {
   }
 }
 
-// What is not in the model is seen in the cost.
+// A misfit of the model raises the cost.
 TEST(ClosedFormNoise, AMisfitIsNotOk) {
   int biased = 0, outlying = 0, right = 0;
   constexpr int trials = 50;

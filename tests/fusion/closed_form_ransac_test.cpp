@@ -112,7 +112,7 @@ TEST(ClosedFormRansac, IsTheGeneratorsAndNobodyElses) {
   EXPECT_EQ(first.inliers, again.inliers);
   EXPECT_EQ(first.hypotheses, again.hypotheses);
   EXPECT_EQ(first.result.solutions.at(0).velocity, again.result.solutions.at(0).velocity);
-  // What is found does not hang on who draws.
+  // The consensus does not depend on the seed.
   EXPECT_EQ(first.inliers, other.inliers);
   for (const std::size_t i : first.inliers) EXPECT_TRUE(first.result.features[i].used);
   for (const std::size_t i : first.outliers) {

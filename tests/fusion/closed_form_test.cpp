@@ -208,7 +208,7 @@ TEST(SecondSolution, IsAScaledCopyForConstantAccelerationAndForThreeImages) {
       EXPECT_LE(relativeError(truth, scene), 1e-9);
       // The difference of the two is as small as 1 - γ: their accuracy is the better the further they are apart.
       const double bar = 1e-10 * std::max(1., std::abs(gamma)) / std::min(1., std::abs(1 - gamma));
-      // What three images see of a varying force is a constant one and a velocity that it adds.
+      // Three images cannot tell a varying force from a constant one and a velocity that it adds.
       const Vector3 added = images[last / 2].displacement / images[last / 2].time - 0.5 * images[last / 2].time * A;
       EXPECT_LE((other.velocity - (gamma * (scene.velocity + added) - added)).norm(), bar);
       EXPECT_LE((other.gravity - (gamma * (A + scene.gravity) - A)).norm(), 10 * bar);
@@ -336,7 +336,7 @@ TEST(Elimination, NormalEquationsAgreeWithReflections) {
     const Scene scene({.images = 8, .features = 8, .camera = Vector3(0.1, 0, 0.05)}, seed);
     const auto result = solveClosedForm(scene.window, {.bearing_noise = 1e-5});
     ASSERT_TRUE(result.ok()) << describe(result.status);
-    // What is taken off for the claimed noise, 1e-10 of the information, is felt where the scale is weak.
+    // The correction for the claimed noise, 1e-10 of the information, is felt where the scale is weak.
     EXPECT_LE(relativeError(result.solutions[0], scene), 1e-6);
     EXPECT_LE(featureError(result.solutions[0], scene), 1e-6);
     EXPECT_EQ(result.covariance.rows(), 6);

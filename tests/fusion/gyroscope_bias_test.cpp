@@ -120,7 +120,7 @@ TEST(GyroscopeBias, MeetsTheTarget) {
     const auto plain = solveClosedForm(closedFormWindow(recorded.window, {}), options);
     for (const bool first : {true, false}) {
       const auto& result = first ? plain : found.result;
-      // What has no solution counts as lost.
+      // A window without a solution counts as lost.
       const bool none = result.solutions.empty();
       const double s = none ? 100 : 100 * std::abs(result.solutions[0].velocity.norm() / scene.velocity.norm() - 1);
       const double d = none ? 90 : tilt(result.solutions[0].gravity, scene.gravity) * 180 / M_PI;
@@ -180,7 +180,7 @@ TEST(GyroscopeBias, WithTheAccelerometersOrLarge) {
 
     const Recorded far({.images = 21, .features = 20}, 0.2, pixel, {1.7e-4, 2e-3}, seed);
     const auto from_zero = estimateGyroscopeBias(far.window, options);
-    // What has not been found must not be called so.
+    // A bias that has not been found must not be reported as ok.
     if (from_zero.ok()) large.push_back((from_zero.bias - far.bias).norm());
   }
   std::printf("  with the accelerometer's bias %.5f / %.5f rad/s; 0.2 rad/s: %zu of %d ok, %.5f / %.5f rad/s\n",
@@ -226,7 +226,7 @@ TEST(GyroscopeBias, RefusesBadInput) {
   EXPECT_EQ(fault(window, options), FaultKind::wrong_index);
   window = recorded.window;
   std::vector<Preintegration<double>> motions = window.motions();
-  motions[2] = Preintegration<double>();  // of no duration
+  motions[2] = Preintegration<double>();  // no duration
   window = InertialWindow(motions, window.features);
   EXPECT_EQ(fault(window, options), FaultKind::image_order);
   // At rest there is nothing to tell a bias from.

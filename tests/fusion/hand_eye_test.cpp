@@ -324,8 +324,8 @@ TEST(HandEye, NoiseUpToAFactor) {
   EXPECT_LT((scaled.X.covariance - expected).norm(), 1e-6 * expected.norm());
 }
 
-/// What a wrong reading of the covariance of C = camera_T_target makes of twenty trials: mean squared distance of the
-/// truth and mean χ² per degree of freedom.
+/// Twenty trials under a wrong reading of the covariance of C = camera_T_target: mean squared distance of the truth and
+/// mean χ² per degree of freedom.
 struct Trap {
   double nees = 0, chi2_per_dof = 0;
   int inconsistent = 0;

@@ -96,7 +96,7 @@ TEST(NoiseCalibration, TellsAGyroscopeFromAnAccelerometer) {
     EXPECT_TRUE(noisy.isTold());
     expectNear(noisy, 16);
     EXPECT_LT(other.high, noisy.low);
-    // What is not told stays as it was given.
+    // A factor that is not told stays as it was given.
     if (!other.isTold() && other.low <= 1 && other.high >= 1) {
       EXPECT_EQ(gyroscope ? found.noise.accelerometer : found.noise.gyroscope,
                 gyroscope ? nominal.accelerometer : nominal.gyroscope);

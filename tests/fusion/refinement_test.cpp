@@ -260,7 +260,7 @@ TEST(Refinement, JudgesItsResult) {
   EXPECT_LE(improbable, 0.1 * trials + 4 * std::sqrt(0.09 * trials));
 }
 
-// What converged may still be too vague, or against the prior: then it is not ok, and the status says why.
+// A converged estimate that is too vague, or against the prior, is not ok, and the status says why.
 TEST(Refinement, WithdrawsWhatIsTooVague) {
   const Recorded recorded({.images = 11, .features = 15, .window = 2}, 92);
   ASSERT_FALSE(recorded.start.solutions.empty());
@@ -366,7 +366,7 @@ TEST(Refinement, IntegratesAnewWhereTheBiasHasGone) {
     const RefinementResult found = refine(from_zero, start, {}, wide);
     EXPECT_TRUE(found.ok());
     EXPECT_GE(found.integrations, 1);
-    // What is left of the difference are updates of first order over what the estimate is off by, 3e-3 rad/s.
+    // The remaining difference is that of first-order updates over the start's error, 3e-3 rad/s.
     const Eigen::Matrix<double, 12, 12> covariance = expected.covariance.atFirst();
     const auto sigma = [&](int first) { return std::sqrt(covariance.diagonal().segment<3>(first).mean()); };
     EXPECT_LE((found.velocity() - expected.velocity()).norm(), 0.01 * sigma(0)) << seed;
@@ -393,7 +393,7 @@ TEST(Refinement, MeetsTheTables) {
     double window;
     std::size_t images, features;
     int trials;
-    double speed[2], degrees[2], scale[2];  ///< of an independent prototype: median, 95 %
+    double speed[2], degrees[2], scale[2];  ///< median and 95 % of an independent prototype
   };
   const double none = std::numeric_limits<double>::infinity();
   const Row rows[] = {

@@ -88,7 +88,7 @@ TEST(RobustInitialisation, IsAsGoodAsWithTheRightTracks) {
     EXPECT_LE(quantileOf(speed, 0.5), 1.05 * quantileOf(oracle, 0.5));
     EXPECT_LE(quantileOf(speed, 0.95), 1.1 * quantileOf(oracle, 0.95));
     EXPECT_LE(quantileOf(error, 0.5), window < 2 ? 0.005 : 0.0017);
-    // Of image noise: the gyroscope's adds a tenth.
+    // The share of the image noise is 3; the gyroscope's adds a tenth.
     EXPECT_NEAR(nees, 3.2, 4 * std::sqrt(6. / trials));
   }
 }
@@ -206,7 +206,7 @@ TEST(RobustInitialisation, SlowMotionIsNotRest) {
       }
     }
   }
-  // Of the few that are called so, at most one moves faster than excluded.
+  // At most one of the few stationary verdicts is on a motion faster than it excludes.
   EXPECT_GT(called, 0);
   EXPECT_LE(excluded, 1);
 }

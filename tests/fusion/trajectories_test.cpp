@@ -139,12 +139,12 @@ TEST(Trajectories, ExactPosesAreAlignedExactly) {
 }
 
 struct AlignmentTrials {
-  double mean = 0;      ///< of NEES over its degrees of freedom
+  double mean = 0;      ///< mean NEES over its degrees of freedom
   double rejected = 0;  ///< at 5 %, two-sided
   double covered = 0;   ///< share of trials with the alignment's error inside its 95 % ellipsoid
   double position = 0, rotation = 0;
-  double log_scale_bias = 0;  ///< of the weighted scale, in its own sigmas
-  double umeyama_bias = 0;    ///< of the least-squares one, in the same
+  double log_scale_bias = 0;  ///< bias of the weighted scale, in its own sigmas
+  double umeyama_bias = 0;    ///< bias of the least-squares scale, in the same
   double dof = 0;
 };
 AlignmentTrials run(AlignmentModel model, std::size_t n, int trials, std::size_t n_to_align = 0, double wrong = 1) {

@@ -152,7 +152,7 @@ TEST(TwoViewModels, TheHierarchyFindsTheMotion) {
       const auto& found = search.state(search.best());
       if (search.models()[search.best()]->name() != nameOf(motion)) continue;
       ++of_this;
-      // Of 80 inliers one in a hundred lies beyond the threshold.
+      // One in a hundred of 80 inliers lies beyond the threshold.
       EXPECT_GE(found.inliers.size(), 72u) << nameOf(motion) << " " << seed;
     }
     EXPECT_GE(of_this, trials - 1) << nameOf(motion);

@@ -206,7 +206,7 @@ TEST(TwoViewOptionalModels, EpipolarModelsContainMotionsOfTheImage) {
     if (motion == M::retinal_displacement || motion == M::similarity) continue;
     F = cross(t) * std::sqrt(2 / cross(t).squaredNorm());
     EXPECT_LE(largestError(F, scene.exact), 1e-14) << "translation, " << nameOf(motion);
-    // Of a motion with a sample of one match the test of support allows for more.
+    // The test of support allows for more where the motion has a sample of one match.
     EXPECT_LE(open(translation, F, scene.exact), beyond("translation")) << nameOf(motion);
     if (motion == M::free_zoom) {
       EXPECT_EQ(beyond("translation"), 0);
@@ -266,7 +266,7 @@ TEST(TwoViewOptionalModels, TheHierarchyFindsTheMotion) {
         }
         if (search.models()[search.best()]->name() != nameOf(motion)) continue;
         ++right;
-        // Of 80 inliers one in a hundred lies beyond the threshold.
+        // One in a hundred of 80 inliers lies beyond the threshold.
         EXPECT_GE(search.state(search.best()).inliers.size(), 72u) << nameOf(motion) << " " << seed;
       }
     }

@@ -1,4 +1,4 @@
-// What windows say together: consistent where their covariances are, and the prior of the biases counted once.
+// Fusion of windows: consistent where their covariances are, and the prior of the biases counted once.
 
 #include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -213,7 +213,7 @@ TEST(WindowFusion, IsConsistent) {
   // The prior, which is common to the windows, takes some off what they may differ by: at most its six degrees of 22.
   EXPECT_LE(chi2 / degrees, 1 + 4 * std::sqrt(2 / degrees));
   EXPECT_GE(chi2 / degrees, 16. / 22 - 4 * std::sqrt(2 / degrees));
-  // What averaging is for.
+  // Averaging pays.
   EXPECT_LT(gyroscope[1], 0.5 * gyroscope[0]);
   EXPECT_LT(accelerometer[1], 0.7 * accelerometer[0]);
   EXPECT_LT(tilts[1], 0.7 * tilts[0]);

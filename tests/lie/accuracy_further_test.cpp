@@ -38,7 +38,7 @@ void checkPartsOfTwo() {
   for (const double angle : sweptAngles<S>()) {
     for (const auto& v : tangents<S, 5>(angle, 0)) {
       using T = liestat::ManifoldTraits<liestat::Essential<S>>;
-      // Of the parameters as they are: E = [d] R.
+      // The reference takes the rounded parameters: E = [d] R.
       const auto x = T::expOrigin(v);
       const Matrix p(x.params());
       const Matrix R = series(crossMatrix(quaternionLog(p)), 0), E = crossMatrix({p.a[4], p.a[5], p.a[6]}) * R;

@@ -138,7 +138,7 @@ TEST_F(EssentialTest, DecomposesWhereEntriesVanish) {
   }
 }
 
-// Of a matrix near an essential one, poses within some of the perturbation, and rotations that are rotations.
+// Decomposing a nearly essential matrix gives a pose within a few times the perturbation, and rotations of unit norm.
 TEST_F(EssentialTest, DecomposesWhatIsNearlyEssential) {
   for (int i = 0; i < 20; ++i) {
     const Essentiald x = pose();

@@ -1,5 +1,5 @@
-// What the traits of each group tell statistics, against its matrices: the contract checks what traits say, and cannot
-// know what they should have said and do not. And what happens if trivial_isotropy is forgotten.
+// The traits of each group against its matrices: the contract checks what traits say, and cannot know what they should
+// have said and do not. And what happens if trivial_isotropy is forgotten.
 
 #include <lie/lie.hpp>
 #include <lie/testing.hpp>

@@ -111,7 +111,7 @@ TEST(Product, VolumeIsTheProductOfTheParts) {
   EXPECT_EQ((volume.hessian.topLeftCorner<3, 3>()), rotation.hessian);
 }
 
-// Of quotients each takes its own nearest representative; an index names one of each.
+// Each quotient takes its own nearest representative; an index names one of each.
 TEST(Product, RepresentativesOfTheParts) {
   using M = liestat_test::Quotients<double>;
   using Q = ManifoldTraits<M>;

@@ -1,5 +1,5 @@
-// What a program that was written for Sophus calls, on every group: members, statics and constants under the names that
-// it knows, with the meaning that their comments state there.
+// Members, statics and constants that a program written for Sophus calls on every group, under the names that it knows,
+// with the meaning that their comments state there.
 
 #include <lie/lie.hpp>
 

@@ -1,5 +1,5 @@
-// What a program that was written for Sophus calls on one group or a few: constructors, accessors and setters under the
-// names that it knows. Members of every group are in sophus_api_test.cpp.
+// Constructors, accessors and setters that a program written for Sophus calls on one group or a few, under the names
+// that it knows. Members of every group are in sophus_api_test.cpp.
 
 #include <lie/lie.hpp>
 

@@ -145,7 +145,7 @@ TEST(ContractCheckers, PassWithoutADefect) {
 
 using Operations = liestat::ManifoldOperations;
 
-// What a wrong operation of each kind says: a little too much, or a place a little aside.
+// Values of a wrong operation of each kind: a little too much, or a place a little aside.
 Eigen::MatrixXd spoilt(const Operations&, const Eigen::MatrixXd& m) {
   return m + Eigen::MatrixXd::Constant(m.rows(), m.cols(), 1e-4);
 }
@@ -274,7 +274,7 @@ TEST(ContractCheckers, FindWrongNumbersOfStatistics) {
   expectFound("lengths for angles", [](auto& s) { std::swap(s.tangent_parts[0].part, s.tangent_parts[1].part); });
 }
 
-// What skips a check, or bounds the inputs of all, must not be able to do so unseen.
+// A member that skips a check, or bounds the inputs of all, must not be able to do so unseen.
 TEST(ContractCheckers, FindWhatWouldSkipThem) {
   liestat::ContractOptions few;
   few.samples = 1;

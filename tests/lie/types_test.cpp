@@ -1,5 +1,5 @@
-// What is a manifold of which kind, and that every class template and view compiles as a whole, with every member, for
-// float, double and ceres::Jet.
+// The concepts that each manifold satisfies, and that every class template and view compiles as a whole, with every
+// member, for float, double and ceres::Jet.
 
 #include <lie/lie.hpp>
 

@@ -125,7 +125,7 @@ TEST(Figure16, NormalisedResidualsAgreeWhereTheSpecificModelIsTrue) {
     const auto error = [](int freedom) { return 4 / std::sqrt(2. * freedom); };
     EXPECT_NEAR(sum.sigma(), 1, error(sum.specific_freedom)) << nameOf(pair.specific);
     if (pair.general == TwoViewMotion::fundamental) {
-      // What a homography moves obeys [e']× H for any epipole e', so two of the seven parameters change nothing to first
+      // Matches of a homography obey [e']× H for any epipole e', so two of the seven parameters change nothing to first
       // order: each e' has a minimum that is χ² with r + 2 degrees of freedom, and the lowest of all is taken. It lies
       // some 1.6 standard deviations below the mean of one (0.85 of these 60 matches; from one start and with 80
       // matches an independent prototype has 0.92).

@@ -82,7 +82,7 @@ struct Stewart {
     return (1 - e0) * (e1 * normal((x - 10) / 5) + (1 - e1) * normal((x - 10 - delta) / 5)) +
            (x >= 0 && x <= 100 ? e0 / 100 : 0);
   }
-  /// Of |x - v|: a curve of fig. 7.
+  /// Density of |x - v|: a curve of fig. 7.
   double curve(double v, double e) const { return density(v + e) + density(v - e); }
 };
 
@@ -205,7 +205,7 @@ TEST(Fig8, BiasOfTheScores) {
     for (std::size_t c = 0; c < 10; ++c) std::printf(" %5.2f±%.2f(%d)", mean[row][c], deviation[row][c], jumps[row][c]);
     std::printf("\n");
   }
-  // What the report concludes holds: only overlapping modes bias the scores, there relevance least.
+  // The report's conclusion holds: only overlapping modes bias the scores, there relevance least.
   EXPECT_LT(mean[0][9], mean[3][9]);
   EXPECT_LT(mean[0][9], mean[2][9]);
 }
@@ -248,7 +248,7 @@ TEST(Threshold, OfTheHistogramIsThatOfTheNote) {
 }
 
 TEST(Threshold, ThatFollowsTheScaleCollapses) {
-  // What is below c times the root mean square of what was below it before, of normal errors without an outlier.
+  // Fraction kept when errors above c times the kept ones' RMS are dropped again and again; normal, no outlier.
   const auto shares = [](double c) {
     CounterRng rng(3);
     Numbers kept(50000);
@@ -305,7 +305,7 @@ TEST(ReportsErrata, Equation26NeedsTheSquareOfTheError) {
     EXPECT_NEAR(integral(0, T, [&](double x) { return std::pow(x, n) * ours(x); }), of_28, 1e-6);
     EXPECT_GT(std::abs(integral(0, T, [&](double x) { return std::pow(x, n) * printed(x); }) - of_28), 0.015);
   }
-  // What follows from (28), and defines the relevance.
+  // A consequence of (28) that defines the relevance.
   const double mu_0 = integral(0, T, ours), mu_1 = integral(0, T, [&](double x) { return x * ours(x); });
   EXPECT_NEAR(12 / (T * T * T) * (mu_0 - 2 * mu_1 / T), alpha * gamma, 1e-5);
 }

@@ -1,4 +1,4 @@
-// What certifiedMean promises of nearly ambiguous features and of needless refusals, and the parts that it stands on.
+// Promises of certifiedMean on nearly ambiguous features and needless refusals, and the parts that it stands on.
 // Thinned rows; the whole tables are `liestat validate means --full`. Bounds are four standard errors of the stated
 // trials; seeds are fixed.
 
@@ -217,7 +217,7 @@ TEST(AveragedHessian, ofOneDatumNearTheCutLocusIsItsDensity) {
   at.mean = SO2d(0.0);
   at.n = 100, at.sum_of_weights = 100;
   at.hessian(0, 0) = 100;
-  const double variance = sd * sd - detail::least_region * detail::least_region;
+  const double variance = sd * sd - detail::min_region_sigma * detail::min_region_sigma;
   const auto averaged = averagedHessian(samples, at, SquareOf<SO2d>(SquareOf<SO2d>::Constant(variance)));
   const double density = std::exp(-0.5 * s * s / (sd * sd)) / (sd * std::sqrt(2 * pi));
   EXPECT_TRUE(averaged.averaged);

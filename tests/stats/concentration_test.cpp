@@ -83,7 +83,7 @@ void rejectsTheUniformLawOnceInAHundred(const char* what) {
     const double rate = static_cast<double>(concentrated) / trials;
     const double error = 4 * std::sqrt(0.01 * 0.99 / trials) + 0.001;
     EXPECT_LE(rate, 0.01 + error) << what << " n = " << n;
-    // Of two data the quantile is so close to the largest value that its fit is on the safe side.
+    // With two data the quantile is so close to the largest value that its fit is on the safe side.
     if (n > 2) {
       EXPECT_GE(rate, 0.01 - error) << what << " n = " << n;
     }

@@ -108,7 +108,7 @@ TEST(ConstraintBlocks, ConditionsAreTheirNormalForm) {
     EXPECT_GT(f(Vector<3>(0, 1, slack)).norm(), 0.5);
     EXPECT_GT(f(Vector<3>(2, 0, slack)).norm(), 0.5);
   }
-  // Of an inequality: if x >= 1 then y = 0 else y = 1.
+  // A conditional on an inequality: if x >= 1 then y = 0 else y = 1.
   const auto g = conditional(atLeastZero(right_of_one, 2), y_is_zero, y_is_one);
   EXPECT_NEAR(g(Vector<3>(3, 0, slackForAtLeastZero(2))).norm(), 0, 1e-14);
   EXPECT_NEAR(g(Vector<3>(-3, 1, slackForAboveZero(4))).norm(), 0, 1e-14);

@@ -42,7 +42,7 @@ struct Constants {
 };
 constexpr double height = 10, pi = 3.14159265358979323846;
 
-/// What the models tell the tests: called at each of their steps.
+/// Counters and a callback for the steps of the models.
 struct Watch {
   std::function<void()> step;
   std::atomic<int> steps{0}, draws{0};
@@ -260,7 +260,7 @@ TEST(ContentKey, DoesNotSeePadding) {
   write(a, 0), write(b, 0xff);
   EXPECT_NE(std::memcmp(&a, &b, sizeof a), 0) << "there is padding";
   EXPECT_EQ(contentKey(a), contentKey(b));
-  // What an alternative that is larger has left behind is padding, too.
+  // The rest of a larger alternative held before is padding, too.
   using Mixed = std::variant<double, Padded>;
   Mixed c(a), d(Padded{'b', 7});
   c = 2.5, d = 2.5;
@@ -365,10 +365,10 @@ TEST(EstimationModule, AValueReplacesTheOneOfItsName) {
   const auto last = finish(module);
   EXPECT_TRUE(std::binary_search(last->inliers[0].begin(), last->inliers[0].end(), 3u));
   EXPECT_FALSE(std::binary_search(last->inliers[1].begin(), last->inliers[1].end(), 3u));
-  // What was read before has stayed.
+  // An output read before has not changed.
   EXPECT_EQ(with->measurements, 40u);
   EXPECT_EQ(last->measurements, 39u);
-  // Of equal values the one that is named goes.
+  // Among equal values the named one goes.
   for (const Name twin : {50u, 51u, 52u}) module.set<0>(twin, Eigen::Vector2d(0, -1));
   EXPECT_TRUE(module.unset(0, 51));
   const auto twins = finish(module);

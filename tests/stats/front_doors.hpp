@@ -55,7 +55,7 @@ class NumberList {
   NamedNumbers list_;
 };
 
-/// What every front door returns.
+/// The results of every front door.
 template <Executor E>
 NamedNumbers frontDoors(const E& executor) {
   std::mt19937_64 engine(5);

@@ -119,7 +119,7 @@ TEST(Hierarchy, IsTheSameForAnyOrderOfAddingAndRemoving) {
     const std::vector<Eigen::Vector2d> points = curvePoints(q, 40, 20, seed);
     const std::vector<Eigen::Vector2d> others =
         curvePoints(truths[(seed + 1) % truths.size()].second, 30, 5, seed + 50);
-    // What stays in the end: all of `points` but the first five.
+    // The points that stay in the end: all of `points` but the first five.
     Curves fresh(curveModels());
     std::vector<std::pair<Curves::Id, Eigen::Vector2d>> fresh_points;
     for (std::size_t i = 5; i < points.size(); ++i) fresh_points.emplace_back(fresh.add(points[i]), points[i]);
@@ -213,7 +213,7 @@ TEST(Hierarchy, AnOutlierCostsHardlyAnEstimate) {
   EXPECT_EQ(chosen(search), "line");
   EXPECT_TRUE(search.state(search.best()).outdated);
   finish(search);
-  // Of the refined hypotheses few are of draws that now take the outlier.
+  // Few of the refined hypotheses come from draws that now take the outlier.
   EXPECT_LE(estimates(), before + before / 4) << "an outlier of all models";
   EXPECT_EQ(chosen(search), "line");
   search.remove(outlier);

@@ -44,7 +44,7 @@ TEST(Product, FusionWithoutCorrelationIsThatOfTheParts) {
   EXPECT_LE((M::template covarianceBlock<1, 1>(whole.covariance) - fused_second.covariance).norm(), 1e-6);
 }
 
-// What correlates two vectors is no different from what correlates the coordinates of one.
+// Correlating two vectors is no different from correlating the coordinates of one.
 TEST(Product, CorrelatedVectorsAreOneVector) {
   using M = Product<Vector2d, Vector3d>;
   using Vector5d = Eigen::Matrix<double, 5, 1>;

@@ -1,5 +1,5 @@
-// What may be passed as data and as weights: each kind of range gives the result of the same values in a std::vector, to
-// the bit, because the estimators see the same numbers in the same order.
+// Ranges accepted as data and as weights: each kind gives the result of the same values in a std::vector, to the bit,
+// because the estimators see the same numbers in the same order.
 #include <lie/frame3.hpp>
 #include <lie/rn.hpp>
 #include <lie/se3.hpp>
@@ -135,7 +135,7 @@ TEST(Ranges, quaternionsAreNormalised) {
   }
   for (const auto& one : q) views.emplace_back(one.coeffs().data());
   static_assert(std::same_as<decltype(mean(q).mean), SO3d>);
-  const double rounding = 1e-14;  // of a normalisation, a few units in the last place
+  const double rounding = 1e-14;  // rounding of a normalisation, a few units in the last place
   expectSameMeans(q, x, rounding);
   expectSameMeans(views, x, rounding);
 }
@@ -255,7 +255,7 @@ TEST(Ranges, emptyOnesAreTooFew) {
   EXPECT_EQ(maha(std::list<Gaussian<SO3d>>()).status, Status::too_few);
 }
 
-// What the concepts refuse; tests/consumers/sentences.cpp shows that the message is one sentence.
+// Ranges that the concepts refuse; tests/consumers/sentences.cpp shows that the message is one sentence.
 static_assert(!SampleRange<std::vector<int>>);
 static_assert(!SampleRange<std::vector<Eigen::VectorXd>>);
 static_assert(!WeightRange<std::vector<SO3d>>);

@@ -80,8 +80,8 @@ TEST(RepeatedExtraction, FindsEachStructureWithItsModel) {
     for (std::size_t i = 0; i < found.size(); ++i) wrong += found[i] != scene.label[i];
     all += found.size();
   }
-  // Of the 1500 inliers one per cent lies beyond the threshold; points in the 0.26 by 0.26 boxes around three crossings
-  // (some 0.5 % of the outliers' and 2 % of the inliers' range) are anyone's; of 300 outliers 4 % lie on a curve.
+  // One per cent of the 1500 inliers lies beyond the threshold; points in the 0.26 by 0.26 boxes around three crossings
+  // (some 0.5 % of the outliers' and 2 % of the inliers' range) are anyone's; 4 % of 300 outliers lie on a curve.
   EXPECT_LT(wrong, 0.045 * static_cast<double>(all));
 }
 

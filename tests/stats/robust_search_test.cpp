@@ -100,7 +100,7 @@ void findsTheEllipse(const Rule& rule, int inliers, int outliers, std::size_t dr
     const auto found = search.refined();
     ASSERT_TRUE(found.parameter);
     EXPECT_TRUE(found.refined);
-    // Of the points on the ellipse 99 % are inliers, of the others those that lie on it by chance.
+    // Inliers are 99 % of the points on the ellipse, and the others that lie on it by chance.
     std::size_t right = 0;
     for (const std::size_t i : found.inliers) right += i < static_cast<std::size_t>(inliers);
     EXPECT_GE(right, static_cast<std::size_t>(0.93 * inliers)) << seed;
@@ -275,10 +275,10 @@ TEST(RobustSearch, LessThanTheLeastScoreIsNothing) {
     const TruncatedCost rule{threshold};
     // Uniform points: the best line has some ten of 500 near it.
     const auto noise = lineScene<LineModelOfSome>(0, 500, seed);
-    EXPECT_FALSE(searched(noise, rule, {.seed = seed, .least_score = 50}).best().parameter);
+    EXPECT_FALSE(searched(noise, rule, {.seed = seed, .min_score = 50}).best().parameter);
     EXPECT_TRUE(searched(noise, rule, {.seed = seed}).best().parameter);
     const auto model = lineScene<LineModelOfSome>(150, 350, seed);
-    const auto a = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6, .least_score = 50}),
+    const auto a = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6, .min_score = 50}),
                b = searched(model, rule, {.seed = seed, .rejection_risk = 1e-6});
     EXPECT_EQ(a.best().draw, b.best().draw);
     EXPECT_EQ(a.best().score, b.best().score);
@@ -296,7 +296,7 @@ TEST(RobustSearch, PolishRaisesTheBest) {
                b = searched(model, rule, {.seed = seed, .local_optimisation = false}, 20);
     EXPECT_FALSE(b.best().refined);
     with += a.best().score, without += b.best().score;
-    // What is reported belongs together.
+    // The reported parameter, errors and inliers belong together.
     std::vector<double> errors(model.size());
     model.errors(*a.best().parameter, errors);
     EXPECT_EQ(a.best().score, rule(errors));
@@ -363,7 +363,7 @@ TEST(Fig9, ImprovementsBecomeRareAndAJumpFindsTheInliers) {
     const auto inliers = search.refined().inliers;
     found += std::count_if(inliers.begin(), inliers.end(), [](std::size_t i) { return i < 60; }) >= 54;
   }
-  // Of draws that are alike the k-th is the best so far with probability 1/k: 3.6 of the first twenty in each scene,
+  // Among draws that are alike the k-th is the best so far with probability 1/k: 3.6 of the first twenty in each scene,
   // 0.05 of the last twenty.
   EXPECT_NEAR(static_cast<double>(early) / scenes, 3.6, 4 * std::sqrt(3.6 / scenes));
   EXPECT_LT(late, 7u);

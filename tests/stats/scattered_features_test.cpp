@@ -1,5 +1,5 @@
-// What certifiedMean promises about scattered features: of all samples at most 7 % get a 95 % region without the truth,
-// and of those that get one, where they are half of all, 93 % have the truth in it. Thinned rows of the table of
+// Promises of certifiedMean on scattered features: of all samples at most 7 % get a 95 % region without the truth, and
+// of those that get one, where they are half of all, 93 % have the truth in it. Thinned rows of the table of
 // docs/uniqueness.md; the whole one is `liestat validate means --full`. Seeds are fixed.
 
 #include <support/verdicts.hpp>

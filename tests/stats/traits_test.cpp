@@ -60,7 +60,7 @@ M withAttitude(const SO3d& R) {
   return x;
 }
 
-/// What makes an attitude Metric, and no more.
+/// The least traits that make an attitude Metric.
 template <class M>
 struct AttitudeManifold : TrivialIsotropy<M, SO3d> {
   using T = ManifoldTraits<SO3d>;
@@ -78,7 +78,7 @@ struct AttitudeManifold : TrivialIsotropy<M, SO3d> {
   static double maxSectionalCurvature() { return T::maxSectionalCurvature(); }
 };
 
-/// What statistics may be told besides.
+/// Optional traits for statistics.
 template <class M>
 struct ToldManifold : AttitudeManifold<M> {
   struct ChordalMoments {

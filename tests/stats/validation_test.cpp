@@ -307,7 +307,7 @@ TEST(Validation, aTailWithoutMeanIsCountedAndNotAveraged) {
       EXPECT_GT(averaged_failed / 300, 0.1);
     }
   }
-  // What is counted is judged: thrice as many fail, as does a wrong covariance of all.
+  // Counted tails are judged: a thrice larger share beyond the quantile fails, as does a wrong covariance of all.
   const auto report = [&](double share, double factor) {
     return validate(serial, {.trials = 20000, .seed = 2}, law, [=](CounterRng& rng, std::uint64_t) {
       const double chi = factor * rng.normalVector<3>().squaredNorm();

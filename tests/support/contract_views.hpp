@@ -1,4 +1,4 @@
-// What the generated tests of the contract ask of a manifold besides its contract: views of its parameters, and casts.
+// Additions of the generated tests to a manifold's contract: views of its parameters, and casts.
 #pragma once
 
 #include <lie/manifold.hpp>

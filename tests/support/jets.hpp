@@ -12,7 +12,7 @@
 
 namespace liestat_test {
 
-/// Of one width for all types, so that what they share (rotations, 3×3 matrices) is compiled once. Those with fewer
+/// One width for all types, so that what they share (rotations, 3×3 matrices) is compiled once. Those with fewer
 /// dimensions leave the last derivatives zero.
 using Jet = ceres::Jet<double, 9>;
 

@@ -4,12 +4,12 @@
 #include <experiments/motion_scene.hpp>
 #include <fusion/motion/types.hpp>
 #include <lie/manifold.hpp>
+#include <lie/units.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
 namespace liestat::tests {
@@ -18,7 +18,7 @@ using experiments::MotionScene;
 using experiments::MotionSceneOptions;
 using experiments::MotionWorld;
 
-inline constexpr double degree = std::numbers::pi / 180;
+using units::degree;
 
 /// The true direction of what an estimate is about.
 inline S2d truthOf(const MotionScene& scene, const MotionEstimate& estimate) {

@@ -44,7 +44,7 @@ struct Pair {
     b = {at_b, joint.bottomRightCorner(n_b, n_b)};
   }
   liestat::CrossCovariance<A, B> cross() const { return joint.topRightCorner(n_a, n_b); }
-  /// Of independent errors.
+  /// Joint covariance of independent errors.
   MatrixXd independent() const {
     MatrixXd m = joint;
     m.topRightCorner(n_a, n_b).setZero();

@@ -1,5 +1,5 @@
-// What sanitized tests leave out: sanitizers look for faults of the code, which a tenth of the trials shows as well;
-// statistics are judged without them.
+// A flag by which sanitized tests leave trials out: sanitizers look for faults of the code, which a tenth of the trials
+// shows as well; statistics are judged without them.
 #pragma once
 
 namespace liestat_test {

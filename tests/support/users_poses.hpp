@@ -22,8 +22,8 @@ DriverPose<S> fromFrame(const liestat::Frame3<S>& f) {
   return {f.so3().matrix(), f.translation()};
 }
 
-/// What a filter calls the camera's pose: camera_T_world, perturbed from the left, Exp(d)·camera_T_world. The library
-/// moves world_T_camera from the right.
+/// The camera's pose in a filter: camera_T_world, perturbed from the left, Exp(d)·camera_T_world. The library moves
+/// world_T_camera from the right.
 template <class S>
 struct LeftPose {
   liestat::SE3<S> camera_T_world;

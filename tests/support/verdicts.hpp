@@ -91,13 +91,13 @@ Verdicts scattered(double kappa, int n, std::uint64_t trials, bool known_noise =
 }
 
 template <class M>
-void keepsThePromise(const char* what, double kappa, int n, std::uint64_t trials, double least_kept = 0,
+void keepsThePromise(const char* what, double kappa, int n, std::uint64_t trials, double min_kept = 0,
                      bool known_noise = false) {
   const Verdicts verdicts = scattered<M>(kappa, n, trials, known_noise);
   const std::string name =
       std::string(what) + ", kappa " + std::to_string(kappa).substr(0, 4) + ", n = " + std::to_string(n);
   verdicts.expectPromise(name);
-  EXPECT_GE(verdicts.kept / verdicts.trials, least_kept - fourErrors(least_kept, verdicts.trials)) << name;
+  EXPECT_GE(verdicts.kept / verdicts.trials, min_kept - fourErrors(min_kept, verdicts.trials)) << name;
   if (kappa == 0) {
     EXPECT_LE(verdicts.kept / verdicts.trials, 0.02 + fourErrors(0.02, verdicts.trials)) << name;
   }

@@ -1,4 +1,4 @@
-// What an inertial sensor measures of a scene, under the names that the tests have for it.
+// Inertial measurements of a scene, under the names that the tests have for them.
 #pragma once
 
 #include <experiments/scene_readings.hpp>
