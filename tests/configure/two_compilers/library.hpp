@@ -1,15 +1,18 @@
-// A library of the project's compiler and a test of another: what they must agree on, to be linked and run.
+// What a library of the project's compiler and a test of another one must agree on: names, sizes, alignment.
 #pragma once
 
 #include <Eigen/Core>
-#include <concepts>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+namespace two_compilers {
+
 template <class T>
-concept Number = std::floating_point<T>;
+concept Number = requires(T x) { x + x; };
+template <class F>
+concept Function = requires(F f) { f(1.0); };
 
 struct Result {
   Eigen::Vector4d vector;
@@ -18,17 +21,14 @@ struct Result {
   std::vector<Eigen::Vector4d> list;
 };
 
-// The name of a constrained template is the compiler's own affair until it stands in another compiler's object.
-template <Number T, class F>
-  requires std::invocable<F, T>
-Result result(T value, F&& function) {
-  Result made;
-  made.vector.setConstant(function(value));
-  made.matrix = Eigen::Matrix3f::Identity();
-  made.text = "a text that is too long for its own place";
-  made.list.assign(3, made.vector);
-  return made;
+// As the means are: constrained, and compiled in the library.
+template <Number T, Function F>
+Result result(const F& function, T value) {
+  return {Eigen::Vector4d::Constant(function(value)), Eigen::Matrix3f::Identity(), "longer than its own place",
+          std::vector<Eigen::Vector4d>(3, Eigen::Vector4d::Constant(function(value)))};
 }
+extern template Result result<double>(const std::function<double(double)>&, double);
 
-extern template Result result(double, const std::function<double(double)>&);
 Result doubled(const Result& result, std::size_t alignment);
+
+}  // namespace two_compilers
