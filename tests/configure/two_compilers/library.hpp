@@ -10,9 +10,13 @@
 namespace two_compilers {
 
 template <class T>
-concept Number = requires(T x) { x + x; };
+concept Number = requires(T x) {
+  x + x;
+};
 template <class F>
-concept Function = requires(F f) { f(1.0); };
+concept Function = requires(F f) {
+  f(1.0);
+};
 
 struct Result {
   Eigen::Vector4d vector;
