@@ -174,20 +174,20 @@ TEST(Progress, Line) {
   }
 }
 
-/// A terminal of so many columns whose other end the test reads.
+/// A terminal of so many columns whose other end the test reads. Some containers have none to give: stream() is null there.
 class Terminal {
  public:
   explicit Terminal(unsigned short columns) : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
-    EXPECT_GE(master_, 0);
-    EXPECT_EQ(::grantpt(master_), 0);
-    EXPECT_EQ(::unlockpt(master_), 0);
-    stream_ = std::fopen(::ptsname(master_), "w");
+    const char* name = nullptr;
+    if (master_ >= 0 && ::grantpt(master_) == 0 && ::unlockpt(master_) == 0) name = ::ptsname(master_);
+    if (name != nullptr) stream_ = std::fopen(name, "w");
+    if (stream_ == nullptr) return;
     const winsize size{24, columns, 0, 0};
     EXPECT_EQ(::ioctl(master_, TIOCSWINSZ, &size), 0);
   }
   ~Terminal() {
     if (stream_ != nullptr) std::fclose(stream_);
-    ::close(master_);
+    if (master_ >= 0) ::close(master_);
   }
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
@@ -205,9 +205,11 @@ class Terminal {
   std::FILE* stream_ = nullptr;
 };
 
+constexpr const char* no_terminal = "no pseudo-terminal is to be had here: /dev/ptmx or /dev/pts is missing or full";
+
 TEST(Progress, FitsTheTerminalAndIsRemoved) {
   Terminal terminal(30);
-  ASSERT_NE(terminal.stream(), nullptr);
+  if (terminal.stream() == nullptr) GTEST_SKIP() << no_terminal;
   {
     Progress progress("validate two-view", 100, terminal.stream());
     progress.advance(25);
@@ -217,7 +219,7 @@ TEST(Progress, FitsTheTerminalAndIsRemoved) {
 
 TEST(Progress, AnInterruptEndsTheLineAndTheProgram) {
   Terminal terminal(60);
-  ASSERT_NE(terminal.stream(), nullptr);
+  if (terminal.stream() == nullptr) GTEST_SKIP() << no_terminal;
   const auto interrupted = [&](auto disposition) {
     std::signal(SIGINT, disposition);
     Progress progress("work", 100, terminal.stream());
@@ -237,7 +239,7 @@ TEST(Progress, AnInterruptEndsTheLineAndTheProgram) {
 
 TEST(Progress, AnInterruptOfTrialsStopsThemAndTheNextOneTheProgram) {
   Terminal terminal(60);
-  ASSERT_NE(terminal.stream(), nullptr);
+  if (terminal.stream() == nullptr) GTEST_SKIP() << no_terminal;
   const auto interrupted = [&](int times) {
     std::signal(SIGINT, SIG_DFL);
     {
