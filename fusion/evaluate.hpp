@@ -24,7 +24,7 @@ struct PoseStamps {
 
 /// The partners of the estimate's poses, by time, or by row where neither has times. Poses before the options' `start` and
 /// after their `end` must have been left out: see rowsBetween. Never throws: see the status.
-Association associate(const PoseStamps& reference, const PoseStamps& estimate, const AssociationOptions& options = {});
+Associated associate(const PoseStamps& reference, const PoseStamps& estimate, const AssociationOptions& options = {});
 
 /// The times from `start` to `end`, both included, as indices; where one is not given, there is no bound.
 std::vector<std::size_t> rowsBetween(std::span<const double> times, std::optional<double> start,

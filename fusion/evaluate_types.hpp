@@ -129,7 +129,7 @@ constexpr auto words(EvaluationStatus) {
 }
 
 /// The partners of poses.
-struct Association {
+struct Associated {
   EvaluationStatus status = EvaluationStatus::ok;
   std::string reason = {};
   std::vector<TimeMatch> matches = {};

@@ -99,9 +99,9 @@ void refuse(EvaluationStatus status, const std::string& reason, const Trajectory
   }
 }
 
-Association associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options) {
-  Association a = associate({reference.times, reference.size(), reference.name},
-                            {estimate.times, estimate.size(), estimate.name}, options.association);
+Associated associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options) {
+  Associated a = associate({reference.times, reference.size(), reference.name},
+                           {estimate.times, estimate.size(), estimate.name}, options.association);
   if (!a.ok()) refuse(a.status, a.reason, reference, estimate, options);
   return a;
 }

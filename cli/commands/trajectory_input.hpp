@@ -33,7 +33,7 @@ Trajectory readTimedTrajectory(const std::string& path, const TrajectoryOptions&
                          const Trajectory& estimate, const TrajectoryInputOptions& options);
 
 /// The association of two trajectories. Throws InputError where times do not overlap or nothing matches.
-Association associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options);
+Associated associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options);
 
 /// The reference between two times; the estimate keeps all of its poses. Throws InputError.
 void cutTimes(Trajectory& reference, const TrajectoryInputOptions& options);

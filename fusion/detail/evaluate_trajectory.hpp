@@ -179,9 +179,9 @@ inline std::string noteOfIndefinite(const TrajectoryEvaluation& e, const std::ve
 
 }  // namespace detail
 
-LIESTAT_FUSION_INLINE Association associate(const PoseStamps& reference, const PoseStamps& estimate,
-                                            const AssociationOptions& options) {
-  Association a;
+LIESTAT_FUSION_INLINE Associated associate(const PoseStamps& reference, const PoseStamps& estimate,
+                                           const AssociationOptions& options) {
+  Associated a;
   const std::string reference_name(reference.name);
   const auto refuse = [&a](EvaluationStatus status, std::string reason) {
     a.status = status, a.reason = std::move(reason);
@@ -285,8 +285,8 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     }
     truth.keep(rows);
   }
-  const Association association = associate({truth.times(), truth.poses().size(), reference_name},
-                                            {left.times(), left.poses().size(), estimate_name}, o.association);
+  const Associated association = associate({truth.times(), truth.poses().size(), reference_name},
+                                           {left.times(), left.poses().size(), estimate_name}, o.association);
   e.by_time = association.by_time;
   if (!association.ok()) return refuse(association.status, association.reason);
   e.matched = matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation);
