@@ -105,8 +105,8 @@ std::string fileOf(const std::string& path) {
   return path == "-" ? sourceName(path) : printable(std::filesystem::path(path).filename().string(), 200);
 }
 
-/// A file as the library takes it. Where the file has no covariances, none may be asked for.
-PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& named, std::string_view option) {
+/// A file as the library takes it, with the convention of its covariances if the file does not state it.
+PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention, std::string_view option) {
   PoseTrajectory p{.times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = t.lines};
   for (std::size_t i = 0; i < p.lines.size(); ++i) {
     if (p.lines[i] == 0) p.lines[i] = i + 1;
@@ -115,14 +115,14 @@ PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& named, std
     p.poses = exactPoses(t.poses);
     return p;
   }
-  const std::optional<Convention> given = named.empty() ? std::nullopt : std::optional(conventionNamed(named, option));
+  const auto given = convention.empty() ? std::nullopt : std::optional(conventionNamed(convention, option));
   const Convention c = conventionOf(t, given, option);
   p.covariance_convention = describe(c);
   p.poses = gaussiansOf(t, c);
   return p;
 }
 
-/// What only the options of this command can be blamed for; the rest is said as in other commands.
+/// Throws InputError: about an option that only this command has, or as other commands do.
 [[noreturn]] void refuse(const EvaluateOptions& o, const TrajectoryEvaluation& e, const Trajectory& reference,
                          const Trajectory& estimate) {
   switch (e.status) {
