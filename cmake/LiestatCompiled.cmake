@@ -11,7 +11,7 @@ set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certi
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation recording noise_calibration homography_models epipolar_models pose_models robust_two_view two_view
     hand_eye motion)
-set(LIESTAT_COMPILED_SOURCES_trajectories trajectories convention_diagnosis)
+set(LIESTAT_COMPILED_SOURCES_trajectories trajectories evaluate convention_diagnosis)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost)
 

@@ -7,6 +7,7 @@
 // A verdict is yes, no or none. None is no half of a yes: what was not tested has not passed.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -40,6 +41,14 @@ struct Verdict {
   std::optional<bool> decided() const { return isNone() ? std::nullopt : std::optional<bool>(isYes()); }
   friend bool operator==(const Verdict& v, Answer answer) { return v.answer == answer; }
 };
+
+/// The answer of several verdicts together: yes if all are yes, no if any is no.
+inline Verdict::Answer answerOf(const std::vector<Verdict>& verdicts) {
+  const auto any = [&](Verdict::Answer answer) { return std::find(verdicts.begin(), verdicts.end(), answer); };
+  if (any(Verdict::Answer::no) != verdicts.end()) return Verdict::Answer::no;
+  return verdicts.empty() || any(Verdict::Answer::none) != verdicts.end() ? Verdict::Answer::none
+                                                                          : Verdict::Answer::yes;
+}
 
 /// The fields of a verdict on covariances; see report/describe.hpp.
 template <class V>

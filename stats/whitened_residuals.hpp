@@ -19,6 +19,7 @@
 
 #include <lie/detail/small_matrix.hpp>
 #include <stats/laws.hpp>
+#include <stats/words.hpp>
 
 #include <Eigen/Core>
 
@@ -28,6 +29,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace liestat {
@@ -53,14 +55,24 @@ struct ResidualTest {
   /// NEES over its expectation: 1 where the covariance has the right scale.
   double ratio() const { return statistic / dof; }
 };
+template <class V>
+void describe(V& v, const ResidualTest& t) {
+  v("statistic", t.statistic)("degrees_of_freedom", t.dof)("ratio", t.ratio(), "1 is expected")("p", t.p);
+}
+
+/// The interval below and above which NEES lies with a probability of `tail` each if the covariances are right.
+struct NeesInterval {
+  double low = detail::not_a_number, high = low;
+};
+inline NeesInterval neesInterval(double dof, double tail = 0.025) {
+  return {chiSquaredQuantile(tail, dof), chiSquaredThreshold(tail, dof)};
+}
 
 /// The names of the tests, in the order of WhitenedResidualTests::all().
 enum class ResidualTestKind { joint, position, rotation, mean, covariance, tail, lag };
 
-/// The enumerator's name, for files.
-inline const char* name(ResidualTestKind kind) {
-  constexpr std::array names{"joint_nees", "position_nees", "rotation_nees", "mean", "covariance", "tail", "lag"};
-  return names[static_cast<std::size_t>(kind)];
+constexpr auto words(ResidualTestKind) {
+  return std::array{"joint_nees", "position_nees", "rotation_nees", "mean", "covariance", "tail", "lag"};
 }
 
 /// The likely cause where a test fires, in words. `too_large`: the statistic is above its expectation.
@@ -109,7 +121,23 @@ struct WhitenedResidualTests {
   }
   /// No test fires, and those of NEES apply.
   bool consistent(double level = residual_test_level) const { return joint.applies() && !anyFires(level); }
+  /// The tests that fire, each with its likely cause.
+  std::vector<std::string> causes() const {
+    std::vector<std::string> list;
+    for (std::size_t k = 0; k < all().size(); ++k) {
+      const ResidualTest test = all()[k];
+      if (!test.fires()) continue;
+      const auto kind = static_cast<ResidualTestKind>(k);
+      const bool large = kind == ResidualTestKind::lag ? test.statistic > 0 : test.ratio() > 1;
+      list.push_back(std::string(name(kind)) + ": " + cause(kind, large) + " (p " + significant(test.p, 2) + ")");
+    }
+    return list;
+  }
 };
+template <class V>
+void describe(V& v, const WhitenedResidualTests& tests) {
+  for (std::size_t k = 0; k < tests.all().size(); ++k) v(name(static_cast<ResidualTestKind>(k)), tests.all()[k]);
+}
 
 namespace detail {
 

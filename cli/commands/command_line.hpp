@@ -1,8 +1,11 @@
 #pragma once
 
+#include <stats/words.hpp>
+
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -79,10 +82,26 @@ class Command {
     return word(
         name, names, [&value, values](const std::string& given) { value = values.at(given); }, description);
   }
+  /// The same of an enumeration with words, or of an optional one.
+  template <Worded Enum>
+  Option choice(const std::string& name, Enum& value, const std::string& description) const {
+    return word(
+        name, wordsOf<Enum>(), [&value](const std::string& given) { value = *named<Enum>(given); }, description);
+  }
+  template <Worded Enum>
+  Option choice(const std::string& name, std::optional<Enum>& value, const std::string& description) const {
+    return word(
+        name, wordsOf<Enum>(), [&value](const std::string& given) { value = named<Enum>(given); }, description);
+  }
   /// The work: returns the exit code, and may throw InputError.
   void run(Run work) const;
 
  private:
+  template <Worded Enum>
+  static std::vector<std::string> wordsOf() {
+    const auto all = words(Enum{});
+    return {all.begin(), all.end()};
+  }
   Option word(const std::string& name, const std::vector<std::string>& words,
               std::function<void(const std::string&)> take, const std::string& description) const;
 

@@ -18,24 +18,10 @@
 namespace liestat::cli {
 namespace {
 
-constexpr double unknown_figure = std::numeric_limits<double>::quiet_NaN();
-
 std::string alignmentName(const Alignment& a) {
   if (a.model == AlignmentModel::none) return "none";
   const std::string how = a.weighted ? "weighted" : a.model == AlignmentModel::origin ? "first pose" : "least squares";
   return fmt::format("{} ({})", name(a.model), how);
-}
-
-std::vector<std::string> causesOf(const Consistency& c) {
-  std::vector<std::string> causes;
-  const auto all = c.tests.all();
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if (!all[k].fires()) continue;
-    const auto kind = static_cast<ResidualTestKind>(k);
-    const bool large = kind == ResidualTestKind::lag ? all[k].statistic > 0 : all[k].ratio() > 1;
-    causes.push_back(fmt::format("{}: {} (p {})", name(kind), cause(kind, large), number(all[k].p, 2)));
-  }
-  return causes;
 }
 
 std::string statisticsLine(const char* what, const ErrorStatistics& s, const std::string& unit) {
@@ -46,106 +32,42 @@ std::string statisticsLine(const char* what, const ErrorStatistics& s, const std
 
 }  // namespace
 
-EvaluationVerdict verdictOf(const EvaluatedEstimate& e) {
-  EvaluationVerdict v;
-  if (!e.hasCovariances()) {
-    v.text = "no verdict: the estimate has no covariances";
-    return v;
-  }
-  const Consistency& c = e.consistency;
-  if (!c.ok) {
-    v.text = "no verdict: " + c.fault;
-    return v;
-  }
-  v.causes = causesOf(c);
-  if (c.tests.lag.fires() && c.tests.lag.statistic > 0) {
-    if (e.relative && e.relative->joint.applies()) {
-      v.good = !e.relative->joint.fires();
-      v.text =
-          fmt::format("{}: errors are correlated in time, and NEES of relative motions is {} of its expectation (p {})",
-                      *v.good ? "consistent" : "INCONSISTENT", number(e.relative->joint.ratio(), 3),
-                      number(e.relative->joint.p, 2));
-    } else {
-      v.text = fmt::format(
-          "no verdict: errors are correlated in time, and NEES of absolute errors ({} of its expectation) is no test "
-          "then; "
-          "--pairs-model chain tests dead reckoning, doctor looks further",
-          number(c.joint.ratio(), 3));
-    }
-    return v;
-  }
-  v.good = c.tests.consistent();
-  const double ratio = c.joint.ratio();
-  if (*v.good) {
-    v.text = fmt::format("consistent: NEES is {} of its expectation (p {}, {:.0f} degrees of freedom)",
-                         number(ratio, 3), number(c.joint.p, 2), c.joint.dof);
-  } else if (c.joint.fires()) {
-    v.text = fmt::format("{}: NEES is {} of its expectation (p {}, {:.0f} degrees of freedom)",
-                         ratio > 1 ? "OVERCONFIDENT" : "UNDERCONFIDENT", number(ratio, 3), number(c.joint.p, 2),
-                         c.joint.dof);
-  } else {
-    v.text = fmt::format("INCONSISTENT: NEES is {} of its expectation, but errors do not follow the covariances",
-                         number(ratio, 3));
-  }
-  return v;
-}
-
-std::vector<std::pair<std::string, double>> figuresOf(const EvaluatedEstimate& e) {
-  std::vector<std::pair<std::string, double>> f;
-  const auto add = [&](const char* what, const ErrorStatistics& s) {
-    for (const auto& [word, value] :
-         {std::pair("rmse", s.rmse), std::pair("mean", s.mean), std::pair("median", s.median), std::pair("std", s.std),
-          std::pair("min", s.min), std::pair("max", s.max), std::pair("sse", s.sse)}) {
-      f.emplace_back(fmt::format("{}_{}", what, word), value);
-    }
-  };
-  add("ape", e.ape_statistics), add("rpe", e.rpe_statistics);
-  const Consistency& c = e.consistency;
-  f.emplace_back("nees", c.joint.ratio()), f.emplace_back("nees_p", c.joint.p);
-  f.emplace_back("position_nees", c.position.ratio()), f.emplace_back("rotation_nees", c.rotation.ratio());
-  f.emplace_back("rpe_nees", e.relative ? e.relative->joint.ratio() : unknown_figure);
-  f.emplace_back("rpe_nees_p", e.relative ? e.relative->joint.p : unknown_figure);
-  const std::optional<bool> good = verdictOf(e).good;
-  f.emplace_back("consistent", good ? (*good ? 1. : 0.) : unknown_figure);
-  f.emplace_back("matched", static_cast<double>(e.matched.size()));
-  f.emplace_back("matched_share",
-                 static_cast<double>(e.matched.size()) / static_cast<double>(std::max<std::size_t>(1, e.poses)));
-  return f;
-}
-
 std::string formatEvaluation(const EvaluationOutput& output) {
   std::string text;
   for (const EvaluatedEstimate& e : output.estimates) {
-    const EvaluationVerdict v = verdictOf(e);
+    const Verdict v = e.evaluation.verdict();
     text += fmt::format("{}: {}\n", e.name, v.text);
     for (const std::string& c : v.causes) text += "  " + c + "\n";
   }
   text += "\n";
   Table table({"estimate", "poses", "APE rmse", "mean", "max", "RPE rmse", "NEES/dof", "pos", "rot"});
-  for (const EvaluatedEstimate& e : output.estimates) {
+  for (const EvaluatedEstimate& shown : output.estimates) {
+    const TrajectoryEvaluation& e = shown.evaluation;
     const Consistency& c = e.consistency;
     const auto ratio = [](const ResidualTest& t) { return t.applies() ? number(t.ratio(), 3) : std::string(); };
-    table.row({e.name, fmt::format("{}", e.matched.size()), number(e.ape_statistics.rmse),
+    table.row({shown.name, fmt::format("{}", e.matched.size()), number(e.ape_statistics.rmse),
                number(e.ape_statistics.mean), number(e.ape_statistics.max), number(e.rpe_statistics.rmse),
                ratio(c.joint), ratio(c.position), ratio(c.rotation)});
   }
   text += table.str();
-  text += fmt::format("APE in {}, RPE in {}; {}\n", output.ape_unit, output.rpe_unit, output.association);
-  text += fmt::format("reference {}: {} poses{}\n\n", output.reference, output.reference_poses,
+  text += fmt::format("APE in {}, RPE in {}; {}\n", output.setting().ape_unit, output.setting().rpe_unit,
+                      output.setting().association);
+  text += fmt::format("reference {}: {} poses{}\n\n", output.reference, output.setting().reference_poses,
                       output.reference_has_covariances ? ", with covariances" : ", taken as exact");
-  for (const EvaluatedEstimate& e : output.estimates) {
-    text += fmt::format("{}: {} of {} poses matched\n", e.name, e.matched.size(), e.poses);
-    text += "  " + statisticsLine("APE", e.ape_statistics, output.ape_unit);
-    if (!e.rpe.empty()) text += "  " + statisticsLine("RPE", e.rpe_statistics, output.rpe_unit);
+  for (const EvaluatedEstimate& shown : output.estimates) {
+    const TrajectoryEvaluation& e = shown.evaluation;
+    text += fmt::format("{}: {} of {} poses matched\n", shown.name, e.matched.size(), e.poses);
+    text += "  " + statisticsLine("APE", e.ape_statistics, e.ape_unit);
+    if (!e.rpe.empty()) text += "  " + statisticsLine("RPE", e.rpe_statistics, e.rpe_unit);
     text += fmt::format("  alignment of APE and RPE: {}", alignmentName(e.alignment));
     if (e.alignment.scale != 1) text += fmt::format(", scale {}", number(e.alignment.scale, 7));
     text += "\n";
-    if (!e.hasCovariances()) {
+    if (!e.has_covariances) {
       for (const std::string& note : e.notes) text += "  " + note + "\n";
       continue;
     }
     const Consistency& c = e.consistency;
-    text += fmt::format("  covariances: {}\n", e.convention);
+    text += fmt::format("  covariances: {}\n", e.covariance_convention);
     text += fmt::format("  alignment of the verdict: {}", alignmentName(e.weighted));
     if (e.weighted.parameters > 0 && e.weighted.ok) {
       text += fmt::format(", {} parameters from {} poses, condition {}", e.weighted.parameters, e.weighted.poses,
@@ -164,9 +86,8 @@ std::string formatEvaluation(const EvaluationOutput& output) {
       text += "\n";
     }
     const auto bounds = [](const ResidualTest& t) {
-      return fmt::format("{} in [{}, {}], p {}", number(t.ratio(), 4),
-                         number(chiSquaredQuantile(0.025, t.dof) / t.dof, 4),
-                         number(chiSquaredThreshold(0.025, t.dof) / t.dof, 4), number(t.p, 2));
+      return fmt::format("{} in [{}, {}], p {}", number(t.ratio(), 4), number(neesInterval(t.dof).low / t.dof, 4),
+                         number(neesInterval(t.dof).high / t.dof, 4), number(t.p, 2));
     };
     if (c.ok) {
       text += fmt::format("  NEES/dof, joint: {} (95 %)\n", bounds(c.joint));
@@ -174,7 +95,7 @@ std::string formatEvaluation(const EvaluationOutput& output) {
       if (c.rotation.applies()) text += fmt::format("  NEES/dof, rotation: {}\n", bounds(c.rotation));
     }
     if (e.relative && e.relative->joint.applies()) {
-      text += fmt::format("  RPE NEES/dof ({}): {}; {} pairs\n", output.pairs_model, bounds(e.relative->joint),
+      text += fmt::format("  RPE NEES/dof ({}): {}; {} pairs\n", name(*e.pairs_model), bounds(e.relative->joint),
                           e.relative->n);
     }
     if (e.relative && e.relative->indefinite > 0) {
@@ -186,57 +107,12 @@ std::string formatEvaluation(const EvaluationOutput& output) {
   return text;
 }
 
-namespace {
-
-JsonObject statisticsJson(const ErrorStatistics& s) {
-  JsonObject o;
-  return o.set("rmse", s.rmse)
-      .set("mean", s.mean)
-      .set("median", s.median)
-      .set("std", s.std)
-      .set("min", s.min)
-      .set("max", s.max)
-      .set("sse", s.sse);
-}
-JsonObject testJson(const ResidualTest& t) {
-  JsonObject o;
-  return o.set("statistic", t.statistic).set("degrees_of_freedom", t.dof).set("ratio", t.ratio()).set("p", t.p);
-}
-JsonObject alignmentJson(const Alignment& a) {
-  JsonObject o;
-  o.set("model", name(a.model)).set("weighted", a.weighted).set("ok", a.ok).set("scale", a.scale);
-  o.set("translation", Eigen::Vector3d(a.transform.translation()));
-  o.set("quaternion_xyzw", Eigen::Vector4d(a.transform.so3().params()));
-  o.set("parameters", a.parameters).set("poses", a.poses).set("condition", a.condition);
-  o.set("covariance", a.covariance);
-  return o.set("covariance_order", "translation rotation log_scale, along the world's axes");
-}
-
-}  // namespace
-
 void setEvaluation(JsonObject& object, const EvaluationOutput& output) {
-  object.set("reference", output.reference).set("reference_poses", output.reference_poses);
-  object.set("association", output.association);
-  object.set("ape_unit", output.ape_unit).set("rpe_unit", output.rpe_unit);
-  object.set("pairs_model", output.pairs_model.empty() ? std::nullopt : std::optional(output.pairs_model));
+  object.set("reference", output.reference);
+  describeSetting(object, output.setting());
   std::vector<JsonObject> estimates;
   for (const EvaluatedEstimate& e : output.estimates) {
-    JsonObject o;
-    const EvaluationVerdict v = verdictOf(e);
-    o.set("file", e.name).set("verdict", v.text).set("consistent", v.good).set("causes", v.causes);
-    o.set("poses", e.poses).set("matched", e.matched.size()).set("by_time", e.by_time);
-    o.set("ape", statisticsJson(e.ape_statistics)).set("rpe", statisticsJson(e.rpe_statistics));
-    o.set("rpe_pairs", e.pairs.size());
-    o.set("alignment", alignmentJson(e.alignment)).set("weighted_alignment", alignmentJson(e.weighted));
-    o.set("covariance_convention", e.hasCovariances() ? std::optional(e.convention) : std::nullopt);
-    JsonObject tests;
-    const auto all = e.consistency.tests.all();
-    for (std::size_t k = 0; k < all.size(); ++k) tests.set(name(static_cast<ResidualTestKind>(k)), testJson(all[k]));
-    o.set("tests", tests);
-    o.set("rpe_nees", e.relative ? std::optional(testJson(e.relative->joint)) : std::nullopt);
-    std::vector<double> indefinite(e.consistency.indefinite.begin(), e.consistency.indefinite.end());
-    o.set("indefinite", indefinite).set("notes", e.notes);
-    estimates.push_back(o);
+    estimates.push_back(JsonObject().set("file", e.name).fieldsOf(e.evaluation));
   }
   object.set("estimates", estimates).set("failed", output.failed);
 }
@@ -253,15 +129,15 @@ Plot trajectoryPlot(const EvaluationOutput& output) {
                 .y = {.label = axes[static_cast<std::size_t>(j)]},
                 .equal_aspect = true};
     Series reference{.name = "reference"};
-    for (const MatchedPose& p : output.estimates.front().matched) {
+    for (const MatchedPose& p : output.setting().matched) {
       reference.x.push_back(p.reference.mean.translation()[i]),
           reference.y.push_back(p.reference.mean.translation()[j]);
     }
     panel.series.push_back(reference);
     for (const EvaluatedEstimate& e : output.estimates) {
       Series estimate{.name = e.name};
-      for (const MatchedPose& p : e.matched) {
-        const Eigen::Vector3d t = e.alignment(p.estimate.mean).translation();
+      for (const MatchedPose& p : e.evaluation.matched) {
+        const Eigen::Vector3d t = e.evaluation.alignment(p.estimate.mean).translation();
         estimate.x.push_back(t[i]), estimate.y.push_back(t[j]);
       }
       panel.series.push_back(estimate);
@@ -277,14 +153,14 @@ Plot errorPlot(const EvaluatedEstimate& e, std::size_t number_of) {
       .caption = fmt::format("Errors of {} after the weighted alignment, in the body's axes, with the band of three "
                              "standard deviations that the covariances and the alignment give.",
                              e.name),
-      .panels = errorPanels(e.consistency.errors, {e.times, e.by_time}),
+      .panels = errorPanels(e.evaluation.consistency.errors, {e.evaluation.times, e.evaluation.by_time}),
       .columns = 3};
 }
 
 Plot neesPlot(const EvaluatedEstimate& e, std::size_t number_of) {
-  const TimesOfPoses times{e.times, e.by_time};
+  const TimesOfPoses times{e.evaluation.times, e.evaluation.by_time};
   Panel panel = neesPanel(times);
-  panel.series = {neesSeries("NEES", e.consistency.errors, times)};
+  panel.series = {neesSeries("NEES", e.evaluation.consistency.errors, times)};
   return {.name = fmt::format("nees_{}", number_of),
           .caption = fmt::format("NEES of each pose of {}; {}", e.name, neesBounds()),
           .panels = {panel}};
@@ -295,33 +171,33 @@ Plot neesPlot(const EvaluatedEstimate& e, std::size_t number_of) {
 void writeEvaluationReport(const std::string& directory, const std::string& command_line,
                            const EvaluationOutput& output) {
   Report report(directory, "Trajectories against a reference");
-  bool good = true, any = false;
-  std::string verdicts;
+  std::vector<Verdict> verdicts;
+  std::string text;
   for (const EvaluatedEstimate& e : output.estimates) {
-    const EvaluationVerdict v = verdictOf(e);
-    any = any || v.good.has_value(), good = good && v.good.value_or(false);
-    verdicts += (verdicts.empty() ? "" : "; ") + fmt::format("{}: {}", e.name, v.text);
+    verdicts.push_back(e.evaluation.verdict());
+    text += (text.empty() ? "" : "; ") + fmt::format("{}: {}", e.name, verdicts.back().text);
   }
-  report.verdict(any && good && output.failed.empty(), verdicts);
+  report.verdict(output.failed.empty() ? answerOf(verdicts) : Verdict::Answer::no, text);
   report.code(command_line);
   report.section("Figures");
   std::vector<std::vector<std::string>> rows;
-  for (const EvaluatedEstimate& e : output.estimates) {
+  for (const EvaluatedEstimate& shown : output.estimates) {
+    const TrajectoryEvaluation& e = shown.evaluation;
     const Consistency& c = e.consistency;
-    rows.push_back({e.name, fmt::format("{}", e.matched.size()), number(e.ape_statistics.rmse),
+    rows.push_back({shown.name, fmt::format("{}", e.matched.size()), number(e.ape_statistics.rmse),
                     number(e.ape_statistics.median), number(e.ape_statistics.max), number(e.rpe_statistics.rmse),
                     number(c.joint.ratio(), 3), number(c.joint.p, 2), number(c.position.ratio(), 3),
                     number(c.rotation.ratio(), 3)});
   }
-  report.table({"estimate", "poses", "APE rmse " + output.ape_unit, "APE median", "APE max",
-                "RPE rmse " + output.rpe_unit, "NEES/dof", "p", "position", "rotation"},
+  report.table({"estimate", "poses", "APE rmse " + output.setting().ape_unit, "APE median", "APE max",
+                "RPE rmse " + output.setting().rpe_unit, "NEES/dof", "p", "position", "rotation"},
                rows, "Absolute and relative errors; NEES over its degrees of freedom after the weighted alignment.");
   report.code(formatEvaluation(output));
   report.section("Trajectories");
   report.plot(trajectoryPlot(output));
   for (std::size_t k = 0; k < output.estimates.size(); ++k) {
     const EvaluatedEstimate& e = output.estimates[k];
-    if (!e.consistency.ok) continue;
+    if (!e.evaluation.consistency.ok) continue;
     report.section(fmt::format("Errors of {}", e.name));
     report.plot(errorPlot(e, k + 1));
     report.plot(neesPlot(e, k + 1));
@@ -355,8 +231,9 @@ std::string tumText(const std::vector<double>& times, const std::vector<SE3d>& p
 
 }  // namespace
 
-std::string evoResult(const EvaluationOutput& output, const EvaluatedEstimate& e, bool relative,
+std::string evoResult(const EvaluationOutput& output, const EvaluatedEstimate& shown, bool relative,
                       const std::string& path) {
+  const TrajectoryEvaluation& e = shown.evaluation;
   const std::vector<double>& errors = relative ? e.rpe : e.ape;
   std::vector<std::size_t> rows;
   if (relative) {
@@ -377,13 +254,14 @@ std::string evoResult(const EvaluationOutput& output, const EvaluatedEstimate& e
   const auto tail = [relative](const std::vector<double>& list) {
     return npyArray(std::span(list).subspan(relative && !list.empty() ? 1 : 0));
   };
-  JsonObject info, stats;
+  JsonObject info;
   // Two files of one name would be one trajectory.
-  const std::string est_name = e.name == output.reference ? e.name + "_estimate" : e.name;
-  info.set("title", relative ? e.rpe_title : e.ape_title).set("ref_name", output.reference).set("est_name", est_name);
-  info.set("label", fmt::format("{} ({})", relative ? "RPE" : "APE", relative ? output.rpe_unit : output.ape_unit));
-  const ErrorStatistics& s = relative ? e.rpe_statistics : e.ape_statistics;
-  stats = statisticsJson(s);
+  const std::string est_name = shown.name == output.reference ? shown.name + "_estimate" : shown.name;
+  info.set("title", relative ? shown.rpe_title : shown.ape_title)
+      .set("ref_name", output.reference)
+      .set("est_name", est_name);
+  info.set("label", fmt::format("{} ({})", relative ? "RPE" : "APE", relative ? e.rpe_unit : e.ape_unit));
+  const JsonObject stats = JsonObject().fieldsOf(relative ? e.rpe_statistics : e.ape_statistics);
   std::vector<ZipMember> members{{"info.json", info.str()}, {"stats.json", stats.str()}};
   members.push_back({"error_array.npy", npyArray(errors)});
   members.push_back({"seconds_from_start.npy", tail(seconds)});

@@ -54,6 +54,7 @@ figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
 .verdict { overflow-wrap: anywhere; border: 2px solid; border-radius: 6px; padding: .6rem .9rem; max-width: none; font-weight: 600; }
 .good { border-color: #2e8b57; }
 .bad { border-color: #c8452f; }
+.none { border-color: var(--rule); }
 .contents { columns: 2; padding-left: 1.2rem; max-width: 46rem; }
 .notice { border-left: 4px solid #d99a00; background: var(--stripe); padding: .6rem .9rem; max-width: none; }
 footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85rem; }
@@ -280,8 +281,11 @@ std::string Report::uniqueName(std::string_view name) {
   return candidate;
 }
 
-void Report::verdict(bool good, std::string_view text) {
-  verdict_ = fmt::format("<p class=\"verdict {}\">{} {}</p>\n", good ? "good" : "bad", good ? "✓" : "✗", escaped(text));
+void Report::verdict(Verdict::Answer answer, std::string_view text) {
+  const auto [style, sign] = answer == Verdict::Answer::yes  ? std::pair("good", "✓")
+                             : answer == Verdict::Answer::no ? std::pair("bad", "✗")
+                                                             : std::pair("none", "–");
+  verdict_ = fmt::format("<p class=\"verdict {}\">{} {}</p>\n", style, sign, escaped(text));
 }
 
 void Report::section(std::string_view title) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <stats/verdict.hpp>
+
 #include <Eigen/Core>
 #include <cstddef>
 #include <optional>
@@ -97,8 +99,11 @@ class Report {
   /// Makes the directory; throws InputError where that is not possible.
   Report(std::string directory, std::string title);
 
-  /// The answer in one sentence, in a box below the title whenever it is given. A sign says the same as its colour.
-  void verdict(bool good, std::string_view text);
+  /// The answer in one sentence, in a box below the title whenever it is given. A sign says the same as its colour; an
+  /// answer that is neither yes nor no is drawn as neither.
+  void verdict(Verdict::Answer answer, std::string_view text);
+  void verdict(const Verdict& verdict) { this->verdict(verdict.answer, verdict.text); }
+  void verdict(bool good, std::string_view text) { verdict(good ? Verdict::Answer::yes : Verdict::Answer::no, text); }
   /// A heading. Pages with many of them begin with a list of contents.
   void section(std::string_view title);
   /// Plain text.

@@ -2,7 +2,6 @@
 
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <stats/laws.hpp>
 
 #include <fmt/format.h>
 
@@ -11,13 +10,6 @@
 #include <cstddef>
 
 namespace liestat::cli {
-namespace {
-
-double lowestNees() { return chiSquaredQuantile(0.025, 6); }
-double highestNees() { return chiSquaredThreshold(0.025, 6); }
-
-}  // namespace
-
 std::pair<std::string, double> coordinateOfError(int k) {
   constexpr std::array labels{"x, m", "y, m", "z, m", "rotation x, deg", "rotation y, deg", "rotation z, deg"};
   return {labels[static_cast<std::size_t>(k)], k < 3 ? 1 : degrees};
@@ -42,8 +34,8 @@ std::vector<Panel> errorPanels(const std::vector<PoseError>& errors, const Times
 Panel neesPanel(const TimesOfPoses& times) {
   return {.x = {.label = times.label()},
           .y = {.label = "NEES of a pose", .logarithmic = true},
-          .references = {{ReferenceLine::Direction::horizontal, lowestNees()},
-                         {ReferenceLine::Direction::horizontal, highestNees()}}};
+          .references = {{ReferenceLine::Direction::horizontal, neesInterval(6).low},
+                         {ReferenceLine::Direction::horizontal, neesInterval(6).high}}};
 }
 
 Series neesSeries(std::string name, const std::vector<PoseError>& errors, const TimesOfPoses& times) {
@@ -56,7 +48,7 @@ Series neesSeries(std::string name, const std::vector<PoseError>& errors, const 
 
 std::string neesBounds() {
   return fmt::format("95 % of them lie between the dotted lines, {} and {}, if the covariances are right.",
-                     number(lowestNees(), 3), number(highestNees(), 3));
+                     number(neesInterval(6).low, 3), number(neesInterval(6).high, 3));
 }
 
 }  // namespace liestat::cli

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cli/show/page.hpp>
-#include <fusion/trajectories.hpp>
+#include <fusion/trajectories_types.hpp>
 
 #include <string>
 #include <utility>

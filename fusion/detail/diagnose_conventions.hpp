@@ -115,12 +115,6 @@ namespace detail {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-inline std::string significant(double value, int digits = 3) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.*g", digits, value);
-  return text.data();
-}
-
 /// A matrix with its halves of six coordinates exchanged.
 inline Matrix6d halvesExchanged(const Matrix6d& M) {
   Matrix6d X;
@@ -461,7 +455,7 @@ inline ScaleProfile profileScale(const DiagnosisData& data, const DiagnosisOptio
 inline std::string scaleWord(const char* block, double k, double sigma, bool rotation) {
   const auto near = [&](double value) { return std::abs(std::log(k / value)) < 3 * sigma; };
   const std::string part(block);
-  if (near(1)) return part + " block: scale right (" + significant(k) + ")";
+  if (near(1)) return part + " block: scale right (" + significant(k, 3) + ")";
   if (rotation) {
     if (near(0.25)) return part + " block: a quarter of what it should be: half angles, or sigmas twice too small";
     if (near(4)) return part + " block: four times what it should be: double angles, or sigmas twice too large";
@@ -473,7 +467,7 @@ inline std::string scaleWord(const char* block, double k, double sigma, bool rot
     if (near(1e-6)) return part + " block: in kilometres";
   }
   return part + " block: " + (k > 1 ? "inflated (underconfident)" : "too small (overconfident)") + " by a factor of " +
-         significant(k > 1 ? k : 1 / k) + " in variance";
+         significant(k > 1 ? k : 1 / k, 3) + " in variance";
 }
 
 }  // namespace detail
@@ -483,7 +477,7 @@ LIESTAT_FUSION_INLINE std::vector<std::string> ScaleProfile::words() const {
       std::abs(std::log(translation)) > 3 * relative_sigma) {
     const double k = std::sqrt(translation * rotation);
     return {std::string("both blocks: ") + (k > 1 ? "inflated (underconfident)" : "too small (overconfident)") +
-            " by a factor of " + detail::significant(k > 1 ? k : 1 / k) + " in variance"};
+            " by a factor of " + significant(k > 1 ? k : 1 / k, 3) + " in variance"};
   }
   return {detail::scaleWord("translation", translation, relative_sigma, false),
           detail::scaleWord("rotation", rotation, relative_sigma, true)};
@@ -685,8 +679,8 @@ inline void noteFired(const WhitenedResidualTests& tests, std::vector<std::strin
     const bool nees = k < 3;
     notes.push_back(
         std::string(cause(kind, kind == ResidualTestKind::lag ? all[k].statistic > 0 : all[k].ratio() > 1)) + " (" +
-        name(kind) + (nees ? " " + significant(all[k].ratio()) : std::string()) + ", p = " + significant(all[k].p, 2) +
-        ")");
+        name(kind) + (nees ? " " + significant(all[k].ratio(), 3) : std::string()) +
+        ", p = " + significant(all[k].p, 2) + ")");
   }
 }
 
@@ -762,7 +756,7 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
       }
       if (!consistent) {
         d.notes.push_back("the increments do not follow the growth of the covariance (NEES ratio " +
-                          significant(d.chain->increments.ratio()) + ")");
+                          significant(d.chain->increments.ratio(), 3) + ")");
       }
       if (d.chain->increments.applies() || d.accepted.size() > 1) return d;
     }

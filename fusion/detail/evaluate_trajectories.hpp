@@ -80,24 +80,6 @@ LIESTAT_FUSION_INLINE std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3
   return exact;
 }
 
-LIESTAT_FUSION_INLINE const char* name(AlignmentModel model) {
-  switch (model) {
-    case AlignmentModel::none:
-      return "none";
-    case AlignmentModel::origin:
-      return "origin";
-    case AlignmentModel::posyaw:
-      return "posyaw";
-    case AlignmentModel::se3:
-      return "se3";
-    case AlignmentModel::sim3:
-      return "sim3";
-    case AlignmentModel::scale:
-      return "scale";
-  }
-  return "";
-}
-
 LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model,
                                              std::size_t n_to_align) {
   Alignment a;

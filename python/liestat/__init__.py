@@ -38,7 +38,6 @@ from ._sensors import (
     VI_BLOCKS,
     Camera,
     InitialisedWindow,
-    evaluate_trajectory,
     hand_eye,
     motion,
     preintegrate,
@@ -47,5 +46,6 @@ from ._sensors import (
     vi_init,
 )
 from ._statistics import group_mean, mahalanobis, mean
+from ._trajectories import TrajectoryEvaluation, evaluate_trajectory
 
 __version__ = _core.__version__

@@ -18,6 +18,10 @@ _CovarianceAt = Literal["measured", "estimated"] | None
 _Convention = Literal[
     "body", "left", "world", "rotation_first", "left_rotation_first", "world_rotation_first", "chart"
 ]
+_Alignment = Literal["none", "origin", "posyaw", "se3", "sim3", "scale"]
+_PoseRelation = Literal[
+    "full", "trans_part", "rot_part", "angle_deg", "angle_rad", "point_distance", "point_distance_error_ratio"
+]
 
 CONVENTIONS: tuple[str, ...]
 
@@ -378,6 +382,10 @@ def preintegrate(
     max_gap: float = 0.1,
     threads: int = 0,
 ) -> Result: ...
+class TrajectoryEvaluation(Result):
+    @property
+    def consistency(self) -> Result | None: ...
+
 def evaluate_trajectory(
     reference: SE3,
     estimate: SE3,
@@ -386,13 +394,28 @@ def evaluate_trajectory(
     reference_times: ArrayLike | None = None,
     times: ArrayLike | None = None,
     reference_covariances: ArrayLike | None = None,
-    alignment: Literal["none", "origin", "posyaw", "se3", "sim3", "scale"] = "se3",
-    verdict_alignment: Literal["none", "origin", "posyaw", "se3", "sim3"] | None = None,
     association: Literal["interpolate", "nearest"] = "interpolate",
     interpolation: Literal["geodesic", "slerp"] = "geodesic",
     max_gap: float | None = None,
+    t_max_diff: float = 0.01,
+    t_offset: float = 0.0,
+    t_start: float | None = None,
+    t_end: float | None = None,
+    pose_relation: _PoseRelation = "trans_part",
+    alignment: _Alignment = "none",
+    verdict_alignment: _Alignment | None = None,
     n_to_align: int = 0,
-) -> Result: ...
+    project_to_plane: Literal["xy", "xz", "yz"] | None = None,
+    change_unit: Literal["mm", "cm", "m", "km", "deg", "rad"] | None = None,
+    downsample: int = 0,
+    motion_filter: tuple[float, float] | None = None,
+    delta: float = 1.0,
+    delta_unit: Literal["f", "d", "r", "m"] = "f",
+    delta_tol: float = 0.1,
+    all_pairs: bool = False,
+    pairs_from_reference: bool = False,
+    pairs_model: Literal["independent", "chain"] | None = None,
+) -> TrajectoryEvaluation: ...
 def hand_eye(
     a: SE3,
     b: SE3,

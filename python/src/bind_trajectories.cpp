@@ -1,8 +1,9 @@
 // Evaluation of trajectories for Python.
-#include <fusion/trajectories.hpp>
-#include <lie/detail/small_matrix.hpp>
+#include <fusion/convention_diagnosis.hpp>
+#include <fusion/evaluate.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/binding.hpp>
+#include <python/src/described.hpp>
 #include <python/src/interruptible.hpp>
 
 #include <stdexcept>
@@ -13,148 +14,113 @@
 namespace liestat::python {
 namespace {
 
-AlignmentModel modelNamed(const std::string& word) {
-  for (const AlignmentModel model : {AlignmentModel::none, AlignmentModel::origin, AlignmentModel::posyaw,
-                                     AlignmentModel::se3, AlignmentModel::sim3, AlignmentModel::scale}) {
-    if (word == name(model)) return model;
+template <Worded E>
+E chosen(const char* option, const std::string& word) {
+  if (const std::optional<E> choice = named<E>(word)) return *choice;
+  std::string all;
+  for (const char* known : words(E{})) all += (all.empty() ? "'" : ", '") + std::string(known) + "'";
+  throw std::invalid_argument(std::string("evaluate_trajectory: ") + option + ": expected one of " + all + ", got '" +
+                              word + "'");
+}
+
+/// Options by their names in describe(v, EvaluationOptions).
+class GivenOptions {
+ public:
+  explicit GivenOptions(const py::dict& given) : given_(given) {}
+
+  template <class T>
+  const GivenOptions& operator()(const char* option, T& value) const {
+    const py::object given = given_[option];
+    try {
+      if constexpr (requires { value.has_value(); }) {
+        if (!given.is_none()) value = cast<typename T::value_type>(option, given);
+      } else {
+        value = cast<T>(option, given);
+      }
+    } catch (const py::cast_error&) {
+      throw std::invalid_argument(std::string("evaluate_trajectory: ") + option + ": got " +
+                                  py::repr(given).cast<std::string>());
+    }
+    return *this;
   }
-  throw std::invalid_argument("no alignment is called '" + word + "'");
-}
 
-template <class Derived>
-DoubleArray arrayOfMatrix(const Eigen::MatrixBase<Derived>& m) {
-  DoubleArray array({static_cast<py::ssize_t>(m.rows()), static_cast<py::ssize_t>(m.cols())});
-  store(m, array.mutable_data());
-  return array;
-}
-py::dict dictOf(const ResidualTest& test) {
-  py::dict d;
-  d["statistic"] = test.statistic, d["dof"] = test.dof, d["p"] = test.p;
-  return d;
-}
-py::dict dictOf(const ErrorStatistics& s) {
-  py::dict d;
-  d["rmse"] = s.rmse, d["mean"] = s.mean, d["median"] = s.median, d["std"] = s.std;
-  d["min"] = s.min, d["max"] = s.max, d["sse"] = s.sse;
-  return d;
-}
-py::dict dictOf(const Alignment& a) {
-  py::dict d;
-  DoubleArray pose(7);
-  storePoint(a.transform, pose.mutable_data());
-  d["model"] = text(name(a.model)), d["ok"] = a.ok, d["fault"] = a.fault;
-  d["transform"] = pose, d["scale"] = a.scale, d["covariance"] = arrayOfMatrix(a.covariance);
-  d["parameters"] = a.parameters, d["condition"] = a.condition;
-  return d;
-}
-
-/// Poses of one kind in memory: parameters, and covariances unless there are none.
-std::vector<Gaussian<SE3d>> posesOf(const DoubleArray& poses, const py::object& covariances) {
-  const auto n = static_cast<std::size_t>(poses.shape(0));
-  const auto matrices = covariances.is_none() ? DoubleArray() : covariances.cast<DoubleArray>();
-  std::vector<Gaussian<SE3d>> list(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    list[i].mean = point<SE3d>(poses.data() + 7 * i);
-    list[i].covariance.setZero();
-    if (matrices.size() != 0) list[i].covariance = square<6>(matrices.data() + 36 * i);
+ private:
+  template <class T>
+  static T cast(const char* option, const py::object& given) {
+    if constexpr (Worded<T>) {
+      return chosen<T>(option, given.cast<std::string>());
+    } else {
+      return given.cast<T>();
+    }
   }
-  return list;
-}
 
-struct Evaluation {
-  std::vector<TimeMatch> matches;
-  Alignment alignment, weighted;
-  std::vector<double> position, rotation;
-  ErrorStatistics position_statistics, rotation_statistics;
-  Consistency consistency;
-  std::vector<std::size_t> indefinite;  ///< matched poses whose covariance is not positive definite
+  const py::dict& given_;
 };
+
+EvaluationOptions optionsOf(const py::dict& given) {
+  EvaluationOptions o;
+  const GivenOptions take(given);
+  AssociationOptions& a = o.association;
+  take("association", a.rule)("interpolation", a.interpolation)("max_gap", a.max_gap)("t_max_diff", a.max_difference);
+  take("t_offset", a.offset)("t_start", a.start)("t_end", a.end);
+  take("pose_relation", o.pose_relation)("alignment", o.alignment)("verdict_alignment", o.verdict_alignment);
+  take("n_to_align", o.n_to_align)("project_to_plane", o.project_to_plane)("change_unit", o.change_unit);
+  take("downsample", o.downsample);
+  std::optional<std::pair<double, double>> motion;
+  take("motion_filter", motion);
+  if (motion) o.motion_filter = {motion->first, motion->second};
+  take("delta", o.relative.delta)("delta_unit", o.relative.unit)("delta_tol", o.relative.relative_tolerance);
+  take("all_pairs", o.relative.all_pairs)("pairs_from_reference", o.relative.pairs_from_reference);
+  take("pairs_model", o.pairs_model);
+  return o;
+}
+
+/// Arrays as a trajectory: parameters, and times and covariances unless they are None.
+PoseTrajectory trajectoryOf(const DoubleArray& poses, const py::object& times, const py::object& covariances) {
+  PoseTrajectory t;
+  t.has_covariances = !covariances.is_none();
+  t.covariance_convention = describe(Convention{});
+  const auto matrices = t.has_covariances ? covariances.cast<DoubleArray>() : DoubleArray();
+  if (!times.is_none()) {
+    const auto stamps = times.cast<DoubleArray>();
+    t.times.assign(stamps.data(), stamps.data() + stamps.size());
+  }
+  t.poses.resize(static_cast<std::size_t>(poses.shape(0)));
+  for (std::size_t i = 0; i < t.poses.size(); ++i) {
+    t.poses[i].mean = point<SE3d>(poses.data() + 7 * i);
+    if (t.has_covariances) t.poses[i].covariance = square<6>(matrices.data() + 36 * i);
+  }
+  return t;
+}
 
 py::dict evaluate(const DoubleArray& reference, const py::object& reference_times,
                   const py::object& reference_covariances, const DoubleArray& estimate, const py::object& times,
-                  const py::object& covariances, const std::string& alignment, const std::string& verdict_alignment,
-                  bool nearest, bool slerp, double max_gap, std::size_t n_to_align) {
-  const auto truth = posesOf(reference, reference_covariances), poses = posesOf(estimate, covariances);
-  const AlignmentModel model = modelNamed(alignment), verdict_model = modelNamed(verdict_alignment);
-  const bool with_covariances = !covariances.is_none(), by_time = !times.is_none();
-  std::vector<double> truth_times, pose_times;
-  if (by_time) {
-    const auto a = reference_times.cast<DoubleArray>(), b = times.cast<DoubleArray>();
-    truth_times.assign(a.data(), a.data() + a.size()), pose_times.assign(b.data(), b.data() + b.size());
-  }
-  Evaluation e;
+                  const py::object& covariances, const py::dict& options) {
+  const PoseTrajectory truth = trajectoryOf(reference, reference_times, reference_covariances);
+  const PoseTrajectory poses = trajectoryOf(estimate, times, covariances);
+  const EvaluationOptions how = optionsOf(options);
+  TrajectoryEvaluation e;
   {
     const py::gil_scoped_release released;
-    e = interruptible([=](const std::atomic<bool>&) {
-      Evaluation r;
-      if (!by_time) {
-        for (std::size_t i = 0; i < poses.size(); ++i) r.matches.push_back({i, i, 0, 0});
-      } else if (nearest) {
-        r.matches = associateNearest(truth_times, pose_times, max_gap);
-      } else {
-        r.matches = associateByInterpolation(truth_times, pose_times, max_gap);
-      }
-      const auto matched =
-          matchedPoses(r.matches, truth, poses, slerp ? PoseInterpolation::slerp : PoseInterpolation::geodesic);
-      if (matched.empty()) return r;
-      r.alignment = alignUmeyama(matched, model, n_to_align);
-      r.position = absoluteErrors(matched, r.alignment, PoseRelation::trans_part);
-      r.rotation = absoluteErrors(matched, r.alignment, PoseRelation::angle_rad);
-      r.position_statistics = errorStatistics(r.position), r.rotation_statistics = errorStatistics(r.rotation);
-      if (with_covariances) {
-        for (std::size_t i = 0; i < matched.size(); ++i) {
-          if (!liestat::detail::Cholesky<double, 6>(matched[i].estimate.covariance).ok()) r.indefinite.push_back(i);
-        }
-        r.weighted = alignWeighted(matched, verdict_model, n_to_align);
-        r.consistency = evaluateConsistency(matched, r.weighted);
-      }
-      return r;
-    });
+    e = interruptible([=](const std::atomic<bool>&) { return evaluateTrajectory(truth, poses, how); });
   }
-  const auto n = static_cast<py::ssize_t>(e.matches.size());
-  py::dict d;
-  py::array_t<py::ssize_t> rows(n);
-  for (py::ssize_t i = 0; i < n; ++i) {
-    rows.mutable_data()[i] = static_cast<py::ssize_t>(e.matches[static_cast<std::size_t>(i)].estimate);
-  }
-  d["rows"] = rows;
-  d["alignment"] = dictOf(e.alignment);
-  d["position_errors"] = arrayOf(e.position, {n});
-  d["rotation_errors"] = arrayOf(e.rotation, {n});
-  d["position"] = dictOf(e.position_statistics);
-  d["rotation"] = dictOf(e.rotation_statistics);
-  if (!with_covariances || n == 0) {
-    d["consistency"] = py::none();
-    return d;
-  }
-  py::dict c;
-  c["ok"] = e.consistency.ok, c["fault"] = e.consistency.fault, c["n"] = e.consistency.n;
-  c["alignment"] = dictOf(e.weighted);
-  c["joint"] = dictOf(e.consistency.joint), c["position"] = dictOf(e.consistency.position);
-  c["rotation"] = dictOf(e.consistency.rotation);
-  py::dict tests;
-  const char* const names[] = {"joint", "position", "rotation", "mean", "covariance", "tail", "lag"};
-  const auto all = e.consistency.tests.all();
-  for (std::size_t i = 0; i < all.size(); ++i) tests[names[i]] = dictOf(all[i]);
-  c["tests"] = tests;
-  const auto size = static_cast<py::ssize_t>(e.consistency.errors.size());
-  DoubleArray errors({size, py::ssize_t{6}}), matrices({size, py::ssize_t{6}, py::ssize_t{6}}), nees(size);
-  for (py::ssize_t i = 0; i < size; ++i) {
-    const PoseError& error = e.consistency.errors[static_cast<std::size_t>(i)];
-    store(error.error, errors.mutable_data() + 6 * i);
-    store(error.covariance, matrices.mutable_data() + 36 * i);
-    nees.mutable_data()[i] = error.nees;
-  }
-  c["errors"] = errors, c["covariances"] = matrices, c["nees"] = nees;
-  py::list indefinite;
-  for (const std::size_t i : e.indefinite) indefinite.append(i);
-  c["indefinite"] = indefinite;
-  d["consistency"] = c;
-  return d;
+  DictView parts;
+  describeSetting(parts, e), describe(parts, e), describeSeries(parts, e);
+  parts("position", errorStatistics(e.position_errors))("rotation", errorStatistics(e.rotation_errors));
+  DictView outcome;
+  outcome("status", name(e.status))("reason", e.reason)("alignment_fault", e.alignment.fault);
+  outcome("weighted_fault", e.weighted.fault)("consistency_ok", e.consistency.ok);
+  outcome("consistency_fault", e.consistency.fault)("n_tested", e.consistency.n);
+  py::dict result;
+  result["parts"] = parts.dict, result["outcome"] = outcome.dict;
+  return result;
 }
 
 }  // namespace
 
-void bindTrajectories(py::module_& module) { module.def("evaluate_trajectory", &evaluate); }
+void bindTrajectories(py::module_& module) {
+  module.def("evaluate_trajectory", &evaluate);
+  module.def("evaluation_options", [] { return dictOf(EvaluationOptions{}); });
+}
 
 }  // namespace liestat::python

@@ -188,6 +188,28 @@ TEST(EvaluateCommand, PageAndSeveralEstimates) {
   EXPECT_TRUE(std::filesystem::exists(page + "/errors_1.csv"));
   EXPECT_TRUE(std::filesystem::exists(page + "/nees_1.csv"));
   EXPECT_TRUE(contains(out.output, "second.tum: no verdict: the estimate has no covariances"));
+  // What was not tested has neither passed nor failed.
+  EXPECT_TRUE(contains(html, "<p class=\"verdict none\">–")) << html.substr(0, 6000);
+  EXPECT_FALSE(contains(html, "✗"));
+  EXPECT_FALSE(contains(html, "✓"));
+  const auto sign = [&](Words words) {
+    words.insert(words.begin(), {"evaluate", files.reference, files.estimate});
+    words.insert(words.end(), {"--report", page});
+    run(words);
+    const std::string text = contentOf(page + "/index.html");
+    return std::string(contains(text, "✓") ? "yes" : contains(text, "✗") ? "no" : "none");
+  };
+  EXPECT_EQ(sign({"-a"}), "yes");
+  EXPECT_EQ(sign({}), "no");
+  EXPECT_EQ(sign({"-a", "--fail-if", "ape_rmse>0"}), "no");
+}
+
+TEST(EvaluateCommand, ScaleAloneIsJudgedBySim3) {
+  const Files files;
+  const Json scale = files.json({"-s"})["estimates"][0];
+  EXPECT_EQ(scale["alignment"]["model"], "scale");
+  EXPECT_EQ(scale["weighted_alignment"]["model"], "sim3");
+  EXPECT_EQ(scale, files.json({"--alignment", "scale"})["estimates"][0]);
 }
 
 TEST(EvaluateCommand, ConditionsForPipelines) {

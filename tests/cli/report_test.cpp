@@ -128,6 +128,8 @@ TEST(Report, TheVerdictIsFirstAndManySectionsHaveContents) {
   EXPECT_TRUE(contains(page, "<th scope=\"col\" class=\"number\">a</th><th scope=\"col\">b</th>"));
   report.verdict(true, "PASSED");
   EXPECT_TRUE(contains(contentOf(report.write()), "<p class=\"verdict good\">✓ PASSED</p>"));
+  report.verdict(Verdict::none("no verdict: not tested"));
+  EXPECT_TRUE(contains(contentOf(report.write()), "<p class=\"verdict none\">– no verdict: not tested</p>"));
 }
 
 TEST(Report, LinksInItsDirectoryAreReplaced) {

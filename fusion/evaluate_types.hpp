@@ -1,0 +1,265 @@
+// Input, options and result of evaluateTrajectory (fusion/evaluate.hpp). (Needs Boost.Math.)
+#pragma once
+
+#include <fusion/trajectories_types.hpp>
+#include <stats/verdict.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+
+// Input ------------------------------------------------------------------------------------------------------------------
+
+/// Poses with their times. What is in words is for sentences alone.
+struct PoseTrajectory {
+  std::vector<double> times = {};          ///< s, strictly ascending; empty: pose i belongs to the other's pose i
+  std::vector<Gaussian<SE3d>> poses = {};  ///< world_T_body; covariances in the library's convention
+  bool has_covariances = false;            ///< false: those of the poses are taken as zero
+  std::string name = {};                   ///< "est.tum"; empty: "the estimate", "the reference"
+  std::string covariance_convention = {};  ///< the convention from which the covariances were converted
+  std::vector<std::size_t> lines = {};     ///< of a file, one for each pose; empty: there is none
+};
+
+// Options ----------------------------------------------------------------------------------------------------------------
+
+/// The pose of the reference that an estimated pose is compared with.
+enum class AssociationRule {
+  interpolate,  ///< at the time of the estimate, between two stamps
+  nearest       ///< at the nearest stamp, as evo: the motion in between becomes a part of the error
+};
+constexpr auto words(AssociationRule) { return std::array{"interpolate", "nearest"}; }
+
+struct AssociationOptions {
+  AssociationRule rule = AssociationRule::interpolate;
+  PoseInterpolation interpolation = PoseInterpolation::geodesic;
+  /// s, between two stamps of the reference; else five times their median distance.
+  std::optional<double> max_gap = {};
+  double max_difference = 0.01;                ///< s, of nearest stamps
+  double offset = 0;                           ///< s, added to the estimate's times
+  std::optional<double> start = {}, end = {};  ///< s, of the reference; the estimate keeps all of its poses
+};
+
+/// A plane of the world. Positions are projected into it, rotations to the angle about its normal.
+enum class CoordinatePlane { xy, xz, yz };
+constexpr auto words(CoordinatePlane) { return std::array{"xy", "xz", "yz"}; }
+
+/// A unit of errors.
+enum class ErrorUnit { mm, cm, m, km, deg, rad };
+constexpr auto words(ErrorUnit) { return std::array{"mm", "cm", "m", "km", "deg", "rad"}; }
+
+/// Keeps poses after which the body has moved or turned so far since the last one that was kept, measured along the path.
+struct MotionThinning {
+  double distance = 0, degrees = 0;  ///< m, degrees
+};
+
+/// Options of evaluateTrajectory. Those of evo have its meaning.
+struct EvaluationOptions {
+  AssociationOptions association = {};
+  PoseRelation pose_relation = PoseRelation::trans_part;
+  AlignmentModel alignment = AlignmentModel::none;       ///< of APE and RPE, by least squares
+  std::optional<AlignmentModel> verdict_alignment = {};  ///< weighted by the covariances; else the same
+  std::size_t n_to_align = 0;                            ///< the first poses; 0: all
+  std::optional<CoordinatePlane> project_to_plane = {};  ///< both, after the alignment
+  std::optional<ErrorUnit> change_unit = {};             ///< of APE, and of RPE if it has the same unit
+  std::size_t downsample = 0;                            ///< so many poses of each, evenly spaced; 0: all
+  std::optional<MotionThinning> motion_filter = {};      ///< of each, after downsample
+  RelativeOptions relative = {};                         ///< pairs of RPE
+  std::optional<PairsModel> pairs_model = {};            ///< NEES of relative motions; else there is none
+
+  /// The model of the weighted alignment. A scale alone has none: positions that need a scale are aligned by sim3.
+  AlignmentModel verdictAlignment() const {
+    const AlignmentModel model = verdict_alignment.value_or(alignment);
+    return model == AlignmentModel::scale ? AlignmentModel::sim3 : model;
+  }
+};
+
+/// The options by their names in the program and in Python.
+template <class V>
+void describe(V& v, const EvaluationOptions& o) {
+  const auto word = [](const auto& choice) {
+    return choice ? std::optional<std::string>(name(*choice)) : std::nullopt;
+  };
+  v("association", name(o.association.rule))("interpolation", name(o.association.interpolation));
+  v("max_gap", o.association.max_gap, "", "s")("t_max_diff", o.association.max_difference, "", "s");
+  v("t_offset", o.association.offset, "", "s");
+  v("t_start", o.association.start, "", "s")("t_end", o.association.end, "", "s");
+  v("pose_relation", name(o.pose_relation))("alignment", name(o.alignment));
+  v("verdict_alignment", word(o.verdict_alignment))("n_to_align", o.n_to_align);
+  v("project_to_plane", word(o.project_to_plane))("change_unit", word(o.change_unit))("downsample", o.downsample);
+  v("motion_filter",
+    o.motion_filter ? std::optional(Eigen::Vector2d(o.motion_filter->distance, o.motion_filter->degrees))
+                    : std::nullopt,
+    "", "m, deg");
+  v("delta", o.relative.delta)("delta_unit", name(o.relative.unit))("delta_tol", o.relative.relative_tolerance);
+  v("all_pairs", o.relative.all_pairs)("pairs_from_reference", o.relative.pairs_from_reference);
+  v("pairs_model", word(o.pairs_model));
+}
+
+// Result -----------------------------------------------------------------------------------------------------------------
+
+/// How an evaluation ended; what is not `ok` comes with a reason.
+enum class EvaluationStatus {
+  ok,
+  bad_options,        ///< delta is not positive, or no whole number of frames
+  other_unit,         ///< change_unit is not of the kind of the errors
+  bad_times,          ///< times that do not ascend, or fewer or more than poses
+  times_missing,      ///< one trajectory has times, the other has none; or a part is asked for without times
+  unequal_rows,       ///< without times, and not as many poses in both
+  empty_interval,     ///< no pose of the reference between start and end
+  no_overlap,         ///< the times do not overlap
+  no_match,           ///< they overlap, but no pose has a partner
+  too_few,            ///< fewer than two poses have a partner
+  not_aligned,        ///< the positions do not determine the alignment: there are no errors
+  overlapping_pairs,  ///< a pairs_model with all_pairs, whose motions are not independent
+};
+constexpr auto words(EvaluationStatus) {
+  return std::array{"ok",           "bad_options",      "other_unit", "bad_times", "times_missing",
+                    "unequal_rows", "empty_interval",   "no_overlap", "no_match",  "too_few",
+                    "not_aligned",  "overlapping_pairs"};
+}
+
+/// The partners of poses.
+struct Associated {
+  EvaluationStatus status = EvaluationStatus::ok;
+  std::string reason = {};
+  std::vector<TimeMatch> matches = {};
+  bool by_time = true;  ///< false: pose i with pose i
+  double max_gap = 0;   ///< s, as it was applied
+
+  bool ok() const { return status == EvaluationStatus::ok; }
+};
+
+/// A trajectory against a reference. Lists with one entry for each matched pose are in the order of the estimate.
+struct TrajectoryEvaluation {
+  EvaluationStatus status = EvaluationStatus::ok;
+  std::string reason = {};
+
+  std::size_t reference_poses = 0, poses = 0;  ///< that were given
+  std::string association = {};                ///< in words
+  std::string ape_unit = {}, rpe_unit = {};
+  std::optional<PairsModel> pairs_model = {};
+  std::string covariance_convention = {};
+  bool has_covariances = false;  ///< of the estimate
+
+  bool by_time = true;
+  std::vector<std::size_t> rows = {};  ///< of the estimate: the matched poses
+  std::vector<double> times = {};      ///< s; without times the numbers of the rows that were not thinned out
+  std::vector<MatchedPose> matched = {};
+  Alignment alignment = {};                                        ///< of APE and RPE
+  std::vector<double> ape = {}, rpe = {};                          ///< in their units
+  std::vector<std::pair<std::size_t, std::size_t>> pairs = {};     ///< of matched poses, those of RPE
+  std::vector<double> position_errors = {}, rotation_errors = {};  ///< m and rad, whatever the pose relation
+  ErrorStatistics ape_statistics = {}, rpe_statistics = {};
+  Alignment weighted = {};  ///< of the verdict
+  Consistency consistency = {};
+  std::optional<RelativeConsistency> relative = {};
+  std::vector<std::string> notes = {};
+
+  bool ok() const { return status == EvaluationStatus::ok; }
+  /// Whether the covariances of the estimate are to be trusted.
+  Verdict verdict() const;
+};
+
+inline Verdict TrajectoryEvaluation::verdict() const {
+  if (!ok()) return Verdict::none("no verdict: " + reason);
+  if (!has_covariances) return Verdict::none("no verdict: the estimate has no covariances");
+  const Consistency& c = consistency;
+  if (!c.ok) return Verdict::none("no verdict: " + c.fault);
+  const auto judged = [&](bool good, std::string text) {
+    return Verdict{good ? Verdict::Answer::yes : Verdict::Answer::no, std::move(text), c.tests.causes()};
+  };
+  const auto share = [](const ResidualTest& t) { return significant(t.ratio(), 3) + " of its expectation"; };
+  if (c.tests.lag.fires() && c.tests.lag.statistic > 0) {
+    if (!relative || !relative->joint.applies()) {
+      return Verdict::none("no verdict: errors are correlated in time, and NEES of absolute errors (" + share(c.joint) +
+                               ") is no test then; --pairs-model chain tests dead reckoning, doctor looks further",
+                           c.tests.causes());
+    }
+    const bool good = !relative->joint.fires();
+    return judged(good, std::string(good ? "consistent" : "INCONSISTENT") +
+                            ": errors are correlated in time, and NEES of relative motions is " +
+                            share(relative->joint) + " (p " + significant(relative->joint.p, 2) + ")");
+  }
+  const bool good = c.tests.consistent();
+  if (!good && !c.joint.fires()) {
+    return judged(false, "INCONSISTENT: NEES is " + share(c.joint) + ", but errors do not follow the covariances");
+  }
+  return judged(good, std::string(good                  ? "consistent"
+                                  : c.joint.ratio() > 1 ? "OVERCONFIDENT"
+                                                        : "UNDERCONFIDENT") +
+                          ": NEES is " + share(c.joint) + " (p " + significant(c.joint.p, 2) + ", " +
+                          significant(c.joint.dof, 17) + " degrees of freedom)");
+}
+
+// Descriptions -----------------------------------------------------------------------------------------------------------
+
+/// Fields that are the same for all estimates of a run.
+template <class V>
+void describeSetting(V& v, const TrajectoryEvaluation& e) {
+  v("reference_poses", e.reference_poses)("association", e.association, "in words");
+  v("ape_unit", e.ape_unit)("rpe_unit", e.rpe_unit);
+  v("pairs_model", e.pairs_model ? std::optional<std::string>(name(*e.pairs_model)) : std::nullopt);
+}
+
+template <class V>
+void describe(V& v, const TrajectoryEvaluation& e) {
+  describe(v, e.verdict());
+  v("poses", e.poses, "of the estimate")("matched", e.matched.size(), "of them that have a partner");
+  v("by_time", e.by_time, "false: pose i with pose i");
+  v("ape", e.ape_statistics, "absolute errors")("rpe", e.rpe_statistics, "relative errors");
+  v("rpe_pairs", e.pairs.size())("alignment", e.alignment, "of APE and RPE");
+  v("weighted_alignment", e.weighted, "of the verdict");
+  v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt);
+  v("tests", e.consistency.tests, "of the whitened errors");
+  v("rpe_nees", e.relative ? std::optional(e.relative->joint) : std::nullopt, "of relative motions");
+  v("indefinite", e.consistency.indefinite, "matched poses whose covariance is not positive definite");
+  v("notes", e.notes);
+}
+
+/// One row for each matched pose, or for each pair of RPE.
+template <class V>
+void describeSeries(V& v, const TrajectoryEvaluation& e) {
+  const std::vector<PoseError>& errors = e.consistency.errors;
+  const auto n = static_cast<Eigen::Index>(errors.size());
+  Eigen::Matrix<double, Eigen::Dynamic, 6> xi(n, 6);
+  Eigen::Matrix<double, Eigen::Dynamic, 36> covariances(n, 36);
+  std::vector<double> nees;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PoseError& error = errors[static_cast<std::size_t>(i)];
+    xi.row(i) = error.error.transpose();
+    for (int k = 0; k < 36; ++k) covariances(i, k) = error.covariance(k / 6, k % 6);
+    nees.push_back(error.nees);
+  }
+  std::vector<std::size_t> from, to;
+  for (const auto& [i, j] : e.pairs) from.push_back(i), to.push_back(j);
+  v("rows", e.rows, "of the estimate")("times", e.times, "", "s");
+  v("ape_errors", e.ape)("rpe_errors", e.rpe)("pairs_from", from)("pairs_to", to);
+  v("position_errors", e.position_errors, "", "m")("rotation_errors", e.rotation_errors, "", "rad");
+  v("errors", xi, "after the weighted alignment, translation before rotation, body axes", "m, rad");
+  v("covariances", covariances, "of the errors, row by row", "m, rad")("nees", nees, "chi-squared of 6");
+}
+
+/// The figures that pipelines compare with bounds (`--fail-if`), by their short names; see NamedFigures in
+/// report/describe.hpp.
+template <class V>
+void describeFigures(V& v, const TrajectoryEvaluation& e) {
+  const Consistency& c = e.consistency;
+  const ResidualTest relative = e.relative ? e.relative->joint : ResidualTest{};
+  v("ape", e.ape_statistics)("rpe", e.rpe_statistics)("nees", c.joint.ratio())("nees_p", c.joint.p);
+  v("position_nees", c.position.ratio())("rotation_nees", c.rotation.ratio());
+  v("rpe_nees", relative.ratio())("rpe_nees_p", relative.p)("consistent", e.verdict().decided());
+  v("matched", e.matched.size());
+  v("matched_share", static_cast<double>(e.matched.size()) / static_cast<double>(std::max<std::size_t>(1, e.poses)));
+}
+
+}  // namespace liestat
