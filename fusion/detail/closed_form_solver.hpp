@@ -4,6 +4,7 @@
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/detail/closed_form_blocks.hpp>
 #include <fusion/detail/closed_form_ranks.hpp>
+#include <fusion/detail/median.hpp>
 #include <fusion/init/sphere_least_squares.hpp>
 
 #include <Eigen/Core>
@@ -21,13 +22,6 @@ namespace liestat::detail {
 inline constexpr double exact_noise = 1e-9;
 /// Quantile of χ² with one degree of freedom at 0.95: what two costs differ by when the data tell minimisers apart.
 inline constexpr double chi_squared_1_95 = 3.841458820694124;
-
-inline double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// A minimiser in scaled unknowns.
 struct MotionCandidate {

@@ -33,6 +33,7 @@ from ._gaussians import (
     sample,
     validate,
 )
+from ._motion import motion
 from ._results import ConfidenceRegion, Law, MeanResult, Result
 from ._sensors import (
     VI_BLOCKS,
@@ -40,7 +41,6 @@ from ._sensors import (
     InitialisedWindow,
     evaluate_trajectory,
     hand_eye,
-    motion,
     preintegrate,
     robust_two_view,
     two_view,
