@@ -34,7 +34,8 @@ struct PointPair {
   Eigen::Vector2d first = Eigen::Vector2d::Zero(), second = Eigen::Vector2d::Zero();  ///< calibrated coordinates
   double sigma = 0;  ///< standard deviation of each coordinate in both frames (pixels over the focal length), > 0
   /// Frames between the two, > 0. A longer interval has the same noise and a larger motion: V and Ω, both per frame, are
-  /// those of the middle of the interval. (Flow::discrete counts it as one step: give all pairs the same.)
+  /// those of the middle of the interval. (Flow::discrete and the essential filter count it as one step: give all pairs the
+  /// same, or let MotionFilter make them, which gives motions per frame.)
   double frames = 1;
 };
 
@@ -47,8 +48,9 @@ enum class Flow {
 
 /// The vector whose direction it is, and in which axes.
 enum class DirectionMeaning {
-  velocity,    ///< V: Flow::forward in the camera's axes at the first frame, Flow::midpoint in those half-way
-  translation  ///< T of X₂ = R X₁ + T, in the axes of the second frame (Flow::discrete, essential filter)
+  velocity,  ///< V: Flow::forward in the camera's axes at the first frame, Flow::midpoint in those half-way
+  /// T of X₂ = R X₁ + T over the interval of the pairs, in the axes at its end (Flow::discrete, essential filter).
+  translation
 };
 
 /// The rotation from a gyroscope over the interval of the pairs, in the sign and the axes of the filters: the apparent

@@ -75,6 +75,14 @@ py::tuple words(const auto& names) {
 
 void bindMotion(py::module_& module) {
   module.def("motion", &motion);
+  const MotionOptions defaults;
+  py::dict d;
+  d["flow"] = text(flow_choices[static_cast<std::size_t>(defaults.flow)]);
+  d["filter"] = text(filter_choices[static_cast<std::size_t>(defaults.filter)]);
+  d["frames_apart"] = defaults.frames_apart, d["starts"] = defaults.starts, d["outliers"] = defaults.outliers;
+  d["bias"] = defaults.bias, d["bias_sigma"] = defaults.bias_sigma, d["passes"] = defaults.passes;
+  d["process_noise"] = defaults.process_noise, d["rotation_noise"] = defaults.rotation_noise;
+  module.attr("motion_defaults") = d;
   module.attr("motion_flows") = words(flow_choices);
   module.attr("motion_filters") = words(filter_choices);
 }
