@@ -42,7 +42,8 @@ struct DirectionResidual {
   double degrees_of_freedom = 1;
 };
 
-/// The subspace constraint's with the rotation eliminated; Flow::discrete: the essential constraint's, least over rotations.
+/// The subspace constraint's with the rotation eliminated; Flow::discrete: the essential constraint's, least over
+/// rotations.
 inline DirectionResidual residualOf(std::span<const PointPair> pairs, Flow flow, const SO3d& near) {
   DirectionResidual residual;
   residual.degrees_of_freedom = std::max(static_cast<double>(pairs.size()) - 3, 1.0);

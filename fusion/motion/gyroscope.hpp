@@ -1,6 +1,6 @@
 // The rotation that a gyroscope measured between two frames, in the sign and the axes of fusion/motion/: that of the
-// points as the camera sees them, camera2_R_camera1 = Exp(Ω_g); and a gyroscope beside a sequence of frames, from rotations
-// or rates per frame or from the readings of an inertial sensor.
+// points as the camera sees them, camera2_R_camera1 = Exp(Ω_g); and a gyroscope beside a sequence of frames, from
+// rotations or rates per frame or from the readings of an inertial sensor.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -50,10 +50,10 @@ inline GyroscopeRotation composed(const GyroscopeRotation& first, const Gyroscop
   return {(turn * SO3d::exp(first.rotation)).log(), second.covariance + R * first.covariance * R.transpose()};
 }
 
-/// The rotation over an interval of so many frames as a prior of a filter of which each step takes an interval that ends
-/// one frame after the one before. The intervals overlap, and each reading counts in as many of them as they have frames:
-/// the covariance is that many times as large, so that all of them together claim no more. `whole_interval`: the filter's
-/// unit of time is the interval; otherwise it is one frame.
+/// The rotation over an interval of so many frames as a prior of a filter of which each step takes an interval that
+/// ends one frame after the one before. The intervals overlap, and each reading counts in as many of them as they have
+/// frames: the covariance is that many times as large, so that all of them together claim no more. `whole_interval`:
+/// the filter's unit of time is the interval; otherwise it is one frame.
 inline GyroscopeRotation priorOfInterval(GyroscopeRotation over, std::size_t frames, bool whole_interval) {
   const auto n = static_cast<double>(frames);
   over.covariance *= n;
@@ -82,9 +82,9 @@ struct MotionGyroscope {
   Gaussian<Eigen::Vector3d> biasRate(const Gaussian<Eigen::Vector3d>& bias_per_frame) const;
 };
 
-/// From the rotation of each frame since the one before, in the sign and the axes of the filters: element k is that of frame
-/// k, the first one is not read. `seconds` between frames are the unit of a bias. Rotations with numbers that are not finite
-/// count as missing.
+/// From the rotation of each frame since the one before, in the sign and the axes of the filters: element k is that of
+/// frame k, the first one is not read. `seconds` between frames are the unit of a bias. Rotations with numbers that are
+/// not finite count as missing.
 MotionGyroscope gyroscopeOfRotations(std::vector<GyroscopeRotation> rotations, double seconds = 1);
 
 /// A rate in the sensor's axes at the time of a frame.
@@ -92,8 +92,8 @@ struct FrameRate {
   double time = 0;                                 ///< s
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< rad/s
 };
-/// From rates at the frames, by their numbers: between two of them holds the mean of both. `sigma`: rad per frame, of each
-/// component.
+/// From rates at the frames, by their numbers: between two of them holds the mean of both. `sigma`: rad per frame, of
+/// each component.
 MotionGyroscope gyroscopeOfRates(std::map<std::size_t, FrameRate> rates, double sigma, const SO3d& camera_R_sensor,
                                  const Eigen::Vector3d& bias = Eigen::Vector3d::Zero());
 

@@ -1,6 +1,6 @@
 // The filter to use where nothing else is asked for: frames of tracks in, the motion of one frame out. For pairs of
-// successive frames it is the subspace filter until it has settled on one direction, then the essential filter beside it,
-// and back to the former when the rotation turns out to change; for pairs over several frames the subspace filter.
+// successive frames it is the subspace filter until it has settled on one direction, then the essential filter beside
+// it, and back to the former when the rotation turns out to change; for pairs over several frames the subspace filter.
 //
 //   liestat::MotionFilter filter;                                      // or filter(planOf({.frames_apart = 4}))
 //   for (…) if (filter.update(observations).ok()) … filter.estimate()  // or update(observations, gyroscope)
@@ -47,13 +47,13 @@ class MotionFilter {
   /// The filter of a plan. One with a fault runs and gives no usable estimate: look at plan.ok() first.
   explicit MotionFilter(const MotionPlan& plan, const MotionHandOver& hand_over = {});
 
-  /// The next frame of the tracks, and a gyroscope's rotation since the frame before it, with its covariance: the filter
-  /// makes pairs, and of the rotations the prior of their interval, itself. The first frame has no motion.
+  /// The next frame of the tracks, and a gyroscope's rotation since the frame before it, with its covariance: the
+  /// filter makes pairs, and of the rotations the prior of their interval, itself. The first frame has no motion.
   const MotionEstimate& update(std::span<const TrackObservation> frame);
   const MotionEstimate& update(std::span<const TrackObservation> frame,
                                const GyroscopeRotation& since_the_frame_before);
-  /// The same with the rotation of preintegrated readings over the whole interval of the pairs, or nothing where there is
-  /// none. The interval ends in this frame and begins interval() frames before.
+  /// The same with the rotation of preintegrated readings over the whole interval of the pairs, or nothing where there
+  /// is none. The interval ends in this frame and begins interval() frames before.
   const MotionEstimate& updateOver(std::span<const TrackObservation> frame,
                                    const std::optional<GyroscopeRotation>& over_the_interval);
   /// Frames of the interval that the next frame of the tracks ends; 0 before the first one.
@@ -66,8 +66,8 @@ class MotionFilter {
     return updatePairs(pairs, &gyroscope);
   }
 
-  /// The motion of one frame, from the filter in charge. The directions differ in meaning where the subspace filter's flow
-  /// is not Flow::discrete: MotionEstimate::meaning says which it is. A translation is that over the interval.
+  /// The motion of one frame, from the filter in charge. The directions differ in meaning where the subspace filter's
+  /// flow is not Flow::discrete: MotionEstimate::meaning says which it is. A translation is that over the interval.
   const MotionEstimate& estimate() const { return estimate_; }
   /// The same in the unit of time of pairs(): an interval where the plan has whole intervals.
   const MotionEstimate& stepEstimate() const;
@@ -128,8 +128,8 @@ class MotionFilter {
 /// T of X₂ = R X₁ + T from a velocity that is constant over the interval, T = J_l(Ω) V, or the direction itself where it
 /// is one of a translation already; the covariance of the rotation is left out (|Ω|/2 of it, to first order).
 Gaussian<S2d> translationDirection(const MotionEstimate& estimate);
-/// The velocity of a translation over the estimate's rotation, V ∝ J_l(Ω)⁻¹ T, or the direction itself; the covariance as
-/// above.
+/// The velocity of a translation over the estimate's rotation, V ∝ J_l(Ω)⁻¹ T, or the direction itself; the covariance
+/// as above.
 Gaussian<S2d> velocityDirection(const MotionEstimate& estimate);
 
 }  // namespace liestat

@@ -1,5 +1,6 @@
-// What the options of recursive motion come to: the filter and its settings for an input, or the reason why there is none.
-// The rules are here so that the class, the function over a sequence, the program and Python follow the same ones.
+// What the options of recursive motion come to: the filter and its settings for an input, or the reason why there is
+// none. The rules are here so that the class, the function over a sequence, the program and Python follow the same
+// ones.
 //
 //   const liestat::MotionPlan plan = liestat::planOf({.frames_apart = 4});   // the subspace filter, midpoint flow
 //   if (plan.ok()) liestat::MotionFilter filter(plan);                        // fusion/motion/motion_filter.hpp
@@ -35,8 +36,8 @@ inline constexpr std::array<std::string_view, 4> filter_choices{"automatic", "co
 struct MotionOptions {
   FlowChoice flow = FlowChoice::automatic;
   FilterChoice filter = FilterChoice::automatic;
-  /// Frames between the positions of a pair, at most: more than one for noise that drowns the motion of one frame. Results
-  /// are per frame all the same.
+  /// Frames between the positions of a pair, at most: more than one for noise that drowns the motion of one frame.
+  /// Results are per frame all the same.
   std::size_t frames_apart = 1;
   std::size_t starts = MotionFilterOptions{}.starts;             ///< directions to start from
   double process_noise = MotionFilterOptions{}.process_noise;    ///< rad² per frame, of the direction
@@ -50,7 +51,7 @@ struct MotionOptions {
 /// Why there is no plan for some options.
 enum class MotionFault {
   none,
-  composition_over_intervals,  ///< the composition for pairs over several frames: the essential filter knows one interval
+  composition_over_intervals,  ///< the composition for pairs over several frames
   bias_without_gyroscope,      ///< the bias of a gyroscope that is not there
   no_time                      ///< a bias in rad/s, and no time passes between frames
 };
@@ -82,8 +83,8 @@ struct MotionPlan {
   FilterChoice filter = FilterChoice::composition;  ///< never automatic
   MotionFilterOptions settings;                     ///< of the filters; of the gyroscope's bias for one step
   std::size_t frames_apart = 1;
-  /// The filter takes an interval as one step of time, and pairs of that interval alone: the epipolar constraint (discrete
-  /// flow, essential filter) knows no other. Otherwise pairs of all intervals go together.
+  /// The filter takes an interval as one step of time, and pairs of that interval alone: the epipolar constraint
+  /// (discrete flow, essential filter) knows no other. Otherwise pairs of all intervals go together.
   bool whole_intervals = false;
   double step_seconds = 0;  ///< of the filter's unit of time, where there is a gyroscope
   MotionFault fault = MotionFault::none;

@@ -1,5 +1,5 @@
-// The motion of a camera through a sequence of frames: what estimateMotion() (fusion/motion/sequence.hpp) gives, with its
-// verdict, and the errors against a truth.
+// The motion of a camera through a sequence of frames: what estimateMotion() (fusion/motion/sequence.hpp) gives, with
+// its verdict, and the errors against a truth.
 #pragma once
 
 #include <fusion/motion/plan.hpp>
@@ -101,7 +101,8 @@ struct MotionResult {
     return static_cast<std::size_t>(std::count_if(
         frames.begin(), frames.end(), [](const MotionFrame& frame) { return !frame.no_gyroscope.empty(); }));
   }
-  /// The errors against the truth of the frames whose direction may be used, and their median (the upper one; NaN of none).
+  /// The errors against the truth of the frames whose direction may be used, and their median (the upper one; NaN of
+  /// none).
   std::vector<double> errors(std::optional<double> MotionFrame::*error) const {
     std::vector<double> values;
     for (const MotionFrame& frame : frames) {

@@ -20,15 +20,16 @@
 
 namespace liestat {
 
-/// The observations of each frame, by the frames' numbers. Frames between the first and the last that are missing have none.
+/// The observations of each frame, by the frames' numbers. Frames between the first and the last that are missing have
+/// none.
 using TrackFrames = std::map<std::size_t, std::vector<TrackObservation>>;
 
 /// Called after each frame with its number, its result and the filter.
 using MotionObserver = std::function<void(const MotionFrame&, const MotionFilter&)>;
 
 /// Runs the filter of the options over a sequence, `passes` times; the result is that of the last pass. Results are per
-/// frame whatever the interval of the pairs. A combination of options that no filter serves gives a result with a fault and
-/// without frames; frames of which nothing can be said have flags (MotionFlags).
+/// frame whatever the interval of the pairs. A combination of options that no filter serves gives a result with a fault
+/// and without frames; frames of which nothing can be said have flags (MotionFlags).
 MotionResult estimateMotion(const TrackFrames& frames, const MotionOptions& options = {},
                             const MotionGyroscope& gyroscope = {}, const MotionObserver& observer = {});
 
@@ -38,9 +39,9 @@ struct TrueCamera {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();              ///< in the world, m
 };
 
-/// Sets the errors of the frames whose true pose, and that at the start of their interval, are known: of the rotation per
-/// frame, and of the direction, against the velocity or the translation as the estimate means it, where the camera moved by
-/// more than `min_motion` (m).
+/// Sets the errors of the frames whose true pose, and that at the start of their interval, are known: of the rotation
+/// per frame, and of the direction, against the velocity or the translation as the estimate means it, where the camera
+/// moved by more than `min_motion` (m).
 void compareWithTruth(MotionResult& result, const std::map<std::size_t, TrueCamera>& truth, double min_motion = 0.1);
 
 }  // namespace liestat

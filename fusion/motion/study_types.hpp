@@ -57,8 +57,8 @@ class MotionWindow {
   std::vector<MotionPairs> frames_;
 };
 
-/// Directions about a centre as points of a plane, in degrees: the tangent coordinates of the great circle from the centre
-/// (axes as those of its covariance). A direction of the other hemisphere has those of its antipode.
+/// Directions about a centre as points of a plane, in degrees: the tangent coordinates of the great circle from the
+/// centre (axes as those of its covariance). A direction of the other hemisphere has those of its antipode.
 class HemisphereChart {
  public:
   explicit HemisphereChart(const Eigen::Vector3d& centre) : centre_(centre) {}
@@ -110,8 +110,8 @@ struct MotionInterpretation {
 /// All runs are of images alone, with the midpoint flow; directions are velocities but for the essential filter.
 struct MotionWindowRuns {
   MotionTrace winner;  ///< of the hypotheses the one that is best in the end
-  /// With and without the sign of the depths, from the start farthest from the estimate of those that get there (or to its
-  /// antipode).
+  /// With and without the sign of the depths, from the start farthest from the estimate of those that get there (or to
+  /// its antipode).
   MotionTrace held, released;
   MotionTrace essential_held, essential_released;  ///< from the antipode of the estimate, with its rotation
   std::vector<std::size_t> frames;  ///< of the structure; none: no four tracks have a depth in two frames
@@ -133,8 +133,8 @@ struct MotionFrameStudy {
   std::vector<PointPair> pairs, whole;  ///< without outliers; those over the interval, as one step
   std::size_t min_pairs = 0;            ///< that the maps need
   MotionWindowRuns runs;
-  /// The subspace constraint's residual with forward and midpoint flow; the essential constraint's, least over rotations
-  /// (discrete), and at the rotation of the estimate. Empty where there are too few pairs.
+  /// The subspace constraint's residual with forward and midpoint flow; the essential constraint's, least over
+  /// rotations (discrete), and at the rotation of the estimate. Empty where there are too few pairs.
   ResidualMap forward, midpoint, discrete, essential;
 
   std::size_t usablePairs() const { return pairs.size() < whole.size() ? pairs.size() : whole.size(); }

@@ -33,9 +33,9 @@ namespace liestat {
 struct PointPair {
   Eigen::Vector2d first = Eigen::Vector2d::Zero(), second = Eigen::Vector2d::Zero();  ///< calibrated coordinates
   double sigma = 0;  ///< standard deviation of each coordinate in both frames (pixels over the focal length), > 0
-  /// Frames between the two, > 0. A longer interval has the same noise and a larger motion: V and Ω, both per frame, are
-  /// those of the middle of the interval. (Flow::discrete and the essential filter count it as one step: give all pairs the
-  /// same, or let MotionFilter make them, which gives motions per frame.)
+  /// Frames between the two, > 0. A longer interval has the same noise and a larger motion: V and Ω, both per frame,
+  /// are those of the middle of the interval. (Flow::discrete and the essential filter count it as one step: give all
+  /// pairs the same, or let MotionFilter make them, which gives motions per frame.)
   double frames = 1;
 };
 

@@ -54,8 +54,9 @@ def motion(
     span=None,
     essential=None,
 ):
-    """Direction of motion and rotation of a camera, frame by frame, from point tracks: options, defaults and results are
-    those of the program's `liestat motion`.
+    """Direction of motion and rotation of a camera, frame by frame, from point tracks.
+
+    Options, defaults and results are those of the program's `liestat motion`.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def motion(
     passes : int
         Run a short sequence again from its own end.
     gyroscope : array_like, shape (m, 3), optional
-        Apparent rotation vector of the points from the frame before to each frame, rad, for any `frames_apart`: the prior
-        of an interval is made of them. The first one is not used.
+        Apparent rotation vector of the points from the frame before to each frame, rad, for any `frames_apart`: the
+        prior of an interval is made of them. The first one is not used.
     gyroscope_covariance : array_like, shape (3, 3) or (m, 3, 3), optional
         rad², of each.
     seconds : float
@@ -101,15 +102,15 @@ def motion(
     Returns
     -------
     Result
-        The fields of the program's JSON: `status`, `verdict` with `causes`, `frames_usable`, `hand_overs`, `fall_backs`, …
-        and `frames`, a list with the fields of each frame after the first.
+        The fields of the program's JSON: `status`, `verdict` with `causes`, `frames_usable`, `hand_overs`,
+        `fall_backs`, … and `frames`, a list with the fields of each frame after the first.
 
-        Beside them arrays with one row for each frame from 0 on (frames up to the first one with points are not usable):
-        `usable`, `direction` (S2) with `direction_covariance` (m, 2, 2), `meaning` ('velocity' or 'translation': of what
-        the direction is, and in which axes), `rotation` (SO3, second_R_first over one frame) with `rotation_covariance`
-        (m, 3, 3), `mean_inverse_depth`, `sign_evidence`, `innovation`, `pairs`, `inliers`, `filter` (in charge),
-        `covariance_judged`, and the flags `bad_input`, `too_few`, `standstill`, `degenerate`, `ambiguous`,
-        `undecided_sign`, `lost`, `outliers`. `ok` is a deprecated name of `usable`.
+        Beside them arrays with one row for each frame from 0 on (frames up to the first one with points are not
+        usable): `usable`, `direction` (S2) with `direction_covariance` (m, 2, 2), `meaning` ('velocity' or
+        'translation': of what the direction is, and in which axes), `rotation` (SO3, second_R_first over one frame)
+        with `rotation_covariance` (m, 3, 3), `mean_inverse_depth`, `sign_evidence`, `innovation`, `pairs`, `inliers`,
+        `filter` (in charge), `covariance_judged`, and the flags `bad_input`, `too_few`, `standstill`, `degenerate`,
+        `ambiguous`, `undecided_sign`, `lost`, `outliers`. `ok` is a deprecated name of `usable`.
 
         A velocity is per frame, in the axes half-way through the interval of the pairs; a translation is that over the
         interval, in the axes at its end.

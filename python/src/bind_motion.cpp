@@ -15,9 +15,9 @@ namespace {
 
 using Integers = py::array_t<std::int64_t, py::array::c_style>;
 
-/// Observations in rows x, y with their tracks, those of frame i in [offsets[i], offsets[i+1]). Rotations of a gyroscope
-/// since the frame before with their covariances, or empty; rotations (camera_R_world) and centres of the true poses, or
-/// empty. The series have a row for each frame from 0 on.
+/// Observations in rows x, y with their tracks, those of frame i in [offsets[i], offsets[i+1]). Rotations of a
+/// gyroscope since the frame before with their covariances, or empty; rotations (camera_R_world) and centres of the
+/// true poses, or empty. The series have a row for each frame from 0 on.
 py::dict motion(const Integers& offsets, const Integers& tracks, const DoubleArray& xy, double sigma, std::size_t flow,
                 std::size_t filter, std::size_t frames_apart, std::size_t starts, bool outliers, bool bias,
                 double bias_sigma, double process_noise, double rotation_noise, std::size_t passes,

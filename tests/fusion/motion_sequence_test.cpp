@@ -1,5 +1,6 @@
 // Quantities per frame whatever the interval of the pairs: MotionFilter over frames of tracks, estimateMotion() over a
-// sequence, the plan that the options come to, gyroscopes beside a sequence, the comparison with a truth, and the verdict.
+// sequence, the plan that the options come to, gyroscopes beside a sequence, the comparison with a truth, and the
+// verdict.
 #include <experiments/motion_scene.hpp>
 #include <fusion/motion/gyroscope.hpp>
 #include <fusion/motion/motion_filter.hpp>
@@ -43,8 +44,9 @@ struct Consistency {
 constexpr MotionSceneOptions images{.points = 40, .sigma = 1, .rotation = 3};
 constexpr MotionSceneOptions inertial{.points = 40, .sigma = 1, .rotation = 3, .gyroscope_sigma = 0.05};
 
-/// The simulated orbit of 150 frames, 40 points, 1 px, 3° per frame, in so many trials: run(scene, frame) gives the motion
-/// per frame after each frame, of which those from 30 on count. A translation is that over the last `apart` frames.
+/// The simulated orbit of 150 frames, 40 points, 1 px, 3° per frame, in so many trials: run(scene, frame) gives the
+/// motion per frame after each frame, of which those from 30 on count. A translation is that over the last `apart`
+/// frames.
 template <class Make>
 Consistency consistencyOf(const MotionSceneOptions& scenes, std::size_t apart, std::size_t trials, const Make& make) {
   Consistency result;
@@ -97,9 +99,9 @@ auto pairsFilter(const MotionFilterOptions& options, std::size_t apart, bool sho
   };
 }
 
-/// Covariances that are upper bounds and not without meaning. Of twelve trials the standard error of a mean is below a tenth
-/// of its distance from each bound (measured: rotation 0.6 to 2.4, direction 0.16 to 0.9), so that the probability of a
-/// false alarm is below 1e-5.
+/// Covariances that are upper bounds and not without meaning. Of twelve trials the standard error of a mean is below a
+/// tenth of its distance from each bound (measured: rotation 0.6 to 2.4, direction 0.16 to 0.9), so that the
+/// probability of a false alarm is below 1e-5.
 void expectConsistent(const Consistency& c, const char* name) {
   ASSERT_EQ(c.rotation.size(), 12U) << name;
   EXPECT_GT(c.usable, 12U * 110) << name;
