@@ -159,7 +159,7 @@ class Consistency(unittest.TestCase):
 
     def orbit(self, seed, gyroscope_sigma=0.0):
         rng = support.generator(seed)
-        unit = liestat.random_directions(40, seed=seed).params
+        unit = liestat.random_directions(40, rng).params
         points = self.centre + 0.5 * unit * np.cbrt(rng.uniform(0, 1, (40, 1)))
         R, frames, tracks, xy = SO3.exp(self.omega), [], [], []
         for i in range(150):
