@@ -45,16 +45,22 @@ inline std::string reasonOf(const Fault& fault, const GyroscopeReadings& reading
   }
 }
 
-/// Steps of one frame, from frame k to the next by step(k), composed.
+/// Steps of one frame, from frame k to the next by step(k), composed. Errors that are alike in all directions (`isotropic`)
+/// are so after a turn.
 template <class Step>
-MotionGyroscope::Between overFrames(std::size_t first, std::size_t second, const Step& step) {
-  MotionGyroscope::Between sum{GyroscopeRotation{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()}, {}};
+MotionGyroscope::Between overFrames(std::size_t first, std::size_t second, bool isotropic, const Step& step) {
+  SO3d turned;
+  GyroscopeRotation sum{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
   for (std::size_t k = first; k < second; ++k) {
     const MotionGyroscope::Between one = step(k);
     if (!one.rotation) return one;
-    sum.rotation = composed(*sum.rotation, *one.rotation);
+    const SO3d turn = SO3d::exp(one.rotation->rotation);
+    const Eigen::Matrix3d R = isotropic ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : turn.matrix();
+    turned = turn * turned;
+    sum.covariance = Eigen::Matrix3d(R * sum.covariance * R.transpose()) + one.rotation->covariance;
   }
-  return sum;
+  sum.rotation = turned.log();
+  return {sum, {}};
 }
 
 }  // namespace detail
@@ -71,7 +77,7 @@ LIESTAT_FUSION_INLINE MotionGyroscope gyroscopeOfRotations(std::vector<Gyroscope
   gyroscope.seconds = seconds;
   gyroscope.between = [list = std::make_shared<const std::vector<GyroscopeRotation>>(std::move(rotations))](
                           std::size_t first, std::size_t second) {
-    return detail::overFrames(first, second, [&](std::size_t k) -> MotionGyroscope::Between {
+    return detail::overFrames(first, second, false, [&](std::size_t k) -> MotionGyroscope::Between {
       if (k + 1 < list->size() && (*list)[k + 1].rotation.allFinite() && (*list)[k + 1].covariance.allFinite()) {
         return {(*list)[k + 1], {}};
       }
@@ -90,7 +96,7 @@ LIESTAT_FUSION_INLINE MotionGyroscope gyroscopeOfRates(std::map<std::size_t, Fra
   gyroscope.seconds = detail::medianStep(times);
   gyroscope.between = [list = std::make_shared<const std::map<std::size_t, FrameRate>>(std::move(rates)), sigma,
                        camera_R_sensor, bias](std::size_t first, std::size_t second) {
-    return detail::overFrames(first, second, [&](std::size_t k) -> MotionGyroscope::Between {
+    return detail::overFrames(first, second, true, [&](std::size_t k) -> MotionGyroscope::Between {
       const auto a = list->find(k), b = list->find(k + 1);
       if (a == list->end() || b == list->end()) {
         return {{}, "no rate at frame " + std::to_string(a == list->end() ? k : k + 1)};
