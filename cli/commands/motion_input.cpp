@@ -8,14 +8,13 @@
 #include <cli/io/rotation_matrix.hpp>
 #include <cli/io/text.hpp>
 #include <cli/show/units.hpp>
-#include <fusion/imu/preintegrate.hpp>
 #include <fusion/motion/gyroscope.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -130,17 +129,6 @@ Eigen::Vector3d vectorOf(const std::vector<double>& list) {
   return list.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(list[0], list[1], list[2]);
 }
 
-double medianStep(const std::map<std::size_t, double>& times) {
-  std::vector<double> steps;
-  for (auto at = times.begin(), next = at; at != times.end() && ++next != times.end(); ++at) {
-    steps.push_back((next->second - at->second) / static_cast<double>(next->first - at->first));
-  }
-  if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
-
 SO3d cameraFromRates(const MotionInputOptions& options) {
   if (!options.rates_rotation.empty()) {
     const std::vector<double>& q = options.rates_rotation;
@@ -169,120 +157,29 @@ SO3d cameraFromRates(const MotionInputOptions& options) {
   return SO3d::fitToSO3(camera_R_ahead) * vehicle_R_ahead.inverse();
 }
 
-struct Rate {
-  double time = 0;
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
-};
-
-/// Rates at the frames: between two of them holds the mean of both.
-MotionGyroscope gyroscopeOfRates(const MotionInputOptions& options) {
-  const auto rates = std::make_shared<std::map<std::size_t, Rate>>();
-  std::map<std::size_t, double> times;
+/// Sets the gyroscope and the name of its file.
+void readRates(const MotionInputOptions& options, MotionInput& input) {
+  std::map<std::size_t, FrameRate> rates;
   const NumericTable table = readTable(options.rates, {"frame", "t_s", "wx", "wy", "wz"});
-  MotionGyroscope gyroscope;
-  gyroscope.file = table.file();
-  gyroscope.bias = vectorOf(options.gyroscope_bias);
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Rate rate{table(row, 1), {table(row, 2), table(row, 3), table(row, 4)}};
-    if (!rates->emplace(table.index(row, 0), rate).second) {
+    const FrameRate rate{table(row, 1), {table(row, 2), table(row, 3), table(row, 4)}};
+    if (!rates.emplace(table.index(row, 0), rate).second) {
       throw InputError(table.file(), table.line(row), fmt::format("frame {} again", table.index(row, 0)), "it once");
     }
-    times.emplace(table.index(row, 0), rate.time);
   }
-  gyroscope.camera_R_sensor = cameraFromRates(options);
-  gyroscope.seconds = medianStep(times);
-  gyroscope.between = [rates, camera_R_sensor = gyroscope.camera_R_sensor, bias = gyroscope.bias,
-                       sigma = options.rate_sigma / degrees](std::size_t first,
-                                                             std::size_t second) -> MotionGyroscope::Between {
-    SO3d turned;
-    GyroscopeRotation sum{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
-    for (std::size_t k = first; k < second; ++k) {
-      const auto a = rates->find(k), b = rates->find(k + 1);
-      if (a == rates->end() || b == rates->end()) {
-        return {{}, fmt::format("no rate at frame {}", a == rates->end() ? k : k + 1)};
-      }
-      const double seconds = b->second.time - a->second.time;
-      if (!(seconds > 0)) return {{}, fmt::format("no time passes from frame {} to the next", k)};
-      const GyroscopeRotation one = gyroscopeRotation(Eigen::Vector3d(0.5 * (a->second.rate + b->second.rate) - bias),
-                                                      seconds, sigma / seconds, camera_R_sensor);
-      turned = SO3d::exp(one.rotation) * turned;
-      sum.covariance += one.covariance;
-    }
-    sum.rotation = turned.log();
-    return {sum, {}};
-  };
-  return gyroscope;
+  input.gyroscope_file = table.file();
+  input.gyroscope = gyroscopeOfRates(std::move(rates), options.rate_sigma / degrees, cameraFromRates(options),
+                                     vectorOf(options.gyroscope_bias));
 }
 
-/// The readings of an inertial sensor with the times of the images on its clock.
-struct InertialRecording {
-  ImuFile imu;
-  std::map<std::size_t, double> times;
-  RecordingOptions<double> how;
-};
-
-std::string reasonOf(const Fault& fault, const InertialRecording& recording, const std::string& file, double begin,
-                     double end) {
-  const std::vector<ImuSample<double>>& samples = recording.imu.samples;
-  const auto line = [&](std::size_t i) { return fmt::format("{}:{}", file, recording.imu.lines[i]); };
-  switch (fault.kind) {
-    case FaultKind::gap:
-      return fmt::format("no reading from {:.6f} to {:.6f} s ({})", samples[fault.index - 1].time,
-                         samples[fault.index].time, line(fault.index));
-    case FaultKind::not_covered:
-      return fmt::format("it lasts from {:.6f} to {:.6f} s, the readings from {:.6f} to {:.6f} s", begin, end,
-                         samples.front().time, samples.back().time);
-    case FaultKind::bad_interval:
-      return fmt::format("no time passes from {:.6f} to {:.6f} s", begin, end);
-    default:
-      return "the reading in " + line(std::min(fault.index, samples.size() - 1)) + " is of no use";
-  }
-}
-
-MotionGyroscope gyroscopeOfImu(const MotionInputOptions& options, const Calibration& calibration,
-                               std::shared_ptr<InertialRecording> recording) {
-  MotionGyroscope gyroscope;
-  gyroscope.file = options.imu;
-  const CameraCalibration& camera = calibration.cameras.front();
-  gyroscope.camera_R_sensor = camera.imu_T_cam.so3().inverse();
+ImuNoise<double> noiseOf(const MotionInputOptions& options, const Calibration& calibration) {
   ImuNoise<double> noise = calibration.imu.value_or(ImuNoise<double>{});
   if (options.gyroscope_noise) noise.gyroscope = *options.gyroscope_noise;
   if (!(noise.gyroscope > 0)) {
     throw InputError(joined(options.calibration, ", "), 0, "the gyroscope's density of noise is not known",
                      "an imu0 with gyroscope_noise_density, or --gyroscope-noise");
   }
-  gyroscope.bias_walk = noise.gyroscope_walk;
-  gyroscope.bias = vectorOf(options.gyroscope_bias);
-  recording->how.preintegration.noise = noise;
-  recording->how.preintegration.bias.gyroscope = gyroscope.bias;
-  recording->how.max_gap = options.largest_gap;
-  gyroscope.seconds = medianStep(recording->times);
-  gyroscope.between = [recording, file = options.imu, camera_R_imu = gyroscope.camera_R_sensor](
-                          std::size_t first, std::size_t second) -> MotionGyroscope::Between {
-    const auto a = recording->times.find(first), b = recording->times.find(second);
-    if (a == recording->times.end() || b == recording->times.end()) {
-      return {{}, fmt::format("frame {} has no time", a == recording->times.end() ? first : second)};
-    }
-    const RecordingResult<double> result =
-        preintegrate<double>(recording->imu.samples, a->second, b->second, recording->how);
-    if (!result.ok()) return {{}, reasonOf(result.fault, *recording, file, a->second, b->second)};
-    return {gyroscopeRotation(result.motion, camera_R_imu), {}};
-  };
-  return gyroscope;
-}
-
-/// Throws where the readings cover no interval of two successive frames: another clock, or another recording.
-void requireCover(const MotionGyroscope& gyroscope, const InertialRecording& recording) {
-  std::string why;
-  for (auto at = recording.times.begin(), next = at; ++next != recording.times.end(); ++at) {
-    const MotionGyroscope::Between between = gyroscope.between(at->first, next->first);
-    if (between.rotation) return;
-    if (why.empty()) why = fmt::format("frame {}: {}", next->first, between.why);
-  }
-  throw InputError(gyroscope.file, 0,
-                   "the readings cover no interval between two frames; " + why +
-                       suspectedUnit(recording.imu.start_ns, recording.times.begin()->second),
-                   "readings over the images' times, on the same clock (timeshift_cam_imu is applied)");
+  return noise;
 }
 
 }  // namespace
@@ -300,26 +197,41 @@ MotionInput readMotionInput(const MotionInputOptions& options) {
   MotionInput input;
   if (options.imu.empty()) {
     input.tracks = readTracks(options, camera);
-    if (!options.rates.empty()) input.gyroscope = gyroscopeOfRates(options);
+    if (!options.rates.empty()) readRates(options, input);
     return input;
   }
   if (calibration.cameras.empty()) {
     throw InputError(motion_name, 0, "where the camera sits on the inertial sensor is not known",
                      "--calibration with T_cam_imu or T_imu_cam");
   }
-  const auto recording = std::make_shared<InertialRecording>();
-  recording->imu = readImu(options.imu);
-  const ImageTracks images = readImageTracks(options.tracks, options.image_times, recording->imu.start_ns);
+  input.gyroscope_file = options.imu;
+  ImuFile imu = readImu(options.imu);
+  const ImageTracks images = readImageTracks(options.tracks, options.image_times, imu.start_ns);
   TrackRays rays(options, camera);
   for (const PixelObservation& seen : images.observations) {
     rays.add(images.frames[seen.image], images.track_ids[seen.track], seen.u, seen.v);
   }
   input.tracks = rays.take();
+  const CameraCalibration& first = calibration.cameras.front();
+  std::map<std::size_t, double> times;
   for (std::size_t i = 0; i < images.times.size(); ++i) {
-    recording->times.emplace(images.frames[i], images.times[i] + calibration.cameras.front().timeshift_cam_imu);
+    times.emplace(images.frames[i], images.times[i] + first.timeshift_cam_imu);
   }
-  input.gyroscope = gyroscopeOfImu(options, calibration, recording);
-  requireCover(input.gyroscope, *recording);
+  GyroscopeReadings readings{std::move(imu.samples), times, {}};
+  readings.how.preintegration.noise = noiseOf(options, calibration);
+  readings.how.preintegration.bias.gyroscope = vectorOf(options.gyroscope_bias);
+  readings.how.max_gap = options.largest_gap;
+  readings.place = [lines = std::move(imu.lines), file = options.imu](std::size_t i) {
+    return fmt::format("{}:{}", file, lines[i]);
+  };
+  input.gyroscope = gyroscopeOfReadings(std::move(readings), first.imu_T_cam.so3().inverse());
+  // Another clock, or another recording.
+  if (const std::string why = reasonWithoutCover(input.gyroscope, times); !why.empty()) {
+    throw InputError(options.imu, 0,
+                     "the readings cover no interval between two frames; " + why +
+                         suspectedUnit(imu.start_ns, times.begin()->second),
+                     "readings over the images' times, on the same clock (timeshift_cam_imu is applied)");
+  }
   return input;
 }
 

@@ -3,14 +3,10 @@
 // The input of `liestat motion`: tracks in calibrated coordinates, and what a gyroscope says of the rotation between frames.
 
 #include <cli/io/calibration.hpp>
-#include <fusion/motion/track_pairs.hpp>
-#include <fusion/motion/types.hpp>
-
-#include <Eigen/Core>
+#include <fusion/motion/gyroscope.hpp>
+#include <fusion/motion/sequence.hpp>
 
 #include <cstddef>
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,30 +35,14 @@ struct MotionInputOptions {
 
 /// Tracks frame by frame.
 struct MotionTracks {
-  std::map<std::size_t, std::vector<TrackObservation>> frames;  ///< by their numbers in the file
+  TrackFrames frames;       ///< by their numbers in the file
   std::size_t outside = 0;  ///< observations for which the camera's model has no ray ahead; left out
-};
-
-/// A gyroscope between the frames of the tracks. `between` gives the rotation from one frame to a later one, rad over
-/// that interval, or an empty one with the reason in words.
-struct MotionGyroscope {
-  struct Between {
-    std::optional<GyroscopeRotation> rotation;
-    std::string why;  ///< there is none
-  };
-  std::function<Between(std::size_t first, std::size_t second)> between;  ///< empty: there is no gyroscope
-  SO3d camera_R_sensor;
-  double seconds = 0;                              ///< median time between two frames
-  double bias_walk = 0;                            ///< rad/s/√s
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< rad/s, sensor's axes: already taken off the readings
-  std::string file;
-
-  bool given() const { return static_cast<bool>(between); }
 };
 
 struct MotionInput {
   MotionTracks tracks;
   MotionGyroscope gyroscope;
+  std::string gyroscope_file;
 };
 
 /// Reads the files that the options name. Throws InputError, also where focal lengths and image coordinates are in

@@ -1,14 +1,9 @@
 #include <cli/show/motion_report.hpp>
 
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/show/motion_report_maps.hpp>
-#include <cli/show/motion_report_runs.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
 #include <experiments/summary.hpp>
-#include <fusion/motion/motion_filter.hpp>
 
 #include <fmt/format.h>
 
@@ -20,15 +15,6 @@
 #include <utility>
 
 namespace liestat::cli {
-
-void MotionWindow::add(std::size_t frame, std::span<const PointPair> pairs, std::span<const std::uint64_t> tracks,
-                       const MotionEstimate& motion) {
-  if (frame <= newest_) frames_.clear();
-  newest_ = frame;
-  if (frame > looked_at_) return;
-  if (frames_.size() == most_frames) frames_.erase(frames_.begin());
-  frames_.push_back({frame, motion, {pairs.begin(), pairs.end()}, {tracks.begin(), tracks.end()}});
-}
 
 namespace {
 
@@ -60,16 +46,6 @@ Basis basisOf(const S2d& direction) { return ManifoldTraits<S2d>::placement(dire
 /// The true direction of what an estimate is that of.
 Eigen::Vector3d trueDirection(const TrueMotion& truth, DirectionMeaning meaning) {
   return (meaning == DirectionMeaning::velocity ? truth.velocity : truth.translation()).normalized();
-}
-
-/// The velocity of a translation: V ∝ J_l(Ω)⁻¹ T, with the covariance of T.
-Gaussian<S2d> velocityDirection(const MotionEstimate& motion) {
-  if (motion.meaning == DirectionMeaning::velocity) return motion.direction;
-  const Eigen::Matrix3d J = SO3d::leftJacobianInverse(motion.rotation.mean.log());
-  const Eigen::Vector3d V = J * motion.direction.mean.unit_vector();
-  const S2d direction(V);
-  const Eigen::Matrix2d D = basisOf(direction).transpose() * (J * basisOf(motion.direction.mean)) / V.norm();
-  return {direction, D * motion.direction.covariance * D.transpose()};
 }
 
 /// The axis' ends from values that should be seen: a margin about all of them, none without any.
@@ -221,47 +197,20 @@ Plot errorsPlot(const MotionResult& result) {
   return plot;
 }
 
-/// The frame that is looked at, with all that is drawn of it.
-struct LookedAt {
-  std::size_t frame = 0;
-  const MotionEstimate& motion;
-  double interval = 1;  ///< frames, the longest of the pairs'
-  SO3d rotation;        ///< over it, as the translations
-  Gaussian<S2d> velocity, translation;
-  std::optional<Eigen::Vector3d> true_velocity, true_translation;
-  std::vector<PointPair> pairs, whole;  ///< without outliers; those over the interval, as one step
-
-  LookedAt(const MotionPairs& at, const MotionFrame& result) : frame(at.frame), motion(at.motion) {
-    for (const PointPair& pair : at.pairs) interval = std::max(interval, pair.frames);
-    const Eigen::Vector3d Omega = interval * motion.rotation.mean.log();
-    MotionEstimate over = motion;
-    over.rotation.mean = rotation = SO3d::exp(Omega);
-    velocity = velocityDirection(motion), translation = translationDirection(over);
-    if (!result.truth || !result.direction_error) return;
-    true_velocity = result.truth->velocity.normalized();
-    const Eigen::Vector3d turn = interval * result.truth->rotation;
-    true_translation = (SO3d::leftJacobian(turn) * *true_velocity).normalized();
-  }
-  MotionReference reference() const {
-    return {velocity.mean.unit_vector(), translation.mean.unit_vector(), rotation, interval};
-  }
-  const Gaussian<S2d>& directionOf(Flow flow) const { return flow == Flow::discrete ? translation : velocity; }
-  const std::optional<Eigen::Vector3d>& truthOf(Flow flow) const {
-    return flow == Flow::discrete ? true_translation : true_velocity;
-  }
-};
-
 struct FlowMap {
   Flow flow;
   const char* name;
-  ResidualMap map;
+  const ResidualMap& map;
 };
+using FlowMaps = std::array<FlowMap, 3>;
+
+Grid gridOf(const ResidualMap& map) { return {map.grid.x, map.grid.y, map.grid.value}; }
 
 Axis tangentAxis(int number) {
   return {.label = fmt::format("{} tangent coordinate, deg", number == 0 ? "first" : "second"), .low = -93, .high = 93};
 }
 /// The image of a map.
-Panel mapPanel(std::string title, const Grid& grid, const Axis& colour) {
+Panel mapPanel(std::string title, const ResidualGrid& grid, const Axis& colour) {
   Series image{.name = "residual", .style = Style::image, .value = grid.value};
   for (const double y : grid.y) {
     for (const double x : grid.x) addPoint(image, x, y);
@@ -276,9 +225,9 @@ Panel mapPanel(std::string title, const Grid& grid, const Axis& colour) {
 
 /// From the least residual to what nearly all directions are below, three decades at most, so that a few do not take all
 /// colours.
-Axis colourAxis(std::initializer_list<const Grid*> grids) {
+Axis colourAxis(std::initializer_list<const ResidualGrid*> grids) {
   std::vector<double> values;
-  for (const Grid* grid : grids) {
+  for (const ResidualGrid* grid : grids) {
     for (const double value : grid->value) {
       if (std::isfinite(value) && value > 0) values.push_back(value);
     }
@@ -291,7 +240,7 @@ Axis colourAxis(std::initializer_list<const Grid*> grids) {
   return axis;
 }
 
-Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
+Plot residualPlot(const MotionFrameStudy& at, const FlowMaps& maps) {
   Plot plot{
       .name = "residual",
       .caption = fmt::format(
@@ -314,17 +263,17 @@ Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
       panel.series.push_back(others);
     }
     panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
-    panel.series.push_back(star("minimum", of.map.least, second_ink));
+    panel.series.push_back(star("minimum", of.map.minimum, second_ink));
     const HemisphereChart chart(at.directionOf(of.flow).mean.unit_vector());
     if (at.truthOf(of.flow)) panel.series.push_back(star("truth", chart(*at.truthOf(of.flow)), truth_ink));
     plot.panels.push_back(panel);
-    near.series.push_back(star(of.name, of.map.least, k + 1));
-    if (of.map.least.norm() < 45) reach = std::max(reach, of.map.least.norm());
+    near.series.push_back(star(of.name, of.map.minimum, k + 1));
+    if (of.map.minimum.norm() < 45) reach = std::max(reach, of.map.minimum.norm());
     if (!of.map.covariance) continue;
-    Series region = ellipse("", of.map.least, *of.map.covariance, region_95);
+    Series region = ellipse("", of.map.minimum, *of.map.covariance, region_95);
     region.colour = k + 1, region.dashed = true;
     near.series.push_back(region);
-    reach = std::max(reach, std::min(45.0, of.map.least.norm() + std::sqrt(region_95 * of.map.covariance->trace())));
+    reach = std::max(reach, std::min(45.0, of.map.minimum.norm() + std::sqrt(region_95 * of.map.covariance->trace())));
   }
   near.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
   const Eigen::Matrix2d P = degrees * degrees * at.velocity.covariance;
@@ -343,17 +292,17 @@ Plot residualPlot(const LookedAt& at, const std::array<FlowMap, 3>& maps) {
   return plot;
 }
 
-void residualTable(Report& report, const LookedAt& at, const std::array<FlowMap, 3>& maps) {
+void residualTable(Report& report, const MotionFrameStudy& at, const FlowMaps& maps) {
   std::vector<std::vector<std::string>> rows;
   for (const FlowMap& of : maps) {
     const HemisphereChart chart(at.directionOf(of.flow).mean.unit_vector());
-    const Eigen::Vector3d V = chart.direction(of.map.least);
+    const Eigen::Vector3d V = chart.direction(of.map.minimum);
     const auto& truth = at.truthOf(of.flow);
     const Eigen::Matrix2d both = of.map.covariance.value_or(Eigen::Matrix2d::Constant(no_value)) +
                                  degrees * degrees * at.directionOf(of.flow).covariance;
-    const double squared = of.map.least.dot(both.inverse() * of.map.least);
-    rows.push_back({of.name, fmt::format("{:.4f} {:.4f} {:.4f}", V.x(), V.y(), V.z()), number(of.map.least_residual, 3),
-                    number(of.map.least.norm(), 3), number(squared, 3),
+    const double squared = of.map.minimum.dot(both.inverse() * of.map.minimum);
+    rows.push_back({of.name, fmt::format("{:.4f} {:.4f} {:.4f}", V.x(), V.y(), V.z()), number(of.map.residual, 3),
+                    number(of.map.minimum.norm(), 3), number(squared, 3),
                     truth ? number(degrees * std::acos(std::min(1.0, std::abs(truth->dot(V)))), 3) : "n/a",
                     fmt::format("{}", of.map.others.size())});
   }
@@ -381,7 +330,7 @@ Series onSide(std::string name, const MotionTrace& trace, const HemisphereChart&
   return series;
 }
 
-Plot convergencePlot(const LookedAt& at, const MotionWindowRuns& runs, const ResidualMap& map) {
+Plot convergencePlot(const MotionFrameStudy& at, const MotionWindowRuns& runs, const ResidualMap& map) {
   Plot plot{
       .name = "convergence",
       .caption = fmt::format(
@@ -465,7 +414,7 @@ Plot signPlot(std::string name, std::string caption, const MotionTrace& held, co
 }
 
 /// Round levels between the least and the greatest residual.
-std::vector<double> contourLevels(const Grid& grid) {
+std::vector<double> contourLevels(const ResidualGrid& grid) {
   Extents range;
   for (const double value : grid.value) {
     if (value > 0) range.add(value);
@@ -480,7 +429,7 @@ std::vector<double> contourLevels(const Grid& grid) {
   return levels;
 }
 
-Plot contourPlot(const LookedAt& at, const ResidualMap& subspace, const ResidualMap& essential) {
+Plot contourPlot(const MotionFrameStudy& at, const ResidualMap& subspace, const ResidualMap& essential) {
   Plot plot{
       .name = "contours",
       .caption = fmt::format(
@@ -497,14 +446,14 @@ Plot contourPlot(const LookedAt& at, const ResidualMap& subspace, const Residual
                 .x = tangentAxis(0),
                 .y = tangentAxis(1),
                 .colour = colour,
-                .series = {contours("residual", map.grid, contourLevels(map.grid))},
+                .series = {contours("residual", gridOf(map), contourLevels(map.grid))},
                 .equal_aspect = true};
     if (!map.others.empty()) {
       Series others = named("other local minima", Style::points, fourth_ink);
       for (const Eigen::Vector2d& other : map.others) addPoint(others, other.x(), other.y());
       panel.series.push_back(others);
     }
-    panel.series.push_back(star("minimum", map.least, second_ink));
+    panel.series.push_back(star("minimum", map.minimum, second_ink));
     panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
     plot.panels.push_back(panel);
   }
@@ -616,10 +565,10 @@ std::string rigidityVerdict(const RigidityComparison& c) {
 void structureTable(Report& report, const MotionWindowRuns& runs, const Eigen::Vector3d& Omega) {
   std::vector<std::vector<std::string>> rows;
   for (const bool rubbery : {false, true}) {
-    const RigidityTest& test = rubbery ? runs.rubbery.rigidity : runs.rigid.rigidity;
-    const Eigen::Vector3d turn = test.rotation();
+    const MotionInterpretation& seen = rubbery ? runs.rubbery : runs.rigid;
+    const Eigen::Vector3d& turn = seen.rotation;
     rows.push_back(
-        {rubbery ? "rubbery" : "rigid", number(100 * test.spread(), 3),
+        {rubbery ? "rubbery" : "rigid", number(100 * seen.spread, 3),
          fmt::format("{}/{}", rubbery ? runs.comparison.distances - runs.comparison.steadier : runs.comparison.steadier,
                      runs.comparison.distances),
          number(degrees * turn.norm(), 3), number(angleBetween(turn, Omega), 3)});
@@ -633,44 +582,30 @@ void structureTable(Report& report, const MotionWindowRuns& runs, const Eigen::V
                            runs.frames.size()));
 }
 
-void reportFrame(Report& report, const MotionResult& result, const MotionWindow& window,
-                 const MotionFilterOptions& options) {
-  const MotionPairs& pairs = window.frames().back();
-  const auto of = std::find_if(result.frames.begin(), result.frames.end(),
-                               [&](const MotionFrame& frame) { return frame.frame == pairs.frame; });
-  LookedAt at(pairs, *of);
+void reportFrame(Report& report, const MotionFrameStudy& at) {
   const Eigen::Vector3d V = at.velocity.mean.unit_vector(), T = at.translation.mean.unit_vector();
-  const MotionWindowRuns runs = runMotionWindow(window.frames(), options, at.reference());
-  for (std::size_t i = 0; i < pairs.pairs.size(); ++i) {
-    if (i < runs.inliers.size() && runs.inliers[i]) at.pairs.push_back(pairs.pairs[i]);
-  }
-  at.whole = pairsOver(at.interval, at.pairs);
-  report.section(fmt::format("The residual of frame {}", pairs.frame));
+  const MotionWindowRuns& runs = at.runs;
+  report.section(fmt::format("The residual of frame {}", at.frame));
   report.paragraph(fmt::format(
       "Figures from here on are of images alone: frames {} to {}, and the residual of {} pairs of the last one. The "
       "motion turns by {:.3g} deg in this frame.",
-      window.frames().front().frame, pairs.frame, at.pairs.size(), degrees * at.motion.rotation.mean.log().norm()));
-  const std::size_t enough = std::min(at.pairs.size(), at.whole.size());
-  if (enough < options.min_pairs) {
-    report.paragraph(
-        fmt::format("This frame has {} usable pairs of points, and its figures need {}.", enough, options.min_pairs));
+      at.first_frame, at.frame, at.pairs.size(), degrees * at.motion.rotation.mean.log().norm()));
+  if (!at.hasMaps()) {
+    report.paragraph(fmt::format("This frame has {} usable pairs of points, and its figures need {}.", at.usablePairs(),
+                                 at.min_pairs));
     return;
   }
   if (!at.motion.ok()) {
     report.paragraph("The filter's estimate of this frame is not one that may be used: look at its flags.");
   }
-  std::array<FlowMap, 3> maps{FlowMap{Flow::forward, "forward", {}}, FlowMap{Flow::midpoint, "midpoint", {}},
-                              FlowMap{Flow::discrete, "discrete", {}}};
-  for (FlowMap& m : maps) {
-    m.map = residualMap(residualOf(m.flow == Flow::discrete ? at.whole : at.pairs, m.flow, at.rotation),
-                        HemisphereChart(at.directionOf(m.flow).mean.unit_vector()));
-  }
+  const FlowMaps maps{FlowMap{Flow::forward, "forward", at.forward}, FlowMap{Flow::midpoint, "midpoint", at.midpoint},
+                      FlowMap{Flow::discrete, "discrete", at.discrete}};
   report.plot(residualPlot(at, maps));
   residualTable(report, at, maps);
-  report.plot(contourPlot(at, maps[1].map, residualMap(residualAtRotation(at.whole, at.rotation), HemisphereChart(T))));
+  report.plot(contourPlot(at, at.midpoint, at.essential));
 
   report.section("Convergence");
-  report.plot(convergencePlot(at, runs, maps[1].map));
+  report.plot(convergencePlot(at, runs, at.midpoint));
   report.plot(signPlot("sign",
                        "The subspace filter from the farthest start that arrives, with the sign of the depths held and "
                        "released (figures 9 and "
@@ -696,24 +631,16 @@ void reportFrame(Report& report, const MotionResult& result, const MotionWindow&
 }  // namespace
 
 void writeMotionReport(const std::string& directory, const std::string& command_line, const MotionResult& result,
-                       const MotionWindow& window, const MotionFilterOptions& options) {
-  if (!window.has_looked_at()) {
-    throw InputError(fmt::format("--report-frame {}", window.looked_at()), 0,
-                     "there is no such frame with one before it",
-                     fmt::format("one of {} to {}", result.frames.front().frame, result.frames.back().frame));
-  }
+                       const MotionFrameStudy& study) {
   Report report(directory, "Motion from point tracks");
-  const std::size_t usable = result.usable(), n = result.frames.size();
-  report.verdict(
-      usable > 0,
-      usable > 0 ? fmt::format("{} of {} frames have a direction of motion that may be used.", usable, n)
-                 : fmt::format("Not to be trusted: none of {} frames has a direction of motion that may be used.", n));
+  const Verdict verdict = result.verdict();
+  report.verdict(verdict.isYes(), verdict.text + ".");
   report.code(command_line);
   report.section("Estimates");
   report.plot(estimatesPlot(result));
   if (result.with_truth) report.plot(errorsPlot(result));
   report.code(formatMotion(result));
-  reportFrame(report, result, window, options);
+  reportFrame(report, study);
   report.write();
 }
 

@@ -5,3 +5,6 @@
 
 #include <fusion/detail/motion_engine_run.hpp>
 #include <fusion/detail/motion_filter_run.hpp>
+#include <fusion/detail/motion_gyroscope.hpp>
+#include <fusion/detail/motion_sequence.hpp>
+#include <fusion/detail/motion_study.hpp>

@@ -28,17 +28,6 @@
 
 namespace liestat {
 
-/// A point of the structure.
-struct StructurePoint {
-  std::uint64_t track = 0;
-  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< in the image, at the middle of the last interval
-  double inverse_depth = 0;                      ///< |V|/Z; its sign is that of the direction's
-  double variance = 0;
-  std::size_t frames = 0;  ///< that it is made of
-
-  Eigen::Vector3d position() const { return at.homogeneous() / inverse_depth; }
-};
-
 struct MotionStructureOptions {
   double process_noise = 1e-5;  ///< per frame, of the inverse depth, for a speed that is not quite constant
   double gate = 4;              ///< standard deviations beyond which a depth is not taken over
@@ -194,18 +183,6 @@ class RigidityTest {
   std::vector<Eigen::Vector3d> first_, last_;
   std::vector<double> sum_, squares_;
   std::size_t snapshots_ = 0;
-};
-
-/// The rigid one of two interpretations of the same points.
-struct RigidityComparison {
-  std::size_t distances = 0;  ///< that were compared, no point in two of them
-  std::size_t steadier = 0;   ///< those that vary less in the first interpretation
-  /// The probability that distances vary so much less in the first one if neither is more rigid than the other; 1 where
-  /// nothing could be compared.
-  double p_value = 1;
-
-  /// The first interpretation is the rigid one, at this false-alarm probability (which takes seven distances).
-  bool first_is_rigid(double level = 0.01) const { return p_value < level; }
 };
 
 /// Wilcoxon's signed-rank test (F. Wilcoxon, Biometrics Bulletin 1, 1945; its exact law up to fifty distances, the normal

@@ -109,4 +109,14 @@ class TrackPairs {
   std::vector<std::uint64_t> tracks_;
 };
 
+/// The pairs of this interval, each as one step of time: those of an epipolar constraint.
+inline void pairsOver(double interval, std::span<const PointPair> pairs, std::vector<PointPair>& steps) {
+  steps.clear();
+  for (const PointPair& pair : pairs) {
+    if (pair.frames != interval) continue;
+    steps.push_back(pair);
+    steps.back().frames = 1;
+  }
+}
+
 }  // namespace liestat

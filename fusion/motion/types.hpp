@@ -22,7 +22,9 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 namespace liestat {
@@ -31,8 +33,9 @@ namespace liestat {
 struct PointPair {
   Eigen::Vector2d first = Eigen::Vector2d::Zero(), second = Eigen::Vector2d::Zero();  ///< calibrated coordinates
   double sigma = 0;  ///< standard deviation of each coordinate in both frames (pixels over the focal length), > 0
-  /// Frames between the two, > 0. A longer interval has the same noise and a larger motion: V and Ω, both per frame, are
-  /// those of the middle of the interval. (Flow::discrete counts it as one step: give all pairs the same.)
+  /// Frames between the two, > 0. A longer interval has the same noise and a larger motion: V and Ω, both per frame,
+  /// are those of the middle of the interval. (Flow::discrete and the essential filter count it as one step: give all
+  /// pairs the same, or let MotionFilter make them, which gives motions per frame.)
   double frames = 1;
 };
 
@@ -43,10 +46,11 @@ enum class Flow {
   discrete   ///< y₁ is turned by the rotation first: the epipolar constraint itself, exact
 };
 
-/// What a direction is that of, and in which axes.
+/// The vector whose direction it is, and in which axes.
 enum class DirectionMeaning {
-  velocity,    ///< V: Flow::forward in the camera's axes at the first frame, Flow::midpoint in those half-way
-  translation  ///< T of X₂ = R X₁ + T, in the axes of the second frame (Flow::discrete, essential filter)
+  velocity,  ///< V: Flow::forward in the camera's axes at the first frame, Flow::midpoint in those half-way
+  /// T of X₂ = R X₁ + T over the interval of the pairs, in the axes at its end (Flow::discrete, essential filter).
+  translation
 };
 
 /// The rotation from a gyroscope over the interval of the pairs, in the sign and the axes of the filters: the apparent
@@ -115,6 +119,29 @@ struct InverseDepth {
   double value = 0;     ///< |V|/Z at the middle of the interval
   double variance = 0;  ///< of one frame, the direction given
   bool inlier = false;  ///< whether the update used the pair
+};
+
+/// A point of the structure (fusion/motion/structure.hpp).
+struct StructurePoint {
+  std::uint64_t track = 0;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< in the image, at the middle of the last interval
+  double inverse_depth = 0;                      ///< |V|/Z; its sign is that of the direction's
+  double variance = 0;
+  std::size_t frames = 0;  ///< that it is made of
+
+  Eigen::Vector3d position() const { return at.homogeneous() / inverse_depth; }
+};
+
+/// The rigid one of two interpretations of the same points.
+struct RigidityComparison {
+  std::size_t distances = 0;  ///< that were compared, no point in two of them
+  std::size_t steadier = 0;   ///< those that vary less in the first interpretation
+  /// The probability that distances vary so much less in the first one if neither is more rigid than the other; 1 where
+  /// nothing could be compared.
+  double p_value = 1;
+
+  /// The first interpretation is the rigid one, at this false-alarm probability (which takes seven distances).
+  bool first_is_rigid(double level = 0.01) const { return p_value < level; }
 };
 
 /// One direction that competes, for pictures of the way of a filter.

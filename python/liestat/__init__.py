@@ -33,13 +33,13 @@ from ._gaussians import (
     sample,
     validate,
 )
+from ._motion import motion
 from ._results import ConfidenceRegion, Law, MeanResult, Result
 from ._sensors import (
     VI_BLOCKS,
     Camera,
     InitialisedWindow,
     hand_eye,
-    motion,
     preintegrate,
     robust_two_view,
     two_view,

@@ -1,4 +1,4 @@
-"""Sensors and estimators: preintegration, visual-inertial initialisation, two views, hand-eye, motion from tracks."""
+"""Sensors and estimators: preintegration, visual-inertial initialisation, two views, hand-eye."""
 
 import numbers
 import warnings
@@ -353,88 +353,6 @@ def robust_two_view(model, matches, sigma, *, confidence=0.9999, threshold=0.0, 
         warnings.warn(f"liestat.robust_two_view: {d['status']}", UserWarning, stacklevel=2)
     d["relative_pose"] = _relative_pose(d["relative_pose"])
     return Result(model, **d)
-
-
-def motion(
-    frames,
-    tracks,
-    points,
-    sigma,
-    *,
-    span=4,
-    outliers=False,
-    essential=True,
-    process_noise=1e-5,
-    gyroscope=None,
-    gyroscope_covariance=None,
-):
-    """Direction of motion and rotation of a camera, frame by frame, from point tracks.
-
-    Parameters
-    ----------
-    frames, tracks : array_like of int, shape (n,)
-        Which frame (0 to the last, in any order) and which track each point belongs to.
-    points : array_like, shape (n, 2)
-        Calibrated coordinates, (pixel - centre) / focal length.
-    sigma : float
-        Their standard deviation.
-    span : int
-        Pairs join a track's newest position with its oldest within so many frames.
-    outliers : bool
-        Expect some.
-    essential : bool
-        Hand over to the essential filter once one direction is left.
-    process_noise : float
-        rad² per frame of the direction: 1e-5 nearly constant, 1e-3 manoeuvring.
-    gyroscope : array_like, shape (m, 3), optional
-        Apparent rotation vector of the points over each frame's pairs, rad per frame.
-    gyroscope_covariance : array_like, shape (3, 3) or (m, 3, 3), optional
-
-    Returns
-    -------
-    Result
-        One entry for each frame: `direction` (S2) with `direction_covariance` (m, 2, 2), `rotation` (SO3,
-        second_R_first) with `rotation_covariance` (m, 3, 3), `mean_inverse_depth`, `innovation`, `inliers`, and the
-        flags `ok`, `standstill`, `degenerate`, `ambiguous`, `undecided_sign`, `lost`.
-    """
-    f = np.asarray(frames)
-    t = np.asarray(tracks)
-    p = _rows(points, "motion: points", 2)
-    for name, value in (("frames", f), ("tracks", t)):
-        if value.ndim != 1 or not np.issubdtype(value.dtype, np.integer) or (value < 0).any():
-            found = f"{value.dtype} {value.shape}"
-            raise ValueError(f"motion: {name}: expected integers of shape (n,), none negative, got {found}")
-    _same_length("motion", frames=f, tracks=t, points=p)
-    if not sigma > 0:
-        raise ValueError(f"motion: sigma: expected a positive number, got {sigma}")
-    n = int(f.max()) + 1 if len(f) else 0
-    order = np.argsort(f, kind="stable")
-    offsets = np.searchsorted(f[order], np.arange(n + 1)).astype(np.int64)
-    g, c = np.empty((0, 3)), np.empty((0, 3, 3))
-    if gyroscope is not None:
-        g = _rows(gyroscope, "motion: gyroscope", 3)
-        if len(g) != n:
-            raise ValueError(f"motion: gyroscope: expected shape ({n}, 3), one for each frame, got {g.shape}")
-        if gyroscope_covariance is None:
-            raise ValueError("motion: gyroscope_covariance is missing")
-        c = np.ascontiguousarray(
-            np.broadcast_to(_covariances(gyroscope_covariance, "motion: gyroscope_covariance", SO3, (n,)), (n, 3, 3))
-        )
-    d = _core.motion(
-        offsets,
-        np.ascontiguousarray(t[order], dtype=np.int64),
-        np.ascontiguousarray(p[order]),
-        float(sigma),
-        int(span),
-        bool(outliers),
-        bool(essential),
-        g,
-        c,
-        float(process_noise),
-    )
-    d["direction"] = S2._of(d["direction"])
-    d["rotation"] = SO3._of(d["rotation"])
-    return Result("motion of a camera", **d)
 
 
 #: Blocks of the joint covariance of a refined window: name and first row; three rows each.

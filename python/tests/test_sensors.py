@@ -173,9 +173,10 @@ class Motion(unittest.TestCase):
             xy.append(points[:, :2] / points[:, 2:] + 5e-4 * rng.standard_normal((40, 2)))
             points = step.act(points)
         data = [np.concatenate(part) for part in (frames, tracks, xy)]
-        result = liestat.motion(*data, 5e-4, essential=False)
-        self.assertEqual((len(result.direction), len(result.rotation), result.ok.shape), (30, 30, (30,)))
-        self.assertTrue(result.ok[-1])
+        result = liestat.motion(*data, 5e-4, frames_apart=4)
+        self.assertEqual((len(result.direction), len(result.rotation), result.usable.shape), (30, 30, (30,)))
+        self.assertEqual((len(result.frames), result.frames[0].frame), (29, 1))
+        self.assertTrue(result.usable[-1])
         self.assertLess(result.rotation[-1].distance(step.rotation), 0.003)
         # The velocity is the translation half-way through the rotation.
         direction = liestat.S2.from_vector(SO3.exp([0, 0.005, 0.01]).inv().act(step.translation))

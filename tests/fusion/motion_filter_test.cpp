@@ -382,7 +382,7 @@ TEST(MotionFilter, UpdatesAllocateNothing) {
   robust.outliers = true;
   MotionFilter filter;
   SubspaceFilter outliers(robust), inertial(discrete());
-  TrackPairs tracks({.frames = 3});
+  MotionFilter framed(planOf({.frames_apart = 3}, {true, 1, 0}));
   std::vector<TrackObservation> seen;
   std::size_t before = 0;
   for (int k = 0; k < 60; ++k) {
@@ -393,7 +393,7 @@ TEST(MotionFilter, UpdatesAllocateNothing) {
     const std::size_t now = allocations;
     filter.update(scene.pairs), outliers.update(scene.pairs), inertial.update(scene.pairs, scene.gyroscope);
     filter.inverse_depths();
-    tracks.add(seen);
+    framed.update(seen, scene.gyroscope), framed.inverse_depths();
     if (k >= 40) {
       EXPECT_EQ(allocations - now, 0U) << k;
     }
