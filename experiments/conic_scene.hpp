@@ -5,7 +5,7 @@
 // in its angle and have the same noise in both coordinates, outliers are uniform on [-1.5, 1.5] × [-1, 1].
 #pragma once
 
-#include <fusion/detail/null_vectors.hpp>
+#include <lie/linear.hpp>
 #include <stats/constrained.hpp>
 #include <stats/random.hpp>
 
@@ -58,7 +58,7 @@ inline void addConicSquare(const Eigen::Vector2d& m, Eigen::Matrix<double, 6, 6>
 /// The conic with the least qᵀ A q; none where that leaves it open.
 inline std::optional<Conic> leastConic(const Eigen::Matrix<double, 6, 6>& A) {
   Conic q;
-  if (!liestat::detail::leastVector<6>(A, q)) return {};
+  if (!leastVector<6>(A, q)) return {};
   return q;
 }
 /// The conic with the least Σ (q·monomials)², of five points the one through them.

@@ -377,6 +377,8 @@ def preintegrate(
     scheme: Literal["averaged", "held", "cubic"] = "averaged",
     max_gap: float = 0.1,
     threads: int = 0,
+    truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
+    gravity: float = 9.81,
 ) -> Result: ...
 def evaluate_trajectory(
     reference: SE3,

@@ -55,8 +55,38 @@ def _noise(caller, noise):
     return np.concatenate([array, np.zeros(4 - len(array))])
 
 
+def _truth(caller, truth):
+    """Rows of (times, states) or (times, states, biases); none without a truth."""
+    if truth is None:
+        return np.empty((0, 17))
+    if len(truth) not in (2, 3):
+        raise ValueError(f"{caller}: truth: expected (times, states), or these with the biases")
+    t = _vector(truth[0], f"{caller}: times of the truth")
+    states = truth[1]
+    if not isinstance(states, SE23) or states.ndim != 1:
+        shape = f" of shape {states.shape}" if hasattr(states, "shape") else ""
+        raise TypeError(f"{caller}: truth: expected SE23 of shape (n,), got {type(states).__name__}{shape}")
+    biases = np.zeros((len(t), 6)) if len(truth) == 2 else _rows(truth[2], f"{caller}: biases of the truth", 6)
+    _same_length(caller, times=t, states=states, biases=biases)
+    if not (np.diff(t) > 0).all():
+        raise ValueError(f"{caller}: times of the truth: expected ascending ones, each once")
+    return np.ascontiguousarray(np.concatenate([t[:, None], states.params, biases], axis=1))
+
+
 def preintegrate(
-    times, rates, forces, begin, end, *, noise=(0.0, 0.0), bias=None, scheme="averaged", max_gap=0.1, threads=0
+    times,
+    rates,
+    forces,
+    begin,
+    end,
+    *,
+    noise=(0.0, 0.0),
+    bias=None,
+    scheme="averaged",
+    max_gap=0.1,
+    threads=0,
+    truth=None,
+    gravity=9.81,
 ):
     """Preintegrated motions of many intervals of one inertial recording.
 
@@ -72,31 +102,41 @@ def preintegrate(
         Densities: gyroscope (rad/s/√Hz), accelerometer (m/s²/√Hz), and of the random walks of their biases
         (rad/s²/√Hz, m/s³/√Hz).
     bias : array_like, shape (6,), optional
-        Gyroscope (rad/s), accelerometer (m/s²); taken off every reading.
+        Gyroscope (rad/s), accelerometer (m/s²); taken off every reading. By default that of the truth at `begin`, or
+        zero.
     scheme : {'averaged', 'held', 'cubic'}
         How motion goes on between readings.
     max_gap : float
         s; readings further apart than this make an interval not usable.
+    truth : (times, states) or (times, states, biases), optional
+        s, ascending; SE23 of shape (m,), world_T_body with the velocity in the world; (m, 6): gyroscope (rad/s),
+        accelerometer (m/s²).
+    gravity : float
+        m/s², downwards along z in the truth's world.
 
     Returns
     -------
     Result
         `increment` (SE23: rotation, position, velocity), `covariance` (..., 9, 9) in its tangent (position, rotation,
         velocity), `covariance_with_bias` (..., 15, 15), `bias_jacobian` (..., 9, 6), `faults` (list of str, empty
-        where there is none) and `ok`.
+        where there is none) and `ok`; and the fields of the program's JSON: `windows` (a list with the fields of each
+        interval, `error` and `squared_distance` among them with a truth), `verdict` (a sentence), `consistent` (bool;
+        None: no verdict), `causes` and, with a truth and noise, the summed `squared_distance` with its
+        `degrees_of_freedom` and `p`.
 
     Warns
     -----
     UserWarning
-        Where an interval is not usable: its covariance is NaN.
+        Where an interval is not usable: its covariance is NaN. Where the errors against the truth are larger than the
+        covariances explain.
     """
     readings = _readings("preintegrate", times, rates, forces)
     b, e = np.broadcast_arrays(
         _numbers(begin, "preintegrate: begin", ()), _numbers(end, "preintegrate: end", ())
     )
     lead = b.shape
-    bias = np.zeros(6) if bias is None else _vector(bias, "preintegrate: bias")
-    if bias.shape != (6,):
+    bias = np.empty(0) if bias is None else _vector(bias, "preintegrate: bias")
+    if bias.shape not in ((0,), (6,)):
         raise ValueError(f"preintegrate: bias: expected shape (6,), got {bias.shape}")
     d = _core.preintegrate(
         readings,
@@ -107,6 +147,8 @@ def preintegrate(
         scheme,
         float(max_gap),
         int(threads),
+        _truth("preintegrate", truth),
+        float(gravity),
     )
     ok = np.array([not fault for fault in d["faults"]], dtype=bool)
     if not ok.all():
@@ -119,15 +161,12 @@ def preintegrate(
         )
         for name in ("covariance", "covariance_with_bias", "bias_jacobian"):
             d[name][~ok] = np.nan
-    return Result(
-        "preintegrated motion",
-        increment=SE23._of(d["increment"].reshape(*lead, 10)),
-        covariance=d["covariance"].reshape(*lead, 9, 9),
-        covariance_with_bias=d["covariance_with_bias"].reshape(*lead, 15, 15),
-        bias_jacobian=d["bias_jacobian"].reshape(*lead, 9, 6),
-        faults=d["faults"],
-        ok=ok.reshape(lead)[()],
-    )
+    if d["consistent"] is False:
+        warnings.warn(f"liestat.preintegrate: {d['verdict']}", UserWarning, stacklevel=2)
+    d["increment"] = SE23._of(d["increment"].reshape(*lead, 10))
+    for name, shape in (("covariance", (9, 9)), ("covariance_with_bias", (15, 15)), ("bias_jacobian", (9, 6))):
+        d[name] = d[name].reshape(*lead, *shape)
+    return Result.of("preintegrated motion", d | {"ok": ok.reshape(lead)[()]})
 
 
 def evaluate_trajectory(
