@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct ProgramExecutor {
 
   template <class Map, class Combine>
   auto reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
-    using T = ChunkResult<Map>;
+    using T = std::remove_cvref_t<std::invoke_result_t<Map&, std::size_t>>;
     if (n_chunks == 0) return T{};
     // Chunks leave in the order in which they came, so those under way are consecutive and each has a slot of its own.
     std::vector<std::optional<T>> slots(std::min(n_chunks, mostUnderWay(threads)));
@@ -36,7 +37,9 @@ struct ProgramExecutor {
         [&](std::size_t chunk) {
           std::optional<T>& part = slots[chunk % slots.size()];
           if (result) {
-            combineInto(combine, *result, std::move(*part));
+            // As any executor combines two chunks.
+            result = SerialExecutor{}.reduce(
+                2, [&](std::size_t k) { return T(std::move(k == 0 ? *result : *part)); }, combine);
           } else {
             result.emplace(std::move(*part));
           }

@@ -5,7 +5,6 @@
 //   if (root.ok()) const auto z = root.halfSolve<1>(error);  // whitened; z.squaredNorm() is the Mahalanobis distance
 #pragma once
 
-#include <lie/detail/least_vector.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/trig.hpp>
@@ -17,9 +16,6 @@ namespace liestat {
 using detail::Cholesky;
 /// A square root B of a symmetric matrix that may be singular, B Bᵀ = A, SemidefiniteRoot<S, N>.
 using detail::SemidefiniteRoot;
-/// The solution of homogeneous linear equations by least squares: leastVector(A, x) sets x to the unit vector with the least
-/// xᵀ A x, and is false where that is not unique.
-using detail::leastVector;
 /// The cross-product matrix [v] of a vector of three numbers: [v] w = v × w.
 using detail::skew;
 /// A B, without a type of expression for each pair of shapes.

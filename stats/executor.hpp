@@ -80,10 +80,6 @@ struct CombineArchetype {
 
 }  // namespace detail
 
-// For executors of one's own: a chunk's result, and how it is combined with those before it.
-using detail::ChunkResult;
-using detail::combineInto;
-
 /// Evaluates a reduction over chunks: `reduce(n_chunks, map, combine)` returns
 /// combine(… combine(combine(map(0), map(1)), map(2)) …, map(n_chunks - 1)).
 ///
