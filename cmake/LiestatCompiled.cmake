@@ -9,7 +9,7 @@ set(LIESTAT_COMPILED_PARTS means fusion trajectories)
 
 set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
 set(LIESTAT_COMPILED_SOURCES_fusion
-    initialisation recording noise_calibration homography_models epipolar_models pose_models robust_two_view two_view
+    initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models robust_two_view two_view
     hand_eye motion)
 set(LIESTAT_COMPILED_SOURCES_trajectories trajectories convention_diagnosis recording_windows)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)

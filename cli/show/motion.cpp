@@ -2,7 +2,7 @@
 
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
@@ -122,7 +122,7 @@ std::string formatMotion(const MotionResult& result) {
                 ? "\nagainst the truth: no frame that may be used\n"
                 : fmt::format(
                       "\nagainst the truth, {} frames: median direction {:.3g} deg, rotation {:.3g} deg per frame\n",
-                      direction.size(), experiments::quantile(direction, 0.5), experiments::quantile(rotation, 0.5));
+                      direction.size(), liestat::quantile(direction, 0.5), liestat::quantile(rotation, 0.5));
   }
   if (result.with_bias && n > 0) {
     const Gaussian<Eigen::Vector3d>& bias = result.frames.back().gyroscope_bias;
@@ -205,8 +205,8 @@ void setMotion(JsonObject& object, const MotionResult& result) {
   object.set("frames", list);
   if (result.with_truth) {
     object.set("median_direction_error_deg",
-               experiments::quantile(errorsOf(result, &MotionFrame::direction_error), 0.5));
-    object.set("median_rotation_error_deg", experiments::quantile(errorsOf(result, &MotionFrame::rotation_error), 0.5));
+               liestat::quantile(errorsOf(result, &MotionFrame::direction_error), 0.5));
+    object.set("median_rotation_error_deg", liestat::quantile(errorsOf(result, &MotionFrame::rotation_error), 0.5));
   }
 }
 

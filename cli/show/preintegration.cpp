@@ -2,7 +2,7 @@
 
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
@@ -10,7 +10,6 @@ namespace liestat::cli {
 
 namespace {
 
-using experiments::quantile;
 
 /// Where the readings of windows without a result fail.
 std::string faultLines(const std::vector<RecordingWindow>& windows) {

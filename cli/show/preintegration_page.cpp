@@ -4,7 +4,7 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 #include <stats/laws.hpp>
 
 #include <fmt/format.h>
@@ -193,7 +193,7 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
     }
     before = &s;
   }
-  const double median = experiments::quantile(intervals, 0.5);
+  const double median = liestat::quantile(intervals, 0.5);
   report.table(
       {"readings", "duration, s", "median interval, ms", "median rate, Hz", "largest interval, ms", "at, s", "gaps"},
       {{fmt::format("{}", n), number(readings.end - readings.begin, 6), number(median), number(1000 / median),

@@ -299,6 +299,36 @@ def evaluate_trajectory(
     return Result("evaluation", consistency=c, **{k: Result(k, **v) if isinstance(v, dict) else v for k, v in d.items()})
 
 
+class CalibratedPose(Result):
+    """A pose with the fields of the program's JSON: `translation` (m), `quaternion_xyzw`, `rotation_vector` (rad), and for
+    an estimate `covariance` (None where there is none), `standard_deviations`, `standard_deviations_local`.
+
+    Attributes
+    ----------
+    mean : SE3
+    gaussian : Gaussian
+        Its methods are those of the pose, too. Without a covariance it has NaN.
+    """
+
+    @property
+    def mean(self):
+        return SE3._of(np.concatenate([self.quaternion_xyzw, self.translation]))
+
+    @property
+    def gaussian(self):
+        covariance = self.__dict__.get("covariance")
+        return Gaussian._of(self.mean, np.full((6, 6), np.nan) if covariance is None else covariance)
+
+    def __getattr__(self, name):
+        if name.startswith("_") or "quaternion_xyzw" not in self.__dict__:
+            raise AttributeError(name)
+        return getattr(self.gaussian, name)
+
+
+#: Former names of parts of hand_eye().
+_HAND_EYE_NAMES = {"reason": "in_words", "covariance": "joint_covariance", "directions": "open_directions"}
+
+
 def hand_eye(
     a,
     b,
@@ -332,9 +362,10 @@ def hand_eye(
     Returns
     -------
     Result
-        `status`, `reason`, `X` and `Y` (Gaussians: gripper_T_camera, base_T_target), the joint `covariance` (12, 12),
-        `directions` that the motions leave open, `excitations`, `outliers`, `errors` and `pair_chi2` of the pairs,
-        `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival`.
+        The fields of the program's JSON: `status`, `ok`, `in_words`, `X` and `Y` (CalibratedPose: gripper_T_camera,
+        base_T_target; Y is None with `relative`), `joint_covariance` (12, 12), `open_directions` that the motions leave
+        open, `excitations`, `outliers`, `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival` …; and `errors`
+        and `pair_chi2` of the pairs.
 
     Warns
     -----
@@ -364,12 +395,12 @@ def hand_eye(
         int(seed),
     )
     if d["status"] != "ok":
-        warnings.warn(f"liestat.hand_eye: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
-    X = Gaussian._of(SE3._of(d.pop("X")), d.pop("X_covariance"))
-    Y = Gaussian._of(SE3._of(d.pop("Y")), d.pop("Y_covariance"))
-    d["rival"] = None if d["rival"] is None else SE3._of(d["rival"])
-    d["directions"] = [Result("open direction", **one) for one in d["directions"]]
-    return Result("hand-eye calibration", X=X, Y=None if relative else Y, **d)
+        warnings.warn(f"liestat.hand_eye: {d['status']}: {d['in_words']}", UserWarning, stacklevel=2)
+    for name in ("X", "Y", "rival"):
+        if d[name] is not None:
+            d[name] = CalibratedPose.of(name, d[name])
+    d["outliers"] = d["outliers"].tolist()
+    return Result.of("hand-eye calibration", d, _HAND_EYE_NAMES)
 
 
 class Camera:
@@ -440,6 +471,23 @@ def _relative_pose(d):
     )
 
 
+class TwoViewResult(Result):
+    """The result of two_view()."""
+
+    @property
+    def relative_pose(self):
+        """Deprecated: `second_T_first` as `rotation` (SO3), `direction` (S2) and `covariance`."""
+        warnings.warn(
+            "liestat: the part 'relative_pose' is called 'second_T_first' now", DeprecationWarning, stacklevel=2
+        )
+        pose = self.second_T_first
+        return None if pose is None else _relative_pose({"quaternion": pose.quaternion_xyzw, **pose.__dict__})
+
+
+#: Former names of parts of two_view().
+_TWO_VIEW_NAMES = {"physical": "parameters", "errors": "squared_errors", "name": "model"}
+
+
 def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, seed=1):
     """The motion between two images from matches of which some are wrong, its model chosen from several.
 
@@ -457,10 +505,11 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     Returns
     -------
     Result
-        `status`, `reason`, `model` (its name), `matrix` (H or F in pixels) with `matrix_covariance` (9, 9, of entries
-        column after column), `physical` (list; each with `names`, `units`, `values`, `covariance`), `relative_pose`
-        (`rotation`, `direction`, `covariance` of the tangent (direction, rotation); x' = R x + t), `inlier`, `errors`,
-        `threshold`, `lattice`.
+        The fields of the program's JSON: `status`, `reason` (None where ok), `model` (its name), `matrix` (H or F in
+        pixels) with `matrix_covariance` (9, 9, of entries column after column), `parameters` (list; each with `names`,
+        `units`, `values`, `deviations`, `covariance`), `second_T_first` (`quaternion_xyzw`, `direction`, `covariance` of
+        the tangent (direction, rotation); x' = R x + t), `inliers` (their number), `inlier`, `squared_errors`, `lattice`
+        …; and the `threshold` on squared errors.
 
     Warns
     -----
@@ -482,9 +531,7 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     )
     if d["status"] != "ok":
         warnings.warn(f"liestat.two_view: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
-    d["relative_pose"] = _relative_pose(d["relative_pose"])
-    d["physical"] = [Result("physical parameters", **one) for one in d["physical"]]
-    return Result("two-view motion", **d)
+    return TwoViewResult.of("two-view motion", d, _TWO_VIEW_NAMES)
 
 
 def robust_two_view(model, matches, sigma, *, confidence=0.9999, threshold=0.0, max_draws=100000, seed=1):
@@ -623,27 +670,29 @@ VI_BLOCKS = {
 class InitialisedWindow(Result):
     """A window of a visual-inertial recording, in the body's axes at its first image.
 
+    The fields of the program's JSON: `status`, `ok`, `begin`, `end` (s), `images` and `tracks` (numbers of them),
+    `solutions` and `covariance` of the closed form, `refined` (a Result, or None), with a truth `refined_error` …; and the
+    best known of the window:
+
     Attributes
     ----------
-    status, reason : str
-    begin, end : float
-        s.
+    reason : str
     velocity, gravity : ndarray, shape (3,), or None
         At the first image, m/s and m/s².
-    gyroscope_bias, accelerometer_bias : ndarray, shape (3,)
+    best_gyroscope_bias, accelerometer_bias : ndarray, shape (3,)
     states : SE23, shape (images,)
-    covariance : ndarray, shape (27, 27), or None
-        Joint covariance, see `block`; None where the window was not refined.
+    joint_covariance : ndarray, shape (27, 27), or None
+        See `block`; None where the window was not refined.
     scale_sigma, tilt_sigma, chi2 : float
-    images, tracks, inliers : list of int
+    image_indices, track_names, inliers : ndarray of int
     """
 
     def block(self, row, column=None):
         """ndarray, shape (3, 3): the covariance of a block by its name (`VI_BLOCKS`), or of two blocks."""
-        if self.covariance is None:
+        if self.joint_covariance is None:
             raise ValueError(f"no covariance: {self.reason}")
         i, j = VI_BLOCKS[row], VI_BLOCKS[row if column is None else column]
-        return self.covariance[i : i + 3, j : j + 3]
+        return self.joint_covariance[i : i + 3, j : j + 3]
 
 
 def vi_init(
@@ -669,6 +718,7 @@ def vi_init(
     gyroscope_sigma=0.1,
     accelerometer_sigma=0.15,
     seed=1,
+    truth=None,
 ):
     """Velocity, gravity, scale and biases of a visual-inertial recording, window by window, without a first guess.
 
@@ -698,11 +748,15 @@ def vi_init(
         m/s²; None: unknown.
     gyroscope_sigma, accelerometer_sigma : float
         Priors of the biases, rad/s and m/s².
+    truth : (times, states) or (times, states, biases), optional
+        As in `preintegrate`: windows and stretches are compared with it.
 
     Returns
     -------
     Result
-        `windows` (list of InitialisedWindow), `stretches`, `images_outside`.
+        The fields of the program's JSON: `ok` and `in_words` (whether the result is to be trusted), `windows` (list of
+        InitialisedWindow), `fusions` of disjoint windows (with `window_indices`), `statuses`, `images_outside`, with a
+        truth `refined_errors`, `nees_mean` ….
     """
     readings = _readings("vi_init", times, rates, forces)
     stamps = _vector(image_times, "vi_init: image_times")
@@ -739,14 +793,9 @@ def vi_init(
         float(gyroscope_sigma),
         float(accelerometer_sigma),
         int(seed),
+        _truth("vi_init", truth),
     )
-    if d["fault"]:
-        raise ValueError(f"vi_init: {d['fault']}")
-    windows = []
     for one in d["windows"]:
         one["states"] = SE23._of(one["states"])
-        windows.append(InitialisedWindow("window", **one))
-    stretches = [Result("stretch", **one) for one in d["stretches"]]
-    return Result(
-        "visual-inertial initialisation", windows=windows, stretches=stretches, images_outside=d["images_outside"]
-    )
+    d["windows"] = [InitialisedWindow.of("window", one) for one in d["windows"]]
+    return Result.of("visual-inertial initialisation", d, {"stretches": "fusions"})
