@@ -36,8 +36,10 @@ from ._gaussians import (
 from ._results import ConfidenceRegion, Law, MeanResult, Result
 from ._sensors import (
     VI_BLOCKS,
+    CalibratedPose,
     Camera,
     InitialisedWindow,
+    TwoViewResult,
     evaluate_trajectory,
     hand_eye,
     motion,
