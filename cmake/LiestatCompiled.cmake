@@ -3,15 +3,15 @@
 #
 #   means          Fréchet, Mahalanobis and certified means of the common features in double
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
-#   trajectories   evaluation of trajectories and diagnosis of conventions (Boost.Math)
+#   trajectories   evaluation of trajectories, diagnosis of conventions, inertial windows against a truth (Boost.Math)
 
 set(LIESTAT_COMPILED_PARTS means fusion trajectories)
 
 set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
 set(LIESTAT_COMPILED_SOURCES_fusion
-    initialisation recording noise_calibration homography_models epipolar_models pose_models robust_two_view two_view
-    hand_eye motion)
-set(LIESTAT_COMPILED_SOURCES_trajectories trajectories evaluate convention_diagnosis)
+    initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
+    robust_two_view two_view hand_eye motion)
+set(LIESTAT_COMPILED_SOURCES_trajectories trajectories evaluate convention_diagnosis recording_windows)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost)
 

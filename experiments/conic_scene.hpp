@@ -5,11 +5,11 @@
 // in its angle and have the same noise in both coordinates, outliers are uniform on [-1.5, 1.5] × [-1, 1].
 #pragma once
 
-#include <fusion/detail/null_vectors.hpp>
 #include <stats/constrained.hpp>
 #include <stats/random.hpp>
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -57,9 +57,10 @@ inline void addConicSquare(const Eigen::Vector2d& m, Eigen::Matrix<double, 6, 6>
 }
 /// The conic with the least qᵀ A q; none where that leaves it open.
 inline std::optional<Conic> leastConic(const Eigen::Matrix<double, 6, 6>& A) {
-  Conic q;
-  if (!liestat::detail::leastVector<6>(A, q)) return {};
-  return q;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(A);
+  // Rank below five to rounding.
+  if (!(solver.eigenvalues()[1] > 1e-13 * A.trace())) return {};
+  return Conic(solver.eigenvectors().col(0));
 }
 /// The conic with the least Σ (q·monomials)², of five points the one through them.
 inline std::optional<Conic> linearConic(std::span<const Eigen::Vector2d> points) {

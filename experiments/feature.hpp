@@ -150,8 +150,6 @@ inline std::optional<Feature> featureFromName(std::string_view text) {
   return std::nullopt;
 }
 
-namespace detail {
-
 template <std::size_t I, class Result, class F>
 Result visitFeature(Feature kind, F& f) {
   if constexpr (I < features.size()) {
@@ -165,15 +163,13 @@ Result visitFeature(Feature kind, F& f) {
   }
 }
 
-}  // namespace detail
-
 /// Calls f.operator()<M>() with the type of a feature: withFeature(kind, [&]<class M>() { return …; }). The call compiles
 /// f for every feature; f may restrict itself to some by a constraint, such as []<Metric M>() { … }, and then throws
 /// std::invalid_argument for the others. Points have to be among them.
 template <class F>
 auto withFeature(Feature kind, F&& f) {
   using Result = decltype(f.template operator()<Eigen::Vector3d>());
-  return detail::visitFeature<0, Result>(kind, f);
+  return visitFeature<0, Result>(kind, f);
 }
 
 }  // namespace liestat::experiments

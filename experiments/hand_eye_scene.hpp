@@ -14,6 +14,7 @@
 #pragma once
 
 #include <fusion/hand_eye.hpp>
+#include <lie/linear.hpp>
 #include <lie/se3.hpp>
 #include <lie/units.hpp>
 #include <stats/random.hpp>
@@ -233,7 +234,7 @@ class HandEyeScene {
   }
   static Vector6 drawn(const Matrix6& covariance, CounterRng& rng) {
     const Vector6 z = rng.normalVector<6>();
-    return liestat::detail::SemidefiniteRoot<double, 6>(covariance) * z;
+    return SemidefiniteRoot<double, 6>(covariance) * z;
   }
 
   void addOutliers(CounterRng& rng) {

@@ -13,14 +13,13 @@ namespace {
 double logRatio(double error, double reference) { return std::log(error / reference); }
 
 /// The outcomes of which the reports are made, in the order of the methods that are wanted.
-std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const detail::MethodOutcomes& outcomes) {
+std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const MethodOutcomes& outcomes) {
   std::vector<MeansOutcome> list;
   for (std::size_t m = 0; m < methods.size(); ++m) {
     if (!experiment.wanted[m]) continue;
-    const detail::MethodOutcome& o = outcomes[m];
+    const MethodOutcome& o = outcomes[m];
     const bool is_maha = methods[m].criterion == Criterion::maha;
-    const detail::MethodOutcome& reference =
-        outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
+    const MethodOutcome& reference = outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
     MeansOutcome outcome;
     outcome.mu2 = o.mahalanobis_squared;
     outcome.iterations = o.iterations;
@@ -57,7 +56,7 @@ std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
   const ValidationOptions options{
       .trials = experiment.trials, .seed = experiment.seed, .progress = progress, .stop = runStopped};
   return validateAll(ProgramExecutor{threads}, options, laws, [&](CounterRng& rng, std::uint64_t) {
-    return wantedOutcomes(experiment, detail::meansTrial(experiment, rng));
+    return wantedOutcomes(experiment, meansTrial(experiment, rng));
   });
 }
 

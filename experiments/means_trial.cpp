@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace liestat::experiments::detail {
+namespace liestat::experiments {
 namespace {
 
 /// The report's covariance Σ of a feature, in the library's tangent order.
@@ -206,4 +206,4 @@ MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng) {
   return withFeature(experiment.feature, [&]<Metric M>() { return trial<M>(experiment, rng); });
 }
 
-}  // namespace liestat::experiments::detail
+}  // namespace liestat::experiments

@@ -6,7 +6,7 @@
 #include <array>
 #include <limits>
 
-namespace liestat::experiments::detail {
+namespace liestat::experiments {
 
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -22,4 +22,4 @@ using MethodOutcomes = std::array<MethodOutcome, methods.size()>;
 /// One trial of an experiment: a scene from the generator, and what each of `methods` that is wanted makes of it.
 MethodOutcomes meansTrial(const MeansExperiment& experiment, CounterRng& rng);
 
-}  // namespace liestat::experiments::detail
+}  // namespace liestat::experiments

@@ -13,7 +13,6 @@
 #pragma once
 
 #include <fusion/motion/types.hpp>
-#include <lie/detail/trig.hpp>
 #include <lie/so3.hpp>
 #include <lie/units.hpp>
 #include <stats/random.hpp>

@@ -2,7 +2,7 @@
 
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 #include <fusion/motion/motion_filter.hpp>
 #include <fusion/motion/search.hpp>
 #include <fusion/motion/track_pairs.hpp>

@@ -6,7 +6,7 @@
 #include <tbb/info.h>
 #endif
 
-namespace liestat::experiments::detail {
+namespace liestat::experiments {
 
 #ifdef LIESTAT_HAS_TBB
 
@@ -47,4 +47,4 @@ void runInOrder(int /*threads*/, std::size_t n_chunks, const std::function<void(
 
 #endif
 
-}  // namespace liestat::experiments::detail
+}  // namespace liestat::experiments

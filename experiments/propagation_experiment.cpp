@@ -24,7 +24,7 @@ std::vector<ValidationReport> run(const PropagationExperiment& experiment, int t
                                   .progress = progress,
                                   .stop = runStopped};
   return validateAll(ProgramExecutor{threads}, options, laws,
-                     [&](CounterRng& rng, std::uint64_t) { return detail::propagationTrial(experiment, rng); });
+                     [&](CounterRng& rng, std::uint64_t) { return propagationTrial(experiment, rng); });
 }
 
 }  // namespace liestat::experiments

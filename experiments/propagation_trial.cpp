@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace liestat::experiments::detail {
+namespace liestat::experiments {
 namespace {
 
 /// The noise of a feature; tangent order is translation, rotation, logarithm of the scale.
@@ -42,7 +42,8 @@ std::vector<TrialOutcome> trial(const PropagationExperiment& experiment, Counter
   const SquareOf<G> covariance = noise<G::DoF>(experiment.spread);
   std::vector<Drawn<G>> factors;
   for (std::size_t i = 0; i < chain_length; ++i) factors.emplace_back(G::sampleUniform(rng), covariance, rng);
-  const Drawn<Point> point(liestat::detail::uniformInCube<double, 3>(rng), noise<3>(experiment.spread), rng);
+  const double x = rng.uniform(-1, 1), y = rng.uniform(-1, 1), z = rng.uniform(-1, 1);
+  const Drawn<Point> point(Point(x, y, z), noise<3>(experiment.spread), rng);
   const Drawn<G>&a = factors[0], &b = factors[1];
 
   const auto distance = [&](const PropagationMethod& method) {
@@ -92,4 +93,4 @@ std::vector<TrialOutcome> propagationTrial(const PropagationExperiment& experime
   return {};
 }
 
-}  // namespace liestat::experiments::detail
+}  // namespace liestat::experiments

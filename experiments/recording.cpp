@@ -1,28 +1,6 @@
 #include <experiments/recording.hpp>
 
-#include <lie/manifold.hpp>
-#include <lie/so3.hpp>
-
-#include <algorithm>
-
 namespace liestat::experiments {
-
-std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time) {
-  const auto next =
-      std::lower_bound(truth.begin(), truth.end(), time, [](const GroundTruth& g, double t) { return g.time < t; });
-  if (next == truth.end() || (next == truth.begin() && next->time > time)) return std::nullopt;
-  if (next->time == time) return *next;
-  const GroundTruth& before = *(next - 1);
-  const double h = next->time - before.time;
-  if (h > 0.1) return std::nullopt;
-  const double s = (time - before.time) / h;
-  GroundTruth at = before;
-  at.time = time;
-  at.state = SE23d(interpolate(SO3d(before.state.so3()), SO3d(next->state.so3()), s),
-                   Eigen::Vector3d((1 - s) * before.state.translation() + s * next->state.translation()),
-                   Eigen::Vector3d((1 - s) * before.state.velocity() + s * next->state.velocity()));
-  return at;
-}
 
 CameraCalibration defaultCamera() {
   CameraCalibration camera;

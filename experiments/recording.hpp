@@ -2,27 +2,14 @@
 #pragma once
 
 #include <fusion/camera.hpp>
+#include <fusion/imu/ground_truth.hpp>
 #include <fusion/imu/readings.hpp>
-#include <lie/se23.hpp>
 #include <lie/se3.hpp>
 
 #include <cstddef>
-#include <optional>
 #include <string>
-#include <vector>
 
 namespace liestat::experiments {
-
-/// Where a body was, and the biases of its sensor.
-struct GroundTruth {
-  double time = 0;  ///< s, since the start of the recording
-  SE23d state;      ///< world_T_body with the velocity in the world
-  ImuBias<double> bias;
-};
-
-/// The state at a time, between its two neighbours: linear, and along the geodesic of the rotations. Empty outside of
-/// the rows and where these are more than 0.1 s apart. `truth` ascends in time.
-std::optional<GroundTruth> truthAt(const std::vector<GroundTruth>& truth, double time);
 
 /// Noise densities of an ADIS16448, the sensor of EuRoC's recordings, as its data sheet and EuRoC's calibration say.
 inline constexpr ImuNoise<double> adis16448{

@@ -1,7 +1,7 @@
 // Pairs of points a, b = R a with noise in both: the rotation as nine numbers under R Rᵀ = I, and as a point of SO(3).
 #pragma once
 
-#include <lie/detail/trig.hpp>
+#include <lie/linear.hpp>
 #include <lie/so3.hpp>
 #include <stats/constrained.hpp>
 #include <stats/random.hpp>
@@ -43,7 +43,7 @@ struct Rotates {
     EquationDerivatives<3, 3, 6> result;
     const Eigen::Matrix3d M = R.matrix();
     result.value = (*this)(R, m);
-    result.by_parameter = M * liestat::detail::skew(Eigen::Vector3d(m.head<3>()));
+    result.by_parameter = M * skew(Eigen::Vector3d(m.head<3>()));
     result.by_measurement << -M, Eigen::Matrix3d::Identity();
     return result;
   }

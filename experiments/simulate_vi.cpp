@@ -46,7 +46,7 @@ SplineTrajectory builtInTrajectory(double duration, std::uint64_t seed) {
     Eigen::Vector3d amplitude;
     double rate, phase;
   };
-  CounterRng rng(seed, 0, detail::motion_stream);
+  CounterRng rng(seed, 0, motion_stream);
   // Sines whose second (or first) derivatives have this RMS on each axis in the mean.
   const auto waves = [&](int count, double rms, double highest, int derivatives) {
     std::vector<Wave> list;
@@ -103,7 +103,7 @@ SimulatedRecording simulateMotion(const SplineTrajectory& motion, double begin, 
   recording.camera = camera;
   recording.noise = imu.noise;
 
-  CounterRng rng(scene.seed, 0, detail::imu_stream);
+  CounterRng rng(scene.seed, 0, imu_stream);
   std::vector<ImuBias<double>> biases;
   ImuBias<double> bias = imu.bias;
   const auto add = [&](Eigen::Vector3d& v, double deviation) { v += deviation * rng.normalVector<3>(); };
@@ -149,7 +149,7 @@ SimulatedRecording simulateMotion(const SplineTrajectory& motion, double begin, 
     }
     recording.truth.push_back(row);
   }
-  detail::addImages(poses, scene, recording);
+  addImages(poses, scene, recording);
   return recording;
 }
 
@@ -195,7 +195,7 @@ SimulatedRecording simulateImages(const std::vector<ImuSample<double>>& imu, con
     recording.image_times.push_back(recording.truth[row].time);
     poses.push_back(poseOf(recording.truth[row].state));
   }
-  detail::addImages(poses, scene, recording);
+  addImages(poses, scene, recording);
   return recording;
 }
 

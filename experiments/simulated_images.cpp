@@ -11,7 +11,7 @@
 #include <optional>
 #include <utility>
 
-namespace liestat::experiments::detail {
+namespace liestat::experiments {
 namespace {
 
 /// Follows landmarks from image to image.
@@ -162,4 +162,4 @@ void addImages(const std::vector<SE3d>& world_T_body, const ViSceneOptions& opti
   Tracker(world_T_cam, options, recording).run();
 }
 
-}  // namespace liestat::experiments::detail
+}  // namespace liestat::experiments

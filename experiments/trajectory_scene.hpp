@@ -2,7 +2,7 @@
 // with position fixes. For tests, the ledger of convention bugs and an example.
 #pragma once
 
-#include <lie/detail/small_matrix.hpp>
+#include <lie/linear.hpp>
 #include <lie/se3.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/random.hpp>
@@ -44,8 +44,6 @@ struct TrajectoryScene {
     return poses;
   }
 };
-
-namespace detail {
 
 inline SE3d scenePose(SceneMotion motion, const Eigen::Matrix<double, 12, 1>& phase, double t) {
   const auto wave = [&](int k, double frequency) { return std::sin(frequency * t + phase[k]); };
@@ -103,13 +101,11 @@ inline TrajectoryScene emptyScene(const TrajectorySceneOptions& o, CounterRng& r
   return scene;
 }
 
-}  // namespace detail
-
 /// Poses with errors independent of each other.
 inline TrajectoryScene independentScene(const TrajectorySceneOptions& o, CounterRng& rng) {
-  TrajectoryScene scene = detail::emptyScene(o, rng);
+  TrajectoryScene scene = emptyScene(o, rng);
   for (const SE3d& T : scene.truth) {
-    const Eigen::Matrix<double, 6, 6> covariance = detail::sceneCovariance(o, rng);
+    const Eigen::Matrix<double, 6, 6> covariance = sceneCovariance(o, rng);
     const SE3d error = sample(Gaussian<SE3d>{SE3d(), covariance}, rng);
     scene.estimate.push_back({T * error.inverse(), covariance});
   }
@@ -120,13 +116,13 @@ inline TrajectoryScene independentScene(const TrajectorySceneOptions& o, Counter
 /// is measured at each such pose (sigma: that of a step times three) and fused.
 inline TrajectoryScene deadReckoningScene(const TrajectorySceneOptions& o, CounterRng& rng, std::size_t fix_every = 0) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  TrajectoryScene scene = detail::emptyScene(o, rng);
-  Matrix6 covariance = detail::sceneCovariance(o, rng);
+  TrajectoryScene scene = emptyScene(o, rng);
+  Matrix6 covariance = sceneCovariance(o, rng);
   SE3d pose = scene.truth[0] * sample(Gaussian<SE3d>{SE3d(), covariance}, rng).inverse();
   scene.estimate.push_back({pose, covariance});
   for (std::size_t i = 1; i < o.n; ++i) {
     const SE3d motion = scene.truth[i - 1].inverse() * scene.truth[i];
-    const Matrix6 step = detail::sceneCovariance(o, rng);
+    const Matrix6 step = sceneCovariance(o, rng);
     const SE3d measured = motion * sample(Gaussian<SE3d>{SE3d(), step}, rng).inverse();
     pose = pose * measured;
     const Matrix6 A = measured.inverse().Adj();
@@ -138,8 +134,7 @@ inline TrajectoryScene deadReckoningScene(const TrajectorySceneOptions& o, Count
       Eigen::Matrix<double, 3, 6> H = Eigen::Matrix<double, 3, 6>::Zero();
       H.leftCols<3>() = R;
       const Eigen::Matrix3d S = H * covariance * H.transpose() + sigma * sigma * Eigen::Matrix3d::Identity();
-      const Eigen::Matrix<double, 6, 3> K =
-          covariance * H.transpose() * liestat::detail::Cholesky<double, 3>(S).inverse();
+      const Eigen::Matrix<double, 6, 3> K = covariance * H.transpose() * Cholesky<double, 3>(S).inverse();
       pose = pose * SE3d::exp(Eigen::Matrix<double, 6, 1>(K * z));
       const Matrix6 left = Matrix6::Identity() - K * H;
       covariance = left * covariance * left.transpose() + sigma * sigma * K * K.transpose();

@@ -85,7 +85,7 @@ Eigen::Matrix3d homographyOfThree(const Eigen::Matrix3d& F, std::span<const Eige
 /// estimation unaffected by a dominant plane, CVPR 2005): the planes of five triplets are enough to look at.
 bool isDegenerate(const Eigen::Matrix3d& F, const std::vector<Eigen::Vector4d>& sample, const MatchNoise& noise) {
   constexpr std::size_t triplets[5][3] = {{0, 1, 2}, {3, 4, 5}, {0, 1, 6}, {3, 4, 6}, {2, 5, 6}};
-  const double threshold = liestat::detail::errorThresholds(0.01)[2];
+  const double threshold = -2 * std::log(0.01);  // that χ² of two degrees of freedom exceeds in one of a hundred cases
   for (const auto& triplet : triplets) {
     const Eigen::Vector4d* three[] = {&sample[triplet[0]], &sample[triplet[1]], &sample[triplet[2]]};
     const Eigen::Matrix3d H = homographyOfThree(F, three);

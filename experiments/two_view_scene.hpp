@@ -20,7 +20,7 @@
 // order of the matches from stream 2.
 #pragma once
 
-#include <lie/detail/trig.hpp>
+#include <lie/linear.hpp>
 #include <lie/so3.hpp>
 #include <lie/units.hpp>
 #include <stats/random.hpp>
@@ -306,7 +306,7 @@ class TwoViewScene {
       if (options.motion != TwoViewMotion::affine_epipolar) {
         const Eigen::Vector3d first(1 / focal_scale, 1 / focal_scale, 1),
             second(1 / (focal_scale * focal_ratio), 1 / (focal_scale * focal_ratio), 1);
-        F = second.asDiagonal() * liestat::detail::skew(t) * R * first.asDiagonal();
+        F = second.asDiagonal() * skew(t) * R * first.asDiagonal();
       }
       F *= std::sqrt(2.) / F.norm();
     }

@@ -1,6 +1,6 @@
 #include <experiments/vi_init_evaluation.hpp>
 
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 #include <stats/executor.hpp>
 #include <stats/inference.hpp>
 #include <stats/validation.hpp>

@@ -10,12 +10,12 @@
 #pragma once
 
 #include <fusion/hand_eye.hpp>
+#include <fusion/hand_eye_types.hpp>
 #include <stats/conventions.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/propagation.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -24,29 +24,6 @@
 #include <vector>
 
 namespace liestat {
-
-/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
-/// covariance of the inverse pose is one of `left`.
-enum class CovarianceReading {
-  right,                      ///< T·Exp(e), translation before rotation: the library's own
-  left,                       ///< Exp(e)·T, or T⁻¹·Exp(e)
-  rotation_then_translation,  ///< T·Exp(e) with the rotation's block first
-  world_axes                  ///< rotation and translation each along the axes of the world
-};
-inline constexpr std::array all_covariance_readings = {CovarianceReading::right, CovarianceReading::left,
-                                                       CovarianceReading::rotation_then_translation,
-                                                       CovarianceReading::world_axes};
-
-/// How a file's poses and covariances are to be read.
-struct PoseReading {
-  CovarianceReading covariance = CovarianceReading::right;
-  bool inverted = false;  ///< the wanted pose is the inverse of the given one; the covariance goes with it
-  friend bool operator==(const PoseReading&, const PoseReading&) = default;
-};
-struct HandEyeReading {
-  PoseReading a, b;
-  friend bool operator==(const HandEyeReading&, const HandEyeReading&) = default;
-};
 
 /// The pose that is meant, with its covariance in the library's convention.
 inline Gaussian<SE3d> readPose(const Gaussian<SE3d>& given, const PoseReading& reading) {
@@ -75,15 +52,6 @@ struct HandEyeHintOptions {
   /// True if the covariances may have been meant otherwise; false where they come from a model and not from a file.
   bool doubt_a = true, doubt_b = true;
   HandEyeOptions estimate = {};  ///< options of the estimate
-};
-
-/// Another reading that fits.
-struct HandEyeHint {
-  HandEyeReading reading;
-  double chi2_per_degree = 0;  ///< with covariances as given
-  double p = 0;                ///< probability of a χ² as large; NaN where the noise is not known
-  std::size_t outliers = 0;
-  bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
 };
 
 /// True where the residuals ask for an explanation: `inconsistent`, not converged, χ²/dof of 5 or more, or more than a

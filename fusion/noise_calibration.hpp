@@ -50,6 +50,25 @@ struct NoiseCalibration {
   std::size_t degrees_of_freedom = 0;     ///< degrees of freedom of both χ²
 };
 
+template <class V>
+void describe(V& v, const NoiseFactor& x) {
+  v("factor", x.factor)("low", x.low)("high", x.high);
+}
+
+template <class V>
+void describe(V& v, const ImuNoise<double>& x) {
+  v("gyroscope", x.gyroscope, "", "rad/s/√Hz")("accelerometer", x.accelerometer, "", "m/s²/√Hz");
+  v("gyroscope_walk", x.gyroscope_walk, "", "rad/s²/√Hz")("accelerometer_walk", x.accelerometer_walk, "", "m/s³/√Hz");
+}
+
+template <class V>
+void describe(V& v, const NoiseCalibration& x) {
+  v("status", name(x.status))("windows", x.windows)("meetings", x.meetings)("chi2", x.chi2);
+  v("calibrated_chi2", x.calibrated_chi2)("degrees_of_freedom", x.degrees_of_freedom)("common", x.common);
+  v("common_p", x.common_p)("separable", x.separable)("gyroscope", x.gyroscope)("accelerometer", x.accelerometer);
+  v("noise", x.noise);
+}
+
 /// Calibrates the densities of a recording's inertial sensor by its windows. Options as for initialiseRecording();
 /// `progress(done, all)` counts windows, and then passes over all of them.
 NoiseCalibration calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,

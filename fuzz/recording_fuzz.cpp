@@ -68,7 +68,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto truth = liestat::cli::parseGroundTruth(text, "fuzz", start_ns);
     require(!truth.empty() && truth.front().time == 0);
     for (const auto& row : truth) require(row.state.params().allFinite() && std::isfinite(row.time));
-    const auto at = liestat::cli::truthAt(truth, 0.5 * truth.back().time);
+    const auto at = liestat::truthAt(truth, 0.5 * truth.back().time);
     require(!at || at->state.params().allFinite());
   });
   const std::size_t dots = text.find("\n...\n");

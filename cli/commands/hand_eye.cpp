@@ -170,7 +170,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     writeJson(options.json, object);
   }
   if (!options.report.empty()) writeHandEyeReport(options.report, invocation.command_line, output);
-  return output.result.ok() ? exit_fine : exit_not_trusted;
+  return output.result.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
 }  // namespace

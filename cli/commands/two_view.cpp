@@ -80,7 +80,7 @@ int runSeveral(const Options& options, const TwoViewMotionOptions& estimate, Two
     writeJson(options.json, object);
   }
   if (!options.report.empty()) writeTwoViewMotionsReport(options.report, invocation.command_line, output);
-  return output.motions.status == Status::ok && !output.motions.structures.empty() ? exit_fine : exit_not_trusted;
+  return output.motions.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
@@ -89,9 +89,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   output.matches = readMatches(options.file);
   TwoViewMotionOptions estimate = options.estimate;
   takeCameras(options, estimate);
-  output.sigma = estimate.sigma;
-  if (options.motions > 1)
-    return runSeveral(options, estimate, {output.file, output.matches, output.sigma, {}}, invocation);
+  if (options.motions > 1) return runSeveral(options, estimate, {output.file, output.matches, {}}, invocation);
   output.estimate = estimateTwoViewMotion(output.matches, estimate);
   if (options.json != "-") printLines(formatTwoViewMotion(output));
   if (!options.json.empty()) {
@@ -100,7 +98,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     writeJson(options.json, object);
   }
   if (!options.report.empty()) writeTwoViewMotionReport(options.report, invocation.command_line, output);
-  return output.estimate.ok() ? exit_fine : exit_not_trusted;
+  return output.estimate.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
 }  // namespace

@@ -10,11 +10,13 @@
 #include <experiments/interruption.hpp>
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
+#include <fusion/visual_inertial_truth.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -145,7 +147,13 @@ int runCommand(const Options& options, const Invocation& invocation) {
     return exit_interrupted;
   }
   refuseFault(found, measured, recording.imu.start_ns, how, command_name);
-  ViInitResult result = compareWithTruth(std::move(found), recording, how.initialisation.gravity);
+  ViInitResult result;
+  static_cast<ComparedRecording&>(result) =
+      compareWithTruth(std::move(found), measured.image_times, recording.truth, how.initialisation.gravity);
+  // The file's numbers.
+  for (ComparedWindow& w : result.windows) {
+    for (std::uint64_t& track : w.track_names) track = recording.tracks.track_ids[track];
+  }
   result.biases_given = options.known_biases || options.true_biases;
   result.noise = noise;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
@@ -157,7 +165,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
   if (result.windows_left > 0) return exit_interrupted;
-  return result.trusted() ? exit_fine : exit_not_trusted;
+  return result.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <experiments/recording.hpp>
+#include <fusion/imu/ground_truth.hpp>
 #include <fusion/imu/readings.hpp>
 
 #include <cstddef>
@@ -29,9 +29,6 @@ struct ImuFile {
 ImuFile readImu(const std::string& path);
 /// The same from memory.
 ImuFile parseImu(std::string_view text, std::string name);
-
-using experiments::GroundTruth;
-using experiments::truthAt;
 
 /// Reads EuRoC's ground truth: timestamp [ns], p x y z, q w x y z, v x y z and, if there, b_w x y z, b_a x y z. Throws
 /// InputError.

@@ -12,7 +12,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,96 +22,19 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// One of the two unknown poses, with the directions of its parent's frame in which it may be moved without a rotation.
-struct Unknown {
-  const char* symbol;
-  const char *parent, *child;
-  const Gaussian<SE3d>& pose;
-  bool rotation_is_open;
-  std::vector<Eigen::Vector3d> open;
-
-  std::string name() const { return fmt::format("{}_T_{}", parent, child); }
-  const SE3d& mean() const { return pose.mean; }
-  bool hasCovariance() const { return !rotation_is_open && pose.covariance.allFinite(); }
-
-  /// From a local error to translation (m, along the parent's axes) and rotation vector (rad), as they are printed.
-  Matrix6 toCoordinates() const {
-    Matrix6 J = Matrix6::Zero();
-    J.topLeftCorner<3, 3>() = mean().so3().matrix();
-    J.bottomRightCorner<3, 3>() = SO3d::rightJacobianInverse(mean().so3().log());
-    return J;
-  }
-  Matrix6 covarianceOfCoordinates() const {
-    const Matrix6 J = toCoordinates();
-    return J * pose.covariance * J.transpose();
-  }
-  /// Standard deviations; NaN where there is none, and along axes in which an open direction has a component.
-  Vector6 sigmasOfCoordinates() const {
-    return sigmas(covarianceOfCoordinates(), Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
-  }
-  Vector6 localSigmas() const { return sigmas(pose.covariance, mean().so3().inverse().matrix()); }
-
- private:
-  Vector6 sigmas(const Matrix6& covariance, const Eigen::Matrix3d& from_parent) const {
-    if (!hasCovariance()) return Vector6::Constant(nan);
-    constexpr double share = 1e-3;
-    Vector6 result = covariance.diagonal().cwiseSqrt();
-    for (const Eigen::Vector3d& direction : open) {
-      const Eigen::Vector3d moved = from_parent * direction;
-      for (int i = 0; i < 3; ++i) {
-        if (std::abs(moved[i]) > share * moved.norm()) result[i] = nan;
-      }
-    }
-    return result;
-  }
-};
-
-std::vector<Unknown> unknownsOf(const HandEyeResult& r) {
-  std::vector<Unknown> list = {{"X", "gripper", "camera", r.X, r.rotationIsOpen(), {}}};
-  if (r.world) list.push_back({"Y", "base", "target", r.Y, r.rotationIsOpen(), {}});
-  for (const OpenDirection& d : r.directions) {
-    list[0].open.push_back(d.twist.head<3>());
-    if (r.world) list[1].open.push_back(d.twist_of_Y.head<3>());
-  }
-  return list;
-}
-
-const char* verdictOf(const HandEyeResult& r) {
-  switch (r.status) {
-    case FusionStatus::ok:
-      return r.world ? "X and Y are determined" : "X is determined";
-    case FusionStatus::undetermined:
-      return "the motions do not determine X";
-    case FusionStatus::ambiguous:
-      return "two solutions explain the pairs";
-    case FusionStatus::inconsistent:
-      return "the residuals are larger than the covariances of the poses say";
-    case FusionStatus::not_converged:
-      return "the iterations ended before the estimate stayed";
-    default:
-      return describe(r.status);
-  }
-}
-std::string verdict(const HandEyeResult& r) {
-  return r.ok() ? fmt::format("ok: {}\n", verdictOf(r))
-                : fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(r.status), verdictOf(r));
-}
-
 std::string fixed(double value) {
   const std::string text = std::isfinite(value) ? fmt::format("{:.5f}", value) : "n/a";
   return text == "-0.00000" ? "0.00000" : text;
 }
 
 const std::vector<std::string> pose_headers{"", "x", "y", "z", "unit"};
-std::vector<std::vector<std::string>> poseRows(const Unknown& unknown) {
-  const Vector6 sigma = unknown.sigmasOfCoordinates();
-  const Eigen::Vector3d t = unknown.mean().translation(), r = degrees * unknown.mean().so3().log();
+std::vector<std::vector<std::string>> poseRows(const CalibratedPose& unknown) {
+  const Vector6 sigma = unknown.sigmas;
+  const Eigen::Vector3d t = unknown.pose.mean.translation(), r = degrees * unknown.pose.mean.so3().log();
   const auto row = [](const std::string& title, const auto& v, const char* unit, auto&& cell) {
     return std::vector<std::string>{title, cell(v[0]), cell(v[1]), cell(v[2]), unit};
   };
-  const bool none = !unknown.hasCovariance() && !unknown.rotation_is_open;
+  const bool none = !unknown.has_covariance && !unknown.rotation_is_open;
   const auto sigmas = [none](double x) {
     return std::isfinite(x) ? fmt::format("{:.2g}", x) : std::string(none ? "n/a" : "open");
   };
@@ -280,61 +202,24 @@ std::string hintInWords(const HandEyeOutput& output) {
   return text + (hint.agrees ? fmt::format("the residuals agree ({})\n", figures)
                              : fmt::format("the residuals are far smaller ({})\n", figures));
 }
-std::string answer(const HandEyeOutput& output) { return verdict(output.result) + hintInWords(output); }
+std::string answer(const HandEyeOutput& output) { return output.result.verdict().text + "\n" + hintInWords(output); }
 std::string rest(const HandEyeOutput& output) {
   return fitInWords(output) + directionsInWords(output) + rivalInWords(output.result) + outliersInWords(output);
 }
 
 // --- JSON -----------------------------------------------------------------------------------------------------------
 
-JsonObject sigmasJson(const Vector6& sigma, const char* rotation) {
-  JsonObject o;
-  return o.set("translation_m", Eigen::Vector3d(sigma.head<3>()))
-      .set(rotation, Eigen::Vector3d(degrees * sigma.tail<3>()));
-}
-JsonObject poseJson(const SE3d& pose) {
-  JsonObject o;
-  Eigen::Vector4d q = pose.so3().params();
-  if (q[3] < 0) q = -q;
-  return o.set("translation", Eigen::Vector3d(pose.translation()))
-      .set("quaternion_xyzw", q)
-      .set("rotation_vector", Eigen::Vector3d(pose.so3().log()));
-}
-template <int N>
-void setCovariance(JsonObject& o, const char* field, const Eigen::Matrix<double, N, N>& covariance, bool is_there) {
-  if (is_there) {
-    o.set(field, covariance);
-  } else {
-    o.set(field, nullptr);
-  }
-}
-JsonObject toJson(const Unknown& unknown) {
-  JsonObject o = poseJson(unknown.mean());
-  setCovariance<6>(o, "covariance", unknown.pose.covariance, unknown.hasCovariance());
-  o.set("covariance_frame", fmt::format("the {}'s axes at its origin: {} Exp(e)", unknown.child, unknown.name()));
-  o.set("standard_deviations", sigmasJson(unknown.sigmasOfCoordinates(), "rotation_vector_deg"));
-  return o.set("standard_deviations_local", sigmasJson(unknown.localSigmas(), "rotation_deg"));
-}
 JsonObject toJson(const HandEyeFile& file) {
   JsonObject o;
   o.set("file", file.path).set("rows", file.rows).set("unmatched", file.unmatched).set("inverted", file.inverted);
   o.set("noise", file.noise == PoseNoise::columns ? "columns" : file.noise == PoseNoise::option ? "option" : "assumed");
   if (file.noise == PoseNoise::columns) return o.set("sigma", nullptr);
-  return o.set("sigma", sigmasJson(file.sigma, "rotation_deg"));
-}
-JsonObject toJson(const OpenDirection& d, bool world) {
-  JsonObject o;
-  o.set("excitation", d.excitation).set("weak", d.weak).set("twist", d.twist).set("frame", "gripper");
-  if (world) o.set("twist_of_Y", d.twist_of_Y).set("frame_of_Y", "base");
-  return o.set("description", describe(d, "gripper")).set("rotates", d.rotates);
+  return o("sigma", PoseSigmas{file.sigma});
 }
 JsonObject toJson(const PoseRows& rows, const PairFit& fit) {
   JsonObject o;
   o.set("row_a", rows.a + 1).set("row_b", rows.b + 1).set("line_a", rows.line_a).set("line_b", rows.line_b);
-  o.set("time", rows.time);
-  o.set("error_translation", Eigen::Vector3d(fit.error.head<3>()));
-  o.set("error_rotation", Eigen::Vector3d(fit.error.tail<3>()));
-  return o.set("chi2", fit.chi2).set("inlier", fit.inlier);
+  return o.set("time", rows.time).fieldsOf(fit);
 }
 const char* nameOf(CovarianceReading reading) {
   constexpr const char* names[] = {"right", "left", "rotation_first", "world_axes"};
@@ -411,10 +296,10 @@ Plot excitationPlot(const HandEyeOutput& output) {
           .panels = {panel}};
 }
 /// The planes of X's covariance in which no open direction lies.
-Plot covariancePlot(const Unknown& X, bool rotation) {
+Plot covariancePlot(const CalibratedPose& X, bool rotation) {
   constexpr double chi2_95 = 5.991464547107979;  // two degrees of freedom
-  const Matrix6 covariance = X.covarianceOfCoordinates();
-  const Vector6 sigma = X.sigmasOfCoordinates();
+  const Matrix6 covariance = X.covariance_of_coordinates;
+  const Vector6& sigma = X.sigmas;
   const double scale = rotation ? degrees : 1e3;
   const int first = rotation ? 3 : 0;
   const std::array axes{"x", "y", "z"};
@@ -443,48 +328,27 @@ Plot covariancePlot(const Unknown& X, bool rotation) {
 std::string formatHandEye(const HandEyeOutput& output) {
   const HandEyeResult& r = output.result;
   std::string text = answer(output) + "\n";
-  for (const Unknown& unknown : unknownsOf(r)) {
+  for (const CalibratedPose& unknown : calibratedPoses(r)) {
     Table table({fmt::format("{} = {}", unknown.symbol, unknown.name()), "x", "y", "z", "unit"});
     for (const auto& row : poseRows(unknown)) table.row(row);
-    text += table.str() + quaternionOf(unknown.mean()) + "\n\n";
+    text += table.str() + quaternionOf(unknown.pose.mean) + "\n\n";
   }
   return text + summary(output) + rest(output);
 }
 
 void setHandEye(JsonObject& object, const HandEyeOutput& output) {
-  const HandEyeResult& r = output.result;
-  object.set("status", liestat::name(r.status)).set("ok", r.ok()).set("in_words", verdictOf(r));
-  object.set("problem", r.world ? "AX = YB" : "AX = XB");
-  const std::vector<Unknown> unknowns = unknownsOf(r);
-  for (const Unknown& unknown : unknowns) object.set(unknown.symbol, toJson(unknown));
-  if (!r.world) object.set("Y", nullptr);
-  object.set("covariance_order", "translation rotation").set("covariance_side", "right");
-  object.set("covariance_frame",
-             "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known");
-  if (r.world) {
-    setCovariance<12>(object, "joint_covariance", r.covariance, unknowns.front().hasCovariance());
-    object.set("joint_covariance_order", "X translation, X rotation, Y translation, Y rotation");
-  } else {
-    object.set("joint_covariance", nullptr).set("joint_covariance_order", nullptr);
-  }
-  object.set("chi2", r.chi2).set("degrees_of_freedom", r.degrees_of_freedom).set("p", r.p);
-  object.set("variance_factor", r.variance_factor).set("noise", output.options.known_noise ? "given" : "scaled");
-  object.set("excitations", r.excitations);
-  std::vector<JsonObject> directions, pairs;
-  for (const OpenDirection& d : r.directions) directions.push_back(toJson(d, r.world));
-  object.set("open_directions", directions);
-  object.set("rival", r.rival ? std::optional(poseJson(*r.rival)) : std::nullopt);
-  object.set("starts", static_cast<std::int64_t>(r.starts));
-  std::vector<JsonObject> hints;
+  object.fieldsOf(output.result);
+  std::vector<JsonObject> hints, pairs;
   if (output.hint) hints.push_back(toJson(*output.hint, output));
   object.set("hints", hints).set("notes", output.notes);
   object.set("A", toJson(output.a)).set("B", toJson(output.b));
   object.set("association", output.by_time ? "time" : "row");
   object.set("tolerance", output.by_time ? std::optional(output.tolerance) : std::nullopt);
   object.set("largest_gap", output.by_time ? std::optional(output.largest_gap) : std::nullopt);
-  for (std::size_t i = 0; i < r.pairs.size(); ++i) pairs.push_back(toJson(output.rows[i], r.pairs[i]));
-  std::vector<double> outliers(r.outliers.begin(), r.outliers.end());
-  object.set("outliers", outliers).set("pairs", pairs);
+  for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
+    pairs.push_back(toJson(output.rows[i], output.result.pairs[i]));
+  }
+  object.set("pairs", pairs);
 }
 
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {
@@ -493,17 +357,17 @@ void writeHandEyeReport(const std::string& directory, const std::string& command
   report.verdict(r.ok(), answer(output));
   report.code(command_line);
   report.section("Result");
-  const std::vector<Unknown> unknowns = unknownsOf(r);
-  for (const Unknown& unknown : unknowns) {
+  const std::vector<CalibratedPose> unknowns = calibratedPoses(r);
+  for (const CalibratedPose& unknown : unknowns) {
     report.table(pose_headers, poseRows(unknown),
-                 fmt::format("{} = {}; {}", unknown.symbol, unknown.name(), quaternionOf(unknown.mean())));
+                 fmt::format("{} = {}; {}", unknown.symbol, unknown.name(), quaternionOf(unknown.pose.mean)));
   }
   report.code(summary(output) + rest(output));
   report.section("Residuals");
   report.plot(residualPlot(output));
   report.section("What the motions determine");
   report.plot(excitationPlot(output));
-  if (!unknowns.front().hasCovariance()) {
+  if (!unknowns.front().has_covariance) {
     report.paragraph("X has no covariance.");
   } else {
     for (const bool rotation : {false, true}) {

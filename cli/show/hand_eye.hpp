@@ -2,8 +2,7 @@
 
 #include <cli/io/pose_pairs.hpp>
 #include <cli/show/json.hpp>
-#include <fusion/hand_eye.hpp>
-#include <fusion/hand_eye_hints.hpp>
+#include <fusion/hand_eye_types.hpp>
 
 #include <cstddef>
 #include <optional>

@@ -3,7 +3,7 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
@@ -103,7 +103,7 @@ struct Component {
     // A frame that hardly says anything would take the scale.
     Extents seen = usable;
     if (!sigmas.empty() && seen.low <= seen.high) {
-      const double most = experiments::quantile(sigmas, 0.95);
+      const double most = liestat::quantile(sigmas, 0.95);
       seen.low -= most, seen.high += most;
     }
     seen.set(panel.y);
@@ -485,7 +485,7 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
     points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : no_value);
   }
   // Points far behind the rest would leave it no room.
-  const double most = depths.empty() ? 1 : 1.6 * experiments::quantile(depths, 0.9);
+  const double most = depths.empty() ? 1 : 1.6 * liestat::quantile(depths, 0.9);
   along.add(0);
   for (std::size_t k = 0; k < ways.x.size(); ++k) {
     if (ways.y[k] > 0 && ways.y[k] < most) across.add(ways.x[k]), along.add(ways.y[k]);
@@ -543,7 +543,7 @@ Plot distancesPlot(const MotionWindowRuns& runs) {
   }
   if (changes.empty()) return plot;
   // Points near infinity would leave the rest no room.
-  const double most = std::max(1.0, 1.3 * experiments::quantile(changes, 0.97));
+  const double most = std::max(1.0, 1.3 * liestat::quantile(changes, 0.97));
   for (Panel& panel : plot.panels) panel.y.low = -most, panel.y.high = most;
   return plot;
 }

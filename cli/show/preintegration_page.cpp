@@ -4,7 +4,7 @@
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 #include <stats/laws.hpp>
 
 #include <fmt/format.h>
@@ -27,61 +27,30 @@ constexpr std::size_t most_rows = 200;
 struct IncrementPart {
   const char *name, *unit;
   double scale;
-  double IncrementDeviations::*deviation;
+  double IncrementSigmas::*sigma;
   int begin;  ///< of its block in the nine coordinates
 };
-constexpr std::array increment_parts{IncrementPart{"rotation", "deg", degrees, &IncrementDeviations::rotation, 3},
-                                     IncrementPart{"velocity", "m/s", 1, &IncrementDeviations::velocity, 6},
-                                     IncrementPart{"position", "m", 1, &IncrementDeviations::position, 0}};
+constexpr std::array increment_parts{IncrementPart{"rotation", "deg", degrees, &IncrementSigmas::rotation, 3},
+                                     IncrementPart{"velocity", "m/s", 1, &IncrementSigmas::velocity, 6},
+                                     IncrementPart{"position", "m", 1, &IncrementSigmas::position, 0}};
 
-std::size_t countOk(const PreintegrationResult& result) {
-  return static_cast<std::size_t>(std::count_if(result.windows.begin(), result.windows.end(),
-                                                [](const PreintegratedWindow& w) { return w.result.ok(); }));
-}
-
-/// The errors against the truth as the covariances see them.
-struct DistancesToTruth {
-  double mean = 0;
-  std::size_t n = 0;
-  double p = 1;  ///< probability of so large a mean, if the noise of the calibration is true
-};
-DistancesToTruth distancesOf(const PreintegrationResult& result) {
-  DistancesToTruth d;
-  double sum = 0;
-  for (const PreintegratedWindow& w : result.windows) {
-    if (w.error && result.with_noise) sum += w.squared_distance, ++d.n;
-  }
-  if (d.n == 0) return d;
-  d.mean = sum / static_cast<double>(d.n);
-  // Windows do not overlap, and neither does their noise.
-  d.p = chiSquaredSurvival(sum, 9 * static_cast<double>(d.n));
-  return d;
-}
-constexpr double distance_false_alarm = 1e-5;
-
-bool isGood(const PreintegrationResult& result) {
-  return countOk(result) == result.windows.size() && !(distancesOf(result).p < distance_false_alarm);
-}
-
-std::string preintegrationVerdict(const PreintegrationResult& result) {
-  const std::size_t ok = countOk(result), all = result.windows.size();
+/// The verdict in words, beside which windows have an increment.
+std::string preintegrationVerdict(const RecordingWindows& result) {
+  const std::size_t ok = result.okWindows(), all = result.windows.size();
   if (ok == 0) return "NOT TO BE TRUSTED: no window has an increment, as the readings have faults.";
-  const DistancesToTruth distances = distancesOf(result);
-  std::string text;
-  if (ok < all) {
-    text = fmt::format("INCOMPLETE: {} of {} windows have no increment, as the readings have faults.", all - ok, all);
-  } else {
-    text = isGood(result) ? "ok: " : "INCONSISTENT with the truth: ";
-    text += all == 1 ? "the window has an increment" : fmt::format("all of the {} windows have an increment", all);
-    text += isGood(result) ? "." : ", but the errors are larger than the noise of the calibration explains.";
-  }
-  if (distances.n > 0) {
-    text += fmt::format(" The squared distance to the truth is {} in the mean, 9 expected.", number(distances.mean));
-  }
+  std::string text =
+      ok < all
+          ? fmt::format("INCOMPLETE: {} of {} windows have no increment, as the readings have faults.", all - ok, all)
+      : all == 1 ? "ok: the window has an increment."
+                 : fmt::format("ok: all of the {} windows have an increment.", all);
+  if (!result.with_truth) return text;
+  const Verdict verdict = result.verdict();
+  text = verdict.isNo() ? verdict.text + "." + (ok < all ? " " + text : "") : text + " " + verdict.text + ".";
+  for (const std::string& cause : verdict.causes) text += " " + cause + ".";
   return text;
 }
 
-void showWindows(Report& report, const PreintegrationResult& result) {
+void showWindows(Report& report, const RecordingWindows& result) {
   report.section("Windows");
   std::vector<std::string> headers = preintegrationHeaders(result);
   // A page has the room for the units that the terminal leaves out.
@@ -100,8 +69,8 @@ void showWindows(Report& report, const PreintegrationResult& result) {
   if (!remarks.empty()) report.code(remarks.substr(remarks.find_first_not_of('\n')));
 }
 
-void showIncrements(Report& report, const PreintegrationResult& result) {
-  if (countOk(result) < 2) return;
+void showIncrements(Report& report, const RecordingWindows& result) {
+  if (result.okWindows() < 2) return;
   report.section("Increments");
   // Bars of more windows would cover each other.
   const bool bars = result.with_noise && result.windows.size() <= 1000;
@@ -111,15 +80,15 @@ void showIncrements(Report& report, const PreintegrationResult& result) {
             .columns = 3};
   for (const IncrementPart& part : increment_parts) {
     Series points{.style = bars ? Style::errorbars : Style::points};
-    for (const PreintegratedWindow& w : result.windows) {
-      if (!w.result.ok()) continue;
+    for (const RecordingWindow& w : result.windows) {
+      if (!w.ok()) continue;
       const SE23d& x = w.result.motion.increment();
       const double length = part.scale * (part.begin == 3   ? x.so3().log().norm()
                                           : part.begin == 6 ? x.velocity().norm()
                                                             : x.translation().norm());
       points.x.push_back(w.begin), points.y.push_back(length);
       if (!bars) continue;
-      const double sd = part.scale * deviationsOf(w.result.motion).*part.deviation;
+      const double sd = part.scale * incrementSigmas(w.result.motion).*part.sigma;
       points.low.push_back(length - sd), points.high.push_back(length + sd);
     }
     plot.panels.push_back({.x = {.label = "beginning of the window, s"},
@@ -144,8 +113,8 @@ void showGrowth(Report& report, const PreintegratedReadings& readings) {
       .columns = 3};
   for (const IncrementPart& part : increment_parts) {
     Series line;
-    for (const IncrementDeviations& d : readings.growth) {
-      line.x.push_back(d.duration), line.y.push_back(part.scale * d.*part.deviation);
+    for (const IncrementSigmas& d : readings.growth) {
+      line.x.push_back(d.duration), line.y.push_back(part.scale * d.*part.sigma);
     }
     plot.panels.push_back({.x = {.label = "duration, s", .low = 0.0},
                            .y = {.label = fmt::format("sd of {}, {}", part.name, part.unit), .low = 0.0},
@@ -154,7 +123,7 @@ void showGrowth(Report& report, const PreintegratedReadings& readings) {
   report.plot(plot);
 }
 
-void showErrors(Report& report, const PreintegrationResult& result) {
+void showErrors(Report& report, const RecordingWindows& result) {
   if (std::none_of(result.windows.begin(), result.windows.end(), [](const auto& w) { return w.error.has_value(); })) {
     return;
   }
@@ -168,7 +137,7 @@ void showErrors(Report& report, const PreintegrationResult& result) {
   for (const IncrementPart& part : increment_parts) {
     for (int k = 0; k < 3; ++k) {
       Series band{.name = "3 sd", .style = Style::filled_curve}, error{.name = "error", .style = Style::points};
-      for (const PreintegratedWindow& w : result.windows) {
+      for (const RecordingWindow& w : result.windows) {
         if (!w.error) continue;
         error.x.push_back(w.begin), error.y.push_back(part.scale * (*w.error)[part.begin + k]);
         if (!result.with_noise) continue;
@@ -188,8 +157,8 @@ void showErrors(Report& report, const PreintegrationResult& result) {
   if (!result.with_noise) return;
   const double low = chiSquaredQuantile(0.025, 9), high = chiSquaredThreshold(0.025, 9);
   Series points{.style = Style::points};
-  for (const PreintegratedWindow& w : result.windows) {
-    if (w.error) points.x.push_back(w.begin), points.y.push_back(w.squared_distance);
+  for (const RecordingWindow& w : result.windows) {
+    if (w.squared_distance) points.x.push_back(w.begin), points.y.push_back(*w.squared_distance);
   }
   Panel panel{.x = {.label = "beginning of the window, s"},
               .y = {.label = "squared distance to the truth", .logarithmic = true},
@@ -224,7 +193,7 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
     }
     before = &s;
   }
-  const double median = experiments::quantile(intervals, 0.5);
+  const double median = liestat::quantile(intervals, 0.5);
   report.table(
       {"readings", "duration, s", "median interval, ms", "median rate, Hz", "largest interval, ms", "at, s", "gaps"},
       {{fmt::format("{}", n), number(readings.end - readings.begin, 6), number(median), number(1000 / median),
@@ -256,9 +225,9 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
 }  // namespace
 
 void writePreintegrationReport(const std::string& directory, const std::string& command_line,
-                               const PreintegrationResult& result, const PreintegratedReadings& readings) {
+                               const RecordingWindows& result, const PreintegratedReadings& readings) {
   Report report(directory, "Preintegrated motions of " + readings.source);
-  report.verdict(isGood(result), preintegrationVerdict(result));
+  report.verdict(result.usable() && result.okWindows() == result.windows.size(), preintegrationVerdict(result));
   report.code(command_line);
   showIncrements(report, result);
   if (readings.growth.size() > 1) showGrowth(report, readings);

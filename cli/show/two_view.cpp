@@ -21,12 +21,10 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// True if the row's model has an estimate.
-bool hasEstimate(const TwoViewModelRow& row) { return row.status != Status::too_few; }
-
-std::string verdictOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
+/// Why a model was not chosen.
+std::string rejectionOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
   const TwoViewModelRow& row = estimate.lattice[m];
-  if (!hasEstimate(row)) return row.draws > 0 ? "nothing found" : "not looked at";
+  if (!row.hasEstimate()) return row.draws > 0 ? "nothing found" : "not looked at";
   std::string verdict;
   if (row.rejection == Rejection::none) {
     verdict = m == estimate.chosen ? "- chosen" : "-";
@@ -42,10 +40,10 @@ std::vector<std::vector<std::string>> latticeRows(const TwoViewMotionEstimate& e
   std::vector<std::vector<std::string>> rows;
   for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
     const TwoViewModelRow& row = estimate.lattice[m];
-    const bool found = hasEstimate(row);
+    const bool found = row.hasEstimate();
     rows.push_back({row.name, fmt::format("{}", row.free_parameters), row.draws > 0 ? fmt::format("{}", row.draws) : "",
                     found ? fmt::format("{}", row.inliers) : "", found ? fmt::format("{:.3f}", row.relevance) : "",
-                    found ? number(row.rms, 3) : "", verdictOf(estimate, m)});
+                    found ? number(row.rms, 3) : "", rejectionOf(estimate, m)});
   }
   return rows;
 }
@@ -62,13 +60,13 @@ std::string latticeTable(const TwoViewMotionEstimate& estimate) {
 }
 
 /// The entries of the matrix, where they are all that is known.
-std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionResult& e, bool homography) {
+std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionResult& e) {
   std::vector<std::vector<std::string>> rows;
   if (e.matrix_covariance.rows() != 9) return rows;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const double variance = e.matrix_covariance(3 * j + i, 3 * j + i);
-      rows.push_back({fmt::format("{}{}{}", homography ? 'H' : 'F', i + 1, j + 1), number(e.matrix(i, j), 6),
+      rows.push_back({fmt::format("{}{}{}", e.equations == 2 ? 'H' : 'F', i + 1, j + 1), number(e.matrix(i, j), 6),
                       number(std::sqrt(variance), 2), "px, norm 1"});
     }
   }
@@ -87,9 +85,9 @@ std::vector<std::vector<std::string>> parameterRows(const PhysicalParameters& ph
   return rows;
 }
 
-std::string summary(const std::string& file, std::size_t matches, double sigma, const TwoViewImageFrame& frame) {
-  std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n", matches, file,
-                                 sigma, frame.image_size.x(), frame.image_size.y());
+std::string summary(const std::string& file, const TwoViewImageFrame& frame) {
+  std::string text = fmt::format("{} matches of {}, noise {:g} px, images of {:.6g} x {:.6g} px\n", frame.matches, file,
+                                 frame.sigma, frame.image_size.x(), frame.image_size.y());
   if (frame.size_from_matches) text += "that size is the bounding box of the matches: --image-size says it better\n";
   if (frame.repeated > 0) text += fmt::format("{} repeat another one, which counts for them\n", frame.repeated);
   if (frame.contradicted > 0) {
@@ -102,16 +100,13 @@ std::string summary(const std::string& file, std::size_t matches, double sigma, 
   }
   return text;
 }
-std::string summary(const TwoViewMotionOutput& output) {
-  return summary(output.file, output.matches.size(), output.sigma, output.estimate);
-}
 std::string answer(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   if (e.lattice.empty()) return "no model\n";
   std::string text = fmt::format("{}: {} of {} matches agree", e.chosenModel().name, e.inliers, output.matches.size());
-  if (hasEstimate(e.chosenModel())) text += fmt::format(", rms {} px", number(e.chosenModel().rms, 3));
+  if (e.chosenModel().hasEstimate()) text += fmt::format(", rms {} px", number(e.chosenModel().rms, 3));
   text += "\n";
-  if (!e.ok()) text += fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(e.status), e.reason);
+  if (const Verdict verdict = e.verdict(); verdict.isNo()) text += verdict.text + "\n";
   return text;
 }
 /// The line above a table of physical parameters where there are two tables.
@@ -119,52 +114,6 @@ std::string headingOf(const TwoViewMotionResult& e, std::size_t i) {
   if (e.physical.size() < 2) return "";
   return i == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
                 : "the other one:\n";
-}
-
-JsonObject toJson(const PhysicalParameters& physical) {
-  JsonObject o;
-  std::vector<double> values(physical.values.begin(), physical.values.end()), deviations;
-  for (std::size_t i = 0; i < physical.size(); ++i) deviations.push_back(physical.deviation(i));
-  return o.set("names", physical.names)
-      .set("units", physical.units)
-      .set("values", values)
-      .set("deviations", deviations)
-      .set("covariance", physical.covariance);
-}
-/// The fields of a motion.
-void setMotion(JsonObject& object, const TwoViewMotionResult& motion, bool homography) {
-  object.set("matrix", motion.matrix);
-  object.set("matrix_acts_on", homography ? "second ~ matrix * first, pixels" : "second' * matrix * first = 0, pixels");
-  if (motion.matrix_covariance.rows() == 9) {
-    object.set("matrix_covariance", motion.matrix_covariance);
-  } else {
-    object.set("matrix_covariance", nullptr);
-  }
-  std::vector<JsonObject> physical;
-  for (const PhysicalParameters& p : motion.physical) physical.push_back(toJson(p));
-  object.set("parameters", physical);
-  if (motion.relative_pose) {
-    const Essentiald& mean = motion.relative_pose->mean;
-    JsonObject pose;
-    pose.set("quaternion_xyzw", Eigen::Vector4d(mean.so3().params()));
-    pose.set("direction", Eigen::Vector3d(mean.direction().unit_vector()));
-    pose.set("covariance", motion.relative_pose->covariance);
-    pose.set("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
-    object.set("second_T_first", pose);
-  } else {
-    object.set("second_T_first", nullptr);
-  }
-}
-JsonObject toJson(const TwoViewMotionEstimate& estimate, std::size_t m) {
-  const TwoViewModelRow& row = estimate.lattice[m];
-  JsonObject o;
-  o.set("model", row.name).set("parents", row.parents).set("free_parameters", row.free_parameters);
-  o.set("equations", row.equations).set("evaluated", row.evaluated).set("draws", row.draws);
-  if (!hasEstimate(row)) return o.set("status", nullptr);
-  o.set("status", name(row.status)).set("inliers", row.inliers).set("relevance", row.relevance);
-  o.set("chi2", row.chi2).set("degrees_of_freedom", row.degrees_of_freedom).set("rms", row.rms);
-  o.set("unsupported", row.unsupported).set("rejection", name(row.rejection));
-  return row.rejected_by.empty() ? o.set("rejected_by", nullptr) : o.set("rejected_by", row.rejected_by);
 }
 
 /// Each match as a line from its first to its second point.
@@ -236,12 +185,12 @@ Plot latticePlot(const TwoViewMotionEstimate& estimate) {
   for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
     const TwoViewModelRow& row = estimate.lattice[m];
     Series& kind = m == estimate.chosen               ? chosen
-                   : !hasEstimate(row)                ? idle
+                   : !row.hasEstimate()               ? idle
                    : row.rejection == Rejection::none ? others
                                                       : rejected;
     kind.x.push_back(at[row.name].x()), kind.y.push_back(at[row.name].y());
     std::string text = row.name;
-    if (hasEstimate(row)) text += fmt::format(": {} inliers, {} px", row.inliers, number(row.rms, 2));
+    if (row.hasEstimate()) text += fmt::format(": {} inliers, {} px", row.inliers, number(row.rms, 2));
     labels.push_back({.name = text, .style = Style::label, .x = {at[row.name].x()}, .y = {at[row.name].y() + 0.38}});
   }
   for (const Series& kind : {chosen, rejected, others, idle}) {
@@ -256,8 +205,8 @@ Plot latticePlot(const TwoViewMotionEstimate& estimate) {
 }
 Plot errorPlot(const TwoViewMotionOutput& output) {
   std::vector<double> errors;
-  const double limit = std::sqrt(output.estimate.threshold) * output.sigma;
-  for (const double e : output.estimate.errors) errors.push_back(output.sigma * std::sqrt(e));
+  const double limit = std::sqrt(output.estimate.threshold) * output.estimate.sigma;
+  for (const double e : output.estimate.errors) errors.push_back(output.estimate.sigma * std::sqrt(e));
   Panel panel{.x = {.label = "error, px"},
               .y = {.label = "matches"},
               .series = {histogram("", errors, 0, 4 * limit, 40, false)},
@@ -273,7 +222,7 @@ Plot errorPlot(const TwoViewMotionOutput& output) {
 
 std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
-  std::string text = summary(output) + "\n" + answer(output);
+  std::string text = summary(output.file, output.estimate) + "\n" + answer(output);
   for (std::size_t i = 0; i < e.physical.size(); ++i) {
     Table table(parameter_headers);
     for (const auto& row : parameterRows(e.physical[i])) table.row(row);
@@ -281,7 +230,7 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   }
   if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
     Table table(parameter_headers);
-    for (const auto& row : matrixRows(e, e.chosenModel().equations == 2)) table.row(row);
+    for (const auto& row : matrixRows(e)) table.row(row);
     text += "\n" + table.str();
     if (e.chosenModel().name == "fundamental") {
       text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
@@ -291,25 +240,7 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
 }
 
 void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
-  const TwoViewMotionEstimate& e = output.estimate;
-  object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
-  object.set("calibrated", e.calibrated).set("image_corner", e.image_corner).set("image_size", e.image_size);
-  object.set("size_from_matches", e.size_from_matches);
-  object.set("repeated", e.repeated).set("contradicted", e.contradicted);
-  object.set("status", name(e.status));
-  if (e.reason.empty()) {
-    object.set("reason", nullptr);
-  } else {
-    object.set("reason", e.reason);
-  }
-  object.set("model", e.chosenModel().name).set("inliers", e.inliers);
-  setMotion(object, e, e.chosenModel().equations == 2);
-  std::vector<JsonObject> lattice;
-  for (std::size_t m = 0; m < e.lattice.size(); ++m) lattice.push_back(toJson(e, m));
-  object.set("lattice", lattice);
-  std::vector<double> inlier, errors;
-  for (std::size_t i = 0; i < e.inlier.size(); ++i) inlier.push_back(e.inlier[i] ? 1 : 0);
-  object.set("inlier", inlier).set("squared_errors", e.errors);
+  object.set("file", output.file).fieldsOf(output.estimate);
 }
 
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
@@ -318,14 +249,14 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   Report report(directory, "The motion between two images");
   report.verdict(e.ok(), answer(output));
   report.code(command_line);
-  report.paragraph(summary(output));
+  report.paragraph(summary(output.file, output.estimate));
   if (!e.physical.empty()) report.section("Parameters");
   for (std::size_t i = 0; i < e.physical.size(); ++i) {
     report.table(parameter_headers, parameterRows(e.physical[i]), headingOf(e, i));
   }
   if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
     report.section("Parameters");
-    report.table(parameter_headers, matrixRows(e, e.chosenModel().equations == 2));
+    report.table(parameter_headers, matrixRows(e));
   }
   report.section("Matches");
   report.plot(matchPlot(output));
@@ -351,17 +282,12 @@ std::vector<std::vector<std::string>> structureRows(const TwoViewMotions& motion
 }
 std::string endOf(const TwoViewMotionsOutput& output) {
   std::string text = fmt::format("{} matches belong to none\n", output.motions.rest.size());
-  if (output.motions.status != Status::ok) {
-    text += fmt::format("NOT TO BE TRUSTED ({}): {}\n", name(output.motions.status), output.motions.reason);
-  } else if (output.motions.structures.empty()) {
-    text += "NOT TO BE TRUSTED: no model is supported, inliers could be chance\n";
-  }
+  if (const Verdict verdict = output.motions.verdict(); verdict.isNo()) text += verdict.text + "\n";
   return text;
 }
 /// The parameters of a motion, or its matrix.
 std::vector<std::vector<std::string>> rowsOf(const TwoViewStructure& structure, std::size_t i) {
-  return structure.physical.empty() ? matrixRows(structure, structure.equations == 2)
-                                    : parameterRows(structure.physical[i]);
+  return structure.physical.empty() ? matrixRows(structure) : parameterRows(structure.physical[i]);
 }
 std::size_t tablesOf(const TwoViewStructure& structure) {
   if (!structure.physical.empty()) return structure.physical.size();
@@ -373,8 +299,7 @@ std::size_t tablesOf(const TwoViewStructure& structure) {
 std::string formatTwoViewMotions(const TwoViewMotionsOutput& output) {
   Table table(structure_headers);
   for (const auto& row : structureRows(output.motions)) table.row(row);
-  std::string text =
-      summary(output.file, output.matches.size(), output.sigma, output.motions) + "\n" + table.str() + endOf(output);
+  std::string text = summary(output.file, output.motions) + "\n" + table.str() + endOf(output);
   for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
     const TwoViewStructure& s = output.motions.structures[k];
     text += fmt::format("\n{}: {}\n", k + 1, s.model);
@@ -388,35 +313,14 @@ std::string formatTwoViewMotions(const TwoViewMotionsOutput& output) {
 }
 
 void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output) {
-  const TwoViewMotions& m = output.motions;
-  object.set("file", output.file).set("matches", output.matches.size()).set("sigma", output.sigma);
-  object.set("calibrated", m.calibrated).set("image_corner", m.image_corner).set("image_size", m.image_size);
-  object.set("size_from_matches", m.size_from_matches);
-  object.set("repeated", m.repeated).set("contradicted", m.contradicted);
-  object.set("status", name(m.status));
-  if (m.reason.empty()) {
-    object.set("reason", nullptr);
-  } else {
-    object.set("reason", m.reason);
-  }
-  std::vector<double> motion(output.matches.size(), 0);  // of each match: the number of its motion, 0 for none
-  std::vector<JsonObject> list;
-  for (std::size_t k = 0; k < m.structures.size(); ++k) {
-    const TwoViewStructure& s = m.structures[k];
-    JsonObject o;
-    o.set("model", s.model).set("status", name(s.status)).set("inliers", s.inliers.size()).set("rms", s.rms);
-    setMotion(o, s, s.equations == 2);
-    list.push_back(o);
-    for (const std::size_t i : s.inliers) motion[i] = static_cast<double>(k + 1);
-  }
-  object.set("motions", list).set("motion", motion);
+  object.set("file", output.file).fieldsOf(output.motions);
 }
 
 void writeTwoViewMotionsReport(const std::string& directory, const std::string& command_line,
                                const TwoViewMotionsOutput& output) {
   Report report(directory, "Motions between two images");
   report.code(command_line);
-  report.paragraph(summary(output.file, output.matches.size(), output.sigma, output.motions));
+  report.paragraph(summary(output.file, output.motions));
   report.table(structure_headers, structureRows(output.motions), endOf(output));
   std::vector<std::pair<std::string, std::vector<std::size_t>>> groups;
   for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {

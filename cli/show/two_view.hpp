@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cli/show/json.hpp>
-#include <fusion/two_view/two_view.hpp>
+#include <fusion/two_view/two_view_types.hpp>
 
 #include <Eigen/Core>
 
@@ -15,7 +15,6 @@ namespace liestat::cli {
 struct TwoViewMotionOutput {
   std::string file;
   std::vector<Eigen::Vector4d> matches;  ///< px
-  double sigma = 1;
   TwoViewMotionEstimate estimate;
 };
 
@@ -23,7 +22,6 @@ struct TwoViewMotionOutput {
 struct TwoViewMotionsOutput {
   std::string file;
   std::vector<Eigen::Vector4d> matches;  ///< px
-  double sigma = 1;
   TwoViewMotions motions;
 };
 

@@ -1,7 +1,8 @@
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
 #include <cli/show/vi_init.hpp>
-#include <cli/show/vi_init_summary.hpp>
+
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
@@ -21,7 +22,7 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 struct Best {
   Eigen::Vector3d velocity, gravity;
 
-  explicit Best(const ViWindow& w) {
+  explicit Best(const ComparedWindow& w) {
     if (w.isRefined()) {
       velocity = w.refined->velocity();
       gravity = w.refined->gravity;
@@ -34,12 +35,14 @@ struct Best {
   double pitch() const { return std::atan2(gravity.x(), std::hypot(gravity.y(), gravity.z())); }
 };
 
-bool hasSolution(const ViWindow& w) { return !w.closedForm().solutions.empty(); }
+bool hasSolution(const ComparedWindow& w) { return !w.closedForm().solutions.empty(); }
 
 /// Relative.
-double scaleSigma(const ViWindow& w) { return w.isRefined() ? w.refined->scale_sigma : w.closedForm().scale_sigma; }
+double scaleSigma(const ComparedWindow& w) {
+  return w.isRefined() ? w.refined->scale_sigma : w.closedForm().scale_sigma;
+}
 
-double costPerDegree(const ViWindow& w) {
+double costPerDegree(const ComparedWindow& w) {
   if (w.refined && w.refined->degrees_of_freedom > 0) {
     return w.refined->cost / static_cast<double>(w.refined->degrees_of_freedom);
   }
@@ -48,14 +51,16 @@ double costPerDegree(const ViWindow& w) {
                                        : not_a_number;
 }
 
-std::optional<ViError> errorOf(const ViWindow& w) { return w.refined_error ? w.refined_error : w.closed_form_error; }
+std::optional<InitialisationError> errorOf(const ComparedWindow& w) {
+  return w.refined_error ? w.refined_error : w.closed_form_error;
+}
 
 std::string windowTable(const ViInitResult& result, bool with_truth) {
   // With the errors it still fits into 80 columns.
   std::vector<std::string> headers = {"s", "status", "m/s", "roll", "pitch", "sd %", "chi2", "tracks"};
   if (with_truth) headers.insert(headers.end(), {"off m/s", "deg", "%"});
   Table table(headers);
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     std::vector<std::string> cells = {fmt::format("{:.1f}", w.begin), std::string(name(w.verdict()))};
     if (!w.fault && hasSolution(w)) {
       const Best best(w);
@@ -82,7 +87,7 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
   std::vector<std::string> headers = {"to s", "n", "chi2/dof", "p", "sd deg", "rad/s", "m/s2"};
   if (with_truth) headers.insert(headers.end(), {"off m/s", "deg", "rad/s", "m/s2"});
   Table table(headers);
-  for (const ViFusion& f : result.fusions) {
+  for (const ComparedStretch& f : result.stretches) {
     if (!f.has_state) continue;
     const std::size_t dof = f.degrees_of_freedom;
     std::vector<std::string> cells = {fmt::format("{:.1f}", f.end),
@@ -104,10 +109,10 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
 }
 
 /// Stretches whose windows contradict each other.
-std::string contradictionsInWords(const std::vector<ViFusion>& fusions) {
+std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions) {
   std::size_t with_state = 0, contradict = 0, inflated = 0;
   double largest_p = 0, least = std::numeric_limits<double>::infinity(), largest = 0;
-  for (const ViFusion& f : fusions) {
+  for (const ComparedStretch& f : fusions) {
     with_state += f.has_state;
     if (!f.has_state || f.p >= least_p_of_fusion) continue;
     ++contradict;
@@ -123,6 +128,13 @@ std::string contradictionsInWords(const std::vector<ViFusion>& fusions) {
       inflated > 0 ? ", which the fused states' were multiplied by"
                    : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
                      "--calibrate-noise and --noise-factor, or --inflate");
+}
+
+/// Medians and 95 %.
+std::string inWords(const InitialisationErrors& e) {
+  return fmt::format("{:.3g} / {:.3g} m/s, {:.3g} / {:.3g} deg, scale {:.3g} / {:.3g} %", quantile(e.speed, 0.5),
+                     quantile(e.speed, 0.95), quantile(e.gravity, 0.5), quantile(e.gravity, 0.95),
+                     quantile(e.scale, 0.5), quantile(e.scale, 0.95));
 }
 
 /// "4.1 (95 %: 3.2 to 5.3)", "1 (95 %: up to 2.1)".
@@ -160,7 +172,7 @@ std::string noiseInWords(const NoiseCalibration& found) {
 std::string viInitTable(const ViRecording& recording, const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   std::string text = windowTable(result, with_truth);
-  const ViInitSummary summary(result);
+  const InitialisationSummary summary = result.summary();
   if (result.windows_left > 0) {
     text += fmt::format("\ninterrupted: {} of {} windows\n", result.windows.size(),
                         result.windows.size() + result.windows_left);
@@ -173,13 +185,12 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     if (summary.closed_form.size() > 0) {
       text += fmt::format("errors of the {} windows with a scale, of which {} are not ok:\n", summary.compared,
                           summary.compared_not_ok);
-      text += "closed form, median / 95 %: " + summary.closed_form.str() + "\n";
+      text += "closed form, median / 95 %: " + inWords(summary.closed_form) + "\n";
     }
-    if (summary.refined.size() > 0) text += "refined, median / 95 %:     " + summary.refined.str() + "\n";
+    if (summary.refined.size() > 0) text += "refined, median / 95 %:     " + inWords(summary.refined) + "\n";
     if (!with_biases && !summary.gyroscope.empty()) {
-      text +=
-          fmt::format("gyroscope's bias, median / 95 %: {:.2g} / {:.2g} rad/s\n",
-                      experiments::quantile(summary.gyroscope, 0.5), experiments::quantile(summary.gyroscope, 0.95));
+      text += fmt::format("gyroscope's bias, median / 95 %: {:.2g} / {:.2g} rad/s\n",
+                          liestat::quantile(summary.gyroscope, 0.5), liestat::quantile(summary.gyroscope, 0.95));
     }
     if (summary.with_nees > 0) {
       text += fmt::format("NEES of velocity and gravity: {:.3g} in the mean, 5 expected\n",
@@ -190,13 +201,13 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     text += fmt::format("chi2 per degree of freedom of the refinements: {:.3f}\n",
                         summary.cost / static_cast<double>(summary.degrees_of_freedom));
   }
-  if (!result.fusions.empty()) {
+  if (!result.stretches.empty()) {
     text +=
         "\nDisjoint windows together, at the last image of each stretch; chi2 and its p say\nwhether they agree; then "
         "standard deviations of gravity and of the biases";
     text += with_truth ? ",\nand what is off:\n" : ":\n";
     text += fusionTable(result, with_truth);
-    text += contradictionsInWords(result.fusions);
+    text += contradictionsInWords(result.stretches);
   }
   if (result.noise) text += "\n" + noiseInWords(*result.noise);
   std::vector<std::string> notes;
@@ -210,7 +221,7 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     notes.push_back(fmt::format("{} pixels have no direction by the lens' model", result.observations_outside));
   }
   for (const std::string& note : notes) text += "note: " + note + ", and not used\n";
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (!w.fault) continue;
     text += fmt::format("note: the window from {:.3f} s has no result ({}): the readings fail at {:.6f} s\n", w.begin,
                         name(w.verdict()), w.fault_time);

@@ -33,7 +33,7 @@ Series line(std::string name, std::size_t colour, bool dashed = false) {
   return {.name = std::move(name), .style = Style::lines, .colour = colour, .dashed = dashed};
 }
 
-bool isRefined(const ViWindow& w) { return w.isRefined(); }
+bool isRefined(const ComparedWindow& w) { return w.isRefined(); }
 
 /// The rotation that makes gravity point along -z, heading left as it is.
 SO3d levelling(const Eigen::Vector3d& gravity) {
@@ -56,7 +56,7 @@ Panel trajectoryPanel(const ViRecording& recording, const ViInitResult& result, 
       truth.y.push_back(g.state.translation()[vertical]);
     }
   }
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (!w.ok()) continue;
     SO3d world_R_body;
     Eigen::Vector3d start = Eigen::Vector3d::Zero();
@@ -113,7 +113,7 @@ Panel anglePanel(const ViRecording& recording, const ViInitResult& result, bool 
   const auto angle = roll ? rollOf : pitchOf;
   Panel panel{.title = roll ? "roll" : "pitch", .x = {.label = "s"}, .y = {.label = "deg"}};
   Series found{.name = "windows", .style = Style::points, .colour = estimate_colour};
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (w.closedForm().solutions.empty()) continue;
     found.x.push_back(w.begin);
     found.y.push_back(angle(isRefined(w) ? w.refined->gravity : w.closedForm().solutions[0].gravity));
@@ -131,7 +131,7 @@ Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
   Panel panel{.title = "speed", .x = {.label = "s"}, .y = {.label = "m/s", .low = 0}};
   Series found = bars("windows, two standard deviations", estimate_colour);
   const Series truth = truthLine(recording, result, [](const GroundTruth& g) { return g.state.velocity().norm(); });
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (!isRefined(w)) continue;
     const Eigen::Vector3d V = w.refined->velocity(), u = V.normalized();
     addBar(found, w.begin, V.norm(),
@@ -149,7 +149,7 @@ Panel scalePanel(const ViInitResult& result) {
               .references = {{.at = 0}}};
   Series closed{.name = "closed form", .style = Style::points, .colour = second_colour};
   Series refined{.name = "refined", .style = Style::points, .colour = estimate_colour};
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {
       closed.x.push_back(w.begin);
       closed.y.push_back(100 * w.closed_form_error->scale);
@@ -167,13 +167,13 @@ Panel gravityErrorPanel(const ViInitResult& result) {
   Panel panel{.title = "gravity against the truth", .x = {.label = "s"}, .y = {.label = "deg", .low = 0}};
   Series refined{.name = "windows", .style = Style::points, .colour = estimate_colour};
   Series fused{.name = "fused", .style = Style::points, .colour = fused_colour};
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     const auto& error = w.refined_error ? w.refined_error : w.closed_form_error;
     if (!error) continue;
     refined.x.push_back(w.begin);
     refined.y.push_back(degrees * error->gravity);
   }
-  for (const ViFusion& f : result.fusions) {
+  for (const ComparedStretch& f : result.stretches) {
     if (!f.gravity_error) continue;
     fused.x.push_back(f.end);
     fused.y.push_back(degrees * *f.gravity_error);
@@ -190,12 +190,12 @@ Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool g
   Series found = bars("windows", estimate_colour), fused = bars("fused", fused_colour);
   const auto of = [&](const ImuBias<double>& b) { return (gyroscope ? b.gyroscope : b.accelerometer)[axis]; };
   const Series truth = truthLine(recording, result, [&](const GroundTruth& g) { return of(g.bias); });
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (!isRefined(w)) continue;
     const int i = (gyroscope ? InitialCovariance::gyroscope_bias : InitialCovariance::accelerometer_bias) + axis;
     addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance.joint(i, i)));
   }
-  for (const ViFusion& f : result.fusions) {
+  for (const ComparedStretch& f : result.stretches) {
     if (!f.has_state) continue;
     addBar(fused, f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
            gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma);
@@ -207,7 +207,7 @@ Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool g
 }
 
 /// Both solutions of a window as the body at the first image sees them, trajectory and features.
-Panel solutionsPanel(const ViWindow& w) {
+Panel solutionsPanel(const ComparedWindow& w) {
   const ClosedFormResult& closed = w.closedForm();
   const double more = closed.solutions[1].cost - closed.solutions[0].cost;
   Panel panel{.title = fmt::format("{:.1f} s: {}, chi2 {:.3g} more", w.begin, name(closed.status), more),
@@ -245,9 +245,9 @@ Panel solutionsPanel(const ViWindow& w) {
 /// The windows of which two solutions are left come first; of the others those whose second is the nearest.
 void addSolutions(Report& report, const ViInitResult& result) {
   constexpr std::size_t most = 4;
-  std::vector<const ViWindow*> windows;
+  std::vector<const ComparedWindow*> windows;
   std::size_t left = 0;
-  for (const ViWindow& w : result.windows) {
+  for (const ComparedWindow& w : result.windows) {
     if (w.closedForm().solutions.size() < 2) continue;
     windows.push_back(&w);
     left += w.closedForm().status != FusionStatus::ok;
@@ -257,16 +257,16 @@ void addSolutions(Report& report, const ViInitResult& result) {
     report.paragraph("No window has a second solution.");
     return;
   }
-  const auto rank = [](const ViWindow* w) {
+  const auto rank = [](const ComparedWindow* w) {
     const auto& s = w->closedForm().solutions;
     return std::pair(w->closedForm().status == FusionStatus::ok, s[1].cost - s[0].cost);
   };
   std::stable_sort(windows.begin(), windows.end(),
-                   [&](const ViWindow* a, const ViWindow* b) { return rank(a) < rank(b); });
+                   [&](const ComparedWindow* a, const ComparedWindow* b) { return rank(a) < rank(b); });
   const std::size_t all = windows.size();
   windows.resize(std::min(all, most));
   std::vector<Panel> panels;
-  for (const ViWindow* w : windows) panels.push_back(solutionsPanel(*w));
+  for (const ComparedWindow* w : windows) panels.push_back(solutionsPanel(*w));
   report.plot(
       {.name = "two_solutions",
        .caption = fmt::format("Lines: the body; points: features. {} of {} windows have a second minimum, in {} "
@@ -282,12 +282,8 @@ void writeViInitReport(const std::string& directory, const std::string& command_
                        const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   Report report(directory, "Visual-inertial initialisation");
-  const std::size_t ok = result.okWindows(), n = result.windows.size();
-  report.verdict(result.trusted(),
-                 result.trusted()          ? fmt::format("{} of {} windows are ok.", ok, n)
-                 : result.windows_left > 0 ? fmt::format("Interrupted: {} of {} windows.", n, n + result.windows_left)
-                 : ok == 0                 ? fmt::format("Not to be trusted: none of {} windows is ok.", n)
-                                           : "Not to be trusted: the windows contradict each other in every stretch.");
+  const Verdict verdict = result.verdict();
+  report.verdict(!verdict.isNo(), verdict.text);
   report.code(command_line);
   report.code(viInitTable(recording, result));
   report.section("Trajectory");

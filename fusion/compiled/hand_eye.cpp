@@ -4,3 +4,4 @@
 #endif
 
 #include <fusion/detail/estimate_hand_eye.hpp>
+#include <fusion/detail/hand_eye_results.hpp>

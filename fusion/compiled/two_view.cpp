@@ -5,3 +5,4 @@
 
 #include <fusion/detail/estimate_two_view_motion.hpp>
 #include <fusion/detail/physical_parameters.hpp>
+#include <fusion/detail/two_view_results.hpp>

@@ -38,7 +38,7 @@ class HandEyeRun {
 
   HandEyeRun(std::span<const PosePair> pairs, const HandEyeOptions& options)
       : options_(options), pairs_(pairs.begin(), pairs.end()), order_(pairs.size()) {
-    result_.world = world;
+    result_.world = world, result_.known_noise = options_.known_noise;
     std::iota(order_.begin(), order_.end(), std::size_t{0});
   }
 
@@ -345,27 +345,6 @@ LIESTAT_FUSION_INLINE HandEyeResult estimateRobotWorld(std::span<const PosePair>
 
 LIESTAT_FUSION_INLINE HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options) {
   return detail::HandEyeRun<detail::HandEyeEquation>(motions, options).run();
-}
-
-LIESTAT_FUSION_INLINE std::string describe(const OpenDirection& direction, const std::string& frame) {
-  const Eigen::Vector3d rho = direction.twist.head<3>(), phi = direction.twist.tail<3>();
-  const char* which = direction.along_rotation_axis ? "the rotation axis "
-                      : direction.along_translation ? "the direction of motion "
-                                                    : "";
-  // Three decimals; no zero is negative.
-  const auto written = [](const Eigen::Vector3d& v) {
-    std::string text = "(";
-    for (int i = 0; i < 3; ++i) {
-      char number[32];
-      std::snprintf(number, sizeof number, "%s%.3g", i > 0 ? ", " : "", std::round(1000 * v[i]) / 1000 + 0.0);
-      text += number;
-    }
-    return text + ")";
-  };
-  if (!direction.rotates) return std::string("translation along ") + which + written(rho) + " of the " + frame;
-  // The point of the screw's axis that is nearest to the origin.
-  return std::string("rotation about ") + which + written(phi) + " through " + written(phi.cross(rho)) + " m of the " +
-         frame;
 }
 
 }  // namespace liestat

@@ -132,6 +132,7 @@ struct TwoViewInput {
   std::vector<std::size_t> first_of_equal;  ///< for each match the place of the first one that is equal to it
 
   TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
+    frame.matches = matches.size(), frame.sigma = options.sigma;
     frame.calibrated = options.first.has_value();
     if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
     // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
@@ -253,6 +254,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     result.lattice.push_back(detail::rowOf(search, m, options.sigma));
   }
   result.chosen = search.best();
+  if (!result.lattice.empty()) result.equations = result.chosenModel().equations;
   if (!result.ok()) return result;
 
   const ModelState<TwoViewMotionModel>& state = search.state(result.chosen);

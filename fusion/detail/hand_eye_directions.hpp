@@ -98,6 +98,7 @@ inline void appendOpenDirections(std::vector<OpenDirection>& list, const HandEye
     axis.cwiseAbs().maxCoeff(&largest);
     const double scale = (axis[largest] < 0 ? -1 : 1) / axis.norm();
     direction.twist = scale * twist;
+    direction.has_Y = world;
     direction.twist_of_Y = scale * product(of_Y, y);
     direction.along_rotation_axis = std::abs(motion.rotation_axis.dot(axis)) > 0.99 * axis.norm();
     direction.along_translation = std::abs(motion.translation_axis.dot(axis)) > 0.99 * axis.norm();

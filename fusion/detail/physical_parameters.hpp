@@ -25,10 +25,6 @@
 
 namespace liestat {
 
-LIESTAT_FUSION_INLINE double PhysicalParameters::deviation(std::size_t i) const {
-  return std::sqrt(covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)));
-}
-
 namespace detail {
 
 /// Parameters that are named one after the other.

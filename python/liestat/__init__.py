@@ -37,8 +37,10 @@ from ._motion import motion
 from ._results import ConfidenceRegion, Law, MeanResult, Result
 from ._sensors import (
     VI_BLOCKS,
+    CalibratedPose,
     Camera,
     InitialisedWindow,
+    TwoViewResult,
     hand_eye,
     preintegrate,
     robust_two_view,

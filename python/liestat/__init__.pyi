@@ -342,6 +342,16 @@ class Result:
     def __getitem__(self, name: str) -> Any: ...
     def __getattr__(self, name: str) -> Any: ...
 
+class CalibratedPose(Result):
+    @property
+    def mean(self) -> SE3: ...
+    @property
+    def gaussian(self) -> Gaussian: ...
+
+class TwoViewResult(Result):
+    @property
+    def relative_pose(self) -> Result | None: ...
+
 class InitialisedWindow(Result):
     def block(self, row: str, column: str | None = None) -> _Array: ...
 
@@ -381,6 +391,8 @@ def preintegrate(
     scheme: Literal["averaged", "held", "cubic"] = "averaged",
     max_gap: float = 0.1,
     threads: int = 0,
+    truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
+    gravity: float = 9.81,
 ) -> Result: ...
 class TrajectoryEvaluation(Result):
     @property
@@ -495,6 +507,7 @@ def vi_init(
     gyroscope_sigma: float = 0.1,
     accelerometer_sigma: float = 0.15,
     seed: int = 1,
+    truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
 ) -> Result: ...
 def columns(x: Manifold) -> dict[str, _Array]: ...
 def from_columns(kind: type[_M], table: Any) -> _M: ...

@@ -55,8 +55,38 @@ def _noise(caller, noise):
     return np.concatenate([array, np.zeros(4 - len(array))])
 
 
+def _truth(caller, truth):
+    """Rows of (times, states) or (times, states, biases); none without a truth."""
+    if truth is None:
+        return np.empty((0, 17))
+    if len(truth) not in (2, 3):
+        raise ValueError(f"{caller}: truth: expected (times, states), or these with the biases")
+    t = _vector(truth[0], f"{caller}: times of the truth")
+    states = truth[1]
+    if not isinstance(states, SE23) or states.ndim != 1:
+        shape = f" of shape {states.shape}" if hasattr(states, "shape") else ""
+        raise TypeError(f"{caller}: truth: expected SE23 of shape (n,), got {type(states).__name__}{shape}")
+    biases = np.zeros((len(t), 6)) if len(truth) == 2 else _rows(truth[2], f"{caller}: biases of the truth", 6)
+    _same_length(caller, times=t, states=states, biases=biases)
+    if not (np.diff(t) > 0).all():
+        raise ValueError(f"{caller}: times of the truth: expected ascending ones, each once")
+    return np.ascontiguousarray(np.concatenate([t[:, None], states.params, biases], axis=1))
+
+
 def preintegrate(
-    times, rates, forces, begin, end, *, noise=(0.0, 0.0), bias=None, scheme="averaged", max_gap=0.1, threads=0
+    times,
+    rates,
+    forces,
+    begin,
+    end,
+    *,
+    noise=(0.0, 0.0),
+    bias=None,
+    scheme="averaged",
+    max_gap=0.1,
+    threads=0,
+    truth=None,
+    gravity=9.81,
 ):
     """Preintegrated motions of many intervals of one inertial recording.
 
@@ -72,31 +102,41 @@ def preintegrate(
         Densities: gyroscope (rad/s/√Hz), accelerometer (m/s²/√Hz), and of the random walks of their biases
         (rad/s²/√Hz, m/s³/√Hz).
     bias : array_like, shape (6,), optional
-        Gyroscope (rad/s), accelerometer (m/s²); taken off every reading.
+        Gyroscope (rad/s), accelerometer (m/s²); taken off every reading. By default that of the truth at `begin`, or
+        zero.
     scheme : {'averaged', 'held', 'cubic'}
         How motion goes on between readings.
     max_gap : float
         s; readings further apart than this make an interval not usable.
+    truth : (times, states) or (times, states, biases), optional
+        s, ascending; SE23 of shape (m,), world_T_body with the velocity in the world; (m, 6): gyroscope (rad/s),
+        accelerometer (m/s²).
+    gravity : float
+        m/s², downwards along z in the truth's world.
 
     Returns
     -------
     Result
         `increment` (SE23: rotation, position, velocity), `covariance` (..., 9, 9) in its tangent (position, rotation,
         velocity), `covariance_with_bias` (..., 15, 15), `bias_jacobian` (..., 9, 6), `faults` (list of str, empty
-        where there is none) and `ok`.
+        where there is none) and `ok`; and the fields of the program's JSON: `windows` (a list with the fields of each
+        interval, `error` and `squared_distance` among them with a truth), `verdict` (a sentence), `consistent` (bool;
+        None: no verdict), `causes` and, with a truth and noise, the summed `squared_distance` with its
+        `degrees_of_freedom` and `p`.
 
     Warns
     -----
     UserWarning
-        Where an interval is not usable: its covariance is NaN.
+        Where an interval is not usable: its covariance is NaN. Where the errors against the truth are larger than the
+        covariances explain.
     """
     readings = _readings("preintegrate", times, rates, forces)
     b, e = np.broadcast_arrays(
         _numbers(begin, "preintegrate: begin", ()), _numbers(end, "preintegrate: end", ())
     )
     lead = b.shape
-    bias = np.zeros(6) if bias is None else _vector(bias, "preintegrate: bias")
-    if bias.shape != (6,):
+    bias = np.empty(0) if bias is None else _vector(bias, "preintegrate: bias")
+    if bias.shape not in ((0,), (6,)):
         raise ValueError(f"preintegrate: bias: expected shape (6,), got {bias.shape}")
     d = _core.preintegrate(
         readings,
@@ -107,6 +147,8 @@ def preintegrate(
         scheme,
         float(max_gap),
         int(threads),
+        _truth("preintegrate", truth),
+        float(gravity),
     )
     ok = np.array([not fault for fault in d["faults"]], dtype=bool)
     if not ok.all():
@@ -119,15 +161,12 @@ def preintegrate(
         )
         for name in ("covariance", "covariance_with_bias", "bias_jacobian"):
             d[name][~ok] = np.nan
-    return Result(
-        "preintegrated motion",
-        increment=SE23._of(d["increment"].reshape(*lead, 10)),
-        covariance=d["covariance"].reshape(*lead, 9, 9),
-        covariance_with_bias=d["covariance_with_bias"].reshape(*lead, 15, 15),
-        bias_jacobian=d["bias_jacobian"].reshape(*lead, 9, 6),
-        faults=d["faults"],
-        ok=ok.reshape(lead)[()],
-    )
+    if d["consistent"] is False:
+        warnings.warn(f"liestat.preintegrate: {d['verdict']}", UserWarning, stacklevel=2)
+    d["increment"] = SE23._of(d["increment"].reshape(*lead, 10))
+    for name, shape in (("covariance", (9, 9)), ("covariance_with_bias", (15, 15)), ("bias_jacobian", (9, 6))):
+        d[name] = d[name].reshape(*lead, *shape)
+    return Result.of("preintegrated motion", d | {"ok": ok.reshape(lead)[()]})
 
 
 def hand_eye(
@@ -163,9 +202,10 @@ def hand_eye(
     Returns
     -------
     Result
-        `status`, `reason`, `X` and `Y` (Gaussians: gripper_T_camera, base_T_target), the joint `covariance` (12, 12),
-        `directions` that the motions leave open, `excitations`, `outliers`, `errors` and `pair_chi2` of the pairs,
-        `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival`.
+        The fields of the program's JSON: `status`, `ok`, `in_words`, `X` and `Y` (CalibratedPose: gripper_T_camera,
+        base_T_target; Y is None with `relative`), `joint_covariance` (12, 12), `open_directions` that the motions leave
+        open, `excitations`, `outliers`, `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival` …; and `errors`
+        and `pair_chi2` of the pairs.
 
     Warns
     -----
@@ -195,12 +235,12 @@ def hand_eye(
         int(seed),
     )
     if d["status"] != "ok":
-        warnings.warn(f"liestat.hand_eye: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
-    X = Gaussian._of(SE3._of(d.pop("X")), d.pop("X_covariance"))
-    Y = Gaussian._of(SE3._of(d.pop("Y")), d.pop("Y_covariance"))
-    d["rival"] = None if d["rival"] is None else SE3._of(d["rival"])
-    d["directions"] = [Result("open direction", **one) for one in d["directions"]]
-    return Result("hand-eye calibration", X=X, Y=None if relative else Y, **d)
+        warnings.warn(f"liestat.hand_eye: {d['status']}: {d['in_words']}", UserWarning, stacklevel=2)
+    for name in ("X", "Y", "rival"):
+        if d[name] is not None:
+            d[name] = CalibratedPose.of(name, d[name])
+    d["outliers"] = d["outliers"].tolist()
+    return Result.of("hand-eye calibration", d, _HAND_EYE_NAMES)
 
 
 class Camera:
@@ -271,6 +311,23 @@ def _relative_pose(d):
     )
 
 
+class TwoViewResult(Result):
+    """The result of two_view()."""
+
+    @property
+    def relative_pose(self):
+        """Deprecated: `second_T_first` as `rotation` (SO3), `direction` (S2) and `covariance`."""
+        warnings.warn(
+            "liestat: the part 'relative_pose' is called 'second_T_first' now", DeprecationWarning, stacklevel=2
+        )
+        pose = self.second_T_first
+        return None if pose is None else _relative_pose({"quaternion": pose.quaternion_xyzw, **pose.__dict__})
+
+
+#: Former names of parts of two_view().
+_TWO_VIEW_NAMES = {"physical": "parameters", "errors": "squared_errors", "name": "model"}
+
+
 def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, seed=1):
     """The motion between two images from matches of which some are wrong, its model chosen from several.
 
@@ -288,10 +345,11 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     Returns
     -------
     Result
-        `status`, `reason`, `model` (its name), `matrix` (H or F in pixels) with `matrix_covariance` (9, 9, of entries
-        column after column), `physical` (list; each with `names`, `units`, `values`, `covariance`), `relative_pose`
-        (`rotation`, `direction`, `covariance` of the tangent (direction, rotation); x' = R x + t), `inlier`, `errors`,
-        `threshold`, `lattice`.
+        The fields of the program's JSON: `status`, `reason` (None where ok), `model` (its name), `matrix` (H or F in
+        pixels) with `matrix_covariance` (9, 9, of entries column after column), `parameters` (list; each with `names`,
+        `units`, `values`, `deviations`, `covariance`), `second_T_first` (`quaternion_xyzw`, `direction`, `covariance` of
+        the tangent (direction, rotation); x' = R x + t), `inliers` (their number), `inlier`, `squared_errors`, `lattice`
+        …; and the `threshold` on squared errors.
 
     Warns
     -----
@@ -313,9 +371,7 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     )
     if d["status"] != "ok":
         warnings.warn(f"liestat.two_view: {d['status']}: {d['reason']}", UserWarning, stacklevel=2)
-    d["relative_pose"] = _relative_pose(d["relative_pose"])
-    d["physical"] = [Result("physical parameters", **one) for one in d["physical"]]
-    return Result("two-view motion", **d)
+    return TwoViewResult.of("two-view motion", d, _TWO_VIEW_NAMES)
 
 
 def robust_two_view(model, matches, sigma, *, confidence=0.9999, threshold=0.0, max_draws=100000, seed=1):
@@ -372,27 +428,29 @@ VI_BLOCKS = {
 class InitialisedWindow(Result):
     """A window of a visual-inertial recording, in the body's axes at its first image.
 
+    The fields of the program's JSON: `status`, `ok`, `begin`, `end` (s), `images` and `tracks` (numbers of them),
+    `solutions` and `covariance` of the closed form, `refined` (a Result, or None), with a truth `refined_error` …; and the
+    best known of the window:
+
     Attributes
     ----------
-    status, reason : str
-    begin, end : float
-        s.
+    reason : str
     velocity, gravity : ndarray, shape (3,), or None
         At the first image, m/s and m/s².
-    gyroscope_bias, accelerometer_bias : ndarray, shape (3,)
+    best_gyroscope_bias, accelerometer_bias : ndarray, shape (3,)
     states : SE23, shape (images,)
-    covariance : ndarray, shape (27, 27), or None
-        Joint covariance, see `block`; None where the window was not refined.
+    joint_covariance : ndarray, shape (27, 27), or None
+        See `block`; None where the window was not refined.
     scale_sigma, tilt_sigma, chi2 : float
-    images, tracks, inliers : list of int
+    image_indices, track_names, inliers : ndarray of int
     """
 
     def block(self, row, column=None):
         """ndarray, shape (3, 3): the covariance of a block by its name (`VI_BLOCKS`), or of two blocks."""
-        if self.covariance is None:
+        if self.joint_covariance is None:
             raise ValueError(f"no covariance: {self.reason}")
         i, j = VI_BLOCKS[row], VI_BLOCKS[row if column is None else column]
-        return self.covariance[i : i + 3, j : j + 3]
+        return self.joint_covariance[i : i + 3, j : j + 3]
 
 
 def vi_init(
@@ -418,6 +476,7 @@ def vi_init(
     gyroscope_sigma=0.1,
     accelerometer_sigma=0.15,
     seed=1,
+    truth=None,
 ):
     """Velocity, gravity, scale and biases of a visual-inertial recording, window by window, without a first guess.
 
@@ -447,11 +506,15 @@ def vi_init(
         m/s²; None: unknown.
     gyroscope_sigma, accelerometer_sigma : float
         Priors of the biases, rad/s and m/s².
+    truth : (times, states) or (times, states, biases), optional
+        As in `preintegrate`: windows and stretches are compared with it.
 
     Returns
     -------
     Result
-        `windows` (list of InitialisedWindow), `stretches`, `images_outside`.
+        The fields of the program's JSON: `ok` and `in_words` (whether the result is to be trusted), `windows` (list of
+        InitialisedWindow), `fusions` of disjoint windows (with `window_indices`), `statuses`, `images_outside`, with a
+        truth `refined_errors`, `nees_mean` ….
     """
     readings = _readings("vi_init", times, rates, forces)
     stamps = _vector(image_times, "vi_init: image_times")
@@ -488,14 +551,9 @@ def vi_init(
         float(gyroscope_sigma),
         float(accelerometer_sigma),
         int(seed),
+        _truth("vi_init", truth),
     )
-    if d["fault"]:
-        raise ValueError(f"vi_init: {d['fault']}")
-    windows = []
     for one in d["windows"]:
         one["states"] = SE23._of(one["states"])
-        windows.append(InitialisedWindow("window", **one))
-    stretches = [Result("stretch", **one) for one in d["stretches"]]
-    return Result(
-        "visual-inertial initialisation", windows=windows, stretches=stretches, images_outside=d["images_outside"]
-    )
+    d["windows"] = [InitialisedWindow.of("window", one) for one in d["windows"]]
+    return Result.of("visual-inertial initialisation", d, {"stretches": "fusions"})

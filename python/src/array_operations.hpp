@@ -72,14 +72,10 @@ struct Operand {
   std::size_t columns;
 };
 
-namespace detail {
-
 template <std::size_t Result, class F, std::size_t... I>
 constexpr Kernel kernelOf(std::index_sequence<I...>) {
   return &rowsOf<F, Result, I...>;
 }
-
-}  // namespace detail
 
 /// An operation whose kernel is a loop over f, a lambda without captures: f(a, …, out) on pointers to numbers.
 template <std::size_t Result, std::size_t N, class F>
@@ -90,7 +86,7 @@ ArrayOperation operation(std::string_view name, const Operand (&operands)[N], F)
     result.names[i] = operands[i].name;
     result.columns[i] = operands[i].columns;
   }
-  result.kernel = detail::kernelOf<Result, F>(std::make_index_sequence<N>{});
+  result.kernel = kernelOf<Result, F>(std::make_index_sequence<N>{});
   return result;
 }
 

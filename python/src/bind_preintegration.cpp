@@ -1,7 +1,8 @@
 // Preintegration of many intervals of one recording for Python.
-#include <fusion/imu/preintegrate.hpp>
+#include <fusion/imu/recording_windows.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/binding.hpp>
+#include <python/src/described.hpp>
 #include <python/src/executor.hpp>
 
 #include <array>
@@ -36,17 +37,31 @@ ImuNoise<double> noiseOf(const DoubleArray& noise) {
   return {p[0], p[1], p[2], p[3]};
 }
 
+/// True states in rows: time, pose and velocity of SE23, biases of gyroscope and accelerometer.
+std::vector<GroundTruth> truthOf(const DoubleArray& rows) {
+  std::vector<GroundTruth> list(static_cast<std::size_t>(rows.shape(0)));
+  const double* p = rows.data();
+  for (GroundTruth& truth : list) {
+    truth = {p[0], point<SE23d>(p + 1), {vector<3>(p + 11), vector<3>(p + 14)}};
+    p += 17;
+  }
+  return list;
+}
+
 namespace {
 
+/// `bias` has six numbers, or none: then it is that of the truth, or zero.
 py::dict preintegrateAll(const DoubleArray& readings, const DoubleArray& begin, const DoubleArray& end,
                          const DoubleArray& noise, const DoubleArray& bias, const std::string& scheme, double max_gap,
-                         int threads) {
-  RecordingOptions<double> options;
-  options.preintegration.noise = noiseOf(noise);
-  options.preintegration.bias = {vector<3>(bias.data()), vector<3>(bias.data() + 3)};
-  options.scheme = schemeOf(scheme);
-  options.max_gap = max_gap;
+                         int threads, const DoubleArray& truth_rows, double gravity) {
+  RecordingWindowOptions options;
+  options.integration.preintegration.noise = noiseOf(noise);
+  options.integration.scheme = schemeOf(scheme);
+  options.integration.max_gap = max_gap;
+  if (bias.size() > 0) options.bias = {vector<3>(bias.data()), vector<3>(bias.data() + 3)};
+  options.gravity = gravity;
   const std::vector<ImuSample<double>> list = readingsOf(readings);
+  const std::vector<GroundTruth> truth = truthOf(truth_rows);
   const auto n = begin.size();
   DoubleArray increment({n, py::ssize_t{10}});
   DoubleArray covariance({n, py::ssize_t{9}, py::ssize_t{9}});
@@ -58,32 +73,35 @@ py::dict preintegrateAll(const DoubleArray& readings, const DoubleArray& begin, 
   double* const jacobians = jacobian.mutable_data();
   const double* const begins = begin.data();
   const double* const ends = end.data();
-  std::vector<Fault> faults(static_cast<std::size_t>(n));
+  RecordingWindows result = preintegrateWindows(list, {}, truth, options);
+  result.windows.resize(static_cast<std::size_t>(n));
   {
     const py::gil_scoped_release released;
     SignalWatch signals;
     const PythonExecutor executor{threads, &signals};
-    const std::size_t n_chunks = chunkCount(faults.size(), 8);
+    const std::size_t n_chunks = chunkCount(result.windows.size(), 8);
     executor.reduce(
         n_chunks,
         [&](std::size_t chunk) {
-          const ChunkRange range = chunkRange(faults.size(), n_chunks, chunk);
+          const ChunkRange range = chunkRange(result.windows.size(), n_chunks, chunk);
           for (std::size_t i = range.begin; i < range.end; ++i) {
-            const RecordingResult<double> result =
-                preintegrate<double>(std::span<const ImuSample<double>>(list), begins[i], ends[i], options);
-            faults[i] = result.fault;
-            storePoint(result.motion.increment(), increments + 10 * i);
-            store(result.motion.gaussian().covariance, covariances + 81 * i);
-            store(result.motion.covarianceWithBias(), all_covariances + 225 * i);
-            store(result.motion.biasJacobian(), jacobians + 54 * i);
+            RecordingWindow& window = result.windows[i];
+            window = preintegrateWindow(list, {begins[i], ends[i]}, truth, options);
+            const Preintegration<double>& motion = window.result.motion;
+            storePoint(motion.increment(), increments + 10 * i);
+            store(motion.gaussian().covariance, covariances + 81 * i);
+            store(motion.covarianceWithBias(), all_covariances + 225 * i);
+            store(motion.biasJacobian(), jacobians + 54 * i);
           }
           return 0;
         },
         [](int&, const int&) {});
   }
+  py::dict d = dictOf(result);
   py::list reasons;
-  for (const Fault& fault : faults) reasons.append(fault ? describe(fault) : std::string());
-  py::dict d;
+  for (const RecordingWindow& window : result.windows) {
+    reasons.append(window.ok() ? std::string() : describe(window.result.fault));
+  }
   d["increment"] = increment;
   d["covariance"] = covariance;
   d["covariance_with_bias"] = with_bias;

@@ -4,6 +4,7 @@
 #include <python/src/array_operations.hpp>
 #include <python/src/binding.hpp>
 #include <python/src/camera_arguments.hpp>
+#include <python/src/described.hpp>
 #include <python/src/interruptible.hpp>
 
 #include <algorithm>
@@ -60,45 +61,7 @@ py::dict twoView(const DoubleArray& matches, double sigma, const DoubleArray& fi
       return estimateTwoViewMotion(list, stoppable);
     });
   }
-  py::dict d;
-  d["status"] = text(name(found.status));
-  d["reason"] = found.reason;
-  d["model"] = found.lattice.empty() ? std::string() : found.chosenModel().name;
-  d["matrix"] = matrixOf(found.matrix);
-  d["matrix_covariance"] = matrixOf(found.matrix_covariance);
-  py::list physical;
-  for (const PhysicalParameters& parameters : found.physical) {
-    py::dict one;
-    py::list names, units;
-    for (const std::string& s : parameters.names) names.append(s);
-    for (const std::string& s : parameters.units) units.append(s);
-    one["names"] = names;
-    one["units"] = units;
-    one["values"] = vectorOf(parameters.values);
-    one["covariance"] = matrixOf(parameters.covariance);
-    physical.append(one);
-  }
-  d["physical"] = physical;
-  d["relative_pose"] = found.relative_pose ? py::object(poseOf(*found.relative_pose)) : py::object(py::none());
-  py::array_t<bool> inlier(static_cast<py::ssize_t>(found.inlier.size()));
-  for (std::size_t i = 0; i < found.inlier.size(); ++i) inlier.mutable_data()[i] = found.inlier[i];
-  d["inlier"] = inlier;
-  d["errors"] = arrayOf(found.errors, {static_cast<py::ssize_t>(found.errors.size())});
-  d["threshold"] = found.threshold;
-  d["calibrated"] = found.calibrated;
-  py::list lattice;
-  for (const TwoViewModelRow& row : found.lattice) {
-    py::dict one;
-    one["name"] = row.name;
-    one["free_parameters"] = row.free_parameters;
-    one["inliers"] = row.inliers;
-    one["rms"] = row.rms;
-    one["relevance"] = row.relevance;
-    one["rejected_by"] = row.rejected_by;
-    lattice.append(one);
-  }
-  d["lattice"] = lattice;
-  return d;
+  return dictWithSeries(found);
 }
 
 struct RobustAnswer {

@@ -1,10 +1,11 @@
 // Visual-inertial initialisation of a recording for Python.
 #include <fusion/visual_inertial.hpp>
+#include <fusion/visual_inertial_truth.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/binding.hpp>
+#include <python/src/described.hpp>
 #include <python/src/interruptible.hpp>
 
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,59 +15,17 @@ namespace liestat::python {
 
 std::vector<ImuSample<double>> readingsOf(const DoubleArray& rows);
 ImuNoise<double> noiseOf(const DoubleArray& noise);
+std::vector<GroundTruth> truthOf(const DoubleArray& rows);
 
 namespace {
 
-DoubleArray vector3(const Eigen::Vector3d& v) {
-  DoubleArray array(3);
-  store(v, array.mutable_data());
-  return array;
-}
-
-/// A window's result in plain numbers.
-py::dict windowOf(const InitialisedWindow& window) {
-  py::dict d;
-  d["begin"] = window.begin;
-  d["end"] = window.end;
-  d["status"] = text(name(window.verdict()));
-  d["reason"] = window.fault ? describe(window.fault) : std::string(describe(window.verdict()));
+/// A window's fields, with its states in rows.
+py::dict windowOf(const ComparedWindow& window) {
+  py::dict d = dictWithSeries(window);
   const std::vector<SE23d> states = window.states();
   DoubleArray rows({static_cast<py::ssize_t>(states.size()), py::ssize_t{10}});
   for (std::size_t i = 0; i < states.size(); ++i) storePoint(states[i], rows.mutable_data() + 10 * i);
   d["states"] = rows;
-  const ImuBias<double> bias = window.bias();
-  d["gyroscope_bias"] = vector3(bias.gyroscope);
-  d["accelerometer_bias"] = vector3(bias.accelerometer);
-  const bool refined = window.isRefined();
-  d["refined"] = refined;
-  const auto& closed = window.closedForm();
-  if (refined) {
-    d["velocity"] = vector3(window.refined->velocity());
-    d["gravity"] = vector3(window.refined->gravity);
-    DoubleArray joint({py::ssize_t{27}, py::ssize_t{27}});
-    store(window.refined->covariance.joint, joint.mutable_data());
-    d["covariance"] = joint;
-    d["scale_sigma"] = window.refined->scale_sigma;
-    d["tilt_sigma"] = window.refined->tilt_sigma;
-    d["chi2"] = window.refined->cost;
-    d["degrees_of_freedom"] = window.refined->degrees_of_freedom;
-  } else {
-    const bool any = !closed.solutions.empty();
-    d["velocity"] = any ? py::object(vector3(closed.solutions[0].velocity)) : py::object(py::none());
-    d["gravity"] = any ? py::object(vector3(closed.solutions[0].gravity)) : py::object(py::none());
-    d["covariance"] = py::none();
-    d["scale_sigma"] = closed.scale_sigma;
-    d["tilt_sigma"] = closed.tilt_sigma;
-    d["chi2"] = any ? closed.solutions[0].cost : std::nan("");
-    d["degrees_of_freedom"] = closed.degrees_of_freedom;
-  }
-  py::list images, tracks, inliers;
-  for (const std::size_t i : window.images) images.append(i);
-  for (const std::size_t i : window.tracks) tracks.append(i);
-  for (const std::size_t i : window.found.inliers) inliers.append(window.tracks[i]);
-  d["images"] = images;
-  d["tracks"] = tracks;
-  d["inliers"] = inliers;
   return d;
 }
 
@@ -74,7 +33,7 @@ py::dict initialise(const DoubleArray& readings, const DoubleArray& noise, const
                     const DoubleArray& cameras, const py::array_t<std::int64_t, py::array::c_style>& indices,
                     const DoubleArray& bearings, double window, double stride, double image_rate, bool consensus,
                     bool refinement, double stretch, double gravity, double gyroscope_sigma, double accelerometer_sigma,
-                    std::uint64_t seed) {
+                    std::uint64_t seed, const DoubleArray& truth_rows) {
   struct Input {
     std::vector<ImuSample<double>> readings;
     VisualInertialRecording recording;
@@ -107,38 +66,35 @@ py::dict initialise(const DoubleArray& readings, const DoubleArray& noise, const
   options.initialisation.prior.gyroscope_sigma = gyroscope_sigma;
   options.initialisation.prior.accelerometer_sigma = accelerometer_sigma;
   options.initialisation.consensus.seed = seed;
-  VisualInertialResult result;
+  const std::vector<double> times = input.recording.image_times;
+  const std::vector<GroundTruth> truth = truthOf(truth_rows);
+  VisualInertialResult found;
+  ComparedRecording result;
   {
     const py::gil_scoped_release released;
-    result = interruptible([input = std::move(input)](const std::atomic<bool>& stop) mutable {
+    found = interruptible([input = std::move(input)](const std::atomic<bool>& stop) mutable {
       input.recording.readings = input.readings;
       return initialiseRecording(input.recording, input.options, [&stop](std::size_t, std::size_t) {
         if (stop) throw Stopped{};
       });
     });
+    if (!found.fault) {
+      result =
+          compareWithTruth(std::move(found), times, truth, gravity > 0 ? std::optional<double>(gravity) : std::nullopt);
+    }
   }
-  py::dict d;
-  d["fault"] = result.fault ? describe(result.fault) : std::string();
+  if (found.fault) throw py::value_error("vi_init: " + describe(found.fault));
+  py::dict d = dictOf(result);
   py::list windows;
-  for (const InitialisedWindow& one : result.windows) windows.append(windowOf(one));
+  for (const ComparedWindow& one : result.windows) windows.append(windowOf(one));
   d["windows"] = windows;
-  py::list stretches;
-  for (const FusedStretch& stretch_found : result.stretches) {
-    py::dict one;
-    one["begin"] = stretch_found.begin;
-    one["end"] = stretch_found.end;
-    one["ok"] = stretch_found.ok();
-    one["p"] = stretch_found.p;
-    one["inflation"] = stretch_found.inflation;
-    one["chi2"] = stretch_found.chi2;
-    one["degrees_of_freedom"] = stretch_found.degrees_of_freedom;
-    py::list of_windows;
-    for (const std::size_t i : stretch_found.windows) of_windows.append(i);
-    one["windows"] = of_windows;
-    stretches.append(one);
+  py::list fused;
+  for (std::size_t k = 0; k < result.stretches.size(); ++k) {
+    py::dict one = py::list(d["fusions"])[k];
+    one["window_indices"] = DictView::of(result.stretches[k].windows);
+    fused.append(one);
   }
-  d["stretches"] = stretches;
-  d["images_outside"] = result.images_outside;
+  d["fusions"] = fused;
   return d;
 }
 

@@ -30,6 +30,11 @@ def program(*arguments, codes=(0,)):
     return result
 
 
+def simulate(what, *arguments):
+    """Runs `liestat simulate what`."""
+    subprocess.run([PROGRAM, "simulate", what, *map(str, arguments)], check=True, capture_output=True)
+
+
 def plain(value):
     """A value of the module as JSON would have it."""
     if isinstance(value, liestat.Result):

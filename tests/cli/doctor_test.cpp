@@ -149,7 +149,7 @@ TEST(DoctorCommand, EdgesOfAGraph) {
   Convention c = convention(Perturbation::right, RotationUnit::half_angle);
   c.content = CovarianceContent::information, c.layout = CovarianceLayout::upper21;
   for (int i = 0; i + 1 < 80; ++i) {
-    const auto covariance = experiments::detail::sceneCovariance({}, rng);
+    const auto covariance = experiments::sceneCovariance({}, rng);
     const SE3d error = sample(Gaussian<SE3d>{SE3d(), covariance}, rng);
     const auto a = static_cast<std::size_t>(i);
     const SE3d Z = poses[a].inverse() * poses[a + 1] * error.inverse();

@@ -427,5 +427,38 @@ TEST(HandEye, IdenticalPosesLeaveEverythingOpen) {
   }
 }
 
+TEST(HandEye, TheVerdictIsThatOfTheStatus) {
+  HandEyeResult result = estimateRobotWorld(HandEyeScene({.pairs = 12}, 3).pairs);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result.verdict(), Verdict::Answer::yes);
+  EXPECT_EQ(result.verdict().text, "ok: X and Y are determined");
+  result.status = FusionStatus::inconsistent;
+  EXPECT_EQ(result.verdict(), Verdict::Answer::no);
+  EXPECT_EQ(result.verdict().text,
+            "NOT TO BE TRUSTED (inconsistent): the residuals are larger than the covariances of the poses say");
+  // What was wrong with the input is said.
+  const HandEyeResult bad = estimateHandEye(std::vector<PosePair>(1));
+  EXPECT_EQ(bad.verdict(), Verdict::Answer::no);
+  EXPECT_EQ(bad.inWords(), "1 pairs of poses are too few");
+}
+
+TEST(HandEye, StandardDeviationsAlongOpenDirectionsAreNone) {
+  HandEyeResult result = estimateRobotWorld(HandEyeScene({.pairs = 12}, 3).pairs);
+  std::vector<CalibratedPose> poses = calibratedPoses(result);
+  ASSERT_EQ(poses.size(), 2U);
+  // Translation in the parent's axes: R Σ Rᵀ.
+  const Eigen::Matrix3d R = result.Y.mean.so3().matrix();
+  const Eigen::Matrix3d turned = R * result.Y.covariance.topLeftCorner<3, 3>() * R.transpose();
+  EXPECT_LT((poses[1].sigmas.head<3>() - turned.diagonal().cwiseSqrt()).norm(), 1e-12);
+  OpenDirection open;
+  open.twist[2] = 1;
+  result.directions = {open};
+  poses = calibratedPoses(result);
+  EXPECT_TRUE(poses[0].sigmas.head<2>().allFinite() && poses[0].sigmas.tail<3>().allFinite());
+  EXPECT_TRUE(std::isnan(poses[0].sigmas[2]));
+  result.directions[0].rotates = true;
+  EXPECT_FALSE(calibratedPoses(result)[0].has_covariance);
+}
+
 }  // namespace
 }  // namespace liestat

@@ -416,7 +416,7 @@ TEST(Trajectories, TruthWithCovarianceIsAdded) {
     TrajectoryScene scene = experiments::independentScene({.n = 30}, rng);
     Moved m = moved(scene, AlignmentModel::se3, rng);
     for (MatchedPose& p : m.poses) {
-      p.reference.covariance = experiments::detail::sceneCovariance({}, rng);
+      p.reference.covariance = experiments::sceneCovariance({}, rng);
       p.reference.mean = p.reference.mean * sample(Gaussian<SE3d>{SE3d(), p.reference.covariance}, rng);
     }
     mean += evaluateConsistency(m.poses, alignWeighted(m.poses, AlignmentModel::se3)).joint.ratio() / 100;

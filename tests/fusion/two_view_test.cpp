@@ -432,5 +432,23 @@ TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {
   EXPECT_EQ(estimateTwoViewMotion(scene.pixels, bad).status, Status::not_converged);
 }
 
+TEST(TwoViewMotion, TheVerdictIsThatOfTheStatus) {
+  const TwoViewMotionEstimate none = estimateTwoViewMotion({}, {});
+  EXPECT_EQ(none.verdict(), Verdict::Answer::no);
+  EXPECT_EQ(none.verdict().text, "NOT TO BE TRUSTED (too_few): there is no finite match");
+  TwoViewMotionEstimate found;
+  found.status = Status::ok;
+  EXPECT_EQ(found.verdict(), Verdict::Answer::yes);
+  // Several motions: a search that ended well and found none is no answer.
+  TwoViewMotions motions;
+  motions.status = Status::ok;
+  EXPECT_EQ(motions.verdict(), Verdict::Answer::no);
+  EXPECT_EQ(motions.verdict().text, "NOT TO BE TRUSTED: no model is supported, inliers could be chance");
+  motions.structures.emplace_back();
+  EXPECT_EQ(motions.verdict(), Verdict::Answer::yes);
+  motions.status = Status::not_converged;
+  EXPECT_EQ(motions.verdict(), Verdict::Answer::no);
+}
+
 }  // namespace
 }  // namespace liestat

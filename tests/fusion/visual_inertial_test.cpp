@@ -2,6 +2,8 @@
 
 #include <fusion/init/closed_form.hpp>
 #include <fusion/visual_inertial.hpp>
+#include <fusion/visual_inertial_truth.hpp>
+#include <stats/quantile.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
@@ -9,7 +11,10 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 namespace {
@@ -172,6 +177,91 @@ TEST(SeveralCameras, SolveTheClosedForm) {
     window.features[2][0].camera = 2;
     EXPECT_EQ(solveClosedForm(window).fault, Fault(FaultKind::wrong_index, 2));
   }
+}
+
+ComparedWindow okWindow() {
+  ComparedWindow w;
+  w.tracks = {0};
+  w.found.result.status = FusionStatus::ok;
+  w.found.result.consistent = true;
+  w.found.inliers = {0};
+  return w;
+}
+
+TEST(VisualInertialVerdict, OneWindowIsOkAndNoStretchContradictsAll) {
+  ComparedRecording r;
+  const auto text = [&](Verdict::Answer answer) {
+    EXPECT_EQ(r.verdict(), answer) << r.verdict().text;
+    return r.verdict().text;
+  };
+  EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: none of 0 windows is ok.");
+  r.windows.resize(2);
+  EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: none of 2 windows is ok.");
+  r.windows[1] = okWindow();
+  EXPECT_EQ(text(Verdict::Answer::yes), "1 of 2 windows are ok.");
+  // Stretches that contradict each other: p below the bound.
+  r.stretches.resize(2);
+  for (ComparedStretch& f : r.stretches) f.has_state = true, f.p = 1e-6;
+  EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: the windows contradict each other in every stretch.");
+  r.stretches[1].inflated = true;
+  EXPECT_EQ(text(Verdict::Answer::yes), "1 of 2 windows are ok.");
+  r.windows_left = 3;
+  EXPECT_EQ(text(Verdict::Answer::no), "Interrupted: 2 of 5 windows.");
+}
+
+TEST(VisualInertialVerdict, ErrorsAreThoseOfWindowsThatClaimAScale) {
+  ComparedRecording r;
+  r.windows = {okWindow(), okWindow(), okWindow()};
+  r.windows[0].closed_form_error = InitialisationError{1, 0.1, -0.5};
+  r.windows[1].closed_form_error = InitialisationError{3, 0.1, 0.1};
+  r.windows[1].found.result.consistent = false;
+  r.windows[2].closed_form_error = InitialisationError{9, 0.1, 0.1};
+  r.windows[2].found.result.status = FusionStatus::stationary;
+  const InitialisationSummary s = r.summary();
+  EXPECT_EQ(s.closed_form.size(), 2U);
+  EXPECT_EQ(s.compared, 2U);
+  EXPECT_EQ(s.compared_not_ok, 1U);
+  EXPECT_EQ(s.closed_form.scale[0], 50) << "percent, without sign";
+  EXPECT_EQ(s.statuses.at("stationary"), 1U);
+  EXPECT_EQ(quantile(s.closed_form.speed, 0.5), 3) << "the upper of two";
+}
+
+TEST(VisualInertialTruth, TheErrorOfAnExactEstimateIsZero) {
+  VisualInertialResult found;
+  found.windows.resize(1);
+  InitialisedWindow& w = found.windows[0];
+  w.images = {0, 1};
+  w.tracks = {7};
+  w.found.result.status = FusionStatus::ok;
+  RefinementResult refined;
+  refined.status = FusionStatus::ok;
+  std::vector<GroundTruth> truth(2);
+  const SO3d R = SO3d::exp(Eigen::Vector3d(0.1, 0.2, -0.3));
+  const Eigen::Vector3d v(1, 2, 3), step(0.1, 0.2, 0.3);
+  truth[0] = {0, SE23d(R, Eigen::Vector3d(4, 5, 6), v), {}};
+  truth[1] = {0.1, SE23d(R, Eigen::Vector3d(4, 5, 6) + step, v), {}};
+  const SO3d back = R.inverse();
+  refined.gravity = back * Eigen::Vector3d(0, 0, -9.81);
+  refined.states = {SE23d(SO3d(), Eigen::Vector3d::Zero(), back * v), SE23d(SO3d(), back * step, back * v)};
+  refined.covariance.joint.setIdentity();
+  w.refined = refined;
+  const std::vector<double> times{0, 0.1};
+  ComparedRecording exact = compareWithTruth(found, times, truth, 9.81);
+  ASSERT_TRUE(exact.windows[0].refined_error.has_value());
+  EXPECT_LT(exact.windows[0].refined_error->speed, 1e-12);
+  EXPECT_LT(exact.windows[0].refined_error->gravity, 1e-12);
+  EXPECT_NEAR(exact.windows[0].refined_error->scale, 0, 1e-12);
+  EXPECT_NEAR(exact.windows[0].nees.value_or(-1), 0, 1e-12);
+  EXPECT_EQ(exact.windows[0].track_names, std::vector<std::uint64_t>{7});
+  // A speed that is off by 2 m/s with variances of one: NEES 4. A trajectory twice as long: scale 1.
+  found.windows[0].refined->states[0] = SE23d(SO3d(), Eigen::Vector3d::Zero(), back * v + Eigen::Vector3d(2, 0, 0));
+  found.windows[0].refined->states[1] = SE23d(SO3d(), 2 * (back * step), back * v);
+  const ComparedRecording off = compareWithTruth(found, times, truth, 9.81);
+  EXPECT_NEAR(off.windows[0].refined_error->speed, 2, 1e-12);
+  EXPECT_NEAR(off.windows[0].refined_error->scale, 1, 1e-12);
+  EXPECT_NEAR(off.windows[0].nees.value_or(0), 4, 1e-12);
+  // Without a truth at all images there is nothing to compare.
+  EXPECT_FALSE(compareWithTruth(found, times, std::span(truth).first(1), 9.81).windows[0].nees.has_value());
 }
 
 }  // namespace

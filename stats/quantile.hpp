@@ -1,3 +1,4 @@
+// Quantiles of a few values. (Needs the standard library alone.)
 #pragma once
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace liestat::experiments {
+namespace liestat {
 
 /// The p-quantile of some values by the nearest rank: the one of rank p (n - 1) in ascending order, from 0, rounded, so
 /// that it is one of them (of an even number the median is the upper of the middle two). NaN for none. Infinite values
@@ -17,4 +18,4 @@ inline double quantile(std::vector<double> values, double p) {
   return *at;
 }
 
-}  // namespace liestat::experiments
+}  // namespace liestat

@@ -1,0 +1,256 @@
+// The measurements, options and results of hand-eye calibration (fusion/hand_eye.hpp, fusion/hand_eye_hints.hpp), for
+// units that only look at them.
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <fusion/status.hpp>
+#include <lie/se3.hpp>
+#include <stats/gaussian.hpp>
+#include <stats/verdict.hpp>
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat {
+
+/// Poses (or motions) of both sensors at one time. Covariances may be singular, and one of them zero (an exact pose),
+/// if both together have rank six.
+struct PosePair {
+  Gaussian<SE3d> a, b;
+};
+
+struct HandEyeOptions {
+  /// `false`: the covariances are known up to one common factor, which is estimated from the residuals.
+  bool known_noise = true;
+  /// Searches for outliers if a pair is beyond the gate in the estimate from all pairs.
+  bool find_outliers = true;
+  /// Squared error of a pair, in units of its noise, beyond which it is an outlier; χ²₆ at 0.999 by default.
+  double gate = 22.457744484825327;
+  /// Number of minimal samples in the search for outliers: with 45 % outliers, 80 miss an all-inlier sample once in a
+  /// million times.
+  int samples = 80;
+  /// The excitation from which on a direction is estimated, and that below which noise alone explains it.
+  double trusted_excitation = 10, least_excitation = 3;
+  /// The fit is `inconsistent` if the probability of exceeding its χ² is smaller.
+  double least_p = 1e-3;
+  std::uint64_t seed = 1;  ///< seed of the fixed starts and samples
+};
+
+/// A direction of X (and Y) that the motions do not determine: the excitation is below the trusted one.
+struct OpenDirection {
+  /// Ratio of the information to that which the noise of the poses alone would produce; 1 is noise.
+  double excitation = 0;
+  /// Above the least excitation: fixed like the others, but the motions contain some information on it.
+  bool weak = false;
+  /// The twist (translation, rotation) in the gripper's frame along which X is open: Exp(s·twist) X. Its rotation has
+  /// unit length if there is one, otherwise its translation.
+  Eigen::Matrix<double, 6, 1> twist = Eigen::Matrix<double, 6, 1>::Zero();
+  /// The same for Y, in the base's frame; zero for motions.
+  Eigen::Matrix<double, 6, 1> twist_of_Y = Eigen::Matrix<double, 6, 1>::Zero();
+  bool has_Y = false;  ///< AX = YB
+  /// The direction rotates X; otherwise it is a pure translation.
+  bool rotates = false;
+  /// Its axis is the rotation axis of the gripper.
+  bool along_rotation_axis = false;
+  /// Its axis is the direction of the gripper's translation, without rotation.
+  bool along_translation = false;
+};
+
+/// "translation along the rotation axis (0.1, 0.0, 1.0) of the gripper".
+std::string describe(const OpenDirection& direction, const std::string& frame = "gripper");
+
+/// The fit of one pair.
+struct PairFit {
+  /// e = Log(X⁻¹ A⁻¹ Y B): translation (m) and rotation (rad) in the camera's frame.
+  Eigen::Matrix<double, 6, 1> error = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
+  double chi2 = std::numeric_limits<double>::quiet_NaN();  ///< squared length in units of its noise; χ²₆ at the truth
+  bool inlier = false;
+};
+
+/// A calibration. Statuses:
+///   ok             X, and Y, with their covariance
+///   undetermined   the motions leave `directions` open; X and Y are one of the solutions that fit
+///   ambiguous      a second solution, `rival`, explains the pairs as well
+///   inconsistent   the residuals are larger than the covariances predict, or fewer than half of the pairs agree
+///   not_converged
+///   bad_input      see `fault`
+struct HandEyeResult {
+  FusionStatus status = FusionStatus::bad_input;
+  Fault fault;
+  bool world = false;       ///< AX = YB
+  bool known_noise = true;  ///< false: the covariances are known up to a factor, and there is no p
+  /// Y is X for AX = XB. Their covariances are blocks of the joint one.
+  Gaussian<SE3d> X = {SE3d(), Eigen::Matrix<double, 6, 6>::Constant(std::numeric_limits<double>::quiet_NaN())}, Y = X;
+  /// Joint covariance of the local errors of X and Y, X first (for AX = XB only the block of X is used). Open
+  /// directions are treated as known: it is singular if there are `directions`, and NaN if one of them rotates X,
+  /// because an arbitrary rotation is not a small error.
+  Eigen::Matrix<double, 12, 12> covariance =
+      Eigen::Matrix<double, 12, 12>::Constant(std::numeric_limits<double>::quiet_NaN());
+  /// Squared distance of the inliers from their corrected poses, under the given covariances. It follows χ².
+  double chi2 = std::numeric_limits<double>::quiet_NaN();
+  int degrees_of_freedom = 0;
+  double p = std::numeric_limits<double>::quiet_NaN();  ///< probability of a larger χ²; NaN if the noise is not known
+  /// The factor by which the given covariances of the poses were multiplied: 1 if the noise is known, else χ²/dof.
+  double variance_factor = 1;
+  /// Excitations of the six directions, ascending.
+  Eigen::Matrix<double, 6, 1> excitations = Eigen::Matrix<double, 6, 1>::Zero();
+  std::vector<OpenDirection> directions;  ///< those below the trusted excitation, ascending
+  std::vector<PairFit> pairs;             ///< in the order of the input
+  std::vector<std::size_t> outliers;      ///< indices of the outliers, ascending
+  std::optional<SE3d> rival;              ///< X of a second solution that fits as well
+  int starts = 0;                         ///< number of starts that were compared
+
+  bool ok() const { return status == FusionStatus::ok; }
+  /// How it ended, in words.
+  std::string inWords() const;
+  /// Whether the calibration is to be trusted: yes where the status is ok, else no.
+  Verdict verdict() const;
+  /// True if an open direction rotates X, so that there is no covariance.
+  bool rotationIsOpen() const {
+    for (const OpenDirection& d : directions) {
+      if (d.rotates) return true;
+    }
+    return false;
+  }
+};
+
+/// One of the two unknown poses, parent_T_child, with the standard deviations of its coordinates.
+struct CalibratedPose {
+  const char *symbol = "X", *parent = "gripper", *child = "camera";
+  Gaussian<SE3d> pose;
+  bool has_covariance = false;
+  bool rotation_is_open = false;
+  /// Of the translation (m, along the parent's axes) and of the rotation vector (rad). NaN where there is no covariance,
+  /// and along axes in which an open direction has a component.
+  Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Matrix<double, 6, 1> local_sigmas = sigmas;  ///< of the local error T·Exp(e), likewise
+  /// Covariance of translation and rotation vector as above; open directions count as known.
+  Eigen::Matrix<double, 6, 6> covariance_of_coordinates = Eigen::Matrix<double, 6, 6>::Zero();
+
+  std::string name() const { return std::string(parent) + "_T_" + child; }
+};
+/// X, and Y where there is one.
+std::vector<CalibratedPose> calibratedPoses(const HandEyeResult& result);
+
+/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
+/// covariance of the inverse pose is one of `left`.
+enum class CovarianceReading {
+  right,                      ///< T·Exp(e), translation before rotation: the library's own
+  left,                       ///< Exp(e)·T, or T⁻¹·Exp(e)
+  rotation_then_translation,  ///< T·Exp(e) with the rotation's block first
+  world_axes                  ///< rotation and translation each along the axes of the world
+};
+inline constexpr std::array all_covariance_readings = {CovarianceReading::right, CovarianceReading::left,
+                                                       CovarianceReading::rotation_then_translation,
+                                                       CovarianceReading::world_axes};
+
+/// How a file's poses and covariances are to be read.
+struct PoseReading {
+  CovarianceReading covariance = CovarianceReading::right;
+  bool inverted = false;  ///< the wanted pose is the inverse of the given one; the covariance goes with it
+  friend bool operator==(const PoseReading&, const PoseReading&) = default;
+};
+struct HandEyeReading {
+  PoseReading a, b;
+  friend bool operator==(const HandEyeReading&, const HandEyeReading&) = default;
+};
+
+/// Another reading that fits.
+struct HandEyeHint {
+  HandEyeReading reading;
+  double chi2_per_degree = 0;  ///< with covariances as given
+  double p = 0;                ///< of a χ² as large; NaN where the noise is not known
+  std::size_t outliers = 0;
+  bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
+};
+
+/// A pose as translation, quaternion with w ≥ 0, and rotation vector.
+struct PoseCoordinates {
+  SE3d pose;
+};
+template <class V>
+void describe(V& v, const PoseCoordinates& x) {
+  Eigen::Vector4d q = x.pose.so3().params();
+  if (q[3] < 0) q = -q;
+  v("translation", Eigen::Vector3d(x.pose.translation()), "", "m")("quaternion_xyzw", q);
+  v("rotation_vector", Eigen::Vector3d(x.pose.so3().log()), "", "rad");
+}
+
+/// Standard deviations (m, rad), shown in m and degrees.
+struct PoseSigmas {
+  Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Zero();
+  const char* rotation = "rotation_deg";  ///< what the rotation's are called
+};
+template <class V>
+void describe(V& v, const PoseSigmas& x) {
+  v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()));
+  v(x.rotation, Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()));
+}
+
+template <class V>
+void describe(V& v, const CalibratedPose& x) {
+  describe(v, PoseCoordinates{x.pose.mean});
+  v("covariance", x.has_covariance ? std::optional(x.pose.covariance) : std::nullopt, "of local errors");
+  v("covariance_frame", std::string("the ") + x.child + "'s axes at its origin: " + x.name() + " Exp(e)");
+  v("standard_deviations", PoseSigmas{x.sigmas, "rotation_vector_deg"}, "null along open directions");
+  v("standard_deviations_local", PoseSigmas{x.local_sigmas});
+}
+
+/// An open direction with the frames in which it is given.
+template <class V>
+void describe(V& v, const OpenDirection& d) {
+  v("excitation", d.excitation)("weak", d.weak)("twist", d.twist, "of X", "m, rad")("frame", "gripper");
+  if (d.has_Y) v("twist_of_Y", d.twist_of_Y, "", "m, rad")("frame_of_Y", "base");
+  v("description", describe(d, std::string("gripper")))("rotates", d.rotates);
+}
+
+template <class V>
+void describe(V& v, const PairFit& fit) {
+  v("error_translation", Eigen::Vector3d(fit.error.head<3>()), "in the camera's frame", "m");
+  v("error_rotation", Eigen::Vector3d(fit.error.tail<3>()), "", "rad");
+  v("chi2", fit.chi2, "6 expected")("inlier", fit.inlier);
+}
+
+template <class V>
+void describe(V& v, const HandEyeResult& r) {
+  v("status", name(r.status))("ok", r.ok())("in_words", r.inWords())("problem", r.world ? "AX = YB" : "AX = XB");
+  const std::vector<CalibratedPose> poses = calibratedPoses(r);
+  v("X", poses.front(), "gripper_T_camera");
+  v("Y", r.world ? std::optional(poses.back()) : std::nullopt, "base_T_target");
+  v("covariance_order", "translation rotation")("covariance_side", "right");
+  v("covariance_frame",
+    "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known");
+  v("joint_covariance", r.world && poses.front().has_covariance ? std::optional(r.covariance) : std::nullopt);
+  v("joint_covariance_order",
+    r.world ? std::optional<std::string>("X translation, X rotation, Y translation, Y rotation") : std::nullopt);
+  v("chi2", r.chi2)("degrees_of_freedom", r.degrees_of_freedom)("p", r.p, "null: the noise is not known");
+  v("variance_factor", r.variance_factor)("noise", r.known_noise ? "given" : "scaled");
+  v("excitations", r.excitations)("open_directions", r.directions);
+  v("rival", r.rival ? std::optional(PoseCoordinates{*r.rival}) : std::nullopt, "X of a second solution");
+  v("starts", r.starts)("outliers", r.outliers, "numbers of the wrong pairs, from 0");
+}
+
+/// The pairs: errors (n×6, translation and rotation, m and rad) and squared lengths in units of their noise.
+template <class V>
+void describeSeries(V& v, const HandEyeResult& r) {
+  Eigen::Matrix<double, Eigen::Dynamic, 6> errors(static_cast<Eigen::Index>(r.pairs.size()), 6);
+  std::vector<double> squared;
+  for (std::size_t i = 0; i < r.pairs.size(); ++i) {
+    errors.row(static_cast<Eigen::Index>(i)) = r.pairs[i].error.transpose();
+    squared.push_back(r.pairs[i].chi2);
+  }
+  v("errors", errors, "of the pairs", "m, rad")("pair_chi2", squared, "6 expected");
+}
+
+}  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/hand_eye_results.hpp>
+#endif

@@ -1,0 +1,108 @@
+// The results of preintegrateWindows() (recording_windows.hpp), for units that only look at them.
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <fusion/imu/preintegrate.hpp>
+#include <stats/verdict.hpp>
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace liestat {
+
+/// The motion over one window, and its error where the truth is known at both ends.
+struct RecordingWindow {
+  double begin = 0, end = 0;  ///< s
+  RecordingResult<double> result;
+  ImuBias<double> bias = {};  ///< that was taken off the readings
+  /// Times (s) of the reading that is at fault, and of the one before it.
+  std::optional<double> fault_time = {}, time_before_fault = {};
+  /// preintegrationError() between the true states: position (m), rotation (rad), velocity (m/s).
+  std::optional<Eigen::Matrix<double, 9, 1>> error = {};
+  std::optional<double> squared_distance = {};  ///< the error's, under the covariance; none without noise
+
+  bool ok() const { return result.ok(); }
+  /// "ok", "gap", "not covered", …
+  const char* status() const;
+};
+
+/// Largest standard deviations along the axes of an increment over `duration` s.
+struct IncrementSigmas {
+  double duration = 0, rotation = 0, velocity = 0, position = 0;  ///< s, rad, m/s, m
+};
+/// Those of a motion with noise.
+IncrementSigmas incrementSigmas(const Preintegration<double>& motion);
+
+/// Whether errors against a truth are those that the covariances predict: the sum of the squared distances of n windows
+/// under χ² with 9 n degrees of freedom.
+struct IncrementTest {
+  std::size_t windows = 0;  ///< that were compared
+  double squared_distance = 0;
+  double degrees_of_freedom = 0;
+  double p = 0;  ///< probability of a larger sum
+
+  double ratio() const { return squared_distance / degrees_of_freedom; }
+};
+
+/// The windows of a recording.
+struct RecordingWindows {
+  std::vector<RecordingWindow> windows;
+  bool with_noise = false;  ///< both white densities are known, so there are covariances
+  bool with_truth = false;
+
+  /// Windows that have an increment.
+  std::size_t okWindows() const;
+  /// The test of the errors; none without truth, without noise, or where the truth covers no window.
+  std::optional<IncrementTest> test() const;
+  /// Whether the errors are within the covariances: no, if the sum of the squared distances is exceeded with a
+  /// probability below `false_alarm`. The law is exact if the noise of the sensor is Gaussian with the given densities,
+  /// the biases are the true ones, windows do not overlap, and the truth is exact. The truth's own error is in no
+  /// covariance: one that is not small beside the sensor's makes the answer no, and so does a known bias that is off.
+  /// Windows that follow each other share the truth at their common end, so that its error counts in both, and with
+  /// opposite signs. None without truth or without noise.
+  Verdict verdict(double false_alarm = 1e-5) const;
+  /// There is an increment, and the verdict is not no.
+  bool usable() const { return okWindows() > 0 && !verdict().isNo(); }
+};
+
+/// Fields of a window: those of an increment only where there is one, of an error only with a truth.
+template <class V>
+void describe(V& v, const RecordingWindow& w) {
+  v("begin", w.begin, "", "s")("status", w.status(), "ok, or the fault of the readings");
+  v("duration", w.result.motion.duration(), "", "s")("largest_gap", w.result.max_gap, "between readings", "s");
+  if (!w.ok()) {
+    if (w.fault_time) v("fault_time", *w.fault_time, "of the reading that is at fault", "s");
+    return;
+  }
+  const SE23d& x = w.result.motion.increment();
+  v("quaternion_xyzw", Eigen::Vector4d(x.so3().params()))("rotation_vector", Eigen::Vector3d(x.so3().log()), "", "rad");
+  v("position", Eigen::Vector3d(x.translation()), "", "m")("velocity", Eigen::Vector3d(x.velocity()), "", "m/s");
+  const ImuNoise<double>& noise = w.result.motion.options().noise;
+  const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
+  v("covariance",
+    with_noise ? std::optional(Eigen::Matrix<double, 9, 9>(w.result.motion.gaussian().covariance)) : std::nullopt,
+    "of position, rotation, velocity; null without noise");
+  v("bias_jacobian", w.result.motion.biasJacobian(), "by the biases of gyroscope and accelerometer");
+  if (w.error) v("error", *w.error, "against the truth: position, rotation, velocity", "m, rad, m/s");
+  if (w.squared_distance) v("squared_distance", *w.squared_distance, "of the error, 9 expected");
+}
+
+template <class V>
+void describe(V& v, const RecordingWindows& r) {
+  v("covariance_order", "position rotation velocity")("covariance_side", "right");
+  v("covariance_frame", "axes of the body at the end of the window, m rad m/s")("windows", r.windows);
+  if (const auto test = r.test()) {
+    v("squared_distance", test->squared_distance, "sum over the windows");
+    v("degrees_of_freedom", test->degrees_of_freedom)("p", test->p, "probability of a larger sum");
+  }
+  describe(v, r.verdict());
+}
+
+}  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/recording_windows_verdict.hpp>
+#endif

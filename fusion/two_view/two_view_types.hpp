@@ -1,0 +1,204 @@
+// The results of the estimate of a motion between two images (fusion/two_view/two_view.hpp), for units that only look at
+// them.
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <lie/essential.hpp>
+#include <stats/gaussian.hpp>
+#include <stats/hierarchy_types.hpp>
+#include <stats/status.hpp>
+#include <stats/verdict.hpp>
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace liestat {
+
+/// The physical parameters of an estimated motion, and their covariance (first order). Directions and normals are three
+/// numbers of norm one, whose covariance has rank two; rotations are rotation vectors, whose standard deviations are those
+/// of the rotation's error in the axes of the first camera, R·Exp(e).
+struct PhysicalParameters {
+  std::vector<std::string> names;
+  std::vector<std::string> units;  ///< px, rad or none
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;  ///< not finite where the parameters are not determined
+
+  std::size_t size() const { return names.size(); }
+  double deviation(std::size_t i) const;
+};
+
+/// What is known of a model of the lattice.
+struct TwoViewModelRow {
+  std::string name;
+  std::vector<std::string> parents;
+  int free_parameters = 0, equations = 0;
+  bool evaluated = false;           ///< its draws came to their end
+  Status status = Status::too_few;  ///< of its estimate; too_few: there is none
+  std::size_t draws = 0, inliers = 0;
+  double relevance = 0;
+  double chi2 = 0, degrees_of_freedom = 0;  ///< over its own inliers
+  double rms = 0;                           ///< σ sqrt(χ²/r): what noise these inliers show, px
+  bool unsupported = true;                  ///< its inliers could be chance
+  Rejection rejection = Rejection::none;
+  std::string rejected_by;
+
+  bool hasEstimate() const { return status != Status::too_few; }
+};
+
+/// A motion as its model tells it.
+struct TwoViewMotionResult {
+  /// H or F in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
+  int equations = 0;                  ///< of a match: 2, the matrix is H, or 1, it is F
+  /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of both
+  /// first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal lengths.
+  std::vector<PhysicalParameters> physical;
+  /// Of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, and its covariance in
+  /// the tangent (direction, rotation).
+  std::optional<Gaussian<Essentiald>> relative_pose;
+};
+
+/// What is taken of the images, and of their matches.
+struct TwoViewImageFrame {
+  std::size_t matches = 0;                                 ///< all that were given
+  double sigma = 0;                                        ///< standard deviation of each coordinate, px
+  Eigen::Vector2d image_corner = Eigen::Vector2d::Zero();  ///< the upper left one, px: zero where the size is known
+  Eigen::Vector2d image_size = Eigen::Vector2d::Zero();    ///< px
+  bool calibrated = false, size_from_matches = false;
+  std::size_t repeated = 0;      ///< matches that are equal to another one, which counts for them
+  std::size_t contradicted = 0;  ///< different ones that take no part, because they contradict each other
+};
+
+/// The motion between two images.
+struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
+  /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the estimate
+  /// of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches are the
+  /// same one.
+  Status status = Status::too_few;
+  std::string reason;  ///< in words, unless ok
+  std::vector<TwoViewModelRow> lattice;
+  std::size_t chosen = 0;      ///< number in the lattice
+  std::vector<bool> inlier;    ///< of each match
+  std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
+  std::size_t inliers = 0;
+  double threshold = 0;  ///< of the chosen model, on squared errors
+
+  bool ok() const { return status == Status::ok; }
+  const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
+  /// Whether the estimate is to be trusted: yes where the status is ok, else no.
+  Verdict verdict() const;
+};
+
+/// One of several motions in the same images: of an object, or of a plane of the scene.
+struct TwoViewStructure : TwoViewMotionResult {
+  std::string model;
+  Status status = Status::ok;        ///< of the estimate from its own inliers
+  std::vector<std::size_t> inliers;  ///< places of its matches, ascending
+  double rms = 0;                    ///< σ sqrt(χ²/r) of these, px
+};
+
+/// Several motions, in the order in which they were found.
+struct TwoViewMotions : TwoViewImageFrame {
+  Status status = Status::too_few;  ///< as TwoViewMotionEstimate's; ok without a structure, too
+  std::string reason;
+  std::vector<TwoViewStructure> structures;
+  std::vector<std::size_t> rest;  ///< matches that belong to none
+
+  /// There is a motion that chance does not explain, and the search came to its end.
+  bool ok() const { return status == Status::ok && !structures.empty(); }
+  /// Whether the motions are to be trusted: yes where ok(), else no.
+  Verdict verdict() const;
+};
+
+/// A relative pose up to scale.
+struct RelativePose {
+  Gaussian<Essentiald> pose;
+};
+template <class V>
+void describe(V& v, const RelativePose& x) {
+  v("quaternion_xyzw", Eigen::Vector4d(x.pose.mean.so3().params()));
+  v("direction", Eigen::Vector3d(x.pose.mean.direction().unit_vector()));
+  v("covariance", x.pose.covariance, "", "rad");
+  v("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
+}
+
+template <class V>
+void describe(V& v, const PhysicalParameters& x) {
+  std::vector<double> deviations;
+  for (std::size_t i = 0; i < x.size(); ++i) deviations.push_back(x.deviation(i));
+  v("names", x.names)("units", x.units)("values", x.values)("deviations", deviations, "standard deviations");
+  v("covariance", x.covariance);
+}
+
+template <class V>
+void describe(V& v, const TwoViewModelRow& row) {
+  v("model", row.name)("parents", row.parents)("free_parameters", row.free_parameters)("equations", row.equations);
+  v("evaluated", row.evaluated)("draws", row.draws);
+  v("status", row.hasEstimate() ? std::optional<std::string>(name(row.status)) : std::nullopt);
+  if (!row.hasEstimate()) return;
+  v("inliers", row.inliers)("relevance", row.relevance)("chi2", row.chi2)("degrees_of_freedom", row.degrees_of_freedom);
+  v("rms", row.rms, "", "px")("unsupported", row.unsupported, "its inliers could be chance");
+  v("rejection", name(row.rejection));
+  v("rejected_by", row.rejected_by.empty() ? std::nullopt : std::optional(row.rejected_by));
+}
+
+template <class V>
+void describe(V& v, const TwoViewMotionResult& x) {
+  v("matrix", x.matrix, "of norm 1");
+  v("matrix_acts_on", x.equations == 2 ? "second ~ matrix * first, pixels" : "second' * matrix * first = 0, pixels");
+  v("matrix_covariance", x.matrix_covariance.rows() == 9 ? std::optional(x.matrix_covariance) : std::nullopt,
+    "of its entries column after column");
+  v("parameters", x.physical);
+  v("second_T_first", x.relative_pose ? std::optional(RelativePose{*x.relative_pose}) : std::nullopt);
+}
+
+template <class V>
+void describe(V& v, const TwoViewImageFrame& x) {
+  v("matches", x.matches)("sigma", x.sigma, "", "px")("calibrated", x.calibrated);
+  v("image_corner", x.image_corner, "", "px")("image_size", x.image_size, "", "px");
+  v("size_from_matches", x.size_from_matches)("repeated", x.repeated)("contradicted", x.contradicted);
+}
+
+template <class V>
+void describe(V& v, const TwoViewMotionEstimate& x) {
+  describe(v, static_cast<const TwoViewImageFrame&>(x));
+  v("status", name(x.status))("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason));
+  v("model", x.lattice.empty() ? std::string() : x.chosenModel().name)("inliers", x.inliers);
+  describe(v, static_cast<const TwoViewMotionResult&>(x));
+  v("lattice", x.lattice)("inlier", x.inlier, "of each match")("squared_errors", x.errors, "in units of the noise");
+}
+
+/// What the program does not print.
+template <class V>
+void describeSeries(V& v, const TwoViewMotionEstimate& x) {
+  v("threshold", x.threshold, "of the chosen model, on squared errors");
+}
+
+template <class V>
+void describe(V& v, const TwoViewStructure& x) {
+  v("model", x.model)("status", name(x.status))("inliers", x.inliers.size())("rms", x.rms, "", "px");
+  describe(v, static_cast<const TwoViewMotionResult&>(x));
+}
+
+template <class V>
+void describe(V& v, const TwoViewMotions& x) {
+  describe(v, static_cast<const TwoViewImageFrame&>(x));
+  v("status", name(x.status))("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason));
+  v("motions", x.structures);
+  std::vector<double> motion(x.matches, 0);
+  for (std::size_t k = 0; k < x.structures.size(); ++k) {
+    for (const std::size_t i : x.structures[k].inliers) motion[i] = static_cast<double>(k + 1);
+  }
+  v("motion", motion, "of each match: the number of its motion, 0 for none");
+}
+
+}  // namespace liestat
+
+#ifndef LIESTAT_COMPILED_FUSION
+#include <fusion/detail/two_view_results.hpp>
+#endif

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# rooms.sh ROOT : rooms call public names of the library.
+#
+#   cli/, python/, experiments/, examples/, formats/ and report/ name nothing in a namespace detail and include nothing of
+#   a folder detail/
+#   views (cli/show/) include results, no estimator: no header that brings definitions with it (LIESTAT_COMPILED_…), but
+#   for those of types
+#
+# What is wrong is printed with file and line, and the exit code is 1. Before that the checks are tried on planted faults.
+set -eu
+
+# check ROOT: prints what is wrong, and fails if anything is.
+check() {
+  local root=$1 wrong=0 room header
+  cd "$root"
+  for room in cli python experiments examples formats report; do
+    [ -d "$room" ] || continue
+    # CLI11 has a namespace of that name, too.
+    if grep -rnP --include='*.hpp' --include='*.cpp' \
+      '(?<!CLI::)\bdetail::|namespace (\w+::)*detail\b|#include <(lie|stats|fusion|report)/([\w/]*/)?detail/' "$room"; then
+      wrong=1
+    fi
+  done
+  while read -r header; do
+    case $header in *_types.hpp) continue ;; esac
+    if grep -rnF --include='*.hpp' --include='*.cpp' "#include <$header>" cli/show; then
+      wrong=1
+    fi
+  done < <(grep -rlE --include='*.hpp' '^#ifndef LIESTAT_COMPILED_' lie stats fusion | grep -v /detail/)
+  return "$wrong"
+}
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work"/{cli/show,lie,stats,fusion,python}
+printf '#pragma once\n#ifndef LIESTAT_COMPILED_FUSION\n#endif\n' | tee "$work/fusion/mean_types.hpp" >"$work/fusion/mean.hpp"
+tried() {
+  printf '%s\n' "$2" >"$work/$1"
+  if (check "$work") >"$work/found"; then echo "the check finds no fault in: $2" && exit 1; fi
+  rm "$work/$1"
+}
+tried python/a.cpp 'return liestat::detail::skew(v);'
+tried python/a.cpp '  x = detail::skew(v);'
+tried cli/a.hpp 'namespace detail {'
+tried cli/a.hpp '#include <fusion/two_view/detail/b.hpp>'
+tried cli/a.hpp '#include <lie/detail/b.hpp>'
+tried cli/show/a.hpp '#include <fusion/mean.hpp>'
+printf '#include <fusion/mean_types.hpp>\nCLI::detail::to_string(x);\n' >"$work/cli/show/a.hpp"
+(check "$work") || { echo "the check finds faults where there are none" && exit 1; }
+
+check "$1"
