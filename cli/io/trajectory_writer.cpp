@@ -342,6 +342,22 @@ Convention conventionFor(std::string_view format, Convention convention) {
   return convention;
 }
 
+std::vector<std::string> notesOf(const TrajectoryText& text, std::string_view format, const Convention& convention) {
+  std::vector<std::string> notes;
+  if (text.n_rounded_times > 0) {
+    notes.push_back(fmt::format("{} times have digits that the format {} has not; they were cut off",
+                                text.n_rounded_times, format));
+  }
+  if (text.n_lost_cross > 0) {
+    notes.push_back(fmt::format("{} covariances have a cross block, for which the layout {} has no place",
+                                text.n_lost_cross, name(convention.layout)));
+  }
+  if (text.n_marked > 0) {
+    notes.push_back(fmt::format("{} unknown components are written as a variance of 1e6", text.n_marked));
+  }
+  return notes;
+}
+
 TrajectoryText formatTrajectory(const Trajectory& trajectory, std::string_view format, const Convention& convention) {
   return Writer(trajectory, format, conventionFor(format, convention)).write();
 }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace liestat::cli {
 
@@ -18,6 +19,9 @@ struct TrajectoryText {
   std::size_t n_lost_cross = 0;     ///< covariances whose cross block the format or layout has no place for
   std::size_t n_marked = 0;         ///< components written with the variance that means "not measured"
 };
+
+/// Sentences on what the format has no place for.
+std::vector<std::string> notesOf(const TrajectoryText& text, std::string_view format, const Convention& convention);
 
 /// True if the format says, in the file or beside it, what its covariances mean; others need the user to know.
 bool isSelfDescribing(std::string_view format);
