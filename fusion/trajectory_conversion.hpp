@@ -92,8 +92,12 @@ void describe(V& v, const TrajectoryConversion& c) {
   v("sampling_error", c.sampling_error, "standard error of sampled variances, relative")("notes", c.notes);
 }
 template <class V>
+void describe(V& v, const UnconvertedMatrix& f) {
+  v("fault", name(f.fault))("row", f.row)("found", f.found)("expected", f.expected);
+}
+template <class V>
 void describeSeries(V& v, const TrajectoryConversion& c) {
-  v("matrices", c.matrices, "in the convention of the result");
+  v("matrices", c.matrices, "in the convention of the result")("faults", c.faults, "matrices that were not converted");
 }
 
 }  // namespace liestat

@@ -123,29 +123,6 @@ void readTimes(const std::string& path, Trajectory& trajectory) {
   trajectory.times = std::move(times.times), trajectory.time_texts = std::move(times.time_texts);
 }
 
-/// The convention of the result: the one that was asked for, or liestat's where the file can say so.
-Convention targetConvention(const ConvertOptions& options, const std::string& format) {
-  const auto given = conventionGiven(options.cov_to, "--cov-to");
-  if (given && (isSelfDescribing(format) && options.cov_to.find("layout=") == std::string::npos)) {
-    Convention c = *given;
-    c.layout = CovarianceLayout::upper21;
-    return conventionFor(format, c);
-  }
-  if (given) {
-    const Convention c = conventionFor(format, *given);
-    if (c.layout != given->layout && options.cov_to.find("layout=") != std::string::npos) {
-      throw InputError(convert_name, 0,
-                       fmt::format("--cov-to {}, but the format {} has its own layout", options.cov_to, format),
-                       std::string(name(c.layout)));
-    }
-    return c;
-  }
-  if (isSelfDescribing(format)) return conventionFor(format, {.layout = CovarianceLayout::upper21});
-  if (format.rfind("mavlink", 0) == 0) return *conventionPreset("mavlink");
-  throw InputError(convert_name, 0, fmt::format("the format {} cannot say what its covariances mean", format),
-                   "--cov-to with a convention (docs/which_convention.md)");
-}
-
 void convertPoses(const ConvertOptions& options, ConvertOutput& output) {
   Trajectory trajectory = readTrajectory(options.input, options.reading);
   if (!options.times.empty()) readTimes(options.times, trajectory);
@@ -154,7 +131,7 @@ void convertPoses(const ConvertOptions& options, ConvertOutput& output) {
   Convention to;
   if (trajectory.hasCovariances()) {
     const Convention from = conventionOf(trajectory, conventionGiven(options.cov_from, "--cov-from"), "--cov-from");
-    to = targetConvention(options, output.to_format);
+    to = conventionToWrite(output.to_format, options.cov_to, convert_name, "--cov-to");
     output.conversion =
         converted(options, trajectory.name, trajectory.poses, trajectory.covariances, trajectory.lines, from, to);
     trajectory.covariances = output.conversion.matrices;

@@ -28,6 +28,11 @@ bool isSelfDescribing(std::string_view format);
 /// The convention with what the format has of its own: order, layout.
 Convention conventionFor(std::string_view format, Convention convention);
 
+/// The convention of a result in a format: the one that is asked for (as conventionNamed reads it; empty: none), or
+/// liestat's where the file can say so. Throws InputError, which names the caller and its option.
+Convention conventionToWrite(std::string_view format, const std::string& asked, const std::string& caller,
+                             std::string_view option);
+
 /// The text of a trajectory in a format (trajectoryFormatNames() without `auto`). Its covariances are matrices of the
 /// convention, as conventionFor returns it. Throws InputError if the format needs times that are not there, or cannot
 /// say that an entry is unknown.
