@@ -134,7 +134,8 @@ class ConvertParity(ParityTest):
         with open(path, "w", encoding="utf-8") as file:
             fields = {"order": "tr", "perturbation": "left", "unit": "rad", "content": "covariance", "layout": "upper21"}
             file.write("# liestat-covariance 1\n" + "".join(f"# {k}: {v}\n" for k, v in fields.items()))
-            file.write(self.csv(far, precise))
+            adjoint = far.Adj()
+            file.write(self.csv(far, adjoint @ precise @ np.swapaxes(adjoint, 1, 2)))
         ours = self.compare(path, "csv", None, "right")
         self.assertTrue(any("2 matrices are about an origin so far away" in note for note in ours.notes), ours.notes)
 

@@ -149,7 +149,10 @@ TEST(TrajectoryConversion, IndefiniteMatricesAreConvertedAndNotTrusted) {
 
 TEST(TrajectoryConversion, LossesAreBounded) {
   // From far away: the digits were lost by whoever wrote it.
-  const TrajectoryConversion far = convert(somePoses(2, 1e-6, 5e6), "left", "right");
+  Poses distant = somePoses(2, 1e-6, 5e6);
+  for (std::size_t i = 0; i < 2; ++i)
+    distant.matrices[i] = leftCovariance<SE3d>({distant.poses[i], distant.matrices[i]});
+  const TrajectoryConversion far = convert(distant, "left", "right");
   EXPECT_EQ(far.far_input, 2U);
   EXPECT_GT(far.round_trip_bound, largest_round_trip);
   EXPECT_TRUE(hasNote(far, "2 matrices are about an origin so far away"));
@@ -180,7 +183,7 @@ TEST(TrajectoryConversion, NothingIsNoVerdict) {
   for (const FieldDescription& f : fieldsOf(c)) names.push_back(f.path);
   EXPECT_EQ(names.front(), "covariances");
   EXPECT_NE(std::find(names.begin(), names.end(), "covariance_from.perturbation"), names.end());
-  EXPECT_EQ(names.back(), "notes[]");
+  EXPECT_EQ(names.back(), "notes");
 }
 
 }  // namespace
