@@ -6,8 +6,8 @@
 //   if (diagnosis.verdict == liestat::DiagnosisVerdict::identified) use(diagnosis.accepted.front());
 //   else std::puts(diagnosis.reason.c_str());
 //
-// A whole file, with or without a truth, with its runs and what its format fixes: diagnoseCovariances, whose verdict() is
-// that of `liestat doctor`.
+// diagnoseCovariances takes a whole file, with or without a truth, with its runs and what its format fixes. Its verdict()
+// is that of `liestat doctor`.
 //
 // 168 hypotheses (order × perturbation × unit × content) are compared by the likelihood of the errors. The margin
 // ln(168/α) is a bound, not a fit: for independent errors the true hypothesis is rejected with probability α at most. Several
@@ -66,12 +66,12 @@ struct CovarianceDiagnosisOptions {
   std::optional<double> at;  ///< s, of several runs: the time of their residuals; the last common one if unset
 };
 
-/// The diagnosis of a file. Several runs give one residual each, at one time: those are independent of each other, while
-/// neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is decided.
+/// The diagnosis of a file. Several runs give one residual each, at one time: those are independent of each other,
+/// while neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is decided.
 CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
                                         const CovarianceDiagnosisOptions& options = {});
 
-/// The poses in a convention and, with a truth, the consistency of their errors after an alignment. Unknown cross blocks
+/// The poses in a convention and, with an alignment to the truth, the consistency of their errors. Unknown cross blocks
 /// count as zero.
 ConventionReading readInConvention(std::span<const DiagnosedPose> poses, const Convention& convention,
                                    std::optional<AlignmentModel> alignment);

@@ -133,8 +133,8 @@ struct ConventionDiagnosis {
   double growth = detail::not_a_number;  ///< NEES of the second half over the first
 };
 
-/// The hypotheses that a file can decide, from its poses and matrices alone: if `convention` is the truth, the nearest other hypothesis and
-/// the number of poses that tell them apart with 95 %.
+/// The hypotheses that a file can decide, from its poses and matrices alone: if `convention` is the truth, the nearest
+/// other hypothesis and the number of poses that tell them apart with 95 %.
 struct PlanRow {
   Convention convention, nearest;
   double divergence = 0;          ///< Kullback-Leibler, nats per pose, to the nearest that is not equal
@@ -168,8 +168,8 @@ struct CovarianceDiagnosis {
   std::vector<Convention> accepted() const;
   /// The convention that explains the errors, else the likeliest one; nothing if none does.
   std::optional<Convention> best() const;
-  /// Yes: one convention is identified, and the errors are consistent with it (of a plan: always). No: the errors do not
-  /// follow the covariances, or no convention explains them. None: several conventions do, or there are too few poses.
+  /// Yes: one convention is identified, and the errors are consistent with it (of a plan: always). No: the errors do
+  /// not follow the covariances, or no convention explains them. None: several conventions do, or there are too few poses.
   Verdict verdict() const;
 };
 

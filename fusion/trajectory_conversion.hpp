@@ -72,8 +72,8 @@ struct TrajectoryConversion {
   Verdict verdict() const;
 };
 
-/// Converts the matrices that belong to poses, as many as there are poses, layouts undone (unpackCovariance). A matrix with
-/// a fault is NaN in the result; the others are converted.
+/// Converts the matrices that belong to poses, one for each, layouts undone (unpackCovariance). A matrix with a fault is
+/// NaN in the result; the others are converted.
 TrajectoryConversion convertTrajectory(std::span<const SE3d> poses,
                                        std::span<const Eigen::Matrix<double, 6, 6>> matrices, const Convention& from,
                                        const Convention& to, const ConversionOptions& options = {});

@@ -18,7 +18,7 @@ struct DiagnosisOutput {
 
 std::string formatDiagnosis(const DiagnosisOutput& output);
 void setDiagnosis(JsonObject& object, const DiagnosisOutput& output);
-/// `readings` are the file in the convention that is assumed without a diagnosis, then in the best one if it is another.
+/// `readings`: the file in the convention that is assumed without a diagnosis, then in the best one if it is another.
 void writeDiagnosisReport(const std::string& directory, const std::string& command_line, const DiagnosisOutput& output,
                           const std::vector<ConventionReading>& readings);
 

@@ -1,5 +1,5 @@
-// Hypotheses on the convention of a file, ranked by the likelihood of its errors; docs/theory/trajectories.md, sections 6
-// and 7.
+// Hypotheses on the convention of a file, ranked by the likelihood of its errors; docs/theory/trajectories.md,
+// sections 6 and 7.
 #pragma once
 
 #include <fusion/convention_diagnosis.hpp>

@@ -121,7 +121,9 @@ def read_pose_graph(path, *, ignore_unknown=False, norm_tolerance=1e-3):
 def write_trajectory(
     path, poses, covariances=None, *, format, times=None, convention=None, source="right", frames=()
 ):
-    """Writes poses and covariances as a file of another program; TUM, KITTI and EuRoC get their covariances in `path`.cov.
+    """Writes poses and covariances as a file of another program.
+
+    TUM, KITTI and EuRoC files get their covariances in `path`.cov.
 
     Parameters
     ----------
@@ -161,7 +163,8 @@ def write_trajectory(
         conversion = _convert(caller, params, covariances, source, target)
         if conversion.faults:
             fault = conversion.faults[0]
-            raise ValueError(f"{caller}: pose {fault.row}: {fault.found}, expected {fault.expected or 'another convention'}")
+            expected = fault.expected or "another convention"
+            raise ValueError(f"{caller}: pose {fault.row}: {fault.found}, expected {expected}")
         matrices = conversion.matrices
         if conversion.decided is False:
             warnings.warn(f"liestat.{caller}: {conversion.sentence}", UserWarning, stacklevel=2)

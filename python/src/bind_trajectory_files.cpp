@@ -108,7 +108,7 @@ std::string conventionToWrite(const std::string& format, const std::string& aske
   return conventionName(cli::conventionToWrite(format, asked, "write_trajectory", "convention"));
 }
 
-/// The text of a file, of its side file, and notes. The matrices are in the convention, which conventionToWrite returned.
+/// The text of a file, of its side file, and notes. The matrices are in the convention that conventionToWrite returned.
 py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleArray>& matrices,
                            const std::vector<std::string>& times, const std::string& format,
                            const std::string& convention, const std::vector<std::string>& frames) {

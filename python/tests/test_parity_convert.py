@@ -1,5 +1,5 @@
-"""`convert` of the program and of the module: the same figures, notes, verdict and files, and the readers and the writer
-of trajectories behind them."""
+"""`convert` of the program and of the module: the same figures, notes, verdict and files, and the readers and the
+writer of trajectories behind them."""
 
 import os
 import re
@@ -94,9 +94,8 @@ class ConvertParity(ParityTest):
             for source in ("ros-fixed", "left,order=rt", "mrpt-ypr,unit=deg"):
                 if form == "openvins" and source.startswith("left"):
                     continue
-                path = self.write(
-                    "given", poses, covariances, format=form, times=None if form == "kitti" else times, convention=source
-                )
+                stamps = None if form == "kitti" else times
+                path = self.write("given", poses, covariances, format=form, times=stamps, convention=source)
                 for to_format in ("csv", FORMATS[(i + 3) % len(FORMATS)]):
                     if form == "kitti" and to_format not in ("csv", "ros-json", "ros-yaml", "kitti"):
                         continue
@@ -123,17 +122,16 @@ class ConvertParity(ParityTest):
         large, big, _ = some_poses(3, 0.03)
         path = self.write("large.csv", large, big, format="csv")
         self.assertEqual(self.compare(path, "csv", None, "ros-fixed").beyond_first_order, 3)
-        sampled = self.compare(
-            path, "csv", None, "ros-fixed", ["--sampled", "--samples", "500", "--seed", "7"], sampled=True, samples=500, seed=7
-        )
+        flags = ["--sampled", "--samples", "500", "--seed", "7"]
+        sampled = self.compare(path, "csv", None, "ros-fixed", flags, sampled=True, samples=500, seed=7)
         self.assertGreater(sampled.sampling_error, 0)
         # The defaults of samples and seed are the program's.
         self.compare(path, "csv", None, "ros-fixed", ["--sampled"], sampled=True)
         far, precise, _ = some_poses(2, 1e-6, 5e6)
         path = self.path("far.csv")
         with open(path, "w", encoding="utf-8") as file:
-            fields = {"order": "tr", "perturbation": "left", "unit": "rad", "content": "covariance", "layout": "upper21"}
-            file.write("# liestat-covariance 1\n" + "".join(f"# {k}: {v}\n" for k, v in fields.items()))
+            file.write("# liestat-covariance 1\n# order: tr\n# perturbation: left\n# unit: rad\n")
+            file.write("# content: covariance\n# layout: upper21\n")
             adjoint = far.Adj()
             file.write(self.csv(far, adjoint @ precise @ np.swapaxes(adjoint, 1, 2)))
         ours = self.compare(path, "csv", None, "right")
@@ -144,7 +142,7 @@ class ConvertParity(ParityTest):
         names = "tx,ty,tz,qx,qy,qz,qw," + ",".join(f"cov_{i}{j}" for i in range(6) for j in range(i, 6))
         order = [4, 5, 6, 0, 1, 2, 3]
         upper = np.triu_indices(6)
-        rows = [",".join(map(repr, [*map(float, p[order]), *map(float, c[upper])])) for p, c in zip(poses.params, covariances)]
+        rows = [",".join(repr(float(x)) for x in [*p[order], *c[upper]]) for p, c in zip(poses.params, covariances)]
         return "\n".join([names, *rows]) + "\n"
 
     def test_verdict_is_the_exit_code(self):

@@ -97,7 +97,8 @@ class DoctorParity(ParityTest):
                 self.assertEqual(ours.accepted, [accepted], ours.sentence)
                 self.assertIs(ours.decided, decided)
         # A level of the user's, and a truth in another world.
-        ours = liestat.diagnose_conventions(read.poses, read.matrices, truth, times=times, truth_times=times, alpha=0.01)
+        stamps = {"times": times, "truth_times": times}
+        ours = liestat.diagnose_conventions(read.poses, read.matrices, truth, **stamps, alpha=0.01)
         self.compare([estimate, reference, *words, "--alpha", "0.01"], ours)
         world = SE3.exp(np.array([1.0, 2, 3, 0.3, -0.5, 0.7]))
         moved = self.truth("moved.tum", world * truth, times)

@@ -315,7 +315,7 @@ TEST(ConventionDiagnosis, BadInputIsSaid) {
   EXPECT_TRUE(planDiagnosis({}).empty());
 }
 
-// --- Whole files ------------------------------------------------------------------------------------------------------
+// --- Whole files -----------------------------------------------------------------------------------------------------
 
 CovarianceDiagnosis diagnosed(const DiagnosedRun& run, const CovarianceDiagnosisOptions& options = {}) {
   return diagnoseCovariances(std::span(&run, 1), options);
