@@ -215,7 +215,8 @@ class ConvertParity(ParityTest):
         )
         for name in ("from", "to", "poses", "files"):
             theirs.pop(name)
-        self.assert_equal_results(theirs, ours, series=("matrices", "faults", "sentence", "decided"))
+        self.assertEqual(theirs.pop("notes"), with_flags(ours.notes))
+        self.assert_equal_results(theirs, ours, series=("matrices", "faults", "notes", "sentence", "decided"))
         np.testing.assert_allclose(
             liestat.read_pose_graph(self.path("a.toro")).matrices, ours.matrices, rtol=1e-13, atol=1e-13
         )
