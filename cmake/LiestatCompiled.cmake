@@ -3,7 +3,8 @@
 #
 #   means          Fréchet, Mahalanobis and certified means of the common features in double
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
-#   trajectories   evaluation of trajectories, diagnosis of conventions, inertial windows against a truth (Boost.Math)
+#   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
+#                  (Boost.Math, Random123)
 
 set(LIESTAT_COMPILED_PARTS means fusion trajectories)
 
@@ -11,9 +12,10 @@ set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certi
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
     robust_two_view two_view hand_eye motion)
-set(LIESTAT_COMPILED_SOURCES_trajectories trajectories evaluate convention_diagnosis recording_windows)
+set(LIESTAT_COMPILED_SOURCES_trajectories
+    trajectories evaluate convention_diagnosis trajectory_conversion recording_windows)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
-set(LIESTAT_COMPILED_NEEDS_trajectories boost)
+set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 
 # liestat_compiled(PART ROOT LIBRARY): the static library liestat_PART of ROOT/<room>/compiled, known as liestat::PART, too.
 # LIBRARY is the target of the headers. There is none if a package is missing that the part needs.

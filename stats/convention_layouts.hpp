@@ -34,9 +34,7 @@ struct PackedCovariance {
   std::span<const double> numbers() const&& = delete;  // a view into a temporary
 };
 
-namespace detail {
-
-/// Row and column of the numbers of a layout, in their sequence.
+/// Row and column in the matrix of each number of a layout, in their sequence.
 struct LayoutEntries {
   struct Entry {
     int row, column;
@@ -44,8 +42,10 @@ struct LayoutEntries {
   std::array<Entry, 36> entries{};
   std::size_t size = 0;
   constexpr void add(int row, int column) { entries[size++] = {row, column}; }
+  constexpr const Entry& operator[](std::size_t k) const { return entries[k]; }
 };
 
+/// The entries of the convention's layout; those of planar layouts depend on its order and perturbation too.
 constexpr LayoutEntries layoutEntries(const Convention& convention) {
   LayoutEntries list;
   switch (convention.layout) {
@@ -88,14 +88,12 @@ constexpr LayoutEntries layoutEntries(const Convention& convention) {
   return list;
 }
 
-}  // namespace detail
-
 /// The numbers of the convention's layout, of a matrix in the convention (toConvention).
 inline PackedCovariance packCovariance(const Convention& convention, const Eigen::Matrix<double, 6, 6>& matrix) {
-  const detail::LayoutEntries list = detail::layoutEntries(convention);
+  const LayoutEntries list = layoutEntries(convention);
   PackedCovariance packed;
   packed.size = list.size;
-  for (std::size_t k = 0; k < list.size; ++k) packed.storage[k] = matrix(list.entries[k].row, list.entries[k].column);
+  for (std::size_t k = 0; k < list.size; ++k) packed.storage[k] = matrix(list[k].row, list[k].column);
   return packed;
 }
 
@@ -104,12 +102,12 @@ inline PackedCovariance packCovariance(const Convention& convention, const Eigen
 /// numbers is not layoutSize.
 inline std::optional<Eigen::Matrix<double, 6, 6>> unpackCovariance(const Convention& convention,
                                                                    std::span<const double> numbers) {
-  const detail::LayoutEntries list = detail::layoutEntries(convention);
+  const LayoutEntries list = layoutEntries(convention);
   if (numbers.size() != list.size) return std::nullopt;
   Eigen::Matrix<double, 6, 6> matrix;
   matrix.setConstant(std::numeric_limits<double>::quiet_NaN());
   for (std::size_t k = 0; k < list.size; ++k) {
-    const auto [i, j] = list.entries[k];
+    const auto [i, j] = list[k];
     matrix(i, j) = numbers[k];
     if (convention.layout != CovarianceLayout::full36) matrix(j, i) = numbers[k];
   }

@@ -2,6 +2,7 @@
 // pole of Euler angles, and what is not linear. docs/theory/conventions.md, section 5.
 #pragma once
 
+#include <lie/linear.hpp>
 #include <stats/conventions.hpp>
 
 #include <algorithm>
@@ -109,6 +110,34 @@ inline ConversionLoss conversionLoss(const Convention& from, const Convention& t
     loss.problem = world ? ConversionProblem::far_origin : ConversionProblem::near_pole;
   }
   return loss;
+}
+
+/// True if the part of a matrix that is known (not NaN) is positive semidefinite up to rounding.
+inline bool isSemidefinite(const Eigen::Matrix<double, 6, 6>& matrix) {
+  const auto known = [&](int i, int j) { return std::isnan(matrix(i, j)) ? double(i == j) : matrix(i, j); };
+  // Free of units, and with room for the rounding of what is singular.
+  Eigen::Matrix<double, 6, 6> R;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const double scale = std::sqrt(known(i, i) * known(j, j));
+      R(i, j) = scale > 0 ? known(i, j) / scale : (i == j ? 1 : (known(i, j) == 0 ? 0 : 2));
+    }
+    R(i, i) += 1e-9;
+  }
+  return Cholesky<double, 6>(R).ok();
+}
+
+/// Sets unknown (NaN) covariances between known components to 0; true if there were any.
+inline bool assumeUncorrelated(Eigen::Matrix<double, 6, 6>& matrix) {
+  bool any = false;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      if (!std::isnan(matrix(i, j)) || std::isnan(matrix(i, i)) || std::isnan(matrix(j, j))) continue;
+      matrix(i, j) = 0;
+      any = true;
+    }
+  }
+  return any;
 }
 
 }  // namespace liestat

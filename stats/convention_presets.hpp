@@ -204,4 +204,12 @@ inline std::string conventionName(const Convention& c, bool with_layout = true) 
   return text;
 }
 
+/// See report/describe.hpp.
+template <class V>
+void describe(V& v, const Convention& c) {
+  v("name", conventionName(c), "as parseConvention reads it")("order", name(c.order))("perturbation",
+                                                                                      name(c.perturbation));
+  v("unit", name(c.unit), "of the rotation")("content", name(c.content))("layout", name(c.layout));
+}
+
 }  // namespace liestat

@@ -7,15 +7,12 @@
 #include <cli/io/trajectory_rows.hpp>
 #include <cli/io/trajectory_writer.hpp>
 #include <cli/show/json.hpp>
-#include <stats/convention_layouts.hpp>
-#include <stats/convention_losses.hpp>
+#include <fusion/trajectory_conversion.hpp>
 #include <stats/convention_presets.hpp>
-#include <stats/convention_sampling.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -36,216 +33,56 @@ struct ConvertOptions {
   std::uint64_t seed = 1;
 };
 
-/// Figures of a conversion, for people and JSON.
+/// A conversion of a file, for people and JSON.
 struct ConvertOutput {
   std::string from_format, to_format;
-  std::optional<Convention> from, to;  ///< of the covariances; nothing if there are none
-  std::size_t poses = 0, covariances = 0, unknown = 0, partly_unknown = 0, assumed = 0;
-  std::vector<std::size_t> indefinite;  ///< lines, or numbers from 0 where there are none
-  double round_trip = 0, rotation_sigma = 0, sampling_error = 0;
-  std::size_t beyond_first_order = 0, far_input = 0, zero_variances = 0;
-  std::vector<std::string> notes;
+  std::size_t poses = 0;
+  TrajectoryConversion conversion;
   std::vector<std::string> files;
 };
 
-/// The error of a matrix: the pose at which it is, and where the row stands.
-struct ConvertRow {
-  const SE3d& pose;
-  std::size_t line, index;
-};
-
-/// True if the part of a matrix that is known is positive semidefinite up to rounding.
-bool isSemidefinite(const Matrix6& matrix) {
-  Matrix6 C = matrix;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
-      if (std::isnan(C(i, j))) C(i, j) = i == j ? 1 : 0;
-    }
+/// Sentences of the library put the names of its options between backquotes; here they are options of the command line.
+std::string withFlags(std::string text) {
+  for (std::size_t begin = text.find('`'); begin != std::string::npos; begin = text.find('`', begin)) {
+    const std::size_t end = text.find('`', begin + 1);
+    std::string flag = text.substr(begin + 1, end - begin - 1);
+    std::replace(flag.begin(), flag.end(), '_', '-');
+    text.replace(begin, end + 1 - begin, "--" + flag);
   }
-  // Free of units, and with room for the rounding of what is singular.
-  Matrix6 R;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
-      const double scale = std::sqrt(C(i, i) * C(j, j));
-      R(i, j) = scale > 0 ? C(i, j) / scale : (i == j ? 1 : (C(i, j) == 0 ? 0 : 2));
-    }
-    R(i, i) += 1e-9;
-  }
-  return detail::Cholesky<double, 6>(R).ok();
+  return text;
 }
 
-/// Converts matrices one by one and keeps account.
-class Converter {
- public:
-  Converter(const ConvertOptions& options, const Convention& from, const Convention& to, std::string file,
-            ConvertOutput& output)
-      : options_(options), from_(from), to_(to), file_(std::move(file)), output_(output) {}
-
-  Matrix6 convert(Matrix6 matrix, const ConvertRow& row) {
-    ++output_.covariances;
-    if (options_.assume_uncorrelated && fillCross(matrix)) ++output_.assumed;
-    if (matrix.array().isNaN().all()) {
-      ++output_.unknown;
-      return matrix;
-    }
-    if (matrix.array().isNaN().any()) ++output_.partly_unknown;
-    for (int i = 0; i < 6; ++i) {
-      if (matrix(i, i) == 0) {
-        ++output_.zero_variances;
-        break;
-      }
-    }
-    if (!isSemidefinite(matrix)) {
-      output_.indefinite.push_back(row.line > 0 ? row.line : row.index);
-      if (from_.content != CovarianceContent::covariance || to_.content != CovarianceContent::covariance) {
-        throw InputError(file_, row.line, "the matrix is indefinite", "a positive definite one, to change its content");
-      }
-    }
-    Convention same = from_;
-    same.layout = to_.layout;
-    if (same == to_) return matrix;
-    const Gaussian<SE3d> g = fromConvention(from_, row.pose, matrix);
-    look(g, row);
-    if (options_.sampled && family(from_.perturbation) != family(to_.perturbation) && g.covariance.allFinite()) {
-      return sample(matrix, row);
-    }
-    const Matrix6 converted = convertConvention(from_, to_, row.pose, matrix);
-    if (converted.array().isNaN().all()) throwUndetermined(matrix, row);
-    return converted;
+/// The conversion of poses and their matrices; throws InputError for the first matrix that is not converted.
+TrajectoryConversion converted(const ConvertOptions& options, const std::string& file, const std::vector<SE3d>& poses,
+                               const std::vector<Matrix6>& matrices, const std::vector<std::size_t>& lines,
+                               const Convention& from, const Convention& to) {
+  ConversionOptions conversion{options.assume_uncorrelated, options.sampled, options.samples, options.seed, lines};
+  TrajectoryConversion result = convertTrajectory(poses, matrices, from, to, conversion);
+  if (!result.faults.empty()) {
+    const UnconvertedMatrix& fault = result.faults.front();
+    const std::size_t line = lines[fault.row];
+    throw InputError(file, line, (line == 0 ? fmt::format("pose {}: ", fault.row) : "") + fault.found,
+                     withFlags(fault.expected));
   }
-
- private:
-  /// Covariances between known components that are not known become zero; true if there were any.
-  static bool fillCross(Matrix6& matrix) {
-    bool any = false;
-    for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) {
-        if (!std::isnan(matrix(i, j)) || std::isnan(matrix(i, i)) || std::isnan(matrix(j, j))) continue;
-        matrix(i, j) = 0;
-        any = true;
-      }
-    }
-    return any;
-  }
-
-  /// The conversion's losses; throws InputError where the result would not be a covariance any more.
-  void look(const Gaussian<SE3d>& g, const ConvertRow& row) {
-    const ConversionLoss loss = conversionLoss(from_, to_, g);
-    output_.round_trip = std::max(output_.round_trip, loss.round_trip);
-    output_.rotation_sigma = std::max(output_.rotation_sigma, loss.rotation_sigma);
-    if (loss.firstOrderFails()) ++output_.beyond_first_order;
-    if (loss.problem == ConversionProblem::none) return;
-    if (loss.problem == ConversionProblem::far_origin && to_.perturbation != Perturbation::left) {
-      // Losses before this file are its writer's.
-      ++output_.far_input;
-      return;
-    }
-    const Eigen::Vector3d p = g.mean.translation();
-    std::string found = message(loss.problem);
-    if (loss.problem == ConversionProblem::far_origin) found = fmt::format("|p| is {:.6g} m: {}", p.norm(), found);
-    if (row.line == 0) found = fmt::format("pose {}: {}", row.index, found);
-    throw InputError(file_, row.line, found,
-                     loss.problem == ConversionProblem::undefined_angles
-                         ? std::string()
-                         : fmt::format("a round trip within {:g} sigma, this one loses {:.2g}", largest_round_trip,
-                                       loss.round_trip));
-  }
-
-  Matrix6 sample(const Matrix6& matrix, const ConvertRow& row) {
-    const Matrix6 covariance = covarianceFromContent(from_.content, matrix);
-    const SampledMoments moments =
-        sampledConversion(from_, to_, row.pose, covariance, options_.samples, options_.seed, row.index);
-    output_.sampling_error = std::max(output_.sampling_error, moments.relative_error);
-    return covarianceAsContent(to_.content, moments.second_moment);
-  }
-
-  [[noreturn]] void throwUndetermined(const Matrix6& matrix, const ConvertRow& row) const {
-    const bool cross = matrix.diagonal().allFinite();
-    throw InputError(file_, row.line,
-                     fmt::format("{}the matrix does not determine one of '{}'",
-                                 row.line == 0 ? fmt::format("pose {}: ", row.index) : "", conventionName(to_, false)),
-                     cross ? "all covariances between components, or --assume-uncorrelated" : "the whole matrix");
-  }
-
-  const ConvertOptions& options_;
-  Convention from_, to_;
-  std::string file_;
-  ConvertOutput& output_;
-};
-
-void addConvertNotes(ConvertOutput& output, const ConvertOptions& options) {
-  auto& notes = output.notes;
-  const auto lines = [](const std::vector<std::size_t>& list) {
-    std::string text;
-    for (std::size_t k = 0; k < list.size() && k < 3; ++k) text += (k > 0 ? ", " : "") + std::to_string(list[k]);
-    return text + (list.size() > 3 ? ", ..." : "");
-  };
-  if (output.unknown > 0)
-    notes.push_back(fmt::format("{} covariances are unknown as a whole, and stay so", output.unknown));
-  if (output.partly_unknown > 0) {
-    notes.push_back(
-        fmt::format("{} covariances have unknown entries; what depends on them is unknown", output.partly_unknown));
-  }
-  if (output.assumed > 0)
-    notes.push_back(fmt::format("{} covariances: unknown correlations taken as 0", output.assumed));
-  if (!output.indefinite.empty()) {
-    notes.push_back(fmt::format("{} of {} matrices are indefinite (line {})", output.indefinite.size(),
-                                output.covariances, lines(output.indefinite)));
-  }
-  if (output.zero_variances > 0) {
-    notes.push_back(fmt::format("{} matrices have a variance of 0: rounded away by whoever wrote the file?",
-                                output.zero_variances));
-  }
-  if (output.far_input > 0) {
-    notes.push_back(
-        fmt::format("{} matrices are about an origin so far away that digits have cancelled: bound {:.2g} "
-                    "sigma",
-                    output.far_input, output.round_trip));
-  }
-  if (output.beyond_first_order > 0 && !options.sampled) {
-    notes.push_back(
-        fmt::format("{} rotations have a sigma above {} rad (largest {:.3g}): first order fails, use "
-                    "--sampled",
-                    output.beyond_first_order, first_order_sigma, output.rotation_sigma));
-  }
-  if (options.sampled && output.sampling_error > 0) {
-    notes.push_back(fmt::format("second moments by sampling, standard error {:.2g} of the variances at most",
-                                output.sampling_error));
-  }
+  for (std::string& note : result.notes) note = withFlags(note);
+  return result;
 }
 
 std::string formatConvert(const ConvertOutput& output) {
+  const TrajectoryConversion& c = output.conversion;
   std::string text = fmt::format("{} {} from {} to {}\n", output.poses, output.poses == 1 ? "pose" : "poses",
                                  output.from_format, output.to_format);
-  if (output.from && output.to) {
-    text += fmt::format("covariances from {} to {}\n", conventionName(*output.from, false),
-                        conventionName(*output.to, false));
+  if (c.from && c.to) {
+    text += fmt::format("covariances from {} to {}\n", conventionName(*c.from, false), conventionName(*c.to, false));
   }
-  for (const std::string& note : output.notes) text += "note: " + note + "\n";
+  for (const std::string& note : c.notes) text += "note: " + note + "\n";
   for (const std::string& file : output.files) text += "written: " + file + "\n";
   return text;
 }
 
 void setConvert(JsonObject& object, const ConvertOutput& output) {
   object.set("from", output.from_format).set("to", output.to_format).set("poses", output.poses);
-  object.set("covariances", output.covariances);
-  const auto convention = [&](const char* key, const std::optional<Convention>& c) {
-    if (!c) {
-      object.set(key, nullptr);
-      return;
-    }
-    JsonObject fields;
-    fields.set("name", conventionName(*c)).set("order", name(c->order)).set("perturbation", name(c->perturbation));
-    fields.set("unit", name(c->unit)).set("content", name(c->content)).set("layout", name(c->layout));
-    object.set(key, fields);
-  };
-  convention("covariance_from", output.from), convention("covariance_to", output.to);
-  object.set("unknown", output.unknown).set("partly_unknown", output.partly_unknown);
-  object.set("assumed_uncorrelated", output.assumed).set("indefinite", output.indefinite.size());
-  object.set("zero_variances", output.zero_variances);
-  object.set("round_trip_bound", output.round_trip).set("largest_rotation_sigma_rad", output.rotation_sigma);
-  object.set("beyond_first_order", output.beyond_first_order).set("sampling_error", output.sampling_error);
-  object.set("notes", output.notes).set("files", output.files);
+  object.fieldsOf(output.conversion).set("files", output.files);
 }
 
 std::optional<Convention> conventionGiven(const std::string& text, const char* option) {
@@ -286,69 +123,28 @@ void readTimes(const std::string& path, Trajectory& trajectory) {
   trajectory.times = std::move(times.times), trajectory.time_texts = std::move(times.time_texts);
 }
 
-/// The convention of the result: the one that was asked for, or liestat's where the file can say so.
-Convention targetConvention(const ConvertOptions& options, const std::string& format) {
-  const auto given = conventionGiven(options.cov_to, "--cov-to");
-  if (given && (isSelfDescribing(format) && options.cov_to.find("layout=") == std::string::npos)) {
-    Convention c = *given;
-    c.layout = CovarianceLayout::upper21;
-    return conventionFor(format, c);
-  }
-  if (given) {
-    const Convention c = conventionFor(format, *given);
-    if (c.layout != given->layout && options.cov_to.find("layout=") != std::string::npos) {
-      throw InputError(convert_name, 0,
-                       fmt::format("--cov-to {}, but the format {} has its own layout", options.cov_to, format),
-                       std::string(name(c.layout)));
-    }
-    return c;
-  }
-  if (isSelfDescribing(format)) return conventionFor(format, {.layout = CovarianceLayout::upper21});
-  if (format.rfind("mavlink", 0) == 0) return *conventionPreset("mavlink");
-  throw InputError(convert_name, 0, fmt::format("the format {} cannot say what its covariances mean", format),
-                   "--cov-to with a convention (docs/which_convention.md)");
-}
-
-void convertTrajectory(const ConvertOptions& options, ConvertOutput& output) {
+void convertPoses(const ConvertOptions& options, ConvertOutput& output) {
   Trajectory trajectory = readTrajectory(options.input, options.reading);
   if (!options.times.empty()) readTimes(options.times, trajectory);
   output.from_format = trajectory.format, output.to_format = options.to.empty() ? trajectory.format : options.to;
   output.poses = trajectory.size();
-  if (trajectory.n_normalised > 0) {
-    output.notes.push_back(fmt::format("{} rotations were normalised, off by {:.2g} at most", trajectory.n_normalised,
-                                       trajectory.largest_norm_error));
-  }
-  if (trajectory.n_unmeasured > 0) {
-    output.notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",
-                                       trajectory.n_unmeasured, options.reading.unmeasured));
-  }
   Convention to;
   if (trajectory.hasCovariances()) {
     const Convention from = conventionOf(trajectory, conventionGiven(options.cov_from, "--cov-from"), "--cov-from");
-    to = targetConvention(options, output.to_format);
-    output.from = from, output.to = to;
-    Converter converter(options, from, to, trajectory.name, output);
-    for (std::size_t i = 0; i < trajectory.size(); ++i) {
-      trajectory.covariances[i] =
-          converter.convert(trajectory.covariances[i], {trajectory.poses[i], trajectory.lines[i], i});
-    }
+    to = conventionToWrite(output.to_format, options.cov_to, convert_name, "--cov-to");
+    output.conversion =
+        converted(options, trajectory.name, trajectory.poses, trajectory.covariances, trajectory.lines, from, to);
+    trajectory.covariances = output.conversion.matrices;
   } else if (!options.cov_from.empty() || !options.cov_to.empty()) {
     throw InputError(trajectory.name, 0, "the file has no covariances, and --cov-from or --cov-to is given",
                      "covariances in the file or in a side file (--cov)");
   }
   const TrajectoryText text = formatTrajectory(trajectory, output.to_format, to);
-  addConvertNotes(output, options);
-  if (text.n_rounded_times > 0) {
-    output.notes.push_back(fmt::format("{} times have digits that the format {} has not; they were cut off",
-                                       text.n_rounded_times, output.to_format));
-  }
-  if (text.n_lost_cross > 0) {
-    output.notes.push_back(fmt::format("{} covariances have a cross block, for which the layout {} has no place",
-                                       text.n_lost_cross, name(to.layout)));
-  }
-  if (text.n_marked > 0) {
-    output.notes.push_back(fmt::format("{} unknown components are written as a variance of 1e6", text.n_marked));
-  }
+  std::vector<std::string>& notes = output.conversion.notes;
+  const std::vector<std::string> read = notesOf(trajectory, options.reading),
+                                 written = notesOf(text, output.to_format, to);
+  notes.insert(notes.begin(), read.begin(), read.end());
+  notes.insert(notes.end(), written.begin(), written.end());
   writeConverted(options, output, text.text, text.side_file);
 }
 
@@ -370,15 +166,17 @@ void convertGraph(const ConvertOptions& options, ConvertOutput& output, const Te
         Convention{.perturbation = Perturbation::body_axes, .content = CovarianceContent::information};
   }
   const Convention to = conventionOf(target, conventionGiven(options.cov_to, "--cov-to"), "--cov-to");
-  output.from = from, output.to = to;
-  Converter converter(options, from, to, graph.name, output);
-  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
-    GraphEdge& edge = graph.edges[i];
-    edge.matrix = converter.convert(edge.matrix, {edge.measurement, edge.line, i});
+  std::vector<SE3d> poses;
+  std::vector<Matrix6> matrices;
+  std::vector<std::size_t> lines;
+  for (const GraphEdge& e : graph.edges) {
+    poses.push_back(e.measurement), matrices.push_back(e.matrix), lines.push_back(e.line);
   }
+  output.conversion = converted(options, graph.name, poses, matrices, lines, from, to);
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) graph.edges[i].matrix = output.conversion.matrices[i];
   const std::string text = formatGraph(graph, output.to_format, to);
-  addConvertNotes(output, options);
-  if (!graph.fixed.empty() && output.to_format != "g2o") output.notes.emplace_back("FIX has no counterpart in TORO");
+  if (!graph.fixed.empty() && output.to_format != "g2o")
+    output.conversion.notes.emplace_back("FIX has no counterpart in TORO");
   writeConverted(options, output, text, {});
 }
 
@@ -407,7 +205,7 @@ int runConvert(const ConvertOptions& given, const Invocation& invocation) {
       throw InputError(sourceName(options.input), 0, fmt::format("poses to the format {}, which has edges", options.to),
                        "a file of g2o or TORO");
     }
-    convertTrajectory(options, output);
+    convertPoses(options, output);
   }
   // The figures go where the result does not.
   const std::string summary = formatConvert(output);
@@ -421,7 +219,7 @@ int runConvert(const ConvertOptions& given, const Invocation& invocation) {
     setConvert(object, output);
     writeJson(options.json, object);
   }
-  return output.indefinite.empty() ? exit_fine : exit_not_trusted;
+  return output.conversion.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
 
 }  // namespace

@@ -5,13 +5,13 @@
 #include <cli/io/pose_graph_file.hpp>
 #include <cli/io/text.hpp>
 #include <cli/show/diagnosis.hpp>
+#include <fusion/convention_diagnosis.hpp>
 #include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -28,22 +28,13 @@ struct DoctorOptions {
   std::vector<std::string> files;
   std::string json, report, align;
   TrajectoryInputOptions input;
-  bool no_truth = false, plan = false, runs = false, everything = false;
+  bool no_truth = false, plan = false, everything = false;
   std::optional<double> at;
   double alpha = 1e-3;
 };
 
 const std::map<std::string, AlignmentModel> doctor_alignments{
     {"posyaw", AlignmentModel::posyaw}, {"se3", AlignmentModel::se3}, {"sim3", AlignmentModel::sim3}};
-
-/// A content that format or file fixes leaves fewer hypotheses.
-std::vector<Convention> possible(const std::optional<CovarianceOrder>& order,
-                                 const std::optional<CovarianceContent>& content) {
-  std::vector<Convention> list = conventionHypotheses();
-  std::erase_if(
-      list, [&](const Convention& c) { return (order && c.order != *order) || (content && c.content != *content); });
-  return list;
-}
 
 Trajectory readWithCovariances(const std::string& path, const TrajectoryOptions& options) {
   Trajectory t = readTimedTrajectory(path, options);
@@ -55,18 +46,18 @@ Trajectory readWithCovariances(const std::string& path, const TrajectoryOptions&
 }
 
 /// Poses of an estimate with the truth at their times.
-std::vector<DiagnosedPose> withTruth(const Trajectory& estimate, const Trajectory& truth, const DoctorOptions& o,
-                                     std::vector<double>* times, std::vector<std::string>& notes) {
+DiagnosedRun withTruth(const Trajectory& estimate, const Trajectory& truth, const DoctorOptions& o,
+                       std::vector<std::string>& notes) {
   const Associated associated = associate(truth, estimate, o.input);
   const std::vector<Gaussian<SE3d>> exact = exactPoses(truth.poses), poses = exactPoses(estimate.poses);
   const std::vector<MatchedPose> matched =
       matchedPoses(associated.matches, exact, poses,
                    o.input.interpolation == "slerp" ? PoseInterpolation::slerp : PoseInterpolation::geodesic);
-  std::vector<DiagnosedPose> list;
+  DiagnosedRun run;
   for (std::size_t k = 0; k < matched.size(); ++k) {
     const std::size_t row = associated.matches[k].estimate;
-    list.push_back({matched[k].estimate.mean, estimate.covariances[row], matched[k].reference.mean});
-    if (times != nullptr) times->push_back(estimate.hasTimes() ? estimate.times[row] : static_cast<double>(row));
+    run.poses.push_back({matched[k].estimate.mean, estimate.covariances[row], matched[k].reference.mean});
+    if (estimate.hasTimes()) run.times.push_back(estimate.times[row]);
   }
   const std::string suspicion = suspectQuaternionOrder(matched, truth.name, estimate.name);
   if (!suspicion.empty()) notes.push_back(suspicion);
@@ -74,14 +65,14 @@ std::vector<DiagnosedPose> withTruth(const Trajectory& estimate, const Trajector
     notes.push_back(fmt::format("{} of {} poses of {} have a partner in {}", matched.size(), estimate.size(),
                                 estimate.name, truth.name));
   }
-  return list;
+  return run;
 }
 
 /// Edges of a graph and the relative poses of its vertices, or of those of another file.
-std::vector<DiagnosedPose> edgesOf(const PoseGraph& graph, const std::vector<GraphVertex>& vertices, bool has_truth) {
+DiagnosedRun edgesOf(const PoseGraph& graph, const std::vector<GraphVertex>& vertices, bool has_truth) {
   std::unordered_map<std::int64_t, SE3d> poses;
   for (const GraphVertex& v : vertices) poses.emplace(v.id, v.pose);
-  std::vector<DiagnosedPose> list;
+  DiagnosedRun run;
   for (const GraphEdge& e : graph.edges) {
     DiagnosedPose p{e.measurement, e.matrix, e.measurement};
     if (has_truth) {
@@ -89,9 +80,9 @@ std::vector<DiagnosedPose> edgesOf(const PoseGraph& graph, const std::vector<Gra
       if (from == poses.end() || to == poses.end()) continue;
       p.truth = from->second.inverse() * to->second;
     }
-    list.push_back(p);
+    run.poses.push_back(p);
   }
-  return list;
+  return run;
 }
 
 bool isGraph(const std::string& path, const std::string& format, TextFile& file) {
@@ -100,33 +91,14 @@ bool isGraph(const std::string& path, const std::string& format, TextFile& file)
   return looksLikeGraph(file.text);
 }
 
-void diagnose(const DoctorOptions& o, const std::vector<DiagnosedPose>& poses, const DiagnosisOptions& options,
-              DiagnosisOutput& output) {
-  output.structure = matrixStructure(poses);
-  if (output.mode == "plan") {
-    std::vector<Convention> of;
-    // Those that differ in axes, order and unit; contents are told apart at once.
-    for (const Convention& c : options.hypotheses) {
-      const CovarianceContent content = options.hypotheses.front().content;
-      if (c.content == content && (o.everything || c.unit == RotationUnit::radian)) of.push_back(c);
-    }
-    output.plan = planDiagnosis(poses, of, options);
-  } else if (output.mode == "chain") {
-    output.chain = diagnoseChain(poses, options.hypotheses);
-  } else {
-    output.diagnosis = diagnoseConventions(poses, options);
-  }
-}
-
 int runDoctor(DoctorOptions o, const Invocation& invocation) {
   o.input.settle();
   DiagnosisOutput output;
-  DiagnosedFile file;
-  output.mode = o.plan ? "plan" : o.no_truth ? "chain" : "diagnosis";
-  DiagnosisOptions options;
-  options.alpha = o.alpha;
+  CovarianceDiagnosisOptions options;
+  options.mode = o.plan ? DiagnosisMode::plan : o.no_truth ? DiagnosisMode::chain : DiagnosisMode::diagnosis;
+  options.alpha = o.alpha, options.all_units = o.everything, options.at = o.at;
   if (!o.align.empty()) options.alignment = doctor_alignments.at(o.align);
-  const bool has_truth = output.mode == "diagnosis";
+  const bool has_truth = options.mode == DiagnosisMode::diagnosis;
   std::vector<std::string> estimates = o.files;
   std::string truth_path;
   if (has_truth || (o.plan && estimates.size() > 1)) {
@@ -137,7 +109,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     estimates.pop_back();
   }
   if (!has_truth && estimates.size() > 1) throw InputError(doctor_name, 0, "several estimates", "one without a truth");
-  std::vector<DiagnosedPose>& poses = file.poses;
+  std::vector<DiagnosedRun> runs;
   TextFile text;
   if (isGraph(estimates.front(), o.input.estimate.format, text)) {
     if (o.no_truth) throw InputError(text.name, 0, "edges, and --no-truth", "a trajectory, or the true vertices");
@@ -154,83 +126,59 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
       vertices = parseGraph(truth.text, truth.name, true).vertices;
       output.reference = truth.name;
     }
-    poses = edgesOf(graph, vertices, has_truth);
-    if (poses.empty()) {
+    runs.push_back(edgesOf(graph, vertices, has_truth));
+    if (runs[0].poses.empty()) {
       throw InputError(graph.name, 0, "no edge joins two vertices of the truth", "vertices with the same numbers");
     }
-    output.what = "edges", output.files = {graph.name};
-    options.hypotheses = possible(std::nullopt, CovarianceContent::information);
-    file.assumed.content = CovarianceContent::information;
-    // Successive edges are independent measurements.
-    options.alignment = AlignmentModel::none;
+    output.files = {graph.name};
+    options.edges = true, options.content = CovarianceContent::information;
   } else {
-    std::optional<CovarianceOrder> order;
     Trajectory truth;
     if (!truth_path.empty()) {
       truth = readTimedTrajectory(truth_path, o.input.reference);
       cutTimes(truth, o.input);
       output.reference = truth.name;
     }
-    std::vector<std::vector<DiagnosedPose>> runs;
-    std::vector<std::vector<double>> times;
     for (const std::string& path : estimates) {
       const Trajectory estimate = readWithCovariances(path, o.input.estimate);
       output.files.push_back(estimate.name);
-      order = estimate.fixed_order;
-      file.times.by_time = estimate.hasTimes();
+      options.order = estimate.fixed_order;
       if (estimate.stated_convention) {
         output.notes.push_back(fmt::format("{} states {}", estimate.covariance_source,
                                            conventionName(*estimate.stated_convention, false)));
       }
-      std::vector<DiagnosedPose> list;
-      std::vector<double> at;
       if (has_truth) {
-        list = withTruth(estimate, truth, o, &at, output.notes);
-      } else {
-        for (std::size_t i = 0; i < estimate.size(); ++i) {
-          list.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
-        }
-        if (estimate.hasTimes()) at = estimate.times;
+        runs.push_back(withTruth(estimate, truth, o, output.notes));
+        continue;
       }
-      runs.push_back(list), times.push_back(at);
-    }
-    options.hypotheses = possible(order, std::nullopt);
-    file.assumed.order = order.value_or(file.assumed.order);
-    output.what = "poses";
-    if (runs.size() == 1) {
-      poses = runs[0];
-      file.times.values = times[0];
-    } else {
-      // One residual of each run, at one time: they are independent of each other.
-      double last = std::numeric_limits<double>::infinity();
-      for (const auto& t : times) last = std::min(last, t.back());
-      const double at = o.at.value_or(last);
-      for (std::size_t r = 0; r < runs.size(); ++r) {
-        const auto nearest = std::min_element(times[r].begin(), times[r].end(),
-                                              [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); });
-        poses.push_back(runs[r][static_cast<std::size_t>(nearest - times[r].begin())]);
+      DiagnosedRun run{{}, estimate.times};
+      for (std::size_t i = 0; i < estimate.size(); ++i) {
+        run.poses.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
       }
-      options.ordered = false;
-      options.alignment = AlignmentModel::none;
-      if (!o.align.empty())
-        throw InputError(doctor_name, 0, "--align with several runs", "runs in the world of the truth");
-      output.what = fmt::format("runs at {:.10g} s", at);
+      runs.push_back(std::move(run));
     }
+    if (runs.size() > 1 && !o.align.empty())
+      throw InputError(doctor_name, 0, "--align with several runs", "runs in the world of the truth");
   }
-  diagnose(o, poses, options, output);
-  file.alignment = options.alignment;
-  if (file.times.values.empty()) {
-    file.times.by_time = false;
-    for (std::size_t i = 0; i < poses.size(); ++i) file.times.values.push_back(static_cast<double>(i));
-  }
+  output.result = diagnoseCovariances(runs, options);
   if (o.json != "-") printLines(formatDiagnosis(output));
   if (!o.json.empty()) {
     JsonObject object = jsonEnvelope(invocation.command_line);
     setDiagnosis(object, output);
     writeJson(o.json, object);
   }
-  if (!o.report.empty()) writeDiagnosisReport(o.report, invocation.command_line, output, file);
-  return exitCodeOf(output);
+  const Verdict verdict = output.result.verdict();
+  if (!o.report.empty()) {
+    // The reading that is assumed without a diagnosis, at the back, and the best one.
+    const std::optional<AlignmentModel> alignment = has_truth ? std::optional(output.result.alignment) : std::nullopt;
+    std::vector<Convention> read{output.result.assumed};
+    const std::optional<Convention> best = output.result.best();
+    if (best && *best != read[0]) read.push_back(*best);
+    std::vector<ConventionReading> readings;
+    for (const Convention& c : read) readings.push_back(readInConvention(output.result.poses, c, alignment));
+    writeDiagnosisReport(o.report, invocation.command_line, output, readings);
+  }
+  return verdict.isYes() ? exit_fine : verdict.isNone() ? exit_undecidable : exit_inconsistent;
 }
 
 }  // namespace

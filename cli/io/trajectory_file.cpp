@@ -378,6 +378,19 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
   return trajectory;
 }
 
+std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options) {
+  std::vector<std::string> notes;
+  if (trajectory.n_normalised > 0) {
+    notes.push_back(fmt::format("{} rotations were normalised, off by {:.2g} at most", trajectory.n_normalised,
+                                trajectory.largest_norm_error));
+  }
+  if (trajectory.n_unmeasured > 0) {
+    notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",
+                                trajectory.n_unmeasured, options.unmeasured));
+  }
+  return notes;
+}
+
 Convention conventionNamed(const std::string& text, std::string_view option) {
   if (const auto convention = parseConvention(text)) return *convention;
   std::vector<std::string> names;

@@ -71,6 +71,9 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
 /// The same from memory, without side file; `name` stands for the file in messages.
 Trajectory parseTrajectory(std::string_view text, std::string name, const TrajectoryOptions& options = {});
 
+/// Sentences on what reading has changed: rotations normalised, components not measured.
+std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options);
+
 /// The convention in which the covariances of a trajectory are to be read: what the file states and what the user says
 /// with an option (its name is for messages). What the user says stands above the rule of a format, but must not
 /// contradict a header. Throws InputError where neither says it.

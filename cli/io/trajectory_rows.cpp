@@ -99,16 +99,16 @@ void applySentinels(std::vector<double>& numbers, CovarianceLayout layout, doubl
     std::fill(numbers.begin(), numbers.end(), unknown_entry);
     return;
   }
-  const auto list = detail::layoutEntries({.layout = layout});
+  const auto list = layoutEntries({.layout = layout});
   bool absent[6] = {}, any = false;
   for (std::size_t k = 0; k < list.size; ++k) {
-    const auto [i, j] = list.entries[k];
+    const auto [i, j] = list[k];
     if (i == j && numbers[k] >= unmeasured) absent[i] = any = true;
   }
   if (!any) return;
   ++trajectory.n_unmeasured;
   for (std::size_t k = 0; k < list.size; ++k) {
-    if (absent[list.entries[k].row] || absent[list.entries[k].column]) numbers[k] = unknown_entry;
+    if (absent[list[k].row] || absent[list[k].column]) numbers[k] = unknown_entry;
   }
 }
 

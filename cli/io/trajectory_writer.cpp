@@ -342,6 +342,41 @@ Convention conventionFor(std::string_view format, Convention convention) {
   return convention;
 }
 
+Convention conventionToWrite(std::string_view format, const std::string& asked, const std::string& caller,
+                             std::string_view option) {
+  if (!asked.empty()) {
+    Convention given = conventionNamed(asked, option);
+    const bool names_layout = asked.find("layout=") != std::string::npos;
+    if (isSelfDescribing(format) && !names_layout) given.layout = CovarianceLayout::upper21;
+    const Convention c = conventionFor(format, given);
+    if (c.layout != given.layout && names_layout) {
+      throw InputError(caller, 0, fmt::format("{} {}, but the format {} has its own layout", option, asked, format),
+                       std::string(name(c.layout)));
+    }
+    return c;
+  }
+  if (isSelfDescribing(format)) return conventionFor(format, {.layout = CovarianceLayout::upper21});
+  if (format.rfind("mavlink", 0) == 0) return *conventionPreset("mavlink");
+  throw InputError(caller, 0, fmt::format("the format {} cannot say what its covariances mean", format),
+                   fmt::format("{} with a convention (docs/which_convention.md)", option));
+}
+
+std::vector<std::string> notesOf(const TrajectoryText& text, std::string_view format, const Convention& convention) {
+  std::vector<std::string> notes;
+  if (text.n_rounded_times > 0) {
+    notes.push_back(fmt::format("{} times have digits that the format {} has not; they were cut off",
+                                text.n_rounded_times, format));
+  }
+  if (text.n_lost_cross > 0) {
+    notes.push_back(fmt::format("{} covariances have a cross block, for which the layout {} has no place",
+                                text.n_lost_cross, name(convention.layout)));
+  }
+  if (text.n_marked > 0) {
+    notes.push_back(fmt::format("{} unknown components are written as a variance of 1e6", text.n_marked));
+  }
+  return notes;
+}
+
 TrajectoryText formatTrajectory(const Trajectory& trajectory, std::string_view format, const Convention& convention) {
   return Writer(trajectory, format, conventionFor(format, convention)).write();
 }

@@ -1,8 +1,8 @@
 #include <cli/show/diagnosis.hpp>
 
-#include <cli/commands/command_line.hpp>
 #include <cli/show/outline.hpp>
 #include <cli/show/page.hpp>
+#include <cli/show/pose_errors.hpp>
 #include <cli/show/table.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/laws.hpp>
@@ -22,55 +22,27 @@ namespace {
 /// Rows of the tables of hypotheses.
 constexpr std::size_t most_shown = 20;
 
-/// The file read in one convention.
-struct Reading {
-  std::string name;
-  Convention convention;
-  std::vector<Gaussian<SE3d>> poses;
-  Consistency consistency;  ///< not ok without a truth, or with covariances that are not positive definite
-};
+std::string nameOf(const ConventionReading& reading) { return conventionName(reading.convention, false); }
 
-Reading readingOf(const DiagnosedFile& file, const Convention& convention, bool has_truth) {
-  Reading reading{conventionName(convention, false), convention, {}, {}};
-  std::vector<MatchedPose> matched;
-  for (const DiagnosedPose& p : file.poses) {
-    Eigen::Matrix<double, 6, 6> matrix = p.matrix;
-    // An unknown cross block counts as zero, as in the diagnosis.
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 3; j < 6; ++j) {
-        if (std::isnan(matrix(i, j))) matrix(i, j) = matrix(j, i) = 0;
-      }
-    }
-    reading.poses.push_back(fromConvention(convention, p.estimate, matrix));
-    matched.push_back({exactPoses(std::vector<SE3d>{p.truth}).front(), reading.poses.back()});
-  }
-  if (has_truth) reading.consistency = evaluateConsistency(matched, alignWeighted(matched, file.alignment));
-  return reading;
+/// The times of the poses, or the numbers of their rows.
+TimesOfPoses timesOf(const CovarianceDiagnosis& d) {
+  TimesOfPoses times{d.times, !d.times.empty()};
+  for (std::size_t i = 0; i < d.poses.size() && !times.by_time; ++i) times.values.push_back(static_cast<double>(i));
+  return times;
 }
 
 /// True if plots can show errors of this reading.
-bool hasErrors(const Reading& reading) {
+bool hasErrors(const ConventionReading& reading) {
   const std::vector<PoseError>& errors = reading.consistency.errors;
   return std::any_of(errors.begin(), errors.end(), [](const PoseError& e) { return std::isfinite(e.nees); });
 }
 
-std::vector<double> neesOf(const Reading& reading) {
+std::vector<double> neesOf(const ConventionReading& reading) {
   std::vector<double> values;
   for (const PoseError& e : reading.consistency.errors) {
     if (std::isfinite(e.nees)) values.push_back(e.nees);
   }
   return values;
-}
-
-/// The convention that explains the errors, else the likeliest one.
-std::optional<Convention> bestOf(const DiagnosisOutput& output) {
-  const std::vector<Convention>* accepted = output.diagnosis ? &output.diagnosis->accepted
-                                            : output.chain   ? &output.chain->accepted
-                                                             : nullptr;
-  if (accepted != nullptr && !accepted->empty()) return accepted->front();
-  if (!output.diagnosis || output.diagnosis->fits.empty()) return std::nullopt;
-  const HypothesisFit& first = output.diagnosis->fits.front();
-  return std::isinf(first.log_likelihood) ? std::nullopt : std::optional(first.convention);
 }
 
 bool explains(const std::vector<Convention>& accepted, const Convention& c) {
@@ -147,10 +119,10 @@ void showChain(Report& report, const ChainDiagnosis& c) {
                fmt::format("The first {} of {} conventions.", rows.size(), c.fits.size()));
 }
 
-void showPlan(Report& report, const DiagnosisOutput& output) {
+void showPlan(Report& report, const std::vector<PlanRow>& plan) {
   report.section("Conventions that can be told apart");
   std::vector<std::vector<std::string>> rows;
-  for (const PlanRow& row : output.plan) {
+  for (const PlanRow& row : plan) {
     std::string equal;
     for (const Convention& c : row.equal) equal += (equal.empty() ? "" : " ") + conventionName(c, false);
     const bool any = row.poses > 0;
@@ -162,7 +134,7 @@ void showPlan(Report& report, const DiagnosisOutput& output) {
 }
 
 /// The calibration of readings: their indices, the distribution of NEES, NEES over the times.
-void showCalibration(Report& report, const DiagnosedFile& file, const std::vector<const Reading*>& readings) {
+void showCalibration(Report& report, const TimesOfPoses& times, const std::vector<const ConventionReading*>& readings) {
   report.section("Calibration");
   const double bound = chiSquaredThreshold(0.05, 6);
   std::vector<std::vector<std::string>> rows;
@@ -171,20 +143,20 @@ void showCalibration(Report& report, const DiagnosedFile& file, const std::vecto
                  .y = {.label = "share of poses, %", .low = 0.0, .high = 100.0}};
   coverage.series.push_back(
       {.name = "as it should be", .style = Style::lines, .x = {0, 100}, .y = {0, 100}, .colour = 6, .dashed = true});
-  Panel nees = neesPanel(file.times);
+  Panel nees = neesPanel(times);
   nees.title = "NEES of each pose";
   for (std::size_t k = 0; k < readings.size(); ++k) {
-    const Reading& r = *readings[k];
+    const ConventionReading& r = *readings[k];
     std::vector<double> values = neesOf(r);
     std::sort(values.begin(), values.end());
     const auto n = static_cast<double>(values.size());
     const auto inside = static_cast<double>(std::upper_bound(values.begin(), values.end(), bound) - values.begin());
     const Consistency& c = r.consistency;
-    rows.push_back({r.name, fmt::format("{}", values.size()), number(c.joint.ratio(), 3), number(c.joint.p, 2),
+    rows.push_back({nameOf(r), fmt::format("{}", values.size()), number(c.joint.ratio(), 3), number(c.joint.p, 2),
                     number(c.position.ratio(), 3), number(c.rotation.ratio(), 3), number(100 * inside / n, 3)});
     // The first reading at the back of both panels.
     const std::size_t colour = k == 0 ? 1 : 0;
-    Series curve{.name = r.name, .style = Style::lines, .x = {0}, .y = {0}, .colour = colour};
+    Series curve{.name = nameOf(r), .style = Style::lines, .x = {0}, .y = {0}, .colour = colour};
     const std::size_t step = std::max<std::size_t>(1, values.size() / 500);
     for (std::size_t i = step - 1; i < values.size(); i += step) {
       curve.x.push_back(100 * (1 - chiSquaredSurvival(values[i], 6)));
@@ -192,7 +164,7 @@ void showCalibration(Report& report, const DiagnosedFile& file, const std::vecto
     }
     curve.x.push_back(100), curve.y.push_back(100);
     coverage.series.push_back(curve);
-    nees.series.push_back(neesSeries(r.name, c.errors, file.times));
+    nees.series.push_back(neesSeries(nameOf(r), c.errors, times));
     nees.series.back().colour = colour;
   }
   report.table(
@@ -208,13 +180,14 @@ void showCalibration(Report& report, const DiagnosedFile& file, const std::vecto
 }
 
 /// Errors over the times with the bands of the best reading, and of the assumed one.
-void showErrors(Report& report, const DiagnosedFile& file, const Reading& best, const Reading* assumed) {
+void showErrors(Report& report, const TimesOfPoses& times, const ConventionReading& best,
+                const ConventionReading* assumed) {
   report.section("Errors over time");
   Plot plot{.name = "errors", .columns = 3};
-  plot.panels = errorPanels(best.consistency.errors, file.times);
+  plot.panels = errorPanels(best.consistency.errors, times);
   for (int k = 0; k < 6; ++k) {
     Panel& panel = plot.panels[static_cast<std::size_t>(k)];
-    panel.series[0].name = "3 sd, " + best.name;
+    panel.series[0].name = "3 sd, " + nameOf(best);
     if (assumed == nullptr) continue;
     double reach = 0;
     for (const double high : panel.series[0].high) reach = std::max(reach, high);
@@ -224,11 +197,11 @@ void showErrors(Report& report, const DiagnosedFile& file, const Reading& best, 
     Series band{.style = Style::filled_curve};
     for (std::size_t i = 0; i < assumed->consistency.errors.size(); ++i) {
       const double sigma = 3 * unit * std::sqrt(assumed->consistency.errors[i].covariance(k, k));
-      band.x.push_back(file.times.values[i]), band.low.push_back(-sigma), band.high.push_back(sigma);
+      band.x.push_back(times.values[i]), band.low.push_back(-sigma), band.high.push_back(sigma);
     }
     band = outlineOf(band);
     panel.series.push_back(
-        {.name = "3 sd, " + assumed->name, .x = band.x, .y = band.high, .colour = 3, .dashed = true});
+        {.name = "3 sd, " + nameOf(*assumed), .x = band.x, .y = band.high, .colour = 3, .dashed = true});
     panel.series.push_back({.x = band.x, .y = band.low, .colour = 3, .dashed = true});
   }
   bool is_outline = false;
@@ -241,25 +214,26 @@ void showErrors(Report& report, const DiagnosedFile& file, const Reading& best, 
   }
   plot.caption = fmt::format(
       "Errors in the body's axes with the band of three standard deviations that the covariances have if read as {}{}.",
-      best.name, assumed == nullptr ? "" : fmt::format("; dashed: as {}, drawn as far as it fits", assumed->name));
+      nameOf(best),
+      assumed == nullptr ? "" : fmt::format("; dashed: as {}, drawn as far as it fits", nameOf(*assumed)));
   report.plot(plot);
 }
 
 /// Standard deviations over the poses, where there is no truth.
-void showDeviations(Report& report, const DiagnosedFile& file, const std::vector<const Reading*>& readings) {
+void showDeviations(Report& report, const TimesOfPoses& times, const std::vector<const ConventionReading*>& readings) {
   report.section("Standard deviations");
   Plot plot{.name = "deviations",
             .caption =
                 "The largest standard deviation of each pose's position and of its rotation, by the convention in "
                 "which the file is read."};
   for (const int from : {0, 3}) {
-    Panel panel{.x = {.label = file.times.label()},
+    Panel panel{.x = {.label = times.label()},
                 .y = {.label = from == 0 ? "sd of position, m" : "sd of rotation, deg", .logarithmic = true}};
     for (std::size_t k = 0; k < readings.size(); ++k) {
-      Series line{.name = readings[k]->name, .colour = k == 0 ? 1 : 0};
+      Series line{.name = nameOf(*readings[k]), .colour = k == 0 ? 1 : 0};
       for (std::size_t i = 0; i < readings[k]->poses.size(); ++i) {
         const double variance = readings[k]->poses[i].covariance.diagonal().segment<3>(from).maxCoeff();
-        line.x.push_back(file.times.values[i]);
+        line.x.push_back(times.values[i]);
         line.y.push_back(coordinateOfError(from).second * std::sqrt(variance));
       }
       panel.series.push_back(outlineOf(line));
@@ -269,50 +243,36 @@ void showDeviations(Report& report, const DiagnosedFile& file, const std::vector
   report.plot(plot);
 }
 
-std::string planVerdict(const DiagnosisOutput& output) {
-  const auto n = static_cast<double>(output.structure.n);
-  const auto decided = std::count_if(output.plan.begin(), output.plan.end(), [n](const PlanRow& row) {
-    return row.equal.empty() && row.poses > 0 && row.poses <= n;
-  });
-  return fmt::format("With its {} {} this file tells {} of {} conventions from all others.", output.structure.n,
-                     output.what, decided, output.plan.size());
-}
-
 }  // namespace
 
 void writeDiagnosisReport(const std::string& directory, const std::string& command_line, const DiagnosisOutput& output,
-                          const DiagnosedFile& file) {
+                          const std::vector<ConventionReading>& readings) {
   Report report(directory, "Convention of the covariances in " + output.files.front());
-  const bool plan = output.mode == "plan";
-  report.verdict(exitCodeOf(output) == exit_fine, plan ? planVerdict(output) : verdictOf(output));
+  const CovarianceDiagnosis& r = output.result;
+  const Verdict verdict = r.verdict();
+  report.verdict(verdict.isYes(), verdict.text);
   report.code(command_line);
-  if (output.diagnosis) showHypotheses(report, *output.diagnosis);
-  if (plan) showPlan(report, output);
-  const ChainDiagnosis* chain = output.chain                                  ? &*output.chain
-                                : output.diagnosis && output.diagnosis->chain ? &*output.diagnosis->chain
-                                                                              : nullptr;
-  if (chain != nullptr) showChain(report, *chain);
+  if (r.diagnosis) showHypotheses(report, *r.diagnosis);
+  if (r.mode == DiagnosisMode::plan) showPlan(report, r.plan);
+  if (r.chain) showChain(report, *r.chain);
+  if (r.diagnosis && r.diagnosis->chain) showChain(report, *r.diagnosis->chain);
 
-  // The reading that is assumed without a diagnosis, at the back, and the best one.
-  const std::optional<Convention> best_convention = bestOf(output);
-  const bool has_truth = output.diagnosis.has_value();
-  const Reading assumed = readingOf(file, file.assumed, has_truth);
-  const Reading best = best_convention ? readingOf(file, *best_convention, has_truth) : assumed;
-  const bool two = best.convention != assumed.convention;
-  std::vector<const Reading*> readings;
-  for (const Reading* r : {&assumed, &best}) {
-    if ((r == &best || two) && (!has_truth || hasErrors(*r))) readings.push_back(r);
+  const bool has_truth = r.diagnosis.has_value();
+  const TimesOfPoses times = timesOf(r);
+  std::vector<const ConventionReading*> shown;
+  for (const ConventionReading& reading : readings) {
+    if (!has_truth || hasErrors(reading)) shown.push_back(&reading);
   }
   if (!has_truth) {
-    showDeviations(report, file, readings);
-  } else if (readings.empty()) {
+    showDeviations(report, times, shown);
+  } else if (shown.empty()) {
     report.paragraph("No matrix is a covariance as it stands, so that there are no errors to draw.");
   } else {
-    if (output.diagnosis->fault != MatrixFault::none) {
+    if (r.diagnosis->fault != MatrixFault::none) {
       report.paragraph("The plots below show the matrices as the file has them, with their fault.");
     }
-    showCalibration(report, file, readings);
-    showErrors(report, file, *readings.back(), readings.size() > 1 ? readings.front() : nullptr);
+    showCalibration(report, times, shown);
+    showErrors(report, times, *shown.back(), shown.size() > 1 ? shown.front() : nullptr);
   }
   report.section("Result");
   report.code(formatDiagnosis(output));

@@ -4,3 +4,4 @@
 #endif
 
 #include <fusion/detail/diagnose_conventions.hpp>
+#include <fusion/detail/diagnosis_words.hpp>

@@ -19,6 +19,13 @@ from ._manifolds import (
     SemiOrientedFrame3,
 )
 from ._columns import columns, from_columns
+from ._conversions import (
+    convert_trajectory,
+    diagnose_conventions,
+    read_pose_graph,
+    read_trajectory,
+    write_trajectory,
+)
 from ._files import read_features, read_imu, read_tracks
 from ._gaussians import (
     CONVENTIONS,

@@ -522,4 +522,62 @@ def read_features(
     columns: dict[str, str] | None = None,
 ) -> Result: ...
 def read_imu(path: Any) -> Result: ...
+def read_trajectory(
+    path: Any,
+    convention: str | None = None,
+    *,
+    format: str = "auto",
+    covariance_file: Any = None,
+    layout: Literal["full36", "upper21", "lower21", "blocks12", "diag6"] | None = None,
+    unmeasured_above: float = 9e4,
+    columns: dict[str, str] | None = None,
+    ignore_unknown: bool = False,
+    norm_tolerance: float = 1e-3,
+) -> Result: ...
+def read_pose_graph(path: Any, *, ignore_unknown: bool = False, norm_tolerance: float = 1e-3) -> Result: ...
+def write_trajectory(
+    path: Any,
+    poses: SE3,
+    covariances: ArrayLike | None = None,
+    *,
+    format: str,
+    times: Sequence[float | str] | _Array | None = None,
+    convention: str | None = None,
+    source: str = "right",
+    frames: Sequence[str] = (),
+) -> Result: ...
+def convert_trajectory(
+    poses: SE3,
+    matrices: ArrayLike,
+    source: str,
+    to: str = "right",
+    *,
+    assume_uncorrelated: bool = False,
+    sampled: bool = False,
+    samples: int = 2000,
+    seed: int = 1,
+    lines: Sequence[int] | _Array | None = None,
+) -> Result: ...
+def diagnose_conventions(
+    estimate: SE3 | Sequence[SE3],
+    matrices: ArrayLike | Sequence[ArrayLike],
+    truth: SE3 | None = None,
+    *,
+    times: ArrayLike | Sequence[ArrayLike] | None = None,
+    truth_times: ArrayLike | None = None,
+    no_truth: bool = False,
+    plan: bool = False,
+    all_units: bool = False,
+    align: Literal["none", "posyaw", "se3", "sim3"] = "none",
+    at: float | None = None,
+    alpha: float = 1e-3,
+    order: Literal["tr", "rt"] | None = None,
+    content: Literal["covariance", "information", "sigmas"] | None = None,
+    edges: bool = False,
+    association: Literal["interpolate", "nearest"] = "interpolate",
+    interpolation: Literal["geodesic", "slerp"] = "geodesic",
+    max_gap: float | None = None,
+    max_difference: float = 0.01,
+    offset: float = 0.0,
+) -> Result: ...
 def read_tracks(path: Any, image_times: Any = "", *, start_ns: int = 0) -> Result: ...

@@ -19,7 +19,10 @@ _POSES: tuple = (Frame3, SE3, SemiOrientedFrame3, NonOrientedFrame3)
 
 def _reader(name):
     if not hasattr(_core, name):
-        raise NotImplementedError(f"{name}: the module was built without {{fmt}}, which the readers need")
+        raise NotImplementedError(
+            f"{name}: the module was built without the libraries that readers of files need: {{fmt}} and zlib, and for "
+            "trajectories nlohmann/json and yaml-cpp"
+        )
     return getattr(_core, name)
 
 

@@ -43,6 +43,8 @@ void bindTwoView(py::module_& module);
 void bindViInit(py::module_& module);
 void bindReaders(py::module_& module);
 void bindTrajectories(py::module_& module);
+void bindConversions(py::module_& module);
+void bindTrajectoryFiles(py::module_& module);
 void bindMeans(py::module_& module);
 
 }  // namespace liestat::python

@@ -27,9 +27,13 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindHandEye(module);
   liestat::python::bindMotion(module);
   liestat::python::bindTrajectories(module);
+  liestat::python::bindConversions(module);
   liestat::python::bindTwoView(module);
   liestat::python::bindViInit(module);
 #ifdef LIESTAT_PYTHON_READERS
   liestat::python::bindReaders(module);
+#endif
+#ifdef LIESTAT_PYTHON_TRAJECTORY_READERS
+  liestat::python::bindTrajectoryFiles(module);
 #endif
 }

@@ -315,5 +315,119 @@ TEST(ConventionDiagnosis, BadInputIsSaid) {
   EXPECT_TRUE(planDiagnosis({}).empty());
 }
 
+// --- Whole files -----------------------------------------------------------------------------------------------------
+
+CovarianceDiagnosis diagnosed(const DiagnosedRun& run, const CovarianceDiagnosisOptions& options = {}) {
+  return diagnoseCovariances(std::span(&run, 1), options);
+}
+
+TEST(CovarianceDiagnosis, VerdictsAreYesNoAndNone) {
+  CounterRng rng(21);
+  TrajectoryScene scene = experiments::independentScene({.n = 60}, rng);
+  const DiagnosedRun right{written(scene, convention(P::world_axes)), scene.times};
+  const CovarianceDiagnosis yes = diagnosed(right);
+  EXPECT_TRUE(yes.verdict().isYes()) << yes.verdict().text;
+  EXPECT_EQ(yes.verdict().text, "identified: " + describe(convention(P::world_axes)));
+  EXPECT_EQ(yes.best(), convention(P::world_axes));
+  EXPECT_EQ(yes.assumed, Convention{});
+  EXPECT_EQ(yes.times, scene.times);
+  EXPECT_EQ(yes.what, "poses");
+  const CovarianceDiagnosis few = diagnosed({{right.poses.begin(), right.poses.begin() + 5}, {}});
+  EXPECT_TRUE(few.verdict().isNone());
+  EXPECT_EQ(few.verdict().text.rfind("UNDECIDABLE: 5 poses", 0), 0U) << few.verdict().text;
+  EXPECT_FALSE(few.best());
+  for (auto& g : scene.estimate) g.covariance *= 0.25;
+  const CovarianceDiagnosis no = diagnosed({written(scene, convention(P::right)), {}});
+  EXPECT_TRUE(no.verdict().isNo());
+  EXPECT_EQ(no.verdict().text.rfind("INCONSISTENT: ", 0), 0U) << no.verdict().text;
+  EXPECT_EQ(no.verdict().causes, no.diagnosis->notes);
+  DiagnosedRun broken{written(scene, convention(P::right)), {}};
+  for (DiagnosedPose& p : broken.poses) p.matrix(2, 2) = -1;
+  EXPECT_TRUE(diagnosed(broken).verdict().isNo());
+  EXPECT_EQ(diagnosed(broken).verdict().text.rfind("NONE: ", 0), 0U);
+  EXPECT_TRUE(diagnoseCovariances({}).verdict().isNone());
+}
+
+TEST(CovarianceDiagnosis, ChainAndPlan) {
+  CounterRng rng(22);
+  const TrajectoryScene scene =
+      experiments::deadReckoningScene({.n = 60, .sigma_translation = 0.01, .sigma_rotation = 0.002}, rng);
+  const DiagnosedRun run{written(scene, convention(P::right)), {}};
+  const CovarianceDiagnosis chain = diagnosed(run, {.mode = DiagnosisMode::chain});
+  EXPECT_FALSE(chain.diagnosis);
+  EXPECT_EQ(chain.verdict().text, "identified: " + describe(convention(P::right)));
+  EXPECT_EQ(chain.accepted(), std::vector{convention(P::right)});
+  // Smoothed: no convention lets it grow.
+  DiagnosedRun shrinking = run;
+  std::reverse(shrinking.poses.begin(), shrinking.poses.end());
+  const CovarianceDiagnosis none = diagnosed(shrinking, {.mode = DiagnosisMode::chain});
+  EXPECT_TRUE(none.verdict().isNone());
+  EXPECT_EQ(none.verdict().text, "UNDECIDABLE: " + none.chain->reason);
+  // A plan always has an answer; contents are told apart at once.
+  const CovarianceDiagnosis plan = diagnosed(run, {.mode = DiagnosisMode::plan});
+  EXPECT_TRUE(plan.verdict().isYes());
+  ASSERT_EQ(plan.plan.size(), 14U);
+  for (const PlanRow& row : plan.plan) EXPECT_EQ(row.convention.unit, U::radian);
+  EXPECT_EQ(diagnosed(run, {.mode = DiagnosisMode::plan, .all_units = true}).plan.size(), 56U);
+  const auto decided = std::count_if(plan.plan.begin(), plan.plan.end(), [](const PlanRow& row) {
+    return row.equal.empty() && row.poses > 0 && row.poses <= 60;
+  });
+  EXPECT_EQ(plan.verdict().text,
+            "With its 60 poses this file tells " + std::to_string(decided) + " of 14 conventions from all others.");
+}
+
+TEST(CovarianceDiagnosis, FormatsAndEdgesLeaveFewerHypotheses) {
+  CounterRng rng(23);
+  const TrajectoryScene scene = experiments::independentScene({.n = 60}, rng);
+  const auto rt = CovarianceOrder::rotation_translation;
+  const DiagnosedRun run{written(scene, convention(P::right, U::half_angle, CovarianceContent::information, rt)),
+                         scene.times};
+  const CovarianceDiagnosis d = diagnosed(
+      run, {.alignment = AlignmentModel::se3, .order = rt, .content = CovarianceContent::information, .edges = true});
+  EXPECT_EQ(d.diagnosis->fits.size(), 28U);
+  EXPECT_EQ(d.accepted(), std::vector{convention(P::right, U::half_angle, CovarianceContent::information, rt)});
+  EXPECT_EQ(d.assumed, convention(P::right, U::radian, CovarianceContent::information, rt));
+  EXPECT_EQ(d.what, "edges");
+  EXPECT_EQ(d.alignment, AlignmentModel::none) << "edges have no world";
+}
+
+TEST(CovarianceDiagnosis, SeveralRunsGiveOneResidualEach) {
+  const TrajectorySceneOptions options{.n = 10, .sigma_translation = 0.01, .sigma_rotation = 0.002};
+  std::vector<DiagnosedRun> runs;
+  for (std::uint64_t r = 0; r < 40; ++r) {
+    CounterRng rng(24, r);
+    const TrajectoryScene scene = experiments::deadReckoningScene(options, rng);
+    runs.push_back({written(scene, convention(P::left)), scene.times});
+  }
+  // One run ends before the others: the last common time is its end.
+  runs[7].poses.pop_back(), runs[7].times.pop_back();
+  const CovarianceDiagnosis last = diagnoseCovariances(runs);
+  ASSERT_EQ(last.poses.size(), 40U);
+  EXPECT_EQ(last.poses[0].truth.params(), runs[0].poses[8].truth.params());
+  EXPECT_FALSE(last.diagnosis->correlated);
+  EXPECT_TRUE(contains(last.accepted(), convention(P::left))) << last.verdict().text;
+  const CovarianceDiagnosis at =
+      diagnoseCovariances(runs, {.at = runs[0].times[3] + 0.2 * (runs[0].times[4] - runs[0].times[3])});
+  EXPECT_EQ(at.poses[5].truth.params(), runs[5].poses[3].truth.params());
+  // Without times the rows count.
+  for (DiagnosedRun& run : runs) run.times.clear();
+  EXPECT_EQ(diagnoseCovariances(runs, {.at = 2}).poses[1].truth.params(), runs[1].poses[2].truth.params());
+  EXPECT_EQ(diagnoseCovariances(runs, {.at = 2}).what, "runs at 2 s");
+}
+
+TEST(CovarianceDiagnosis, AReadingShowsTheErrorsOfOneConvention) {
+  CounterRng rng(25);
+  const TrajectoryScene scene = experiments::independentScene({.n = 60}, rng);
+  std::vector<DiagnosedPose> poses = written(scene, convention(P::left));
+  const ConventionReading right = readInConvention(poses, convention(P::left), AlignmentModel::none);
+  EXPECT_TRUE(right.consistency.tests.consistent());
+  EXPECT_LT((right.poses[3].covariance - scene.estimate[3].covariance).norm(), 1e-12);
+  EXPECT_FALSE(readInConvention(poses, convention(P::right), AlignmentModel::none).consistency.tests.consistent());
+  EXPECT_TRUE(readInConvention(poses, convention(P::left), std::nullopt).consistency.errors.empty());
+  // An unknown cross block counts as zero.
+  poses[0].matrix(0, 4) = poses[0].matrix(4, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(readInConvention(poses, convention(P::right), std::nullopt).poses[0].covariance.allFinite());
+}
+
 }  // namespace
 }  // namespace liestat

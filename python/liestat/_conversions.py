@@ -1,0 +1,361 @@
+"""Trajectories in files, and the conventions of their covariances: the program's `convert` and `doctor`."""
+
+import os
+import warnings
+
+import numpy as np
+
+from . import _core
+from ._files import _reader
+from ._manifolds import SE3
+from ._operate import as_numbers
+from ._results import Result
+
+_LAYOUTS = (None, "full36", "upper21", "lower21", "blocks12", "diag6")
+
+
+def _choice(caller, name, value, allowed):
+    if value not in allowed:
+        raise ValueError(f"{caller}: {name}: expected one of {', '.join(map(repr, allowed))}, got {value!r}")
+
+
+def _poses(caller, name, value):
+    if not isinstance(value, SE3) or value.ndim != 1:
+        shape = f" of shape {value.shape}" if hasattr(value, "shape") else ""
+        raise TypeError(f"{caller}: {name}: expected SE3 of shape (n,), got {type(value).__name__}{shape}")
+    return np.ascontiguousarray(value.params)
+
+
+def _matrices(caller, value, n):
+    """Matrices of a file; what is unknown is NaN."""
+    matrices = as_numbers(value, f"{caller}: matrices", (6, 6))
+    if matrices.shape not in ((6, 6), (n, 6, 6)):
+        raise ValueError(f"{caller}: matrices: expected shape ({n}, 6, 6), got {matrices.shape}")
+    return np.ascontiguousarray(np.broadcast_to(matrices, (n, 6, 6)))
+
+
+def _times(caller, name, value, n):
+    times = as_numbers(value, f"{caller}: {name}", ())
+    if times.shape != (n,) or not (np.diff(times) > 0).all():
+        raise ValueError(f"{caller}: {name}: expected {n} ascending times, each once")
+    return np.ascontiguousarray(times)
+
+
+def read_trajectory(
+    path,
+    convention=None,
+    *,
+    format="auto",
+    covariance_file=None,
+    layout=None,
+    unmeasured_above=9e4,
+    columns=None,
+    ignore_unknown=False,
+    norm_tolerance=1e-3,
+):
+    """Poses, times and covariances from a file of any format that the program reads (docs/program.md).
+
+    Parameters
+    ----------
+    path : str or path
+    convention : str, optional
+        That of the file's covariances, 'ros-fixed' or 'right,order=rt' (docs/which_convention.md); by default what the
+        file or its format states. 'unknown' leaves the matrices as they are: `covariances` is None.
+    format : str
+        'auto' looks at the first lines; tum, kitti, euroc, csv, openvins, ros-json, ros-yaml, ros-csv, mavlink-json,
+        mavlink-csv.
+    covariance_file : str or path, optional
+        A side file; by default the file's name with .cov after it, if there is one.
+    layout : {'full36', 'upper21', 'lower21', 'blocks12', 'diag6'}, optional
+        The numbers that follow TUM's eight.
+    unmeasured_above : float
+        Variances in messages from which on a component was not measured (m² or rad²).
+    columns, ignore_unknown, norm_tolerance
+        As in `read_features`.
+
+    Returns
+    -------
+    Result
+        `poses` (SE3), `times` (s) and `time_texts` (their digits), `covariances` (m² and rad², body axes, translation
+        before rotation; NaN: unknown), `matrices` (as the file has them), `convention` in which they were read,
+        `stated_convention` of the file, `order` that its format fixes, `format`, `lines`, `frames`, `notes`. Parts that
+        the file does not have are None.
+
+    Raises
+    ------
+    ValueError
+        With file, line, what was found and what was expected; also where nothing says what the covariances mean.
+    """
+    caller = "read_trajectory"
+    _choice(caller, "layout", layout, _LAYOUTS)
+    read = _reader(caller)
+    _choice(caller, "format", format, _core.TRAJECTORY_FORMATS)
+    d = read(
+        os.fspath(path),
+        convention or "",
+        format,
+        os.fspath(covariance_file or ""),
+        layout or "",
+        float(unmeasured_above),
+        [f"{ours}={theirs}" for ours, theirs in (columns or {}).items()],
+        bool(ignore_unknown),
+        float(norm_tolerance),
+    )
+    return Result("trajectory of a file", poses=SE3._of(d.pop("poses")), **d)
+
+
+def read_pose_graph(path, *, ignore_unknown=False, norm_tolerance=1e-3):
+    """Vertices and edges of a pose graph in a file of g2o or TORO.
+
+    Returns
+    -------
+    Result
+        `ids` and `poses` of the vertices; `sources`, `targets`, `measurements` (SE3, source_T_target) and `matrices` of
+        the edges, as the file has them; `planar`, `stated_convention`, `lines` of the edges, `format`.
+    """
+    d = _reader("read_pose_graph")(os.fspath(path), bool(ignore_unknown), float(norm_tolerance))
+    poses, measurements = SE3._of(d.pop("poses")), SE3._of(d.pop("measurements"))
+    return Result("pose graph", poses=poses, measurements=measurements, **d)
+
+
+def write_trajectory(
+    path, poses, covariances=None, *, format, times=None, convention=None, source="right", frames=()
+):
+    """Writes poses and covariances as a file of another program.
+
+    TUM, KITTI and EuRoC files get their covariances in `path`.cov.
+
+    Parameters
+    ----------
+    path : str or path
+    poses : SE3, shape (n,)
+    covariances : array_like, shape (n, 6, 6), optional
+        In the convention `source`, the library's by default; NaN: unknown.
+    format : str
+        As in `read_trajectory`.
+    times : sequence, optional
+        Seconds, as numbers or as texts whose digits are kept.
+    convention : str, optional
+        That of the file's covariances; 'right' by default where the file can say so, needed elsewhere.
+    frames : sequence of str
+        Name of the frame of ROS' messages.
+
+    Returns
+    -------
+    Result
+        `files` that were written, `conversion` (see `convert_trajectory`; None without covariances), `notes`.
+
+    Raises
+    ------
+    ValueError
+        Where a covariance is not one in the convention, or has no place in the format; nothing is written.
+    """
+    caller = "write_trajectory"
+    params = _poses(caller, "poses", poses)
+    write = _reader("format_trajectory")
+    _choice(caller, "format", format, _core.TRAJECTORY_FORMATS[1:])
+    texts = [t if isinstance(t, str) else repr(float(t)) for t in (() if times is None else times)]
+    if texts and len(texts) != len(params):
+        raise ValueError(f"{caller}: {len(texts)} times of {len(params)} poses")
+    target, conversion, matrices = "", None, None
+    if covariances is not None:
+        target = _core.convention_to_write(format, convention or "")
+        conversion = _convert(caller, params, covariances, source, target)
+        if conversion.faults:
+            fault = conversion.faults[0]
+            expected = fault.expected or "another convention"
+            raise ValueError(f"{caller}: pose {fault.row}: {fault.found}, expected {expected}")
+        matrices = conversion.matrices
+        if conversion.decided is False:
+            warnings.warn(f"liestat.{caller}: {conversion.sentence}", UserWarning, stacklevel=2)
+    text, side, notes = write(params, matrices, texts, format, target, list(frames))
+    files = [(os.fspath(path), text)] + ([(os.fspath(path) + ".cov", side)] if side else [])
+    for name, content in reversed(files):
+        with open(name, "w", encoding="utf-8", newline="") as file:
+            file.write(content)
+    return Result("written trajectory", files=[name for name, _ in files], conversion=conversion, notes=notes)
+
+
+def convert_trajectory(
+    poses, matrices, source, to="right", *, assume_uncorrelated=False, sampled=False, samples=2000, seed=1, lines=None
+):
+    """Covariances of poses, or of the edges of a graph, from one convention to another, and what is lost.
+
+    Parameters
+    ----------
+    poses : SE3, shape (n,)
+    matrices : array_like, shape (n, 6, 6)
+        In the convention `source`, NaN for what is unknown: `read_trajectory(path).matrices`.
+    source, to : str
+        Conventions: 'right' is the library's; docs/which_convention.md has the others.
+    assume_uncorrelated : bool
+        Unknown correlations between known components are 0.
+    sampled : bool
+        Second moments by sampling, for rotations with a sigma above 0.1 rad.
+    samples, seed : int
+        Of `sampled`; samples for each pose.
+    lines : sequence of int, optional
+        Lines of the poses in a file, for sentences.
+
+    Returns
+    -------
+    Result
+        `matrices` in the convention `to`; `faults` (`row`, `fault`, `found`, `expected`) of those that could not be
+        converted and are NaN. The program's figures: `covariances` (their number), `covariance_from`, `covariance_to`,
+        `unknown`, `partly_unknown`, `assumed_uncorrelated`, `indefinite`, `zero_variances`, `round_trip_bound`,
+        `largest_rotation_sigma_rad`, `beyond_first_order`, `sampling_error`, `notes`. The verdict: `sentence`, and
+        `decided`, True, False (faults, indefinite matrices) or None (no covariances).
+
+    Warns
+    -----
+    UserWarning
+        Where the verdict is no.
+    """
+    caller = "convert_trajectory"
+    params = _poses(caller, "poses", poses)
+    result = _convert(caller, params, matrices, source, to, assume_uncorrelated, sampled, samples, seed, lines)
+    if result.decided is False:
+        warnings.warn(f"liestat.{caller}: {result.sentence}", UserWarning, stacklevel=2)
+    return result
+
+
+def _convert(
+    caller, params, matrices, source, to, assume_uncorrelated=False, sampled=False, samples=2000, seed=1, lines=None
+):
+    lines = [] if lines is None else [int(line) for line in lines]
+    if lines and len(lines) != len(params):
+        raise ValueError(f"{caller}: {len(lines)} lines of {len(params)} poses")
+    d = _core.convert_trajectory(
+        params,
+        _matrices(caller, matrices, len(params)),
+        source,
+        to,
+        bool(assume_uncorrelated),
+        bool(sampled),
+        int(samples),
+        int(seed),
+        lines,
+    )
+    d["matrices"] = np.array(d["matrices"]).reshape(-1, 6, 6)
+    return Result.of("conversion", d)
+
+
+def diagnose_conventions(
+    estimate,
+    matrices,
+    truth=None,
+    *,
+    times=None,
+    truth_times=None,
+    no_truth=False,
+    plan=False,
+    all_units=False,
+    align="none",
+    at=None,
+    alpha=1e-3,
+    order=None,
+    content=None,
+    edges=False,
+    association="interpolate",
+    interpolation="geodesic",
+    max_gap=None,
+    max_difference=0.01,
+    offset=0.0,
+):
+    """Which conventions explain the errors of poses under the matrices that a file gives for them.
+
+    Parameters
+    ----------
+    estimate : SE3, shape (n,), or a list of them
+        Several runs give one residual each, at one time.
+    matrices : array_like, shape (n, 6, 6), or a list of them
+        As the file has them: `read_trajectory(path, "unknown").matrices`.
+    truth : SE3, shape (n,), or shape (m,) with times
+    times, truth_times : array_like, optional
+        Seconds, ascending; `times` is a list of them for several runs. Without `truth_times` row i belongs to row i.
+    no_truth : bool
+        Dead reckoning without a truth: the covariance may only grow.
+    plan : bool
+        What the file can decide, with how many poses; `all_units`: half and double angles and degrees too.
+    align : {'none', 'posyaw', 'se3', 'sim3'}
+        The truth is in another world.
+    at : float, optional
+        Seconds: the time of the residuals of several runs; the last common one.
+    alpha : float
+        Probability of rejecting the true convention.
+    order : {'tr', 'rt'}, optional
+        The order that the format fixes: `read_trajectory(path).order`.
+    content : {'covariance', 'information', 'sigmas'}, optional
+        The content that the format fixes; information for edges.
+    edges : bool
+        The poses are edges of a graph, and the truth their true relative poses.
+    association : {'interpolate', 'nearest'}
+        The truth at the times of the estimate, or its nearest stamps, at most `max_difference` (s) away.
+    interpolation : {'geodesic', 'slerp'}
+    max_gap : float, optional
+        Seconds between two stamps of the truth to interpolate between; five median steps.
+    offset : float
+        Seconds that are added to `times`.
+
+    Returns
+    -------
+    Result
+        The fields of the program's JSON (docs/doctor.md): `verdict`, `reason`, `accepted`, `fault`, `tests`, `scale`,
+        `hypotheses`, …, or `chain`, or `plan`. The verdict in words is `sentence`; `decided` is True (one convention,
+        and the errors follow it), False (they do not) or None (undecidable).
+    """
+    caller = "diagnose_conventions"
+    _choice(caller, "align", align, ("none", "posyaw", "se3", "sim3"))
+    _choice(caller, "order", order, (None, "tr", "rt"))
+    _choice(caller, "content", content, (None, "covariance", "information", "sigmas"))
+    _choice(caller, "association", association, ("interpolate", "nearest"))
+    _choice(caller, "interpolation", interpolation, ("geodesic", "slerp"))
+    if not 1e-12 <= alpha <= 0.5:
+        raise ValueError(f"{caller}: alpha: expected 1e-12 to 0.5, got {alpha}")
+    if no_truth and plan:
+        raise ValueError(f"{caller}: no_truth and plan exclude each other")
+    if truth is None and not (no_truth or plan):
+        raise ValueError(f"{caller}: no ground truth: expected truth, or no_truth=True, or plan=True")
+    mode = "plan" if plan else "chain" if no_truth else "diagnosis"
+    several = not isinstance(estimate, SE3)
+    estimates, tables, stamps = (estimate, matrices, times) if several else ([estimate], [matrices], [times])
+    stamps = [None] * len(estimates) if stamps is None else stamps
+    if not len(estimates) == len(tables) == len(stamps):
+        raise ValueError(f"{caller}: expected an estimate, matrices and times for each run")
+    if len(estimates) > 1 and (mode != "diagnosis" or align != "none" or edges):
+        raise ValueError(f"{caller}: several runs: expected a truth, runs in its world, and no edges")
+    if truth_times is not None:
+        at_truth = _times(caller, "truth_times", truth_times, len(truth))
+        steps = np.sort(np.diff(at_truth))
+        if association == "nearest":
+            max_gap = max_difference
+        elif max_gap is None:
+            max_gap = 5 * float(steps[len(steps) // 2]) if len(steps) else 0.0
+    runs = []
+    for run, table, run_times in zip(estimates, tables, stamps):
+        params = _poses(caller, "estimate", run)
+        table = _matrices(caller, table, len(params))
+        run_times = None if run_times is None else _times(caller, "times", run_times, len(params))
+        exact = params
+        if mode == "diagnosis":
+            exact = _poses(caller, "truth", truth)
+            if truth_times is not None:
+                if run_times is None:
+                    raise ValueError(f"{caller}: truth_times without times")
+                slerp = interpolation == "slerp"
+                nearest = association == "nearest"
+                rows, exact = _core.match_truth(
+                    exact, at_truth, run_times, nearest, slerp, float(max_gap), float(offset)
+                )
+                if not len(rows):
+                    raise ValueError(f"{caller}: no pose of the estimate has a partner in the truth")
+                params, table, run_times = params[rows], table[rows], run_times[rows]
+            elif len(exact) != len(params):
+                raise ValueError(f"{caller}: {len(exact)} true poses of {len(params)}, expected one for each, or times")
+        runs.append((np.ascontiguousarray(params), np.ascontiguousarray(table), exact, run_times))
+    if edges and content is None:
+        content = "information"
+    d = _core.diagnose_conventions(
+        runs, mode, align, float(alpha), None if at is None else float(at), bool(all_units), order, content, bool(edges)
+    )
+    return Result.of("diagnosis", d)
