@@ -33,7 +33,7 @@ from ._gaussians import (
     sample,
     validate,
 )
-from ._results import ConfidenceRegion, Law, MeanResult, Result
+from ._results import ConfidenceRegion, Law, MeanResult, Result, Uniqueness
 from ._sensors import (
     VI_BLOCKS,
     Camera,
@@ -46,6 +46,6 @@ from ._sensors import (
     two_view,
     vi_init,
 )
-from ._statistics import group_mean, mahalanobis, mean
+from ._statistics import group_mean, mahalanobis, mean, validate_split
 
 __version__ = _core.__version__
