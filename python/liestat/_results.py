@@ -286,6 +286,10 @@ class MeanResult:
         array[:] = parts
         return array.reshape(shape)
 
+    def keys(self):
+        """Names of the fields."""
+        return self._names()
+
     def as_dict(self):
         """The fields of a single mean as the program writes them to JSON, features by their parts.
 

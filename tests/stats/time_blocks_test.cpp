@@ -217,7 +217,7 @@ TEST(SummarizedMean, IsTheCertifiedMean) {
 }
 
 TEST(SummarizedMean, SaysWhyThereIsNoCovariance) {
-  const std::vector<SO3d> none, two = features<SO3d>(2), half_turns{SO3d(), SO3d::exp({0, 0, pi})};
+  const std::vector<SO3d> none, two = features<SO3d>(2), half_turns{SO3d(), SO3d::exp({0, 0, EIGEN_PI})};
   const auto of = [](const std::vector<SO3d>& list, bool certificates) {
     return summarizedMean(SerialExecutor{}, MeanInput<SO3d>{.features = list}, {.certificates = certificates});
   };
