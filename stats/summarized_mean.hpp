@@ -138,13 +138,12 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
     CertifiedMeanOptions<M> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
-    // Ones in place of no weights, so that the compiled estimators serve.
-    const CertifiedMean<M> result =
-        ones ? meanWithCertificates<M>(executor, asSamples(input.features), detail::ones(input.features.size()), how)
-             : certifiedMean(executor, input.features, input.weights, how);
+    const CertifiedMean<M> result = ones ? certifiedMean(executor, input.features, how)
+                                         : certifiedMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
     return setDispersion(mean, input, result.mean.mean);
   }
+  // Ones in place of no weights, so that the compiled estimator serves.
   const MeanResult<M> result =
       ones ? frechetMean<M>(executor, asSamples(input.features), detail::ones(input.features.size()), {})
            : liestat::mean(executor, input.features, input.weights);

@@ -61,7 +61,7 @@ MeanInput<M> meanInput(const Measurements& measurements, const std::vector<M>& f
                      .features = features,
                      .covariance_at = measurements.covariance_at,
                      .likelihood = measurements.likelihood};
-  if (measurements.criterion != Criterion::maha) input.weights = measurements.weights;
+  if (measurements.usesWeights()) input.weights = measurements.weights;
   if (measurements.known_noise) {
     input.covariances.assign(measurements.file.covariances.begin(), measurements.file.covariances.end());
   }
