@@ -11,6 +11,7 @@
 #include <lie/se3.hpp>
 #include <lie/semi_oriented_frame3.hpp>
 #include <lie/so3.hpp>
+#include <stats/mean_summary.hpp>
 
 #include <array>
 #include <cstddef>
@@ -30,9 +31,7 @@ namespace liestat::experiments {
 /// motion as an element of the Lie group.
 enum class Feature { point, rotation, frame, semi_oriented_frame, non_oriented_frame, se3, direction };
 
-/// The criterion of a mean: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
-/// group's.
-enum class Criterion { lsq, wlsq, maha, barycentre };
+using liestat::Criterion;
 
 /// A part of a feature's parameters: a unit quaternion x y z w, a position (m), a unit vector.
 enum class Part { rotation, position, direction };
@@ -131,10 +130,6 @@ static_assert(
 /// The name in options and JSON fields.
 inline std::string name(Feature feature) { return std::string(info(feature).name); }
 inline int degreesOfFreedom(Feature feature) { return info(feature).dof; }
-
-/// Names of criteria in options and JSON fields, in the order of the enumerators.
-inline constexpr std::array criterion_names{"lsq", "wlsq", "maha", "barycentre"};
-inline std::string name(Criterion criterion) { return criterion_names[static_cast<std::size_t>(criterion)]; }
 
 inline std::vector<std::string> featureNames() {
   std::vector<std::string> names;

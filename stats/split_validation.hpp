@@ -10,6 +10,7 @@
 #include <stats/inference.hpp>
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
+#include <stats/split_validation_types.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -24,54 +25,6 @@
 #include <vector>
 
 namespace liestat {
-
-/// Options of validateBySplitting() and of the functions that call it.
-struct SplitOptions {
-  std::size_t splits = 200;
-  std::size_t blocks = 10;  ///< of time; even, for half of them make a half
-  std::uint64_t seed = 1;
-  std::function<void()> advance = [] {};  ///< called twice a split, on any thread
-};
-
-/// Many splits of one kind.
-struct SplitSeries {
-  std::vector<double> distances;  ///< squared, as χ² of the same rank; NaN where an estimate failed
-  double index = 0;               ///< their mean
-  double dof = 0;                 ///< what is expected of it
-  /// The index times this over `dof` follows χ² of so many degrees of freedom: the splits share their measurements, so
-  /// they tell no more than the blocks (or measurements) that were dealt out.
-  double effective_dof = 0;
-  std::size_t failures = 0;
-
-  double factor() const { return index / dof; }
-  /// Of the index, if the covariances are true.
-  double standardError() const { return dof * std::sqrt(2 / effective_dof); }
-  /// Probability of so large an index.
-  double pValue() const { return chiSquaredSurvival(factor() * effective_dof, effective_dof); }
-  /// Ends of the confidence interval of the factor.
-  double factorLow(double confidence = 0.95) const {
-    return factor() * effective_dof / chiSquaredThreshold((1 - confidence) / 2, effective_dof);
-  }
-  double factorHigh(double confidence = 0.95) const {
-    return factor() * effective_dof / chiSquaredQuantile((1 - confidence) / 2, effective_dof);
-  }
-};
-
-/// Several objects measured at the same times: the indices averaged, their degrees of freedom added.
-inline SplitSeries pooled(const std::vector<SplitSeries>& series) {
-  SplitSeries pool;
-  double inverse = 0;
-  const auto count = static_cast<double>(series.size());
-  for (const SplitSeries& s : series) {
-    pool.distances.insert(pool.distances.end(), s.distances.begin(), s.distances.end());
-    pool.index += s.index / count;
-    pool.failures += s.failures;
-    pool.dof = s.dof;
-    inverse += 1 / (s.effective_dof * count * count);
-  }
-  pool.effective_dof = 1 / inverse;
-  return pool;
-}
 
 /// A mean of some of the measurements with its covariance.
 template <Homogeneous M>
@@ -106,11 +59,6 @@ ReferenceLaw lawOfHalves(std::size_t n, bool known_noise) {
   constexpr int k = ManifoldTraits<M>::DoF;
   return known_noise ? ReferenceLaw::chiSquared(k)
                      : ReferenceLaw::hotelling(k, static_cast<int>(std::min<std::size_t>(n, 1000000000)) - 1);
-}
-
-/// The fewest measurements that can be split.
-inline std::size_t fewestMeasurements(int dof, bool known_noise, const SplitOptions& options) {
-  return std::max(options.blocks, known_noise ? std::size_t{2} : 2 * (static_cast<std::size_t>(dof) + 1));
 }
 
 /// The measurements that are split, for validateBySplitting().

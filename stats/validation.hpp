@@ -110,6 +110,16 @@ typename ReportOfOutcome<Outcome>::type reportOf(ValidationSample sample, const 
 
 }  // namespace detail
 
+/// The report of trials that were run elsewhere: their squared Mahalanobis distances in order, NaN for those that failed,
+/// of which `exceptions` by an exception.
+inline ValidationReport reportOfDistances(std::span<const double> mu2, const ReferenceLaw& law,
+                                          std::size_t exceptions = 0) {
+  detail::ValidationSample sample;
+  for (const double distance : mu2) sample.add(TrialOutcome{.mu2 = distance});
+  sample.exceptions = exceptions;
+  return detail::summarize(std::move(sample), law);
+}
+
 /// Validates several estimators on the same scenes: `trial(CounterRng&, std::uint64_t number)` returns a
 /// std::vector or std::array of TrialOutcome, or of a type derived from it, with an outcome for each law; an outcome that
 /// is missing counts as failed. One report for each law, in their order: ValidationReport, or ValidationReportOf the

@@ -55,8 +55,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
     writeMeanReport(options.report, invocation.command_line, options.input.file, measurements, analysis);
   }
   if (interrupted) return exit_interrupted;
-  const bool trusted = analysis.status == Status::ok || analysis.status == Status::not_applicable;
-  return trusted ? exit_fine : exit_not_trusted;
+  return analysis.trusted() ? exit_fine : exit_not_trusted;
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 #include <cli/commands/split.hpp>
 
+#include <cli/io/feature_values.hpp>
 #include <experiments/feature.hpp>
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
+#include <stats/summarized_mean_splits.hpp>
 
 #include <concepts>
 #include <cstddef>
@@ -37,63 +39,25 @@ struct SplitExecutor {
 };
 
 template <class M>
-HalfMean describeHalf(const SplitPart<M>& part) {
-  HalfMean half{.n = part.n, .mean = describe(part.result.estimate.mean)};
-  if (part.result.valid) half.covariance = part.result.estimate.covariance;
-  return half;
-}
-
-template <class M>
-SplitValidation<M> validate(const Measurements& measurements, const SplitSettings& settings) {
+SplitSummary split(const Measurements& measurements, const SplitSettings& settings) {
   const SplitExecutor executor{{settings.threads}};
-  const FeatureFile& file = measurements.file;
-  if (measurements.criterion == Criterion::maha) {
-    MahaOptions<M> how;
-    how.likelihood = measurements.likelihood;
-    return validateMahaBySplitting(executor, gaussiansOf<M>(file), measurements.covariance_at, how, file.times,
-                                   settings.split);
+  const std::vector<M> features = featuresOf<M>(measurements.file);
+  const auto with = [&](const SplitOptions& options) {
+    return splitMean(executor, meanInput(measurements, features), measurements.file.times, options);
+  };
+  SplitSummary result = with(settings.split);
+  result.feature = name(measurements.feature);
+  experiments::countTrials(result.done());
+  if (!experiments::runStopped()) return result;
+  // The degrees of freedom of a series that an interrupt cut short are those of the splits that were done. No split begins
+  // any more, so that this takes a few estimates.
+  for (SplitSeries SplitOutcome::*const kind : {&SplitOutcome::random, &SplitOutcome::by_blocks}) {
+    SplitSeries& series = result.*kind;
+    SplitOptions done = settings.split;
+    done.splits = series.distances.size();
+    if (done.splits == 0 || done.splits == settings.split.splits) continue;
+    series.effective_dof = (with(done).*kind).effective_dof;
   }
-  if constexpr (Metric<M>) {
-    std::vector<SquareOf<M>> noise;
-    if (measurements.known_noise) noise = covariancesOf<M>(file);
-    return validateMeanBySplitting(executor, featuresOf<M>(file), measurements.weights, noise, file.times,
-                                   settings.split);
-  } else {
-    return validateGroupMeanBySplitting(executor, featuresOf<M>(file), measurements.weights, file.times,
-                                        settings.split);
-  }
-}
-
-/// The degrees of freedom of a series that an interrupt cut short: those of the splits that were done. No split begins any
-/// more, so that this takes a few estimates.
-template <class M>
-void correctFreedom(const Measurements& measurements, const SplitSettings& settings,
-                    SplitSeries SplitValidation<M>::*kind, SplitValidation<M>& validation) {
-  SplitSeries& series = validation.*kind;
-  SplitSettings done = settings;
-  done.split.splits = series.distances.size();
-  if (done.split.splits == 0 || done.split.splits == settings.split.splits) return;
-  series.effective_dof = (validate<M>(measurements, done).*kind).effective_dof;
-}
-
-template <class M>
-SplitResult split(const Measurements& measurements, const SplitSettings& settings) {
-  SplitValidation<M> validation = validate<M>(measurements, settings);
-  experiments::countTrials(validation.random.distances.size() + validation.by_blocks.distances.size());
-  if (experiments::runStopped()) {
-    correctFreedom(measurements, settings, &SplitValidation<M>::random, validation);
-    correctFreedom(measurements, settings, &SplitValidation<M>::by_blocks, validation);
-  }
-  SplitResult result;
-  result.n = validation.n;
-  result.random = validation.random;
-  result.by_blocks = validation.by_blocks;
-  result.first = describeHalf(validation.first);
-  result.second = describeHalf(validation.second);
-  result.merged = describeHalf(validation.merged);
-  result.squared_distance = validation.squared_distance;
-  result.p_value = validation.p_value;
-  result.law = validation.law.name();
   return result;
 }
 
@@ -103,8 +67,8 @@ std::size_t fewestMeasurements(const Measurements& measurements, const SplitOpti
   return fewestMeasurements(degreesOfFreedom(measurements.feature), measurements.known_noise, options);
 }
 
-SplitResult splitMeasurements(const Measurements& measurements, const SplitSettings& settings,
-                              const std::function<void()>& advance) {
+SplitSummary splitMeasurements(const Measurements& measurements, const SplitSettings& settings,
+                               const std::function<void()>& advance) {
   SplitSettings how = settings;
   how.split.advance = advance;
   return experiments::withFeature(measurements.feature, [&]<class M>() { return split<M>(measurements, how); });

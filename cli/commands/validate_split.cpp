@@ -40,23 +40,11 @@ FileSplit splitFile(const Options& options) {
                      fmt::format("{} measurements, too few to be split", measurements.size()),
                      fmt::format("{} at least (--blocks is {})", fewest, options.settings.split.blocks));
   }
-  FileSplit split;
-  split.source = options.input.file;
-  split.description = measurementsInWords(options.input.file, measurements);
-  split.feature = measurements.feature;
-  split.criterion = measurements.criterion;
-  split.settings = options.settings.split;
-  split.known_noise = measurements.known_noise;
-  split.covariance_at_matters = measurements.covariance_at_matters;
-  split.covariance_at = measurements.covariance_at;
-  split.notes = measurements.notes;
   const StopOnInterrupt watch;
   Progress bar("validate split", 2 * options.settings.split.splits);
   experiments::trials_of_run.planned += 2 * options.settings.split.splits;
-  split.result = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
-  split.random = split.result.random;
-  split.by_blocks = split.result.by_blocks;
-  return split;
+  return {splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); }), options.input.file,
+          measurementsInWords(options.input.file, measurements), measurements.notes};
 }
 
 /// The measurements of one landmark as a file would have them.
@@ -86,6 +74,7 @@ LandmarkSplits splitStereo(const Options& options) {
 
   LandmarkSplits all;
   all.source = prefix;
+  all.feature = name(Feature::point), all.dof = degreesOfFreedom(Feature::point);
   all.settings = options.settings.split;
   all.surveyed = !survey.empty();
   std::vector<std::pair<std::size_t, Measurements>> enough;  // of each landmark that can be split, and its track
@@ -103,13 +92,14 @@ LandmarkSplits splitStereo(const Options& options) {
     throw InputError(prefix + "_tracks.csv", 0, "no landmark was seen often enough to be split",
                      fmt::format("{} observations of one", options.settings.split.blocks));
   }
+  all.objects = enough.size();
   std::vector<SplitSeries> random, by_blocks;
   const StopOnInterrupt watch;
   Progress bar("validate split", 2 * options.settings.split.splits * enough.size());
   experiments::trials_of_run.planned += 2 * options.settings.split.splits * enough.size();
   for (const auto& [track, measurements] : enough) {
     if (experiments::runStopped()) break;
-    const SplitResult split = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
+    const SplitSummary split = splitMeasurements(measurements, options.settings, [&bar] { bar.advance(); });
     if (split.random.distances.empty()) continue;
     AnalysisOptions how;
     how.threads = options.settings.threads;

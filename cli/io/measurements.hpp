@@ -37,6 +37,10 @@ struct Measurements {
   std::vector<std::string> notes = {};  ///< for the user, about these choices
 
   std::size_t size() const { return file.size(); }
+  /// The criterion takes the weights.
+  bool usesWeights() const {
+    return criterion == Criterion::wlsq || (criterion == Criterion::barycentre && !file.weights.empty());
+  }
 };
 
 /// Decides what is averaged and how. `command` begins the messages. Throws InputError where the wish does not fit the

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include <cli/io/text.hpp>
 #include <cli/show/table.hpp>
@@ -59,22 +58,6 @@ ShownPart shownPart(const TangentBlock& part, const FeatureValue& value) {
 
 }  // namespace
 
-std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance) {
-  std::vector<double> list;
-  for (int i = part.begin; i < part.begin + part.size; ++i) {
-    list.push_back(unitOf(part).scale * std::sqrt(std::max(0.0, covariance(i, i))));
-  }
-  return list;
-}
-
-std::optional<std::vector<double>> worldDeviations(const TangentBlock& part, const FeatureValue& mean,
-                                                   const Eigen::MatrixXd& covariance) {
-  if (isAngular(part.part) || !mean.quaternion_xyzw) return std::nullopt;
-  const Eigen::Matrix3d R = SO3d::fromParams(*mean.quaternion_xyzw).matrix();
-  const Eigen::Matrix3d world = R * covariance.block<3, 3>(part.begin, part.begin) * R.transpose();
-  return deviations(TangentBlock{part.part, 0, 3}, world);
-}
-
 std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis) {
   std::vector<std::vector<std::string>> rows;
   const auto add = [&](const std::string& what, const std::vector<double>& list, const TangentBlock& part) {
@@ -86,7 +69,7 @@ std::vector<std::vector<std::string>> meanRows(const Measurements& measurements,
   };
   for (const TangentBlock& part : experiments::info(measurements.feature).tangent) {
     const ShownPart shown = shownPart(part, analysis.mean);
-    const bool has_covariance = analysis.covariance.size() > 0;
+    const bool has_covariance = analysis.hasCovariance();
     double least = 0;
     if (has_covariance) {
       const auto world = worldDeviations(part, analysis.mean, analysis.covariance);
@@ -124,30 +107,15 @@ std::string oneLine(const FeatureValue& value) {
   return text;
 }
 
-std::string uniquenessInWords(const MeanAnalysis& analysis) {
-  const bool certified = analysis.unique != Uniqueness::not_certified;
-  std::string text = std::string(certified ? name(analysis.unique) : "not certified") + ": ";
-  if (!analysis.proof.empty()) {
-    text += analysis.proof;
-  } else if (analysis.cells > 0) {
-    text += "branch and bound did not finish";
-  } else {
-    text += "no certificate holds";
-  }
-  return analysis.cells > 0 ? text + fmt::format(", {} cells", analysis.cells) : text;
-}
-
 std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis) {
   if (analysis.covariance.size() == 0) {
     return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
   }
   const int k = degreesOfFreedom(measurements.feature);
-  const std::string law = analysis.covariance_from == "residuals"
-                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
-                              : fmt::format("chi-square with {} degrees of freedom", k);
+  const std::string law = analysis.fromResiduals() ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
+                                                   : fmt::format("chi-square with {} degrees of freedom", k);
   return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
-                     analysis.covariance_from == "residuals" ? "the residuals" : "the measurements' own covariances",
-                     law);
+                     analysis.fromResiduals() ? "the residuals" : "the measurements' own covariances", law);
 }
 
 std::string measurementsInWords(const std::string& source, const Measurements& measurements) {
@@ -198,7 +166,7 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
     text +=
         fmt::format("quaternion x y z w  {0:.{4}f} {1:.{4}f} {2:.{4}f} {3:.{4}f}\n", q[0], q[1], q[2], q[3], decimals);
   }
-  text += "uniqueness   " + uniquenessInWords(analysis) + "\n";
+  text += "uniqueness   " + analysis.uniquenessInWords() + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
   if (analysis.more_rivals) text += "  rival      and others: these are not all\n";
   for (const NearRival& rival : analysis.near_ties) {
@@ -206,17 +174,13 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
   if (analysis.time_blocks) text += "blocks       " + blocksInWords(*analysis.time_blocks) + "\n";
-  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
-  for (std::size_t p = 0; measurements.size() > 1 && p < parts.size() && p < analysis.largest.size(); ++p) {
-    text +=
-        fmt::format("farthest     {} {} in {}, line {}\n", number(unitOf(parts[p]).scale * analysis.largest[p].value),
-                    unitOf(parts[p]).name, name(parts[p].part), analysis.largest[p].line);
+  for (const FarthestMeasurement& f : analysis.farthest) {
+    if (measurements.size() < 2) break;
+    text += fmt::format("farthest     {} {} in {}, line {}\n", number(f.shown()), unitOf(f.part).name, name(f.part),
+                        f.line.value_or(0));
   }
-  for (const std::string& note : measurements.notes) text += "note         " + note + "\n";
   for (const std::string& note : analysis.notes) text += "note         " + note + "\n";
-  if (analysis.status != Status::ok && analysis.status != Status::not_applicable) {
-    text += fmt::format("\nNot to be trusted ({}): {}.\n", name(analysis.status), analysis.reason);
-  }
+  if (!analysis.trusted()) text += "\n" + analysis.verdict().text + "\n";
   return text;
 }
 

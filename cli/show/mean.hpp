@@ -16,32 +16,12 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
 void setMeanFields(JsonObject& object, const std::string& source, const Measurements& measurements,
                    const MeanAnalysis& analysis);
 
-/// `quaternion_xyzw`, `rotation_vector` (rad), `translation` (m), `point` (m), `direction`: what the feature has.
-JsonObject toJson(const FeatureValue& value);
-
-/// `covariance_order`, `covariance_side`, `covariance_frame`: how a covariance of a feature is to be read, in words.
-void setCovarianceWords(JsonObject& object, Feature feature);
-
-/// Square roots of a covariance's diagonal in degrees and metres: a list for each part of the tangent vector, named
-/// rotation_deg, translation_m and so on.
-JsonObject standardDeviations(Feature feature, const Eigen::MatrixXd& covariance);
-
 /// A feature on one line, for lists of rivals and of halves.
 std::string oneLine(const FeatureValue& value);
-
-/// Square roots of the diagonal of one part of a covariance, in the part's unit, along the axes of the mean.
-std::vector<double> deviations(const TangentBlock& part, const Eigen::MatrixXd& covariance);
-/// The same along the axes of the world, in which a translation is given; nothing for parts that are not translations of
-/// a feature with a rotation.
-std::optional<std::vector<double>> worldDeviations(const TangentBlock& part, const FeatureValue& mean,
-                                                   const Eigen::MatrixXd& covariance);
 
 /// Rows of a table with the columns name, x, y, z, unit: each part of the feature with the digits that its standard
 /// deviation leaves, and below it standard deviations and dispersion, for translations along both kinds of axes.
 std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis);
-
-/// "is unique: the data …" and so on.
-std::string uniquenessInWords(const MeanAnalysis& analysis);
 
 /// The origin of the covariance and how it is to be read, or the reason why there is none.
 std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis);

@@ -232,9 +232,7 @@ void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBl
 void writeMeanReport(const std::string& directory, const std::string& command_line, const std::string& source,
                      const Measurements& measurements, const MeanAnalysis& analysis) {
   Report report(directory, "Mean of the measurements in " + source);
-  const bool trusted = analysis.status == Status::ok || analysis.status == Status::not_applicable;
-  report.verdict(trusted, trusted ? "The mean is " + uniquenessInWords(analysis) + "."
-                                  : fmt::format("Not to be trusted ({}): {}.", name(analysis.status), analysis.reason));
+  report.verdict(analysis.trusted(), analysis.verdict().text);
   report.paragraph(measurementsInWords(source, measurements) + ".");
   report.code(command_line);
   const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;

@@ -5,8 +5,7 @@
 #include <cli/io/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
 #include <cli/show/json.hpp>
-#include <cli/commands/split.hpp>
-#include <experiments/interruption.hpp>
+#include <stats/split_validation_types.hpp>
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -18,32 +17,17 @@ namespace liestat::cli {
 
 class Report;
 
-/// The result of a run, whatever the input was.
-struct SplitOutcome {
-  std::string source;       ///< a file, or the prefix of several
-  std::string description;  ///< the measurements in words
-  experiments::Feature feature = experiments::Feature::point;
-  experiments::Criterion criterion = experiments::Criterion::maha;
-  SplitOptions settings;
-  SplitSeries random, by_blocks;
-  bool known_noise = true;
-
-  /// Not after an interrupt.
-  bool passed() const { return !experiments::trials_of_run.incomplete() && !(by_blocks.pValue() < split_false_alarm); }
-};
-
 /// The measurements of one file.
-struct FileSplit : SplitOutcome {
-  SplitResult result;
-  bool covariance_at_matters = false;
-  CovarianceAt covariance_at = CovarianceAt::estimated;
+struct FileSplit : SplitSummary {
+  std::string source;       ///< the file
+  std::string description;  ///< the measurements in words
   std::vector<std::string> notes;
 };
 
 /// One object of a stereo track set.
 struct LandmarkSplit {
   std::size_t track = 0;
-  SplitResult split;
+  SplitSummary split;
   MeanAnalysis whole;
   std::optional<Eigen::Vector3d> survey = {};
 
@@ -53,6 +37,9 @@ struct LandmarkSplit {
 
 /// Several landmarks, pooled.
 struct LandmarkSplits : SplitOutcome {
+  std::string source;       ///< the prefix of the files
+  std::string description;  ///< the measurements in words
+  Criterion criterion = Criterion::maha;
   std::vector<LandmarkSplit> landmarks;
   std::size_t skipped = 0;  ///< landmarks with too few observations
   bool surveyed = false;
@@ -72,11 +59,8 @@ JsonObject toJson(const LandmarkSplits& split, const std::string& command_line);
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split);
 void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split);
 
-/// Parts of these views: the last lines, the fields in JSON and the plots that both have.
+/// Parts of these views: the last lines, the verdict among them, and the plots.
 std::string splitVerdict(const SplitOutcome& outcome);
-/// Its last paragraph in one line: PASSED, FAILED or INTERRUPTED, and what follows from that.
-std::string adviceOf(const SplitOutcome& outcome);
-JsonObject splitEnvelope(const SplitOutcome& outcome, const std::string& command_line);
 void plotSplits(Report& report, const SplitOutcome& outcome);
 
 }  // namespace liestat::cli

@@ -61,8 +61,11 @@ std::string formatSplit(const LandmarkSplits& split) {
 }
 
 JsonObject toJson(const LandmarkSplits& split, const std::string& command_line) {
-  JsonObject object = splitEnvelope(split, command_line);
-  object.set("criterion", name(split.criterion)).set("skipped", split.skipped);
+  JsonObject object = jsonEnvelope(command_line, split.settings.seed);
+  object.set("file", split.source)
+      .fieldsOf<SplitOutcome>(split)
+      .set("criterion", name(split.criterion))
+      .set("skipped", split.skipped);
   if (split.surveyed) {
     object.set("survey_rms", split.surveyRms()).set("survey_squared_distance", split.surveySquaredDistance());
   } else {
@@ -82,7 +85,7 @@ JsonObject toJson(const LandmarkSplits& split, const std::string& command_line) 
 
 void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split) {
   Report report(directory, "Split of the landmarks in " + split.source);
-  report.verdict(split.passed(), adviceOf(split));
+  report.verdict(split.passed(), split.verdict().text);
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));

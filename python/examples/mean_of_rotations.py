@@ -11,7 +11,7 @@ def main() -> None:
     measured = truth.retract(0.1 * rng.standard_normal((40, 3)))
 
     result = liestat.mean(measured)
-    print("status     ", result.status, result.uniqueness)
+    print("status     ", result.status, result.unique)
     print("mean       ", result.mean.log().round(4), "rad")
     print("sigma      ", result.sigma, "rad, body axes")
     print("95 % region", result.confidence_region(0.95))

@@ -41,7 +41,7 @@ from ._gaussians import (
     validate,
 )
 from ._motion import motion
-from ._results import ConfidenceRegion, Law, MeanResult, Result
+from ._results import ConfidenceRegion, Law, MeanResult, Result, Uniqueness
 from ._sensors import (
     VI_BLOCKS,
     CalibratedPose,
@@ -54,7 +54,7 @@ from ._sensors import (
     two_view,
     vi_init,
 )
-from ._statistics import group_mean, mahalanobis, mean
+from ._statistics import group_mean, mahalanobis, mean, validate_split
 from ._trajectories import TrajectoryEvaluation, evaluate_trajectory
 
 __version__ = _core.__version__

@@ -168,9 +168,13 @@ class R3(_Metric, Manifold):
     def moved(self, by: R3 | SO3 | SE3, threads: int = 1) -> R3: ...
 
 class Law:
-    dof: int
+    degrees_of_freedom: int
     samples: int | None
-    def __init__(self, dof: int, samples: int | None = None) -> None: ...
+    def __init__(
+        self, degrees_of_freedom: int | None = None, samples: int | None = None, *, dof: int | None = None
+    ) -> None: ...
+    @property
+    def dof(self) -> int: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> Literal["chi2", "hotelling"]: ...
@@ -189,31 +193,20 @@ class ConfidenceRegion:
     def __init__(self, mean: Manifold, covariance: _Array, probability: float, law: Law) -> None: ...
     def contains(self, x: Manifold) -> Any: ...
 
+class Uniqueness(str):
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __ne__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
 class MeanResult:
-    mean: Any
-    covariance: Any
-    status: Any
-    reason: Any
-    unique: Any
-    uniqueness: Any
-    proof: Any
-    rivals: Any
-    near_ties: Any
-    more_rivals: Any
-    dispersion: Any
-    law: Any
     criterion: str
     shape: tuple[int, ...]
-    n: Any
-    iterations: Any
-    cells: Any
-    cost: Any
-    residual: Any
-    tolerance: Any
-    r_star: Any
-    fit: Any
-    fit_dof: Any
     def __init__(self, kind: Any, criterion: str, answers: Any, shape: tuple[int, ...]) -> None: ...
+    def __getattr__(self, name: str) -> Any: ...
+    def __dir__(self) -> list[str]: ...
+    def keys(self) -> list[str]: ...
+    def as_dict(self) -> dict[str, Any]: ...
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any) -> MeanResult: ...
     @property
@@ -280,9 +273,25 @@ def mean(
     *,
     covariance_at: _CovarianceAt = None,
     likelihood: bool = False,
+    times: ArrayLike | None = None,
+    inflate: bool = False,
     budget: int | None = None,
     threads: int = 0,
 ) -> MeanResult: ...
+def validate_split(
+    x: Manifold,
+    weights: ArrayLike | None = None,
+    covariances: ArrayLike | None = None,
+    times: ArrayLike | None = None,
+    criterion: Literal["lsq", "wlsq", "maha", "barycentre"] | None = None,
+    *,
+    covariance_at: _CovarianceAt = None,
+    likelihood: bool = False,
+    splits: int = 200,
+    blocks: int = 10,
+    seed: int = 1,
+    threads: int = 0,
+) -> Result: ...
 def group_mean(
     x: Group,
     weights: ArrayLike | None = None,

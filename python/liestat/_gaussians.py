@@ -563,7 +563,7 @@ def validate(
     fields = _core.validation_report(
         distances,
         exceptions,
-        law.dof,
+        law.degrees_of_freedom,
         law.samples or 0,
         float(false_alarm),
         float(tolerance),

@@ -51,23 +51,38 @@ class Result:
         return f"<{self._title}{'' if status is None else f': {status}'}; {', '.join(self.keys())}>"
 
 
+def _renamed(old, new):
+    warnings.warn(f"liestat: {old!r} is called {new!r} now", DeprecationWarning, stacklevel=3)
+
+
 class Law:
     """The law of a squared Mahalanobis distance: χ² where the noise was known, Hotelling's T² where the covariance came
     from the residuals of `samples` features.
 
     Parameters
     ----------
-    dof : int
-        Dimension k of the error.
+    degrees_of_freedom : int
+        Dimension k of the error; `dof` is its former name.
     samples : int, optional
         Number of features whose residuals gave the covariance; none: χ².
     """
 
-    __slots__ = ("dof", "samples")
+    __slots__ = ("degrees_of_freedom", "samples")
 
-    def __init__(self, dof, samples=None):
-        self.dof = int(dof)
+    def __init__(self, degrees_of_freedom=None, samples=None, *, dof=None):
+        if dof is not None:
+            _renamed("dof", "degrees_of_freedom")
+            degrees_of_freedom = dof
+        if degrees_of_freedom is None:
+            raise TypeError("Law: degrees_of_freedom is missing")
+        self.degrees_of_freedom = int(degrees_of_freedom)
         self.samples = int(samples) if samples else None
+
+    @property
+    def dof(self):
+        """Former name of `degrees_of_freedom`."""
+        _renamed("dof", "degrees_of_freedom")
+        return self.degrees_of_freedom
 
     @property
     def name(self):
@@ -76,23 +91,23 @@ class Law:
 
     def quantile(self, probability):
         """The squared distance that is not exceeded with the given probability; NaN where the law has none."""
-        return _core.law_quantile(self.dof, self.samples or 0, float(probability))
+        return _core.law_quantile(self.degrees_of_freedom, self.samples or 0, float(probability))
 
     def survival(self, squared_distance):
         """The probability that the squared distance is exceeded; elementwise."""
         values = np.asarray(squared_distance, dtype=np.float64)
-        flat = [_core.law_survival(self.dof, self.samples or 0, float(v)) for v in values.ravel()]
+        flat = [_core.law_survival(self.degrees_of_freedom, self.samples or 0, float(v)) for v in values.ravel()]
         return np.array(flat).reshape(values.shape)[()]
 
     def mean(self):
         """The expectation."""
-        return _core.law_mean(self.dof, self.samples or 0)
+        return _core.law_mean(self.degrees_of_freedom, self.samples or 0)
 
     def __repr__(self):
-        return f"Law(dof={self.dof}" + (f", samples={self.samples})" if self.samples else ")")
+        return f"Law(degrees_of_freedom={self.degrees_of_freedom}" + (f", samples={self.samples})" if self.samples else ")")
 
     def __eq__(self, other):
-        return isinstance(other, Law) and (self.dof, self.samples) == (other.dof, other.samples)
+        return isinstance(other, Law) and (self.degrees_of_freedom, self.samples) == (other.degrees_of_freedom, other.samples)
 
     __hash__ = None
 
@@ -139,83 +154,151 @@ class ConfidenceRegion:
         return f"<{100 * self.probability:g} % region of a {type(self.mean).__name__}: semi-axes {axes}>"
 
 
+class Uniqueness(str):
+    """'unique', 'ambiguous' or 'not_certified'. Only the first is true, and equals True: the part `unique` of a result was
+    a bool before it was a word, and ``if result.unique:`` means what it meant.
+    """
+
+    __slots__ = ()
+
+    def __bool__(self):
+        return str.__eq__(self, "unique")
+
+    def __eq__(self, other):
+        if isinstance(other, (bool, np.bool_)):
+            return bool(self) == bool(other)
+        return str.__eq__(self, other)
+
+    def __ne__(self, other):
+        return not self == other
+
+    __hash__ = str.__hash__
+
+
 class MeanResult:
     """A mean with its certificates and its covariance.
 
-    For a reduction along some of several axes the attributes have the shape of the axes that are left; otherwise they
-    are those of a single mean.
+    The attributes are the fields of ``liestat mean --json``, with the same names and values; features are of their
+    types. `as_dict()` has them as the program writes them. For a reduction along some of several axes the attributes
+    have the shape of the axes that are left; otherwise they are those of a single mean.
 
     Attributes
     ----------
     mean : the type of the features
     covariance : ndarray, shape (..., k, k), or None
         Covariance of the mean in its own axes, m² and rad²; None (NaN in an array) where it is withheld.
+    covariance_from, covariance_law : str or None
+        'noise' or 'residuals', and with it 'chi2' or 'hotelling'.
     status : str
-        'ok', 'ambiguous', 'ill_defined', 'too_few', 'not_converged' or 'not_applicable'.
-    reason : str
-        Why there is no covariance, in words; empty if there is one.
-    unique : bool
-        Whether the mean is proven to be the only one.
-    uniqueness, proof : str
-        'unique', 'ambiguous' or 'not_certified', and the certificate in words.
+        'ok', 'ambiguous', 'ill_defined', 'too_few', 'not_converged', or 'not_applicable': there is a mean, but no
+        covariance of it can be computed.
+    reason : str or None
+        Why there is no covariance, in words; None if there is one.
+    unique : Uniqueness
+        The word 'unique', 'ambiguous' or 'not_certified'; true if it is 'unique'. An array of words for several means.
+    proof : str
+        The certificate in words.
     rivals : the type of the features, shape (m,)
-        Other minimisers of equal cost.
+        Other minimisers of equal cost; all of them if `rivals_complete`.
     near_ties : the type of the features, shape (m,)
-        Other minima that the measurements do not exclude.
+        Other minima that the measurements do not exclude; by `near_tie_z` standard deviations they are the worse.
     dispersion : ndarray, shape (..., k, k)
         Covariance of the features about the mean.
+    farthest : list of dict
+        The farthest feature in each part of the tangent vector, with its index; empty with ``certify=False``.
+    standard_deviations, standard_deviations_world : dict
+        Of the mean by parts, in degrees and metres, along its own axes and along those of the world.
     law : Law
         The law of the squared Mahalanobis distance of the truth.
     criterion : str
-        'lsq', 'maha' or 'barycentre'.
+        'lsq', 'wlsq', 'maha' or 'barycentre'.
     n, iterations : int
     cells : int
         Of the global search; 0 where it was not needed.
-    cost, residual, tolerance, r_star, fit, fit_dof : float
-        As in C++: `fit` is the sum of squared Mahalanobis distances for 'maha', χ² with `fit_dof` degrees of freedom if
-        the covariances are right.
+    cut_locus_mass, hessian_change : float
+        Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the confidence
+        region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
+    fit, fit_dof, fit_p : float or None
+        Sum of squared Mahalanobis distances for 'maha', χ² with `fit_dof` degrees of freedom if the covariances are
+        right, and the probability of so large a sum; None (NaN in an array) for the other criteria.
+    time_blocks : dict or None
+        With `times`: the factor by which the covariance is too small since the errors of successive features depend on
+        each other, `factor`, with its 95 % interval, `p`, and whether it was `applied`.
+    notes : list of str
+        What is remarkable about the result.
+    cost, residual, tolerance, r_star : float
+        As in C++.
     """
 
-    _scalars: tuple = ("status", "reason", "uniqueness", "proof", "n", "iterations", "cost", "residual", "tolerance")
-    _scalars += ("r_star", "cells")
+    #: Features and numbers that the fields have in another form.
+    _features: tuple = ("mean", "rivals", "near_ties")
+    _values: tuple = ("near_tie_z", "cost")
 
     def __init__(self, kind, criterion, answers, shape):
         self._kind, self.criterion, self.shape = kind, criterion, shape
         self._answers = answers
-        k = kind.dof
-        if shape == ():
-            answer = answers[0]
-            self.mean = kind._of(answer["mean"])
-            self.covariance = answer["covariance"]
-            self.dispersion = answer["dispersion"]
-            self.rivals = kind._of(answer["rivals"])
-            self.near_ties = kind._of(answer["near_ties"])
-            self.law = Law(k, answer["law_samples"])
-            self.more_rivals = answer["more_rivals"]
-            self.fit, self.fit_dof = answer["fit"], answer["fit_dof"]
-            for name in self._scalars:
-                setattr(self, name, answer[name])
-            self.unique = self.uniqueness == "unique"
-            return
-        nan = np.full((k, k), np.nan)
 
-        def matrices(name):
-            return _array([a[name] if a[name] is not None else nan for a in answers], (*shape, k, k))
+    def _names(self):
+        return [n for n in (self._answers[0] if self._answers else _core.mean_fields) if n != "_values"]
 
-        def objects(values):
-            array = np.empty(len(answers), dtype=object)
-            array[:] = values
-            return array.reshape(shape)
+    def __dir__(self):
+        return [*super().__dir__(), *self._names(), *self._values, "law"]
 
-        self.mean = kind._of(_array([a["mean"] for a in answers], (*shape, kind.parameters)))
-        self.covariance = matrices("covariance")
-        self.dispersion = matrices("dispersion")
-        self.rivals = objects([kind._of(a["rivals"]) for a in answers])
-        self.near_ties = objects([kind._of(a["near_ties"]) for a in answers])
-        self.law = objects([Law(k, a["law_samples"]) for a in answers])
-        for name in (*self._scalars, "fit", "fit_dof", "more_rivals"):
-            setattr(self, name, np.array([a[name] for a in answers]).reshape(shape))
-        self.unique = self.uniqueness == "unique"
+    def __getattr__(self, name):
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name == "uniqueness":
+            _renamed("uniqueness", "unique")
+            return self.unique
+        if name == "more_rivals":
+            _renamed("more_rivals", "rivals_complete, its contrary,")
+            return np.logical_not(self.rivals_complete)[()] if self.shape else not self.rivals_complete
+        if name != "law" and name not in self._values and name not in self._names():
+            raise AttributeError(f"no part {name!r}; there are {', '.join(dir(self))}")
+        parts = [self._part(answer, name) for answer in self._answers]
+        value = parts[0] if self.shape == () else self._stacked(name, parts)
+        self.__dict__[name] = value
+        return value
+
+    def _part(self, answer, name):
+        """A part of one mean."""
+        if name in self._features:
+            return self._kind._of(answer["_values"][name])
+        if name in self._values:
+            return answer["_values"][name]
+        if name == "law":
+            return Law(self._kind.dof, answer["_values"]["law_samples"])
+        return Uniqueness(answer[name]) if name == "unique" else answer[name]
+
+    def _stacked(self, name, parts):
+        """The parts of several means as an array of their shape."""
+        k, shape = self._kind.dof, self.shape
+        if name == "mean":
+            return self._kind._of(_array([x.params for x in parts], (*shape, self._kind.parameters)))
+        if name in ("covariance", "dispersion"):
+            nan = np.full((k, k), np.nan)
+            return _array([nan if m is None else m for m in parts], (*shape, k, k))
+        if name in ("fit", "fit_dof", "fit_p"):
+            return _array([np.nan if v is None else v for v in parts], shape)
+        if name != "unique" and parts and all(isinstance(v, (bool, int, float, str)) for v in parts):
+            return np.array(parts).reshape(shape)
+        array = np.empty(len(parts), dtype=object)
+        array[:] = parts
+        return array.reshape(shape)
+
+    def keys(self):
+        """Names of the fields."""
+        return self._names()
+
+    def as_dict(self):
+        """The fields of a single mean as the program writes them to JSON, features by their parts.
+
+        Returns
+        -------
+        dict
+        """
+        self._single("as_dict")
+        return {name: self._answers[0][name] for name in self._names()}
 
     def __len__(self):
         if self.shape == ():
@@ -273,7 +356,7 @@ class MeanResult:
 
     def _rows(self):
         names = self._kind.tangent_names
-        rows = [("status", self.status), ("uniqueness", f"{self.uniqueness}: {self.proof}" if self.proof else "")]
+        rows = [("status", self.status), ("uniqueness", self.proof)]
         if self.reason:
             rows.append(("reason", self.reason))
         rows.append(("mean", np.array2string(self.mean.params, precision=6)))
@@ -285,13 +368,14 @@ class MeanResult:
         rows.append(("features", str(self.n)))
         if len(self.rivals) or len(self.near_ties):
             rows.append(("rivals", f"{len(self.rivals)} of equal cost, {len(self.near_ties)} near ties"))
+        rows += [("note", note) for note in self.notes]
         return rows
 
     def __repr__(self):
         if self.shape:
             ok = int(np.count_nonzero(self.status == "ok"))
             return f"<MeanResult of {'×'.join(map(str, self.shape))} {self._kind.__name__}: {ok} ok>"
-        return f"<MeanResult: {self.mean!r}, {self.status}, {self.uniqueness}, n = {self.n}>"
+        return f"<MeanResult: {self.mean!r}, {self.status}, {self.unique}, n = {self.n}>"
 
     def _repr_html_(self):
         if self.shape:

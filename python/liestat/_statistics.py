@@ -9,7 +9,7 @@ import numpy as np
 from . import _core
 from ._manifolds import SO3, Frame3, Manifold, NonOrientedFrame3, SemiOrientedFrame3
 from ._operate import as_numbers, operate, require_finite
-from ._results import MeanResult
+from ._results import MeanResult, Result
 
 #: Types with an invariant metric, whose default criterion is least squares.
 _METRIC = ("R3", "S2", "SO3", "Frame3", "SemiOrientedFrame3", "NonOrientedFrame3")
@@ -62,10 +62,6 @@ def _grouped(array, axes, ndim):
     return moved.reshape((math.prod(lead), n, *array.shape[ndim:])), lead
 
 
-def _empty(*shape):
-    return np.empty(shape)
-
-
 def mean(
     x,
     weights=None,
@@ -76,6 +72,8 @@ def mean(
     *,
     covariance_at=None,
     likelihood=False,
+    times=None,
+    inflate=False,
     budget=None,
     threads=0,
 ):
@@ -104,8 +102,14 @@ def mean(
         estimate (an object's). Both are the same for other types.
     likelihood : bool
         For 'maha': add the logarithm of the volume element, for the maximum of the likelihood.
+    times : array_like, optional
+        Of the features, in whatever unit; broadcast to ``x.shape``. Halves of the features made of blocks of time then
+        tell whether the errors of successive features are independent, as the covariance supposes (`time_blocks` of the
+        result, with a note where they are not).
+    inflate : bool
+        Multiply the covariance by the factor by which blocks of time disagree, where it is above one.
     budget : int, optional
-        Of the global search: looks at a datum from a cell, some 30 ns each. Default: 1e8, for 'maha' 1e7.
+        Of the global search: looks at a datum from a cell, some 30 ns each. Default: 1e8, for 'maha' 1e7 at most.
     threads : int
         0 for as many as the machine has. The result has the same bits for any number.
 
@@ -124,21 +128,34 @@ def mean(
     >>> x = liestat.SO3.exp([[0.31, 0.02, -0.11], [0.28, 0.05, -0.13], [0.33, 0.01, -0.08], [0.30, 0.04, -0.12]])
     >>> result = liestat.mean(x)
     >>> result.status, result.unique
-    ('ok', True)
+    ('ok', 'unique')
     >>> result.mean.log().round(4)
     array([ 0.305,  0.03 , -0.11 ])
     """
-    result = _mean(
-        "mean", x, weights, covariances, axis, criterion, certify, covariance_at, likelihood, budget, threads
+    kind, criterion, groups, lead = _requests(
+        "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times
     )
-    withheld = [a for a in result._answers if a["covariance"] is None]
+    if inflate and times is None:
+        raise ValueError("mean: inflate needs times")
+    answers = [
+        _core.mean(**group, certify=bool(certify), inflate=bool(inflate), budget=int(budget or 0), threads=int(threads))
+        for group in groups
+    ]
+    if inflate and any(a["time_blocks"] is None for a in answers):
+        raise ValueError(
+            "mean: inflate, but blocks of time cannot be compared: that needs features with times, at least ten, and a "
+            "mean with a covariance"
+        )
+    result = MeanResult(kind, criterion, answers, lead)
+    withheld = [a for a in answers if a["covariance"] is None]
     if withheld:
-        which = "" if result.shape == () else f" for {len(withheld)} of {len(result._answers)} means"
+        which = "" if lead == () else f" for {len(withheld)} of {len(answers)} means"
         warnings.warn(f"liestat.mean: no covariance{which}: {withheld[0]['reason']}", UserWarning, stacklevel=2)
     return result
 
 
-def _mean(caller, x, weights, covariances, axis, criterion, certify, covariance_at, likelihood, budget, threads):
+def _requests(caller, x, weights, covariances, axis, criterion, covariance_at, likelihood, times):
+    """The type, the criterion, the arguments of the extension for each mean, and the shape of the means."""
     x = require_manifold(x, caller)
     kind = type(x)
     name = kind._core_name
@@ -169,44 +186,104 @@ def _mean(caller, x, weights, covariances, axis, criterion, certify, covariance_
                 f"{caller}: covariance_at: for {name} say 'measured' (covariances in the axes of each measurement, a "
                 "sensor's) or 'estimated' (in the axes of the estimate, an object's)"
             )
+    elif likelihood:
+        raise ValueError(f"{caller}: likelihood is that of criterion 'maha'")
     elif criterion == "barycentre" and covariances is not None:
         raise ValueError(f"{caller}: criterion 'barycentre' takes weights; covariances are for 'maha'")
+    elif covariances is not None and isinstance(x, _FRAMES):
+        if covariance_at == "measured":
+            raise ValueError(f"{caller}: criterion 'lsq' takes covariances in the axes of the estimate, else 'maha'")
+        covariance_at = "estimated"
     axes = _axes(axis, x.ndim, caller)
     require_finite(x.params, f"{caller}: x")
     features, lead = _grouped(np.ascontiguousarray(x.params), axes, x.ndim)
-    groups, n = features.shape[:2]
 
-    if weights is not None:
-        w = require_finite(as_numbers(weights, f"{caller}: weights", ()), f"{caller}: weights")
-        if (w < 0).any():
-            raise ValueError(f"{caller}: weights, shape {w.shape}: one is negative")
+    def one_for_each(values, what):
+        values = require_finite(as_numbers(values, f"{caller}: {what}", ()), f"{caller}: {what}")
         try:
-            w = np.broadcast_to(w, x.shape)
+            return _grouped(np.broadcast_to(values, x.shape), axes, x.ndim)[0]
         except ValueError:
-            raise ValueError(f"{caller}: weights, shape {w.shape}: does not broadcast to {x.shape}") from None
-        w = _grouped(w, axes, x.ndim)[0]
+            raise ValueError(f"{caller}: {what}, shape {values.shape}: does not broadcast to {x.shape}") from None
+
+    w = t = c = np.empty((len(features), 0))
+    if weights is not None:
+        w = one_for_each(weights, "weights")
+        if (w < 0).any():
+            raise ValueError(f"{caller}: weights, shape {np.shape(weights)}: one is negative")
+        criterion = "wlsq" if criterion == "lsq" else criterion
+    if times is not None:
+        t = one_for_each(times, "times")
     if covariances is not None:
         c = _covariances(covariances, f"{caller}: covariances", kind, x.shape)
         k = (kind.dof, kind.dof)
-        one = math.prod(c.shape[:-2]) == 1 and criterion == "maha"
-        c = c.reshape(1, 1, *k) if one else _grouped(np.broadcast_to(c, (*x.shape, *k)), axes, x.ndim)[0]
-    answers = []
-    for i in range(groups):
-        answers.append(
-            _core.mean(
-                type=name,
-                criterion=criterion,
-                features=np.ascontiguousarray(features[i]),
-                weights=_empty(0) if weights is None else np.ascontiguousarray(w[i]),
-                covariances=_empty(0) if covariances is None else np.ascontiguousarray(c[0 if one else i]),
-                covariances_at_measurement=covariance_at != "estimated",
-                likelihood=bool(likelihood),
-                certify=bool(certify),
-                budget=int(budget or 0),
-                threads=int(threads),
-            )
+        if math.prod(c.shape[:-2]) == 1 and criterion == "maha":
+            c = np.broadcast_to(c.reshape(1, 1, *k), (len(features), 1, *k))
+        else:
+            c = _grouped(np.broadcast_to(c, (*x.shape, *k)), axes, x.ndim)[0]
+    groups = [
+        dict(
+            type=name,
+            criterion=criterion,
+            features=np.ascontiguousarray(features[i]),
+            weights=np.ascontiguousarray(w[i]),
+            covariances=np.ascontiguousarray(c[i]),
+            times=np.ascontiguousarray(t[i]),
+            covariances_at_measurement=covariance_at != "estimated",
+            likelihood=bool(likelihood),
         )
-    return MeanResult(kind, criterion, answers, lead)
+        for i in range(len(features))
+    ]
+    return kind, criterion, groups, lead
+
+
+def validate_split(
+    x,
+    weights=None,
+    covariances=None,
+    times=None,
+    criterion=None,
+    *,
+    covariance_at=None,
+    likelihood=False,
+    splits=200,
+    blocks=10,
+    seed=1,
+    threads=0,
+):
+    """Whether the covariance of a mean is true of real measurements: split in two, at random and by blocks of time, do the
+    halves agree? ``liestat validate split`` for arrays.
+
+    Splits at random do not see errors that successive measurements share, splits by blocks of time do.
+
+    Parameters
+    ----------
+    x, weights, covariances, criterion, covariance_at, likelihood
+        As those of `mean`; all of `x` are measurements of one feature.
+    times : array_like, optional
+        Of the measurements; None: they are in order.
+    splits : int
+        Of each kind.
+    blocks : int
+        Of time; even.
+    seed, threads : int
+        The same seed gives the same bits on any number of threads.
+
+    Returns
+    -------
+    Result
+        The fields of the program's JSON; `passed`, `inflation` (by which the covariance of the mean is too small) with
+        `inflation_low` and `inflation_high`, `random` and `by_blocks`, and `first`, `second` (the halves in time) and
+        `merged` with their means. Besides `verdict`, the verdict in words, and `causes`.
+    """
+    if blocks < 2 or blocks % 2:
+        raise ValueError(f"validate_split: blocks must be even and positive, got {blocks}")
+    if splits < 1:
+        raise ValueError(f"validate_split: splits: expected at least 1, got {splits}")
+    request = _requests(
+        "validate_split", x, weights, covariances, None, criterion, covariance_at, likelihood, times
+    )[2][0]
+    fields = _core.split(**request, splits=int(splits), blocks=int(blocks), seed=int(seed), threads=int(threads))
+    return Result.of("validation by splits", fields)
 
 
 def group_mean(x, weights=None, axis=None, certify=True, *, budget=None, threads=0):

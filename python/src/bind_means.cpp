@@ -1,10 +1,14 @@
 // Means for Python: arrays in, a dictionary of what is known out.
 #include <python/src/binding.hpp>
+#include <python/src/described.hpp>
 #include <python/src/means.hpp>
+#include <stats/mean_notes.hpp>
+#include <stats/split_validation_types.hpp>
+#include <stats/time_blocks.hpp>
 
-#include <cmath>
-#include <map>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace liestat::python {
 namespace {
@@ -16,67 +20,103 @@ const MeanType& typeOf(const std::string& name) {
   throw py::type_error("no means of " + name);
 }
 
-py::dict answerOf(const MeanAnswer& answer) {
-  const auto p = static_cast<py::ssize_t>(answer.mean.size());
-  const auto rows = [&](const std::vector<double>& list) {
-    return arrayOf(list, {p > 0 ? static_cast<py::ssize_t>(list.size()) / p : 0, p});
+/// The fields of a mean, and beside them, under "_values", what the module makes its types of.
+py::dict answerOf(const MeanSummary& mean) {
+  py::dict values;
+  const auto p = static_cast<py::ssize_t>(mean.mean.parameters.size());
+  const auto rows = [&](const auto& list, const auto& valueOf) {
+    std::vector<double> all;
+    for (const auto& element : list) {
+      const Eigen::VectorXd& parameters = valueOf(element).parameters;
+      all.insert(all.end(), parameters.begin(), parameters.end());
+    }
+    return arrayOf(all, {static_cast<py::ssize_t>(list.size()), p});
   };
-  const auto matrix = [&](const std::vector<double>& list) -> py::object {
-    if (list.empty()) return py::none();
-    const auto k = static_cast<py::ssize_t>(std::lround(std::sqrt(static_cast<double>(list.size()))));
-    return arrayOf(list, {k, k});
-  };
-  py::dict d;
-  d["n"] = answer.n;
-  d["mean"] = arrayOf(answer.mean, {p});
-  d["covariance"] = matrix(answer.covariance);
-  d["dispersion"] = matrix(answer.dispersion);
-  d["rivals"] = rows(answer.rivals);
-  d["near_ties"] = rows(answer.near_ties);
-  d["near_tie_z"] = arrayOf(answer.near_tie_z, {static_cast<py::ssize_t>(answer.near_tie_z.size())});
-  d["status"] = text(answer.status);
-  d["reason"] = text(answer.reason);
-  d["uniqueness"] = text(answer.uniqueness);
-  d["proof"] = text(answer.proof);
-  d["converged"] = answer.converged;
-  d["more_rivals"] = answer.more_rivals;
-  d["concentrated"] = answer.concentrated;
-  d["iterations"] = answer.iterations;
-  d["residual"] = answer.residual;
-  d["tolerance"] = answer.tolerance;
-  d["cost"] = answer.cost;
-  d["r_star"] = answer.r_star;
-  d["cells"] = answer.cells;
-  d["hessian_change"] = answer.hessian_change;
-  d["fit"] = answer.fit;
-  d["fit_dof"] = answer.fit_dof;
-  d["law_samples"] = answer.law_samples;
+  std::vector<double> z;
+  for (const NearRival& tie : mean.near_ties) z.push_back(tie.z);
+  values["mean"] = DictView::of(mean.mean.parameters);
+  values["rivals"] = rows(mean.rivals, [](const FeatureValue& x) -> const FeatureValue& { return x; });
+  values["near_ties"] = rows(mean.near_ties, [](const NearRival& x) -> const FeatureValue& { return x.feature; });
+  values["near_tie_z"] = arrayOf(z, {static_cast<py::ssize_t>(z.size())});
+  values["cost"] = mean.cost;
+  values["law_samples"] = mean.known_noise ? std::size_t{0} : mean.n;
+  py::dict d = dictOf(mean);
+  d["_values"] = values;
   return d;
 }
 
+Criterion criterionOf(const std::string& text) {
+  for (const Criterion c : {Criterion::lsq, Criterion::wlsq, Criterion::maha, Criterion::barycentre}) {
+    if (name(c) == text) return c;
+  }
+  throw py::value_error("no criterion " + text);
+}
+
+MeanRequest requestOf(const std::string& criterion, const DoubleArray& features, const DoubleArray& weights,
+                      const DoubleArray& covariances, const DoubleArray& times, bool covariances_at_measurement,
+                      bool likelihood, int threads) {
+  return {.criterion = criterionOf(criterion),
+          .features = numbers(features),
+          .weights = numbers(weights),
+          .covariances = numbers(covariances),
+          .times = numbers(times),
+          .covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated,
+          .likelihood = likelihood,
+          .threads = threads};
+}
+
 py::dict mean(const std::string& type, const std::string& criterion, const DoubleArray& features,
-              const DoubleArray& weights, const DoubleArray& covariances, bool covariances_at_measurement,
-              bool likelihood, bool certify, std::size_t budget, int threads) {
+              const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
+              bool covariances_at_measurement, bool likelihood, bool certify, bool inflate, std::size_t budget,
+              int threads) {
   const MeanType& means = typeOf(type);
-  const MeanFunction function = criterion == "maha"         ? means.mahalanobis
-                                : criterion == "barycentre" ? means.barycentre
-                                                            : means.least_squares;
-  if (function == nullptr) throw py::value_error(type + " has no criterion " + criterion);
-  const MeanRequest request{.features = numbers(features),
-                            .weights = numbers(weights),
-                            .covariances = numbers(covariances),
-                            .covariances_at_measurement = covariances_at_measurement,
-                            .likelihood = likelihood,
-                            .certify = certify,
-                            .budget = budget,
-                            .threads = threads};
-  MeanAnswer answer;
+  MeanRequest request =
+      requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
+  request.certify = certify;
+  request.budget = budget;
+  MeanSummary answer;
   {
     const py::gil_scoped_release released;
     SignalWatch signals;
-    answer = function(request, signals);
+    answer = means.mean(request, signals);
+    answer.feature = means.feature;
+    const std::size_t n = request.features.size() / static_cast<std::size_t>(means.parameters);
+    addMeanNotes(answer, n);
+    if (!request.times.empty() && answer.hasCovariance()) {
+      const auto by_blocks = [&](const SplitOptions& split) { return means.split(request, signals, split).by_blocks; };
+      setTimeBlocks(answer, compareTimeBlocks(n, means.dof, answer.known_noise, by_blocks), inflate);
+    }
   }
   return answerOf(answer);
+}
+
+/// The validation of a mean by splits, and its verdict in words.
+py::dict split(const std::string& type, const std::string& criterion, const DoubleArray& features,
+               const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
+               bool covariances_at_measurement, bool likelihood, std::size_t splits, std::size_t blocks,
+               std::uint64_t seed, int threads) {
+  const MeanType& means = typeOf(type);
+  const MeanRequest request =
+      requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
+  const SplitOptions options{.splits = splits, .blocks = blocks, .seed = seed};
+  const std::size_t n = request.features.size() / static_cast<std::size_t>(means.parameters);
+  const std::size_t fewest = fewestMeasurements(means.dof, !request.covariances.empty(), options);
+  if (n < fewest) {
+    throw py::value_error("validate_split: " + std::to_string(n) + " measurements, too few to be split: " +
+                          std::to_string(fewest) + " at least (blocks is " + std::to_string(blocks) + ")");
+  }
+  SplitSummary result;
+  {
+    const py::gil_scoped_release released;
+    SignalWatch signals;
+    result = means.split(request, signals, options);
+    result.feature = means.feature;
+  }
+  const Verdict verdict = result.verdict();
+  py::dict d = dictOf(result);
+  d["verdict"] = text(verdict.text);
+  d["causes"] = DictView::of(verdict.causes);
+  return d;
 }
 
 /// Fuses groups of n features: features (g, n, p), covariances (g, n, k, k). Returns means (g, p), covariances (g, k, k).
@@ -100,7 +140,7 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
       MeanRequest request;
       request.features = of_group(features, i);
       request.covariances = of_group(covariances, i);
-      request.covariances_at_measurement = covariances_at_measurement;
+      request.covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated;
       means.fuse(request, mean_out + i * p, covariance_out + i * k * k);
       signals.look();
     }
@@ -112,8 +152,13 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
 
 void bindMeans(py::module_& module) {
   using namespace py::literals;
-  module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a,
-             "covariances_at_measurement"_a, "likelihood"_a, "certify"_a, "budget"_a, "threads"_a);
+  module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
+             "covariances_at_measurement"_a, "likelihood"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
+  py::list fields;
+  for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
+  module.attr("mean_fields") = fields;
+  module.def("split", &split, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
+             "covariances_at_measurement"_a, "likelihood"_a, "splits"_a, "blocks"_a, "seed"_a, "threads"_a);
   module.def("fuse", &fuse, "type"_a, "features"_a, "covariances"_a, "covariances_at_measurement"_a);
 }
 

@@ -1,7 +1,6 @@
 // The report of a Monte-Carlo validation for Python, from the distances of its trials.
 #include <python/src/binding.hpp>
-#include <stats/detail/validation_sample.hpp>
-#include <stats/validation_report.hpp>
+#include <stats/validation.hpp>
 
 namespace liestat::python {
 namespace {
@@ -9,10 +8,7 @@ namespace {
 py::dict report(const DoubleArray& distances, std::size_t exceptions, int dof, int samples, double false_alarm,
                 double index_tolerance, double ks_tolerance, double failure_fraction, double tail) {
   const ReferenceLaw law = samples > 0 ? ReferenceLaw::hotelling(dof, samples) : ReferenceLaw::chiSquared(dof);
-  liestat::detail::ValidationSample sample;
-  for (const double mu2 : numbers(distances)) sample.add(TrialOutcome{.mu2 = mu2});
-  sample.exceptions = exceptions;
-  const ValidationReport report = liestat::detail::summarize(sample, law);
+  const ValidationReport report = reportOfDistances(numbers(distances), law, exceptions);
   const ValidationTolerance tolerance{
       .index = index_tolerance, .ks = ks_tolerance, .failure_fraction = failure_fraction, .tail = tail};
   const ValidationVerdict verdict = report.verdict(false_alarm, tolerance);

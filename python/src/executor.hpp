@@ -43,7 +43,7 @@ struct PythonExecutor {
   SignalWatch* signals = nullptr;
 
   template <class Map, class Combine>
-  liestat::detail::ChunkResult<Map> reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
+  auto reduce(std::size_t n_chunks, Map&& map, Combine&& combine) const {
     const auto watched = [&](std::size_t chunk) {
       if (signals != nullptr) signals->look();
       return std::invoke(map, chunk);

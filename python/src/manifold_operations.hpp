@@ -3,7 +3,7 @@
 
 #include <lie/arrays.hpp>
 #include <lie/concepts.hpp>
-#include <lie/detail/small_matrix.hpp>
+#include <lie/linear.hpp>
 #include <lie/manifold.hpp>
 #include <python/src/array_operations.hpp>
 #include <stats/conventions.hpp>
@@ -84,7 +84,7 @@ void addManifoldOperations(std::vector<ArrayOperation>& list) {
                                }));
   list.push_back(operation<p>("sampled", {{"mean", p}, {"covariance", kk}, {"normals", k}},
                               [](const double* x, const double* covariance, const double* normals, double* out) {
-                                const liestat::detail::SemidefiniteRoot<double, K> root(square<K>(covariance));
+                                const SemidefiniteRoot<double, K> root(square<K>(covariance));
                                 storePoint(exp(point<M>(x), TangentOf<M>(root * vector<K>(normals))), out);
                               }));
   if constexpr (HasTangentParts<M> && T::Group::DoF == T::DoF) {

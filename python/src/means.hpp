@@ -2,49 +2,48 @@
 #pragma once
 
 #include <python/src/executor.hpp>
+#include <stats/mean_summary.hpp>
 
 #include <cstddef>
 #include <span>
-#include <string>
 #include <string_view>
-#include <vector>
+
+namespace liestat {
+struct SplitOptions;
+struct SplitSummary;
+}  // namespace liestat
 
 namespace liestat::python {
 
-/// Arguments of the means.
+/// Arguments of the means and of their validation by splits.
 struct MeanRequest {
+  Criterion criterion = Criterion::lsq;
   std::span<const double> features;     ///< rows of parameters
   std::span<const double> weights;      ///< one for each feature, or empty
   std::span<const double> covariances;  ///< dof×dof matrices, one for each feature or a single one, or empty
-  bool covariances_at_measurement = true;
+  std::span<const double> times;        ///< one for each feature, or empty
+  CovarianceAt covariance_at = CovarianceAt::measured;
   bool likelihood = false;
   bool certify = true;
   std::size_t budget = 0;  ///< of the search; 0: the library's
   int threads = 0;
 };
 
-/// A mean with all that is known about it. Matrices are row-major, empty where there are none.
-struct MeanAnswer {
-  std::size_t n = 0;
-  std::vector<double> mean, covariance, dispersion, rivals, near_ties, near_tie_z;
-  std::string_view status, reason, uniqueness, proof;
-  bool converged = false, more_rivals = false, concentrated = true;
-  int iterations = 0;
-  double residual = 0, tolerance = 0, cost = 0, r_star = 0, hessian_change = 0, fit = 0, fit_dof = 0;
-  std::size_t cells = 0;
-  int law_samples = 0;  ///< of Hotelling's law; 0: the covariance is of known noise, and the law is χ²
-};
-
-using MeanFunction = MeanAnswer (*)(const MeanRequest&, SignalWatch&);
-
+/// summarizedMean() of a type.
+using MeanFunction = MeanSummary (*)(const MeanRequest&, SignalWatch&);
+/// splitMean() of a type.
+using SplitFunction = SplitSummary (*)(const MeanRequest&, SignalWatch&, const SplitOptions&);
 /// fuse() of features with covariances: writes the mean's parameters and its covariance, NaN where it is not to be
 /// trusted.
 using FuseFunction = void (*)(const MeanRequest&, double* mean, double* covariance);
 
-/// A type whose means are compiled in, and the criteria that it has.
+/// A type whose means are compiled in.
 struct MeanType {
   std::string_view name;
-  MeanFunction least_squares = nullptr, mahalanobis = nullptr, barycentre = nullptr;
+  std::string_view feature;  ///< its name in results, which is that of the program
+  int parameters = 0, dof = 0;
+  MeanFunction mean = nullptr;
+  SplitFunction split = nullptr;
   FuseFunction fuse = nullptr;
 };
 
@@ -52,5 +51,8 @@ struct MeanType {
 const MeanType* commonMeans(std::string_view name);
 const MeanType* planarMeans(std::string_view name);
 const MeanType* extendedPoseMeans(std::string_view name);
+/// The splits of the common means, which are compiled apart.
+template <class M>
+SplitSummary splitOf(const MeanRequest& request, SignalWatch& signals, const SplitOptions& options);
 
 }  // namespace liestat::python

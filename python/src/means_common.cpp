@@ -1,13 +1,7 @@
 // Means of the features that liestat_means holds compiled.
 #include <python/src/mean_of.hpp>
 
-#include <lie/frame3.hpp>
-#include <lie/non_oriented_frame3.hpp>
-#include <lie/rn.hpp>
-#include <lie/s2.hpp>
-#include <lie/se3.hpp>
-#include <lie/semi_oriented_frame3.hpp>
-#include <lie/so3.hpp>
+#include <experiments/feature.hpp>
 
 #include <algorithm>
 #include <array>
@@ -16,18 +10,18 @@ namespace liestat::python {
 namespace {
 
 template <class M>
-constexpr MeanType metricType(std::string_view name) {
-  return {name, leastSquares<M>, leastMahalanobis<M>, nullptr, fuseFeatures<M>};
+constexpr MeanType commonType(std::string_view name) {
+  return meanType<M>(name, experiments::info<M>().name);
 }
 
 constexpr std::array types{
-    metricType<Eigen::Vector3d>("R3"),
-    metricType<SO3d>("SO3"),
-    metricType<S2d>("S2"),
-    metricType<Frame3d>("Frame3"),
-    metricType<SemiOrientedFrame3d>("SemiOrientedFrame3"),
-    metricType<NonOrientedFrame3d>("NonOrientedFrame3"),
-    MeanType{"SE3", nullptr, leastMahalanobis<SE3d>, barycentre<SE3d>, fuseFeatures<SE3d>},
+    commonType<Eigen::Vector3d>("R3"),
+    commonType<SO3d>("SO3"),
+    commonType<S2d>("S2"),
+    commonType<Frame3d>("Frame3"),
+    commonType<SemiOrientedFrame3d>("SemiOrientedFrame3"),
+    commonType<NonOrientedFrame3d>("NonOrientedFrame3"),
+    commonType<SE3d>("SE3"),
 };
 
 }  // namespace

@@ -1,12 +1,12 @@
 // Means of extended poses: rotation, position and velocity.
-#include <python/src/mean_of.hpp>
+#include <python/src/split_of.hpp>
 
 #include <lie/se23.hpp>
 
 namespace liestat::python {
 
 const MeanType* extendedPoseMeans(std::string_view name) {
-  static constexpr MeanType type{"SE23", nullptr, leastMahalanobis<SE23d>, barycentre<SE23d>, fuseFeatures<SE23d>};
+  static constexpr MeanType type = meanType<SE23d>("SE23", "se23");
   return name == type.name ? &type : nullptr;
 }
 

@@ -1,5 +1,5 @@
 // Means of rigid motions of the plane.
-#include <python/src/mean_of.hpp>
+#include <python/src/split_of.hpp>
 
 #include <lie/frame2.hpp>
 #include <lie/se2.hpp>
@@ -7,7 +7,7 @@
 namespace liestat::python {
 
 const MeanType* planarMeans(std::string_view name) {
-  static constexpr MeanType type{"SE2", nullptr, leastMahalanobis<SE2d>, barycentre<SE2d>, fuseFeatures<SE2d>};
+  static constexpr MeanType type = meanType<SE2d>("SE2", "se2");
   return name == type.name ? &type : nullptr;
 }
 

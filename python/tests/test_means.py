@@ -119,7 +119,7 @@ class Means(unittest.TestCase):
             result.confidence_region()
         with self.assertWarns(UserWarning):
             few = liestat.mean(SO3.identity(2))
-        self.assertEqual(few.status, "too_few")
+        self.assertEqual(few.status, "not_applicable")
         with self.assertWarnsRegex(UserWarning, "there are no features"):
             empty = liestat.mean(SO3.identity((0,)))
         self.assertEqual((empty.n, empty.status), (0, "too_few"))

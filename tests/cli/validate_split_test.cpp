@@ -45,13 +45,13 @@ struct StoppedSplits {
     settings.split.splits = 20;
   }
   ~StoppedSplits() { start(0); }
-  SplitResult run(std::size_t splits) {
+  SplitSummary run(std::size_t splits) {
     settings.split.splits = splits;
     start(splits);
     return splitMeasurements(measurements, settings);
   }
   /// An interrupt comes after so many splits of both kinds.
-  SplitResult stoppedAfter(std::size_t count) {
+  SplitSummary stoppedAfter(std::size_t count) {
     settings.split.splits = 20;
     start(20);
     std::size_t done = 0;
@@ -62,14 +62,8 @@ struct StoppedSplits {
     run.stop = false, run.done = 0, run.planned = 2 * splits;
   }
   /// The lines on the terminal, as they are now.
-  std::string textOf(const SplitResult& result) const {
-    FileSplit split;
-    split.feature = measurements.feature;
-    split.criterion = measurements.criterion;
-    split.settings = settings.split;
-    split.result = result;
-    split.random = result.random;
-    split.by_blocks = result.by_blocks;
+  static std::string textOf(const SplitSummary& result) {
+    const FileSplit split{result, "f.csv", "", {}};
     return formatSplit(split);
   }
 };
@@ -80,8 +74,8 @@ std::vector<double> firstOf(const std::vector<double>& list, std::size_t n) {
 
 TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
   StoppedSplits splits;
-  const SplitResult whole = splits.run(20), seven = splits.run(7);
-  const SplitResult early = splits.stoppedAfter(7);
+  const SplitSummary whole = splits.run(20), seven = splits.run(7);
+  const SplitSummary early = splits.stoppedAfter(7);
   EXPECT_EQ(experiments::trials_of_run.done, 7U);
   EXPECT_EQ(early.random.distances, firstOf(whole.random.distances, 7));
   EXPECT_EQ(early.random.effective_dof, seven.random.effective_dof);
@@ -93,7 +87,7 @@ TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
   EXPECT_NE(text.find("\nINTERRUPTED: 7 of 40 splits were done, none of them by blocks of time,"), std::string::npos)
       << text;
 
-  const SplitResult late = splits.stoppedAfter(27);
+  const SplitSummary late = splits.stoppedAfter(27);
   EXPECT_EQ(late.random.distances, whole.random.distances);
   EXPECT_EQ(late.random.effective_dof, whole.random.effective_dof);
   EXPECT_EQ(late.by_blocks.distances, firstOf(whole.by_blocks.distances, 7));
@@ -101,7 +95,7 @@ TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
   EXPECT_NE(splits.textOf(late).find("\nINTERRUPTED: 27 of 40 splits were done. Halves"), std::string::npos);
 
   // One that comes after the last split interrupts nothing.
-  const SplitResult ended = splits.stoppedAfter(40);
+  const SplitSummary ended = splits.stoppedAfter(40);
   EXPECT_EQ(ended.by_blocks.distances, whole.by_blocks.distances);
   EXPECT_NE(splits.textOf(ended).find("\nPASSED: "), std::string::npos);
 }

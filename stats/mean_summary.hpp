@@ -1,0 +1,182 @@
+// A mean of features of any type with all that is known about it: what `liestat mean` and Python's liestat.mean show.
+// summarizedMean() of stats/summarized_mean.hpp makes it. Needs Eigen alone.
+#pragma once
+
+#include <lie/concepts.hpp>
+#include <stats/feature_value.hpp>
+#include <stats/maha_types.hpp>
+#include <stats/status.hpp>
+#include <stats/time_blocks_types.hpp>
+#include <stats/uniqueness_types.hpp>
+#include <stats/verdict.hpp>
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+
+/// The criterion of a mean: least squares, weighted least squares, least Mahalanobis distances; the barycentre is a Lie
+/// group's.
+enum class Criterion { lsq, wlsq, maha, barycentre };
+
+/// The name in options and fields.
+inline std::string name(Criterion criterion) {
+  switch (criterion) {
+    case Criterion::lsq:
+      return "lsq";
+    case Criterion::wlsq:
+      return "wlsq";
+    case Criterion::maha:
+      return "maha";
+    case Criterion::barycentre:
+      return "barycentre";
+  }
+  return "unknown";
+}
+
+/// The name in options and fields.
+constexpr const char* name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
+
+/// Another feature that the measurements do not exclude, and by how many standard deviations it is the worse.
+struct NearRival {
+  FeatureValue feature;
+  double z = 0;
+};
+
+template <class V>
+void describe(V& v, const NearRival& x) {
+  describe(v, x.feature);
+  v("z", x.z, "by so many standard deviations it is the worse");
+}
+
+/// The measurement farthest from the mean in one part of the tangent vector.
+struct FarthestMeasurement {
+  TangentPart part = TangentPart::point;
+  double distance = 0;                   ///< rad, m or m/s
+  std::size_t index = 0;                 ///< among the measurements
+  std::optional<std::size_t> line = {};  ///< of the file that they come from
+  /// In the unit that people read.
+  double shown() const { return unitOf(part).scale * distance; }
+};
+
+template <class V>
+void describe(V& v, const FarthestMeasurement& x) {
+  v("part", name(x.part))("distance", x.shown())("unit", unitOf(x.part).name);
+  if (x.line) {
+    v("line", *x.line, "of the file");
+  } else {
+    v("index", x.index, "among the measurements");
+  }
+}
+
+/// A mean with its certificates and its covariance, whatever the type. Matrices are empty where there are none.
+struct MeanSummary {
+  std::string feature = {};  ///< the type's name
+  std::span<const TangentBlock> parts = {};
+  bool group = false;  ///< the type has no invariant metric (SE3)
+  Criterion criterion = Criterion::lsq;
+  /// The frame of the measurements' covariances; nothing where it does not matter, or none are used.
+  std::optional<CovarianceAt> covariance_at = {};
+  bool likelihood = false, weighted = false;
+  bool known_noise = false;  ///< the covariance follows from that of the measurements (χ²), not from residuals
+
+  FeatureValue mean;
+  std::size_t n = 0;  ///< measurements that count: those of weight zero do not
+  /// The status of the mean with its covariance: not_applicable if there is a mean but no covariance can be computed.
+  Status status = Status::ok;
+  std::string reason = {};  ///< in words, where status is not ok
+  bool converged = false;
+  int iterations = 0;
+  double residual = 0;  ///< norm of the last step
+  double tolerance = 0, cost = 0;
+
+  Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
+  Status covariance_status = Status::ok;
+  Eigen::MatrixXd dispersion;                                     ///< the measurements' covariance about the mean
+  std::vector<FarthestMeasurement> farthest = {};                 ///< one for each part of the tangent vector
+  std::optional<Eigen::Matrix<double, 3, 2>> tangent_basis = {};  ///< directions: the axes of the coordinates
+
+  Uniqueness unique = Uniqueness::not_certified;
+  std::string proof = {};  ///< in words
+  std::vector<FeatureValue> rivals = {};
+  bool more_rivals = false;  ///< these are not all
+  double r_star = 0;
+  std::size_t cells = 0;
+  std::vector<NearRival> near_ties = {};
+  double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
+  /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
+  double hessian_change = 0;
+
+  /// Sum of the measurements' squared Mahalanobis distances, where their noise is known, and what is expected.
+  double fit = 0;
+  double fit_dof = 0;  ///< 0: there is none
+  double fit_p = 1;    ///< probability of so large a sum
+
+  std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
+  std::vector<std::string> notes = {};         ///< what is remarkable, in sentences
+
+  bool hasCovariance() const { return covariance.size() > 0; }
+  /// A covariance from the residuals.
+  bool fromResiduals() const { return hasCovariance() && !known_noise; }
+  /// There is a mean that may be used, with or without a covariance.
+  bool trusted() const { return status == Status::ok || status == Status::not_applicable; }
+
+  /// "unique: branch and bound, 232 cells" and so on.
+  std::string uniquenessInWords() const {
+    std::string text = std::string(unique == Uniqueness::not_certified ? "not certified" : name(unique)) + ": ";
+    text += !proof.empty() ? proof : cells > 0 ? "branch and bound did not finish" : "no certificate holds";
+    return cells > 0 ? text + ", " + std::to_string(cells) + " cells" : text;
+  }
+  /// Whether the mean may be used.
+  Verdict verdict() const {
+    if (trusted()) return Verdict::yes("The mean is " + uniquenessInWords() + ".");
+    return Verdict::no(std::string("Not to be trusted (") + name(status) + "): " + reason + ".");
+  }
+};
+
+/// All that is known about a mean. Status `not_applicable` and no covariance: there is a mean, but no covariance of it
+/// can be computed.
+template <class V>
+void describe(V& v, const MeanSummary& m) {
+  const auto where = [](bool there, auto value) { return there ? std::optional(std::move(value)) : std::nullopt; };
+  const bool has = m.hasCovariance(), fits = m.fit_dof > 0;
+  v("feature", m.feature, "the type of the measurements")("criterion", name(m.criterion));
+  v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
+    "frame of the measurements' covariances; null where it does not matter");
+  v("likelihood", m.likelihood, "whether the volume element is in the criterion");
+  v("weighted", m.weighted)("n", m.n, "measurements that count");
+  v("status", name(m.status))("reason", where(m.status != Status::ok, m.reason), "in words, where status is not ok");
+  v("converged", m.converged)("iterations", m.iterations)("residual", m.residual, "norm of the last step");
+  v("tolerance", m.tolerance)("mean", m.mean);
+  v("covariance", where(has, m.covariance), "of the mean, in its own axes; null where it is withheld");
+  v("covariance_status", name(m.covariance_status));
+  describe(v, covarianceWords(m.parts, m.group));
+  if (m.tangent_basis) v("tangent_basis", *m.tangent_basis, "axes of the covariance of a direction");
+  v("covariance_from", where(has, std::string(m.known_noise ? "noise" : "residuals")));
+  v("covariance_law", where(has, std::string(m.known_noise ? "chi2" : "hotelling")), "of squared distances");
+  v("standard_deviations", partDeviations(m.parts, m.covariance), "along the axes of the mean");
+  v("standard_deviations_world", worldDeviations(m.parts, m.mean, m.covariance), "along the axes of the world");
+  v("dispersion", where(m.dispersion.size() > 0, m.dispersion), "the measurements' covariance about the mean");
+  v("dispersion_standard_deviations_world", worldDeviations(m.parts, m.mean, m.dispersion));
+  v("dispersion_standard_deviations", partDeviations(m.parts, m.dispersion));
+  v("farthest", m.farthest, "the farthest measurement in each part of the tangent vector");
+  v("unique", name(m.unique), "unique, ambiguous or not_certified")("proof", m.uniquenessInWords());
+  v("rivals", m.rivals, "other features of equal cost")("rivals_complete", !m.more_rivals);
+  v("r_star", m.r_star, "radius in which the criterion is convex and has no other minimum", "rad");
+  v("cells", m.cells, "of the global search; 0: it was not needed");
+  v("near_ties", m.near_ties, "other minima that the measurements do not exclude");
+  v("cut_locus_mass", m.cut_locus_mass, "fraction of the measurements near the cut locus of the mean");
+  v("hessian_change", m.hessian_change, "relative decrease of the Hessian averaged over the confidence region");
+  v("fit", where(fits, m.fit), "sum of the squared Mahalanobis distances")("fit_dof", where(fits, m.fit_dof));
+  v("fit_p", where(fits, m.fit_p), "probability of so large a sum");
+  v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent");
+  v("notes", m.notes, "what is remarkable, in sentences");
+}
+
+}  // namespace liestat

@@ -1,0 +1,194 @@
+// Options and results of stats/split_validation.hpp that are the same for all types, and their verdict (needs
+// Boost.Math).
+#pragma once
+
+#include <stats/feature_value.hpp>
+#include <stats/laws.hpp>
+#include <stats/mean_summary.hpp>
+#include <stats/verdict.hpp>
+#include <stats/words.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace liestat {
+
+/// Options of validateBySplitting() and of the functions that call it.
+struct SplitOptions {
+  std::size_t splits = 200;
+  std::size_t blocks = 10;  ///< of time; even, for half of them make a half
+  std::uint64_t seed = 1;
+  std::function<void()> advance = [] {};  ///< called twice a split, on any thread
+};
+
+/// Many splits of one kind.
+struct SplitSeries {
+  std::vector<double> distances;  ///< squared, as χ² of the same rank; NaN where an estimate failed
+  double index = 0;               ///< their mean
+  double dof = 0;                 ///< what is expected of it
+  /// The index times this over `dof` follows χ² of so many degrees of freedom: the splits share their measurements, so
+  /// they tell no more than the blocks (or measurements) that were dealt out.
+  double effective_dof = 0;
+  std::size_t failures = 0;
+
+  double factor() const { return index / dof; }
+  /// Of the index, if the covariances are true.
+  double standardError() const { return dof * std::sqrt(2 / effective_dof); }
+  /// Probability of so large an index.
+  double pValue() const { return chiSquaredSurvival(factor() * effective_dof, effective_dof); }
+  /// Ends of the confidence interval of the factor.
+  double factorLow(double confidence = 0.95) const {
+    return factor() * effective_dof / chiSquaredThreshold((1 - confidence) / 2, effective_dof);
+  }
+  double factorHigh(double confidence = 0.95) const {
+    return factor() * effective_dof / chiSquaredQuantile((1 - confidence) / 2, effective_dof);
+  }
+};
+
+/// Several objects measured at the same times: the indices averaged, their degrees of freedom added.
+inline SplitSeries pooled(const std::vector<SplitSeries>& series) {
+  SplitSeries pool;
+  double inverse = 0;
+  const auto count = static_cast<double>(series.size());
+  for (const SplitSeries& s : series) {
+    pool.distances.insert(pool.distances.end(), s.distances.begin(), s.distances.end());
+    pool.index += s.index / count;
+    pool.failures += s.failures;
+    pool.dof = s.dof;
+    inverse += 1 / (s.effective_dof * count * count);
+  }
+  pool.effective_dof = 1 / inverse;
+  return pool;
+}
+
+/// The fewest measurements that can be split.
+inline std::size_t fewestMeasurements(int dof, bool known_noise, const SplitOptions& options) {
+  return std::max(options.blocks, known_noise ? std::size_t{2} : 2 * (static_cast<std::size_t>(dof) + 1));
+}
+
+/// A split fails when the blocks' index is too large by chance with less than this probability.
+inline constexpr double split_false_alarm = 1e-5;
+
+template <class V>
+void describe(V& v, const SplitSeries& s) {
+  v("splits", s.distances.size())("failures", s.failures, "splits without an estimate, which are left out");
+  v("index", s.index, "mean squared distance of the halves")("index_expected", s.dof)("index_se", s.standardError());
+  v("effective_dof", s.effective_dof, "degrees of freedom of the index")("p", s.pValue());
+  v("factor", s.factor(), "index over what is expected")("factor_low", s.factorLow())("factor_high", s.factorHigh());
+}
+
+/// A validation by splits, whatever the measurements are: of one object, or of several pooled.
+struct SplitOutcome {
+  std::string feature = {};  ///< the type's name
+  int dof = 0;
+  bool known_noise = true;  ///< covariances follow from those of the measurements, not from residuals
+  SplitOptions settings = {};
+  std::size_t objects = 1;  ///< each was to be split so often
+  SplitSeries random, by_blocks;
+
+  std::size_t planned() const { return 2 * settings.splits * objects; }
+  std::size_t done() const { return random.distances.size() + by_blocks.distances.size(); }
+  bool interrupted() const { return done() < planned(); }
+  /// Not after an interrupt.
+  bool passed() const { return !interrupted() && !(by_blocks.pValue() < split_false_alarm); }
+
+  /// Whether halves made of blocks of time agree as well as the covariances say. No verdict after an interrupt.
+  Verdict verdict() const {
+    const std::string factor = significant(by_blocks.factor(), 3);
+    std::vector<std::string> causes;
+    const bool random_fails = random.pValue() < split_false_alarm;
+    if (random_fails) {
+      causes.push_back("Already at random the halves differ by " + significant(random.factor(), 3) +
+                       " times the expected squared distance: the measurements scatter more than their covariances "
+                       "say.");
+    }
+    if (interrupted()) {
+      std::string text =
+          "INTERRUPTED: " + std::to_string(done()) + " of " + std::to_string(planned()) + " splits were done";
+      text += by_blocks.distances.empty() ? ", none of them by blocks of time, from which the verdict comes."
+                                          : ". Halves made of blocks of time differ by " + factor +
+                                                " times the expected squared distance so far.";
+      return Verdict::none(std::move(text), std::move(causes));
+    }
+    const std::string range =
+        "95 %: " + significant(by_blocks.factorLow(), 3) + " to " + significant(by_blocks.factorHigh(), 3);
+    if (passed()) {
+      Verdict verdict =
+          Verdict::yes("PASSED: halves made of blocks of time agree as well as their covariances say (factor " +
+                       factor + ", " + range + "). Nothing speaks against independent errors.");
+      verdict.causes = std::move(causes);
+      return verdict;
+    }
+    return Verdict::no(
+        "FAILED: halves made of blocks of time differ by " + factor + " times the expected squared distance" +
+            (random_fails ? "" : ", which halves at random do not show") +
+            ". The errors of successive measurements are not independent: multiply the covariance of the mean by " +
+            factor + " (" + range + "), its standard deviations by " + significant(std::sqrt(by_blocks.factor()), 3) +
+            "; by more if the errors hold on for longer than a block.",
+        std::move(causes));
+  }
+};
+
+template <class V>
+void describe(V& v, const SplitOutcome& o) {
+  v("feature", o.feature)("dof", o.dof)("known_noise", o.known_noise);
+  v("splits", o.settings.splits, "of each kind")("blocks", o.settings.blocks, "of time");
+  v("random", o.random)("by_blocks", o.by_blocks);
+  v("inflation", o.by_blocks.factor(), "by which the covariance of the mean is too small");
+  v("inflation_low", o.by_blocks.factorLow())("inflation_high", o.by_blocks.factorHigh());
+  v("false_alarm", split_false_alarm, "probability that independent errors fail");
+  v("passed", o.passed());
+  if (o.interrupted()) v("interrupted", true)("trials_done", o.done())("trials_planned", o.planned());
+}
+
+/// The mean of a part of the measurements, whatever their type.
+struct SplitHalf {
+  std::size_t n = 0;
+  std::span<const TangentBlock> parts = {};
+  FeatureValue mean = {};
+  Eigen::MatrixXd covariance = {};  ///< empty if there is none
+};
+
+template <class V>
+void describe(V& v, const SplitHalf& h) {
+  v("n", h.n)("mean", h.mean);
+  v("covariance", h.covariance.size() > 0 ? std::optional(h.covariance) : std::nullopt);
+  v("standard_deviations", partDeviations(h.parts, h.covariance));
+}
+
+/// A SplitValidation of measurements of any type: splitMean() of stats/summarized_mean_splits.hpp.
+struct SplitSummary : SplitOutcome {
+  std::size_t n = 0;
+  std::span<const TangentBlock> parts = {};
+  bool group = false;  ///< the type has no invariant metric (SE3)
+  Criterion criterion = Criterion::maha;
+  std::optional<CovarianceAt> covariance_at = {};  ///< nothing where it does not matter
+  SplitHalf first, second;                         ///< in time
+  SplitHalf merged;                                ///< both fused
+  double squared_distance = 0;                     ///< of the halves in time
+  double p_value = 0;
+  std::string law;  ///< chi2 or hotelling
+};
+
+template <class V>
+void describe(V& v, const SplitSummary& s) {
+  describe(v, static_cast<const SplitOutcome&>(s));
+  v("n", s.n)("criterion", name(s.criterion));
+  v("covariance_at",
+    s.covariance_at ? std::optional(std::string(name(*s.covariance_at))) : std::optional<std::string>());
+  describe(v, covarianceWords(s.parts, s.group));
+  v("first", s.first, "the first half in time")("second", s.second)("merged", s.merged, "both halves fused");
+  v("squared_distance", s.squared_distance, "of the halves in time")("law", s.law)("p", s.p_value);
+}
+
+}  // namespace liestat

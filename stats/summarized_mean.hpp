@@ -1,0 +1,230 @@
+// summarizedMean: the mean of features by any criterion, certified, as a result that is the same for all types. The
+// program and Python's module compute their means by it. Needs Eigen alone.
+//
+//   const MeanInput<SO3d> input{.features = rotations};
+//   const MeanSummary mean = summarizedMean(SerialExecutor{}, input);
+#pragma once
+
+#include <lie/s2.hpp>
+#include <stats/certified_group_mean.hpp>
+#include <stats/certified_maha.hpp>
+#include <stats/certified_mean.hpp>
+#include <stats/concentration.hpp>
+#include <stats/covariance.hpp>
+#include <stats/detail/any_executor.hpp>
+#include <stats/dispersion.hpp>
+#include <stats/mean_summary.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace liestat {
+
+/// Measurements of one type, and how they are averaged. The lists must outlive the call.
+template <Homogeneous M>
+struct MeanInput {
+  Criterion criterion = Metric<M> ? Criterion::lsq : Criterion::barycentre;
+  std::span<const M> features = {};
+  std::span<const double> weights = {};  ///< one for each feature, or none; not for maha
+  /// Covariances of the features' errors, one for each feature or a single one, as in CertifiedMeanOptions and maha();
+  /// none: the covariance of the mean comes from the residuals.
+  std::vector<SquareOf<M>> covariances = {};
+  CovarianceAt covariance_at = CovarianceAt::measured;  ///< frame of the covariances, for maha
+  bool likelihood = false;                              ///< maha: with the volume element
+
+  bool weighted() const {
+    return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
+  }
+  /// The features with their covariances.
+  std::vector<Gaussian<M>> gaussians() const {
+    std::vector<Gaussian<M>> list;
+    list.reserve(features.size());
+    for (const M& x : features) list.push_back({x, covariances[covariances.size() == 1 ? 0 : list.size()]});
+    return list;
+  }
+};
+
+/// Options of summarizedMean().
+struct MeanSummaryOptions {
+  /// The budget is that of the search; for maha, which cannot certify, a tenth of the default at most.
+  UniquenessOptions uniqueness = {};
+  /// False: the iteration and its covariance alone, without a search for other minima; a tenth of the time for a million
+  /// features. The farthest measurements are not looked for either.
+  bool certificates = true;
+};
+
+/// Both models of covariances of the type's errors, in the frames of the measurements and in that of the mean, differ.
+template <Homogeneous M>
+constexpr bool covarianceFrameMatters() {
+  return Metric<M> && ManifoldTraits<M>::Group::DoF == ManifoldTraits<M>::DoF && tangentPartsOf<M>().size() > 1;
+}
+
+namespace detail {
+
+/// The fields of every estimate: its iteration.
+template <class Iteration>
+void setIteration(MeanSummary& mean, const Iteration& iteration) {
+  mean.n = iteration.n;
+  mean.mean = featureValue(iteration.mean);
+  mean.converged = converged(iteration.status);
+  mean.iterations = iteration.iterations;
+  mean.residual = static_cast<double>(iteration.residual);
+  mean.tolerance = static_cast<double>(iteration.tolerance);
+  if constexpr (requires { iteration.cost; }) mean.cost = static_cast<double>(iteration.cost);
+}
+
+/// The status of the mean with its covariance. Too few measurements for a covariance from residuals have a mean all the
+/// same, and that is the answer.
+inline void setStatus(MeanSummary& mean, Status status, const char* reason) {
+  mean.status = status, mean.reason = reason;
+  if (status == Status::too_few && mean.n > 0) {
+    mean.status = Status::not_applicable;
+    mean.reason = "a covariance from residuals needs more measurements than the feature has dimensions";
+  }
+  mean.covariance_status = mean.status;
+}
+
+/// A certified estimate.
+template <class Iteration, class Certified>
+void setCertified(MeanSummary& mean, const Iteration& iteration, const Certified& result) {
+  setIteration(mean, iteration);
+  setStatus(mean, result.status, result.reason);
+  mean.unique = result.uniqueness.unique;
+  mean.proof = result.uniqueness.proof;
+  mean.r_star = result.uniqueness.r_star;
+  mean.cells = result.uniqueness.cells;
+  mean.more_rivals = result.uniqueness.more_rivals;
+  for (const auto& rival : result.uniqueness.rivals) mean.rivals.push_back(featureValue(rival));
+  for (const auto& tie : result.near_ties) mean.near_ties.push_back({featureValue(tie.feature), tie.z});
+  mean.cut_locus_mass = result.cut_locus.mass;
+  mean.hessian_change = result.hessian_change;
+  if (result.estimate) mean.covariance = result.estimate->covariance.template cast<double>();
+}
+
+/// An estimate without certificates: the iteration, and its covariance where the features show a mean at all.
+template <Homogeneous M, class Iteration>
+void setUncertified(MeanSummary& mean, const Iteration& iteration, const SquareOf<M>& covariance, bool concentrated) {
+  setIteration(mean, iteration);
+  const bool few = !mean.known_noise && iteration.n <= static_cast<std::size_t>(ManifoldTraits<M>::DoF);
+  if (iteration.n == 0) return setStatus(mean, Status::too_few, "there are no features");
+  if (!converged(iteration.status)) return setStatus(mean, iteration.status, not_converged_reason);
+  if (few) return setStatus(mean, Status::too_few, too_few_reason);
+  if (!concentrated) return setStatus(mean, Status::ill_defined, scattered_reason);
+  if (!covariance.allFinite()) return setStatus(mean, Status::ill_defined, hessian_reason);
+  setStatus(mean, Status::ok, "");
+  mean.covariance = covariance.template cast<double>();
+}
+
+template <Homogeneous M>
+void setDispersion(MeanSummary& mean, const MeanInput<M>& input, const M& y) {
+  if (mean.n == 0) return;
+  const Dispersion<M> dispersion =
+      input.weights.empty() ? dispersionAbout(input.features, y) : dispersionAbout(input.features, input.weights, y);
+  mean.dispersion = dispersion.covariance.template cast<double>();
+  for (const FarthestFeature& f : dispersion.farthest) {
+    mean.farthest.push_back({f.block.part, f.distance, f.index});
+  }
+}
+
+template <Metric M, Executor E>
+void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
+                     const MeanSummaryOptions& options) {
+  const bool ones = input.weights.empty();
+  if (options.certificates) {
+    CertifiedMeanOptions<M> how;
+    how.uniqueness = options.uniqueness;
+    how.known_noise = input.covariances;
+    const CertifiedMean<M> result = ones ? certifiedMean(executor, input.features, how)
+                                         : certifiedMean(executor, input.features, input.weights, how);
+    setCertified(mean, result.mean, result);
+    return setDispersion(mean, input, result.mean.mean);
+  }
+  // Ones in place of no weights, so that the compiled estimator serves.
+  const MeanResult<M> result =
+      ones ? frechetMean<M>(executor, asSamples(input.features), detail::ones(input.features.size()), {})
+           : liestat::mean(executor, input.features, input.weights);
+  const SquareOf<M> covariance = !mean.known_noise ? covarianceFromResiduals(result)
+                                 : ones            ? covarianceFromNoise(result, input.covariances)
+                                                   : covarianceFromNoise(result, input.weights, input.covariances);
+  const Concentration found =
+      ones ? concentration(input.features, result.mean) : concentration(input.features, input.weights, result.mean);
+  setUncertified<M>(mean, result, covariance, found.concentrated);
+  if (result.n > 0) mean.dispersion = result.dispersion().template cast<double>();
+}
+
+template <LieGroup G, Executor E>
+void setBarycentre(MeanSummary& mean, const E& executor, const MeanInput<G>& input, const MeanSummaryOptions& options) {
+  const bool ones = input.weights.empty();
+  if (options.certificates) {
+    CertifiedGroupMeanOptions how;
+    how.uniqueness = options.uniqueness;
+    const CertifiedGroupMean<G> result = ones ? certifiedGroupMean(executor, input.features, how)
+                                              : certifiedGroupMean(executor, input.features, input.weights, how);
+    setCertified(mean, result.mean, result);
+    return setDispersion(mean, input, result.mean.mean);
+  }
+  const GroupMeanResult<G> result =
+      ones ? groupMean(executor, input.features) : groupMean(executor, input.features, input.weights);
+  setUncertified<G>(mean, result, result.covarianceFromResiduals(), result.concentration.concentrated);
+  setDispersion(mean, input, result.mean);
+}
+
+template <Homogeneous M, Executor E>
+void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
+                    const MeanSummaryOptions& options) {
+  const std::vector<Gaussian<M>> samples = input.gaussians();
+  if (options.certificates) {
+    CertifiedMahaOptions<M> how;
+    const std::size_t most = how.uniqueness.budget;
+    how.maha.likelihood = input.likelihood;
+    how.uniqueness = options.uniqueness;
+    how.uniqueness.budget = std::min(options.uniqueness.budget, most);
+    const CertifiedMaha<M> result = certifiedMaha(executor, samples, input.covariance_at, how);
+    mean.fit = result.fit;
+    mean.fit_dof = result.fit_dof;
+    setCertified(mean, result.maha, result);
+    return setDispersion(mean, input, result.maha.mean);
+  }
+  MahaOptions<M> how;
+  how.likelihood = input.likelihood;
+  const MahaResult<M> result = maha(executor, samples, input.covariance_at, how);
+  setUncertified<M>(mean, result, result.covariance, showAMean<M>(samples, result.mean));
+  setDispersion(mean, input, result.mean);
+}
+
+}  // namespace detail
+
+/// The mean of the measurements by their criterion, with its covariance if that can be trusted, its certificates and the
+/// dispersion; `feature`, notes and time_blocks are left to the caller (stats/mean_notes.hpp, stats/time_blocks.hpp). A
+/// criterion that the type does not have (barycentre of a type with a metric, lsq without) is taken for the one that it
+/// has. The result has the same bits on any executor.
+template <Homogeneous M, Executor E>
+MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const MeanSummaryOptions& options = {}) {
+  decltype(auto) any = detail::erased(executor);
+  MeanSummary mean;
+  mean.parts = tangentPartsOf<M>();
+  mean.group = !Metric<M>;
+  mean.criterion = input.criterion;
+  mean.likelihood = input.likelihood;
+  mean.weighted = input.weighted();
+  mean.known_noise = !input.covariances.empty();
+  if (mean.known_noise && covarianceFrameMatters<M>()) mean.covariance_at = input.covariance_at;
+  if (input.criterion == Criterion::maha) {
+    detail::setMahalanobis(mean, any, input, options);
+  } else if constexpr (Metric<M>) {
+    detail::setLeastSquares(mean, any, input, options);
+  } else {
+    detail::setBarycentre(mean, any, input, options);
+  }
+  if constexpr (std::is_same_v<M, S2<ScalarOf<M>>>) {
+    const M y = featureOf<M>(mean.mean);
+    mean.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>().template cast<double>();
+  }
+  return mean;
+}
+
+}  // namespace liestat
