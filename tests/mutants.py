@@ -2,6 +2,7 @@
 """The steps of tests/mutants.sh: plants the faults of mutants.txt, builds once, runs, and says what found them."""
 
 import argparse
+import contextlib
 import csv
 import hashlib
 import json
@@ -194,7 +195,8 @@ class Test:
 
             def kill():
                 expired.set()
-                os.killpg(process.pid, signal.SIGKILL)
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
 
             timer = threading.Timer(timeout, kill)
             timer.start()
@@ -406,10 +408,10 @@ def report(args, out, tests, mutants, results):
 def main():
     parser = argparse.ArgumentParser(prog="tests/mutants.sh", description=__doc__)
     parser.add_argument("--only", default="", metavar="REGEX", help="faults whose file, kind or text match")
-    parser.add_argument("--tests", default="", metavar="REGEX", help="test programs to build and run (lie/, stats/mean)")
+    parser.add_argument("--tests", default="", metavar="REGEX", help="test programs to build and run (lie/)")
     parser.add_argument("--jobs", type=int, default=1, help="compilers and tests at a time (1)")
     parser.add_argument("--first", action="store_true",
-                        help="leave a fault as soon as a test has found it: what nothing finds, in a fraction of the time")
+                        help="leave a fault as soon as a test has found it: what nothing finds, in a part of the time")
     parser.add_argument("--compiler", help="clang++ if there is one")
     parser.add_argument("--syntax", metavar="REGEX", help="only compile the units whose paths match, without code")
     parser.add_argument("--report", action="store_true", help="only write the report of what has run")

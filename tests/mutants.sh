@@ -7,7 +7,7 @@
 #   tests/mutants.sh --check            every entry of mutants.txt matches its file once; takes seconds, needs awk alone
 #   tests/mutants.sh --help             the other options (mutants.py; Python 3.9 or later, nothing besides)
 #
-# Results are in build/mutants/: results.jsonl (each run), matrix.csv (fault by test), report.md (docs/design.md has the last).
+# Results are in build/mutants/: results.jsonl (each run), matrix.csv (fault by test), report.md (for docs/design.md).
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
