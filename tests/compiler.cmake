@@ -25,7 +25,7 @@ if(liestat_test_compiler)
     set(liestat_test_options -Wno-unknown-warning-option -Wno-gnu-zero-variadic-macro-arguments)
     execute_process(COMMAND ${liestat_test_compiler_path} --version OUTPUT_VARIABLE version ERROR_QUIET)
     if(version MATCHES "clang version ([0-9]+)")
-      # Most of clang's time for a test is optimisation, most of g++'s is not.
+      # More than half of its time for a test at -O1 is optimisation.
       set(liestat_clang_compiles_tests TRUE)
       list(APPEND liestat_test_options -fpch-instantiate-templates)
       # Later versions write the constraints of a template into its name, and g++ 14 does not write the same.
