@@ -6,6 +6,9 @@ set(LIESTAT_TEST_COMPILER "" CACHE STRING "Compiler of the tests; empty: clang++
 set(liestat_test_launcher)
 set(liestat_test_options)
 set(liestat_clang_compiles_tests FALSE)
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  set(liestat_clang_compiles_tests TRUE)
+endif()
 set(liestat_test_compiler "${LIESTAT_TEST_COMPILER}")
 if(NOT liestat_test_compiler AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CROSSCOMPILING)
   set(liestat_test_compiler clang++)
@@ -19,12 +22,16 @@ if(liestat_test_compiler)
     set(liestat_test_launcher ${CMAKE_CURRENT_SOURCE_DIR}/compile_with.sh ${CMAKE_CXX_COMPILER_LAUNCHER}
                               ${liestat_test_compiler_path} --)
     # The other options are those of the project's compiler.
-    set(liestat_test_options -Wno-unknown-warning-option -Wno-gnu-zero-variadic-macro-arguments
-                             -fpch-instantiate-templates)
+    set(liestat_test_options -Wno-unknown-warning-option -Wno-gnu-zero-variadic-macro-arguments)
     execute_process(COMMAND ${liestat_test_compiler_path} --version OUTPUT_VARIABLE version ERROR_QUIET)
-    # Later versions write the constraints of a template into its name, and g++ 14 does not write the same.
-    if(version MATCHES "clang version ([0-9]+)" AND CMAKE_MATCH_1 GREATER 16)
-      list(APPEND liestat_test_options -fclang-abi-compat=16)
+    if(version MATCHES "clang version ([0-9]+)")
+      # More than half of its time for a test at -O1 is optimisation.
+      set(liestat_clang_compiles_tests TRUE)
+      list(APPEND liestat_test_options -fpch-instantiate-templates)
+      # Later versions write the constraints of a template into its name, and g++ 14 does not write the same.
+      if(CMAKE_MATCH_1 GREATER 16)
+        list(APPEND liestat_test_options -fclang-abi-compat=16)
+      endif()
     endif()
     # Asked once for each pair of compilers and their flags.
     string(TOUPPER "CMAKE_CXX_FLAGS_${CMAKE_BUILD_TYPE}" flags)
@@ -48,14 +55,10 @@ if(liestat_test_compiler)
     message(STATUS "Tests are compiled by ${own}, not ${liestat_test_compiler}: ${liestat_no_compiler}")
     set(liestat_test_launcher)
     set(liestat_test_options)
+    set(liestat_clang_compiles_tests FALSE)
   elseif(liestat_test_launcher)
     message(STATUS "Tests are compiled by ${liestat_test_compiler_path}")
   endif()
-endif()
-
-# Most of clang's time for a test is optimisation, most of g++'s is not.
-if(liestat_test_launcher MATCHES "clang" OR CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-  set(liestat_clang_compiles_tests TRUE)
 endif()
 
 # liestat_compile_as_test(TARGET): with that compiler.
