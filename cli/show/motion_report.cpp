@@ -12,6 +12,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace liestat::cli {
@@ -634,7 +636,11 @@ void writeMotionReport(const std::string& directory, const std::string& command_
                        const MotionFrameStudy& study) {
   Report report(directory, "Motion from point tracks");
   const Verdict verdict = result.verdict();
-  report.verdict(verdict.isYes(), verdict.text + ".");
+  // The page has a colour for what the terminal says in capitals.
+  constexpr std::string_view loud = "NOT TO BE TRUSTED", calm = "Not to be trusted";
+  std::string text = verdict.text + ".";
+  if (text.starts_with(loud)) text.replace(0, loud.size(), calm);
+  report.verdict(verdict.isYes(), text);
   report.code(command_line);
   report.section("Estimates");
   report.plot(estimatesPlot(result));

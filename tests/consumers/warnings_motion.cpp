@@ -3,7 +3,9 @@
 #include <fusion/motion/gyroscope.hpp>
 #include <fusion/motion/motion_filter.hpp>
 #include <fusion/motion/search.hpp>
+#include <fusion/motion/sequence.hpp>
 #include <fusion/motion/structure.hpp>
+#include <fusion/motion/study.hpp>
 #include <fusion/motion/track_pairs.hpp>
 
 #include <vector>
@@ -23,7 +25,11 @@ bool follows() {
   const MotionEstimate& motion = filter.update(pairs, gyroscopeRotation(Eigen::Vector3d::UnitX(), 0.1, 1e-3, {}));
   structure.update(tracks.tracks(), pairs, filter.inverse_depths(), motion);
   rigidity.add({});
-  return motion.ok() && SphereSearch().update(pairs).allFinite() && rigidity.spread() > 0 &&
+  MotionResult result = estimateMotion({{0, seen}, {1, seen}}, {.frames_apart = 2}, gyroscopeOfRotations({}));
+  compareWithTruth(result, {});
+  MotionWindow window;
+  if (window.has_looked_at() && !studyFrame(window, result).hasMaps()) return false;
+  return motion.ok() && result.verdict().isYes() && SphereSearch().update(pairs).allFinite() && rigidity.spread() > 0 &&
          structure.inFront().empty() && filter.essential().essential().covariance.allFinite() &&
          filter.subspace().hypotheses().empty() && translationDirection(motion).covariance.allFinite();
 }
