@@ -204,8 +204,7 @@ void setMotion(JsonObject& object, const MotionResult& result) {
   }
   object.set("frames", list);
   if (result.with_truth) {
-    object.set("median_direction_error_deg",
-               liestat::quantile(errorsOf(result, &MotionFrame::direction_error), 0.5));
+    object.set("median_direction_error_deg", liestat::quantile(errorsOf(result, &MotionFrame::direction_error), 0.5));
     object.set("median_rotation_error_deg", liestat::quantile(errorsOf(result, &MotionFrame::rotation_error), 0.5));
   }
 }
