@@ -50,8 +50,8 @@ using MeasuredPoint = Gaussian<Eigen::Vector3d>;
 
 /// The point that a rectified stereo pair sees, in the coordinates of the left camera: depth fu·b/disparity, and the
 /// two rows averaged by their variances. The covariance is the pixels', through the derivative of that (first order,
-/// which holds as long as the disparity is many of its standard deviations). Empty without pixel variances, and where the
-/// disparity is below `min_disparity` px.
+/// which holds as long as the disparity is many of its standard deviations). Empty without pixel variances, and where
+/// the disparity is below `min_disparity` px.
 inline std::optional<MeasuredPoint> triangulate(const StereoCamera& camera, const StereoObservation& observation,
                                                 double min_disparity = 1) {
   if (!camera.pixel_variance) return std::nullopt;
