@@ -70,6 +70,12 @@ struct HandEyeRow : JudgedReport {
   std::size_t right = 0;
   std::optional<bool> right_passed;  ///< whether these are all; absent elsewhere
   double lost = 0;                   ///< share of the right pairs that were taken for wrong ones
+
+  /// Whether all that was judged passes; none where nothing was.
+  std::optional<bool> answer() const {
+    if (!right_passed && !passed) return std::nullopt;
+    return right_passed.value_or(true) && passed.value_or(true);
+  }
 };
 
 /// The tally of what must be right in all trials.

@@ -62,6 +62,9 @@ struct RobustRow : JudgedReport {
   double wrong = 0;        ///< share of the outliers that it has; NaN without any
   double draws = 0;        ///< mean number of them
   std::size_t needed = 0;  ///< sampleCount() for the true number of inliers
+
+  /// No where fewer structures were found than is likely, else what the distances say.
+  std::optional<bool> answer() const { return found_passed.value_or(true) ? passed : std::optional<bool>(false); }
 };
 
 /// The thresholds that are found in the errors under the refined estimate, where noise is not known: lengths in standard

@@ -127,8 +127,8 @@ struct CalibratedPose {
   Gaussian<SE3d> pose;
   bool has_covariance = false;
   bool rotation_is_open = false;
-  /// Of the translation (m, along the parent's axes) and of the rotation vector (rad). NaN where there is no covariance,
-  /// and along axes in which an open direction has a component.
+  /// Of the translation (m, along the parent's axes) and of the rotation vector (rad). NaN where there is no
+  /// covariance, and along axes in which an open direction has a component.
   Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
   Eigen::Matrix<double, 6, 1> local_sigmas = sigmas;  ///< of the local error T·Exp(e), likewise
   /// Covariance of translation and rotation vector as above; open directions count as known.
@@ -139,8 +139,8 @@ struct CalibratedPose {
 /// X, and Y where there is one.
 std::vector<CalibratedPose> calibratedPoses(const HandEyeResult& result);
 
-/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right ones of T⁻¹: a
-/// covariance of the inverse pose is one of `left`.
+/// The error that a covariance beside a pose T may belong to. Left perturbations of T are, but for their sign, right
+/// ones of T⁻¹: a covariance of the inverse pose is one of `left`.
 enum class CovarianceReading {
   right,                      ///< T·Exp(e), translation before rotation: the library's own
   left,                       ///< Exp(e)·T, or T⁻¹·Exp(e)

@@ -1,7 +1,7 @@
 // Errors of a visual-inertial initialisation against a ground truth, and their normalised squares.
 //
-//   const liestat::ComparedRecording compared =
-//       liestat::compareWithTruth(liestat::initialiseRecording(recording, options), recording.image_times, truth, 9.81);
+//   auto found = liestat::initialiseRecording(recording, options);
+//   const auto compared = liestat::compareWithTruth(std::move(found), recording.image_times, truth, 9.81);
 //   std::puts(compared.verdict().text.c_str());
 #pragma once
 
@@ -37,9 +37,9 @@ double neesOnSphere(const Eigen::Matrix<double, N + 1, 1>& error, const Covarian
                                        Eigen::Matrix<double, N, N>(reduce * half));
 }
 
-/// Compares windows and stretches with the truth at the times of their images (s, of the recording's); `truth` ascends in
-/// time and may be empty. A window is compared where the truth is known at each of its images. `gravity`: its length in
-/// m/s², none where it was not known (then 9.81 is taken for the errors, and there is no NEES).
+/// Compares windows and stretches with the truth at the times of their images (s, of the recording's); `truth` ascends
+/// in time and may be empty. A window is compared where the truth is known at each of its images. `gravity`: its length
+/// in m/s², none where it was not known (then 9.81 is taken for the errors, and there is no NEES).
 ComparedRecording compareWithTruth(VisualInertialResult found, std::span<const double> image_times,
                                    std::span<const GroundTruth> truth, std::optional<double> gravity);
 

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # rooms.sh ROOT : rooms call public names of the library.
 #
-#   cli/, python/, experiments/, examples/, formats/ and report/ name nothing in a namespace detail and include nothing of
-#   a folder detail/
+#   cli/, python/, experiments/, examples/, formats/ and report/ name nothing in a namespace detail and include nothing
+#   of a folder detail/
 #   views (cli/show/) include results, no estimator: no header that brings definitions with it (LIESTAT_COMPILED_…), but
 #   for those of types
 #
-# What is wrong is printed with file and line, and the exit code is 1. Before that the checks are tried on planted faults.
+# What is wrong is printed with file and line, and the exit code is 1. Before that the checks are tried on planted
+# faults.
 set -eu
 
 # check ROOT: prints what is wrong, and fails if anything is.

@@ -3,9 +3,9 @@
 #include <cli/commands/validation_command.hpp>
 #include <cli/io/input_error.hpp>
 #include <cli/io/output_file.hpp>
-#include <cli/io/stereo.hpp>
 #include <cli/io/text.hpp>
 #include <cli/io/tracks.hpp>
+#include <fusion/stereo.hpp>
 #include <cli/show/json.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>

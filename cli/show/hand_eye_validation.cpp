@@ -29,11 +29,6 @@ std::string coverageCell(const HandEyeRow& row) {
   return row.report.index > 0 ? fmt::format("{:.3f}", row.report.coverage[2].observed) : "";
 }
 std::string rightCell(const HandEyeRow& row) { return fmt::format("{}/{}", row.right, row.trials); }
-std::string verdict(const HandEyeRow& row) {
-  const bool failed = !row.right_passed.value_or(true) || !row.passed.value_or(true);
-  const bool judged = row.right_passed || row.passed;
-  return verdictCell(judged ? std::optional<bool>(!failed) : std::nullopt);
-}
 
 /// One table: its rows, and how each looks.
 struct Part {
@@ -61,7 +56,7 @@ const Part parts[] = {
                indexCell(row),
                coverageCell(row),
                number(row.chi2_per_dof, 3),
-               verdict(row)};
+               verdictCell(row.answer())};
      }},
     {HandEyeExperiment::accuracy,
      true,
@@ -70,7 +65,7 @@ const Part parts[] = {
      {"noise", "n", "r", "mean", "K-S p", "verdict"},
      [](const HandEyeRow& row) -> Cells {
        return {noiseName(row),           fmt::format("{}", row.pairs),     fmt::format("{}", row.report.dof),
-               number(row.report.index), number(row.report.ks_p_value, 2), verdict(row)};
+               number(row.report.index), number(row.report.ks_p_value, 2), verdictCell(row.answer())};
      }},
     {HandEyeExperiment::motions,
      false,
@@ -85,7 +80,7 @@ const Part parts[] = {
                fmt::format("{}", row.report.dof),
                indexCell(row),
                coverageCell(row),
-               verdict(row)};
+               verdictCell(row.answer())};
      }},
     {HandEyeExperiment::outliers,
      false,
@@ -93,8 +88,8 @@ const Part parts[] = {
      "Trials in which all were found; right pairs lost, 0.1 % expected.",
      {"noise", "wrong pairs", "found", "lost %", "index", "95 %", "verdict"},
      [](const HandEyeRow& row) -> Cells {
-       return {noiseName(row), name(*row.outliers), rightCell(row), fmt::format("{:.2f}", 100 * row.lost),
-               indexCell(row), coverageCell(row),   verdict(row)};
+       return {noiseName(row), name(*row.outliers), rightCell(row),           fmt::format("{:.2f}", 100 * row.lost),
+               indexCell(row), coverageCell(row),   verdictCell(row.answer())};
      }},
     {HandEyeExperiment::formulations,
      false,

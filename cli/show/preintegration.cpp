@@ -10,7 +10,6 @@ namespace liestat::cli {
 
 namespace {
 
-
 /// Where the readings of windows without a result fail.
 std::string faultLines(const std::vector<RecordingWindow>& windows) {
   std::string text;

@@ -9,8 +9,8 @@
 
 namespace liestat::cli {
 
-/// A table, one line per window; below it where readings fail, the medians of the errors where the truth is known, and the
-/// verdict.
+/// A table, one line per window; below it where readings fail, the medians of the errors where the truth is known, and
+/// the verdict.
 std::string formatPreintegration(const RecordingWindows& result);
 
 /// The readings that were preintegrated, for the page.

@@ -40,7 +40,6 @@ const char* shortName(RobustScore score) {
 const Cells search_headers{"out %",   "score",   "found", "draws", "needed",
                            "right %", "wrong %", "index", "95 %",  "verdict"};
 Cells searchCells(const RobustRow& row) {
-  const bool failed = !row.found_passed.value_or(true);
   return {fmt::format("{:g}", 100 * row.outliers),
           shortName(row.score),
           percent(share(row.found, row.trials)),
@@ -50,7 +49,7 @@ Cells searchCells(const RobustRow& row) {
           percent(row.wrong),
           number(row.report.index, 3),
           percent(row.report.coverage[2].observed),
-          verdictCell(failed ? std::optional<bool>(false) : row.passed)};
+          verdictCell(row.answer())};
 }
 
 const Cells threshold_headers{"outliers %", "histogram %", "mean", "sd", "moments %", "median", "one in ten below"};

@@ -19,8 +19,9 @@ struct GroundTruth {
   ImuBias<double> bias;
 };
 
-/// The state at a time, between its two neighbours: linear, and along the geodesic of the rotations; the biases are those
-/// of the one before. Empty outside of the rows and where these are more than 0.1 s apart. `truth` ascends in time.
+/// The state at a time, between its two neighbours: linear, and along the geodesic of the rotations; the biases are
+/// those of the one before. Empty outside of the rows and where these are more than 0.1 s apart. `truth` ascends in
+/// time.
 inline std::optional<GroundTruth> truthAt(std::span<const GroundTruth> truth, double time) {
   constexpr double max_gap = 0.1;  // s
   const auto next =

@@ -1,5 +1,5 @@
-// Windows of a recording of an inertial sensor: the motion over each, its errors against a truth, and the verdict on the
-// covariances.
+// Windows of a recording of an inertial sensor: the motion over each, its errors against a truth, and the verdict on
+// the covariances.
 //
 //   liestat::RecordingWindowOptions options;
 //   options.integration.preintegration.noise = noise;
@@ -23,8 +23,9 @@ struct TimeInterval {
   double begin = 0, end = 0;
 };
 
-/// Whole intervals of `length` s, one after the other from `begin` (without a length one, to `end`). The last one is kept
-/// where rounding alone would take it away. Empty where none fits, more than `max_count` do, or a number is not finite.
+/// Whole intervals of `length` s, one after the other from `begin` (without a length one, to `end`). The last one is
+/// kept where rounding alone would take it away. Empty where none fits, more than `max_count` do, or a number is not
+/// finite.
 std::vector<TimeInterval> consecutiveWindows(double begin, double end, std::optional<double> length = {},
                                              double max_count = 1e6);
 

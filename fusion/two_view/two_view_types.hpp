@@ -1,5 +1,5 @@
-// The results of the estimate of a motion between two images (fusion/two_view/two_view.hpp), for units that only look at
-// them.
+// The results of the estimate of a motion between two images (fusion/two_view/two_view.hpp), for units that only look
+// at them.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -19,8 +19,8 @@
 namespace liestat {
 
 /// The physical parameters of an estimated motion, and their covariance (first order). Directions and normals are three
-/// numbers of norm one, whose covariance has rank two; rotations are rotation vectors, whose standard deviations are those
-/// of the rotation's error in the axes of the first camera, R·Exp(e).
+/// numbers of norm one, whose covariance has rank two; rotations are rotation vectors, whose standard deviations are
+/// those of the rotation's error in the axes of the first camera, R·Exp(e).
 struct PhysicalParameters {
   std::vector<std::string> names;
   std::vector<std::string> units;  ///< px, rad or none
@@ -55,11 +55,12 @@ struct TwoViewMotionResult {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
   int equations = 0;                  ///< of a match: 2, the matrix is H, or 1, it is F
-  /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of both
-  /// first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal lengths.
+  /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of
+  /// both first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal
+  /// lengths.
   std::vector<PhysicalParameters> physical;
-  /// Of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, and its covariance in
-  /// the tangent (direction, rotation).
+  /// Of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, and its covariance
+  /// in the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
 };
 
@@ -76,9 +77,9 @@ struct TwoViewImageFrame {
 
 /// The motion between two images.
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
-  /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the estimate
-  /// of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches are the
-  /// same one.
+  /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
+  /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
+  /// are the same one.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;

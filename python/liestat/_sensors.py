@@ -347,9 +347,9 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     Result
         The fields of the program's JSON: `status`, `reason` (None where ok), `model` (its name), `matrix` (H or F in
         pixels) with `matrix_covariance` (9, 9, of entries column after column), `parameters` (list; each with `names`,
-        `units`, `values`, `deviations`, `covariance`), `second_T_first` (`quaternion_xyzw`, `direction`, `covariance` of
-        the tangent (direction, rotation); x' = R x + t), `inliers` (their number), `inlier`, `squared_errors`, `lattice`
-        …; and the `threshold` on squared errors.
+        `units`, `values`, `deviations`, `covariance`), `second_T_first` (`quaternion_xyzw`, `direction`, `covariance`
+        of the tangent (direction, rotation); x' = R x + t), `inliers` (their number), `inlier`, `squared_errors`,
+        `lattice` …; and the `threshold` on squared errors.
 
     Warns
     -----
@@ -429,8 +429,8 @@ class InitialisedWindow(Result):
     """A window of a visual-inertial recording, in the body's axes at its first image.
 
     The fields of the program's JSON: `status`, `ok`, `begin`, `end` (s), `images` and `tracks` (numbers of them),
-    `solutions` and `covariance` of the closed form, `refined` (a Result, or None), with a truth `refined_error` …; and the
-    best known of the window:
+    `solutions` and `covariance` of the closed form, `refined` (a Result, or None), with a truth `refined_error` …; and
+    the best known of the window:
 
     Attributes
     ----------

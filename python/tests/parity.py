@@ -35,6 +35,17 @@ def simulate(what, *arguments):
     subprocess.run([PROGRAM, "simulate", what, *map(str, arguments)], check=True, capture_output=True)
 
 
+def truth_of(path, start_ns):
+    """EuRoC's ground truth as the module takes it: times, states, biases."""
+    with open(path, encoding="utf-8") as file:
+        rows = [line.split(",") for line in file if not line.startswith("#")]
+    times = np.array([int(row[0]) - start_ns for row in rows]) * 1e-9
+    n = np.array([[float(cell) for cell in row[1:]] for row in rows])
+    # Quaternions are normalised as the program does it, to the bit.
+    states = liestat.SE23._normalized(n[:, [4, 5, 6, 3, 0, 1, 2, 7, 8, 9]], "truth")
+    return times, states, n[:, 10:16]
+
+
 def plain(value):
     """A value of the module as JSON would have it."""
     if isinstance(value, liestat.Result):

@@ -22,12 +22,9 @@ class PreintegrateParity(parity.ParityTest):
         if not parity.PROGRAM:
             return
         parity.simulate("vi", "--output", cls.directory.name, "--overwrite", "--seed", 3, "--end", 12)
-        imu = np.loadtxt(os.path.join(cls.directory.name, "imu.csv"), delimiter=",", comments="#")
-        truth = np.loadtxt(os.path.join(cls.directory.name, "truth.csv"), delimiter=",", comments="#")
-        cls.start = imu[0, 0]
-        cls.readings = ((imu[:, 0] - cls.start) * 1e-9, imu[:, 1:4], imu[:, 4:7])
-        states = np.hstack([truth[:, [5, 6, 7, 4, 1, 2, 3]], truth[:, 8:11]])
-        cls.truth = ((truth[:, 0] - cls.start) * 1e-9, liestat.SE23(states), truth[:, 11:17])
+        imu = liestat.read_imu(os.path.join(cls.directory.name, "imu.csv"))
+        cls.readings = (imu.times, imu.rates, imu.forces)
+        cls.truth = parity.truth_of(os.path.join(cls.directory.name, "truth.csv"), imu.start_ns)
 
     def run_both(self, *options, codes=(0,), noise=NOISE, window=1.0, **keywords):
         imu = os.path.join(self.directory.name, "imu.csv")

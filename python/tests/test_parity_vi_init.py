@@ -56,11 +56,7 @@ class ViInitParity(parity.ParityTest):
         rays, sigmas = liestat.Camera(450, 450, 376, 240, width=752, height=480).bearings(tracks.pixels)
         cls.measured = (imu.times, imu.rates, imu.forces, NOISE, tracks.image_times, tracks.images, tracks.tracks)
         cls.measured += (rays, sigmas)
-        rows = np.loadtxt(files["truth"], delimiter=",", comments="#")
-        states = np.hstack([rows[:, [5, 6, 7, 4, 1, 2, 3]], rows[:, 8:11]])
-        with open(files["truth"], encoding="utf-8") as file:
-            stamps = [int(line.split(",")[0]) - imu.start_ns for line in file if not line.startswith("#")]
-        cls.truth = (np.array(stamps) * 1e-9, liestat.SE23(states), rows[:, 11:17])
+        cls.truth = parity.truth_of(files["truth"], imu.start_ns)
 
     def run_both(self, *options, codes=(0,), **keywords):
         json = parity.program(*self.arguments, *options, codes=codes)

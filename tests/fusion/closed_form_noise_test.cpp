@@ -221,8 +221,8 @@ double nees(const ClosedFormResult& result, const Scene& scene, const Eigen::Vec
   const ClosedFormSolution& s = result.solutions.at(0);
   Eigen::Matrix<double, 9, 1> error;
   error << s.velocity - scene.velocity, s.gravity - scene.gravity, s.accelerometer_bias - bias;
-  if (result.covariance.rows() == 9) return experiments::neesOnSphere<8>(error, result.covariance, s.gravity);
-  return experiments::neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), result.covariance, s.gravity);
+  if (result.covariance.rows() == 9) return liestat::neesOnSphere<8>(error, result.covariance, s.gravity);
+  return liestat::neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), result.covariance, s.gravity);
 }
 
 // Without the inertial sensor's noise, what the covariance says it contains is all there is.

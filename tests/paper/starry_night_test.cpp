@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/stereo.hpp>
+#include <cli/io/tracks.hpp>
 
 namespace liestat::cli {
 namespace {

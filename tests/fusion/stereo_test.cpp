@@ -1,4 +1,4 @@
-#include <cli/io/stereo.hpp>
+#include <fusion/stereo.hpp>
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 const StereoCamera camera{500, 510, 320, 240, 0.25, Eigen::Vector4d(1, 4, 2, 3)};
@@ -48,6 +48,9 @@ TEST(Stereo, SmallDisparitiesAreLeftOut) {
   EXPECT_TRUE(triangulate(camera, o, 0.5).has_value());
   o.uR = 321;
   EXPECT_FALSE(triangulate(camera, o).has_value());
+  StereoCamera unknown = camera;
+  unknown.pixel_variance.reset();
+  EXPECT_FALSE(triangulate(unknown, {0, 0, 320, 240, 300, 240}).has_value()) << "no noise, no covariance";
 }
 
 TEST(Stereo, BackProjectionSortsByTrackAndFrame) {
@@ -64,8 +67,8 @@ TEST(Stereo, BackProjectionSortsByTrackAndFrame) {
   };
   StereoObservation without_pose = seen(first, 2);
   without_pose.frame = 9;
-  const auto landmarks =
-      backProject({seen(second, 7), seen(first, 7), seen(second, 2), without_pose}, {first, second}, camera);
+  const auto landmarks = backProject(std::vector{seen(second, 7), seen(first, 7), seen(second, 2), without_pose},
+                                     std::vector{first, second}, camera);
   ASSERT_EQ(landmarks.size(), 2U);
   EXPECT_EQ(landmarks[0].track, 2U);
   EXPECT_EQ(landmarks[0].points.size(), 1U);
@@ -76,4 +79,4 @@ TEST(Stereo, BackProjectionSortsByTrackAndFrame) {
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat
