@@ -39,7 +39,7 @@ struct Verdict {
   bool isNone() const { return answer == Answer::none; }
   /// True, false, or nothing where there is no verdict.
   std::optional<bool> decided() const { return isNone() ? std::nullopt : std::optional<bool>(isYes()); }
-  friend bool operator==(const Verdict& v, Answer answer) { return v.answer == answer; }
+  friend bool operator==(const Verdict& v, Answer expected) { return v.answer == expected; }
 };
 
 /// The answer of several verdicts together: yes if all are yes, no if any is no.

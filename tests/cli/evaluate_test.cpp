@@ -192,16 +192,16 @@ TEST(EvaluateCommand, PageAndSeveralEstimates) {
   EXPECT_TRUE(contains(html, "<p class=\"verdict none\">–")) << html.substr(0, 6000);
   EXPECT_FALSE(contains(html, "✗"));
   EXPECT_FALSE(contains(html, "✓"));
-  const auto sign = [&](Words words) {
-    words.insert(words.begin(), {"evaluate", files.reference, files.estimate});
+  const auto sign = [&page](const Files& f, Words words) {
+    words.insert(words.begin(), {"evaluate", f.reference, f.estimate});
     words.insert(words.end(), {"--report", page});
     run(words);
     const std::string text = contentOf(page + "/index.html");
     return std::string(contains(text, "✓") ? "yes" : contains(text, "✗") ? "no" : "none");
   };
-  EXPECT_EQ(sign({"-a"}), "yes");
-  EXPECT_EQ(sign({}), "no");
-  EXPECT_EQ(sign({"-a", "--fail-if", "ape_rmse>0"}), "no");
+  EXPECT_EQ(sign(files, {"-a"}), "yes");
+  EXPECT_EQ(sign(Files(60, 0.25), {"-a"}), "no");
+  EXPECT_EQ(sign(files, {"-a", "--fail-if", "ape_rmse>0"}), "no");
 }
 
 TEST(EvaluateCommand, ScaleAloneIsJudgedBySim3) {

@@ -208,8 +208,9 @@ TEST(EvaluateTrajectory, WhatTheDataDoNotAllow) {
             EvaluationStatus::overlapping_pairs);
 }
 
-// evo: numpy.linspace(0, n - 1, count, dtype=int); a pose is kept once path or angle since the last kept one suffice.
-TEST(EvaluateTrajectory, ThinsOutAsEvo) {
+// The even spacing is evo's: numpy.linspace(0, n - 1, count, dtype=int). Path and angle are summed from pose to pose since
+// the last one that was kept; about one axis, as here, the angle is evo's.
+TEST(EvaluateTrajectory, ThinsOut) {
   const auto rows = [](std::size_t n, const EvaluationOptions& options) {
     return evaluateTrajectory(line(n), line(n), options).rows;
   };
