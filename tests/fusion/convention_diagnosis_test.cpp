@@ -351,16 +351,17 @@ TEST(CovarianceDiagnosis, VerdictsAreYesNoAndNone) {
 TEST(CovarianceDiagnosis, ChainAndPlan) {
   CounterRng rng(22);
   const TrajectoryScene scene =
-      experiments::deadReckoningScene({.n = 60, .sigma_translation = 0.01, .sigma_rotation = 0.002}, rng);
+      experiments::deadReckoningScene({.n = 200, .sigma_translation = 0.01, .sigma_rotation = 0.002}, rng);
   const DiagnosedRun run{written(scene, convention(P::right)), {}};
   const CovarianceDiagnosis chain = diagnosed(run, {.mode = DiagnosisMode::chain});
   EXPECT_FALSE(chain.diagnosis);
   EXPECT_EQ(chain.verdict().text, "identified: " + describe(convention(P::right)));
   EXPECT_EQ(chain.accepted(), std::vector{convention(P::right)});
-  // Smoothed: no convention lets it grow.
-  DiagnosedRun shrinking = run;
-  std::reverse(shrinking.poses.begin(), shrinking.poses.end());
-  const CovarianceDiagnosis none = diagnosed(shrinking, {.mode = DiagnosisMode::chain});
+  // Independent of each other: no convention lets it grow.
+  const TrajectoryScene corrected = experiments::independentScene({.n = 60}, rng);
+  const CovarianceDiagnosis none =
+      diagnosed({written(corrected, convention(P::right)), {}}, {.mode = DiagnosisMode::chain});
+  EXPECT_FALSE(none.chain->is_chain);
   EXPECT_TRUE(none.verdict().isNone());
   EXPECT_EQ(none.verdict().text, "UNDECIDABLE: " + none.chain->reason);
   // A plan always has an answer; contents are told apart at once.
@@ -370,10 +371,10 @@ TEST(CovarianceDiagnosis, ChainAndPlan) {
   for (const PlanRow& row : plan.plan) EXPECT_EQ(row.convention.unit, U::radian);
   EXPECT_EQ(diagnosed(run, {.mode = DiagnosisMode::plan, .all_units = true}).plan.size(), 56U);
   const auto decided = std::count_if(plan.plan.begin(), plan.plan.end(), [](const PlanRow& row) {
-    return row.equal.empty() && row.poses > 0 && row.poses <= 60;
+    return row.equal.empty() && row.poses > 0 && row.poses <= 200;
   });
   EXPECT_EQ(plan.verdict().text,
-            "With its 60 poses this file tells " + std::to_string(decided) + " of 14 conventions from all others.");
+            "With its 200 poses this file tells " + std::to_string(decided) + " of 14 conventions from all others.");
 }
 
 TEST(CovarianceDiagnosis, FormatsAndEdgesLeaveFewerHypotheses) {
