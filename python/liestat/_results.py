@@ -252,9 +252,9 @@ class MeanResult:
             return self.unique
         if name == "more_rivals":
             _renamed("more_rivals", "rivals_complete, its contrary,")
-            return np.logical_not(self.rivals_complete)[()] if self.shape else not self.rivals_complete
+            return not self.rivals_complete if self.shape == () else np.logical_not(self.rivals_complete)
         if name != "law" and name not in self._values and name not in self._names():
-            raise AttributeError(f"no part {name!r}; there are {', '.join(dir(self))}")
+            raise AttributeError(f"no part {name!r}; there are {', '.join((*self._names(), *self._values))}, law")
         parts = [self._part(answer, name) for answer in self._answers]
         value = parts[0] if self.shape == () else self._stacked(name, parts)
         self.__dict__[name] = value
@@ -283,7 +283,8 @@ class MeanResult:
         if name != "unique" and parts and all(isinstance(v, (bool, int, float, str)) for v in parts):
             return np.array(parts).reshape(shape)
         array = np.empty(len(parts), dtype=object)
-        array[:] = parts
+        for i, part in enumerate(parts):  # not array[:], which looks into lists
+            array[i] = part
         return array.reshape(shape)
 
     def keys(self):
