@@ -104,10 +104,13 @@ class Law:
         return _core.law_mean(self.degrees_of_freedom, self.samples or 0)
 
     def __repr__(self):
-        return f"Law(degrees_of_freedom={self.degrees_of_freedom}" + (f", samples={self.samples})" if self.samples else ")")
+        samples = f", samples={self.samples}" if self.samples else ""
+        return f"Law(degrees_of_freedom={self.degrees_of_freedom}{samples})"
 
     def __eq__(self, other):
-        return isinstance(other, Law) and (self.degrees_of_freedom, self.samples) == (other.degrees_of_freedom, other.samples)
+        if not isinstance(other, Law):
+            return False
+        return (self.degrees_of_freedom, self.samples) == (other.degrees_of_freedom, other.samples)
 
     __hash__ = None
 
@@ -155,8 +158,9 @@ class ConfidenceRegion:
 
 
 class Uniqueness(str):
-    """'unique', 'ambiguous' or 'not_certified'. Only the first is true, and equals True: the part `unique` of a result was
-    a bool before it was a word, and ``if result.unique:`` means what it meant.
+    """'unique', 'ambiguous' or 'not_certified'. Only the first is true, and equals True.
+
+    The part `unique` of a result was a bool before it was a word: ``if result.unique:`` means what it meant.
     """
 
     __slots__ = ()
@@ -216,8 +220,8 @@ class MeanResult:
     cells : int
         Of the global search; 0 where it was not needed.
     cut_locus_mass, hessian_change : float
-        Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the confidence
-        region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
+        Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the
+        confidence region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
     fit, fit_dof, fit_p : float or None
         Sum of squared Mahalanobis distances for 'maha', χ² with `fit_dof` degrees of freedom if the covariances are
         right, and the probability of so large a sum; None (NaN in an array) for the other criteria.

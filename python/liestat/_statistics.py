@@ -251,10 +251,9 @@ def validate_split(
     seed=1,
     threads=0,
 ):
-    """Whether the covariance of a mean is true of real measurements: split in two, at random and by blocks of time, do the
-    halves agree? ``liestat validate split`` for arrays.
+    """Whether the covariance of a mean is true of real measurements; ``liestat validate split`` for arrays.
 
-    Splits at random do not see errors that successive measurements share, splits by blocks of time do.
+    The measurements are split in two, at random and by blocks of time: do the means of the halves agree? Splits at random do not see errors that successive measurements share, splits by blocks of time do.
 
     Parameters
     ----------

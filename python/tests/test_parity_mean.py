@@ -67,7 +67,8 @@ class MeanParity(ParityTest):
                 path, ("--feature", feature, "--inflate"), kind=kind, use=["times"], inflate=True
             )
             self.assertTrue(inflated.time_blocks["applied"])
-            np.testing.assert_allclose(inflated.covariance, plainly.covariance * plainly.time_blocks["factor"], rtol=1e-12)
+            factor = plainly.time_blocks["factor"]
+            np.testing.assert_allclose(inflated.covariance, factor * plainly.covariance, rtol=1e-12)
         with self.assertRaisesRegex(ValueError, "blocks of time cannot be compared"):
             liestat.mean(liestat.R3(np.eye(3)), times=[0, 1, 2], inflate=True)
 
