@@ -104,10 +104,13 @@ class Law:
         return _core.law_mean(self.degrees_of_freedom, self.samples or 0)
 
     def __repr__(self):
-        return f"Law(degrees_of_freedom={self.degrees_of_freedom}" + (f", samples={self.samples})" if self.samples else ")")
+        samples = f", samples={self.samples}" if self.samples else ""
+        return f"Law(degrees_of_freedom={self.degrees_of_freedom}{samples})"
 
     def __eq__(self, other):
-        return isinstance(other, Law) and (self.degrees_of_freedom, self.samples) == (other.degrees_of_freedom, other.samples)
+        if not isinstance(other, Law):
+            return False
+        return (self.degrees_of_freedom, self.samples) == (other.degrees_of_freedom, other.samples)
 
     __hash__ = None
 
@@ -155,8 +158,9 @@ class ConfidenceRegion:
 
 
 class Uniqueness(str):
-    """'unique', 'ambiguous' or 'not_certified'. Only the first is true, and equals True: the part `unique` of a result was
-    a bool before it was a word, and ``if result.unique:`` means what it meant.
+    """'unique', 'ambiguous' or 'not_certified'. Only the first is true, and equals True.
+
+    The part `unique` of a result was a bool before it was a word: ``if result.unique:`` means what it meant.
     """
 
     __slots__ = ()
@@ -216,8 +220,8 @@ class MeanResult:
     cells : int
         Of the global search; 0 where it was not needed.
     cut_locus_mass, hessian_change : float
-        Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the confidence
-        region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
+        Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the
+        confidence region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
     fit, fit_dof, fit_p : float or None
         Sum of squared Mahalanobis distances for 'maha', χ² with `fit_dof` degrees of freedom if the covariances are
         right, and the probability of so large a sum; None (NaN in an array) for the other criteria.
@@ -252,9 +256,9 @@ class MeanResult:
             return self.unique
         if name == "more_rivals":
             _renamed("more_rivals", "rivals_complete, its contrary,")
-            return np.logical_not(self.rivals_complete)[()] if self.shape else not self.rivals_complete
+            return not self.rivals_complete if self.shape == () else np.logical_not(self.rivals_complete)
         if name != "law" and name not in self._values and name not in self._names():
-            raise AttributeError(f"no part {name!r}; there are {', '.join(dir(self))}")
+            raise AttributeError(f"no part {name!r}; there are {', '.join((*self._names(), *self._values))}, law")
         parts = [self._part(answer, name) for answer in self._answers]
         value = parts[0] if self.shape == () else self._stacked(name, parts)
         self.__dict__[name] = value
@@ -283,7 +287,8 @@ class MeanResult:
         if name != "unique" and parts and all(isinstance(v, (bool, int, float, str)) for v in parts):
             return np.array(parts).reshape(shape)
         array = np.empty(len(parts), dtype=object)
-        array[:] = parts
+        for i, part in enumerate(parts):  # not array[:], which looks into lists
+            array[i] = part
         return array.reshape(shape)
 
     def keys(self):

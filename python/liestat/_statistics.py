@@ -96,7 +96,8 @@ def mean(
         metric (SE2, SE3, SE23) 'barycentre'.
     certify : bool
         Certify that the mean is the only one, by a global search if need be, and that the covariance can be trusted.
-        Without, the iteration and its covariance alone: a tenth of the time for a million features.
+        Without, the iteration and its covariance alone: a tenth of the time for a million features. (The program's
+        --no-certify leaves out the global search, and nothing else.)
     covariance_at : {'measured', 'estimated'}, optional
         For frames and 'maha': the axes of the covariances, those of each measurement (a sensor's) or those of the
         estimate (an object's). Both are the same for other types.
@@ -250,10 +251,9 @@ def validate_split(
     seed=1,
     threads=0,
 ):
-    """Whether the covariance of a mean is true of real measurements: split in two, at random and by blocks of time, do the
-    halves agree? ``liestat validate split`` for arrays.
+    """Whether the covariance of a mean is true of real measurements; ``liestat validate split`` for arrays.
 
-    Splits at random do not see errors that successive measurements share, splits by blocks of time do.
+    The measurements are split in two, at random and by blocks of time: do the means of the halves agree? Splits at random do not see errors that successive measurements share, splits by blocks of time do.
 
     Parameters
     ----------

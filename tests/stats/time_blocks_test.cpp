@@ -210,7 +210,8 @@ TEST(SummarizedMean, IsTheCertifiedMean) {
   EXPECT_FALSE(plain.weighted);
   const MeanSummary fast =
       summarizedMean(SerialExecutor{}, MeanInput<SO3d>{.features = rotations}, {.certificates = false});
-  EXPECT_EQ(fast.mean.parameters, plain.mean.parameters);
+  // Sums with weights of one round elsewhere.
+  EXPECT_LT((fast.mean.parameters - plain.mean.parameters).norm(), 1e-15);
   EXPECT_EQ(fast.unique, Uniqueness::not_certified);
   EXPECT_EQ(fast.covariance, Eigen::MatrixXd(covarianceFromResiduals(mean(rotations))));
   EXPECT_EQ(plain.verdict().text, "The mean is " + plain.uniquenessInWords() + ".");
