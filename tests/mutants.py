@@ -376,13 +376,15 @@ def report(args, out, tests, mutants, results):
     reached = set().union(*reaches.values()) if reaches else set()
     chosen = cheapest(cost, {p: f for p, f in finds.items() if f})
     alone = {p: {i for i in f if not any(i in g for q, g in finds.items() if q != p)} for p, f in finds.items()}
+    pairs = sum(len(set(r["reached"]) & set(by_id)) for r in results if not r["mutant"] and r["verdict"] == "passed")
+    done = len({(r["test"], r["mutant"]) for r in results if r["mutant"]})
     lines = [f"{len(mutants)} faults, {len(ran)} test programs: {len(reached)} reached, {len(ran_mutants)} tried, "
-             f"{len(everything)} found.", ""]
+             f"{len(everything)} found. {done} of {pairs} pairs of a fault and a test that reaches it have run.", ""]
     lines += ["| room | faults | reached | found |", "| --- | --- | --- | --- |"]
     for room in sorted({m.file.split("/")[0] for m in mutants}):
         own = {m.id for m in mutants if m.file.startswith(room + "/")}
         lines.append(f"| {room}/ | {len(own)} | {len(own & reached)} | {len(own & everything)} |")
-    if not args.first:
+    if done == pairs:  # else the choice would depend on what happened to run
         lines += ["", f"The cheapest programs that find all of them: {sum(cost[p] for p in chosen):.0f} s of "
                   f"{sum(cost.values()):.0f} s.", "",
                   "| program | now in | compiler, s | run, s | finds | alone | keep |",
@@ -391,8 +393,8 @@ def report(args, out, tests, mutants, results):
             lines.append(f"| {p} | {label[p]} | {compiled[p]:.0f} | {ran[p]:.1f} | {len(finds[p])} | "
                          f"{len(alone.get(p, ()))} | {'yes' if p in chosen else ''} |")
         lacking = everything - set().union(*(finds[p] for p in finds if label[p] == "test"), set())
-        for title, ids in (("Found by what only --all runs", lacking),):
-            lines += ["", f"{title}: {len(ids)}.", *(f"- {by_id[i].name}" for i in sorted(ids))]
+        lines += ["", f"Found by what only --all runs: {len(lacking)}.",
+                  *(f"- `{by_id[i].name}`" for i in sorted(lacking, key=lambda i: by_id[i].number))]
     missed = sorted((ran_mutants & reached) - everything, key=lambda i: by_id[i].number)
     lines += ["", f"Reached, and found by nothing: {len(missed)}. Each is a missing test.",
               *(f"- `{by_id[i].name}`" for i in missed)]
