@@ -20,7 +20,7 @@ ClosedFormOutcome closedFormNeesTrial(const ViInitWindow& size, double noise, Co
   // A window without a single consistent answer makes no claim. With the wrong noise χ² would say so first, and hide
   // the distances.
   if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
-      r.covariance_content != CovarianceContent::image_noise) {
+      r.covariance_content != ClosedFormCovarianceContent::image_noise) {
     return {};
   }
   const ClosedFormSolution& s = r.solutions[0];
@@ -40,7 +40,7 @@ ClosedFormOutcome closedFormBiasNeesTrial(const ViInitWindow& size, double noise
   scene.addNoise(noise * vi_init_bearing_noise, rng);
   const auto r = solveClosedForm(scene.window, options);
   if (r.status != FusionStatus::ok || (noise == 1 && !r.consistent) ||
-      r.covariance_content != CovarianceContent::image_noise_bias_prior) {
+      r.covariance_content != ClosedFormCovarianceContent::image_noise_bias_prior) {
     return {};
   }
   const ClosedFormSolution& s = r.solutions[0];

@@ -1,4 +1,4 @@
-#include <experiments/summary.hpp>
+#include <stats/quantile.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/closed_form.hpp>

@@ -2,7 +2,8 @@
 // conventions that explain its errors, and the verdict; for units that only show them. (Needs Boost.Math.)
 #pragma once
 
-#include <fusion/trajectories.hpp>
+#include <fusion/detail/compiled.hpp>
+#include <fusion/trajectories_types.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/conventions.hpp>
 #include <stats/verdict.hpp>
@@ -191,23 +192,6 @@ inline std::vector<std::string> conventionNames(const std::vector<Convention>& c
   return names;
 }
 
-/// The seven tests by their names.
-struct TestOfDiagnosis {
-  ResidualTest test;
-};
-template <class V>
-void describe(V& v, const TestOfDiagnosis& t) {
-  v("statistic", t.test.statistic)("degrees_of_freedom", t.test.dof)("p", t.test.p);
-}
-struct TestsOfDiagnosis {
-  WhitenedResidualTests tests;
-};
-template <class V>
-void describe(V& v, const TestsOfDiagnosis& t) {
-  const auto all = t.tests.all();
-  for (std::size_t k = 0; k < all.size(); ++k) v(name(static_cast<ResidualTestKind>(k)), TestOfDiagnosis{all[k]});
-}
-
 }  // namespace detail
 
 template <class V>
@@ -249,7 +233,7 @@ void describe(V& v, const ConventionDiagnosis& d) {
   v("exact_coordinates", d.exact_coordinates, "of each hypothesis, as the errors are large");
   v("increments_as_absolute", d.increments_as_absolute, "the matrices are those of single steps");
   v("growth", d.growth, "NEES of the second half over the first");
-  v("tests", detail::TestsOfDiagnosis{d.tests}, "under the best hypothesis");
+  v("tests", d.tests, "under the best hypothesis");
   v("scale", d.scale, "scales of the blocks, where they are free");
   if (d.chain) v("chain", *d.chain);
   v("hypotheses", d.fits, "the best first; empty if correlated");

@@ -1,9 +1,11 @@
-// Quantiles of a few values. (Needs the standard library alone.)
+// Quantiles of a few values, and the usual distance of times. (Needs the standard library alone.)
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <span>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -16,6 +18,14 @@ inline double quantile(std::vector<double> values, double p) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), at, values.end());
   return *at;
+}
+
+/// The median of the differences of successive times, the larger of two middle ones; 0 for fewer than two times.
+inline double medianStep(std::span<const double> times) {
+  if (times.size() < 2) return 0;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  return quantile(std::move(steps), 0.5);
 }
 
 }  // namespace liestat

@@ -51,8 +51,7 @@ DiagnosedRun withTruth(const Trajectory& estimate, const Trajectory& truth, cons
   const Associated associated = associate(truth, estimate, o.input);
   const std::vector<Gaussian<SE3d>> exact = exactPoses(truth.poses), poses = exactPoses(estimate.poses);
   const std::vector<MatchedPose> matched =
-      matchedPoses(associated.matches, exact, poses,
-                   o.input.interpolation == "slerp" ? PoseInterpolation::slerp : PoseInterpolation::geodesic);
+      matchedPoses(associated.matches, exact, poses, o.input.association.interpolation);
   DiagnosedRun run;
   for (std::size_t k = 0; k < matched.size(); ++k) {
     const std::size_t row = associated.matches[k].estimate;

@@ -21,8 +21,8 @@ void TrajectoryInputOptions::declare(const Command& command) {
   command.choice(
       "--association", association.rule,
       "interpolate: the reference at the times of the estimate (default); nearest: the nearest stamps, as evo");
-  command.option("--interpolation", interpolation, "Curve between two poses of the reference (default geodesic)")
-      .oneOf({"geodesic", "slerp"});
+  command.choice("--interpolation", association.interpolation,
+                 "Curve between two poses of the reference (default geodesic)");
   command
       .option("--max-gap", association.max_gap,
               "Largest distance of two stamps to interpolate between, s (default: five times the median distance)")
@@ -49,7 +49,6 @@ void TrajectoryInputOptions::settle() {
     }
     estimate.layout = c.layout;
   }
-  association.interpolation = named<PoseInterpolation>(interpolation).value();
   for (const double value : {association.offset, association.start.value_or(0), association.end.value_or(0)}) {
     if (!std::isfinite(value)) throw InputError("liestat", 0, "a time that is not finite", "seconds");
   }

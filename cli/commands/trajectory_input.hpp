@@ -17,7 +17,6 @@ struct TrajectoryInputOptions {
   TrajectoryOptions estimate, reference;
   std::string layout;  ///< of the numbers after TUM's eight; empty: unsaid
   AssociationOptions association;
-  std::string interpolation = name(PoseInterpolation::geodesic);
 
   /// Declares them, evo's names included.
   void declare(const Command& command);

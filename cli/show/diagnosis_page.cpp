@@ -249,8 +249,7 @@ void writeDiagnosisReport(const std::string& directory, const std::string& comma
                           const std::vector<ConventionReading>& readings) {
   Report report(directory, "Convention of the covariances in " + output.files.front());
   const CovarianceDiagnosis& r = output.result;
-  const Verdict verdict = r.verdict();
-  report.verdict(verdict.isYes(), verdict.text);
+  report.verdict(r.verdict());
   report.code(command_line);
   if (r.diagnosis) showHypotheses(report, *r.diagnosis);
   if (r.mode == DiagnosisMode::plan) showPlan(report, r.plan);

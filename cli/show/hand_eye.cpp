@@ -354,7 +354,7 @@ void setHandEye(JsonObject& object, const HandEyeOutput& output) {
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {
   const HandEyeResult& r = output.result;
   Report report(directory, "Hand-eye calibration");
-  report.verdict(r.ok(), answer(output));
+  report.verdict(r.verdict().answer, answer(output));
   report.code(command_line);
   report.section("Result");
   const std::vector<CalibratedPose> unknowns = calibratedPoses(r);

@@ -232,7 +232,7 @@ void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBl
 void writeMeanReport(const std::string& directory, const std::string& command_line, const std::string& source,
                      const Measurements& measurements, const MeanAnalysis& analysis) {
   Report report(directory, "Mean of the measurements in " + source);
-  report.verdict(analysis.trusted(), analysis.verdict().text);
+  report.verdict(analysis.verdict());
   report.paragraph(measurementsInWords(source, measurements) + ".");
   report.code(command_line);
   const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;

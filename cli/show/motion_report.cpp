@@ -640,7 +640,7 @@ void writeMotionReport(const std::string& directory, const std::string& command_
   constexpr std::string_view loud = "NOT TO BE TRUSTED", calm = "Not to be trusted";
   std::string text = verdict.text + ".";
   if (text.starts_with(loud)) text.replace(0, loud.size(), calm);
-  report.verdict(verdict.isYes(), text);
+  report.verdict(verdict.answer, text);
   report.code(command_line);
   report.section("Estimates");
   report.plot(estimatesPlot(result));

@@ -227,7 +227,10 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
 void writePreintegrationReport(const std::string& directory, const std::string& command_line,
                                const RecordingWindows& result, const PreintegratedReadings& readings) {
   Report report(directory, "Preintegrated motions of " + readings.source);
-  report.verdict(result.usable() && result.okWindows() == result.windows.size(), preintegrationVerdict(result));
+  report.verdict(!result.complete()  ? Verdict::Answer::no
+                 : result.with_truth ? result.verdict().answer
+                                     : Verdict::Answer::yes,
+                 preintegrationVerdict(result));
   report.code(command_line);
   showIncrements(report, result);
   if (readings.growth.size() > 1) showGrowth(report, readings);

@@ -88,7 +88,7 @@ JsonObject toJson(const FileSplit& split, const std::string& command_line) {
 
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split) {
   Report report(directory, "Split of the measurements in " + split.source);
-  report.verdict(split.passed(), split.verdict().text);
+  report.verdict(split.verdict());
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));

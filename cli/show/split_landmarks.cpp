@@ -85,7 +85,7 @@ JsonObject toJson(const LandmarkSplits& split, const std::string& command_line) 
 
 void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split) {
   Report report(directory, "Split of the landmarks in " + split.source);
-  report.verdict(split.passed(), split.verdict().text);
+  report.verdict(split.verdict());
   report.paragraph(split.description + ".");
   report.code(command_line);
   report.code(formatSplit(split));

@@ -247,7 +247,7 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
                               const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   Report report(directory, "The motion between two images");
-  report.verdict(e.ok(), answer(output));
+  report.verdict(e.verdict().answer, answer(output));
   report.code(command_line);
   report.paragraph(summary(output.file, output.estimate));
   if (!e.physical.empty()) report.section("Parameters");

@@ -62,7 +62,11 @@ void showVerdict(Report& report, std::string_view text) {
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   if (lines.size() < 2) return;
-  report.verdict(lines.back() == "PASSED", fmt::format("{}: {}", lines.back(), lines[lines.size() - 2]));
+  // A run that was interrupted has no verdict.
+  report.verdict(lines.back() == "PASSED"   ? Verdict::Answer::yes
+                 : lines.back() == "FAILED" ? Verdict::Answer::no
+                                            : Verdict::Answer::none,
+                 fmt::format("{}: {}", lines.back(), lines[lines.size() - 2]));
 }
 
 Panel histogramPanel(const JudgedReport& row, const std::string& title) {

@@ -282,8 +282,7 @@ void writeViInitReport(const std::string& directory, const std::string& command_
                        const ViInitResult& result) {
   const bool with_truth = !recording.truth.empty();
   Report report(directory, "Visual-inertial initialisation");
-  const Verdict verdict = result.verdict();
-  report.verdict(!verdict.isNo(), verdict.text);
+  report.verdict(result.verdict());
   report.code(command_line);
   report.code(viInitTable(recording, result));
   report.section("Trajectory");

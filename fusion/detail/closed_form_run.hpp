@@ -256,7 +256,7 @@ class ClosedFormRun {
     }
     if (candidates_.empty() || status == Status::scale_unobservable) {
       result_.covariance.resize(0, 0);
-      result_.covariance_content = CovarianceContent::none;
+      result_.covariance_content = ClosedFormCovarianceContent::none;
       for (ClosedFormFeature& feature : result_.features) {
         feature.depth_determined = false;
         feature.depth_sigma = std::numeric_limits<double>::infinity();

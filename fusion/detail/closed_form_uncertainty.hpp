@@ -39,8 +39,8 @@ inline void predictUncertainty(ClosedFormSolver& solver, const RayTable& table, 
     for (int i = 0; i < m; ++i) {
       for (int j = 0; j < m; ++j) result.covariance(i, j) = unit(i) * unit(j) * scaled(from(i), from(j));
     }
-    result.covariance_content =
-        solver.hasPrior() ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise;
+    result.covariance_content = solver.hasPrior() ? ClosedFormCovarianceContent::image_noise_bias_prior
+                                                  : ClosedFormCovarianceContent::image_noise;
   }
   std::vector<double> relative;
   for (std::size_t i = 0; i < table.features(); ++i) {

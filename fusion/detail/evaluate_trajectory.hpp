@@ -2,8 +2,9 @@
 #pragma once
 
 #include <fusion/evaluate.hpp>
-#include <fusion/median_step.hpp>
 #include <lie/euler.hpp>
+#include <lie/units.hpp>
+#include <stats/quantile.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +15,7 @@ namespace liestat {
 
 namespace detail {
 
-inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
+inline constexpr double degrees_per_radian = 1 / units::degree;
 
 inline bool ascendsStrictly(std::span<const double> times) {
   for (std::size_t i = 0; i < times.size(); ++i) {

@@ -85,7 +85,7 @@ struct ClosedFormSolution {
 };
 
 /// The sources of error that a covariance accounts for.
-enum class CovarianceContent {
+enum class ClosedFormCovarianceContent {
   none,                   ///< there is none: exact data, or not all unknowns are determined
   image_noise,            ///< image noise only: not the inertial sensor's noise, nor unmodelled biases
   image_noise_bias_prior  ///< image noise and the prior of the accelerometer's bias
@@ -120,7 +120,7 @@ struct ClosedFormResult {
 
   /// That of (V, G) or (V, G, b) of the first solution, 6 or 9 square; singular along a known |G|. Empty: none.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9> covariance;
-  CovarianceContent covariance_content = CovarianceContent::none;
+  ClosedFormCovarianceContent covariance_content = ClosedFormCovarianceContent::none;
   double scale_sigma = std::numeric_limits<double>::infinity();  ///< relative, predicted; with noise
   double tilt_sigma = std::numeric_limits<double>::infinity();   ///< rad, of the vertical, predicted; with noise
 
@@ -149,13 +149,13 @@ struct ClosedFormResult {
 };
 
 /// In words, for people.
-inline const char* describe(CovarianceContent content) {
+inline const char* describe(ClosedFormCovarianceContent content) {
   switch (content) {
-    case CovarianceContent::none:
+    case ClosedFormCovarianceContent::none:
       return "none";
-    case CovarianceContent::image_noise:
+    case ClosedFormCovarianceContent::image_noise:
       return "image noise only";
-    case CovarianceContent::image_noise_bias_prior:
+    case ClosedFormCovarianceContent::image_noise_bias_prior:
       return "image noise and the prior of the accelerometer's bias only";
   }
   return "";

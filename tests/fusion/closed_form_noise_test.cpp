@@ -240,7 +240,7 @@ TEST(ClosedFormNoise, TheCovarianceIsThatOfImageNoise) {
       const Scene scene = noisyScene(options, 90000 + trial, false);
       const auto result = solveClosedForm(scene.window, solve);
       ASSERT_EQ(result.covariance_content,
-                bias ? CovarianceContent::image_noise_bias_prior : CovarianceContent::image_noise);
+                bias ? ClosedFormCovarianceContent::image_noise_bias_prior : ClosedFormCovarianceContent::image_noise);
       index += nees(result, scene, options.bias) / trials;
       cost += result.solutions[0].cost;
       degrees += static_cast<double>(result.degrees_of_freedom);

@@ -340,7 +340,7 @@ TEST(Elimination, NormalEquationsAgreeWithReflections) {
     EXPECT_LE(relativeError(result.solutions[0], scene), 1e-6);
     EXPECT_LE(featureError(result.solutions[0], scene), 1e-6);
     EXPECT_EQ(result.covariance.rows(), 6);
-    EXPECT_EQ(result.covariance_content, CovarianceContent::image_noise);
+    EXPECT_EQ(result.covariance_content, ClosedFormCovarianceContent::image_noise);
     EXPECT_EQ(result.degrees_of_freedom, 2 * 64u - 24 - 5);
     // |G| is known: nothing along it.
     Eigen::Matrix<double, 6, 1> along;

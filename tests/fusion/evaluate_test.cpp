@@ -3,7 +3,7 @@
 
 #include <experiments/trajectory_scene.hpp>
 #include <fusion/evaluate.hpp>
-#include <fusion/median_step.hpp>
+#include <stats/quantile.hpp>
 #include <report/describe.hpp>
 
 #include <gtest/gtest.h>
