@@ -143,10 +143,8 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
     setCertified(mean, result.mean, result);
     return setDispersion(mean, input, result.mean.mean);
   }
-  // Ones in place of no weights, so that the compiled estimator serves.
   const MeanResult<M> result =
-      ones ? frechetMean<M>(executor, asSamples(input.features), detail::ones(input.features.size()), {})
-           : liestat::mean(executor, input.features, input.weights);
+      ones ? liestat::mean(executor, input.features) : liestat::mean(executor, input.features, input.weights);
   const SquareOf<M> covariance = !mean.known_noise ? covarianceFromResiduals(result)
                                  : ones            ? covarianceFromNoise(result, input.covariances)
                                                    : covarianceFromNoise(result, input.weights, input.covariances);

@@ -19,6 +19,8 @@
                                            const MeanOptions<M>&);                                           \
   instantiate MeanResult<M> frechetMean<M>(const SerialExecutor&, const Samples<M>&, const Samples<double>&, \
                                            const MeanOptions<M>&);                                           \
+  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const UnitWeights&,        \
+                                           const MeanOptions<M>&);                                           \
   instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&,    \
                                            const MeanOptions<M>&)
 
