@@ -23,7 +23,8 @@ for compiler in "${CXX:-g++}" clang++; do
 done
 [ ${#compilers[@]} -gt 0 ] || { echo "compile_cost: no compiler" >&2; exit 2; }
 
-linked="-DLIESTAT_COMPILED_MEANS -DLIESTAT_COMPILED_FUSION"
+header_only="-DLIESTAT_HEADER_ONLY"
+linked="-DLIESTAT_COMPILED_MEANS -DLIESTAT_COMPILED_FUSION -DLIESTAT_COMPILED_TRAJECTORIES"
 
 # milliseconds COMPILER [FLAGS…]: of a unit on standard input; - where it doesn't compile, for want of a package.
 milliseconds() {
@@ -53,7 +54,7 @@ row() {
   shift 2
   printf '| %-38s | %7s |' "$name" "$(lines <<<"$unit")"
   for compiler in "${compilers[@]}"; do
-    printf ' %10s |' "$(milliseconds "$compiler" "$@" <<<"$unit")"
+    printf ' %10s |' "$(milliseconds "$compiler" "$@" $header_only <<<"$unit")"
     # shellcheck disable=SC2086 # several flags in one variable
     printf ' %17s |' "$(milliseconds "$compiler" "$@" $linked <<<"$unit")"
   done

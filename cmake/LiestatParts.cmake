@@ -14,9 +14,8 @@ function(liestat_part target)
   list(REMOVE_ITEM sources ${heavy})
   add_library(${target} STATIC ${sources} ${heavy})
   target_link_libraries(${target} PUBLIC ${ARG_USES} PRIVATE liestat_strict)
-  # Whoever calls an estimator of fusion/ uses liestat_fusion, and who asks for a mean liestat_means; all others need
-  # their types only.
-  target_compile_definitions(${target} PRIVATE LIESTAT_COMPILED_FUSION LIESTAT_COMPILED_MEANS)
+  # Whoever asks for a mean uses liestat_means; all others need its types only.
+  target_compile_definitions(${target} PRIVATE LIESTAT_COMPILED_MEANS)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
   set_source_files_properties(${heavy} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

@@ -16,6 +16,7 @@
 // Derivations: docs/theory/trajectories.md, sections 6 to 8; measured power, and a ledger of bugs: docs/doctor.md.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
 
 #include <cstddef>
@@ -27,12 +28,13 @@ namespace liestat {
 
 /// The 168 hypotheses: two orders, seven perturbations (right, left, world axes, world-body axes, roll-pitch-yaw,
 /// yaw-pitch-roll, transposed axes), four units of rotation, three contents.
-std::vector<Convention> conventionHypotheses();
+LIESTAT_TRAJECTORIES_API std::vector<Convention> conventionHypotheses();
 
-MatrixStructure matrixStructure(std::span<const DiagnosedPose> poses);
+LIESTAT_TRAJECTORIES_API MatrixStructure matrixStructure(std::span<const DiagnosedPose> poses);
 
 /// Needs no truth. Says nothing of a common scale, and for `left` nothing of order and unit.
-ChainDiagnosis diagnoseChain(std::span<const DiagnosedPose> poses, std::span<const Convention> hypotheses = {});
+LIESTAT_TRAJECTORIES_API ChainDiagnosis diagnoseChain(std::span<const DiagnosedPose> poses,
+                                                      std::span<const Convention> hypotheses = {});
 
 struct DiagnosisOptions {
   double alpha = 1e-3;                              ///< probability of rejecting the truth
@@ -43,11 +45,13 @@ struct DiagnosisOptions {
 };
 
 /// Finds the conventions that explain the errors. Fewer than ten usable poses are "undecidable".
-ConventionDiagnosis diagnoseConventions(std::span<const DiagnosedPose> poses, const DiagnosisOptions& options = {});
+LIESTAT_TRAJECTORIES_API ConventionDiagnosis diagnoseConventions(std::span<const DiagnosedPose> poses,
+                                                                 const DiagnosisOptions& options = {});
 
 /// Rows of the convention candidates `of` (empty: all) against all hypotheses. At most 40 poses, evenly spaced, are used.
-std::vector<PlanRow> planDiagnosis(std::span<const DiagnosedPose> poses, std::span<const Convention> of = {},
-                                   const DiagnosisOptions& options = {});
+LIESTAT_TRAJECTORIES_API std::vector<PlanRow> planDiagnosis(std::span<const DiagnosedPose> poses,
+                                                            std::span<const Convention> of = {},
+                                                            const DiagnosisOptions& options = {});
 
 /// A run of a file: poses in order of time.
 struct DiagnosedRun {
@@ -68,16 +72,17 @@ struct CovarianceDiagnosisOptions {
 
 /// The diagnosis of a file. Several runs give one residual each, at one time: those are independent of each other,
 /// while neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is decided.
-CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
-                                        const CovarianceDiagnosisOptions& options = {});
+LIESTAT_TRAJECTORIES_API CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
+                                                                 const CovarianceDiagnosisOptions& options = {});
 
 /// The poses in a convention and, with an alignment to the truth, the consistency of their errors. Unknown cross blocks
 /// count as zero.
-ConventionReading readInConvention(std::span<const DiagnosedPose> poses, const Convention& convention,
-                                   std::optional<AlignmentModel> alignment);
+LIESTAT_TRAJECTORIES_API ConventionReading readInConvention(std::span<const DiagnosedPose> poses,
+                                                            const Convention& convention,
+                                                            std::optional<AlignmentModel> alignment);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/diagnose_conventions.hpp>
 #endif

@@ -259,6 +259,6 @@ void describe(V& v, const CovarianceDiagnosis& d) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/diagnosis_words.hpp>
 #endif

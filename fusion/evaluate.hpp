@@ -10,6 +10,7 @@
 // in fusion/trajectories.hpp.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/evaluate_types.hpp>
 #include <fusion/trajectories.hpp>
 
@@ -24,25 +25,27 @@ struct PoseStamps {
 
 /// The partners of the estimate's poses, by time, or by row where neither has times. Poses before the options' `start` and
 /// after their `end` must have been left out: see rowsBetween. Never throws: see the status.
-Associated associate(const PoseStamps& reference, const PoseStamps& estimate, const AssociationOptions& options = {});
+LIESTAT_TRAJECTORIES_API Associated associate(const PoseStamps& reference, const PoseStamps& estimate,
+                                              const AssociationOptions& options = {});
 
 /// The times from `start` to `end`, both included, as indices; where one is not given, there is no bound.
-std::vector<std::size_t> rowsBetween(std::span<const double> times, std::optional<double> start,
-                                     std::optional<double> end);
+LIESTAT_TRAJECTORIES_API std::vector<std::size_t> rowsBetween(std::span<const double> times,
+                                                              std::optional<double> start, std::optional<double> end);
 
 /// A sentence if the quaternions of one of two trajectories look as if w came first: relative rotations over a fifth of the
 /// run then agree five times better. Empty otherwise, and for fewer than ten poses.
-std::string suspectQuaternionOrder(std::span<const MatchedPose> poses, std::string_view reference,
-                                   std::string_view estimate);
+LIESTAT_TRAJECTORIES_API std::string suspectQuaternionOrder(std::span<const MatchedPose> poses,
+                                                            std::string_view reference, std::string_view estimate);
 
 /// Compares an estimate with a reference. The verdict is that of errors after an alignment which the covariances weight;
 /// those of APE and RPE follow no χ². Never throws: where the data or the options do not allow a comparison, `status` and
 /// `reason` say why, and errors are empty, statistics NaN. O(n).
-TrajectoryEvaluation evaluateTrajectory(const PoseTrajectory& reference, const PoseTrajectory& estimate,
-                                        const EvaluationOptions& options = {});
+LIESTAT_TRAJECTORIES_API TrajectoryEvaluation evaluateTrajectory(const PoseTrajectory& reference,
+                                                                 const PoseTrajectory& estimate,
+                                                                 const EvaluationOptions& options = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/evaluate_trajectory.hpp>
 #endif

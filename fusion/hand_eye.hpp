@@ -20,6 +20,7 @@
 // same bits for any order of the pairs. docs/hand_eye.md has figures, limits and the conventions of other libraries.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/hand_eye_types.hpp>
 
 #include <span>
@@ -28,14 +29,15 @@ namespace liestat {
 
 /// AX = YB from at least three pairs of absolute poses with independent errors (degrees of freedom 6 n - 12, one more
 /// for each open direction).
-HandEyeResult estimateRobotWorld(std::span<const PosePair> poses, const HandEyeOptions& options = {});
+LIESTAT_FUSION_API HandEyeResult estimateRobotWorld(std::span<const PosePair> poses,
+                                                    const HandEyeOptions& options = {});
 
 /// AX = XB from at least two pairs of relative motions with independent errors (degrees of freedom 6 n - 6, one more
 /// for each open direction).
-HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options = {});
+LIESTAT_FUSION_API HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/estimate_hand_eye.hpp>
 #endif

@@ -251,6 +251,6 @@ void describeSeries(V& v, const HandEyeResult& r) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/hand_eye_results.hpp>
 #endif

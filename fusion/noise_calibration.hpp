@@ -11,6 +11,7 @@
 // meetings widened by Student's law.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/visual_inertial_types.hpp>
 
 #include <cstddef>
@@ -71,11 +72,12 @@ void describe(V& v, const NoiseCalibration& x) {
 
 /// Calibrates the densities of a recording's inertial sensor by its windows. Options as for initialiseRecording();
 /// `progress(done, all)` counts windows, and then passes over all of them.
-NoiseCalibration calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,
-                                const std::function<void(std::size_t done, std::size_t all)>& progress = {});
+LIESTAT_FUSION_API NoiseCalibration
+calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,
+               const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/calibrate_noise.hpp>
 #endif

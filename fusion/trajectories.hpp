@@ -30,66 +30,72 @@ namespace liestat {
 
 /// For each time of the estimate the place between two stamps of the reference, if these are at most `max_gap` (s) apart; a
 /// stamp that is hit exactly needs no neighbour. Both lists ascend strictly. An offset is added to the estimate's times.
-std::vector<TimeMatch> associateByInterpolation(std::span<const double> reference_times,
-                                                std::span<const double> estimate_times,
-                                                double max_gap = std::numeric_limits<double>::infinity(),
-                                                double offset = 0);
+LIESTAT_TRAJECTORIES_API std::vector<TimeMatch> associateByInterpolation(
+    std::span<const double> reference_times, std::span<const double> estimate_times,
+    double max_gap = std::numeric_limits<double>::infinity(), double offset = 0);
 
 /// evo's association: each stamp of the shorter list (the reference if both are as long) to the nearest of the other, within
 /// max_difference (s); the earlier of two as near. Not one-to-one. Both lists ascend.
-std::vector<TimeMatch> associateNearest(std::span<const double> reference_times, std::span<const double> estimate_times,
-                                        double max_difference = 0.01, double offset = 0);
+LIESTAT_TRAJECTORIES_API std::vector<TimeMatch> associateNearest(std::span<const double> reference_times,
+                                                                 std::span<const double> estimate_times,
+                                                                 double max_difference = 0.01, double offset = 0);
 
 /// The pairs of an association. The covariance of an interpolated reference is (1 - s) Σ₀ + s Σ₁, an upper bound whatever the
 /// correlation of the two. Empty `reference` covariances are zeros: see exactPoses.
-std::vector<MatchedPose> matchedPoses(std::span<const TimeMatch> matches, std::span<const Gaussian<SE3d>> reference,
-                                      std::span<const Gaussian<SE3d>> estimate,
-                                      PoseInterpolation interpolation = PoseInterpolation::geodesic);
+LIESTAT_TRAJECTORIES_API std::vector<MatchedPose> matchedPoses(
+    std::span<const TimeMatch> matches, std::span<const Gaussian<SE3d>> reference,
+    std::span<const Gaussian<SE3d>> estimate, PoseInterpolation interpolation = PoseInterpolation::geodesic);
 
 /// Poses as Gaussians without uncertainty.
-std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses);
+LIESTAT_TRAJECTORIES_API std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses);
 
 // Alignment --------------------------------------------------------------------------------------------------------------
 
 /// Least squares of the positions, estimate to reference, from the first n_to_align poses (0: all) (Umeyama 1991; posyaw: Zhang
 /// and Scaramuzza 2018). As evo: for sim3 the scale is biased by the noise of the estimate. `covariance` is that of the
 /// positions' covariances carried through the solution (se3 and posyaw), NaN for sim3 and scale.
-Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align = 0);
+LIESTAT_TRAJECTORIES_API Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model,
+                                                std::size_t n_to_align = 0);
 
 /// The most likely alignment under the covariances of full poses, from the first n_to_align poses (0: all). Model `origin` is
 /// se3 from one pose; `none` is the identity. The scale is unbiased.
-Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align = 0);
+LIESTAT_TRAJECTORIES_API Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model,
+                                                 std::size_t n_to_align = 0);
 
 // Consistency ------------------------------------------------------------------------------------------------------------
 
 /// Judges errors after a weighted alignment (or none): one from least squares has errors that follow no χ².
-Consistency evaluateConsistency(std::span<const MatchedPose> poses, const Alignment& alignment);
+LIESTAT_TRAJECTORIES_API Consistency evaluateConsistency(std::span<const MatchedPose> poses,
+                                                         const Alignment& alignment);
 
 // Errors as evo has them ---------------------------------------------------------------------------------------------------
 
 /// Statistics of a list of numbers.
-ErrorStatistics errorStatistics(std::span<const double> errors);
+LIESTAT_TRAJECTORIES_API ErrorStatistics errorStatistics(std::span<const double> errors);
 
 /// APE: the error of each pose, E = (A T̂)⁻¹ T, after an alignment.
-std::vector<double> absoluteErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
-                                   PoseRelation relation);
+LIESTAT_TRAJECTORIES_API std::vector<double> absoluteErrors(std::span<const MatchedPose> poses,
+                                                            const Alignment& alignment, PoseRelation relation);
 
 /// Indices (i, j) of poses at a distance, by evo's rules. Empty if there are none or delta is not positive.
-std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const MatchedPose> poses,
-                                                           const Alignment& alignment, const RelativeOptions& options);
+LIESTAT_TRAJECTORIES_API std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const MatchedPose> poses,
+                                                                                    const Alignment& alignment,
+                                                                                    const RelativeOptions& options);
 
 /// RPE: the error of each pair's relative motion, E = (T_i⁻¹ T_j)⁻¹ (T̂_i⁻¹ T̂_j) after alignment. Ratios of pairs at which the
 /// reference did not move are left out, and so are their pairs from `pairs`.
-std::vector<double> relativeErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
-                                   std::vector<std::pair<std::size_t, std::size_t>>& pairs, PoseRelation relation);
+LIESTAT_TRAJECTORIES_API std::vector<double> relativeErrors(std::span<const MatchedPose> poses,
+                                                            const Alignment& alignment,
+                                                            std::vector<std::pair<std::size_t, std::size_t>>& pairs,
+                                                            PoseRelation relation);
 
 /// NEES of the relative motions of pairs under a model; `scale` is that of the alignment.
-RelativeConsistency relativeConsistency(std::span<const MatchedPose> poses,
-                                        std::span<const std::pair<std::size_t, std::size_t>> pairs, PairsModel model,
-                                        double scale = 1);
+LIESTAT_TRAJECTORIES_API RelativeConsistency
+relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
+                    PairsModel model, double scale = 1);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/evaluate_trajectories.hpp>
 #endif

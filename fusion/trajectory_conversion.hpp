@@ -44,7 +44,7 @@ enum class ConversionFault {
   undetermined       ///< unknown entries leave nothing of the result
 };
 /// The enumerator's name, for files.
-const char* name(ConversionFault fault);
+LIESTAT_TRAJECTORIES_API const char* name(ConversionFault fault);
 
 /// A matrix that was not converted. Sentences put names of options between backquotes.
 struct UnconvertedMatrix {
@@ -74,9 +74,10 @@ struct TrajectoryConversion {
 
 /// Converts the matrices that belong to poses, one for each, layouts undone (unpackCovariance). A matrix with a fault is
 /// NaN in the result; the others are converted.
-TrajectoryConversion convertTrajectory(std::span<const SE3d> poses,
-                                       std::span<const Eigen::Matrix<double, 6, 6>> matrices, const Convention& from,
-                                       const Convention& to, const ConversionOptions& options = {});
+LIESTAT_TRAJECTORIES_API TrajectoryConversion convertTrajectory(std::span<const SE3d> poses,
+                                                                std::span<const Eigen::Matrix<double, 6, 6>> matrices,
+                                                                const Convention& from, const Convention& to,
+                                                                const ConversionOptions& options = {});
 
 /// See report/describe.hpp.
 template <class V>
@@ -102,6 +103,6 @@ void describeSeries(V& v, const TrajectoryConversion& c) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/convert_trajectory.hpp>
 #endif

@@ -16,6 +16,7 @@
 // the input is a fault of the result or of a window. Derivation: docs/theory/visual_inertial.md.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/visual_inertial_types.hpp>
 
 #include <cstddef>
@@ -24,11 +25,12 @@
 namespace liestat {
 
 /// Slides windows over a recording. progress(done, all), where given, counts windows.
-VisualInertialResult initialiseRecording(const VisualInertialRecording& recording, const VisualInertialOptions& options,
-                                         const std::function<void(std::size_t done, std::size_t all)>& progress = {});
+LIESTAT_FUSION_API VisualInertialResult
+initialiseRecording(const VisualInertialRecording& recording, const VisualInertialOptions& options,
+                    const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/initialise_recording.hpp>
 #endif

@@ -5,6 +5,7 @@
 //   std::puts(compared.verdict().text.c_str());
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/ground_truth.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>
 #include <stats/gaussian.hpp>
@@ -40,11 +41,12 @@ double neesOnSphere(const Eigen::Matrix<double, N + 1, 1>& error, const Covarian
 /// Compares windows and stretches with the truth at the times of their images (s, of the recording's); `truth` ascends
 /// in time and may be empty. A window is compared where the truth is known at each of its images. `gravity`: its length
 /// in m/s², none where it was not known (then 9.81 is taken for the errors, and there is no NEES).
-ComparedRecording compareWithTruth(VisualInertialResult found, std::span<const double> image_times,
-                                   std::span<const GroundTruth> truth, std::optional<double> gravity);
+LIESTAT_FUSION_API ComparedRecording compareWithTruth(VisualInertialResult found, std::span<const double> image_times,
+                                                      std::span<const GroundTruth> truth,
+                                                      std::optional<double> gravity);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/compare_with_truth.hpp>
 #endif

@@ -273,6 +273,6 @@ void describe(V& v, const ComparedRecording& r) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/initialisation_summary.hpp>
 #endif

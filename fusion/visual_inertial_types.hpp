@@ -160,6 +160,6 @@ struct VisualInertialResult {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/closed_form_states.hpp>
 #endif

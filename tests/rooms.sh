@@ -3,7 +3,7 @@
 #
 #   cli/, python/, experiments/, examples/, formats/ and report/ name nothing in a namespace detail and include nothing
 #   of a folder detail/
-#   views (cli/show/) include results, no estimator: no header that brings definitions with it (LIESTAT_COMPILED_…), but
+#   views (cli/show/) include results, no estimator: no header that brings definitions with it (LIESTAT_HEADER_ONLY), but
 #   for those of types
 #
 # What is wrong is printed with file and line, and the exit code is 1. Before that the checks are tried on planted
@@ -27,14 +27,14 @@ check() {
     if grep -rnF --include='*.hpp' --include='*.cpp' "#include <$header>" cli/show; then
       wrong=1
     fi
-  done < <(grep -rlE --include='*.hpp' '^#ifndef LIESTAT_COMPILED_' lie stats fusion | grep -v /detail/)
+  done < <(grep -rlE --include='*.hpp' '^#if(def LIESTAT_HEADER_ONLY|ndef LIESTAT_COMPILED_)' lie stats fusion | grep -v /detail/)
   return "$wrong"
 }
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$work"/{cli/show,lie,stats,fusion,python}
-printf '#pragma once\n#ifndef LIESTAT_COMPILED_FUSION\n#endif\n' | tee "$work/fusion/mean_types.hpp" >"$work/fusion/mean.hpp"
+printf '#pragma once\n#ifdef LIESTAT_HEADER_ONLY\n#endif\n' | tee "$work/fusion/mean_types.hpp" >"$work/fusion/mean.hpp"
 tried() {
   printf '%s\n' "$2" >"$work/$1"
   if (check "$work") >"$work/found"; then echo "the check finds no fault in: $2" && exit 1; fi

@@ -1,6 +1,6 @@
 // Diagnosis of conventions, compiled once; see initialisation.cpp.
-#ifndef LIESTAT_COMPILED_FUSION
-#define LIESTAT_COMPILED_FUSION
+#ifndef LIESTAT_COMPILED_TRAJECTORIES
+#define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
 #include <fusion/detail/diagnose_conventions.hpp>

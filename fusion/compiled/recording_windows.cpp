@@ -1,6 +1,6 @@
 // Windows of an inertial recording, compiled once; see initialisation.cpp.
-#ifndef LIESTAT_COMPILED_FUSION
-#define LIESTAT_COMPILED_FUSION
+#ifndef LIESTAT_COMPILED_TRAJECTORIES
+#define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
 #include <fusion/detail/preintegrate_windows.hpp>

@@ -1,6 +1,6 @@
 // Evaluation of trajectories, compiled once; see initialisation.cpp.
-#ifndef LIESTAT_COMPILED_FUSION
-#define LIESTAT_COMPILED_FUSION
+#ifndef LIESTAT_COMPILED_TRAJECTORIES
+#define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
 #include <fusion/detail/evaluate_trajectories.hpp>

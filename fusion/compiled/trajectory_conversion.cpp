@@ -1,6 +1,6 @@
 // Conversion of the covariances of trajectories, compiled once; see initialisation.cpp.
-#ifndef LIESTAT_COMPILED_FUSION
-#define LIESTAT_COMPILED_FUSION
+#ifndef LIESTAT_COMPILED_TRAJECTORIES
+#define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
 #include <fusion/detail/convert_trajectory.hpp>

@@ -1,10 +1,29 @@
-// LIESTAT_FUSION_INLINE, the linkage of the estimators of fusion/. By default their headers include the definitions, as
-// inline functions: nothing has to be linked. With LIESTAT_COMPILED_FUSION the headers only declare, which compiles in
-// a fraction of the time, and the program links the definitions of fusion/compiled/.
+// How the estimators of fusion/ are compiled. Their headers declare them; the definitions, in fusion/detail/, are compiled
+// once by the CMake targets liestat::fusion and liestat::trajectories, or by a project that compiles fusion/compiled/*.cpp
+// itself and defines LIESTAT_COMPILED_FUSION and LIESTAT_COMPILED_TRAJECTORIES for all of its units, as the targets do. With
+// LIESTAT_HEADER_ONLY defined for all units the headers include the definitions and nothing is linked.
+//
+// A unit with neither may include the headers and use the types. A call of an estimator is an error at compile time that
+// names the target and the macro, rather than an undefined symbol.
 #pragma once
 
-#ifdef LIESTAT_COMPILED_FUSION
-#define LIESTAT_FUSION_INLINE
-#else
+/// The linkage of definitions.
+#ifdef LIESTAT_HEADER_ONLY
 #define LIESTAT_FUSION_INLINE inline
+#else
+#define LIESTAT_FUSION_INLINE
+#endif
+
+/// Stand before the declarations of estimators.
+#if defined(LIESTAT_HEADER_ONLY) || defined(LIESTAT_COMPILED_FUSION)
+#define LIESTAT_FUSION_API
+#else
+#define LIESTAT_FUSION_API \
+  [[gnu::error("liestat: link the CMake target liestat::fusion, or define LIESTAT_HEADER_ONLY for all units")]]
+#endif
+#if defined(LIESTAT_HEADER_ONLY) || defined(LIESTAT_COMPILED_TRAJECTORIES)
+#define LIESTAT_TRAJECTORIES_API
+#else
+#define LIESTAT_TRAJECTORIES_API \
+  [[gnu::error("liestat: link the CMake target liestat::trajectories, or define LIESTAT_HEADER_ONLY for all units")]]
 #endif

@@ -59,7 +59,7 @@ struct DirectionCandidate {
 
 class MotionEngine {
  public:
-  MotionEngine(const MotionFilterOptions& options, MotionState state);
+  LIESTAT_FUSION_API MotionEngine(const MotionFilterOptions& options, MotionState state);
 
   const MotionEstimate& update(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
   const MotionEstimate& estimate() const { return estimate_; }
@@ -156,6 +156,6 @@ class MotionEngine {
 
 }  // namespace liestat::detail
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/motion_engine_run.hpp>
 #endif

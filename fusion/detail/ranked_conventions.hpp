@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fusion/convention_diagnosis.hpp>
+#include <fusion/trajectories.hpp>  // first: its definitions include the next
 #include <fusion/detail/pose_alignment.hpp>
 #include <fusion/detail/repaired_matrices.hpp>
 #include <stats/convention_charts.hpp>

@@ -8,6 +8,7 @@
 //   std::puts(result.verdict().text.c_str());
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/ground_truth.hpp>
 #include <fusion/imu/recording_windows_types.hpp>
 
@@ -26,8 +27,9 @@ struct TimeInterval {
 /// Whole intervals of `length` s, one after the other from `begin` (without a length one, to `end`). The last one is
 /// kept where rounding alone would take it away. Empty where none fits, more than `max_count` do, or a number is not
 /// finite.
-std::vector<TimeInterval> consecutiveWindows(double begin, double end, std::optional<double> length = {},
-                                             double max_count = 1e6);
+LIESTAT_TRAJECTORIES_API std::vector<TimeInterval> consecutiveWindows(double begin, double end,
+                                                                      std::optional<double> length = {},
+                                                                      double max_count = 1e6);
 
 struct RecordingWindowOptions {
   RecordingOptions<double> integration = {};  ///< its bias is replaced, see `bias`
@@ -38,19 +40,24 @@ struct RecordingWindowOptions {
 
 /// The motion over one window of readings (in the order of time, as for preintegrate()); `truth` may be empty. Nothing
 /// throws: see RecordingResult::fault.
-RecordingWindow preintegrateWindow(std::span<const ImuSample<double>> readings, const TimeInterval& window,
-                                   std::span<const GroundTruth> truth = {}, const RecordingWindowOptions& options = {});
+LIESTAT_TRAJECTORIES_API RecordingWindow preintegrateWindow(std::span<const ImuSample<double>> readings,
+                                                            const TimeInterval& window,
+                                                            std::span<const GroundTruth> truth = {},
+                                                            const RecordingWindowOptions& options = {});
 /// Those over several, in their order.
-RecordingWindows preintegrateWindows(std::span<const ImuSample<double>> readings, std::span<const TimeInterval> windows,
-                                     std::span<const GroundTruth> truth = {},
-                                     const RecordingWindowOptions& options = {});
+LIESTAT_TRAJECTORIES_API RecordingWindows preintegrateWindows(std::span<const ImuSample<double>> readings,
+                                                              std::span<const TimeInterval> windows,
+                                                              std::span<const GroundTruth> truth = {},
+                                                              const RecordingWindowOptions& options = {});
 
 /// The standard deviations of increments from the beginning of the window on, in `steps` equal steps of its duration.
-std::vector<IncrementSigmas> growthOfSigmas(std::span<const ImuSample<double>> readings, const RecordingWindow& window,
-                                            RecordingOptions<double> options, std::size_t steps = 50);
+LIESTAT_TRAJECTORIES_API std::vector<IncrementSigmas> growthOfSigmas(std::span<const ImuSample<double>> readings,
+                                                                     const RecordingWindow& window,
+                                                                     RecordingOptions<double> options,
+                                                                     std::size_t steps = 50);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/preintegrate_windows.hpp>
 #endif

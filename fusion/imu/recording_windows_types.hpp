@@ -105,6 +105,6 @@ void describe(V& v, const RecordingWindows& r) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/recording_windows_verdict.hpp>
 #endif

@@ -11,6 +11,7 @@
 // 0.01 rad/s, over two seconds it is not (docs/theory/visual_inertial.md, sections 2.2 and 3.6).
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <fusion/init/closed_form_types.hpp>
@@ -39,9 +40,9 @@ class InertialWindow {
       : features(std::move(tracks)), cameras(std::move(body_T_cameras)), motions_(std::move(motions)) {}
   /// From readings in the order of time, which may be those of a whole recording (those that the window needs are
   /// copied), and the times of the n images on their clock (s). Readings that do not serve leave a fault().
-  InertialWindow(std::span<const ImuSample<double>> readings, std::vector<double> times,
-                 const RecordingOptions<double>& how = {}, std::vector<FeatureTrack> tracks = {},
-                 std::vector<SE3d> body_T_cameras = {SE3d()});
+  LIESTAT_FUSION_API InertialWindow(std::span<const ImuSample<double>> readings, std::vector<double> times,
+                                    const RecordingOptions<double>& how = {}, std::vector<FeatureTrack> tracks = {},
+                                    std::vector<SE3d> body_T_cameras = {SE3d()});
 
   /// From each image to the next, all with bias(); empty where there is a fault.
   const std::vector<Preintegration<double>>& motions() const { return motions_; }
@@ -95,10 +96,11 @@ struct BiasedImage {
 
 /// All images for given biases, motions updated to first order. The derivative by the accelerometer's bias is in each
 /// WindowImage.
-std::vector<BiasedImage> biasedImages(const std::vector<Preintegration<double>>& motions, const ImuBias<double>& bias);
+LIESTAT_FUSION_API std::vector<BiasedImage> biasedImages(const std::vector<Preintegration<double>>& motions,
+                                                         const ImuBias<double>& bias);
 
 /// The window of the closed form for given biases.
-ClosedFormWindow closedFormWindow(const InertialWindow& window, const ImuBias<double>& bias);
+LIESTAT_FUSION_API ClosedFormWindow closedFormWindow(const InertialWindow& window, const ImuBias<double>& bias);
 /// The same for the biases that its motions were integrated with.
 inline ClosedFormWindow closedFormWindow(const InertialWindow& window) {
   return closedFormWindow(window, window.bias());
@@ -115,6 +117,6 @@ inline Eigen::Vector3d bearingInBody(const std::vector<SE3d>& cameras, const Tra
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/inertial_window.hpp>
 #endif

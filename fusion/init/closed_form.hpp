@@ -15,15 +15,17 @@
 // It is in double only: its ranks are decided at 1e-10.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/init/closed_form_types.hpp>
 
 namespace liestat {
 
 /// Velocity, gravity and features of a window. Input that can't be used gives bad_input with a fault, never a crash.
-ClosedFormResult solveClosedForm(const ClosedFormWindow& window, const InitialisationOptions& options = {});
+LIESTAT_FUSION_API ClosedFormResult solveClosedForm(const ClosedFormWindow& window,
+                                                    const InitialisationOptions& options = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/solve_closed_form.hpp>
 #endif

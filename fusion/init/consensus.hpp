@@ -10,6 +10,7 @@
 // Matas and J. Kittler's (LO-RANSAC, 2003).
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/init/closed_form.hpp>
 
 #include <cstddef>
@@ -29,10 +30,11 @@ struct ConsensusResult {
 
 /// Velocity, gravity and features of a window of which up to half of the tracks, and more with more hypotheses, are
 /// wrong. Bad input: see result.fault; options that make no sense, such as no noise, are bad_option.
-ConsensusResult solveClosedFormRobustly(const ClosedFormWindow& window, const InitialisationOptions& options);
+LIESTAT_FUSION_API ConsensusResult solveClosedFormRobustly(const ClosedFormWindow& window,
+                                                           const InitialisationOptions& options);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/solve_closed_form_robustly.hpp>
 #endif

@@ -24,16 +24,18 @@
 // the gyroscope's must be smaller over the window (3e-4 rad in two seconds of an ADIS16448, where a pixel is 2e-3).
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/results.hpp>
 
 namespace liestat {
 
 /// The bias that the rotations between images say. The window is integrated anew where first order will not do.
-EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window, const InitialisationOptions& options);
+LIESTAT_FUSION_API EpipolarBiasResult estimateEpipolarGyroscopeBias(const InertialWindow& window,
+                                                                    const InitialisationOptions& options);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/estimate_epipolar_gyroscope_bias.hpp>
 #endif

@@ -11,6 +11,7 @@
 // found.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form_types.hpp>
 
@@ -36,10 +37,11 @@ struct GyroscopeBiasResult {
 
 /// The bias that explains the bearings best, with the closed form for it. The window is integrated anew where a
 /// first-order update will not do.
-GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window, const InitialisationOptions& options);
+LIESTAT_FUSION_API GyroscopeBiasResult estimateGyroscopeBias(InertialWindow window,
+                                                             const InitialisationOptions& options);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/estimate_gyroscope_bias.hpp>
 #endif

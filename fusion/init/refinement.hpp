@@ -11,6 +11,7 @@
 // Gauss–Newton fails from short windows.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/results.hpp>
 
@@ -19,19 +20,20 @@ namespace liestat {
 /// The most probable motion next to a start: a solution of the closed form, and the biases with which it was found (its
 /// own correction of the accelerometer's is added). The motions must have been integrated with the sensor's noise;
 /// where the biases go too far for their first-order update, the window is integrated anew and refined on from there.
-RefinementResult refine(InertialWindow window, const ClosedFormSolution& start, const ImuBias<double>& start_bias,
-                        const InitialisationOptions& options);
+LIESTAT_FUSION_API RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
+                                           const ImuBias<double>& start_bias, const InitialisationOptions& options);
 
 /// The most probable gravity and biases of a window in which the body stays where it is (it may turn), from a first guess
 /// of gravity: `states` have no velocity and position, there are no `features`, and `covariance` says how far the
 /// accelerometer's bias and the tilt stand for each other. stationary: the readings scatter as their noise says
 /// (p ≥ 1e-3); no_parallax: they do not. Otherwise as refine(). Whether tracks show a motion is not asked: that is
 /// solveClosedForm()'s stationary.
-RefinementResult refineAtRest(InertialWindow window, const Eigen::Vector3d& gravity, const ImuBias<double>& start_bias,
-                              const InitialisationOptions& options);
+LIESTAT_FUSION_API RefinementResult refineAtRest(InertialWindow window, const Eigen::Vector3d& gravity,
+                                                 const ImuBias<double>& start_bias,
+                                                 const InitialisationOptions& options);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/refine.hpp>
 #endif

@@ -11,16 +11,18 @@
 // world behind it.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/results.hpp>
 
 namespace liestat {
 
 /// Velocity, gravity, features and the gyroscope's bias of a window. Bad input: see result.fault.
-RobustInitialisation initialiseRobustly(const InertialWindow& window, const InitialisationOptions& options);
+LIESTAT_FUSION_API RobustInitialisation initialiseRobustly(const InertialWindow& window,
+                                                           const InitialisationOptions& options);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/initialise_robustly.hpp>
 #endif

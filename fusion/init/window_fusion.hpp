@@ -15,6 +15,7 @@
 // features", 1998, section 4.2 (the mean) and 5.2 (the test).
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/inertial_state.hpp>
@@ -39,8 +40,8 @@ using Matrix11 = Eigen::Matrix<double, 11, 11>;
 /// The state at the end of a motion that begins where the state is: gravity and velocity by the inertial sensor, with
 /// its noise, the biases with their random walk. Gravity's length in m/s². The motion is updated to the state's biases
 /// to first order: over seconds it should have been integrated with them.
-Gaussian<InertialState> carried(const Gaussian<InertialState>& state, const Preintegration<double>& motion,
-                                double gravity);
+LIESTAT_FUSION_API Gaussian<InertialState> carried(const Gaussian<InertialState>& state,
+                                                   const Preintegration<double>& motion, double gravity);
 
 /// A window's estimate of the states at its first and its last image, with the covariance of both.
 struct WindowStates {
@@ -54,7 +55,7 @@ struct WindowStates {
 
 /// The states at the ends of a refined window, each with its own biases where these walk. Not ok() where the refinement
 /// did not succeed.
-WindowStates windowStates(const RefinementResult& refined);
+LIESTAT_FUSION_API WindowStates windowStates(const RefinementResult& refined);
 
 /// Collects windows in the order of time; see the header comment.
 class WindowFusion {
@@ -106,9 +107,9 @@ class WindowFusion {
 
  private:
   /// The first window, or one without covariance.
-  Meeting begin(const WindowStates& window);
+  LIESTAT_FUSION_API Meeting begin(const WindowStates& window);
   /// A later one, and the motion since the last.
-  Meeting meet(const WindowStates& window, const Preintegration<double>& since);
+  LIESTAT_FUSION_API Meeting meet(const WindowStates& window, const Preintegration<double>& since);
   /// From the first image to the last by the window's own estimate.
   static Gaussian<InertialState> through(const WindowStates& window, const Gaussian<InertialState>& at_first);
 
@@ -120,6 +121,6 @@ class WindowFusion {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/fuse_windows.hpp>
 #endif

@@ -85,7 +85,7 @@ struct MotionGyroscope {
 /// From the rotation of each frame since the one before, in the sign and the axes of the filters: element k is that of
 /// frame k, the first one is not read. `seconds` between frames are the unit of a bias. Rotations with numbers that are
 /// not finite count as missing.
-MotionGyroscope gyroscopeOfRotations(std::vector<GyroscopeRotation> rotations, double seconds = 1);
+LIESTAT_FUSION_API MotionGyroscope gyroscopeOfRotations(std::vector<GyroscopeRotation> rotations, double seconds = 1);
 
 /// A rate in the sensor's axes at the time of a frame.
 struct FrameRate {
@@ -94,8 +94,9 @@ struct FrameRate {
 };
 /// From rates at the frames, by their numbers: between two of them holds the mean of both. `sigma`: rad per frame, of
 /// each component.
-MotionGyroscope gyroscopeOfRates(std::map<std::size_t, FrameRate> rates, double sigma, const SO3d& camera_R_sensor,
-                                 const Eigen::Vector3d& bias = Eigen::Vector3d::Zero());
+LIESTAT_FUSION_API MotionGyroscope gyroscopeOfRates(std::map<std::size_t, FrameRate> rates, double sigma,
+                                                    const SO3d& camera_R_sensor,
+                                                    const Eigen::Vector3d& bias = Eigen::Vector3d::Zero());
 
 /// The readings of an inertial sensor beside a sequence of frames.
 struct GyroscopeReadings {
@@ -106,14 +107,15 @@ struct GyroscopeReadings {
   std::function<std::string(std::size_t index)> place = {};
 };
 /// From readings, preintegrated over each interval. The noise of the gyroscope must be positive.
-MotionGyroscope gyroscopeOfReadings(GyroscopeReadings readings, const SO3d& camera_R_sensor);
+LIESTAT_FUSION_API MotionGyroscope gyroscopeOfReadings(GyroscopeReadings readings, const SO3d& camera_R_sensor);
 
 /// Why a gyroscope has no rotation for any interval of two successive ones of these frames (another clock, or another
 /// recording); empty if it has one, or if there are not two frames.
-std::string reasonWithoutCover(const MotionGyroscope& gyroscope, const std::map<std::size_t, double>& times);
+LIESTAT_FUSION_API std::string reasonWithoutCover(const MotionGyroscope& gyroscope,
+                                                  const std::map<std::size_t, double>& times);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/motion_gyroscope.hpp>
 #endif

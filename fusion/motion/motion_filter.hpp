@@ -16,6 +16,7 @@
 // filter knows one interval alone: pairs over several frames never come to a hand-over.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/motion/essential_filter.hpp>
 #include <fusion/motion/plan.hpp>
 #include <fusion/motion/subspace_filter.hpp>
@@ -43,9 +44,10 @@ struct MotionHandOver {
 class MotionFilter {
  public:
   /// Pairs of successive frames.
-  explicit MotionFilter(const MotionFilterOptions& options = {}, const MotionHandOver& hand_over = {});
+  LIESTAT_FUSION_API explicit MotionFilter(const MotionFilterOptions& options = {},
+                                           const MotionHandOver& hand_over = {});
   /// The filter of a plan. One with a fault runs and gives no usable estimate: look at plan.ok() first.
-  explicit MotionFilter(const MotionPlan& plan, const MotionHandOver& hand_over = {});
+  LIESTAT_FUSION_API explicit MotionFilter(const MotionPlan& plan, const MotionHandOver& hand_over = {});
 
   /// The next frame of the tracks, and a gyroscope's rotation since the frame before it, with its covariance: the
   /// filter makes pairs, and of the rotations the prior of their interval, itself. The first frame has no motion.
@@ -127,13 +129,13 @@ class MotionFilter {
 
 /// T of X₂ = R X₁ + T from a velocity that is constant over the interval, T = J_l(Ω) V, or the direction itself where it
 /// is one of a translation already; the covariance of the rotation is left out (|Ω|/2 of it, to first order).
-Gaussian<S2d> translationDirection(const MotionEstimate& estimate);
+LIESTAT_FUSION_API Gaussian<S2d> translationDirection(const MotionEstimate& estimate);
 /// The velocity of a translation over the estimate's rotation, V ∝ J_l(Ω)⁻¹ T, or the direction itself; the covariance
 /// as above.
-Gaussian<S2d> velocityDirection(const MotionEstimate& estimate);
+LIESTAT_FUSION_API Gaussian<S2d> velocityDirection(const MotionEstimate& estimate);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/motion_filter_run.hpp>
 #endif

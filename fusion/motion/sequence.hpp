@@ -30,8 +30,9 @@ using MotionObserver = std::function<void(const MotionFrame&, const MotionFilter
 /// Runs the filter of the options over a sequence, `passes` times; the result is that of the last pass. Results are per
 /// frame whatever the interval of the pairs. A combination of options that no filter serves gives a result with a fault
 /// and without frames; frames of which nothing can be said have flags (MotionFlags).
-MotionResult estimateMotion(const TrackFrames& frames, const MotionOptions& options = {},
-                            const MotionGyroscope& gyroscope = {}, const MotionObserver& observer = {});
+LIESTAT_FUSION_API MotionResult estimateMotion(const TrackFrames& frames, const MotionOptions& options = {},
+                                               const MotionGyroscope& gyroscope = {},
+                                               const MotionObserver& observer = {});
 
 /// The true pose of a camera.
 struct TrueCamera {
@@ -42,10 +43,11 @@ struct TrueCamera {
 /// Sets the errors of the frames whose true pose, and that at the start of their interval, are known: of the rotation
 /// per frame, and of the direction, against the velocity or the translation as the estimate means it, where the camera
 /// moved by more than `min_motion` (m).
-void compareWithTruth(MotionResult& result, const std::map<std::size_t, TrueCamera>& truth, double min_motion = 0.1);
+LIESTAT_FUSION_API void compareWithTruth(MotionResult& result, const std::map<std::size_t, TrueCamera>& truth,
+                                         double min_motion = 0.1);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/motion_sequence.hpp>
 #endif

@@ -14,10 +14,10 @@
 namespace liestat {
 
 /// The window has seen the frame that it looks at, which is one of the result's.
-MotionFrameStudy studyFrame(const MotionWindow& window, const MotionResult& result);
+LIESTAT_FUSION_API MotionFrameStudy studyFrame(const MotionWindow& window, const MotionResult& result);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/motion_study.hpp>
 #endif

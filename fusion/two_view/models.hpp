@@ -102,9 +102,9 @@ using TwoViewModels = std::vector<std::shared_ptr<const TwoViewModel>>;
 namespace detail {
 
 /// The part of the lattice that homographies make, that of epipolar geometries, and optional ones of these.
-TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options);
-TwoViewModels epipolarModels(const TwoViewImages& images, const TwoViewModelOptions& options);
-TwoViewModels poseModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+LIESTAT_FUSION_API TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+LIESTAT_FUSION_API TwoViewModels epipolarModels(const TwoViewImages& images, const TwoViewModelOptions& options);
+LIESTAT_FUSION_API TwoViewModels poseModels(const TwoViewImages& images, const TwoViewModelOptions& options);
 
 }  // namespace detail
 
@@ -125,7 +125,7 @@ inline TwoViewModels twoViewModels(const TwoViewImages& images,
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/epipolar_models.hpp>
 #include <fusion/detail/homography_models.hpp>
 #include <fusion/detail/pose_models.hpp>

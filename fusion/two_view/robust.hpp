@@ -84,18 +84,19 @@ struct RobustEssential : TwoViewRobustResult {
 };
 
 /// In any coordinates. Matches on the wrong side of the plane's horizon are outliers.
-RobustHomography robustHomography(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
-                                  const TwoViewRobustOptions& options = {});
+LIESTAT_FUSION_API RobustHomography robustHomography(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
+                                                     const TwoViewRobustOptions& options = {});
 /// In any coordinates. Where all points lie in a plane any of the geometries that agree with its homography may be found:
 /// the covariance then says so, in two directions.
-RobustFundamental robustFundamental(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
-                                    const TwoViewRobustOptions& options = {});
+LIESTAT_FUSION_API RobustFundamental robustFundamental(std::span<const Eigen::Vector4d> matches,
+                                                       const MatchNoise& noise,
+                                                       const TwoViewRobustOptions& options = {});
 /// In normalised coordinates, u = (p - c)/f. Inliers lie in front of both views.
-RobustEssential robustEssential(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
-                                const TwoViewRobustOptions& options = {});
+LIESTAT_FUSION_API RobustEssential robustEssential(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
+                                                   const TwoViewRobustOptions& options = {});
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/robust_two_view.hpp>
 #endif

@@ -49,26 +49,27 @@ struct TwoViewMotionOptions {
 /// The estimate from matches in pixels. Equal matches count once. Matches that contradict each other take no part in it,
 /// but may be inliers of what is found. Those that are not finite, or that no direction of a camera belongs to, are outliers
 /// of all models. Nothing is thrown: the status says what is wrong. The same matches in another order give the same answer.
-TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
-                                            const TwoViewMotionOptions& options);
+LIESTAT_FUSION_API TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
+                                                               const TwoViewMotionOptions& options);
 
 /// Several motions: the matches that agree with the first are taken out, and the search runs again over the rest, until
 /// chance explains what is found or there are `most` (stats/repeated_extraction.hpp). Each match belongs to the motion that
 /// explains it best.
-TwoViewMotions estimateTwoViewMotions(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options,
-                                      std::size_t most = 20);
+LIESTAT_FUSION_API TwoViewMotions estimateTwoViewMotions(std::span<const Eigen::Vector4d> matches,
+                                                         const TwoViewMotionOptions& options, std::size_t most = 20);
 
 /// The physical parameters of a model of the lattice by its name and its estimate, in the units of the matches that it
 /// was estimated from: `unit` says how many px are one unit in each image. `matches` tell on which side of the cameras
 /// points lie. Nothing for a model that is not of the lattice, or without a covariance.
-std::vector<PhysicalParameters> physicalParameters(const std::string& model,
-                                                   const ModelEstimate<TwoViewMotionModel>& estimate,
-                                                   std::span<const Eigen::Vector4d> matches,
-                                                   TwoViewCalibration calibration, const FocalLengths& unit);
+LIESTAT_FUSION_API std::vector<PhysicalParameters> physicalParameters(const std::string& model,
+                                                                      const ModelEstimate<TwoViewMotionModel>& estimate,
+                                                                      std::span<const Eigen::Vector4d> matches,
+                                                                      TwoViewCalibration calibration,
+                                                                      const FocalLengths& unit);
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/estimate_two_view_motion.hpp>
 #include <fusion/detail/physical_parameters.hpp>
 #endif

@@ -200,6 +200,6 @@ void describe(V& v, const TwoViewMotions& x) {
 
 }  // namespace liestat
 
-#ifndef LIESTAT_COMPILED_FUSION
+#ifdef LIESTAT_HEADER_ONLY
 #include <fusion/detail/two_view_results.hpp>
 #endif

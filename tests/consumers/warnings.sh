@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# No warning from the headers in a user's own unit, with the compiler that CXX names, else with g++ and clang++ where they
+# No warning from the headers in a user's own unit, which compiles the estimators as well (LIESTAT_HEADER_ONLY), with the compiler that CXX names, else with g++ and clang++ where they
 # are installed; Boost's and Random123's own headers are the system's. Usage: warnings.sh [UNIT…], without arguments all of
 # them; CMAKE_BUILD_PARALLEL_LEVEL is how many compilers run at once.
 set -euo pipefail
@@ -23,7 +23,7 @@ check() {
     return 0
   fi
   # shellcheck disable=SC2086
-  output=$($1 -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror -I"$root" \
+  output=$($1 -std=c++20 -DLIESTAT_HEADER_ONLY -fsyntax-only -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror -I"$root" \
     ${eigen//-I/-isystem } "$2" 2>&1) || {
     echo "$output"
     echo "warnings: $name: failed"
