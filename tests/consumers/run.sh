@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds and runs one tiny program in each way that a user can take liestat: in place, by add_subdirectory, by
-# find_package and by pkg-config from an installed tree. Usage: run.sh [WORK_DIRECTORY]; CXX and CMAKE are obeyed.
+# find_package and by pkg-config from an installed tree; the estimators of fusion/ linked and header-only. Usage: run.sh [WORK_DIRECTORY]; CXX and CMAKE are obeyed.
 # Without pkg-config its part is left out, and said to be: nothing else of liestat needs it. Before that, what a user's
 # own unit gets to see of a mistake: one sentence. (warnings.sh: no warning.)
 set -euo pipefail
@@ -81,6 +81,20 @@ else
   echo "consumers: mistakes are answered by one sentence each"
 fi
 
+# Estimators of fusion/ in a program that links nothing: a call is answered by one sentence that names the target and the
+# macro, and with the macro the program is whole.
+# shellcheck disable=SC2086
+estimators() { $CXX -std=c++20 "$@" -I"$root" $eigen "$here/fusion.cpp" 2>&1; }
+for target in fusion trajectories; do
+  estimators -c -o not_linked.o | grep -q "liestat: link the CMake target liestat::$target, or define LIESTAT_HEADER_ONLY" || {
+    estimators -c -o not_linked.o
+    echo "consumers: failed: a call of an estimator that is not linked is not answered by a sentence" >&2
+    exit 1
+  }
+done
+quietly estimators -DLIESTAT_HEADER_ONLY -o header_only
+built_and_ran ./header_only "in place, LIESTAT_HEADER_ONLY"
+
 quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
 quietly "$CMAKE" --build add_subdirectory
 built_and_ran ./add_subdirectory/consumer "add_subdirectory"
@@ -100,6 +114,7 @@ quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$w
 quietly "$CMAKE" --build find_package
 built_and_ran ./find_package/consumer "find_package"
 built_and_ran ./find_package/compiled "find_package with components"
+built_and_ran ./find_package/fusion "find_package with fusion and trajectories"
 if "$CMAKE" -S "$here/find_package" -B bogus -DCMAKE_PREFIX_PATH="$work/moved" -DWANTED=bogus >"$work/log" 2>&1 ||
   ! grep -q 'There is no component bogus; there are means, fusion, trajectories' "$work/log"; then
   cat "$work/log"
