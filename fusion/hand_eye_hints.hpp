@@ -70,7 +70,7 @@ class HandEyeExplanation {
   HandEyeExplanation(std::span<const PosePair> given, bool world, const HandEyeHintOptions& options)
       : given_(some(given)), world_(world), options_(options) {}
 
-  std::optional<HandEyeHint> best() {
+  LIESTAT_FUSION_API std::optional<HandEyeHint> best() {
     const HandEyeHint found = fit(options_.reading);
     // With the poses of A inverted instead, X and Y are exchanged and the fit is the same.
     HandEyeReading inverted = options_.reading;
@@ -105,7 +105,7 @@ class HandEyeExplanation {
     for (std::size_t i = 0; i < pairs.size(); i += step) spread.push_back(pairs[i]);
     return spread;
   }
-  HandEyeHint fit(const HandEyeReading& reading) const {
+  LIESTAT_FUSION_API HandEyeHint fit(const HandEyeReading& reading) const {
     std::vector<PosePair> pairs;
     for (const PosePair& pair : given_) pairs.push_back(readPair(pair, reading));
     const HandEyeResult result =
@@ -120,7 +120,7 @@ class HandEyeExplanation {
     return hint.outliers <= than.outliers && 10 * hint.chi2_per_degree < than.chi2_per_degree;
   }
   /// Other covariances of A, of B, and of both where both may have been written by one program.
-  void addReadings(std::vector<HandEyeHint>& hints, const HandEyeReading& from) const {
+  LIESTAT_FUSION_API void addReadings(std::vector<HandEyeHint>& hints, const HandEyeReading& from) const {
     for (const CovarianceReading covariance : all_covariance_readings) {
       for (const auto& [a, b] : {std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
         if ((a && !options_.doubt_a) || (b && !options_.doubt_b)) continue;
@@ -143,8 +143,9 @@ class HandEyeExplanation {
 /// nearest to one, with p ≥ 1e-3 and no more than a third of the pairs rejected. Where none does, inverse poses if they
 /// make χ²/dof at least ten times smaller. Of more than 40 pairs a part is fitted. Empty where nothing asks for an
 /// explanation, and where nothing explains it.
-inline std::optional<HandEyeHint> explainHandEye(std::span<const PosePair> given, const HandEyeResult& result,
-                                                 const HandEyeHintOptions& options = {}) {
+LIESTAT_FUSION_API inline std::optional<HandEyeHint> explainHandEye(std::span<const PosePair> given,
+                                                                    const HandEyeResult& result,
+                                                                    const HandEyeHintOptions& options = {}) {
   if (!asksForExplanation(result)) return std::nullopt;
   return detail::HandEyeExplanation(given, result.world, options).best();
 }

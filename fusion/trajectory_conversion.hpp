@@ -44,7 +44,7 @@ enum class ConversionFault {
   undetermined       ///< unknown entries leave nothing of the result
 };
 /// The enumerator's name, for files.
-LIESTAT_TRAJECTORIES_API const char* name(ConversionFault fault);
+const char* name(ConversionFault fault);
 
 /// A matrix that was not converted. Sentences put names of options between backquotes.
 struct UnconvertedMatrix {

@@ -59,7 +59,7 @@ struct DirectionCandidate {
 
 class MotionEngine {
  public:
-  LIESTAT_FUSION_API MotionEngine(const MotionFilterOptions& options, MotionState state);
+  MotionEngine(const MotionFilterOptions& options, MotionState state);
 
   const MotionEstimate& update(std::span<const PointPair> pairs, const GyroscopeRotation* gyroscope);
   const MotionEstimate& estimate() const { return estimate_; }

@@ -102,7 +102,7 @@ LIESTAT_FUSION_API std::vector<BiasedImage> biasedImages(const std::vector<Prein
 /// The window of the closed form for given biases.
 LIESTAT_FUSION_API ClosedFormWindow closedFormWindow(const InertialWindow& window, const ImuBias<double>& bias);
 /// The same for the biases that its motions were integrated with.
-inline ClosedFormWindow closedFormWindow(const InertialWindow& window) {
+LIESTAT_FUSION_API inline ClosedFormWindow closedFormWindow(const InertialWindow& window) {
   return closedFormWindow(window, window.bias());
 }
 

@@ -107,9 +107,9 @@ class WindowFusion {
 
  private:
   /// The first window, or one without covariance.
-  LIESTAT_FUSION_API Meeting begin(const WindowStates& window);
+  Meeting begin(const WindowStates& window);
   /// A later one, and the motion since the last.
-  LIESTAT_FUSION_API Meeting meet(const WindowStates& window, const Preintegration<double>& since);
+  Meeting meet(const WindowStates& window, const Preintegration<double>& since);
   /// From the first image to the last by the window's own estimate.
   static Gaussian<InertialState> through(const WindowStates& window, const Gaussian<InertialState>& at_first);
 

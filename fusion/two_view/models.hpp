@@ -110,7 +110,7 @@ LIESTAT_FUSION_API TwoViewModels poseModels(const TwoViewImages& images, const T
 
 /// The lattice. ModelEstimate::covariance is 9×9, of the rank that is free; of `essential` 5×5 in the tangent of the pose,
 /// of `upright` the same of rank three, of `shared focal length` 6×6, the last one log f.
-inline TwoViewModels twoViewModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+LIESTAT_FUSION_API inline TwoViewModels twoViewModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
   TwoViewModels models = detail::homographyModels(images, options);
   for (const TwoViewModels& more : {detail::epipolarModels(images, options), detail::poseModels(images, options)}) {
     models.insert(models.end(), more.begin(), more.end());
@@ -118,8 +118,8 @@ inline TwoViewModels twoViewModels(const TwoViewImages& images, const TwoViewMod
   return models;
 }
 /// The default lattice.
-inline TwoViewModels twoViewModels(const TwoViewImages& images,
-                                   TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
+LIESTAT_FUSION_API inline TwoViewModels twoViewModels(const TwoViewImages& images,
+                                                      TwoViewCalibration calibration = TwoViewCalibration::calibrated) {
   return twoViewModels(images, TwoViewModelOptions{.calibration = calibration});
 }
 
