@@ -32,8 +32,6 @@ std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, cons
 
 }  // namespace
 
-std::string name(CovarianceAt at) { return at == CovarianceAt::measured ? "measured" : "estimated"; }
-
 std::size_t methodIndex(const Method& method) {
   std::size_t i = 0;
   while (i + 1 < methods.size() &&

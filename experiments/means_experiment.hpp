@@ -44,9 +44,6 @@ inline std::string name(Noise noise) { return noise_names[static_cast<std::size_
 
 inline constexpr std::array all_criteria{Criterion::lsq, Criterion::wlsq, Criterion::maha};
 
-/// The name of the program's option and JSON field.
-std::string name(CovarianceAt at);
-
 /// A way to estimate a mean and its covariance, of those that a trial compares.
 struct Method {
   Criterion criterion;

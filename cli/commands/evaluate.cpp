@@ -148,7 +148,9 @@ EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& refere
   }
   EvaluatedEstimate e{
       .name = fileOf(path),
-      .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how)};
+      .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how),
+      .ape_title = {},
+      .rpe_title = {}};
   if (!e.evaluation.ok()) refuse(o, e.evaluation, reference, estimate);
   // Titles name the unit in which the errors are first computed.
   e.ape_title = fmt::format("APE w.r.t. {} ({}){}", wordsOfRelation(o.how.pose_relation), e.evaluation.ape_unit,

@@ -326,11 +326,6 @@ def diagnose_conventions(
         raise ValueError(f"{caller}: several runs: expected a truth, runs in its world, and no edges")
     if truth_times is not None:
         at_truth = _times(caller, "truth_times", truth_times, len(truth))
-        steps = np.sort(np.diff(at_truth))
-        if association == "nearest":
-            max_gap = max_difference
-        elif max_gap is None:
-            max_gap = 5 * float(steps[len(steps) // 2]) if len(steps) else 0.0
     runs = []
     for run, table, run_times in zip(estimates, tables, stamps):
         params = _poses(caller, "estimate", run)
@@ -344,11 +339,10 @@ def diagnose_conventions(
                     raise ValueError(f"{caller}: truth_times without times")
                 slerp = interpolation == "slerp"
                 nearest = association == "nearest"
+                gap = None if max_gap is None else float(max_gap)
                 rows, exact = _core.match_truth(
-                    exact, at_truth, run_times, nearest, slerp, float(max_gap), float(offset)
+                    exact, at_truth, run_times, nearest, slerp, gap, float(max_difference), float(offset)
                 )
-                if not len(rows):
-                    raise ValueError(f"{caller}: no pose of the estimate has a partner in the truth")
                 params, table, run_times = params[rows], table[rows], run_times[rows]
             elif len(exact) != len(params):
                 raise ValueError(f"{caller}: {len(exact)} true poses of {len(params)}, expected one for each, or times")

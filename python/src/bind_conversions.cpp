@@ -1,5 +1,6 @@
 // Conversion of the covariances of trajectories, and the diagnosis of their convention, for Python.
 #include <fusion/convention_diagnosis.hpp>
+#include <fusion/evaluate.hpp>
 #include <fusion/trajectory_conversion.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/described.hpp>
@@ -57,14 +58,19 @@ py::dict convert(const DoubleArray& poses, const DoubleArray& matrices, const st
 
 /// Poses with a partner in the truth: their rows, and the truth at their times.
 py::tuple matchTruth(const DoubleArray& truth, const DoubleArray& truth_times, const DoubleArray& times, bool nearest,
-                     bool slerp, double max_gap, double offset) {
+                     bool slerp, std::optional<double> max_gap, double max_difference, double offset) {
   const std::vector<double> at = valuesOf(truth_times), wanted = valuesOf(times);
-  const auto matches =
-      nearest ? associateNearest(at, wanted, max_gap, offset) : associateByInterpolation(at, wanted, max_gap, offset);
+  const AssociationOptions how{.rule = nearest ? AssociationRule::nearest : AssociationRule::interpolate,
+                               .interpolation = slerp ? PoseInterpolation::slerp : PoseInterpolation::geodesic,
+                               .max_gap = max_gap,
+                               .max_difference = max_difference,
+                               .offset = offset};
+  const Associated found = associate({at, at.size(), "the truth"}, {wanted, wanted.size(), "the estimate"}, how);
+  if (!found.ok()) throw std::invalid_argument("diagnose_conventions: " + found.reason);
+  const std::vector<TimeMatch>& matches = found.matches;
   const std::vector<Gaussian<SE3d>> exact = exactPoses(posesOf(truth));
   const std::vector<Gaussian<SE3d>> estimate(wanted.size());
-  const auto matched =
-      matchedPoses(matches, exact, estimate, slerp ? PoseInterpolation::slerp : PoseInterpolation::geodesic);
+  const auto matched = matchedPoses(matches, exact, estimate, how.interpolation);
   const auto n = static_cast<py::ssize_t>(matched.size());
   py::array_t<py::ssize_t> rows(n);
   DoubleArray poses({n, py::ssize_t{7}});
