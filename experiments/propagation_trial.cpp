@@ -42,7 +42,9 @@ std::vector<TrialOutcome> trial(const PropagationExperiment& experiment, Counter
   const SquareOf<G> covariance = noise<G::DoF>(experiment.spread);
   std::vector<Drawn<G>> factors;
   for (std::size_t i = 0; i < chain_length; ++i) factors.emplace_back(G::sampleUniform(rng), covariance, rng);
-  const double x = rng.uniform(-1, 1), y = rng.uniform(-1, 1), z = rng.uniform(-1, 1);
+  // The leading 53 bits, as sampleUniform() takes them.
+  const auto coordinate = [&rng] { return 2 * (static_cast<double>(rng() >> 11) * 0x1p-53) - 1; };
+  const double x = coordinate(), y = coordinate(), z = coordinate();
   const Drawn<Point> point(Point(x, y, z), noise<3>(experiment.spread), rng);
   const Drawn<G>&a = factors[0], &b = factors[1];
 

@@ -169,6 +169,36 @@ def preintegrate(
     return Result.of("preintegrated motion", d | {"ok": ok.reshape(lead)[()]})
 
 
+class CalibratedPose(Result):
+    """A pose with the fields of the program's JSON: `translation` (m), `quaternion_xyzw`, `rotation_vector` (rad), and
+    for an estimate `covariance` (None where there is none), `standard_deviations`, `standard_deviations_local`.
+
+    Attributes
+    ----------
+    mean : SE3
+    gaussian : Gaussian
+        Its methods are those of the pose, too. Without a covariance it has NaN.
+    """
+
+    @property
+    def mean(self):
+        return SE3._of(np.concatenate([self.quaternion_xyzw, self.translation]))
+
+    @property
+    def gaussian(self):
+        covariance = self.__dict__.get("covariance")
+        return Gaussian._of(self.mean, np.full((6, 6), np.nan) if covariance is None else covariance)
+
+    def __getattr__(self, name):
+        if name.startswith("_") or "quaternion_xyzw" not in self.__dict__:
+            raise AttributeError(name)
+        return getattr(self.gaussian, name)
+
+
+#: Former names of parts of hand_eye().
+_HAND_EYE_NAMES = {"reason": "in_words", "covariance": "joint_covariance", "directions": "open_directions"}
+
+
 def hand_eye(
     a,
     b,
