@@ -190,6 +190,42 @@ TEST(SumCertificatesOnTheSphere, boundTheRadiusOfConvexity) {
   }
 }
 
+/// The distance to the cut locus that the last pass has seen is that which looks at the data, but for the last step.
+TYPED_TEST(SumCertificates, knowTheDistanceToTheCutLocus) {
+  using M = TypeParam;
+  for (const double spread : {0.05, 0.2, 0.4}) {
+    CounterRng rng(34, static_cast<std::uint64_t>(100 * spread));
+    const std::vector<M> samples = cloud<M>(rng, 30, spread);
+    const MeanResult<M> mean = liestat::mean(samples);
+    ASSERT_TRUE(converged(mean.status));
+    if constexpr (detail::compactFactor<M>() != CompactFactor::none) {
+      EXPECT_NEAR(detail::leastDistanceToCutLocus(mean), detail::distanceToCutLocus(samples, mean.mean), 1e-6)
+          << spread;
+    }
+  }
+}
+
+/// The region of a settled covariance is so many standard deviations wide, its covariance their square.
+TEST(SettledCovariance, averagesOverAWidthInStandardDeviations) {
+  for (const std::size_t n : {5, 10, 30}) {
+    CounterRng rng(35, n);
+    const std::vector<SO3d> samples = cloud<SO3d>(rng, n, 0.8);
+    const auto features = detail::asSamples(samples);
+    const auto weights = detail::ones(n);
+    const MeanResult<SO3d> mean = liestat::mean(samples);
+    ASSERT_TRUE(converged(mean.status));
+    const Eigen::Matrix3d covariance = 0.09 * Eigen::Matrix3d::Identity();
+    const auto settled =
+        detail::settleCovariance(features, weights, mean, 1.0, [&](const auto&) { return covariance; });
+    const double width = std::min(2.0, 0.1 * static_cast<double>(n));
+    const auto averaged =
+        detail::findAveragedHessian(features, weights, mean, Eigen::Matrix3d(width * width * covariance));
+    ASSERT_TRUE(averaged.averaged && settled.settled) << n;
+    EXPECT_LE((settled.hessian - averaged.hessian).norm(), 1e-12 * averaged.hessian.norm()) << n;
+    EXPECT_NEAR(settled.change, averaged.change, 1e-12) << n;
+  }
+}
+
 TEST(SumCertificatesOfWeights, addUp) {
   std::vector<double> weights(1003, 1);
   EXPECT_TRUE(detail::weightSums(weights, weights.size()).ones);
