@@ -1,5 +1,6 @@
 // The certificates from the sums of a mean's last pass (stats/detail/sum_certificates.hpp) against those that look at the
-// data: the same verdicts on random samples of every spread, and each bound below what it bounds.
+// data: the same verdicts on random samples of every spread, and each bound below what it bounds. By hand, what certificates
+// stand on: averaging regions, near ties.
 
 #include <lie/lie.hpp>
 #include <stats/certified_mean.hpp>
@@ -224,6 +225,22 @@ TEST(SettledCovariance, averagesOverAWidthInStandardDeviations) {
     EXPECT_LE((settled.hessian - averaged.hessian).norm(), 1e-12 * averaged.hessian.norm()) << n;
     EXPECT_NEAR(settled.change, averaged.change, 1e-12) << n;
   }
+}
+
+/// Angles ±1.5 and ±1.6 have their mean at 0, the rival π, and local minima at ±π/2, one datum taken the other way.
+TEST(NearTies, haveStudentsStatisticOfTheDifferences) {
+  const std::vector<SO2d> samples{SO2d(1.5), SO2d(-1.5), SO2d(1.6), SO2d(-1.6)};
+  const MeanResult<SO2d> mean = liestat::mean(samples);
+  ASSERT_NEAR(mean.mean.log(), 0, 1e-12);
+  SquareOf<SO2d> covariance;
+  covariance << 0.01;  // no minimum lies in its region
+  const auto ties = nearTies(samples, mean, covariance);
+  ASSERT_EQ(ties.size(), 3U);
+  // ½ ((π - a)² - a²) for each angle.
+  const double a = 0.5 * pi * (pi - 3), b = 0.5 * pi * (pi - 3.2), average = 0.5 * (a + b);
+  const double sd = std::sqrt(2 * (std::pow(a - average, 2) + std::pow(b - average, 2)) / 3);
+  EXPECT_NEAR(distance(ties[0].feature, SO2d(pi)), 0, 1e-12);
+  EXPECT_NEAR(ties[0].z, 4 * average / (std::sqrt(4.0) * sd), 1e-12);
 }
 
 TEST(SumCertificatesOfWeights, addUp) {
