@@ -4,6 +4,8 @@
 
 #include <lie/lie.hpp>
 #include <stats/certified_mean.hpp>
+#include <stats/detail/settled_maha.hpp>
+#include <stats/maha.hpp>
 #include <stats/random.hpp>
 #include <stats/sampling.hpp>
 
@@ -224,6 +226,23 @@ TEST(SettledCovariance, averagesOverAWidthInStandardDeviations) {
     EXPECT_LE((settled.hessian - averaged.hessian).norm(), 1e-12 * averaged.hessian.norm()) << n;
     EXPECT_NEAR(settled.change, averaged.change, 1e-12) << n;
   }
+}
+
+/// On the circle the Hessian is Σ 1/s², and so is Gauss' and Newton's. Averaged it is less by the change, and the covariance
+/// greater by the square of that.
+TEST(SettledMaha, hasTheCovarianceOfTheAveragedHessian) {
+  const double variance = 1;
+  std::vector<Gaussian<SO2d>> samples;
+  for (int i = 0; i < 42; ++i) {
+    const double angle = i < 2 ? 2.8 : 0.3;  // one pair near the cut locus of the mean
+    samples.push_back({SO2d(i % 2 == 0 ? angle : -angle), variance * SquareOf<SO2d>::Ones()});
+  }
+  const auto result = maha(samples, CovarianceAt::measured);
+  ASSERT_EQ(result.status, Status::ok);
+  const auto settled = detail::settleMaha<SO2d>(SerialExecutor{}, samples, CovarianceAt::measured, false, result, 1.0);
+  ASSERT_TRUE(settled.settled);
+  ASSERT_GT(settled.change, 0.01);
+  EXPECT_NEAR(settled.covariance(0, 0), variance / 42 / std::pow(1 - settled.change, 2), 1e-12);
 }
 
 /// Angles ±1.5 and ±1.6 have their mean at 0, the rival π, and local minima at ±π/2, one datum taken the other way.
