@@ -166,6 +166,11 @@ TEST(ConventionDiagnosis, AnUnknownWorldIsAligned) {
     EXPECT_EQ(d.verdict, DiagnosisVerdict::identified) << d.reason;
     EXPECT_TRUE(contains(d.accepted, c)) << describe(c) << ": " << d.reason;
     EXPECT_NE(diagnoseConventions(poses).verdict, DiagnosisVerdict::identified);
+    // The ratio of the best fit is that of its consistency after the same alignment, which takes six degrees of freedom.
+    const auto reading = readInConvention(poses, d.fits.front().convention, AlignmentModel::se3);
+    ASSERT_TRUE(reading.consistency.ok);
+    EXPECT_EQ(reading.consistency.joint.dof, 6 * 60 - 6);
+    EXPECT_NEAR(d.fits.front().nees_ratio, reading.consistency.joint.ratio(), 1e-9);
   }
 }
 
@@ -281,6 +286,11 @@ TEST(ConventionDiagnosis, FaultsAreRepaired) {
     return Matrix6(J * M * J.transpose());
   });
   EXPECT_EQ(arm.fault, MatrixFault::lever_arm_sign) << arm.reason;
+  const ConventionDiagnosis transposed = spoiled([](const Matrix6& M, const SE3d& T) {
+    const Matrix6 J = T.Adj().transpose();
+    return Matrix6(J * M * J.transpose());
+  });
+  EXPECT_EQ(transposed.fault, MatrixFault::adjoint_transposed) << transposed.reason;
 }
 
 TEST(ConventionDiagnosis, UnknownCrossBlocksAreNotZero) {

@@ -1,6 +1,7 @@
 // The gyroscope's bias from rotations alone: among drifting tracks, with a covariance that is true, with and without
 // parallax, and what it refuses.
 
+#include <fusion/detail/epipolar_residual.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <support/vi_recorded.hpp>
@@ -27,6 +28,34 @@ const InitialisationOptions options{.bearing_noise = pixel};
 double squaredDistance(const EpipolarBiasResult& found, const Eigen::Vector3d& bias) {
   const Eigen::Vector3d error = found.bias - bias;
   return error.dot(found.covariance.llt().solve(error));
+}
+
+TEST(EpipolarGyroscopeBias, ResidualsOfMatchesByDefinition) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    CounterRng rng(17, seed);
+    detail::EpipolarSight a{0, {}, rng.unitVector<3>(), 1e-6}, b{1, {}, rng.unitVector<3>(), 9e-6};
+    const Eigen::Vector3d t = rng.unitVector<3>();
+    const detail::EpipolarRow row = detail::rowOf(a, b, t);
+    // s² but for the term of second order, 100 σ² σ'².
+    const double s2 = a.variance * b.u.cross(t).squaredNorm() + b.variance * a.u.cross(t).squaredNorm();
+    EXPECT_NEAR(1 / (row.scale * row.scale), s2 + 100 * a.variance * b.variance, 1e-14 * s2) << seed;
+    EXPECT_NEAR(row.value, row.scale * t.dot(a.u.cross(b.u)), 1e-12 * row.scale) << seed;
+    // By central differences, second order in h and rounding over h: t turned on its sphere, and the second sight turned.
+    const double h = 1e-5;
+    for (int k = 0; k < 3; ++k) {
+      const SO3d turn = SO3d::exp(Eigen::Vector3d(h * Eigen::Vector3d::Unit(k))), back = turn.inverse();
+      const Eigen::Vector3d along = Eigen::Vector3d::Unit(k).cross(t);
+      const auto of = [&](const Eigen::Vector3d& to) { return detail::rowOf(a, b, to).value; };
+      const double by_t = (of(turn * t) - of(back * t)) / (2 * h);
+      EXPECT_NEAR(row.by_t.dot(along), by_t, 1e-7 * row.scale) << seed;
+      const auto turned = [&](const SO3d& R) {
+        detail::EpipolarSight there = b;
+        there.u = R * b.u;
+        return detail::rowOf(a, there, t).value;
+      };
+      EXPECT_NEAR(row.by_turn[k], (turned(turn) - turned(back)) / (2 * h), 1e-7 * row.scale) << seed;
+    }
+  }
 }
 
 TEST(EpipolarGyroscopeBias, IsFoundWithoutNoise) {

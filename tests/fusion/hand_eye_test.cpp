@@ -3,6 +3,7 @@
 
 #include <experiments/hand_eye_scene.hpp>
 #include <fusion/detail/hand_eye_problem.hpp>
+#include <fusion/detail/hand_eye_refine.hpp>
 #include <fusion/hand_eye.hpp>
 
 #include <gtest/gtest.h>
@@ -64,6 +65,48 @@ TEST(HandEye, JacobiansAgreeWithDifferences) {
     EXPECT_LT((J.A - by_a).norm(), 1e-8 * (1 + by_a.norm())) << size;
     EXPECT_LT((J.B - by_b).norm(), 1e-8 * (1 + by_b.norm())) << size;
   }
+}
+
+TEST(HandEye, HeldDirectionsAgreeWithDifferences) {
+  CounterRng rng(2);
+  for (const double size : {1e-6, 0.3, 1.0}) {
+    const auto pose = [&] { return SE3d(SO3d(rng.unitQuaternion()), rng.normalVector<3>()); };
+    detail::HeldDirections<detail::RobotWorldEquation> held{pose()};
+    for (int k = 0; k < 6; ++k) held.rows.col(k) = rng.normalVector<6>();
+    const SE3d X = pose(), Y = held.reference * SE3d::exp(size * rng.unitVector<6>());
+    const auto at = [&](const SE3d& step) { return detail::RobotWorldEquation::parameter({X, Y * step}); };
+    const auto d = held.linearize(at(SE3d()));
+    const double h = 1e-6;
+    Matrix6 by_y;
+    for (int k = 0; k < 6; ++k) {
+      const SE3d plus = SE3d::exp(h * Vector6::Unit(k));
+      by_y.col(k) = (held(at(plus)) - held(at(plus.inverse()))) / (2 * h);
+    }
+    EXPECT_LT((d.value - held(at(SE3d()))).norm(), 1e-14 * (1 + d.value.norm())) << size;
+    EXPECT_EQ(d.by_parameter.leftCols<6>().norm(), 0);
+    // Second order in h, and rounding over h.
+    EXPECT_LT((d.by_parameter.rightCols<6>() - by_y).norm(), 1e-8 * (1 + by_y.norm())) << size;
+  }
+}
+
+// The step solves the normal equations, whatever is eliminated and whichever basis the directions have.
+TEST(HandEye, StepsSolveTheNormalEquations) {
+  CounterRng rng(3);
+  Eigen::Matrix<double, 12, 12> A;
+  for (int k = 0; k < 12; ++k) A.col(k) = rng.normalVector<12>();
+  const Eigen::Matrix<double, 12, 12> H = A * A.transpose() + Eigen::Matrix<double, 12, 12>::Identity();
+  const Eigen::Matrix<double, 12, 1> g = rng.normalVector<12>();
+  detail::HandEyeSums sums;
+  sums.xx = H.topLeftCorner<6, 6>(), sums.xy = H.topRightCorner<6, 6>(), sums.yy = H.bottomRightCorner<6, 6>();
+  sums.x = g.head<6>(), sums.y = g.tail<6>();
+  detail::HandEyeExcitation excitation;
+  for (int k = 0; k < 6; ++k) excitation.vectors.col(k) = rng.normalVector<6>();
+  const auto [x, y] = detail::handEyeStep(sums, excitation, 0, true);
+  Eigen::Matrix<double, 12, 1> step;
+  step << x, y;
+  // Rounding times the condition, some 1e3.
+  EXPECT_LT((H * step + g).norm(), 1e-11 * g.norm());
+  EXPECT_LT((sums.yy * detail::handEyeStep(sums, excitation, 0, false).second + sums.y).norm(), 1e-11 * g.norm());
 }
 
 TEST(HandEye, ExactPairsGiveTheTruth) {

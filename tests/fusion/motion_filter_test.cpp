@@ -443,6 +443,15 @@ TEST(TrackPairs, IntervalsOfTracksThatComeAndGo) {
   EXPECT_EQ(equal.add(std::vector{at(1, 2)}).size(), 1U);
 }
 
+// A pair has one deviation for both frames, with which the difference has the variance that it has: 3² + 4² = 2·12.5.
+TEST(TrackPairs, NoiseIsTheRootMeanSquareOfBothFrames) {
+  TrackPairs tracks;
+  EXPECT_TRUE(tracks.add(std::vector{TrackObservation{1, {0, 0}, 0.03}}).empty());
+  const auto pairs = tracks.add(std::vector{TrackObservation{1, {1, 0}, 0.04}});
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_NEAR(2 * pairs[0].sigma * pairs[0].sigma, 0.03 * 0.03 + 0.04 * 0.04, 1e-17);
+}
+
 TEST(TrackPairs, LongerIntervalsBeatNoise) {
   // 8 px at 5° per frame, frame 20: 21 % of the directions are found from successive frames, 96 % from pairs of up to
   // six frames (1000 trials).

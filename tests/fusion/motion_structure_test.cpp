@@ -2,6 +2,7 @@
 #include <experiments/motion_scene.hpp>
 #include <fusion/motion/structure.hpp>
 #include <fusion/motion/subspace_filter.hpp>
+#include <lie/se3.hpp>
 #include <support/motion_runs.hpp>
 
 #include <gtest/gtest.h>
@@ -63,6 +64,24 @@ TEST(MotionStructure, IsAccurateAndRigid) {
   }
   // Many frames know more than one.
   EXPECT_LT(std::sqrt(error / static_cast<double>(n)), 0.7 * std::sqrt(single / static_cast<double>(n)));
+}
+
+// A point that was measured once is then where the constant motion has taken it, exp(V, Ω) in one frame.
+TEST(MotionStructure, PredictsAlongTheMotionOfConstantTwist) {
+  MotionEstimate motion;
+  const Eigen::Vector3d V = Eigen::Vector3d(0.6, -0.3, 0.5).normalized(), Omega(0.3, -0.5, 0.4);
+  motion.direction.mean = S2d(V);
+  motion.rotation.mean = SO3d::exp(Omega);
+  const std::vector<PointPair> pairs{{{0.2, -0.1}, {0.3, 0.1}, 0.001}};
+  const std::vector<std::uint64_t> tracks{7};
+  MotionStructure structure;
+  structure.update(tracks, pairs, std::vector<InverseDepth>{{0.1, 1e-4, true}}, motion);
+  structure.update(tracks, pairs, std::vector<InverseDepth>{{0, 0, false}}, motion);
+  ASSERT_EQ(structure.points().size(), 1U);
+  SE3d::Tangent twist;
+  twist << V, Omega;
+  const Eigen::Vector3d there = SE3d::exp(twist) * Eigen::Vector3d(Eigen::Vector3d(0.25, 0, 1) / 0.1);
+  EXPECT_NEAR(structure.points()[0].inverse_depth, 1 / there.z(), 1e-15);
 }
 
 TEST(MotionStructure, RubberyInterpretationIsToldFromTheRigidOne) {

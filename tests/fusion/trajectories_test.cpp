@@ -256,6 +256,68 @@ TEST(Trajectories, LeveragesAddUpToTheParameters) {
   }
 }
 
+// Four poses at one place, errors of ±1 along x and ±0.5 about z, covariances I: with a free transformation the mean
+// takes a quarter of each covariance, and three degrees of freedom off each part.
+TEST(Trajectories, FourEqualPosesByHand) {
+  std::vector<MatchedPose> poses;
+  for (const double sign : {1.0, -1.0, 1.0, -1.0}) {
+    const SE3d truth(SO3d::rotZ(poses.size() < 2 ? 0.5 * sign : -0.5 * sign), Eigen::Vector3d(0, 0, 0));
+    const SE3d along(SO3d(), Eigen::Vector3d(sign, 0, 0));
+    poses.push_back({{poses.size() < 2 ? along : truth, Matrix6::Zero()}, {SE3d(), Matrix6::Identity()}});
+  }
+  const Consistency all = evaluateConsistency(poses, alignWeighted(poses, AlignmentModel::se3));
+  ASSERT_TRUE(all.ok) << all.fault;
+  constexpr double eps = 1e-12;  // that of the alignment, which ends below 1e-6 standard deviations, squared
+  for (const PoseError& e : all.errors) {
+    EXPECT_LT((e.covariance - 0.75 * Matrix6::Identity()).norm(), eps);
+    EXPECT_NEAR(e.leverage, 6.0 / 4, eps);
+  }
+  EXPECT_EQ(all.joint.dof, 6 * 4 - 6);
+  EXPECT_NEAR(all.position.dof, 3 * 4 - 3, eps);
+  EXPECT_NEAR(all.rotation.dof, 3 * 4 - 3, eps);
+  EXPECT_NEAR(all.joint.statistic, 2.5, eps);
+  EXPECT_NEAR(all.position.statistic, 2, eps);
+  EXPECT_NEAR(all.rotation.statistic, 0.5, eps);
+  // Aligned by the first two, the others have that mean's covariance I/2 besides, and share it: a sum of n = 2 has the
+  // mean 3·2 (1 + 1/2) and half the variance 3 (2 + 2·2/2 + 2²/2²) = 15, as 5/3 of χ² of 27/5 degrees of freedom.
+  const Consistency rest = evaluateConsistency(poses, alignWeighted(poses, AlignmentModel::se3, 2));
+  ASSERT_TRUE(rest.ok) << rest.fault;
+  EXPECT_LT((rest.errors[0].covariance - 0.5 * Matrix6::Identity()).norm(), eps);
+  EXPECT_LT((rest.errors[2].covariance - 1.5 * Matrix6::Identity()).norm(), eps);
+  EXPECT_NEAR(rest.position.dof, 27.0 / 5, eps);
+  EXPECT_NEAR(rest.position.ratio(), rest.errors[2].error.head<3>().squaredNorm() * 2 / 9, eps);
+}
+
+// Leverage is what the alignment takes off each covariance, relatively.
+TEST(Trajectories, CovariancesAfterTheAlignmentAreSmallerByTheLeverage) {
+  for (const AlignmentModel model : {AlignmentModel::posyaw, AlignmentModel::se3, AlignmentModel::sim3}) {
+    CounterRng rng(23);
+    const Moved m = moved(experiments::independentScene({.n = 12}, rng), model, rng);
+    const Consistency c = evaluateConsistency(m.poses, alignWeighted(m.poses, model));
+    ASSERT_TRUE(c.ok) << c.fault;
+    for (std::size_t i = 0; i < m.poses.size(); ++i) {
+      const double left = m.poses[i].estimate.covariance.llt().solve(c.errors[i].covariance).trace();
+      EXPECT_NEAR(left, 6 - c.errors[i].leverage, 1e-9) << name(model);
+    }
+  }
+}
+
+// The mirror image of a cross of positions ±3, ±2, ±1: no rotation is better than none, with the scale that remains.
+TEST(Trajectories, MirrorImagesAreNotAlignedByAReflection) {
+  std::vector<MatchedPose> poses;
+  for (const Eigen::Vector3d& x : {Eigen::Vector3d(3, 0, 0), Eigen::Vector3d(0, 2, 0), Eigen::Vector3d(0, 0, 1)}) {
+    for (const double sign : {1.0, -1.0}) {
+      const SE3d at(SO3d(), Eigen::Vector3d(sign * x)),
+          mirrored(SO3d(), Eigen::Vector3d(sign * x.x(), sign * x.y(), -sign * x.z()));
+      poses.push_back({{mirrored, Matrix6::Zero()}, {at, Matrix6::Identity()}});
+    }
+  }
+  const Alignment a = alignUmeyama(poses, AlignmentModel::sim3);
+  ASSERT_TRUE(a.ok);
+  EXPECT_LT(a.transform.so3().log().norm(), 1e-14);
+  EXPECT_NEAR(a.scale, (9 + 4 - 1) / (9.0 + 4 + 1), 1e-14);
+}
+
 TEST(Trajectories, FarOriginsLoseNothing) {
   CounterRng rng(7);
   const TrajectoryScene scene = experiments::independentScene({.n = 50}, rng);

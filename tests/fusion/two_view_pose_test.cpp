@@ -1,5 +1,6 @@
 // Five points, three with the vertical, poses of essential matrices and planes, focal lengths of fundamental matrices.
 
+#include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/five_point.hpp>
 #include <fusion/two_view/focal_lengths.hpp>
 #include <fusion/two_view/pose.hpp>
@@ -276,6 +277,43 @@ TEST(TwoViewPose, SpecialHomographies) {
   EXPECT_TRUE(posesOfHomography(Eigen::Matrix3d::Zero()).empty());
   EXPECT_TRUE(posesOfHomography(Eigen::Matrix3d(n * n.transpose())).empty());
   EXPECT_TRUE(posesOfHomography(Eigen::Matrix3d::Constant(std::nan(""))).empty());
+}
+
+/// cᵀ (D V Dᵀ)⁻¹ c of equations c of a match, D by central differences: of equations that are at most quadratic in each
+/// coordinate these are exact but for rounding, 1e-16 over the step.
+template <int N, class Equations>
+double sampsonError(const Equations& c, const Eigen::Vector4d& m, const MatchNoise& noise) {
+  constexpr double h = 1e-2;
+  Eigen::Matrix<double, N, 4> D;
+  for (int k = 0; k < 4; ++k) {
+    const Eigen::Vector4d step = h * Eigen::Vector4d::Unit(k);
+    D.col(k) = (c(Eigen::Vector4d(m + step)) - c(Eigen::Vector4d(m - step))) / (2 * h);
+  }
+  const double a = noise.first * noise.first, b = noise.second * noise.second;
+  const Eigen::Matrix<double, N, N> V = D * Eigen::Vector4d(a, a, b, b).asDiagonal() * D.transpose();
+  return c(m).dot(V.inverse() * c(m));
+}
+
+TEST(TwoViewErrors, AreThoseOfTheEquationsUnderUnequalNoises) {
+  for (std::uint64_t trial = 0; trial < 20; ++trial) {
+    CounterRng rng(31, trial);
+    Eigen::Matrix3d H, F;
+    for (int k = 0; k < 3; ++k) H.col(k) = rng.normalVector<3>(), F.col(k) = rng.normalVector<3>();
+    H = 0.3 * H + 2 * Eigen::Matrix3d::Identity();
+    const Eigen::Vector4d m = 0.7 * rng.normalVector<4>();
+    const MatchNoise noise{0.01, 0.03};
+    const auto mapped = [&](const Eigen::Vector4d& at) {
+      const Eigen::Vector3d y = H * Eigen::Vector3d(at[0], at[1], 1);
+      return Eigen::Vector2d(y.z() * at.tail<2>() - y.head<2>());
+    };
+    const auto onLine = [&](const Eigen::Vector4d& at) {
+      return Eigen::Matrix<double, 1, 1>(Eigen::Vector3d(at[2], at[3], 1).dot(F * Eigen::Vector3d(at[0], at[1], 1)));
+    };
+    ASSERT_GT((H * Eigen::Vector3d(m[0], m[1], 1)).z(), 0) << trial;
+    const double homography = sampsonError<2>(mapped, m, noise), epipolar = sampsonError<1>(onLine, m, noise);
+    EXPECT_NEAR(homographyError(H, m, noise), homography, 1e-9 * homography) << trial;
+    EXPECT_NEAR(epipolarError(F, m, noise), epipolar, 1e-9 * epipolar) << trial;
+  }
 }
 
 TEST(FocalLengths, PhysicalFormGivesTheFundamentalMatrixBack) {

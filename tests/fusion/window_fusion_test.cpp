@@ -227,6 +227,8 @@ TEST(WindowFusion, SeesAContradiction) {
   const Fused right(recording);
   ASSERT_TRUE(right.ok);
   EXPECT_EQ(right.meetings[0].degrees_of_freedom, 0);
+  EXPECT_EQ(right.meetings[1].degrees_of_freedom, ManifoldTraits<InertialState>::DoF);
+  EXPECT_EQ(right.fusion.degrees_of_freedom(), 2U * 11);
   EXPECT_LT(right.meetings[1].chi2, limit);
   EXPECT_LT(right.meetings[2].chi2, limit);
   const Fused wrong(recording, 1);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <type_traits>
 
 namespace {
@@ -109,6 +110,32 @@ TEST(Product, VolumeIsTheProductOfTheParts) {
   EXPECT_EQ(volume.value, rotation.value + direction.value);
   EXPECT_EQ((volume.gradient.tail<2>()), direction.gradient);
   EXPECT_EQ((volume.hessian.topLeftCorner<3, 3>()), rotation.hessian);
+}
+
+/// log det J_l of a group with its derivatives: second order in h, and rounding over h.
+template <class G>
+void isTheVolumeOfTheExponential(const char* name) {
+  constexpr int k = G::DoF;
+  using V = ManifoldTraits<G>;
+  typename G::Tangent z;
+  for (int i = 0; i < k; ++i) z[i] = 0.7 - 0.3 * i + 0.05 * i * i;
+  const auto volume = V::logVolume(z);
+  EXPECT_NEAR(volume.value, std::log(G::leftJacobian(z).determinant()), 1e-13) << name;
+  constexpr double h = 1e-5;
+  for (int i = 0; i < k; ++i) {
+    const typename G::Tangent step = h * G::Tangent::Unit(i), ahead = z + step, behind = z - step;
+    EXPECT_NEAR(volume.gradient[i], (V::logVolume(ahead).value - V::logVolume(behind).value) / (2 * h), 1e-9) << name;
+    const typename G::Tangent by = (V::logVolume(ahead).gradient - V::logVolume(behind).gradient) / (2 * h);
+    EXPECT_LT((volume.hessian.col(i) - by).norm(), 1e-9) << name;
+  }
+}
+TEST(Volume, IsTheDeterminantOfTheJacobian) {
+  isTheVolumeOfTheExponential<SO2d>("SO2");
+  isTheVolumeOfTheExponential<SO3d>("SO3");
+  isTheVolumeOfTheExponential<SE2d>("SE2");
+  isTheVolumeOfTheExponential<SE3d>("SE3");
+  isTheVolumeOfTheExponential<SE23d>("SE23");
+  isTheVolumeOfTheExponential<RxSO3d>("RxSO3");
 }
 
 // Each quotient takes its own nearest representative; an index names one of each.

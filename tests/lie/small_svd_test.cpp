@@ -1,5 +1,6 @@
 // Singular values of small matrices (lie/detail/small_orthogonal.hpp): singular matrices, and columns of all sizes.
 
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 
 #include <Eigen/QR>
@@ -46,6 +47,28 @@ Eigen::Matrix<double, N, N> random(std::mt19937_64& rng) {
   Eigen::Matrix<double, N, N> A;
   for (int i = 0; i < N * N; ++i) A.data()[i] = normal(rng);
   return A;
+}
+
+TEST(SmallMatrix, StepsAndPseudoInversesOfThreeEquations) {
+  std::mt19937_64 rng(8);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Matrix3d A = random<3>(rng), H = A * A.transpose() + 0.1 * Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d b = random<3>(rng).col(0);
+    Eigen::Vector3d x;
+    ASSERT_TRUE(solveStep(H, b, x));
+    // Cofactors lose the square of the condition, at most 1e4 here.
+    EXPECT_LE((H * x - b).norm(), 1e-8 * b.norm()) << H;
+    int rank = 0;
+    const Eigen::Matrix3d all = pseudoInverse(H, rank);
+    EXPECT_EQ(rank, 3);
+    EXPECT_LE((all * H - Eigen::Matrix3d::Identity()).norm(), 1e-11) << H;
+    // Penrose's equations of a matrix of rank two.
+    const Eigen::Matrix3d two = A.leftCols<2>() * A.leftCols<2>().transpose(), X = pseudoInverse(two, rank);
+    EXPECT_EQ(rank, 2);
+    EXPECT_LE((two * X * two - two).norm(), 1e-11 * two.norm()) << two;
+    EXPECT_LE((X * two * X - X).norm(), 1e-10 * X.norm()) << two;
+    EXPECT_LE((X * two - two * X).norm(), 1e-10) << two;
+  }
 }
 
 TEST(SmallSvd, OfSingularMatricesEndsAfterAFewSweeps) {

@@ -1,6 +1,9 @@
 #include <lie/frame3.hpp>
 #include <lie/rn.hpp>
 #include <lie/s2.hpp>
+#include <lie/so2.hpp>
+#include <stats/concentration.hpp>
+#include <stats/covariance.hpp>
 #include <stats/dispersion.hpp>
 
 #include <gtest/gtest.h>
@@ -12,6 +15,8 @@
 namespace {
 
 using namespace liestat;
+
+constexpr double pi = static_cast<double>(EIGEN_PI);
 
 TEST(Dispersion, OfPointsIsTheirSecondMoment) {
   const std::vector<Eigen::Vector3d> points{{1, 0, 0}, {-1, 0, 0}, {0, 2, 0}, {0, -2, 0}};
@@ -80,6 +85,52 @@ TEST(Dispersion, OfDirectionsIsTheirSquaredAngle) {
   }
   const auto d = dispersionAbout(ring, y);
   EXPECT_TRUE(d.covariance.isApprox(0.125 * Eigen::Matrix2d::Identity(), 1e-13));
+}
+
+// Of points everything is linear, so that the classical formulas hold to rounding.
+TEST(Covariance, OfPointsByHand) {
+  const std::vector<Eigen::Vector2d> points{{3, 0}, {-1, 0}, {1, 1}, {1, -1}};
+  const Eigen::Vector2d centre(1, 0);
+  const auto isDiagonal = [](const Eigen::Matrix2d& covariance, double x, double y) {
+    EXPECT_LT((covariance - Eigen::Matrix2d(Eigen::Vector2d(x, y).asDiagonal())).norm(), 1e-15);
+  };
+  isDiagonal(empiricalCovariance(points, centre), 8.0 / 4, 2.0 / 4);
+  const auto found = mean(points);
+  isDiagonal(covarianceFromResiduals(found), 8.0 / (4 * 3), 2.0 / (4 * 3));
+  isDiagonal(covarianceFromResiduals(found, ResidualNoise::any), 8.0 / (4 * 3), 2.0 / (4 * 3));
+  isDiagonal(covarianceFromCommonNoise(found, Eigen::Matrix2d(Eigen::Vector2d(2, 1).asDiagonal())), 2.0 / 4, 1.0 / 4);
+}
+
+TEST(Concentration, ofTheUniformLawByHand) {
+  // ∫ θ² over the density of the angle: 1/π on the circle, sin θ/2 on the sphere, (1 - cos θ)/π on SO(3).
+  EXPECT_DOUBLE_EQ(detail::circleLaw().expectation, pi * pi / 3);
+  EXPECT_DOUBLE_EQ(detail::sphereLaw().expectation, (pi * pi - 4) / 2);
+  EXPECT_DOUBLE_EQ(detail::rotationLaw(0).expectation, pi * pi / 3 + 2);
+  // A mean adapts to its data: they scatter less about it than about any other point, and the less the fewer they are.
+  for (const auto& law : {detail::circleLaw(), detail::sphereLaw(), detail::rotationLaw(0), detail::rotationLaw(1),
+                          detail::rotationLaw(3)}) {
+    double before = 0;
+    for (const double n : {2.0, 3.0, 10.0, 100.0, 1e6}) {
+      EXPECT_GT(law.limit(n), before) << n;
+      before = law.limit(n);
+    }
+    EXPECT_LT(before, law.expectation);
+    EXPECT_EQ(law.limit(1), 0);
+  }
+}
+
+TEST(Concentration, ofTwoAnglesByHand) {
+  // ±θ about zero have the mean square θ², and a quarter of π²/3 is (0.9069 rad)².
+  const auto about = [](double angle, const std::vector<double>& weights) {
+    return concentration(std::vector<SO2d>{SO2d(angle), SO2d(-angle), SO2d(angle), SO2d(-angle)}, weights, SO2d(0.0));
+  };
+  EXPECT_NEAR(about(0.9, {1, 1, 1, 1}).mean_square, 0.81, 1e-15);
+  EXPECT_TRUE(about(0.9, {1, 1, 1, 1}).isModest());
+  EXPECT_FALSE(about(0.92, {1, 1, 1, 1}).isModest());
+  // Weights count as (Σw)²/Σw² data, whatever their unit.
+  EXPECT_DOUBLE_EQ(about(0.9, {5, 5, 5, 5}).limit, detail::circleLaw().limit(4));
+  EXPECT_DOUBLE_EQ(about(0.9, {5, 5, 5, 0}).limit, detail::circleLaw().limit(3));
+  EXPECT_DOUBLE_EQ(about(0.9, {4, 2, 1, 1}).limit, detail::circleLaw().limit(64.0 / 22));
 }
 
 }  // namespace

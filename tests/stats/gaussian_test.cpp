@@ -109,6 +109,23 @@ TEST(Gaussian, comparisonOfTwoEstimatesFollowsChiSquared) {
   EXPECT_NEAR(sum / n, 3.037, 4 * std::hypot(0.033, std::sqrt(6.0 / n)));
 }
 
+TEST(Gaussian, transportCarriesTheGeodesicsDirection) {
+  // Along the geodesic from x to y its direction stays what it is, log(x, y) at x and -log(y, x) at y, and so does the
+  // one to its left.
+  CounterRng rng(7, 0);
+  for (int trial = 0; trial < 10; ++trial) {
+    const S2d x = sampleInCube<S2d>(rng), y = sampleInCube<S2d>(rng);
+    const Eigen::Vector2d at_x = log(x, y), at_y = -log(y, x);
+    const auto tilted = [](const Eigen::Vector2d& v) {
+      return Eigen::Vector2d(v + 0.5 * Eigen::Vector2d(-v.y(), v.x()));
+    };
+    const Eigen::Vector2d a = tilted(at_x), b = tilted(at_y);
+    const Gaussian<S2d> there = transport(Gaussian<S2d>{x, a * a.transpose()}, y);
+    EXPECT_LT((there.covariance - b * b.transpose()).norm(), 1e-12 * a.squaredNorm());
+    EXPECT_LT(distance(there.mean, y), 1e-15);
+  }
+}
+
 TEST(Gaussian, badCovarianceGivesNaN) {
   Gaussian<SO3d> g;
   g.covariance(1, 1) = -1;

@@ -66,6 +66,7 @@ TEST(Hierarchy, ChoosesTheModelOfTheInliers) {
       const double sigma = curve_sigma / std::sqrt(55);
       EXPECT_LE((found.estimate.parameter - q).norm(), 8 * sigma) << name << " " << seed;
       EXPECT_GE(found.inliers.size(), 53u);
+      EXPECT_DOUBLE_EQ(found.relevance, Relevance{2 * found.threshold}(found.errors)) << "(29), t the threshold";
       EXPECT_EQ(found.rejection, Rejection::none);
     }
     EXPECT_GE(right, 37) << name;

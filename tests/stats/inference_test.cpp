@@ -1,4 +1,5 @@
 #include <stats/inference.hpp>
+#include <stats/model_choice_f_test.hpp>
 
 #include <gtest/gtest.h>
 
@@ -25,6 +26,19 @@ TEST(ChiSquared, agreesWithItsClosedForms) {
     EXPECT_NEAR(chiSquaredCdf(x, 1) / std::erf(std::sqrt(x / 2)), 1, 2e-15) << x;
     EXPECT_NEAR(chiSquaredPdf(x, 2) / (0.5 * std::exp(-x / 2)), 1, 4e-15) << x;
   }
+}
+
+TEST(FTest, rejectsBeyondTheQuantile) {
+  // Two parameters more, r' = 8: P(F > f) = (1 + 2 f/8)^(-8/2).
+  const double probability = 0.99, f = 8 / 2 * (std::pow(1 - probability, -2.0 / 8) - 1);
+  const FTestPhi phi{probability};
+  EXPECT_NEAR(phi(10, 8), 10.0 / 8 / (1 + f * 2 / 8), 1e-14);
+  // ((χ² - χ'²)/2)/(χ'²/8) on either side of f.
+  for (const double factor : {0.999, 1.001}) {
+    const ModelFit general{8, 12, 4}, specific{8 + 2 * f * factor, 12, 2};
+    EXPECT_EQ(fitRejects(specific, general, phi), factor > 1);
+  }
+  EXPECT_TRUE(std::isnan(phi(8, 10)));
 }
 
 TEST(ChiSquared, quantileAndThresholdInvert) {

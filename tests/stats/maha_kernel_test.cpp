@@ -111,4 +111,29 @@ TYPED_TEST(MahaKernelSums, quaternions_far_from_unit_go_the_general_way) {
   EXPECT_EQ(p.information.size(), data.size());
 }
 
+TEST(MahaCovariance, of_two_rotations_by_hand) {
+  // Rotations by ±a about one axis, each with the covariance s² I, have their mean at I. Across the axis the Hessian of
+  // θ²/2 is c = (a/2) cot(a/2), and J_rᵀ⁻¹ J_r⁻¹ = (a/2)²/sin²(a/2); along it both are one. So H⁻¹ H_GN H⁻¹ is s²/2
+  // along and s²/(2 cos²(a/2)) across the axis, where H⁻¹ alone would be s²/(2 c).
+  const double a = 1.2, variance = 0.01;
+  const Eigen::Vector3d axis(0, 0, a);
+  const Eigen::Matrix3d noise = variance * Eigen::Matrix3d::Identity();
+  const std::vector<Gaussian<SO3d>> two{{SO3d::exp(axis), noise}, {SO3d::exp(Eigen::Vector3d(-axis)), noise}};
+  // So are 128 of them, for kernels, but for the number.
+  for (const int copies : {1, 64}) {
+    std::vector<Gaussian<SO3d>> data;
+    for (int i = 0; i < copies; ++i) data.insert(data.end(), two.begin(), two.end());
+    const auto result = maha(data, CovarianceAt::measured);
+    ASSERT_EQ(result.status, Status::ok);
+    const double across = 1 / std::pow(std::cos(a / 2), 2);
+    const Eigen::Vector3d expected = variance / (2 * copies) * Eigen::Vector3d(across, across, 1);
+    EXPECT_LE((result.covariance - Eigen::Matrix3d(expected.asDiagonal())).norm(), 1e-12 * expected.norm()) << copies;
+  }
+}
+
+TEST(MahaWeight, is_the_geometric_mean_of_the_information) {
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(1, 8, 27).asDiagonal();
+  EXPECT_NEAR(scalarWeight(covariance), 1.0 / 6, 1e-15);
+}
+
 }  // namespace

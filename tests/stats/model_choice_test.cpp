@@ -60,6 +60,41 @@ TEST(ModelChoice, FitNeedsDegreesOfFreedom) {
   EXPECT_DOUBLE_EQ((ModelFit{90, 100, 10}.normalised()), 1);
 }
 
+TEST(ModelChoice, PhiIsPerDegreeOfFreedomOfTheSpecificModel) {
+  EXPECT_DOUBLE_EQ(ExponentialPhi{2}(4, 3), std::exp(-2.0 / 4));
+  EXPECT_DOUBLE_EQ(ExponentialPhi{3}(10, 4), std::exp(-3 * 6.0 / 10));
+  // So is the κ that is fitted: it decides between two labels of one improvement where Φ does.
+  const ModelFit specific{20, 12, 2}, general{6, 12, 6};
+  const LabelledPair pair{specific, general, true};
+  const double kappa = 2 * fitKappa({&pair, 1});  // the middle of [0, κ]
+  EXPECT_TRUE(fitRejects(specific, general, ExponentialPhi{(1 - 1e-9) * kappa}));
+  EXPECT_FALSE(fitRejects(specific, general, ExponentialPhi{(1 + 1e-9) * kappa}));
+}
+
+TEST(TailProbabilities, AreThoseOfTheClosedForms) {
+  constexpr double eps = 1e-13;  // that of the continued fraction
+  const double pi = std::acos(-1.0);
+  for (const double x : {0.01, 0.7, 3.0, 11.0, 40.0}) {
+    // χ²: Q(x, n + 2) = Q(x, n) + (x/2)^(n/2) exp(-x/2)/Γ(n/2 + 1), Γ(3/2) = √π/2, Γ(5/2) = 3√π/4.
+    const double half = x / 2, e = std::exp(-half);
+    const double one = std::erfc(std::sqrt(half)), three = one + 2 * std::sqrt(half / pi) * e;
+    EXPECT_NEAR(detail::chiSquaredTail(x, 1), one, eps * one);
+    EXPECT_NEAR(detail::chiSquaredTail(x, 3), three, eps * three);
+    const double five = three + 4 * std::pow(half, 1.5) * e / (3 * std::sqrt(pi));
+    EXPECT_NEAR(detail::chiSquaredTail(x, 5), five, eps * five);
+    EXPECT_NEAR(detail::chiSquaredTail(x, 2), e, eps * e);
+    EXPECT_NEAR(detail::chiSquaredTail(x, 6), e * (1 + half + half * half / 2), eps);
+    // Student's law of one (Cauchy's) and of two degrees of freedom, either side of zero.
+    for (const double t : {x, -x}) {
+      EXPECT_NEAR(detail::studentTail(t, 1), 0.5 - std::atan(t) / pi, eps);
+      EXPECT_NEAR(detail::studentTail(t, 2), 0.5 - t / (2 * std::sqrt(2 + t * t)), eps);
+    }
+    // Hotelling's of two dimensions; of one it is Student's t².
+    EXPECT_NEAR(detail::hotellingTail(x, 2, 9), std::pow(1 + x / 8, -3.5), eps);
+    EXPECT_NEAR(detail::hotellingTail(x, 1, 9), 2 * detail::studentTail(std::sqrt(x), 8), eps);
+  }
+}
+
 TEST(ModelChoice, KappaIsFittedToLabels) {
   // Right specific models, and general ones that improve the fit by a factor of four.
   std::vector<LabelledPair> pairs;

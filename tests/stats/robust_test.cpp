@@ -210,6 +210,19 @@ TEST(HistogramThreshold, FallsBack) {
   fallsBack(flat);
 }
 
+TEST(HistogramThreshold, IsSmoothedByHand) {
+  // Bins of 0.1: ten errors in each of the first five, two in each of the others. The box of 21 bins, reflected at zero,
+  // holds 2·(50 + 6 + 5) of them at zero, less than half of that from bin 13 on, and 42 from bin 15 on, the first saddle.
+  // Without the reflection no more than 82 are in it, and 42 is no valley.
+  Errors errors;
+  for (int bin = 0; bin < 80; ++bin) {
+    for (int i = 0; i < (bin < 5 ? 10 : 2); ++i) errors.push_back(std::pow(0.1 * (bin + 0.5), 2));
+  }
+  const ErrorThreshold t = histogramThreshold(errors, 16, 6.6349);
+  EXPECT_TRUE(t.found);
+  EXPECT_NEAR(t.squared, 1.55 * 1.55, 1e-12);
+}
+
 TEST(HistogramThreshold, FollowsTheUnit) {
   Errors errors = errorsOf(300, 100, 3);
   const double here = histogramThreshold(errors, 16, 6.6349).squared;

@@ -47,6 +47,29 @@ TEST(SplitValidation, HalvesInTimeAreThoseOfTheTimes) {
   EXPECT_TRUE(lawOfHalves<Point>(4, false).is_hotelling());
 }
 
+TEST(SplitValidation, HalvesByHand) {
+  // Four points about (0, 0) and four about (3, 0), deviation diag(2/3): the means have the covariances I/6 each, the
+  // squared distance is 9·3. Two samples of four are Hotelling's of eight less two degrees of freedom, which in two
+  // dimensions exceeds t² with probability (1 + t²/6)^(-5/2).
+  using Point2 = Eigen::Vector2d;
+  std::vector<Point2> points;
+  for (const double x : {0.0, 3.0}) {
+    for (const Point2& d : {Point2(1, 0), Point2(-1, 0), Point2(0, 1), Point2(0, -1)})
+      points.push_back(Point2(x, 0) + d);
+  }
+  const SplitOptions options{.splits = 3, .blocks = 2};
+  const auto v = validateMeanBySplitting(SerialExecutor{}, points, std::vector<double>(8, 1.0), {}, {}, options);
+  EXPECT_NEAR(v.squared_distance, 27, 1e-12);
+  EXPECT_NEAR(v.p_value, std::pow(1 + 27.0 / 6, -2.5), 1e-12);
+  // The index of splits at random: eight measurements have seven degrees of freedom for each dimension, three splits three.
+  EXPECT_DOUBLE_EQ(v.random.effective_dof, 2 / (1.0 / 7 + 1.0 / 3));
+  EXPECT_DOUBLE_EQ(v.random.standardError(), 2 * std::sqrt(2 / v.random.effective_dof));
+  // One split of two blocks is one difference, whatever they weigh: one degree of freedom.
+  EXPECT_DOUBLE_EQ(detail::dealtDegreesOfFreedom({1, 1}, {{1, 0}}), 1);
+  EXPECT_DOUBLE_EQ(detail::dealtDegreesOfFreedom({3, 1}, {{1, 0}}), 1);
+  EXPECT_DOUBLE_EQ(detail::dealtDegreesOfFreedom({3, 1, 2}, {{1, 0, 0}, {1, 0, 0}}), 1);
+}
+
 TEST(SplitValidation, FindsNothingInIndependentErrors) {
   const std::vector<Point> points = measurements(400, 10, 0, 5);
   const auto v = validateMeanBySplitting(SerialExecutor{}, points, std::vector<double>(400, 1.0));

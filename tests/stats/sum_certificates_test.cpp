@@ -1,8 +1,11 @@
 // The certificates from the sums of a mean's last pass (stats/detail/sum_certificates.hpp) against those that look at the
-// data: the same verdicts on random samples of every spread, and each bound below what it bounds.
+// data: the same verdicts on random samples of every spread, and each bound below what it bounds. By hand, what certificates
+// stand on: averaging regions, near ties.
 
 #include <lie/lie.hpp>
 #include <stats/certified_mean.hpp>
+#include <stats/detail/settled_maha.hpp>
+#include <stats/maha.hpp>
 #include <stats/random.hpp>
 #include <stats/sampling.hpp>
 
@@ -188,6 +191,74 @@ TEST(SumCertificatesOnTheSphere, boundTheRadiusOfConvexity) {
       EXPECT_GE(lower, exact - spread) << "spread " << spread;
     }
   }
+}
+
+/// The distance to the cut locus that the last pass has seen is that which looks at the data, but for the last step.
+TYPED_TEST(SumCertificates, knowTheDistanceToTheCutLocus) {
+  using M = TypeParam;
+  for (const double spread : {0.05, 0.2, 0.4}) {
+    CounterRng rng(34, static_cast<std::uint64_t>(100 * spread));
+    const std::vector<M> samples = cloud<M>(rng, 30, spread);
+    const MeanResult<M> mean = liestat::mean(samples);
+    ASSERT_TRUE(converged(mean.status));
+    if constexpr (detail::compactFactor<M>() != CompactFactor::none) {
+      EXPECT_NEAR(detail::leastDistanceToCutLocus(mean), detail::distanceToCutLocus(samples, mean.mean), 1e-6)
+          << spread;
+    }
+  }
+}
+
+/// The region of a settled covariance is so many standard deviations wide, its covariance their square.
+TEST(SettledCovariance, averagesOverAWidthInStandardDeviations) {
+  for (const std::size_t n : {5, 10, 30}) {
+    CounterRng rng(35, n);
+    const std::vector<SO3d> samples = cloud<SO3d>(rng, n, 0.8);
+    const auto features = detail::asSamples(samples);
+    const auto weights = detail::ones(n);
+    const MeanResult<SO3d> mean = liestat::mean(samples);
+    ASSERT_TRUE(converged(mean.status));
+    const double width = std::min(2.0, 0.1 * static_cast<double>(n));
+    const Eigen::Matrix3d region = 0.36 * Eigen::Matrix3d::Identity(), covariance = region / (width * width);
+    const auto settled =
+        detail::settleCovariance(features, weights, mean, 1.0, [&](const auto&) { return covariance; });
+    const auto averaged = detail::findAveragedHessian(features, weights, mean, region);
+    ASSERT_TRUE(averaged.averaged && settled.settled) << n;
+    EXPECT_LE((settled.hessian - averaged.hessian).norm(), 1e-12 * averaged.hessian.norm()) << n;
+    EXPECT_NEAR(settled.change, averaged.change, 1e-12) << n;
+  }
+}
+
+/// On the circle the Hessian is Σ 1/s², and so is Gauss' and Newton's. Averaged it is less by the change, and the covariance
+/// greater by the square of that.
+TEST(SettledMaha, hasTheCovarianceOfTheAveragedHessian) {
+  const double variance = 1;
+  std::vector<Gaussian<SO2d>> samples;
+  for (int i = 0; i < 42; ++i) {
+    const double angle = i < 2 ? 2.8 : 0.3;  // one pair near the cut locus of the mean
+    samples.push_back({SO2d(i % 2 == 0 ? angle : -angle), variance * SquareOf<SO2d>::Ones()});
+  }
+  const auto result = maha(samples, CovarianceAt::measured);
+  ASSERT_EQ(result.status, Status::ok);
+  const auto settled = detail::settleMaha<SO2d>(SerialExecutor{}, samples, CovarianceAt::measured, false, result, 1.0);
+  ASSERT_TRUE(settled.settled);
+  ASSERT_GT(settled.change, 0.01);
+  EXPECT_NEAR(settled.covariance(0, 0), variance / 42 / std::pow(1 - settled.change, 2), 1e-12);
+}
+
+/// Angles ±1.5 and ±1.6 have their mean at 0, the rival π, and local minima at ±π/2, one datum taken the other way.
+TEST(NearTies, haveStudentsStatisticOfTheDifferences) {
+  const std::vector<SO2d> samples{SO2d(1.5), SO2d(-1.5), SO2d(1.6), SO2d(-1.6)};
+  const MeanResult<SO2d> mean = liestat::mean(samples);
+  ASSERT_NEAR(distance(mean.mean, SO2d(0.0)), 0, 1e-12);
+  SquareOf<SO2d> covariance;
+  covariance << 0.01;  // no minimum lies in its region
+  const auto ties = nearTies(samples, mean, covariance);
+  ASSERT_EQ(ties.size(), 3U);
+  // ½ ((π - a)² - a²) for each angle.
+  const double a = 0.5 * pi * (pi - 3), b = 0.5 * pi * (pi - 3.2), average = 0.5 * (a + b);
+  const double sd = std::sqrt(2 * (std::pow(a - average, 2) + std::pow(b - average, 2)) / 3);
+  EXPECT_NEAR(distance(ties[0].feature, SO2d(pi)), 0, 1e-12);
+  EXPECT_NEAR(ties[0].z, 4 * average / (std::sqrt(4.0) * sd), 1e-12);
 }
 
 TEST(SumCertificatesOfWeights, addUp) {

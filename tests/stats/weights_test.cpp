@@ -157,6 +157,20 @@ TEST(Weights, OfBarycentres) {
   EXPECT_EQ(groupMean(samples, weights).status, Status::not_applicable);
 }
 
+// Rotations by 0 and 0.9 about one axis, with weights as 2 to 1: the barycentre is 0.3, the residuals -0.3 and 0.6, their
+// second moment (2·0.09 + 0.36)/3, and as many times that over n - 1 is the variance of the barycentre.
+TEST(Weights, OfABarycentreByHand) {
+  const std::vector<SO3d> rotations{SO3d::rotZ(0), SO3d::rotZ(0.9)};
+  for (const double unit : {1.0, 0.01}) {
+    const auto found = groupMean(rotations, std::vector<double>{2 * unit, unit});
+    ASSERT_EQ(found.status, Status::ok);
+    EXPECT_NEAR(found.mean.log().z(), 0.3, 1e-15);
+    EXPECT_NEAR(found.dispersion()(2, 2), 0.18, 1e-15);
+    EXPECT_NEAR((found.scatter(2, 2) / (found.jacobian(2, 2) * found.jacobian(2, 2))) * found.sum_of_weights, 0.18,
+                1e-15);
+  }
+}
+
 // Half of the weights 1e300, half 1e-300: the second half is not there.
 TEST(Weights, OfVeryDifferentSizes) {
   const auto samples = scattered<SO3d>(static_cast<int>(n), 0.1);

@@ -3,8 +3,10 @@
 #include <stats/random.hpp>
 #include <stats/whitened_residuals.hpp>
 
+#include <boost/math/distributions/chi_squared.hpp>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -142,6 +144,53 @@ TEST(WhitenedResiduals, PowerAgainstPlantedFaults) {
                   [&](Residuals& all, CounterRng& rng) { correlated(0.9)(all, rng), scaled(4, 0.1)(all, rng); }),
             1);
   EXPECT_LT(power(Kind::lag, 50, scaled(4, 0.1)), 0.02);
+}
+
+/// The smaller tail of χ², doubled, by Boost itself.
+double twoSided(double statistic, double dof) {
+  const boost::math::chi_squared law(dof);
+  return 2 * std::min(cdf(law, statistic), cdf(complement(law, statistic)));
+}
+
+TEST(WhitenedResiduals, StatisticsByHand) {
+  // Four residuals along each axis, ±√6, but +√12 four times along the first: the second moment is diag(2, 1, 1, 1, 1, 1),
+  // the mean √12/6 along the first axis.
+  std::vector<PoseResidual> residuals;
+  for (int k = 0; k < 6; ++k) {
+    for (int i = 0; i < 4; ++i) {
+      const double length = k == 0 ? std::sqrt(12.0) : i % 2 == 0 ? std::sqrt(6.0) : -std::sqrt(6.0);
+      residuals.push_back({length * Vector6::Unit(k), Matrix6::Identity()});
+    }
+  }
+  const auto tests = testWhitenedResiduals(residuals, {.joint = 7, .position = 4, .rotation = 3});
+  constexpr double eps = 1e-12;  // rounding of some hundred operations, relative
+  const auto isNees = [](const ResidualTest& test, double statistic, double dof) {
+    EXPECT_NEAR(test.statistic, statistic, eps * statistic);
+    EXPECT_EQ(test.dof, dof);
+    EXPECT_NEAR(test.p, twoSided(statistic, dof), 1e-10);
+  };
+  isNees(tests.joint, 4 * 12 + 20 * 6, 6 * 24 - 7);
+  isNees(tests.position, 4 * 12 + 8 * 6, 3 * 24 - 4);
+  isNees(tests.rotation, 12 * 6, 3 * 24 - 3);
+  // n |z̄|² = 24·12/36, and P(χ²₆ > x) = exp(-x/2) (1 + x/2 + x²/8).
+  EXPECT_NEAR(tests.mean.statistic, 8, 8 * eps);
+  EXPECT_EQ(tests.mean.dof, 6);
+  EXPECT_NEAR(tests.mean.p, std::exp(-4.0) * (1 + 4 + 8), 1e-12);
+  // n (tr S - ln det S - 6) with Bartlett's factor 1 - (2·6 + 1 - 2/(6 + 1))/(6 n), against χ² of 6·7/2.
+  const double ratio = 24 * (7 - std::log(2.0) - 6) * (1 - (13 - 2.0 / 7) / (6 * 24));
+  EXPECT_NEAR(tests.covariance.statistic, ratio, 1e-11);
+  EXPECT_EQ(tests.covariance.dof, 21);
+  EXPECT_NEAR(tests.covariance.p, cdf(complement(boost::math::chi_squared(21), ratio)), 1e-12);
+}
+
+TEST(WhitenedResiduals, PartsAreMarginal) {
+  // A position and a rotation correlated by 0.6: each part alone has the variance one, whatever the other is.
+  PoseResidual residual{(Vector6() << 1, 0, 0, 2, 0, 0).finished(), Matrix6::Identity()};
+  residual.covariance(0, 3) = residual.covariance(3, 0) = 0.6;
+  const auto tests = testWhitenedResiduals({&residual, 1});
+  EXPECT_NEAR(tests.position.statistic, 1, 1e-14);
+  EXPECT_NEAR(tests.rotation.statistic, 4, 1e-14);
+  EXPECT_NEAR(tests.joint.statistic, (1 + 4 - 2 * 0.6 * 2) / (1 - 0.36), 1e-14);
 }
 
 TEST(WhitenedResiduals, BadInputIsSaid) {
