@@ -130,7 +130,7 @@ struct ViInitRow {
   double value = std::numeric_limits<double>::quiet_NaN();     ///< χ² per degree of freedom, fraction
   double value_se = std::numeric_limits<double>::quiet_NaN();  ///< its standard error if the promise is kept
   std::optional<ViInitPromise> promise;
-  std::optional<bool> passed;         ///< whether it passed, where there is a promise
+  std::optional<bool> passed;                             ///< whether it passed, where there is a promise
   ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
 };
 

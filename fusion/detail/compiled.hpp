@@ -19,7 +19,7 @@
 #ifdef __clang__
 #define LIESTAT_NOT_LINKED(target)                                                                               \
   __attribute__((unavailable("liestat: link the CMake target " target ", or define LIESTAT_HEADER_ONLY for all " \
-                                                                      "units")))
+                             "units")))
 #else
 #define LIESTAT_NOT_LINKED(target) \
   [[gnu::error("liestat: link the CMake target " target ", or define LIESTAT_HEADER_ONLY for all units")]]
