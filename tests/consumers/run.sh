@@ -85,9 +85,10 @@ fi
 # macro, and with the macro the program is whole.
 # shellcheck disable=SC2086
 estimators() { $CXX -std=c++20 "$@" -I"$root" $eigen "$here/fusion.cpp" 2>&1; }
+errors=$(estimators -c -o not_linked.o || true)
 for target in fusion trajectories; do
-  estimators -c -o not_linked.o | grep -q "liestat: link the CMake target liestat::$target, or define LIESTAT_HEADER_ONLY" || {
-    estimators -c -o not_linked.o
+  grep -q "liestat: link the CMake target liestat::$target, or define LIESTAT_HEADER_ONLY" <<<"$errors" || {
+    echo "$errors"
     echo "consumers: failed: a call of an estimator that is not linked is not answered by a sentence" >&2
     exit 1
   }
