@@ -102,7 +102,7 @@ struct ViInitPromise {
   double note_median = std::numeric_limits<double>::infinity();
   double note_p95 = std::numeric_limits<double>::infinity();
   std::size_t note_windows = 60;
-  double deviation = 0;  ///< largest deviation of χ² per degree of freedom from 1
+  double deviation = 0;  ///< tolerated deviation of χ² per degree of freedom from 1
   double fraction = 0;   ///< at least
 };
 

@@ -127,7 +127,7 @@ struct CalibratedPose {
   Gaussian<SE3d> pose;
   bool has_covariance = false;
   bool rotation_is_open = false;
-  /// Standard deviations of the translation (m, along the parent's axes) and of the rotation vector (rad). NaN without a
+  /// Standard deviations of the translation (m, in the parent's axes) and of the rotation vector (rad). NaN without a
   /// covariance, and along axes in which an open direction has a component.
   Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
   Eigen::Matrix<double, 6, 1> local_sigmas = sigmas;  ///< those of the local error T·Exp(e), likewise

@@ -130,7 +130,7 @@ constexpr auto words(DeltaUnit) { return std::array{"f", "d", "r", "m"}; }  // e
 struct RelativeOptions {
   double delta = 1;
   DeltaUnit unit = DeltaUnit::frames;
-  double relative_tolerance = 0.1;  ///< tolerance relative to delta, for all pairs
+  double relative_tolerance = 0.1;  ///< tolerance of the distance relative to delta, for all pairs
   bool all_pairs = false;
   bool pairs_from_reference = false;
 };

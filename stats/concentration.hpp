@@ -1,4 +1,4 @@
-// Test of whether rotations, directions and the like have a mean: their scatter against that of uniform ones. Needs Eigen
+// Test whether rotations, directions and the like have a mean: their scatter against that of uniform ones. Needs Eigen
 // alone.
 //
 // Under the uniform law of a compact homogeneous space every feature has the same expected squared distance V₀ from the

@@ -182,7 +182,7 @@ struct MotionFilterOptions {
 
   // Verdicts on a frame.
   std::size_t min_pairs = 8, min_pairs_gyroscope = 2;
-  double standstill_probability = 0.05;  ///< of calling a moving frame that; see MotionFlags
+  double standstill_probability = 0.05;  ///< probability of missing a standstill; see MotionFlags
   double degenerate_sigma = 0.2;         ///< rad, the larger standard deviation of the direction
   std::size_t lost_frames = 10;
   double lost_innovation = 2;  ///< mean normalised innovation of these frames above which hypotheses start anew
