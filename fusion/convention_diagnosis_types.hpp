@@ -161,9 +161,9 @@ struct CovarianceDiagnosis {
   AlignmentModel alignment = AlignmentModel::none;
   Convention assumed;  ///< in which the file would be read without a diagnosis, as far as the format allows
   MatrixStructure structure;
-  std::optional<ConventionDiagnosis> diagnosis;  ///< in mode diagnosis
-  std::optional<ChainDiagnosis> chain;           ///< in mode chain
-  std::vector<PlanRow> plan;                     ///< in mode plan
+  std::optional<ConventionDiagnosis> diagnosis;  ///< set in mode diagnosis
+  std::optional<ChainDiagnosis> chain;           ///< set in mode chain
+  std::vector<PlanRow> plan;                     ///< set in mode plan
 
   /// The conventions that are left; empty for a plan.
   std::vector<Convention> accepted() const;

@@ -48,7 +48,7 @@ struct CertifiedMaha {
   UniquenessResult<M> uniqueness;     ///< unique on flat manifolds only; ambiguous if there are rivals
   std::vector<NearTie<M>> near_ties;  ///< other minima that the measurements do not exclude, the nearest tie first
   std::size_t starts = 0;             ///< number of starts from which the iteration was run
-  Concentration concentration;        ///< scatter about the weighted least-squares mean
+  Concentration concentration;        ///< concentration about the weighted least-squares mean
   CutLocusMass cut_locus;             ///< mass at the cut locus of the weighted least-squares mean
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.

@@ -60,7 +60,7 @@ struct GyroscopeRotation {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< rad², positive definite
 };
 
-/// Flags on one frame besides the estimate. The state is kept through all of these.
+/// Flags of one frame, besides the estimate. The state is kept through all of these.
 struct MotionFlags {
   bool bad_input =
       false;             ///< pairs with NaN, or with a sigma that is not positive, were left out; or the gyroscope was
