@@ -54,7 +54,7 @@ struct RowPlan {
 struct Plan {
   Experiment experiment;
   double sigma;
-  double cost;  ///< of a trial, in units of one of the first
+  double cost;  ///< cost of a trial, in units of one of the first
   std::vector<RowPlan> rows;
 };
 

@@ -18,7 +18,7 @@ namespace liestat::experiments {
 /// The questions that `liestat validate hand-eye` asks.
 enum class HandEyeExperiment {
   accuracy,     ///< well excited absolute poses: errors, covariance, χ² of the fit
-  motions,      ///< what a motion leaves open, and the covariance of the rest
+  motions,      ///< directions that a motion leaves open, and the covariance of the rest
   outliers,     ///< three wrong pairs of ten: are they found?
   formulations  ///< relative motions that were made of absolute poses, for comparison
 };
@@ -54,7 +54,7 @@ struct HandEyeRow : JudgedReport {
   HandEyeFormulation formulation = HandEyeFormulation::poses;
   HandEyeMotion motion = HandEyeMotion::general;
   HandEyeNoise noise = HandEyeNoise::isotropic;
-  double scale = 1;  ///< of the noise
+  double scale = 1;  ///< factor of the noise
   std::size_t pairs = 0;
   std::optional<HandEyeOutliers> outliers;
   bool fit = false;
@@ -68,10 +68,10 @@ struct HandEyeRow : JudgedReport {
   double note_translation = std::numeric_limits<double>::quiet_NaN();
   /// Trials with the right dimension of what is open (`motions`), or in which every wrong pair was found (`outliers`).
   std::size_t right = 0;
-  std::optional<bool> right_passed;  ///< whether these are all; absent elsewhere
+  std::optional<bool> right_passed;  ///< true if these are all; absent elsewhere
   double lost = 0;                   ///< share of the right pairs that were taken for wrong ones
 
-  /// Whether all that was judged passes; none where nothing was.
+  /// True if all that was judged passes; none if nothing was judged.
   std::optional<bool> answer() const {
     if (!right_passed && !passed) return std::nullopt;
     return right_passed.value_or(true) && passed.value_or(true);

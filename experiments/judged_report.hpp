@@ -20,7 +20,7 @@ inline constexpr double run_false_alarm = 1e-5;
 struct JudgedReport {
   ValidationReport report;
   std::optional<ValidationTolerance> promise;  ///< absent outside the domain of the documentation: shown, not judged
-  std::optional<bool> passed;                  ///< whether it passed, where there is a promise
+  std::optional<bool> passed;                  ///< true if it keeps its promise; absent without one
   ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
   std::vector<HistogramBin> histogram;                    ///< squared distances, with the law's density
   double tail = 0;                                        ///< fraction of distances beyond the law's 99.9 % quantile

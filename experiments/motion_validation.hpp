@@ -77,7 +77,7 @@ struct MotionRow {
   double usable_wrong = 0;  ///< share of these with an error above 10°
   std::optional<MotionPromise> promise;
   std::optional<bool> passed;
-  std::string reason;  ///< what failed, in words
+  std::string reason;  ///< the failed criteria, in words
 };
 
 /// The cells of some methods, in their order.

@@ -23,7 +23,7 @@ namespace {
 
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 constexpr double conic_sigma = 0.005;
-constexpr double inlier_share = 0.99;  // of the errors of inliers that are below the threshold
+constexpr double inlier_share = 0.99;  // fraction of the inliers' errors below the threshold
 constexpr double histogram_T = 16;     // four standard deviations
 
 /// The elements of a list that are named.
@@ -218,7 +218,7 @@ Trial searchedByAll(const Model& model, const RobustValidation& validation, doub
         run(InlierCount{threshold});
         break;
       case RobustScore::trimmed_quantile:
-        run(TrimmedQuantile{0.5 * share});  // what the report takes
+        run(TrimmedQuantile{0.5 * share});  // the quantile that the report takes
         break;
     }
     if (score == validation.scores.front()) trial.thresholds = thresholds;

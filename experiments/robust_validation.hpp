@@ -53,11 +53,11 @@ struct RobustRow : JudgedReport {
   double outliers = 0;
   std::size_t trials = 0, found = 0;  ///< found: nine tenths of the inliers and more are inliers of the estimate
   double confidence = 0;              ///< that was asked for
-  /// What cutting the inliers' errors at a threshold t makes of the distances, to first order: P(χ²_p < t)/P(χ²_{p+2} < t)
+  /// Factor of the distances if inliers' errors are cut at a threshold t, to first order: P(χ²_p < t)/P(χ²_{p+2} < t)
   /// with p equations a measurement.
   double cut_factor = 1;
   std::optional<bool>
-      found_passed;        ///< whether so many are likely where each is found with that probability; if judged
+      found_passed;        ///< true if so many are likely where each is found with that probability; if judged
   double right = 0;        ///< share of the inliers that the estimate has as inliers
   double wrong = 0;        ///< share of the outliers that it has; NaN without any
   double draws = 0;        ///< mean number of them
@@ -74,7 +74,7 @@ struct ThresholdRow {
   double outliers = 0;
   std::size_t trials = 0;
   double histogram_found = 0;                    ///< share of the trials in which the histogram had a minimum
-  double histogram_mean = 0, histogram_sd = 0;   ///< of √threshold in these
+  double histogram_mean = 0, histogram_sd = 0;   ///< mean and standard deviation of √threshold in these
   double moments_found = 0;                      ///< share of the trials with a root
   double moments_median = 0, moments_tenth = 0;  ///< median and tenth of √T; 4.42 expected
 };
@@ -82,7 +82,7 @@ struct ThresholdRow {
 struct RobustValidationResult {
   std::vector<RobustRow> rows;
   std::vector<ThresholdRow> thresholds;
-  Tally tally() const;  ///< of what was found
+  Tally tally() const;  ///< counts whether enough structures were found
 };
 
 /// Runs everything; rows in the order of structures, outliers, scores.

@@ -26,8 +26,8 @@ struct Recognised {
   bool null_right = true, wrong = false;
 };
 
-/// Whether the second solution has its features in front of the camera, where the first's scaled copy is the second:
-/// for a constant acceleration, and for three images.
+/// True if the second solution, a scaled copy of the first, has its features in front of the camera; known only for a
+/// constant acceleration and for three images.
 std::optional<bool> secondInFront(const ClosedFormCase& c, const InertialScene& scene) {
   const SceneMotion motion = c.scene.motion;
   if (c.bias || c.null != 1 || !c.solved || c.scene.layout == SceneLayout::ahead) return {};

@@ -23,7 +23,7 @@ InertialSceneOptions optionsOf(int figure) {
   return {.images = 7, .features = 3, .motion = SceneMotion::constant_acceleration, .acceleration = 1.5};
 }
 
-/// Whether one can tell what is what.
+/// True if both solutions can be read off one drawing: of similar size, with paths and features apart.
 bool canBeDrawn(const InertialScene& scene, const ClosedFormResult& r) {
   const ClosedFormSolution &a = r.solutions[0], &b = r.solutions[1];
   const double size = std::max(extent(scene, a), extent(scene, b));

@@ -81,7 +81,7 @@ Eigen::Matrix3d homographyOfThree(const Eigen::Matrix3d& F, std::span<const Eige
   return A - epipole * v.transpose();
 }
 
-/// Whether five of the seven matches that made F are on one plane (O. Chum, T. Werner and J. Matas, Two-view geometry
+/// True if five of the seven matches that made F are on one plane (O. Chum, T. Werner and J. Matas, Two-view geometry
 /// estimation unaffected by a dominant plane, CVPR 2005): the planes of five triplets are enough to look at.
 bool isDegenerate(const Eigen::Matrix3d& F, const std::vector<Eigen::Vector4d>& sample, const MatchNoise& noise) {
   constexpr std::size_t triplets[5][3] = {{0, 1, 2}, {3, 4, 5}, {0, 1, 6}, {3, 4, 6}, {2, 5, 6}};

@@ -52,7 +52,7 @@ struct TwoViewPairsValidation {
   std::size_t runs = 10;  ///< runs a pair; medians are over these
   std::uint64_t seed = 1;
   int threads = 0;
-  /// Whether matches that others contradict (fusion/two_view/contradictions.hpp) take part.
+  /// Matches that others contradict (fusion/two_view/contradictions.hpp) take part.
   bool contradicted = false;
 };
 

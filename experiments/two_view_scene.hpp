@@ -94,7 +94,7 @@ inline const char* nameOf(TwoViewMotion motion) {
                                    "shared focal length"};
   return names[static_cast<std::size_t>(motion)];
 }
-/// Whether a motion is told by a fundamental matrix, not by a homography.
+/// True if a motion is described by a fundamental matrix, not by a homography.
 inline bool isEpipolar(TwoViewMotion motion) {
   return motion == TwoViewMotion::translation || motion == TwoViewMotion::essential ||
          motion == TwoViewMotion::fundamental || motion == TwoViewMotion::affine_epipolar ||

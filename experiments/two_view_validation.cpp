@@ -51,7 +51,7 @@ int dimensionOf(const TwoViewSceneOptions& options) {
   return 0;
 }
 
-/// Whether `right` of `trials` is within four standard errors of a share, or above it.
+/// True if `right` of `trials` is within four standard errors of a share, or above it.
 bool reaches(double right, double trials, double share) {
   return right >= share * trials - 4 * std::sqrt(share * (1 - share) * trials);
 }

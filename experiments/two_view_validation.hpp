@@ -35,7 +35,7 @@ struct TwoViewChoice {
   TwoViewMotion truth = TwoViewMotion::none;
   std::size_t trials = 0;
   std::array<std::size_t, all_two_view_motions.size()> chosen = {};
-  /// Whether that many right choices are likely at the share that is promised.
+  /// True if the right choices are within four standard errors of the promised share, or above it.
   std::optional<bool> passed;
   std::size_t right() const { return chosen[static_cast<std::size_t>(truth)]; }
   bool optional() const { return static_cast<std::size_t>(truth) >= default_two_view_motions.size(); }
@@ -50,11 +50,11 @@ struct TwoViewRow : JudgedReport {
 };
 
 struct TwoViewValidationResult {
-  std::vector<TwoViewRow> rows;        ///< of motions with a parameter
-  std::vector<TwoViewChoice> choices;  ///< of all motions
+  std::vector<TwoViewRow> rows;        ///< motions with a parameter
+  std::vector<TwoViewChoice> choices;  ///< all motions
   std::optional<bool> average_passed;  ///< where all nine were asked for
   double average() const;              ///< share of right choices among them; NaN of none
-  Tally tally() const;                 ///< of choices and their average
+  Tally tally() const;                 ///< counts the choices and their average
 };
 
 /// Runs everything; in the order of the motions.

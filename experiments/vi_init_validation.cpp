@@ -66,7 +66,7 @@ struct Column {
   Estimator estimator;
   Quantity quantity;
   double (*value)(const Outcome&);
-  int dof = 0;                                   ///< of a distance
+  int dof = 0;                                   ///< degrees of freedom of a distance
   double (*chi2_dof)(const Outcome&) = nullptr;  ///< degrees of freedom of a χ²
 };
 
@@ -78,7 +78,7 @@ struct Experiment {
   struct Row {
     Estimator estimator;
     Quantity quantity;
-    int dof = 0;  ///< of a distance
+    int dof = 0;  ///< degrees of freedom of a distance
   };
   std::vector<Row> rows;
   std::size_t share = 1;  ///< it has only one trial of so many

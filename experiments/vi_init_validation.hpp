@@ -22,7 +22,7 @@ enum class ViInitCheck {
   accuracy,        ///< errors of the closed form, biases known
   gyroscope_bias,  ///< errors where the gyroscope has a bias of 0.05 rad/s
   noise,           ///< the calibration of the sensor's noise where it is 1, 4, 16 times as large
-  rest,            ///< what is at rest is called so, and what moves slowly is not; gravity and biases at rest
+  rest,            ///< rest is recognised, and slow motion is not called rest; gravity and biases at rest
   drift            ///< errors where 40 % of the tracks drift
 };
 inline constexpr std::array all_vi_init_checks = {
@@ -34,10 +34,10 @@ std::string name(ViInitCheck check);
 enum class ViInitEstimator {
   refinement,
   closed_form,
-  closed_form_with_bias,  ///< of the accelerometer
+  closed_form_with_bias,  ///< the bias of the accelerometer
   least_squares,          ///< the closed form without the removal of the noise's bias
-  bias_estimated,         ///< of the gyroscope
-  bias_ignored,           ///< of the gyroscope
+  bias_estimated,         ///< the bias of the gyroscope
+  bias_ignored,           ///< the bias of the gyroscope
   robust,
   oracle,        ///< knows which tracks drift
   no_selection,  ///< takes all tracks
@@ -61,17 +61,17 @@ std::string name(ViInitEstimator estimator);
 /// The quantity that a row is about.
 enum class ViInitQuantity {
   nees_v,           ///< squared Mahalanobis distance of V, 3 degrees of freedom
-  nees_v_g,         ///< of V and gravity, 5
-  nees_all,         ///< of V, gravity and the biases that are estimated: 11, 8 of the closed form
-  nees_last_state,  ///< of the state at the last image, 9
-  nees_at_last,     ///< of that state, gravity and the biases there, 17
-  nees_at_rest,     ///< of gravity and both biases, 8
-  chi2_per_dof,     ///< of the bearings, motions and priors
+  nees_v_g,         ///< the same for V and gravity, 5
+  nees_all,         ///< the same for V, gravity and the biases that are estimated: 11, 8 in closed form
+  nees_last_state,  ///< the same for the state at the last image, 9
+  nees_at_last,     ///< the same for that state, gravity and the biases there, 17
+  nees_at_rest,     ///< the same for gravity and both biases, 8
+  chi2_per_dof,     ///< cost of the bearings, motions and priors
   speed,            ///< length of the error of V
   gravity,          ///< angle to the true one
   scale,            ///< length of V over the true one, off 1
   scale_of_features,
-  bias,       ///< of the gyroscope, length of the error
+  bias,       ///< length of the error of the gyroscope's bias
   selection,  ///< fraction of the windows in which exactly the right tracks were kept
   told,  ///< fraction of the windows that were told right: rest called so; of slow motion: not called rest, or slower than what that excludes
   moving,                  ///< fraction of the windows of slow motion that were not called rest; no promise
@@ -88,21 +88,21 @@ enum class ViInitStatistic {
   distance,     ///< squared distances, against their law
   chi_squared,  ///< a sum of squared residuals over its degrees of freedom
   error,        ///< by median and 95 % quantile
-  fraction      ///< of the windows
+  fraction      ///< fraction of the windows
 };
 ViInitStatistic statistic(ViInitQuantity quantity);
 
 /// The promise made about a row (docs/validation.md), and the figures of an independent prototype. Infinite:
 /// none.
 struct ViInitPromise {
-  ValidationTolerance tolerance = {};  ///< of distances; `failure_fraction` also of all others
+  ValidationTolerance tolerance = {};  ///< tolerance of distances; its `failure_fraction` also of all others
   double median = std::numeric_limits<double>::infinity();
   double p95 = std::numeric_limits<double>::infinity();
   /// The prototype's figures, out of so many windows.
   double note_median = std::numeric_limits<double>::infinity();
   double note_p95 = std::numeric_limits<double>::infinity();
   std::size_t note_windows = 60;
-  double deviation = 0;  ///< of χ² per degree of freedom, from 1
+  double deviation = 0;  ///< tolerated deviation of χ² per degree of freedom from 1
   double fraction = 0;   ///< at least
 };
 
@@ -112,7 +112,7 @@ struct ViInitValidation {
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
   std::size_t trials = 600;     ///< windows a row; of slow motion a tenth of them
   std::size_t recordings = 10;  ///< a row of the calibration of noise
-  double noise = 1;             ///< what is simulated over what the estimators are told
+  double noise = 1;             ///< simulated noise over the noise that the estimators are told
   std::uint64_t seed = 1;
   int threads = 0;
 };
@@ -124,13 +124,13 @@ struct ViInitRow {
   ViInitQuantity quantity{};
   ViInitWindow window;
   std::size_t trials = 0, failures = 0;
-  std::optional<ValidationReport> report;  ///< of distances; their list is empty
+  std::optional<ValidationReport> report;  ///< report on distances; their list is empty
   double median = std::numeric_limits<double>::quiet_NaN();
   double p95 = std::numeric_limits<double>::quiet_NaN();
   double value = std::numeric_limits<double>::quiet_NaN();     ///< χ² per degree of freedom, fraction
   double value_se = std::numeric_limits<double>::quiet_NaN();  ///< its standard error if the promise is kept
   std::optional<ViInitPromise> promise;
-  std::optional<bool> passed;                             ///< whether it passed, where there is a promise
+  std::optional<bool> passed;                             ///< true if the promise is kept; absent without one
   ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
 };
 

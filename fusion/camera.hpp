@@ -61,7 +61,7 @@ struct Camera {
   /// default gives sigma in rad per pixel of noise. None where bearing() has none.
   std::optional<BearingWithSigma> bearingWithSigma(const Eigen::Vector2d& pixel, double pixel_sigma = 1) const;
 
-  /// Whether the pixel lies in the image; true where the size is not known.
+  /// True if the pixel lies in the image, or if the size is not known.
   bool sees(const Eigen::Vector2d& pixel) const;
 
  private:

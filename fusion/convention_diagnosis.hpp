@@ -62,11 +62,11 @@ struct DiagnosedRun {
 struct CovarianceDiagnosisOptions {
   DiagnosisMode mode = DiagnosisMode::diagnosis;
   double alpha = 1e-3;                              ///< probability of rejecting the true convention
-  AlignmentModel alignment = AlignmentModel::none;  ///< of one run of poses: none, posyaw, se3 or sim3
+  AlignmentModel alignment = AlignmentModel::none;  ///< alignment of one run of poses: none, posyaw, se3 or sim3
   std::optional<CovarianceOrder> order = {};        ///< that the format fixes
   std::optional<CovarianceContent> content = {};    ///< that the format fixes
   bool edges = false;                               ///< the poses are edges of a graph, independent of each other
-  bool all_units = false;                           ///< of a plan: half and double angles and degrees as well
+  bool all_units = false;                           ///< a plan has half and double angles and degrees as well
   std::optional<double> at = {};  ///< s, of several runs: the time of their residuals; the last common one if unset
 };
 

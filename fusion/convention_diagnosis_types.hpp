@@ -66,7 +66,7 @@ struct MatrixStructure {
   bool blocks_only = false;    ///< the cross block is unknown
   bool constant = false;       ///< all are the same
   bool diagonal = false, no_cross = false, isotropic_blocks = false;
-  std::array<bool, 6> zero_variance{};  ///< of each coordinate, in the file's order, in all matrices
+  std::array<bool, 6> zero_variance{};  ///< coordinates, in the file's order, with zero variance in all matrices
   bool rank_one = false;                ///< every 2×2 minor vanishes
   std::vector<std::string> words() const;
 };
@@ -84,7 +84,7 @@ struct HypothesisFit {
 struct ScaleProfile {
   Convention convention;
   double translation = 1, rotation = 1;  ///< k_t, k_r: above one inflated, below overconfident
-  double relative_sigma = 0;             ///< of each
+  double relative_sigma = 0;             ///< relative standard deviation of each
   bool identified = false;               ///< no other order and perturbation fits as well, scales free
   std::vector<Convention> accepted;
   WhitenedResidualTests tests;  ///< with the scales removed
@@ -157,13 +157,13 @@ struct CovarianceDiagnosis {
   DiagnosisMode mode = DiagnosisMode::diagnosis;
   std::string what = "poses";        ///< poses, edges, or "runs at 5 s"
   std::vector<DiagnosedPose> poses;  ///< that were diagnosed: of several runs one each
-  std::vector<double> times;         ///< of these poses, s; empty if they have none, or are of several runs
+  std::vector<double> times;         ///< times of these poses, s; empty if they have none, or are of several runs
   AlignmentModel alignment = AlignmentModel::none;
   Convention assumed;  ///< in which the file would be read without a diagnosis, as far as the format allows
   MatrixStructure structure;
-  std::optional<ConventionDiagnosis> diagnosis;  ///< of mode diagnosis
-  std::optional<ChainDiagnosis> chain;           ///< of mode chain
-  std::vector<PlanRow> plan;                     ///< of mode plan
+  std::optional<ConventionDiagnosis> diagnosis;  ///< set in mode diagnosis
+  std::optional<ChainDiagnosis> chain;           ///< set in mode chain
+  std::vector<PlanRow> plan;                     ///< set in mode plan
 
   /// The conventions that are left; empty for a plan.
   std::vector<Convention> accepted() const;

@@ -27,7 +27,7 @@ struct PoseTrajectory {
   bool has_covariances = false;            ///< false: those of the poses are taken as zero
   std::string name = {};                   ///< "est.tum"; empty: "the estimate", "the reference"
   std::string covariance_convention = {};  ///< the convention from which the covariances were converted
-  std::vector<std::size_t> lines = {};     ///< of a file, one for each pose; empty: there is none
+  std::vector<std::size_t> lines = {};     ///< line of the file for each pose; empty: there is none
 };
 
 // Options ----------------------------------------------------------------------------------------------------------------
@@ -66,13 +66,13 @@ struct MotionThinning {
 struct EvaluationOptions {
   AssociationOptions association = {};
   PoseRelation pose_relation = PoseRelation::trans_part;
-  AlignmentModel alignment = AlignmentModel::none;       ///< of APE and RPE, by least squares
+  AlignmentModel alignment = AlignmentModel::none;       ///< least-squares alignment for APE and RPE
   std::optional<AlignmentModel> verdict_alignment = {};  ///< weighted by the covariances; else the same
   std::size_t n_to_align = 0;                            ///< the first poses; 0: all
   std::optional<CoordinatePlane> project_to_plane = {};  ///< both, after the alignment
-  std::optional<ErrorUnit> change_unit = {};             ///< of APE, and of RPE if it has the same unit
+  std::optional<ErrorUnit> change_unit = {};             ///< unit of APE, and of RPE if it has the same unit
   std::size_t downsample = 0;                            ///< so many poses of each, evenly spaced; 0: all
-  std::optional<MotionThinning> motion_filter = {};      ///< of each, after downsample
+  std::optional<MotionThinning> motion_filter = {};      ///< applied to both, after downsample
   RelativeOptions relative = {};                         ///< pairs of RPE
   std::optional<PairsModel> pairs_model = {};            ///< NEES of relative motions; else there is none
 
@@ -149,24 +149,24 @@ struct TrajectoryEvaluation {
   std::string ape_unit = {}, rpe_unit = {};
   std::optional<PairsModel> pairs_model = {};
   std::string covariance_convention = {};
-  bool has_covariances = false;  ///< of the estimate
+  bool has_covariances = false;  ///< the estimate has covariances
 
   bool by_time = true;
-  std::vector<std::size_t> rows = {};  ///< of the estimate: the matched poses
+  std::vector<std::size_t> rows = {};  ///< rows of the estimate: the matched poses
   std::vector<double> times = {};      ///< s; without times the numbers of the rows that were not thinned out
   std::vector<MatchedPose> matched = {};
-  Alignment alignment = {};                                        ///< of APE and RPE
+  Alignment alignment = {};                                        ///< alignment for APE and RPE
   std::vector<double> ape = {}, rpe = {};                          ///< in their units
-  std::vector<std::pair<std::size_t, std::size_t>> pairs = {};     ///< of matched poses, those of RPE
+  std::vector<std::pair<std::size_t, std::size_t>> pairs = {};     ///< pairs of matched poses for RPE
   std::vector<double> position_errors = {}, rotation_errors = {};  ///< m and rad, whatever the pose relation
   ErrorStatistics ape_statistics = {}, rpe_statistics = {};
-  Alignment weighted = {};  ///< of the verdict
+  Alignment weighted = {};  ///< alignment for the verdict
   Consistency consistency = {};
   std::optional<RelativeConsistency> relative = {};
   std::vector<std::string> notes = {};
 
   bool ok() const { return status == EvaluationStatus::ok; }
-  /// Whether the covariances of the estimate are to be trusted.
+  /// Verdict on the covariances of the estimate: are they to be trusted?
   Verdict verdict() const;
 };
 

@@ -110,7 +110,7 @@ struct HandEyeResult {
   bool ok() const { return status == FusionStatus::ok; }
   /// How it ended, in words.
   std::string inWords() const;
-  /// Whether the calibration is to be trusted: yes where the status is ok, else no.
+  /// Verdict on the calibration: to be trusted if the status is ok, else not.
   Verdict verdict() const;
   /// True if an open direction rotates X, so that there is no covariance.
   bool rotationIsOpen() const {
@@ -127,10 +127,10 @@ struct CalibratedPose {
   Gaussian<SE3d> pose;
   bool has_covariance = false;
   bool rotation_is_open = false;
-  /// Of the translation (m, along the parent's axes) and of the rotation vector (rad). NaN where there is no
+  /// Standard deviations of the translation (m, in the parent's axes) and of the rotation vector (rad). NaN without a
   /// covariance, and along axes in which an open direction has a component.
   Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
-  Eigen::Matrix<double, 6, 1> local_sigmas = sigmas;  ///< of the local error T·Exp(e), likewise
+  Eigen::Matrix<double, 6, 1> local_sigmas = sigmas;  ///< those of the local error T·Exp(e), likewise
   /// Covariance of translation and rotation vector as above; open directions count as known.
   Eigen::Matrix<double, 6, 6> covariance_of_coordinates = Eigen::Matrix<double, 6, 6>::Zero();
 
@@ -166,7 +166,7 @@ struct HandEyeReading {
 struct HandEyeHint {
   HandEyeReading reading;
   double chi2_per_degree = 0;  ///< with covariances as given
-  double p = 0;                ///< of a χ² as large; NaN where the noise is not known
+  double p = 0;                ///< probability of a larger χ²; NaN where the noise is not known
   std::size_t outliers = 0;
   bool agrees = false;  ///< within the noise; otherwise it is only much better than what was found
 };
@@ -186,7 +186,7 @@ void describe(V& v, const PoseCoordinates& x) {
 /// Standard deviations (m, rad), shown in m and degrees.
 struct PoseSigmas {
   Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Zero();
-  const char* rotation = "rotation_deg";  ///< what the rotation's are called
+  const char* rotation = "rotation_deg";  ///< name of the rotation's field
 };
 template <class V>
 void describe(V& v, const PoseSigmas& x) {

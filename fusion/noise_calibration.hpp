@@ -24,7 +24,7 @@ namespace liestat {
 struct NoiseFactor {
   double factor = 1, low = 0, high = std::numeric_limits<double>::infinity();
 
-  /// Whether the interval is narrower than a factor of six.
+  /// True if the interval is narrower than a factor of six.
   bool isTold() const { return high < 6 * low; }
 };
 
@@ -40,7 +40,7 @@ struct NoiseCalibration {
   NoiseFactor common;
   /// The probability that two factors explain the meetings so much better than one, if they are one.
   double common_p = 1;
-  /// Whether the recording tells the two apart: both are told.
+  /// True if the recording tells the two apart: both are told.
   bool separable = false;
   /// The densities with the factors: each its own where they are separable or not one (common_p below 0.05), else the
   /// common one; as they were given unless ok.

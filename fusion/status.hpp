@@ -43,7 +43,7 @@ enum class FusionStatus {
   bad_input  ///< the measurements or the options: see the result's fault
 };
 
-/// Whether what ended with this status found its answer, or all of several, whatever else there is to say about it. The
+/// True if an estimation with this status found its answer, or all of several, whatever else can be said about it. The
 /// function of the same name for liestat::Status means the same, and the harness of stats/validation.hpp takes both.
 constexpr bool converged(FusionStatus status) {
   return status == FusionStatus::ok || status == FusionStatus::ambiguous || status == FusionStatus::double_root ||

@@ -59,7 +59,7 @@ inline std::optional<MeasuredPoint> triangulate(const StereoCamera& camera, cons
   const double disparity = observation.uL - observation.uR;
   if (!(disparity >= min_disparity)) return std::nullopt;
   const double depth = camera.fu * camera.b / disparity;
-  const double share = variance[3] / (variance[1] + variance[3]);  // of the left row
+  const double share = variance[3] / (variance[1] + variance[3]);  // weight of the left row
   const double x = (observation.uL - camera.cu) / camera.fu;
   const double y = (share * observation.vL + (1 - share) * observation.vR - camera.cv) / camera.fv;
   const Eigen::Vector3d ray(x, y, 1);

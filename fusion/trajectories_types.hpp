@@ -42,7 +42,7 @@ enum class AlignmentModel {
   posyaw,  ///< translation and rotation about the vertical z axis
   se3,
   sim3,
-  scale  ///< of the positions about the origin of the world, alone (evo's -s without -a)
+  scale  ///< scale of the positions about the origin of the world, alone (evo's -s without -a)
 };
 constexpr auto words(AlignmentModel) { return std::array{"none", "origin", "posyaw", "se3", "sim3", "scale"}; }
 
@@ -59,7 +59,7 @@ struct Alignment {
   std::size_t poses = 0;  ///< the first poses, from which it was estimated
   int iterations = 0;
   double condition =
-      1;  ///< of the information matrix, in units of its diagonal; large: a direction is hardly determined
+      1;  ///< condition of the information matrix, in units of its diagonal; large: a direction is hardly determined
   std::string fault = {};  ///< why it is not ok
 
   SE3d operator()(const SE3d& pose) const {
@@ -94,8 +94,8 @@ struct Consistency {
   std::size_t n = 0;                ///< poses that were tested
   ResidualTest joint;               ///< exact χ² to first order
   ResidualTest position, rotation;  ///< χ² scaled to the exact mean and variance; `statistic` and `dof` are scaled
-  WhitenedResidualTests tests;      ///< of the errors with the covariance above
-  std::vector<PoseError> errors;    ///< of all poses, in their order
+  WhitenedResidualTests tests;      ///< tests of the errors with the covariance above
+  std::vector<PoseError> errors;    ///< errors of all poses, in their order
   std::vector<std::size_t> indefinite;  ///< poses whose covariance is not positive definite
 };
 
@@ -130,14 +130,14 @@ constexpr auto words(DeltaUnit) { return std::array{"f", "d", "r", "m"}; }  // e
 struct RelativeOptions {
   double delta = 1;
   DeltaUnit unit = DeltaUnit::frames;
-  double relative_tolerance = 0.1;  ///< of delta, for all pairs
+  double relative_tolerance = 0.1;  ///< tolerance of the distance relative to delta, for all pairs
   bool all_pairs = false;
   bool pairs_from_reference = false;
 };
 
 /// The assumption on the errors of a pair of poses. Files have covariances of single poses only, so it cannot be read off.
 enum class PairsModel {
-  independent,  ///< of each other: Σ_j + A Σ_i Aᵀ
+  independent,  ///< independent errors: Σ_j + A Σ_i Aᵀ
   chain         ///< dead reckoning, the later error contains the earlier: Σ_j - A Σ_i Aᵀ
 };
 constexpr auto words(PairsModel) { return std::array{"independent", "chain"}; }

@@ -50,7 +50,7 @@ const char* name(ConversionFault fault);
 struct UnconvertedMatrix {
   ConversionFault fault = ConversionFault::undetermined;
   std::size_t row = 0;
-  std::string found, expected;  ///< what is wrong, and what it takes; `expected` may be empty
+  std::string found, expected;  ///< the error, and the values that are accepted; `expected` may be empty
 };
 
 struct TrajectoryConversion {

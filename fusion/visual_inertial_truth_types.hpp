@@ -72,10 +72,10 @@ struct ComparedRecording {
   std::size_t windows_left = 0;    ///< not estimated, because of an interrupt
 
   std::size_t okWindows() const;
-  /// Whether the result is to be trusted: nothing was interrupted, a window is ok, and where windows were fused, those
+  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, and, where windows were fused, those
   /// of a stretch agree.
   Verdict verdict() const;
-  /// Of all windows that claim a scale, not only of those that came out well.
+  /// Summary of all windows that claim a scale, not only of those that came out well.
   InitialisationSummary summary() const;
 };
 

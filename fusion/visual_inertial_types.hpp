@@ -56,7 +56,7 @@ inline std::vector<BearingMeasurement> bearingsOf(std::span<const PixelMeasureme
 /// The measurements of a recording. Times are on one clock (s).
 struct VisualInertialRecording {
   std::span<const ImuSample<double>> readings = {};  ///< in the order of time; a view: they must outlive the call
-  ImuNoise<double> noise = {};                       ///< of the inertial sensor; both white densities must be positive
+  ImuNoise<double> noise = {};                       ///< noise of the readings; both white densities must be positive
   std::vector<double> image_times = {};              ///< ascending
   std::vector<SE3d> cameras = {SE3d()};  ///< body_T_camera of each camera (m); the body is the inertial sensor
   std::vector<BearingMeasurement> observations = {};
@@ -67,7 +67,7 @@ struct VisualInertialOptions {
   double stride = 0;                           ///< s from the start of a window to that of the next; 0: the window
   double image_rate = 10;                      ///< Hz: of the images that are used, at most; 0: all
   std::size_t max_features = 50;               ///< a window: those that were seen most often are taken; 0: all
-  std::size_t min_observations = 4;            ///< of a feature in a window
+  std::size_t min_observations = 4;            ///< minimum for a feature in a window
   std::optional<double> begin = {}, end = {};  ///< s; none: the first and the last image
   bool consensus = true;                       ///< tracks may be wrong
   bool refinement = true;                      ///< else the closed form alone
@@ -89,10 +89,10 @@ struct VisualInertialOptions {
 /// One window.
 struct InitialisedWindow {
   double begin = 0, end = 0;        ///< s, of its first and last image
-  Fault fault;                      ///< of the readings, with the reading's index
+  Fault fault;                      ///< fault of the readings, with the reading's index
   double fault_time = 0;            ///< s
-  std::vector<std::size_t> images;  ///< of the recording's
-  std::vector<std::size_t> tracks;  ///< of the recording's; features of the results in this order
+  std::vector<std::size_t> images;  ///< indices of the recording's images
+  std::vector<std::size_t> tracks;  ///< indices of the recording's tracks; features of the results in this order
   InertialWindow measured;          ///< integrated with the biases of the closed form
   bool known_biases = false;        ///< nothing was estimated
   /// Motion, tracks that agree, and the gyroscope's bias. Where biases are known, or all tracks are right, what was not
@@ -134,9 +134,9 @@ struct InitialisedWindow {
 /// The state that disjoint windows give together (fusion/init/window_fusion.hpp), at the last image of the last.
 struct FusedStretch {
   double begin = 0, end = 0;         ///< s
-  std::vector<std::size_t> windows;  ///< of the result's
-  bool has_state = false;            ///< whether there is one: each window may fail when it is refined again
-  double chi2 = 0;                   ///< of the windows' distances from each other
+  std::vector<std::size_t> windows;  ///< indices of the result's windows
+  bool has_state = false;            ///< false: there is none, as each window may fail when it is refined again
+  double chi2 = 0;                   ///< χ² of the windows' distances from each other
   std::size_t degrees_of_freedom = 0;
   double p = 1;                   ///< the probability of so large a χ² of windows that agree
   double inflation = 1;           ///< factor of the covariances at which they would, at least 1
@@ -144,7 +144,7 @@ struct FusedStretch {
   double gravity = 0;             ///< |G| that was used (m/s²)
   Gaussian<InertialState> state;  ///< at the end
 
-  /// Whether there is a state with a covariance that the windows do not contradict: p ≥ 1e-3, or it was inflated.
+  /// True if there is a state with a covariance that the windows do not contradict: p ≥ 1e-3, or it was inflated.
   bool ok() const { return has_state && (p >= least_p_of_fusion || inflated); }
 };
 

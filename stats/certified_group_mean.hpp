@@ -35,9 +35,9 @@ struct CertifiedGroupMeanOptions {
 template <LieGroup G>
 struct CertifiedGroupMean {
   GroupMeanResult<G> mean;
-  UniquenessResult<G> uniqueness;     ///< of the twin's mean, its rivals as barycentres; cost is the twin's
+  UniquenessResult<G> uniqueness;     ///< uniqueness of the twin's mean, its rivals as barycentres; cost is the twin's
   std::vector<NearTie<G>> near_ties;  ///< those of the twin's mean, as barycentres
-  CutLocusMass cut_locus;             ///< of the twin's mean
+  CutLocusMass cut_locus;             ///< mass at the cut locus of the twin's mean
   double hessian_change = 0;          ///< how much flatter the barycentre's equations are across the confidence region
   /// The barycentre with its covariance from residuals; none unless status is ok.
   std::optional<Gaussian<G>> estimate;

@@ -30,7 +30,7 @@ namespace liestat {
 template <Homogeneous M>
 struct CertifiedMahaOptions {
   MahaOptions<M> maha = {};         ///< its start, if there is one, is tried first
-  UniquenessOptions uniqueness = {  ///< of the least-squares mean that gives the starts
+  UniquenessOptions uniqueness = {  ///< options for the least-squares mean that gives the starts
       .budget = 10'000'000};
   std::size_t starts_from_data = 6;  ///< number of measurements, spread over the range, that are starts too
   double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
@@ -48,8 +48,8 @@ struct CertifiedMaha {
   UniquenessResult<M> uniqueness;     ///< unique on flat manifolds only; ambiguous if there are rivals
   std::vector<NearTie<M>> near_ties;  ///< other minima that the measurements do not exclude, the nearest tie first
   std::size_t starts = 0;             ///< number of starts from which the iteration was run
-  Concentration concentration;        ///< of the weighted least-squares mean
-  CutLocusMass cut_locus;             ///< of the weighted least-squares mean
+  Concentration concentration;        ///< concentration about the weighted least-squares mean
+  CutLocusMass cut_locus;             ///< mass at the cut locus of the weighted least-squares mean
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;

@@ -1,4 +1,4 @@
-// Whether rotations, directions and the like have a mean at all: their scatter against that of uniform ones. Needs Eigen
+// Test whether rotations, directions and the like have a mean: their scatter against that of uniform ones. Needs Eigen
 // alone.
 //
 // Under the uniform law of a compact homogeneous space every feature has the same expected squared distance V₀ from the
@@ -161,7 +161,7 @@ Concentration findConcentration(const R& samples, const W& weights, const MeanRe
   return findConcentration(samples, weights, mean.mean);
 }
 
-/// Whether noise of this covariance scatters less than a quarter as much as uniform features; of products each factor.
+/// True if noise of this covariance scatters less than a quarter as much as uniform features; for products each factor.
 template <Metric M>
 bool isModestNoise(const SquareOf<M>& noise) {
   if constexpr (Factored<M>) {

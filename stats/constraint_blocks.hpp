@@ -11,7 +11,7 @@
 // a number or a vector, and holds where all of it is zero. Blocks are terms again. A slack variable λ is a coordinate of
 // the parameter, given by its place; it must start where slackFor… says.
 //
-// What one must know:
+// Properties to know before use:
 //  - Gradients vanish at λ = 0, and where two factors of a product vanish at once. Such equations are dropped for that step
 //    and counted (ConstrainedResult::dropped_constraints, dropped_equations): a slack that starts at 0 stays there.
 //  - The estimate is a local one: it does not jump to another alternative or value.

@@ -110,7 +110,7 @@ SquareOf<M> empiricalCovariance(R&& samples, const std::type_identity_t<M>& y) {
   return sum / ScalarOf<M>(n);
 }
 
-/// Whether a covariance (symmetric, at most 13×13) leaves some direction without any error, whatever the units: a
+/// True if a covariance (symmetric, at most 13×13) leaves some direction without any error, whatever the units: a
 /// variance that is not positive, or an eigenvalue of the correlation matrix that is not above 1e-10. True for NaN.
 template <class Derived>
 bool isSingular(const Eigen::MatrixBase<Derived>& covariance) {

@@ -53,7 +53,7 @@ class Hierarchy {
     restart();
   }
 
-  /// Whether the models form a lattice (names that differ, parents that exist, no circle, one model without parents), and
+  /// True if the models form a lattice (names differ, parents exist, no circle, one model without parents), and
   /// numbers are within their limits. Otherwise nothing is ever estimated, and fault() says why.
   bool valid() const { return fault_.empty(); }
   const std::string& fault() const { return fault_; }
@@ -174,7 +174,7 @@ class Hierarchy {
     while (m < models_.size() && models_[m]->name() != name) ++m;
     return m;
   }
-  /// Whether `general` contains `specific`, through any number of models.
+  /// True if `general` contains `specific`, through any number of models.
   bool contains(std::size_t general, std::size_t specific) const { return contains_[general][specific]; }
 
   /// The chosen model: the most specific one that no estimated generalisation rejects. Of several, the one with more
@@ -510,7 +510,7 @@ class Hierarchy {
       if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
   }
-  /// Whether a general model, which was not estimated, could reject a specific one by its support: whether there are enough
+  /// True if a general model, which was not estimated, could reject a specific one by its support: there are enough
   /// measurements that the specific one is far from.
   bool mayReject(std::size_t general, std::size_t specific) const {
     const State& state = states_[specific];

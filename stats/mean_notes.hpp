@@ -1,4 +1,4 @@
-// What is remarkable about a mean, in sentences, and the p-value of its fit (needs Boost.Math).
+// Notes on a mean, in sentences, and the p-value of its fit (needs Boost.Math).
 #pragma once
 
 #include <stats/covariance.hpp>

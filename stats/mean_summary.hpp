@@ -60,7 +60,7 @@ struct FarthestMeasurement {
   TangentPart part = TangentPart::point;
   double distance = 0;                   ///< rad, m or m/s
   std::size_t index = 0;                 ///< among the measurements
-  std::optional<std::size_t> line = {};  ///< of the file that they come from
+  std::optional<std::size_t> line = {};  ///< line of the file that they come from
   /// In the unit that people read.
   double shown() const { return unitOf(part).scale * distance; }
 };
@@ -119,7 +119,7 @@ struct MeanSummary {
   double fit_p = 1;    ///< probability of so large a sum
 
   std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
-  std::vector<std::string> notes = {};         ///< what is remarkable, in sentences
+  std::vector<std::string> notes = {};         ///< remarks, in sentences
 
   bool hasCovariance() const { return covariance.size() > 0; }
   /// A covariance from the residuals.
@@ -133,7 +133,7 @@ struct MeanSummary {
     text += !proof.empty() ? proof : cells > 0 ? "branch and bound did not finish" : "no certificate holds";
     return cells > 0 ? text + ", " + std::to_string(cells) + " cells" : text;
   }
-  /// Whether the mean may be used.
+  /// Verdict on the mean: may it be used?
   Verdict verdict() const {
     if (trusted()) return Verdict::yes("The mean is " + uniquenessInWords() + ".");
     return Verdict::no(std::string("Not to be trusted (") + name(status) + "): " + reason + ".");

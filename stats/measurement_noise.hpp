@@ -27,7 +27,7 @@ class IsotropicNoise {
  public:
   static constexpr int dimension = N;
   explicit IsotropicNoise(double sigma) : variance_(sigma * sigma) {}
-  /// Whether it is a positive finite number.
+  /// True if the variance is a positive finite number.
   bool valid() const { return variance_ > 0 && std::isfinite(variance_); }
   /// V Dᵀ.
   template <int P>

@@ -40,16 +40,16 @@ struct SplitPart {
   SplitEstimate<M> result;
 };
 
-/// What validateBySplitting() returns.
+/// The result of validateBySplitting().
 template <Homogeneous M>
 struct SplitValidation {
   std::size_t n = 0;
   SplitSeries random, by_blocks;
   SplitPart<M> first, second;                      ///< the halves in time
   SplitPart<M> merged;                             ///< both fused
-  double squared_distance = 0;                     ///< of the halves in time; NaN where one of them is not valid
+  double squared_distance = 0;                     ///< distance of the halves in time; NaN if one is not valid
   double p_value = 0;                              ///< probability of so large a distance
-  ReferenceLaw law = ReferenceLaw::chiSquared(0);  ///< of the squared distances
+  ReferenceLaw law = ReferenceLaw::chiSquared(0);  ///< law of the squared distances
 };
 
 /// The law of the squared distance of two halves of n measurements. With equal halves the sum of both residual
@@ -63,8 +63,8 @@ ReferenceLaw lawOfHalves(std::size_t n, bool known_noise) {
 
 /// The measurements that are split, for validateBySplitting().
 struct SplitData {
-  std::vector<double> information;  ///< of each: what it tells, as a number: its weight, or det(Σ)^(-1/k)
-  std::vector<double> times = {};   ///< of each; empty: they are in order
+  std::vector<double> information;  ///< information of each as a number: its weight, or det(Σ)^(-1/k)
+  std::vector<double> times = {};   ///< time of each; empty: they are in order
 };
 
 /// All splits of measurements of which there are enough. `estimate(rows)` is the SplitEstimate<M> of the measurements

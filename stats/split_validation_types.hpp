@@ -26,7 +26,7 @@ namespace liestat {
 /// Options of validateBySplitting() and of the functions that call it.
 struct SplitOptions {
   std::size_t splits = 200;
-  std::size_t blocks = 10;  ///< of time; even, for half of them make a half
+  std::size_t blocks = 10;  ///< blocks of time; even, for half of them make a half
   std::uint64_t seed = 1;
   std::function<void()> advance = [] {};  ///< called twice a split, on any thread
 };
@@ -35,14 +35,14 @@ struct SplitOptions {
 struct SplitSeries {
   std::vector<double> distances;  ///< squared, as χ² of the same rank; NaN where an estimate failed
   double index = 0;               ///< their mean
-  double dof = 0;                 ///< what is expected of it
+  double dof = 0;                 ///< expected index
   /// The index times this over `dof` follows χ² of so many degrees of freedom: the splits share their measurements, so
   /// they tell no more than the blocks (or measurements) that were dealt out.
   double effective_dof = 0;
   std::size_t failures = 0;
 
   double factor() const { return index / dof; }
-  /// Of the index, if the covariances are true.
+  /// Standard error of the index, if the covariances are true.
   double standardError() const { return dof * std::sqrt(2 / effective_dof); }
   /// Probability of so large an index.
   double pValue() const { return chiSquaredSurvival(factor() * effective_dof, effective_dof); }
@@ -102,7 +102,7 @@ struct SplitOutcome {
   /// Not after an interrupt.
   bool passed() const { return !interrupted() && !(by_blocks.pValue() < split_false_alarm); }
 
-  /// Whether halves made of blocks of time agree as well as the covariances say. No verdict after an interrupt.
+  /// Verdict: do halves made of blocks of time agree as well as the covariances say? None after an interrupt.
   Verdict verdict() const {
     const std::string factor = significant(by_blocks.factor(), 3);
     std::vector<std::string> causes;
@@ -175,7 +175,7 @@ struct SplitSummary : SplitOutcome {
   std::optional<CovarianceAt> covariance_at = {};  ///< nothing where it does not matter
   SplitHalf first, second;                         ///< in time
   SplitHalf merged;                                ///< both fused
-  double squared_distance = 0;                     ///< of the halves in time
+  double squared_distance = 0;                     ///< distance of the halves in time
   double p_value = 0;
   std::string law;  ///< chi2 or hotelling
 };

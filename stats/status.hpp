@@ -13,7 +13,7 @@ enum class Status {
   not_applicable  ///< the question has no answer for these data
 };
 
-/// Whether an iteration that ended with this status found a minimum, whatever else there is to say about it.
+/// True if an iteration that ended with this status found a minimum, whatever else there is to say about it.
 constexpr bool converged(Status status) {
   return status == Status::ok || status == Status::ambiguous || status == Status::ill_defined;
 }

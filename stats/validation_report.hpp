@@ -204,7 +204,7 @@ struct ValidationReport {
     }
     return ValidationVerdict::passed;
   }
-  /// Whether verdict() is ValidationVerdict::passed.
+  /// True if verdict() is ValidationVerdict::passed.
   bool passed(double false_alarm = 1e-5, const ValidationTolerance& tolerance = {}) const {
     return verdict(false_alarm, tolerance) == ValidationVerdict::passed;
   }

@@ -21,7 +21,7 @@ struct MeanAnalysis : MeanSummary {
 /// Options of analyseMean().
 struct AnalysisOptions {
   bool certify = true;                              ///< branch and bound where the cheap certificates fail
-  std::size_t budget = UniquenessOptions{}.budget;  ///< of its looks at measurements or bins of them
+  std::size_t budget = UniquenessOptions{}.budget;  ///< limit of the search's looks at measurements or bins of them
   int threads = 0;                                  ///< 0: all
   bool charts = false;                              ///< for a report
   std::function<void(double)> progress = {};        ///< is told which part of that budget is spent

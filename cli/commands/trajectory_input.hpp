@@ -15,7 +15,7 @@ namespace liestat::cli {
 /// Options on files of trajectories that both commands have.
 struct TrajectoryInputOptions {
   TrajectoryOptions estimate, reference;
-  std::string layout;  ///< of the numbers after TUM's eight; empty: unsaid
+  std::string layout;  ///< layout of the numbers after TUM's eight; empty: not given
   AssociationOptions association;
 
   /// Declares them, evo's names included.

@@ -77,7 +77,7 @@ LandmarkSplits splitStereo(const Options& options) {
   all.feature = name(Feature::point), all.dof = degreesOfFreedom(Feature::point);
   all.settings = options.settings.split;
   all.surveyed = !survey.empty();
-  std::vector<std::pair<std::size_t, Measurements>> enough;  // of each landmark that can be split, and its track
+  std::vector<std::pair<std::size_t, Measurements>> enough;  // landmarks that can be split: track, measurements
   for (const LandmarkMeasurements& landmark : landmarks) {
     Measurements measurements = measurementsOf(landmark, options.input.options);
     all.criterion = measurements.criterion;

@@ -21,7 +21,7 @@ bool isKnown(std::string_view column) {
   return std::find(known.begin(), known.end(), column) != known.end();
 }
 
-/// Whether a column is the time under a name that other programs give it.
+/// True if the column is the time under a name that other programs give it.
 bool isTime(std::string_view column) { return column == "t" || column == "time" || column == "timestamp"; }
 
 // TUM: t tx ty tz qx qy qz qw, separated by blanks. Some programs put these names into a first line, or a comment.

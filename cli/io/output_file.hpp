@@ -11,7 +11,7 @@ namespace liestat::cli {
 void writeOutput(const std::string& path, std::string_view content);
 
 /// Shows lines on standard output, without the control characters that a name out of a file or a command line may have.
-/// Whether they arrived is seen when the program ends.
+/// The program checks at its end whether they arrived.
 void printLines(std::string_view text);
 
 /// Creates a directory and its parents; throws InputError where that is not possible.

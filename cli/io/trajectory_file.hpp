@@ -28,7 +28,7 @@ inline constexpr double unmeasured_variance = 9e4;
 
 /// The poses of a file in its order, with the matrices beside them.
 struct Trajectory {
-  std::string name;                     ///< of the file in messages
+  std::string name;                     ///< name of the file in messages
   std::string format;                   ///< one of trajectoryFormatNames()
   std::vector<std::string> time_texts;  ///< seconds as the file writes them, exactly; empty if the file has no times
   std::vector<double> times;            ///< the same as numbers, rounded; empty with time_texts

@@ -10,7 +10,7 @@ namespace liestat::cli {
 
 /// One estimate as `liestat evaluate` shows it.
 struct EvaluatedEstimate {
-  std::string name;  ///< of the file
+  std::string name;  ///< name of the file
   TrajectoryEvaluation evaluation;
   std::string ape_title, rpe_title;  ///< as evo writes them, where it could have computed the same
 };

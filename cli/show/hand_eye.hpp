@@ -13,7 +13,7 @@ namespace liestat::cli {
 
 /// Where the covariances of a file's poses come from.
 enum class PoseNoise {
-  columns,  ///< of the file
+  columns,  ///< covariance columns of the file
   option,   ///< --sigma-a, --sigma-b
   assumed   ///< a default; its factor is found in the residuals
 };
@@ -27,7 +27,7 @@ struct HandEyeFile {
   std::size_t rows = 0, unmatched = 0;
 };
 
-/// What `liestat hand-eye` shows.
+/// The results and settings that `liestat hand-eye` shows.
 struct HandEyeOutput {
   HandEyeFile a, b;
   std::vector<PoseRows> rows;

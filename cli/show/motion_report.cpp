@@ -66,7 +66,7 @@ struct Extents {
 /// A quantity of three components over the frames: estimates, bands, truth.
 struct Component {
   std::array<Series, 3> lines, bands, truths;
-  Extents usable;              ///< of what is worth seeing
+  Extents usable;              ///< range of the values worth seeing
   std::vector<double> sigmas;  ///< the same of two standard deviations
 
   /// `frames_apart`: larger gaps between frames are left open.

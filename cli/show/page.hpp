@@ -34,7 +34,7 @@ struct Series {
   std::vector<double> low = {};
   std::vector<double> high = {};
   std::vector<double> width = {};
-  std::vector<double> value = {};          ///< of images and contours
+  std::vector<double> value = {};          ///< values of images and contours
   std::optional<std::size_t> colour = {};  ///< the number of the palette's colour; series of one colour belong together
   bool dashed = false;
 };

@@ -28,7 +28,7 @@ struct IncrementPart {
   const char *name, *unit;
   double scale;
   double IncrementSigmas::*sigma;
-  int begin;  ///< of its block in the nine coordinates
+  int begin;  ///< first index of its block in the nine coordinates
 };
 constexpr std::array increment_parts{IncrementPart{"rotation", "deg", degrees, &IncrementSigmas::rotation, 3},
                                      IncrementPart{"velocity", "m/s", 1, &IncrementSigmas::velocity, 6},

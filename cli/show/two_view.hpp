@@ -11,14 +11,14 @@
 
 namespace liestat::cli {
 
-/// What `liestat two-view` shows.
+/// The result that `liestat two-view` shows.
 struct TwoViewMotionOutput {
   std::string file;
   std::vector<Eigen::Vector4d> matches;  ///< px
   TwoViewMotionEstimate estimate;
 };
 
-/// What `liestat two-view --motions` shows.
+/// The results that `liestat two-view --motions` shows.
 struct TwoViewMotionsOutput {
   std::string file;
   std::vector<Eigen::Vector4d> matches;  ///< px

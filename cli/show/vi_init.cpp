@@ -18,7 +18,7 @@ namespace {
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// What a line says of a window, refined or not.
+/// The velocity and gravity in a window's line: the refined ones, or else those of the closed form.
 struct Best {
   Eigen::Vector3d velocity, gravity;
 

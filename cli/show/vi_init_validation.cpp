@@ -87,7 +87,7 @@ Table errorsTable(const std::vector<Group>& list) {
   return table;
 }
 
-/// What was told right, and the covariance at rest.
+/// Table of the check at rest: windows that were told right, and the covariance.
 Table restTable(const std::vector<Group>& list) {
   Table table({"", "T, n, N", "told right", "moves", "gravity, biases (8)", "95 %", "verdict"});
   for (const Group& g : list) {

@@ -112,7 +112,7 @@ inline RayTable rayTable(const ClosedFormWindow& window, ClosedFormResult& resul
   return table;
 }
 
-/// Whether a feature's parallax is at least so much (rad, for bearings of a relative sigma of one).
+/// True if a feature's parallax is at least so much (rad, for bearings of a relative sigma of one).
 inline bool hasParallax(const ClosedFormFeature& feature, double min_parallax) {
   return feature.parallax >= min_parallax * feature.relative_sigma;
 }

@@ -162,7 +162,7 @@ class ClosedFormRun {
     result_.features_used = table_.features();
     result_.observations_used = table_.rays.size();
   }
-  /// Whether forces and tracks are those of a body at rest: then that is the solution, with depths, which are free, of
+  /// True if forces and tracks are those of a body at rest: then that is the solution, with depths, which are free, of
   /// 1 m.
   bool solveAtRest() {
     const std::optional<Eigen::Vector3d> G =
@@ -183,7 +183,7 @@ class ClosedFormRun {
     return true;
   }
 
-  /// Whether the data decide between the minimisers of exact data with a null space.
+  /// Decides whether the data tell the minimisers of exact data with a null space apart.
   void decideExactly() {
     order(candidates_, table_);
     Status& status = result_.status;
@@ -271,7 +271,7 @@ class ClosedFormRun {
         3 * table_.features() + static_cast<std::size_t>(solver_.motionSize()) - (options_.gravity ? 1 : 0);
     return rows > unknowns ? rows - unknowns : 0;
   }
-  /// Whether noise alone explains the first minimiser's cost.
+  /// True if noise alone explains the first minimiser's cost.
   bool isConsistent() const { return candidates_[0].cost <= noiseLimit(static_cast<double>(degreesOfFreedom())); }
 
   void report() {

@@ -39,7 +39,7 @@ inline double outOfPlane(const std::vector<Ray>& rays) {
   return most;
 }
 
-/// Whether a window of this size may lose rank by coplanarity: with more it is harmless.
+/// True if a window of this size may lose rank by coplanarity: with more it is harmless.
 inline bool coplanarityMatters(std::size_t images, std::size_t features) {
   return (features == 1 && images < 6) || (features == 2 && images == 3);
 }

@@ -117,7 +117,7 @@ class EpipolarSearch {
     Eigen::Vector3d bias;
   };
 
-  /// Whether it is the minimum of another candidate.
+  /// True if the candidate is at the minimum of another one.
   static bool isKnown(const Candidate& candidate, const std::vector<Candidate>& others) {
     return std::any_of(others.begin(), others.end(),
                        [&](const Candidate& other) { return (other.bias - candidate.bias).norm() < 0.01; });

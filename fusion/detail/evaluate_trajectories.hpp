@@ -36,7 +36,7 @@ LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateNearest(std::span<const do
   const bool by_reference = estimate_times.size() > reference_times.size();
   const std::span<const double> shorter = by_reference ? reference_times : estimate_times;
   const std::span<const double> longer = by_reference ? estimate_times : reference_times;
-  const double shift = by_reference ? offset : -offset;  // of the longer list
+  const double shift = by_reference ? offset : -offset;  // added to the times of the longer list
   for (std::size_t i = 0; i < shorter.size() && !longer.empty(); ++i) {
     const double t = shorter[i];
     auto at = std::lower_bound(longer.begin(), longer.end(), t, [&](double x, double y) { return x + shift < y; });

@@ -129,7 +129,7 @@ inline std::string unitOf(PoseRelation relation, bool is_relative) {
 inline double unitFactor(std::string_view from, ErrorUnit to) {
   struct Scale {
     bool is_angle;
-    double per_base;  // of a metre or radian
+    double per_base;  // units in one metre or radian
   };
   constexpr std::array<Scale, 6> scales{
       {{false, 1e3}, {false, 1e2}, {false, 1}, {false, 1e-3}, {true, degrees_per_radian}, {true, 1}}};

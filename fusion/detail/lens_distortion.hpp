@@ -33,7 +33,7 @@ class RadialPolynomial {
     return sum;
   }
 
-  /// Whether the slope is positive from 0 to r. Decided by the coefficients of the Bernstein form, with bisection where
+  /// True if the slope is positive from 0 to r. Decided by the coefficients of the Bernstein form, with bisection where
   /// their signs disagree, so that no dip between samples is missed.
   bool ascendsTo(double r) const {
     std::array<double, 5> b{};
@@ -89,7 +89,7 @@ class RadialPolynomial {
     return value;
   }
 
-  /// Whether the polynomial with these Bernstein coefficients is positive on [0, 1].
+  /// True if the polynomial with these Bernstein coefficients is positive on [0, 1].
   bool positive(const std::array<double, 5>& form, int depth) const {
     const auto end = form.begin() + degree_ + 1;
     if (std::all_of(form.begin(), end, [](double x) { return x > 0; })) return true;

@@ -14,7 +14,7 @@ struct CentredMatches {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero(), mean_second = Eigen::Vector2d::Zero();
   /// Σ a aᵀ, Σ b bᵀ and Σ b aᵀ of the first and the second points.
   Eigen::Matrix2d first = Eigen::Matrix2d::Zero(), second = Eigen::Matrix2d::Zero(), mixed = Eigen::Matrix2d::Zero();
-  /// Whether both images show more than one point: their spread is above rounding.
+  /// True if both images show more than one point: their spread is above rounding.
   bool spread = false;
 
   explicit CentredMatches(std::span<const Eigen::Vector4d> matches) {

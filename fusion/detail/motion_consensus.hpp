@@ -41,7 +41,7 @@ class MotionConsensus {
     best_.cost = static_cast<double>(table.features());
   }
 
-  /// Whether there is anything to choose from.
+  /// True if there are more features to draw from than a hypothesis takes.
   bool possible() const { return drawable_.size() > options_.consensus.features_drawn; }
   const std::vector<bool>& agreeing() const { return agreeing_; }
   /// More than those that a hypothesis is made of.

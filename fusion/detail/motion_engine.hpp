@@ -38,7 +38,7 @@ struct DirectionCandidate {
   double score = 0;
   std::size_t start = 0;  ///< its number among the starts
   static constexpr std::size_t remembered = 24;
-  std::array<double, remembered> costs{};  ///< of the last frames, a ring
+  std::array<double, remembered> costs{};  ///< costs of the last frames, a ring buffer
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;
 
   // Values of the last frame that it was updated with.
@@ -76,16 +76,16 @@ class MotionEngine {
  private:
   using Points = std::span<const FlowPoint<double>>;
   struct Frame {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< of the gyroscope
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< inverse covariance of the gyroscope's rotation
     Eigen::Vector3d gyroscope = Eigen::Vector3d::Zero();
     bool has_gyroscope = false;
   };
   /// Everything about a frame at one hypothesis.
   struct Evaluation {
-    RotationPrior<double> prior;                         ///< of the increment Omega
+    RotationPrior<double> prior;                         ///< prior of the increment Omega
     Eigen::Matrix3d marginal = Eigen::Matrix3d::Zero();  ///< its information, the bias being unknown
     Eigen::Vector3d Omega = Eigen::Vector3d::Zero();
-    SO3d base;  ///< what the points were turned by
+    SO3d base;  ///< rotation by which the points were turned
     SubspaceSums<double> sums;
     Eigen::Matrix<double, 3, 2> basis;
     double capped_cost = 0;
@@ -127,9 +127,9 @@ class MotionEngine {
   std::vector<DirectionCandidate> candidates_;
   std::size_t best_ = 0, updates_ = 0;
   double standstill_quantile_ = 0;
-  double usual_signal_ = 0;  ///< of the last ten or so frames that were not at standstill
+  double usual_signal_ = 0;  ///< mean signal of the last ten or so frames that were not at standstill
   std::size_t moving_frames_ = 0;
-  double still_sum_ = 0, still_dof_ = 0;  ///< of all frames before a clear motion
+  double still_sum_ = 0, still_dof_ = 0;  ///< χ² and degrees of freedom of all frames before a clear motion
   SO3d rotation_alone_;
   Eigen::Matrix3d rotation_information_ = Eigen::Matrix3d::Identity();
   RotationPrior<double> rotation_prior_;  ///< the share of the gyroscope in them
@@ -140,7 +140,7 @@ class MotionEngine {
 
   Frame frame_;
   std::vector<PointPair> pairs_;
-  std::vector<std::size_t> index_;  ///< of each in the caller's list
+  std::vector<std::size_t> index_;  ///< place of each pair in the caller's list
   std::size_t given_ = 0;
   std::vector<FlowPoint<double>> points_;
   std::vector<FlowRow<double>> rows_;

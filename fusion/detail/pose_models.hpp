@@ -127,7 +127,7 @@ class SharedFocalModel : public EpipolarTypeModel {
   /// Fraction of matches on one plane from which the others, which outliers may be, do not determine f.
   static constexpr double max_planar_share = 0.9;
 
-  /// Whether the matches determine the focal length.
+  /// True if the matches determine the focal length.
   bool isTold(const ModelEstimate<Parameter>& found, std::span<const Measurement> inliers) const {
     if (!(found.covariance(5, 5) <= max_log_focal_sigma * max_log_focal_sigma)) return false;
     const Eigen::Matrix<double, 1, 5> J = found.parameter.pose.essentialMatrixJacobian().row(entry(2, 2));
@@ -135,7 +135,7 @@ class SharedFocalModel : public EpipolarTypeModel {
     const double variance = (J * found.covariance.topLeftCorner<5, 5>() * J.transpose())(0);
     return apart * apart > min_axes_sigmas * min_axes_sigmas * variance && !isPlanar(inliers);
   }
-  /// Whether a homography explains nearly all matches.
+  /// True if a homography explains nearly all matches.
   bool isPlanar(std::span<const Measurement> inliers) const {
     constexpr double limit = 9.21;  // the 0.99 quantile of χ² with two degrees of freedom
     std::vector<Measurement> kept(inliers.begin(), inliers.end());

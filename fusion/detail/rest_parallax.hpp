@@ -1,4 +1,4 @@
-// Whether tracks show that the camera moved, however little: the directed test for rest.
+// The directed test for rest: do tracks show that the camera moved, however little?
 //
 // Directions that a camera at rest has seen are those of a common rotation (the gyroscope's bias) and noise. One that
 // moves slowly adds ρᵢ Nᵢ p(t) to feature i: p a smooth path, ρᵢ > 0 an inverse depth, Nᵢ across its direction. Each track

@@ -391,7 +391,7 @@ class RightMatches {
   std::array<double, classes> odds_{};
 };
 
-/// Whether in so many draws, of three hypotheses each, wrong matches alone would agree as well with no more than a
+/// True if in so many draws, of three hypotheses each, wrong matches alone would agree as well with no more than a
 /// probability of one in a thousand: Chernoff's bound on how many fit a hypothesis by chance, beside its sample.
 inline bool isBeyondChance(std::size_t inliers, std::size_t matches, std::size_t sample_size, double chance,
                            std::size_t draws) {
@@ -482,7 +482,7 @@ std::optional<RobustMatrix> robustMatrix(std::span<const Eigen::Vector4d> matche
   return found;
 }
 
-/// Whether there is something to estimate; else the status says why not.
+/// True if there is something to estimate; else the status says why not.
 inline bool isUsable(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
                      const TwoViewRobustOptions& options, std::size_t sample_size, Status& status) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -560,7 +560,7 @@ void robustMatrixAndCovariance(std::span<const Eigen::Vector4d> matches, const M
   }
 }
 
-/// Whether matches show a translation: the mean square of their parallax, in units of its noise, is twice the two that
+/// True if matches show a translation: the mean square of their parallax, in units of its noise, is twice the two that
 /// noise alone makes. None counts for more than five standard deviations, as a few that are wrong would.
 inline bool showTranslation(std::span<const Eigen::Vector4d> matches, const MatchNoise& noise,
                             const Eigen::Matrix3d& R) {

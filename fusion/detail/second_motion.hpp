@@ -23,7 +23,7 @@
 
 namespace liestat::detail {
 
-/// Whether the velocities of two solutions, which are of disjoint tracks, differ by more than their covariances say,
+/// True if the velocities of two solutions, which are of disjoint tracks, differ by more than their covariances say,
 /// p < 1e-4. Without covariances, of exact data, by more than a millionth.
 inline bool areDistinct(const ClosedFormResult& a, const ClosedFormResult& b) {
   const Eigen::Vector3d difference = a.solutions[0].velocity - b.solutions[0].velocity;

@@ -98,7 +98,7 @@ class Preintegration {
                    Vector(increment.translation() + by(bias_.gp, g) + by(bias_.ap, a)),
                    Vector(increment.velocity() + by(bias_.gv, g) + by(bias_.av, a)));
   }
-  /// Whether other biases are so far that the readings should be integrated anew: a change of the gyroscope's by more
+  /// True if other biases are so far that the readings should be integrated anew: a change of the gyroscope's by more
   /// than 0.05 rad/s, or by more than 0.05 rad over the duration.
   bool mustReintegrate(const ImuBias<S>& bias) const {
     const S change = (bias.gyroscope - options_.bias.gyroscope).norm();

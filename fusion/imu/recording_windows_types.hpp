@@ -36,7 +36,7 @@ struct IncrementSigmas {
 /// Those of a motion with noise.
 IncrementSigmas incrementSigmas(const Preintegration<double>& motion);
 
-/// Whether errors against a truth are those that the covariances predict: the sum of the squared distances of n windows
+/// Test whether errors against a truth are those that the covariances predict: the sum of n windows' squared distances
 /// under χ² with 9 n degrees of freedom.
 struct IncrementTest {
   std::size_t windows = 0;  ///< that were compared
@@ -57,7 +57,7 @@ struct RecordingWindows {
   std::size_t okWindows() const;
   /// The test of the errors; none without truth, without noise, or where the truth covers no window.
   std::optional<IncrementTest> test() const;
-  /// Whether the errors are within the covariances: no, if the sum of the squared distances is exceeded with a
+  /// Verdict on the covariances: no, if the sum of the squared distances of the errors is exceeded with a
   /// probability below `false_alarm`. The law is exact if the noise of the sensor is Gaussian with the given densities,
   /// the biases are the true ones, windows do not overlap, and the truth is exact. The truth's own error is in no
   /// covariance: one that is not small beside the sensor's makes the answer no, and so does a known bias that is off.

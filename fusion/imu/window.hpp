@@ -29,7 +29,7 @@ namespace liestat {
 /// All that was measured from the first of n images to the last. The working frame is the body's at the first image.
 class InertialWindow {
  public:
-  std::vector<FeatureTrack> features;    ///< what was seen of each feature, in the axes of its camera
+  std::vector<FeatureTrack> features;    ///< observations of each feature, in the axes of its camera
   std::vector<SE3d> cameras = {SE3d()};  ///< body_T_camera of each camera (m)
 
   /// A window without images.
@@ -54,7 +54,7 @@ class InertialWindow {
   const Fault& fault() const { return fault_; }
   bool hasReadings() const { return !readings_.empty(); }
 
-  /// Whether other biases are so far that a first-order update of a motion will not do.
+  /// True if other biases are so far that a first-order update of a motion will not do.
   bool isFar(const ImuBias<double>& bias) const;
   /// The motions integrated anew with other biases. A window without readings stays as it is, and so does one whose
   /// readings have a fault, which is returned.

@@ -136,11 +136,11 @@ struct ClosedFormResult {
   /// have shown in the tracks, is excluded (with a probability of 0.995); infinite: nothing is.
   double unseen_speed_per_depth = std::numeric_limits<double>::infinity();
 
-  /// Whether the first solution's cost is one of noise, by χ². If not: outliers, an unmodelled bias, bearings noisier
+  /// True if the first solution's cost is one of noise, by χ². If not: outliers, an unmodelled bias, bearings noisier
   /// than was said.
   bool consistent = false;
 
-  /// Whether there is a solution with a scale, from which an iteration may start.
+  /// True if there is a solution with a scale, from which an iteration may start.
   bool hasMotion() const {
     return !solutions.empty() && status != FusionStatus::stationary && status != FusionStatus::scale_unobservable;
   }

@@ -41,7 +41,7 @@ struct EpipolarBiasResult {
   int starts = 0, iterations = 0;
   int integrations = 0;  ///< how often the readings were integrated anew
 
-  /// Whether the residuals of the accepted tracks are noise, by χ², and their features in front of the camera. If not:
+  /// True if the residuals of the accepted tracks are noise, by χ², and their features in front of the camera. If not:
   /// the minimum may be a wrong one, or there is more noise than was said.
   bool consistent = false;
 
@@ -127,12 +127,12 @@ struct RefinementResult {
   Eigen::Vector3d velocity() const {
     return states.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(states[0].velocity());
   }
-  /// Whether the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
+  /// True if the cost is one of noise, to five sigmas of χ², and the biases are those of the prior, p ≥ 1e-4. The cost
   /// alone, with its thousands of bearings, hardly sees a bias.
   bool consistent() const {
     return cost <= detail::noiseLimit(static_cast<double>(degrees_of_freedom)) && prior_p >= 1e-4;
   }
-  /// Whether there are states with their covariance, be it a large one.
+  /// True if there are states with their covariance, be it a large one.
   bool converged() const {
     return status == FusionStatus::ok || status == FusionStatus::gravity_undetermined ||
            status == FusionStatus::scale_unobservable || status == FusionStatus::stationary;

@@ -87,11 +87,11 @@ class WindowFusion {
     return meet(window, integrate({state_.mean.get<2>(), accelerometerBias(state_.mean, gravity_)}));
   }
 
-  /// Whether there is a state.
+  /// True if there is a state.
   bool hasState() const { return windows_ > 0; }
-  /// Whether there is one and the windows do not contradict each other.
+  /// True if there is one and the windows do not contradict each other.
   bool ok() const { return hasState() && p() >= min_p_of_fusion; }
-  /// At the last image of the last window.
+  /// The state at the last image of the last window.
   const Gaussian<InertialState>& state() const { return state_; }
   std::size_t windows() const { return windows_; }
   /// The sum over all meetings: larger than χ² of so many degrees of freedom says that windows contradict each other,

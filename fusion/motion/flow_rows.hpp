@@ -24,7 +24,7 @@ template <class S>
 struct FlowPoint {
   S x = S(0), y = S(0);  ///< where the constraint is taken
   S u = S(0), v = S(0);  ///< ẋ, per frame
-  S variance = S(0);     ///< of each coordinate of ẋ, errors of both frames
+  S variance = S(0);     ///< variance of each coordinate of ẋ, from the errors in both frames
   S frames = S(1);       ///< length of the interval
 };
 

@@ -30,8 +30,8 @@ inline GyroscopeRotation gyroscopeRotation(const Preintegration<double>& motion,
           R * Eigen::Matrix3d(motion.gaussian().covariance.block<3, 3>(3, 3)) * R.transpose()};
 }
 
-/// Of a constant rate (rad/s, in the sensor's axes) over so many seconds, with a standard deviation of each component of
-/// the rate (rad/s).
+/// Rotation at a constant rate (rad/s, in the sensor's axes) over so many seconds, with a standard deviation of each
+/// component of the rate (rad/s).
 inline GyroscopeRotation gyroscopeRotation(const Eigen::Vector3d& rate, double seconds, double sigma,
                                            const SO3d& camera_R_imu) {
   const double s = sigma * seconds;
@@ -101,7 +101,7 @@ LIESTAT_FUSION_API MotionGyroscope gyroscopeOfRates(std::map<std::size_t, FrameR
 /// The readings of an inertial sensor beside a sequence of frames.
 struct GyroscopeReadings {
   std::vector<ImuSample<double>> samples;  ///< in the order of time
-  std::map<std::size_t, double> times;     ///< of the frames, by their numbers, on the readings' clock
+  std::map<std::size_t, double> times;     ///< times of the frames, by their numbers, on the readings' clock
   RecordingOptions<double> how;            ///< with the noise, and the bias that is taken off
   /// Where a reading comes from, for the reasons in words; none: "reading 12".
   std::function<std::string(std::size_t index)> place = {};

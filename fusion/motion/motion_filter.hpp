@@ -76,11 +76,11 @@ class MotionFilter {
   /// The pairs of the last frame of tracks and the track of each, in the unit of time of the filter.
   std::span<const PointPair> pairs() const { return chosen_ ? std::span<const PointPair>(steps_) : tracks_.pairs(); }
   std::span<const std::uint64_t> tracks() const { return tracks_.tracks(); }
-  /// Whether the essential filter is in charge.
+  /// True if the essential filter is in charge.
   bool essential_in_charge() const { return in_charge_; }
   std::size_t hand_overs() const { return hand_overs_; }
   std::size_t fall_backs() const { return fall_backs_; }
-  /// Of the pairs that the filter took, in units of the motion of one frame.
+  /// Inverse depths of the pairs that the filter took, in units of the motion of one frame.
   std::span<const InverseDepth> inverse_depths();
   const MotionPlan& plan() const { return plan_; }
   const SubspaceFilter& subspace() const { return subspace_; }

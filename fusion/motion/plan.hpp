@@ -1,4 +1,4 @@
-// What the options of recursive motion come to: the filter and its settings for an input, or the reason why there is
+// Planning of recursive motion from its options: the filter and its settings for an input, or the reason why there is
 // none. The rules are here so that the class, the function over a sequence, the program and Python follow the same
 // ones.
 //
@@ -81,12 +81,12 @@ struct GyroscopeClock {
 /// How a MotionFilter runs.
 struct MotionPlan {
   FilterChoice filter = FilterChoice::composition;  ///< never automatic
-  MotionFilterOptions settings;                     ///< of the filters; of the gyroscope's bias for one step
+  MotionFilterOptions settings;                     ///< settings of the filters; a bias of the gyroscope is per step
   std::size_t frames_apart = 1;
   /// The filter takes an interval as one step of time, and pairs of that interval alone: the epipolar constraint
   /// (discrete flow, essential filter) knows no other. Otherwise pairs of all intervals go together.
   bool whole_intervals = false;
-  double step_seconds = 0;  ///< of the filter's unit of time, where there is a gyroscope
+  double step_seconds = 0;  ///< duration of the filter's unit of time, where there is a gyroscope
   MotionFault fault = MotionFault::none;
 
   bool ok() const { return fault == MotionFault::none; }

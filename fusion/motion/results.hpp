@@ -117,7 +117,7 @@ struct MotionResult {
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
   }
-  /// Whether any frame has a direction of motion that may be used; the causes count the flags that forbid the others.
+  /// Verdict: may any frame's direction of motion be used? The causes count the flags that forbid the others.
   Verdict verdict() const {
     if (fault != MotionFault::none) return Verdict::none(std::string("NO MOTION: ") + inWords(fault));
     if (frames.empty()) return Verdict::none("NO MOTION: there are fewer than two frames");

@@ -83,7 +83,7 @@ class MotionStructure {
     for (const StructurePoint& p : points_) sum += p.inverse_depth / p.variance, weight += 1 / p.variance;
     return weight > 0 ? sum / weight : std::numeric_limits<double>::quiet_NaN();
   }
-  /// What is seen in front of the camera: the points, or, where their mean is behind it, points whose depths are mirrored
+  /// Points in front of the camera: as they are, or, where their mean is behind it, with depths that are mirrored
   /// about the mean, ρ + 2|mean|.
   std::vector<StructurePoint> inFront() const {
     std::vector<StructurePoint> seen = points_;
@@ -199,7 +199,7 @@ inline RigidityComparison compareRigidity(const RigidityTest& first, const Rigid
   const std::size_t n = gains.size();
   if (n == 0 || a.size() != b.size()) return result;
   std::sort(gains.begin(), gains.end(), [](double x, double y) { return std::abs(x) < std::abs(y); });
-  std::size_t sum = 0;  // of the ranks of the steadier ones
+  std::size_t sum = 0;  // sum of the ranks where the first is steadier
   for (std::size_t k = 0; k < n; ++k) {
     if (gains[k] > 0) sum += k + 1, ++result.steadier;
   }

@@ -97,7 +97,7 @@ struct MotionTrace {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   std::vector<std::size_t> frames;
   std::vector<Eigen::Vector3d> directions;  ///< after each frame
-  std::vector<double> evidence;             ///< of positive depths, in its standard deviations
+  std::vector<double> evidence;             ///< evidence for positive depths, in its standard deviations
 };
 
 /// One interpretation of the points over the last frames of the window.
@@ -109,15 +109,15 @@ struct MotionInterpretation {
 
 /// All runs are of images alone, with the midpoint flow; directions are velocities but for the essential filter.
 struct MotionWindowRuns {
-  MotionTrace winner;  ///< of the hypotheses the one that is best in the end
+  MotionTrace winner;  ///< the hypothesis that is best in the end
   /// With and without the sign of the depths, from the start farthest from the estimate of those that get there (or to
   /// its antipode).
   MotionTrace held, released;
   MotionTrace essential_held, essential_released;  ///< from the antipode of the estimate, with its rotation
-  std::vector<std::size_t> frames;  ///< of the structure; none: no four tracks have a depth in two frames
+  std::vector<std::size_t> frames;  ///< frames of the structure; none: no four tracks have a depth in two frames
   MotionInterpretation rigid, rubbery;
   RigidityComparison comparison;
-  std::vector<bool> inliers;  ///< of the last frame's pairs
+  std::vector<bool> inliers;  ///< inliers among the last frame's pairs
 
   bool hasStructure() const { return !frames.empty(); }
 };

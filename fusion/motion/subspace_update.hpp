@@ -27,7 +27,7 @@
 
 namespace liestat {
 
-/// What is known of the rotation beforehand: its mean (rad per frame) and information (rad⁻²); zero: nothing.
+/// Prior knowledge of the rotation: its mean (rad per frame) and information (rad⁻²); zero: nothing.
 template <class S>
 struct RotationPrior {
   Eigen::Matrix<S, 3, 1> mean = Eigen::Matrix<S, 3, 1>::Zero();
@@ -245,7 +245,7 @@ struct FilterCovariance {
   Eigen::Matrix<S, D, D> reported = Eigen::Matrix<S, D, D>::Identity();
 };
 
-/// What an update does: the step and the reduction of the cost by it (the normalised innovation is cost - reduction).
+/// Result of an update: the step and the reduction of the cost by it (the normalised innovation is cost - reduction).
 template <class S, int D>
 struct FilterStep {
   Eigen::Matrix<S, D, 1> step;

@@ -85,7 +85,7 @@ class TrackPairs {
     ++frame_;
     return pairs_;
   }
-  /// Of the last frame.
+  /// The pairs of the last frame.
   std::span<const PointPair> pairs() const { return pairs_; }
   /// The track of each of them.
   std::span<const std::uint64_t> tracks() const { return tracks_; }
@@ -104,7 +104,7 @@ class TrackPairs {
   std::size_t frame_ = 0;
   std::vector<Known> known_, next_;
   std::vector<Place> places_, next_places_;  ///< a ring of frames + 1 for each known track
-  std::vector<std::size_t> order_;           ///< of the observations, by track
+  std::vector<std::size_t> order_;           ///< indices of the observations, by track
   std::vector<PointPair> pairs_;
   std::vector<std::uint64_t> tracks_;
 };

@@ -60,7 +60,7 @@ struct GyroscopeRotation {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< rad², positive definite
 };
 
-/// What is worth knowing about one frame besides the estimate. The state is kept through all of these.
+/// Flags of one frame, besides the estimate. The state is kept through all of these.
 struct MotionFlags {
   bool bad_input =
       false;             ///< pairs with NaN, or with a sigma that is not positive, were left out; or the gyroscope was
@@ -108,17 +108,17 @@ struct MotionEstimate {
     using std::sqrt;
     return sqrt(mean_inverse_depth_variance) / (mean_inverse_depth * mean_inverse_depth);
   }
-  /// Whether the direction may be used without a further look.
+  /// True if the direction may be used without a further look.
   bool ok() const { return frame > 0 && !flags.degenerate && !flags.ambiguous && !flags.undecided_sign && !flags.lost; }
-  /// Whether the covariance claims to bound the error.
+  /// True if the covariance claims to bound the error.
   bool covariance_judged() const { return ok() && !flags.outliers; }
 };
 
 /// The inverse depth of one pair's point, in units of the motion of one frame.
 struct InverseDepth {
   double value = 0;     ///< |V|/Z at the middle of the interval
-  double variance = 0;  ///< of one frame, the direction given
-  bool inlier = false;  ///< whether the update used the pair
+  double variance = 0;  ///< variance from one frame, the direction given
+  bool inlier = false;  ///< true if the update used the pair
 };
 
 /// A point of the structure (fusion/motion/structure.hpp).
@@ -182,7 +182,7 @@ struct MotionFilterOptions {
 
   // Verdicts on a frame.
   std::size_t min_pairs = 8, min_pairs_gyroscope = 2;
-  double standstill_probability = 0.05;  ///< of calling a moving frame that; see MotionFlags
+  double standstill_probability = 0.05;  ///< probability of missing a standstill; see MotionFlags
   double degenerate_sigma = 0.2;         ///< rad, the larger standard deviation of the direction
   std::size_t lost_frames = 10;
   double lost_innovation = 2;  ///< mean normalised innovation of these frames above which hypotheses start anew

@@ -17,7 +17,7 @@
 
 namespace liestat {
 
-/// Whether each match is contradicted by another: they have one point in common, and not the other. Points within `reach`
+/// True for a match that another contradicts: they have one point in common, and not the other. Points within `reach`
 /// standard deviations of a coordinate are one point; those beyond twice that are two, for noise takes one point that was
 /// found twice so far apart in two of a hundred cases (exp(-reach²)). Matches that are not numbers contradict none. Nothing
 /// depends on the order. O(n log n) where few points have the same abscissa.

@@ -213,7 +213,7 @@ inline MatrixSolutions<3> solveFundamental(std::span<const Eigen::Vector4d> matc
   return result;
 }
 
-/// Whether an epipolar geometry can show all matches in front of both views: (e' × ũ')·(F ũ) has one sign (O. Chum, T.
+/// True if an epipolar geometry can show all matches in front of both views: (e' × ũ')·(F ũ) has one sign (O. Chum, T.
 /// Werner, J. Matas, "Epipolar geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR
 /// 2004). F has rank 2; its sign does not matter. Matches at an epipole tell nothing.
 inline bool isOriented(const Eigen::Matrix3d& F, std::span<const Eigen::Vector4d> matches) {

@@ -22,7 +22,7 @@ inline double area(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return 
 
 }  // namespace detail
 
-/// Whether the two images show the triangles of the first four matches the same way round, as two views of one side of
+/// True if the two images show the triangles of the first four matches the same way round, as two views of one side of
 /// a plane do; false also where three points are collinear in an image. A homography sample that fails is wrong, and
 /// solveHomography gives no solution for it.
 inline bool keepsOrientation(std::span<const Eigen::Vector4d> matches) {

@@ -27,7 +27,7 @@
 
 namespace liestat {
 
-/// What is known before, and how the search goes.
+/// Prior knowledge and the settings of the search.
 struct TwoViewMotionOptions {
   double sigma = 1;  ///< standard deviation of each image coordinate, px
   /// The camera of the first image. Without it rotations and poses of calibrated views are no models, and the motion of a

@@ -31,13 +31,13 @@ struct PhysicalParameters {
   double deviation(std::size_t i) const;
 };
 
-/// What is known of a model of the lattice.
+/// Results for one model of the lattice.
 struct TwoViewModelRow {
   std::string name;
   std::vector<std::string> parents;
   int free_parameters = 0, equations = 0;
   bool evaluated = false;           ///< its draws came to their end
-  Status status = Status::too_few;  ///< of its estimate; too_few: there is none
+  Status status = Status::too_few;  ///< status of its estimate; too_few: there is none
   std::size_t draws = 0, inliers = 0;
   double relevance = 0;
   double chi2 = 0, degrees_of_freedom = 0;  ///< over its own inliers
@@ -54,17 +54,17 @@ struct TwoViewMotionResult {
   /// H or F in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
-  int equations = 0;                  ///< of a match: 2, the matrix is H, or 1, it is F
+  int equations = 0;                  ///< equations of a match: 2, the matrix is H, or 1, it is F
   /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of
   /// both first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal
   /// lengths.
   std::vector<PhysicalParameters> physical;
-  /// Of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, and its covariance
+  /// Pose of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, with covariance
   /// in the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
 };
 
-/// What is taken of the images, and of their matches.
+/// Properties of the images and of their matches, as the estimation uses them.
 struct TwoViewImageFrame {
   std::size_t matches = 0;                                 ///< all that were given
   double sigma = 0;                                        ///< standard deviation of each coordinate, px
@@ -84,21 +84,21 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;
   std::size_t chosen = 0;      ///< number in the lattice
-  std::vector<bool> inlier;    ///< of each match
+  std::vector<bool> inlier;    ///< true for each match that is an inlier
   std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
-  double threshold = 0;  ///< of the chosen model, on squared errors
+  double threshold = 0;  ///< threshold of the chosen model, on squared errors
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
-  /// Whether the estimate is to be trusted: yes where the status is ok, else no.
+  /// Verdict on the estimate: to be trusted if the status is ok, else not.
   Verdict verdict() const;
 };
 
 /// One of several motions in the same images: of an object, or of a plane of the scene.
 struct TwoViewStructure : TwoViewMotionResult {
   std::string model;
-  Status status = Status::ok;        ///< of the estimate from its own inliers
+  Status status = Status::ok;        ///< status of the estimate from its own inliers
   std::vector<std::size_t> inliers;  ///< places of its matches, ascending
   double rms = 0;                    ///< σ sqrt(χ²/r) of these, px
 };
@@ -112,7 +112,7 @@ struct TwoViewMotions : TwoViewImageFrame {
 
   /// There is a motion that chance does not explain, and the search came to its end.
   bool ok() const { return status == Status::ok && !structures.empty(); }
-  /// Whether the motions are to be trusted: yes where ok(), else no.
+  /// Verdict on the motions: to be trusted if ok(), else not.
   Verdict verdict() const;
 };
 
@@ -174,7 +174,7 @@ void describe(V& v, const TwoViewMotionEstimate& x) {
   v("lattice", x.lattice)("inlier", x.inlier, "of each match")("squared_errors", x.errors, "in units of the noise");
 }
 
-/// What the program does not print.
+/// Adds the fields that the program does not print.
 template <class V>
 void describeSeries(V& v, const TwoViewMotionEstimate& x) {
   v("threshold", x.threshold, "of the chosen model, on squared errors");

@@ -192,7 +192,7 @@ class ContractBench : public ContractRecorder {
   double condition(const Point& p) const { return std::max(1.0, m.dlogOrigin(p).norm()); }
 
  private:
-  /// Whether a transformation that is ten units from the identity along a coordinate is e^10 in size, and not ten.
+  /// True if a transformation that is ten units from the identity along a coordinate is e^10 in size, and not ten.
   bool growsExponentially(const Element& f) const {
     return (group.matrix ? group.matrix(f) : group.Adj(f)).norm() > 1e3;
   }

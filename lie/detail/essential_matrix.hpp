@@ -44,7 +44,7 @@ EssentialParts<S> essentialParts(const Eigen::Matrix<S, 3, 3>& E) {
   return parts;
 }
 
-/// Whether the point that a relative pose triangulates from two bearing vectors lies in front of both views: the depths
+/// True if the point that a relative pose triangulates from two bearing vectors lies in front of both views: the depths
 /// in λ_a x_a = λ_b R x_b + d are (d × y)·(x_a × y) and (d × x_a)·(x_a × y) over |x_a × y|², y = R x_b.
 template <class Pose, class A, class B>
 bool isInFront(const Pose& pose, const Eigen::MatrixBase<A>& x_a, const Eigen::MatrixBase<B>& x_b) {

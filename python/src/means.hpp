@@ -25,7 +25,7 @@ struct MeanRequest {
   CovarianceAt covariance_at = CovarianceAt::measured;
   bool likelihood = false;
   bool certify = true;
-  std::size_t budget = 0;  ///< of the search; 0: the library's
+  std::size_t budget = 0;  ///< limit of the search; 0: the library's
   int threads = 0;
 };
 

@@ -114,7 +114,7 @@ Concentration angularConcentration(const R& samples, const W& weights, const M& 
   return result;
 }
 
-/// Whether noise of this covariance turns features by less than a quarter of what uniform ones scatter.
+/// True if noise of this covariance turns features by less than a quarter of what uniform ones scatter.
 template <Homogeneous M>
 bool isModestAngularNoise(const SquareOf<M>& noise) {
   if constexpr (Metric<M>) {

@@ -10,7 +10,7 @@
 
 namespace liestat::detail {
 
-/// Whether the traits of M itself, which is no product, say which compact space it turns on.
+/// True if the traits of M itself, which is no product, say which compact space it turns on.
 template <Homogeneous M>
 inline constexpr bool has_compact_factor =
     compactFactor<M>() != CompactFactor::none&& compactFactor<M>() != CompactFactor::unknown;

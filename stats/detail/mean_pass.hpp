@@ -22,7 +22,7 @@
 
 namespace liestat::detail {
 
-/// Whether there is a weight for every datum.
+/// True if there is a weight for every datum.
 template <class R, class W>
 bool haveOneSize(const R& samples, const W& weights) {
   if constexpr (std::is_same_v<W, UnitWeights>) {

@@ -30,7 +30,7 @@ struct MeasurementBlock {
   Values r, value;  ///< r̂; L⁻¹ value
   Eigen::Matrix<double, K, P> G;
   ReducedRoot<double, P> root;
-  bool finite = true;  ///< whether the input was
+  bool finite = true;  ///< true if the input was finite
 
   /// Where the information is singular: directions N_i of the measurement are free. Zᵀ D N_i = 0 selects the equations
   /// that do not depend on them; `recovery` is N_i (D N_i)⁺.

@@ -94,7 +94,7 @@ class ModelDraws {
     return places;
   }
   std::size_t bestDraw() const { return best_draw_; }
-  /// Whether the next draw is known already.
+  /// True if the next draw is known already.
   bool known() const { return looked_ < draws_.size() && draws_[looked_].valid; }
   std::uint64_t drawKey(std::size_t draw) const { return mixBits(seed_, draw); }
 

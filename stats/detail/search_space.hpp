@@ -96,7 +96,7 @@ struct RotationSpace {
     s.z *= negative ? -ratio : ratio;
     return s;
   }
-  /// Whether every point within ρ of p is nearer to the base by another representative.
+  /// True if every point within ρ of p is nearer to the base by another representative.
   bool isOutsideDomain(const Point& p, double rho) const {
     double other = 0;
     for (int axis = 0; axis < 3; ++axis) {

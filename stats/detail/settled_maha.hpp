@@ -102,7 +102,7 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
   return settled;
 }
 
-/// Whether measurements with their noise show that there is a mean. Neither few of them whose noise and scatter are
+/// True if measurements with their noise show that there is a mean. Neither few of them whose noise and scatter are
 /// below a quarter of the uniform law's nor a single one need to.
 template <Homogeneous M, class R>
 bool showAMean(const R& samples, const M& y) {

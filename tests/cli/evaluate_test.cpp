@@ -188,7 +188,7 @@ TEST(EvaluateCommand, PageAndSeveralEstimates) {
   EXPECT_TRUE(std::filesystem::exists(page + "/errors_1.csv"));
   EXPECT_TRUE(std::filesystem::exists(page + "/nees_1.csv"));
   EXPECT_TRUE(contains(out.output, "second.tum: no verdict: the estimate has no covariances"));
-  // What was not tested has neither passed nor failed.
+  // An estimate that was not tested has neither passed nor failed.
   EXPECT_TRUE(contains(html, "<p class=\"verdict none\">–")) << html.substr(0, 6000);
   EXPECT_FALSE(contains(html, "✗"));
   EXPECT_FALSE(contains(html, "✓"));

@@ -51,7 +51,7 @@ struct Scene {
   }
 };
 
-/// Whether each coordinate is within five standard deviations of the truth; of those of one estimate one of six is
+/// Expects each coordinate within five standard deviations of the truth; in one estimate one of the six is
 /// beyond with a probability of 3e-6.
 void expectTruth(const Json& found, const Json& truth) {
   for (int i = 0; i < 3; ++i) {

@@ -479,7 +479,7 @@ TEST(HandEye, TheVerdictIsThatOfTheStatus) {
   EXPECT_EQ(result.verdict(), Verdict::Answer::no);
   EXPECT_EQ(result.verdict().text,
             "NOT TO BE TRUSTED (inconsistent): the residuals are larger than the covariances of the poses say");
-  // What was wrong with the input is said.
+  // The verdict says which input was wrong.
   const HandEyeResult bad = estimateHandEye(std::vector<PosePair>(1));
   EXPECT_EQ(bad.verdict(), Verdict::Answer::no);
   EXPECT_EQ(bad.inWords(), "1 pairs of poses are too few");

@@ -57,7 +57,7 @@ TEST(TrajectoryConversion, ConvertsEachMatrixAtItsPose) {
     }
     const TrajectoryConversion back = convertTrajectory(p.poses, there.matrices, preset.convention, {});
     for (std::size_t i = 0; i < 5; ++i) {
-      // What the result says of its rounding, of entries in sigmas, and the condition of an information matrix.
+      // The tolerance covers the stated rounding, of entries in sigmas, and the condition of an information matrix.
       EXPECT_LE((back.matrices[i] - p.matrices[i]).cwiseAbs().maxCoeff(), 1e-11 * p.matrices[i].maxCoeff());
     }
   }

@@ -1,5 +1,5 @@
-// Whether scattered features have a mean: the level of the test of uniformity on each compact space, its constants, and
-// what it does about weights and products. Seeds are fixed.
+// Tests of whether scattered features have a mean: the level of the test of uniformity on each compact space, its
+// constants, and its handling of weights and products. Seeds are fixed.
 
 #include <lie/lie.hpp>
 #include <stats/concentration.hpp>

@@ -87,7 +87,7 @@ TEST(Dispersion, OfDirectionsIsTheirSquaredAngle) {
   EXPECT_TRUE(d.covariance.isApprox(0.125 * Eigen::Matrix2d::Identity(), 1e-13));
 }
 
-// Of points everything is linear, so that the classical formulas hold to rounding.
+// For points everything is linear, so that the classical formulas hold to rounding.
 TEST(Covariance, OfPointsByHand) {
   const std::vector<Eigen::Vector2d> points{{3, 0}, {-1, 0}, {1, 1}, {1, -1}};
   const Eigen::Vector2d centre(1, 0);

@@ -1,4 +1,4 @@
-// What is said of a mean beside its numbers: whether errors are independent (stats/time_blocks.hpp), notes, verdicts, and
+// Remarks on a mean beside its numbers: whether errors are independent (stats/time_blocks.hpp), notes, verdicts, and
 // the summaries that are the same for all types.
 #include <lie/rn.hpp>
 #include <lie/s2.hpp>

@@ -1,4 +1,4 @@
-// What a library of the project's compiler and a test of another one must agree on: names, sizes, alignment.
+// The interface that a library of the project's compiler and a test of another one must share: names, sizes, alignment.
 #pragma once
 
 #include <Eigen/Core>
