@@ -85,7 +85,7 @@ fi
 # macro, and with the macro the program is whole.
 # shellcheck disable=SC2086
 estimators() { $CXX -std=c++20 "$@" -I"$root" $eigen "$here/fusion.cpp" 2>&1; }
-errors=$(estimators -c -o not_linked.o || true)
+errors=$(estimators -DHAND_EYE -c -o not_linked.o || true)
 for target in fusion trajectories; do
   grep -q "liestat: link the CMake target liestat::$target, or define LIESTAT_HEADER_ONLY" <<<"$errors" || {
     echo "$errors"
@@ -115,7 +115,7 @@ quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$w
 quietly "$CMAKE" --build find_package
 built_and_ran ./find_package/consumer "find_package"
 built_and_ran ./find_package/compiled "find_package with components"
-built_and_ran ./find_package/fusion "find_package with fusion and trajectories"
+built_and_ran ./find_package/fusion "find_package with trajectories"
 if "$CMAKE" -S "$here/find_package" -B bogus -DCMAKE_PREFIX_PATH="$work/moved" -DWANTED=bogus >"$work/log" 2>&1 ||
   ! grep -q 'There is no component bogus; there are means, fusion, trajectories' "$work/log"; then
   cat "$work/log"
