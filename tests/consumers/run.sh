@@ -85,16 +85,26 @@ fi
 # macro, and with the macro the program is whole.
 # shellcheck disable=SC2086
 estimators() { $CXX -std=c++20 "$@" -I"$root" $eigen "$here/fusion.cpp" 2>&1; }
+trajectories=ON
+printf '#include <boost/math/distributions.hpp>\n#include <Random123/philox.h>\n' | $CXX -std=c++20 -E -x c++ - >/dev/null 2>&1 ||
+  trajectories=OFF
+targets="fusion trajectories"
+if [ $trajectories = OFF ]; then
+  targets=
+  echo "consumers: estimators: SKIPPED, Boost.Math or Random123 is not installed"
+fi
 errors=$(estimators -DHAND_EYE -c -o not_linked.o || true)
-for target in fusion trajectories; do
+for target in $targets; do
   grep -q "liestat: link the CMake target liestat::$target, or define LIESTAT_HEADER_ONLY" <<<"$errors" || {
     echo "$errors"
     echo "consumers: failed: a call of an estimator that is not linked is not answered by a sentence" >&2
     exit 1
   }
 done
-quietly estimators -DLIESTAT_HEADER_ONLY -o header_only
-built_and_ran ./header_only "in place, LIESTAT_HEADER_ONLY"
+if [ $trajectories = ON ]; then
+  quietly estimators -DLIESTAT_HEADER_ONLY -o header_only
+  built_and_ran ./header_only "in place, LIESTAT_HEADER_ONLY"
+fi
 
 quietly "$CMAKE" -S "$here/add_subdirectory" -B add_subdirectory -DLIESTAT_ROOT="$root"
 quietly "$CMAKE" --build add_subdirectory
@@ -111,11 +121,11 @@ for source in "$root"/fusion/compiled/*.cpp "$root"/stats/compiled/*.cpp; do
   quietly test -s "$work/moved/include/liestat/${source#"$root"/}"
 done
 
-quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved"
+quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved" -DTRAJECTORIES=$trajectories
 quietly "$CMAKE" --build find_package
 built_and_ran ./find_package/consumer "find_package"
 built_and_ran ./find_package/compiled "find_package with components"
-built_and_ran ./find_package/fusion "find_package with trajectories"
+[ $trajectories = OFF ] || built_and_ran ./find_package/fusion "find_package with trajectories"
 if "$CMAKE" -S "$here/find_package" -B bogus -DCMAKE_PREFIX_PATH="$work/moved" -DWANTED=bogus >"$work/log" 2>&1 ||
   ! grep -q 'There is no component bogus; there are means, fusion, trajectories' "$work/log"; then
   cat "$work/log"
