@@ -6,7 +6,7 @@
 #   views (cli/show/) include results, no estimator: no header that brings definitions with it (LIESTAT_HEADER_ONLY), but
 #   for those of types
 #
-# What is wrong is printed with file and line, and the exit code is 1. Before that the checks are tried on planted
+# Each violation is printed with file and line, and the exit code is 1. Before that the checks are tried on planted
 # faults.
 set -eu
 

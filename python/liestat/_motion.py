@@ -12,7 +12,7 @@ from ._statistics import _covariances
 
 # Shapes of a frame's row in the series.
 _ROWS = {"direction": (3,), "direction_covariance": (2, 2), "rotation": (4,), "rotation_covariance": (3, 3)}
-# What to do about a fault of the options.
+# Remedies for faults of the options.
 _REMEDIES = {
     "the composition takes successive frames": "filter 'subspace' or 'essential' with frames_apart",
     "a bias is that of a gyroscope, and there is none": "a gyroscope",

@@ -11,7 +11,7 @@ import liestat
 import parity
 
 SERIES = ("errors", "pair_chi2")
-# Of the files, and of how they are read.
+# Fields that describe the files and how they are read.
 OF_FILES = ("hints", "notes", "A", "B", "association", "tolerance", "largest_gap", "pairs")
 
 

@@ -29,7 +29,7 @@ imu0:
   accelerometer_random_walk: 0.003
 """
 NOISE = (0.00016968, 0.002, 1.9393e-05, 0.003)
-# Of the files.
+# Fields that describe the files.
 OF_FILES = ("readings", "start_ns", "images", "tracks", "camera_pose_assumed", "tracks_seen_once")
 OF_FILES += ("observations_outside", "noise_calibration")
 WINDOW_SERIES = ("reason", "velocity", "gravity", "best_gyroscope_bias", "accelerometer_bias", "joint_covariance")
