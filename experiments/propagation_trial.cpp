@@ -50,8 +50,8 @@ std::vector<TrialOutcome> trial(const PropagationExperiment& experiment, Counter
 
   const auto distance = [&](const PropagationMethod& method) {
     const auto product = method.fourth_order
-                             ? [](const Gaussian<G>& x, const Gaussian<G>& y) { return composeFourthOrder(x, y); }
-                             : [](const Gaussian<G>& x, const Gaussian<G>& y) { return compose(x, y); };
+                             ? [](const Gaussian<G>& f, const Gaussian<G>& g) { return composeFourthOrder(f, g); }
+                             : [](const Gaussian<G>& f, const Gaussian<G>& g) { return compose(f, g); };
     switch (method.operation) {
       case Operation::compose:
         return mahalanobisSquared(product(a.given, b.given), G(a.truth * b.truth));

@@ -94,12 +94,11 @@ Eigen::Matrix<S, 4, 1> nearestQuaternion(const Eigen::Matrix<S, 3, 3>& matrix) {
   const Eigen::Matrix<S, 4, 1> q =
       select(v2 > S(0), S(1), S(0)) * unit + select(v2 > S(0), S(0), S(1)) * Eigen::Matrix<S, 4, 1>::Unit(3);
   // Newton's step on the rotation itself removes what the root of a polynomial leaves. P = R(q)ᵀ M is symmetric at the
-  // solution; Exp(δ)ᵀ P is so to first order if (tr P - sym P) δ = vee(P - Pᵀ)/2.
+  // solution; Exp(δ)ᵀ P is so to first order if (tr P - sym P) δ = vee(P - Pᵀ).
   const Eigen::Matrix<S, 3, 3> P = Eigen::Map<const Eigen::Quaternion<S>>(q.data()).toRotationMatrix().transpose() * M;
   Eigen::Matrix<S, 3, 3> H = S(-0.5) * (P + P.transpose());
   H.diagonal().array() += P.trace();
-  const Eigen::Matrix<S, 3, 1> g =
-      S(0.5) * Eigen::Matrix<S, 3, 1>(P(2, 1) - P(1, 2), P(0, 2) - P(2, 0), P(1, 0) - P(0, 1));
+  const Eigen::Matrix<S, 3, 1> g(P(2, 1) - P(1, 2), P(0, 2) - P(2, 0), P(1, 0) - P(0, 1));
   const Eigen::Matrix<S, 3, 3> H_adjugate = cofactors(H);
   const S determinant = H.col(0).dot(H_adjugate.col(0));
   const auto regular = determinant > S(1e-6);

@@ -35,6 +35,19 @@ TEST(FitToSO3, IsTheNearestRotation) {
     EXPECT_LE((SO3d::fitToSO3(M).matrix() - nearest).norm(), 64 * eps / gap) << M << "\n gap " << gap;
   }
 }
+// A rounding of the matrix turns the result by its size over the sum of the two least singular values, one with the sign
+// of the determinant, and no more is lost where that is small.
+TEST(FitToSO3, LosesNoMoreThanTheMatrixDoes) {
+  std::mt19937 generator(6);
+  for (const double gap : {1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5}) {
+    for (int trial = 0; trial < 100; ++trial) {
+      const SO3d U = SO3d::sampleUniform(generator), V = SO3d::sampleUniform(generator);
+      const Eigen::Matrix3d S = Eigen::Vector3d(1, 0.5, gap - 0.5).asDiagonal();
+      const Eigen::Matrix3d R = SO3d::fitToSO3(U.matrix() * S * V.matrix().transpose()).matrix();
+      EXPECT_LE((R - U.matrix() * V.matrix().transpose()).norm(), 16 * eps / gap) << gap;
+    }
+  }
+}
 TEST(FitToSO3, OfMatricesWithoutOneNearestRotationIsARotation) {
   for (const Eigen::Matrix3d& M :
        {Eigen::Matrix3d(Eigen::Matrix3d::Zero()), Eigen::Matrix3d(-Eigen::Matrix3d::Identity()),
