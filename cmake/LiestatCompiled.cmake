@@ -5,8 +5,9 @@
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
+#   formats        readers and writers of files ({fmt}, zlib, yaml-cpp, nlohmann/json)
 
-set(LIESTAT_COMPILED_PARTS means fusion trajectories)
+set(LIESTAT_COMPILED_PARTS means fusion trajectories formats)
 
 set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
 set(LIESTAT_COMPILED_SOURCES_fusion
@@ -14,10 +15,15 @@ set(LIESTAT_COMPILED_SOURCES_fusion
     robust_two_view two_view hand_eye motion)
 set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate convention_diagnosis trajectory_conversion recording_windows)
+set(LIESTAT_COMPILED_SOURCES_formats
+    calibration feature_columns feature_formats features gzip image_tracks imu measurements numeric_table
+    output_file pose_pairs result_zip rotation_matrix text tracks yaml_values messages pose_graph trajectory
+    trajectory_rows trajectory_writer)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
+set(LIESTAT_COMPILED_NEEDS_formats fmt json yaml zlib)
 
-# liestat_compiled(PART ROOT LIBRARY): the static library liestat_PART of ROOT/<room>/compiled, known as liestat::PART, too.
+# liestat_compiled(PART ROOT LIBRARY): the static library liestat_PART of the sources below ROOT, known as liestat::PART, too.
 # LIBRARY is the target of the headers. There is none if a package is missing that the part needs.
 function(liestat_compiled part root library)
   set(target liestat_${part})
@@ -29,16 +35,29 @@ function(liestat_compiled part root library)
       return()
     endif()
   endforeach()
-  set(room fusion)
+  set(directory fusion/compiled)
   if(part STREQUAL "means")
-    set(room stats)
+    set(directory stats/compiled)
+  elseif(part STREQUAL "formats")
+    set(directory formats)
   endif()
   # With it the headers know that their definitions are linked (fusion/detail/compiled.hpp, stats/detail/compiled_mean.hpp).
   string(TOUPPER LIESTAT_COMPILED_${part} definition)
-  list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${room}/compiled/ OUTPUT_VARIABLE sources)
+  list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${directory}/ OUTPUT_VARIABLE sources)
   list(TRANSFORM sources APPEND .cpp)
   list(TRANSFORM LIESTAT_COMPILED_NEEDS_${part} PREPEND liestat_ OUTPUT_VARIABLE packages)
   add_library(${target} STATIC EXCLUDE_FROM_ALL ${sources})
+  if(part STREQUAL "formats")
+    # Most of what its units cost is the headers that they share. Those of trajectories have names of their own.
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    foreach(source IN LISTS sources)
+      if(source MATCHES "/(messages|pose_graph|trajectory[a-z_]*)[.]cpp$")
+        set_source_files_properties(${source} PROPERTIES UNITY_GROUP trajectories)
+      else()
+        set_source_files_properties(${source} PROPERTIES UNITY_GROUP features)
+      endif()
+    endforeach()
+  endif()
   add_library(liestat::${part} ALIAS ${target})
   target_link_libraries(${target} PUBLIC ${library} ${packages})
   target_compile_definitions(${target} PUBLIC ${definition})

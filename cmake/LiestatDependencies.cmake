@@ -109,6 +109,6 @@ function(liestat_summary)
 endfunction()
 
 # What the experiments cannot do without; their tests share the list.
-set(LIESTAT_EXPERIMENTS_NEEDS boost random123 fmt)
+set(LIESTAT_EXPERIMENTS_NEEDS boost random123 fmt json yaml zlib)
 # What the program cannot do without; its tests share the list.
 set(LIESTAT_CLI_NEEDS boost random123 cli11 fmt json yaml zlib)

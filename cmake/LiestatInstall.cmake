@@ -3,12 +3,12 @@
 # architecture, so they live under share/ and the installed tree may be moved.
 include(CMakePackageConfigHelpers)
 
-foreach(room lie stats fusion report)
-  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${room})
-    install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp"
-            PATTERN "compiled/*.cpp")
-  endif()
+foreach(room lie stats fusion)
+  install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp"
+          PATTERN "compiled/*.cpp")
 endforeach()
+install(DIRECTORY formats DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp" PATTERN "*.cpp")
+install(FILES report/describe.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat/report)
 
 set(liestat_package_dir ${CMAKE_INSTALL_DATADIR}/cmake/liestat)
 install(TARGETS liestat EXPORT liestatTargets)

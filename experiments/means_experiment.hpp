@@ -1,6 +1,6 @@
 #pragma once
 
-#include <experiments/feature.hpp>
+#include <formats/feature.hpp>
 #include <stats/maha.hpp>
 
 #include <array>
@@ -24,12 +24,12 @@ namespace liestat::experiments {
 inline constexpr auto all_features = [] {
   constexpr auto count = [] {
     std::size_t n = 0;
-    for (const FeatureInfo& row : features) n += row.has_metric ? 1 : 0;
+    for (const FeatureInfo& row : feature_rows) n += row.has_metric ? 1 : 0;
     return n;
   };
   std::array<Feature, count()> list{};
   std::size_t n = 0;
-  for (const FeatureInfo& row : features) {
+  for (const FeatureInfo& row : feature_rows) {
     if (row.has_metric) list[n++] = row.kind;
   }
   return list;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <experiments/feature.hpp>
+#include <formats/feature.hpp>
 
 #include <cstddef>
 #include <cstdint>

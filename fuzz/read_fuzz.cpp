@@ -10,10 +10,10 @@
 #include <string>
 #include <string_view>
 
-#include <cli/io/imu_file.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/numeric_table.hpp>
-#include <cli/io/reading.hpp>
+#include <formats/imu.hpp>
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/features.hpp>
 
 namespace {
 
@@ -26,10 +26,10 @@ bool isAbsentOrFull(const List& list, std::size_t n) {
   return list.empty() || list.size() == n;
 }
 
-void check(const liestat::cli::FeatureFile& file) {
-  using liestat::experiments::Part;
+void check(const FeatureFile& file) {
+  using Part;
   const std::size_t n = file.size();
-  const auto& parts = liestat::experiments::info(file.kind).parts;
+  const auto& parts = info(file.kind).parts;
   require(n > 0);
   require(file.rotations.size() == (parts.contains(Part::rotation) ? n : 0));
   require(file.positions.size() == (parts.contains(Part::position) ? n : 0));
@@ -50,22 +50,22 @@ void check(const liestat::cli::FeatureFile& file) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  for (const std::string& format : liestat::cli::formatNames()) {
+  for (const std::string& format : formatNames()) {
     try {
-      check(liestat::cli::readFeatures(text, "fuzz", {.format = format}));
-    } catch (const liestat::cli::InputError& error) {
+      check(readFeatures(text, "fuzz", {.format = format}));
+    } catch (const InputError& error) {
       require(std::string_view(error.what()).find('\n') == std::string_view::npos);
     }
   }
   try {
-    const liestat::cli::ImuFile imu = liestat::cli::parseImu(text, "fuzz");
+    const ImuFile imu = parseImu(text, "fuzz");
     require(imu.samples.size() > 1 && imu.samples.size() == imu.lines.size() && imu.duration() > 0);
-  } catch (const liestat::cli::InputError& error) {
+  } catch (const InputError& error) {
     require(std::string_view(error.what()).find('\n') == std::string_view::npos);
   }
   try {
-    (void)liestat::cli::parseTable(text, "fuzz", {"x"}, {"y"});
-  } catch (const liestat::cli::InputError& error) {
+    (void)parseTable(text, "fuzz", {"x"}, {"y"});
+  } catch (const InputError& error) {
     require(std::string_view(error.what()).find('\n') == std::string_view::npos);
   }
   return 0;

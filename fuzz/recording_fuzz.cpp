@@ -11,10 +11,10 @@
 #include <string>
 #include <string_view>
 
-#include <cli/io/calibration.hpp>
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/io/input_error.hpp>
+#include <formats/calibration.hpp>
+#include <formats/image_tracks.hpp>
+#include <formats/imu.hpp>
+#include <formats/input_error.hpp>
 
 namespace {
 
@@ -26,12 +26,12 @@ template <class Action>
 void attempt(Action&& action) {
   try {
     action();
-  } catch (const liestat::cli::InputError& error) {
+  } catch (const InputError& error) {
     require(std::string_view(error.what()).find('\n') == std::string_view::npos);
   }
 }
 
-void check(const liestat::cli::Calibration& calibration) {
+void check(const Calibration& calibration) {
   require(calibration.imu || !calibration.cameras.empty());
   for (const auto& [name, camera, imu_T_cam, timeshift] : calibration.cameras) {
     require(!name.empty() && std::isfinite(timeshift) && imu_T_cam.params().allFinite());
@@ -44,7 +44,7 @@ void check(const liestat::cli::Calibration& calibration) {
   }
 }
 
-void check(const liestat::cli::ImageTracks& tracks) {
+void check(const ImageTracks& tracks) {
   require(tracks.frames.size() == tracks.times.size() && !tracks.observations.empty());
   for (std::size_t i = 0; i < tracks.times.size(); ++i) {
     require(std::isfinite(tracks.times[i]) && (i == 0 || tracks.times[i] > tracks.times[i - 1]));
@@ -60,12 +60,12 @@ void check(const liestat::cli::ImageTracks& tracks) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  attempt([&] { check(liestat::cli::parseCalibration(text, "fuzz")); });
-  attempt([&] { (void)liestat::cli::parseImuNoise(text, "fuzz"); });
-  attempt([&] { check(liestat::cli::parseImageTracks(text, "fuzz", {}, {}, 1403715523912143104)); });
+  attempt([&] { check(parseCalibration(text, "fuzz")); });
+  attempt([&] { (void)parseImuNoise(text, "fuzz"); });
+  attempt([&] { check(parseImageTracks(text, "fuzz", {}, {}, 1403715523912143104)); });
   attempt([&] {
-    const std::int64_t start_ns = liestat::cli::firstStamp(text, "fuzz");
-    const auto truth = liestat::cli::parseGroundTruth(text, "fuzz", start_ns);
+    const std::int64_t start_ns = firstStamp(text, "fuzz");
+    const auto truth = parseGroundTruth(text, "fuzz", start_ns);
     require(!truth.empty() && truth.front().time == 0);
     for (const auto& row : truth) require(row.state.params().allFinite() && std::isfinite(row.time));
     const auto at = liestat::truthAt(truth, 0.5 * truth.back().time);
@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t dots = text.find("\n...\n");
   if (dots != std::string_view::npos) {
     attempt([&] {
-      check(liestat::cli::parseImageTracks(text.substr(0, dots + 1), "fuzz", text.substr(dots + 5), "times", 0));
+      check(parseImageTracks(text.substr(0, dots + 1), "fuzz", text.substr(dots + 5), "times", 0));
     });
   }
   return 0;

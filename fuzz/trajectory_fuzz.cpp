@@ -10,10 +10,10 @@
 #include <string>
 #include <string_view>
 
-#include <cli/io/input_error.hpp>
-#include <cli/io/pose_graph_file.hpp>
-#include <cli/io/trajectory_file.hpp>
-#include <cli/io/trajectory_writer.hpp>
+#include <formats/input_error.hpp>
+#include <formats/pose_graph.hpp>
+#include <formats/trajectory.hpp>
+#include <formats/trajectory_writer.hpp>
 
 namespace {
 
@@ -26,12 +26,12 @@ template <class Function>
 void mayRefuse(Function&& function) {
   try {
     function();
-  } catch (const liestat::cli::InputError& error) {
+  } catch (const InputError& error) {
     require(std::string_view(error.what()).find('\n') == std::string_view::npos);
   }
 }
 
-void check(const liestat::cli::Trajectory& trajectory) {
+void check(const Trajectory& trajectory) {
   const std::size_t n = trajectory.size();
   require(n > 0 && trajectory.lines.size() == n);
   require(trajectory.times.size() == trajectory.time_texts.size());
@@ -49,7 +49,7 @@ void check(const liestat::cli::Trajectory& trajectory) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace liestat::cli;
+  using namespace liestat;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const std::vector<std::string> formats = trajectoryFormatNames();
   for (const std::string& format : formats) {

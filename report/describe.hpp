@@ -6,7 +6,7 @@
 //   }
 //
 // which names each field once: v(name, value, meaning = "", unit = ""). It needs no include of this header. Views are
-// visitors: JSON (cli/show/json.hpp), Python's dictionaries (python/src/described.hpp), and those below. A value is a
+// visitors: JSON (report/json.hpp), Python's dictionaries (python/src/described.hpp), and those below. A value is a
 // number, a word, a matrix or vector of Eigen, a list of values, another described result, or an optional of one of these.
 // Numbers that belong to single poses, frames or windows in long series are described apart, by describeSeries(v, result).
 #pragma once

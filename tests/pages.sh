@@ -2,7 +2,7 @@
 # pages.sh ROOT : each path and link in ROOT's *.md, docs/*.md and docs/theory/*.md leads somewhere, and so does each
 # citation of a page's section in ROOT's *.hpp, *.cpp and *.md.
 #
-# A path begins with a folder of the project (lie/so3.hpp, examples/fuse_poses, cli/io/); a program may be named without
+# A path begins with a folder of the project (lie/so3.hpp, examples/fuse_poses, formats/); a program may be named without
 # .cpp, a pattern such as lie/*.hpp needs one match. A link is [text](page.md), with or without #heading. A citation is
 # page.md, section 4.2 (or sections 4 and 4.2), the page relative to ROOT or to docs, with a heading of each number; it may
 # go on in the next line. Bold text must not begin with code or a formula, which Doxygen does not recognise. What is wrong

@@ -1,10 +1,10 @@
 #include <cli/commands/command_line.hpp>
 
 #include <cli/commands/self_description.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/text.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/text.hpp>
+#include <report/json.hpp>
 #include <lie/instruction_set.hpp>
 
 #include <CLI/App.hpp>

@@ -1,12 +1,12 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/numeric_table.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/pose_graph_file.hpp>
-#include <cli/io/text.hpp>
-#include <cli/io/trajectory_rows.hpp>
-#include <cli/io/trajectory_writer.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/output_file.hpp>
+#include <formats/pose_graph.hpp>
+#include <formats/text.hpp>
+#include <formats/trajectory_rows.hpp>
+#include <formats/trajectory_writer.hpp>
+#include <report/json.hpp>
 #include <fusion/trajectory_conversion.hpp>
 #include <stats/convention_presets.hpp>
 
@@ -54,7 +54,7 @@ std::string withFlags(std::string text) {
 
 /// The conversion of poses and their matrices; throws InputError for the first matrix that is not converted.
 TrajectoryConversion converted(const ConvertOptions& options, const std::string& file, const std::vector<SE3d>& poses,
-                               const std::vector<Matrix6>& matrices, const std::vector<std::size_t>& lines,
+                               const std::vector<Matrix6d>& matrices, const std::vector<std::size_t>& lines,
                                const Convention& from, const Convention& to) {
   ConversionOptions conversion{options.assume_uncorrelated, options.sampled, options.samples, options.seed, lines};
   TrajectoryConversion result = convertTrajectory(poses, matrices, from, to, conversion);
@@ -167,7 +167,7 @@ void convertGraph(const ConvertOptions& options, ConvertOutput& output, const Te
   }
   const Convention to = conventionOf(target, conventionGiven(options.cov_to, "--cov-to"), "--cov-to");
   std::vector<SE3d> poses;
-  std::vector<Matrix6> matrices;
+  std::vector<Matrix6d> matrices;
   std::vector<std::size_t> lines;
   for (const GraphEdge& e : graph.edges) {
     poses.push_back(e.measurement), matrices.push_back(e.matrix), lines.push_back(e.line);

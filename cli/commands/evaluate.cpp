@@ -1,8 +1,8 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/trajectory_input.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/text.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/text.hpp>
 #include <cli/show/evaluation.hpp>
 #include <fusion/convention_diagnosis.hpp>
 #include <fusion/evaluate.hpp>

@@ -1,11 +1,11 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/feature_values.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/pose_pairs.hpp>
-#include <cli/io/text.hpp>
+#include <formats/feature_values.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/pose_pairs.hpp>
+#include <formats/text.hpp>
 #include <cli/show/hand_eye.hpp>
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/hand_eye.hpp>
 #include <fusion/hand_eye_hints.hpp>

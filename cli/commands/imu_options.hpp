@@ -3,7 +3,7 @@
 // The options that all commands that read an inertial sensor have.
 
 #include <cli/commands/command_line.hpp>
-#include <cli/io/calibration.hpp>
+#include <formats/calibration.hpp>
 #include <fusion/imu/preintegrate.hpp>
 
 #include <string>

@@ -1,5 +1,5 @@
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>

@@ -1,7 +1,7 @@
 #include <cli/commands/mean_analysis.hpp>
 
-#include <cli/io/feature_values.hpp>
-#include <experiments/feature.hpp>
+#include <formats/feature_values.hpp>
+#include <formats/feature.hpp>
 #include <experiments/parallel.hpp>
 #include <stats/summarized_mean.hpp>
 
@@ -53,7 +53,7 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
 }  // namespace
 
 MeanAnalysis estimateMean(const Measurements& measurements, const AnalysisOptions& options) {
-  return experiments::withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, options); });
+  return withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, options); });
 }
 
 }  // namespace liestat::cli

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/io/measurements.hpp>
+#include <formats/measurements.hpp>
 #include <stats/charts.hpp>
 #include <stats/mean_summary.hpp>
 

@@ -9,7 +9,7 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
   app.option("--columns", columns, "Names of CSV columns that are not ours: r00=R00,tx=cx (ours=the file's)").list();
   app.flag("--ignore-unknown", ignore_unknown, "Pass over CSV columns without a meaning");
   app.option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
-      .oneOf(experiments::featureNames());
+      .oneOf(featureNames());
   app.option("--criterion", options.criterion,
              "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
       .oneOf({"lsq", "wlsq", "maha"});

@@ -1,9 +1,9 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/motion_input.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/tracks.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/tracks.hpp>
+#include <report/json.hpp>
 #include <cli/show/motion.hpp>
 #include <cli/show/motion_report.hpp>
 #include <fusion/motion/sequence.hpp>

@@ -1,12 +1,12 @@
 #include <cli/commands/motion_input.hpp>
 
-#include <cli/io/camera.hpp>
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/numeric_table.hpp>
-#include <cli/io/rotation_matrix.hpp>
-#include <cli/io/text.hpp>
+#include <cli/commands/camera.hpp>
+#include <formats/image_tracks.hpp>
+#include <formats/imu.hpp>
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/rotation_matrix.hpp>
+#include <formats/text.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/motion/gyroscope.hpp>
 

@@ -2,7 +2,7 @@
 
 // The input of `liestat motion`: tracks in calibrated coordinates, and what a gyroscope says of the rotation between frames.
 
-#include <cli/io/calibration.hpp>
+#include <formats/calibration.hpp>
 #include <fusion/motion/gyroscope.hpp>
 #include <fusion/motion/sequence.hpp>
 

@@ -1,10 +1,10 @@
-#include <cli/io/calibration.hpp>
+#include <formats/calibration.hpp>
 #include <cli/commands/commands.hpp>
-#include <cli/io/imu_file.hpp>
+#include <formats/imu.hpp>
 #include <cli/commands/imu_options.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <report/json.hpp>
 #include <cli/show/preintegration.hpp>
 #include <fusion/imu/recording_windows.hpp>
 

@@ -1,8 +1,8 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/recording_files.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <experiments/recording_files.hpp>
+#include <report/json.hpp>
 #include <experiments/motion_recording.hpp>
 
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/show/json.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <report/json.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <experiments/two_view_validation.hpp>
 #include <lie/so3.hpp>

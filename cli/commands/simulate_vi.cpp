@@ -1,10 +1,10 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/calibration.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/recording_files.hpp>
-#include <cli/io/text.hpp>
+#include <formats/calibration.hpp>
+#include <formats/imu.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <experiments/recording_files.hpp>
+#include <formats/text.hpp>
 #include <cli/show/simulated_recording.hpp>
 #include <experiments/simulate_vi.hpp>
 

@@ -1,7 +1,7 @@
 #include <cli/commands/split.hpp>
 
-#include <cli/io/feature_values.hpp>
-#include <experiments/feature.hpp>
+#include <formats/feature_values.hpp>
+#include <formats/feature.hpp>
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <stats/summarized_mean_splits.hpp>
@@ -71,7 +71,7 @@ SplitSummary splitMeasurements(const Measurements& measurements, const SplitSett
                                const std::function<void()>& advance) {
   SplitSettings how = settings;
   how.split.advance = advance;
-  return experiments::withFeature(measurements.feature, [&]<class M>() { return split<M>(measurements, how); });
+  return withFeature(measurements.feature, [&]<class M>() { return split<M>(measurements, how); });
 }
 
 }  // namespace liestat::cli

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/io/measurements.hpp>
+#include <formats/measurements.hpp>
 #include <stats/split_validation_types.hpp>
 
 #include <cstddef>

@@ -1,7 +1,7 @@
 #include <cli/commands/trajectory_input.hpp>
 
-#include <cli/io/input_error.hpp>
-#include <cli/io/text.hpp>
+#include <formats/input_error.hpp>
+#include <formats/text.hpp>
 #include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cli/commands/command_line.hpp>
-#include <cli/io/trajectory_file.hpp>
+#include <formats/trajectory.hpp>
 #include <fusion/evaluate.hpp>
 
 #include <cstddef>

@@ -1,10 +1,10 @@
 #include <cli/commands/commands.hpp>
-#include <cli/io/calibration.hpp>
-#include <cli/io/camera.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/numeric_table.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/show/json.hpp>
+#include <formats/calibration.hpp>
+#include <cli/commands/camera.hpp>
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/output_file.hpp>
+#include <report/json.hpp>
 #include <cli/show/two_view.hpp>
 #include <fusion/two_view/two_view.hpp>
 

@@ -1,12 +1,12 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/measurement_options.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/text.hpp>
-#include <cli/io/tracks.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/text.hpp>
+#include <formats/tracks.hpp>
 #include <fusion/stereo.hpp>
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
 #include <cli/show/split.hpp>

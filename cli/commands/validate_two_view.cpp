@@ -1,6 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/io/two_view_pairs.hpp>
+#include <experiments/two_view_pair_files.hpp>
 #include <cli/show/two_view_pairs.hpp>
 #include <cli/show/two_view_rules.hpp>
 #include <cli/show/two_view_validation.hpp>

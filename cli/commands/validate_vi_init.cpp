@@ -1,7 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
 #include <cli/show/table1.hpp>
 #include <cli/show/two_solutions.hpp>
 #include <cli/show/vi_init_validation.hpp>

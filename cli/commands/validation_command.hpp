@@ -3,9 +3,9 @@
 // The common part of the commands `validate means`, `validate propagation` and the like: lists of names on the command
 // line, options of a run, a progress bar, rows in JSON, the exit code.
 
-#include <cli/io/output_file.hpp>
+#include <formats/output_file.hpp>
 #include <cli/commands/commands.hpp>
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/show/progress.hpp>
 #include <cli/show/validation.hpp>
 #include <experiments/interruption.hpp>

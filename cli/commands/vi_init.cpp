@@ -1,9 +1,9 @@
-#include <cli/io/calibration.hpp>
-#include <cli/io/camera.hpp>
+#include <formats/calibration.hpp>
+#include <cli/commands/camera.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>

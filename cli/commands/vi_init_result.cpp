@@ -1,6 +1,6 @@
 #include <cli/commands/vi_init_result.hpp>
 
-#include <cli/io/input_error.hpp>
+#include <formats/input_error.hpp>
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <cli/io/calibration.hpp>
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
+#include <formats/calibration.hpp>
+#include <formats/image_tracks.hpp>
+#include <formats/imu.hpp>
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>
 

@@ -1,6 +1,6 @@
 #include <cli/show/diagnosis.hpp>
 
-#include <cli/io/text.hpp>
+#include <formats/text.hpp>
 #include <cli/show/table.hpp>
 #include <stats/convention_presets.hpp>
 

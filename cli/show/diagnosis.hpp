@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
 
 #include <string>

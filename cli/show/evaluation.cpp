@@ -1,9 +1,9 @@
 #include <cli/show/evaluation.hpp>
 
-#include <cli/io/input_error.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/result_zip.hpp>
-#include <cli/io/text.hpp>
+#include <formats/input_error.hpp>
+#include <formats/output_file.hpp>
+#include <formats/result_zip.hpp>
+#include <formats/text.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/pose_errors.hpp>
 #include <cli/show/table.hpp>

@@ -1,7 +1,7 @@
 #include <cli/show/hand_eye.hpp>
 
-#include <cli/io/output_file.hpp>
-#include <cli/io/text.hpp>
+#include <formats/output_file.hpp>
+#include <formats/text.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <cli/io/pose_pairs.hpp>
-#include <cli/show/json.hpp>
+#include <formats/pose_pairs.hpp>
+#include <report/json.hpp>
 #include <fusion/hand_eye_types.hpp>
 
 #include <cstddef>

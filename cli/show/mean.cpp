@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <cli/io/text.hpp>
+#include <formats/text.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>
 
@@ -67,7 +67,7 @@ std::vector<std::vector<std::string>> meanRows(const Measurements& measurements,
     row.push_back(unitOf(part).name);
     rows.push_back(row);
   };
-  for (const TangentBlock& part : experiments::info(measurements.feature).tangent) {
+  for (const TangentBlock& part : info(measurements.feature).tangent) {
     const ShownPart shown = shownPart(part, analysis.mean);
     const bool has_covariance = analysis.hasCovariance();
     double least = 0;
@@ -119,7 +119,7 @@ std::string covarianceInWords(const Measurements& measurements, const MeanAnalys
 }
 
 std::string measurementsInWords(const std::string& source, const Measurements& measurements) {
-  const experiments::FeatureInfo& feature = experiments::info(measurements.feature);
+  const FeatureInfo& feature = info(measurements.feature);
   std::string text = fmt::format("{}: {} {} ({})", sourceName(source), measurements.size(),
                                  measurements.size() == 1 ? feature.name : feature.plural, measurements.file.format);
   if (measurements.file.n_normalised > 0) {
@@ -134,7 +134,7 @@ namespace {
 /// As many decimals as the standard deviation of the rotation leaves, nine at least.
 int quaternionDecimals(Feature feature, const MeanAnalysis& analysis) {
   if (analysis.covariance.size() == 0) return 9;
-  for (const TangentBlock& part : experiments::info(feature).tangent) {
+  for (const TangentBlock& part : info(feature).tangent) {
     if (!isAngular(part.part)) continue;
     const double least = analysis.covariance.diagonal().segment(part.begin, part.size).minCoeff();
     if (least > 0) return std::clamp(2 - static_cast<int>(std::floor(0.5 * std::log10(least))), 9, 16);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/commands/mean_analysis.hpp>
 
 #include <optional>

@@ -235,7 +235,7 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
   report.verdict(analysis.verdict());
   report.paragraph(measurementsInWords(source, measurements) + ".");
   report.code(command_line);
-  const std::span<const TangentBlock> parts = experiments::info(measurements.feature).tangent;
+  const std::span<const TangentBlock> parts = info(measurements.feature).tangent;
   if (analysis.charts) {
     for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
       if (isAngular(part->part)) {

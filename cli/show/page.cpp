@@ -12,11 +12,11 @@
 #include <numbers>
 #include <utility>
 
-#include <cli/io/run_program.hpp>
+#include <cli/show/run_program.hpp>
 #include <cli/show/plots.hpp>
-#include <cli/show/json.hpp>
-#include <cli/io/output_file.hpp>
-#include <cli/io/text.hpp>
+#include <report/json.hpp>
+#include <formats/output_file.hpp>
+#include <formats/text.hpp>
 
 namespace liestat::cli {
 namespace {

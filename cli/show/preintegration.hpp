@@ -1,7 +1,7 @@
 // The view of `liestat preintegrate`: motions between two times, their noise, and how far they are from a truth.
 #pragma once
 
-#include <cli/io/imu_file.hpp>
+#include <formats/imu.hpp>
 #include <fusion/imu/recording_windows_types.hpp>
 
 #include <string>

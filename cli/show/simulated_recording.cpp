@@ -1,6 +1,6 @@
 #include <cli/show/simulated_recording.hpp>
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 
 #include <fmt/format.h>
 

@@ -2,9 +2,9 @@
 
 // Views of `liestat validate split`, of the measurements in a file and of landmarks that a stereo camera saw.
 
-#include <cli/io/measurements.hpp>
+#include <formats/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <stats/split_validation_types.hpp>
 
 #include <Eigen/Core>

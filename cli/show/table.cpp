@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include <cli/io/text.hpp>
+#include <formats/text.hpp>
 
 namespace liestat::cli {
 namespace {

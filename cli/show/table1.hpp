@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <experiments/table1.hpp>
 
 #include <string>

@@ -1,6 +1,6 @@
 #include <cli/show/two_view.hpp>
 
-#include <cli/io/output_file.hpp>
+#include <formats/output_file.hpp>
 #include <cli/show/page.hpp>
 #include <cli/show/table.hpp>
 #include <cli/show/units.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <fusion/two_view/two_view_types.hpp>
 
 #include <Eigen/Core>

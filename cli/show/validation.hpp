@@ -2,7 +2,7 @@
 
 // The parts that the views of the validations share.
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/show/page.hpp>
 #include <experiments/judged_report.hpp>
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <cli/show/json.hpp>
+#include <report/json.hpp>
 #include <cli/commands/vi_init_result.hpp>
 
 namespace liestat::cli {

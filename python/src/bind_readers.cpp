@@ -1,8 +1,8 @@
 // The program's readers of files for Python: columns by name.
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/io/input_error.hpp>
-#include <cli/io/reading.hpp>
+#include <formats/image_tracks.hpp>
+#include <formats/imu.hpp>
+#include <formats/input_error.hpp>
+#include <formats/features.hpp>
 #include <python/src/binding.hpp>
 
 #include <pybind11/stl.h>
@@ -34,17 +34,17 @@ py::array_t<std::int64_t> integers(const std::vector<std::int64_t>& list) {
 
 py::dict readFeatures(const std::string& path, const std::string& format, double norm_tolerance,
                       const std::string& angles, bool ignore_unknown, const std::vector<std::string>& columns) {
-  cli::ReadingOptions options;
+  ReadingOptions options;
   options.format = format;
   options.norm_tolerance = norm_tolerance;
-  options.angles = angles == "radians"   ? cli::AngleUnit::radians
-                   : angles == "degrees" ? cli::AngleUnit::degrees
-                                         : cli::AngleUnit::unsaid;
+  options.angles = angles == "radians"   ? AngleUnit::radians
+                   : angles == "degrees" ? AngleUnit::degrees
+                                         : AngleUnit::unsaid;
   options.ignore_unknown = ignore_unknown;
   options.columns = columns;
-  const cli::FeatureFile file = [&] {
+  const FeatureFile file = [&] {
     const py::gil_scoped_release released;
-    return cli::readFeatureFile(path, options);
+    return readFeatureFile(path, options);
   }();
   const auto vector3 = [](const Eigen::Vector3d& v, double* out) { Eigen::Map<Eigen::Vector3d>{out} = v; };
   py::dict d;
@@ -61,7 +61,7 @@ py::dict readFeatures(const std::string& path, const std::string& format, double
   const py::ssize_t k = file.covariances.empty() ? 0 : static_cast<py::ssize_t>(file.covariances[0].rows());
   DoubleArray covariances({static_cast<py::ssize_t>(file.covariances.size()), k, k});
   double* out = covariances.mutable_data();
-  for (const cli::Covariance& covariance : file.covariances) {
+  for (const FeatureCovariance& covariance : file.covariances) {
     for (py::ssize_t i = 0; i < k; ++i) {
       for (py::ssize_t j = 0; j < k; ++j) *out++ = covariance(i, j);
     }
@@ -71,9 +71,9 @@ py::dict readFeatures(const std::string& path, const std::string& format, double
 }
 
 py::dict readImuFile(const std::string& path) {
-  const cli::ImuFile file = [&] {
+  const ImuFile file = [&] {
     const py::gil_scoped_release released;
-    return cli::readImu(path);
+    return readImu(path);
   }();
   py::dict d;
   d["format"] = file.format;
@@ -87,9 +87,9 @@ py::dict readImuFile(const std::string& path) {
 }
 
 py::dict readTracksFile(const std::string& path, const std::string& image_times, std::int64_t start_ns) {
-  const cli::ImageTracks file = [&] {
+  const ImageTracks file = [&] {
     const py::gil_scoped_release released;
-    return cli::readImageTracks(path, image_times, start_ns);
+    return readImageTracks(path, image_times, start_ns);
   }();
   std::vector<std::int64_t> images, tracks;
   for (const auto& seen : file.observations) {
@@ -113,14 +113,14 @@ py::dict readTracksFile(const std::string& path, const std::string& image_times,
 }  // namespace
 
 void bindReaders(py::module_& module) {
-  static py::exception<cli::InputError> input_error(module, "InputError", PyExc_ValueError);
+  static py::exception<InputError> input_error(module, "InputError", PyExc_ValueError);
   module.def("read_features", &readFeatures);
   module.def("read_imu", &readImuFile);
   module.def("read_tracks", &readTracksFile);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
-    } catch (const cli::InputError& error) {
+    } catch (const InputError& error) {
       input_error(error.what());
     }
   });

@@ -1,9 +1,9 @@
 // The program's readers and writer of trajectories and pose graphs for Python.
-#include <cli/io/input_error.hpp>
-#include <cli/io/pose_graph_file.hpp>
-#include <cli/io/text.hpp>
-#include <cli/io/trajectory_file.hpp>
-#include <cli/io/trajectory_writer.hpp>
+#include <formats/input_error.hpp>
+#include <formats/pose_graph.hpp>
+#include <formats/text.hpp>
+#include <formats/trajectory.hpp>
+#include <formats/trajectory_writer.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/described.hpp>
 #include <stats/convention_presets.hpp>
@@ -33,11 +33,11 @@ py::object nameOf(const std::optional<Convention>& c) {
   return c ? py::object(text(conventionName(*c, false))) : py::none();
 }
 
-cli::TrajectoryOptions readingOptions(const std::string& format, const std::string& covariance_file,
+TrajectoryOptions readingOptions(const std::string& format, const std::string& covariance_file,
                                       const std::string& layout, double unmeasured,
                                       const std::vector<std::string>& columns, bool ignore_unknown,
                                       double norm_tolerance) {
-  cli::TrajectoryOptions options;
+  TrajectoryOptions options;
   options.format = format, options.covariance_file = covariance_file, options.unmeasured = unmeasured;
   options.reading.columns = columns, options.reading.ignore_unknown = ignore_unknown;
   options.reading.norm_tolerance = norm_tolerance;
@@ -49,11 +49,11 @@ cli::TrajectoryOptions readingOptions(const std::string& format, const std::stri
 py::dict readTrajectory(const std::string& path, const std::string& convention, const std::string& format,
                         const std::string& covariance_file, const std::string& layout, double unmeasured,
                         const std::vector<std::string>& columns, bool ignore_unknown, double norm_tolerance) {
-  const cli::TrajectoryOptions options =
+  const TrajectoryOptions options =
       readingOptions(format, covariance_file, layout, unmeasured, columns, ignore_unknown, norm_tolerance);
-  const cli::Trajectory t = [&] {
+  const Trajectory t = [&] {
     const py::gil_scoped_release released;
-    return cli::readTrajectory(path, options);
+    return readTrajectory(path, options);
   }();
   py::dict d;
   d["poses"] = arrayOfPoses(t.poses);
@@ -61,13 +61,13 @@ py::dict readTrajectory(const std::string& path, const std::string& convention, 
   d["time_texts"] = t.hasTimes() ? py::cast(t.time_texts) : py::none();
   for (const char* part : {"covariances", "matrices", "convention"}) d[part] = py::none();
   if (t.hasCovariances()) {
-    d["matrices"] = arrayOfMatrices(t.covariances, [](const cli::Matrix6& m) -> const cli::Matrix6& { return m; });
+    d["matrices"] = arrayOfMatrices(t.covariances, [](const Matrix6d& m) -> const Matrix6d& { return m; });
     if (convention != "unknown") {
       std::optional<Convention> given;
-      if (!convention.empty()) given = cli::conventionNamed(convention, "convention");
-      const Convention c = cli::conventionOf(t, given, "convention");
+      if (!convention.empty()) given = conventionNamed(convention, "convention");
+      const Convention c = conventionOf(t, given, "convention");
       d["convention"] = nameOf(c);
-      d["covariances"] = arrayOfMatrices(cli::gaussiansOf(t, c), [](const auto& g) { return g.covariance; });
+      d["covariances"] = arrayOfMatrices(gaussiansOf(t, c), [](const auto& g) { return g.covariance; });
     }
   }
   d["stated_convention"] = nameOf(t.stated_convention);
@@ -75,21 +75,21 @@ py::dict readTrajectory(const std::string& path, const std::string& convention, 
   d["format"] = t.format;
   d["lines"] = DictView::of(t.lines);
   d["frames"] = t.frames;
-  d["notes"] = cli::notesOf(t, options);
+  d["notes"] = notesOf(t, options);
   return d;
 }
 
 py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm_tolerance) {
-  const cli::PoseGraph graph = [&] {
+  const PoseGraph graph = [&] {
     const py::gil_scoped_release released;
-    const cli::TextFile file = cli::loadText(path);
-    return cli::parseGraph(file.text, file.name, ignore_unknown, norm_tolerance);
+    const TextFile file = loadText(path);
+    return parseGraph(file.text, file.name, ignore_unknown, norm_tolerance);
   }();
   std::vector<SE3d> poses, measurements;
   std::vector<std::int64_t> ids, from, to;
   std::vector<std::size_t> lines;
-  for (const cli::GraphVertex& v : graph.vertices) poses.push_back(v.pose), ids.push_back(v.id);
-  for (const cli::GraphEdge& e : graph.edges) {
+  for (const GraphVertex& v : graph.vertices) poses.push_back(v.pose), ids.push_back(v.id);
+  for (const GraphEdge& e : graph.edges) {
     measurements.push_back(e.measurement), from.push_back(e.from), to.push_back(e.to), lines.push_back(e.line);
   }
   py::dict d;
@@ -97,7 +97,7 @@ py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm
   d["ids"] = DictView::of(ids), d["poses"] = arrayOfPoses(poses);
   d["sources"] = DictView::of(from), d["targets"] = DictView::of(to);
   d["measurements"] = arrayOfPoses(measurements);
-  d["matrices"] = arrayOfMatrices(graph.edges, [](const cli::GraphEdge& e) -> const cli::Matrix6& { return e.matrix; });
+  d["matrices"] = arrayOfMatrices(graph.edges, [](const GraphEdge& e) -> const Matrix6d& { return e.matrix; });
   d["stated_convention"] = nameOf(graph.stated_convention);
   d["lines"] = DictView::of(lines);
   return d;
@@ -105,19 +105,19 @@ py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm
 
 /// The convention in which a format is written, as a name with its layout.
 std::string conventionToWrite(const std::string& format, const std::string& asked) {
-  return conventionName(cli::conventionToWrite(format, asked, "write_trajectory", "convention"));
+  return conventionName(conventionToWrite(format, asked, "write_trajectory", "convention"));
 }
 
 /// The text of a file, of its side file, and notes. The matrices are in the convention that conventionToWrite returned.
 py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleArray>& matrices,
                            const std::vector<std::string>& times, const std::string& format,
                            const std::string& convention, const std::vector<std::string>& frames) {
-  cli::Trajectory t;
+  Trajectory t;
   t.name = "write_trajectory", t.format = format, t.frames = frames, t.time_texts = times;
   for (const std::string& time : times) {
     double value = 0;
-    if (cli::parseNumber(time, value) != cli::NumberKind::finite) {
-      throw cli::InputError(t.name, 0, "the time '" + cli::printable(time) + "'", "a finite number of seconds");
+    if (parseNumber(time, value) != NumberKind::finite) {
+      throw InputError(t.name, 0, "the time '" + printable(time) + "'", "a finite number of seconds");
     }
     t.times.push_back(value);
   }
@@ -127,8 +127,8 @@ py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleA
     t.lines.push_back(0);
   }
   const Convention c = convention.empty() ? Convention{} : *parseConvention(convention);
-  const cli::TrajectoryText file = cli::formatTrajectory(t, format, c);
-  return py::make_tuple(file.text, file.side_file, cli::notesOf(file, format, c));
+  const TrajectoryText file = formatTrajectory(t, format, c);
+  return py::make_tuple(file.text, file.side_file, notesOf(file, format, c));
 }
 
 }  // namespace
@@ -138,7 +138,7 @@ void bindTrajectoryFiles(py::module_& module) {
   module.def("read_pose_graph", &readPoseGraph);
   module.def("convention_to_write", &conventionToWrite);
   module.def("format_trajectory", &formatTrajectory);
-  module.attr("TRAJECTORY_FORMATS") = py::tuple(py::cast(cli::trajectoryFormatNames()));
+  module.attr("TRAJECTORY_FORMATS") = py::tuple(py::cast(trajectoryFormatNames()));
 }
 
 }  // namespace liestat::python

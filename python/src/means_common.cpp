@@ -1,7 +1,7 @@
 // Means of the features that liestat_means holds compiled.
 #include <python/src/mean_of.hpp>
 
-#include <experiments/feature.hpp>
+#include <formats/feature.hpp>
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@ namespace {
 
 template <class M>
 constexpr MeanType commonType(std::string_view name) {
-  return meanType<M>(name, experiments::info<M>().name);
+  return meanType<M>(name, info<M>().name);
 }
 
 constexpr std::array types{

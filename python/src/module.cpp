@@ -32,8 +32,6 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindViInit(module);
 #ifdef LIESTAT_PYTHON_READERS
   liestat::python::bindReaders(module);
-#endif
-#ifdef LIESTAT_PYTHON_TRAJECTORY_READERS
   liestat::python::bindTrajectoryFiles(module);
 #endif
 }

@@ -1,7 +1,7 @@
 // Splits of the features that liestat_means holds compiled; apart from their means, so that two compilers share the work.
 #include <python/src/split_of.hpp>
 
-#include <experiments/feature.hpp>
+#include <formats/feature.hpp>
 
 namespace liestat::python {
 

@@ -1,6 +1,6 @@
 // A camera as the program's options give it; the models are tested in fusion/camera_test.cpp.
 
-#include <cli/io/camera.hpp>
+#include <cli/commands/camera.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

@@ -1,8 +1,8 @@
 // liestat convert: round trips of every format, what is not known, what is ambiguous, and files that are wrong.
 #include <cli/commands/commands.hpp>
-#include <cli/io/pose_graph_file.hpp>
-#include <cli/io/trajectory_file.hpp>
-#include <cli/io/trajectory_rows.hpp>
+#include <formats/pose_graph.hpp>
+#include <formats/trajectory.hpp>
+#include <formats/trajectory_rows.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/random.hpp>
 
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {
@@ -50,7 +50,7 @@ std::string csvOf(int rows, double scale = 1e-4, double distance = 3) {
   for (int k = 0; k < rows; ++k) {
     const Eigen::Vector4d q = rng.unitQuaternion().coeffs();
     const Eigen::Vector3d p = distance * rng.unitVector<3>();
-    Matrix6 C = scale * Matrix6::Identity();
+    Matrix6d C = scale * Matrix6d::Identity();
     for (int m = 0; m < 4; ++m) {
       const Eigen::Matrix<double, 6, 1> u = rng.normalVector<6>();
       C += scale * u * u.transpose();
@@ -71,10 +71,10 @@ double gapOf(const Trajectory& a, const Trajectory& b, bool cross = true) {
   double largest = 0;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
     EXPECT_LE((a.poses[i].matrix() - b.poses[i].matrix()).cwiseAbs().maxCoeff(), 1e-14);
-    Matrix6 A = a.covariances[i], B = b.covariances[i];
+    Matrix6d A = a.covariances[i], B = b.covariances[i];
     if (!cross) {
       EXPECT_TRUE((B.topRightCorner<3, 3>().array().isNaN()).all());
-      for (Matrix6* M : {&A, &B}) M->topRightCorner<3, 3>().setZero(), M->bottomLeftCorner<3, 3>().setZero();
+      for (Matrix6d* M : {&A, &B}) M->topRightCorner<3, 3>().setZero(), M->bottomLeftCorner<3, 3>().setZero();
     }
     const double gap = (A - B).cwiseAbs().maxCoeff() / A.cwiseAbs().maxCoeff();
     if (!(gap <= largest)) largest = gap;
@@ -292,7 +292,7 @@ TEST_F(Convert, edgesOfGraphs) {
   EXPECT_LE((after.edges[0].measurement.matrix() - before.edges[0].measurement.matrix()).norm(), 1e-14);
   // Half and whole angles differ by a factor of four in the rotation's block, two in the cross block.
   ASSERT_EQ(convert({g2o, path("c.g2o"), "--cov-from", "g2o-half", "--cov-to", "g2o-full"}).status, 0);
-  const Matrix6 full = parseGraph(contentOf(path("c.g2o")), "c").edges[0].matrix;
+  const Matrix6d full = parseGraph(contentOf(path("c.g2o")), "c").edges[0].matrix;
   EXPECT_NEAR(full(3, 3), 100, 1e-11);
   EXPECT_NEAR(full(0, 3), 0.25, 1e-14);
   EXPECT_NEAR(full(0, 0), 10, 1e-13);
@@ -311,11 +311,11 @@ TEST_F(Convert, planarEdges) {
   // Along the axes of the vertex that the edge leaves, and back; an angle in the plane is never a half.
   ASSERT_EQ(convert({g2o, path("q.graph"), "--to", "toro", "--cov-to", "toro"}).status, 0);
   ASSERT_EQ(convert({path("q.graph"), path("q.g2o"), "--to", "g2o", "--cov-from", "toro"}).status, 0);
-  const Matrix6 there = parseGraph(contentOf(path("q.graph")), "q").edges[0].matrix;
+  const Matrix6d there = parseGraph(contentOf(path("q.graph")), "q").edges[0].matrix;
   const double c = std::cos(0.5), s = std::sin(0.5);
   EXPECT_NEAR(there(0, 0), c * c * 100 - 2 * c * s * 10 + s * s * 200, 1e-10);
   EXPECT_NEAR(there(5, 5), 4000, 1e-9);
-  const Matrix6 back = parseGraph(contentOf(path("q.g2o")), "q").edges[0].matrix;
+  const Matrix6d back = parseGraph(contentOf(path("q.g2o")), "q").edges[0].matrix;
   EXPECT_NEAR(back(0, 1), 10, 1e-10);
   EXPECT_NEAR(back(0, 5), 5, 1e-10);
   EXPECT_EQ(conventionOf(parseGraph(text, "p"), *parseConvention("g2o-half"), "x").unit, RotationUnit::radian);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <cli/program_output.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 #include <support/trajectory_files.hpp>
 
 namespace liestat::cli {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/result_zip.hpp>
+#include <formats/result_zip.hpp>
 #include <cli/program_output.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 #include <support/trajectory_files.hpp>
 
 namespace liestat::cli {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include <cli/program_output.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

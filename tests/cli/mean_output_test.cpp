@@ -1,7 +1,7 @@
 // Notes of `liestat mean` on a result: axes, digits, rivals, weights, rows that depend on each other.
 #include <cli/commands/mean_analysis.hpp>
-#include <cli/io/measurements.hpp>
-#include <cli/io/reading.hpp>
+#include <formats/measurements.hpp>
+#include <formats/features.hpp>
 #include <cli/show/mean.hpp>
 
 #include <gtest/gtest.h>

@@ -22,8 +22,8 @@
 #include <utility>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
-#include <cli/temporary_directory.hpp>
+#include <cli/show/run_program.hpp>
+#include <support/temporary_directory.hpp>
 #include <experiments/motion_scene.hpp>
 
 namespace liestat::cli {

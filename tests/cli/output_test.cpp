@@ -20,11 +20,11 @@
 #include <thread>
 #include <vector>
 
-#include <cli/show/json.hpp>
-#include <cli/io/output_file.hpp>
+#include <report/json.hpp>
+#include <formats/output_file.hpp>
 #include <cli/show/progress.hpp>
 #include <cli/show/table.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 #include <experiments/interruption.hpp>
 
 namespace liestat::cli {

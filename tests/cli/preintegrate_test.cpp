@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/calibration.hpp>
-#include <cli/io/run_program.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/temporary_directory.hpp>
+#include <formats/calibration.hpp>
+#include <cli/show/run_program.hpp>
+#include <formats/imu.hpp>
+#include <support/temporary_directory.hpp>
 #include <cli/show/preintegration_validation.hpp>
 
 namespace liestat::cli {

@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
+#include <cli/show/run_program.hpp>
 #include <cli/show/axes.hpp>
 #include <cli/show/plots.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 namespace {

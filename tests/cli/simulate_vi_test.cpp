@@ -1,10 +1,10 @@
 // `liestat simulate vi`: readings that are those of the written truth, tracks that point at the written landmarks, and
 // noise of the size asked for, all of it read back from the files.
 
-#include <cli/io/calibration.hpp>
-#include <cli/io/image_tracks.hpp>
-#include <cli/io/imu_file.hpp>
-#include <cli/io/recording_files.hpp>
+#include <formats/calibration.hpp>
+#include <formats/image_tracks.hpp>
+#include <formats/imu.hpp>
+#include <experiments/recording_files.hpp>
 #include <cli/show/simulated_recording.hpp>
 #include <experiments/simulate_vi.hpp>
 
@@ -23,9 +23,9 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
-#include <cli/temporary_directory.hpp>
-#include <cli/io/tracks.hpp>
+#include <cli/show/run_program.hpp>
+#include <support/temporary_directory.hpp>
+#include <formats/tracks.hpp>
 
 namespace liestat::cli {
 using namespace experiments;

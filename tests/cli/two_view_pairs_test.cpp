@@ -1,7 +1,7 @@
 // `liestat validate two-view --pairs`: the reader, the comparison with labels, and what the hierarchy makes of the real
 // pairs, as far as LIESTAT_DATA names their directory.
 
-#include <cli/io/two_view_pairs.hpp>
+#include <experiments/two_view_pair_files.hpp>
 #include <cli/show/two_view_pairs.hpp>
 #include <experiments/plane_scene.hpp>
 #include <fusion/two_view/contradictions.hpp>
@@ -23,8 +23,8 @@
 #include <utility>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
-#include <cli/temporary_directory.hpp>
+#include <cli/show/run_program.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 using namespace experiments;

@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/run_program.hpp>
-#include <cli/temporary_directory.hpp>
+#include <cli/show/run_program.hpp>
+#include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
 using namespace experiments;

@@ -2,9 +2,9 @@
 
 #include <cli/commands/measurement_options.hpp>
 #include <cli/commands/split.hpp>
-#include <cli/io/run_program.hpp>
+#include <cli/show/run_program.hpp>
 #include <cli/show/split.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 #include <experiments/interruption.hpp>
 #include <stats/random.hpp>
 

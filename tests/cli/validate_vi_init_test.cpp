@@ -1,9 +1,9 @@
 // `liestat validate vi-init`: what it shows and writes. What it finds: tests/experiments/.
 
-#include <cli/io/run_program.hpp>
+#include <cli/show/run_program.hpp>
 #include <cli/show/table1.hpp>
 #include <cli/show/vi_init_validation.hpp>
-#include <cli/temporary_directory.hpp>
+#include <support/temporary_directory.hpp>
 #include <experiments/closed_form_cases.hpp>
 
 #include <gtest/gtest.h>

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/io/tracks.hpp>
+#include <formats/tracks.hpp>
 
 namespace liestat::cli {
 namespace {

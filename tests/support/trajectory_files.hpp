@@ -1,7 +1,7 @@
 // Files of simulated trajectories for the tests of the program: TUM, and the side file of covariances.
 #pragma once
 
-#include <cli/io/trajectory_rows.hpp>
+#include <formats/trajectory_rows.hpp>
 #include <experiments/trajectory_scene.hpp>
 #include <stats/convention_layouts.hpp>
 

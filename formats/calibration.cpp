@@ -1,0 +1,248 @@
+#include <formats/calibration.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <formats/input_error.hpp>
+#include <formats/text.hpp>
+#include <formats/yaml_values.hpp>
+
+namespace liestat {
+namespace {
+
+/// T_cam_imu and T_imu_cam of one file may differ by this, rad and m: they are rounded each for itself.
+constexpr double pose_tolerance = 1e-3;
+
+constexpr std::array densities = {"gyroscope_noise_density", "accelerometer_noise_density", "gyroscope_random_walk",
+                                  "accelerometer_random_walk"};
+
+double density(const Section& sensor, const char* key) {
+  const auto value = sensor.find(key);
+  if (!value) {
+    throw InputError(sensor.file, 0, fmt::format("there is no {}", key), "the densities of noise and walk of an IMU");
+  }
+  double number = 0;
+  if (!value->node.IsScalar() || parseNumber(value->node.Scalar(), number) != NumberKind::finite || number < 0) {
+    throw InputError(sensor.file, value->line(), fmt::format("{} is {}", key, shown(value->node)),
+                     "a number of zero or more");
+  }
+  return number;
+}
+
+ImuNoise<double> imuNoise(const Section& sensor) {
+  return {.gyroscope = density(sensor, densities[0]),
+          .accelerometer = density(sensor, densities[1]),
+          .gyroscope_walk = density(sensor, densities[2]),
+          .accelerometer_walk = density(sensor, densities[3])};
+}
+
+Distortion distortionOf(const Section& section) {
+  const char* expected = "radtan (radial-tangential), equidistant or none; others are not supported";
+  const auto model = section.find("distortion_model");
+  if (!model) section.complainMissing("distortion_model", expected);
+  const std::string name = model->node.IsScalar() ? model->node.Scalar() : "";
+  if (name == "none") return Distortion::none;
+  if (name == "radtan" || name == "radial-tangential" || name == "plumb_bob") return Distortion::radtan;
+  if (name == "equidistant") return Distortion::equidistant;
+  model->complain("is " + shown(model->node), expected);
+}
+
+Eigen::Vector4d coefficientsOf(const Section& section, Distortion distortion) {
+  const auto list = section.find(section.has("distortion_coeffs") ? "distortion_coeffs" : "distortion_coefficients");
+  if (!list) {
+    if (distortion == Distortion::none) return Eigen::Vector4d::Zero();
+    section.complainMissing("distortion_coeffs", "four numbers");
+  }
+  const std::string expected =
+      distortion == Distortion::equidistant ? "four numbers, k1 k2 k3 k4" : "four numbers, k1 k2 p1 p2";
+  const std::vector<double> values = numbers(*list, expected);
+  if (distortion == Distortion::none) {
+    if (std::any_of(values.begin(), values.end(), [](double x) { return x != 0; }))
+      list->complain("are not zero", "none for the distortion_model none");
+    return Eigen::Vector4d::Zero();
+  }
+  if (values.size() != 4) {
+    list->complain(fmt::format("{} {}", values.size() == 1 ? "is" : "are", values.size()), expected);
+  }
+  return Eigen::Vector4d(values[0], values[1], values[2], values[3]);
+}
+
+Camera cameraOf(const Section& section) {
+  Camera camera;
+  if (const auto model = section.find("camera_model");
+      model && !(model->node.IsScalar() && model->node.Scalar() == "pinhole"))
+    model->complain("is " + shown(model->node), "pinhole; others are not supported");
+  const char* expected = "four numbers, fu fv cu cv in pixels";
+  const auto intrinsics = section.find("intrinsics");
+  if (!intrinsics) section.complainMissing("intrinsics", expected);
+  const std::vector<double> values = numbers(*intrinsics, expected);
+  if (values.size() != 4) intrinsics->complain(fmt::format("are {}", values.size()), expected);
+  for (const std::size_t i : {0U, 1U}) {
+    if (!(values[i] > 0)) intrinsics->complain(fmt::format("have the focal length {}", values[i]), "a positive one");
+  }
+  camera.fu = values[0], camera.fv = values[1], camera.cu = values[2], camera.cv = values[3];
+  camera.distortion = distortionOf(section);
+  camera.coefficients = coefficientsOf(section, camera.distortion);
+  if (const auto resolution = section.find("resolution")) {
+    const char* size = "two whole numbers, width and height in pixels";
+    const std::vector<double> pixels = numbers(*resolution, size);
+    const bool fine = pixels.size() == 2 && std::all_of(pixels.begin(), pixels.end(), [](double x) {
+                        return x >= 1 && x <= 1e6 && x == std::floor(x);
+                      });
+    if (!fine) resolution->complain(fmt::format("is {}", fmt::join(pixels, " by ")), size);
+    camera.width = static_cast<int>(pixels[0]), camera.height = static_cast<int>(pixels[1]);
+  }
+  return camera;
+}
+
+/// The contents of one file. A pose by T_BS is to the body's axes, which another file may set apart from the sensor's.
+struct Parsed {
+  Calibration calibration;
+  std::vector<bool> to_body;       ///< for each camera: imu_T_cam is still body_T_cam
+  std::optional<SE3d> body_T_imu;  ///< where the sensor has a T_BS
+  std::string file;
+};
+
+void addCamera(const Section& section, std::string name, Parsed& parsed) {
+  CameraCalibration result;
+  result.name = std::move(name);
+  result.camera = cameraOf(section);
+  const auto T_cam_imu = section.find("T_cam_imu"), T_imu_cam = section.find("T_imu_cam"), T_BS = section.find("T_BS");
+  if (T_imu_cam) result.imu_T_cam = rigidMotion(*T_imu_cam);
+  if (T_cam_imu) {
+    const SE3d inverse = rigidMotion(*T_cam_imu).inverse();
+    if (T_imu_cam) {
+      const SE3d difference = result.imu_T_cam.inverse() * inverse;
+      const double turn = difference.so3().log().norm(), shift = difference.translation().norm();
+      if (!(turn < pose_tolerance && shift < pose_tolerance)) {
+        T_cam_imu->complain(fmt::format("is not the inverse of T_imu_cam in line {}: {:.3g} rad and {:.3g} m from it",
+                                        T_imu_cam->line(), turn, shift),
+                            "one of the two, or both agreeing");
+      }
+    } else {
+      result.imu_T_cam = inverse;
+    }
+  }
+  const bool to_body = !T_cam_imu && !T_imu_cam;
+  if (to_body) {
+    if (!T_BS) {
+      section.complainMissing(
+          "pose on the IMU",
+          "T_cam_imu (takes the IMU's coordinates to the camera's) or T_imu_cam (its inverse), or EuRoC's T_BS");
+    }
+    result.imu_T_cam = rigidMotion(*T_BS);
+  } else if (T_BS) {
+    T_BS->complain("stands beside T_cam_imu or T_imu_cam", "one of them");
+  }
+  if (const auto shift = section.find("timeshift_cam_imu")) result.timeshift_cam_imu = shift->number("seconds");
+  parsed.calibration.cameras.push_back(std::move(result));
+  parsed.to_body.push_back(to_body);
+}
+
+/// cam0, cam12.
+bool isCameraName(const std::string& key) {
+  return key.size() > 3 && key.compare(0, 3, "cam") == 0 && key.find_first_not_of("0123456789", 3) == std::string::npos;
+}
+
+/// The name of a sensor.yaml's sensor: the directory that the file lies in.
+std::string directoryOf(const std::string& path) {
+  const std::size_t end = path.rfind('/');
+  if (end == std::string::npos || end == 0) return {};
+  const std::size_t begin = path.rfind('/', end - 1);
+  return path.substr(begin == std::string::npos ? 0 : begin + 1, end - (begin == std::string::npos ? 0 : begin + 1));
+}
+
+void addImu(const Section& section, Parsed& parsed) {
+  parsed.calibration.imu = imuNoise(section);
+  if (const auto T_BS = section.find("T_BS")) parsed.body_T_imu = rigidMotion(*T_BS);
+}
+
+Parsed parseFile(std::string_view text, const std::string& name) {
+  return withRoot(text, name, [&](const Section& root) {
+    Parsed parsed;
+    parsed.file = name;
+    for (const auto& entry : root.node) {
+      if (!entry.first.IsScalar()) continue;
+      const std::string key = entry.first.Scalar();
+      if (!entry.second.IsMap()) continue;
+      if (isCameraName(key)) addCamera(Section(entry.second, name, key), key, parsed);
+      if (key == "imu0") addImu(Section(entry.second, name, key), parsed);
+    }
+    const auto sensor_type = root.find("sensor_type");
+    const std::string type = sensor_type && sensor_type->node.IsScalar() ? sensor_type->node.Scalar() : "";
+    if (type == "camera" || (type.empty() && root.has("intrinsics"))) {
+      const std::string directory = directoryOf(name);
+      addCamera(root, directory.empty() ? "cam0" : printable(directory), parsed);
+    }
+    const bool any_density = std::any_of(densities.begin(), densities.end(), [&](auto* key) { return root.has(key); });
+    if (!parsed.calibration.imu && (type == "imu" || any_density)) addImu(root, parsed);
+    if (!parsed.calibration.imu && parsed.calibration.cameras.empty()) {
+      throw InputError(name, 0, "there is neither a camera nor an IMU",
+                       "cam0 or imu0 of Kalibr's and OpenVINS' chains, or EuRoC's sensor.yaml");
+    }
+    return parsed;
+  });
+}
+
+/// Poses on the body become poses on the sensor, once all files are read.
+Calibration finished(Parsed&& parsed) {
+  for (std::size_t i = 0; parsed.body_T_imu && i < parsed.to_body.size(); ++i) {
+    SE3d& pose = parsed.calibration.cameras[i].imu_T_cam;
+    if (parsed.to_body[i]) pose = parsed.body_T_imu->inverse() * pose;
+  }
+  return std::move(parsed.calibration);
+}
+
+}  // namespace
+
+Calibration parseCalibration(std::string_view text, const std::string& name) { return finished(parseFile(text, name)); }
+
+Calibration readCalibration(const std::vector<std::string>& paths) {
+  Parsed all;
+  std::string file_of_imu;
+  std::vector<std::string> file_of_camera;
+  for (const std::string& path : paths) {
+    const TextFile file = loadText(path);
+    Parsed parsed = parseFile(file.text, file.name);
+    if (parsed.calibration.imu) {
+      if (all.calibration.imu)
+        throw InputError(file.name, 0, "it has an IMU, as has " + file_of_imu, "one in all files");
+      all.calibration.imu = parsed.calibration.imu;
+      all.body_T_imu = parsed.body_T_imu;
+      file_of_imu = file.name;
+    }
+    for (std::size_t i = 0; i < parsed.calibration.cameras.size(); ++i) {
+      CameraCalibration& camera = parsed.calibration.cameras[i];
+      const std::vector<CameraCalibration>& others = all.calibration.cameras;
+      const auto same =
+          std::find_if(others.begin(), others.end(), [&](const auto& c) { return c.name == camera.name; });
+      if (same != others.end()) {
+        const auto place = static_cast<std::size_t>(same - others.begin());
+        throw InputError(file.name, 0, "it has " + camera.name + ", as has " + file_of_camera[place],
+                         "each camera once");
+      }
+      all.calibration.cameras.push_back(std::move(camera));
+      all.to_body.push_back(parsed.to_body[i]);
+      file_of_camera.push_back(file.name);
+    }
+  }
+  return finished(std::move(all));
+}
+
+ImuNoise<double> parseImuNoise(std::string_view text, const std::string& name) {
+  return withRoot(text, name, [&](const Section& root) {
+    const YAML::Node section = root.node["imu0"];
+    return imuNoise(section && section.IsMap() ? Section(section, name, "imu0") : root);
+  });
+}
+
+ImuNoise<double> readImuNoise(const std::string& path) {
+  const TextFile file = loadText(path);
+  return parseImuNoise(file.text, file.name);
+}
+
+}  // namespace liestat

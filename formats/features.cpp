@@ -1,0 +1,241 @@
+#include <formats/features.hpp>
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <formats/feature_columns.hpp>
+#include <formats/feature_formats.hpp>
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/rotation_matrix.hpp>
+#include <lie/units.hpp>
+
+namespace liestat {
+namespace {
+
+constexpr double rounding = 1e-12;
+
+/// At most that many rows fit into a text: a row has a digit and a separator for each field.
+std::size_t mostRows(std::string_view text, std::size_t columns) {
+  const auto newlines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  return std::min(newlines + 1, text.size() / (2 * columns) + 1);
+}
+
+/// Reads the rows of one text, whose format says how they are laid out.
+class FeatureReader {
+ public:
+  FeatureReader(std::string_view text, std::string file, const ReadingOptions& options)
+      : text_(text), reader_(text), name_(std::move(file)), options_(options) {}
+
+  FeatureFile read() {
+    requireText(text_, name_);
+    if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
+    const FeatureFormat& format = featureFormat(options_.format, reader_, name_);
+    file_.format = std::string(format.name);
+    if (!options_.columns.empty() && format.name != "csv") {
+      throw InputError(name_, reader_.number(), fmt::format("--columns for a file of the format {}", format.name),
+                       "a CSV file, whose header names the columns");
+    }
+    layout_ = format.reads(reader_, name_, options_);
+    for (std::string& column : layout_.columns) {
+      if (options_.without_covariances && column.rfind("cov_", 0) == 0) column.clear();
+    }
+    const std::size_t first_line = reader_.number();
+    places_ = findFeature(layout_.columns, name_, first_line);
+    if (layout_.has_header && !reader_.next()) {
+      throw InputError(name_, first_line, "there is a header but no data", "at least one row after it");
+    }
+    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == absent && places_.euler[0] == absent) {
+      throw InputError(name_, first_line, "--degrees, but there are no angles",
+                       "the columns rx,ry,rz or roll,pitch,yaw");
+    }
+    readRows();
+    return std::move(file_);
+  }
+
+ private:
+  void readRows() {
+    const std::size_t rows = mostRows(text_, layout_.columns.size());
+    const FeatureParts& parts = info(places_.kind).parts;
+    file_.kind = places_.kind;
+    file_.lines.reserve(rows);
+    if (parts.contains(FeaturePart::rotation)) file_.rotations.reserve(rows);
+    if (parts.contains(FeaturePart::position)) file_.positions.reserve(rows);
+    if (parts.contains(FeaturePart::direction)) file_.directions.reserve(rows);
+    if (places_.weight != absent) file_.weights.reserve(rows);
+    if (places_.time != absent) file_.times.reserve(rows);
+    values_.resize(layout_.columns.size());
+    do {
+      line_ = reader_.number();
+      splitFields(reader_.line(), layout_.separator, fields_);
+      if (fields_.size() != layout_.columns.size())
+        throwWrongWidth(fields_.size(), layout_.columns.size(), layout_.description, name_, line_);
+      for (std::size_t i = 0; i < layout_.columns.size(); ++i) {
+        if (!layout_.columns[i].empty()) values_[i] = numberField(fields_[i], layout_.columns[i], name_, line_);
+      }
+      addRow();
+    } while (reader_.next());
+    if (places_.weight != absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
+      throw InputError(name_, file_.lines.front(), "every weight is 0", "one above 0");
+    }
+    // A text may have far more characters than its shortest rows would need.
+    file_.lines.shrink_to_fit();
+    file_.rotations.shrink_to_fit();
+    file_.positions.shrink_to_fit();
+    file_.directions.shrink_to_fit();
+    file_.weights.shrink_to_fit();
+    file_.times.shrink_to_fit();
+  }
+
+  double value(int place) const { return values_[static_cast<std::size_t>(place)]; }
+
+  void addRow() {
+    const FeatureParts& parts = info(places_.kind).parts;
+    if (parts.contains(FeaturePart::rotation)) file_.rotations.push_back(readRotation());
+    if (parts.contains(FeaturePart::position)) file_.positions.push_back(readVector(places_.position));
+    if (parts.contains(FeaturePart::direction)) file_.directions.push_back(readDirection());
+    if (places_.weight != absent) {
+      const double weight = value(places_.weight);
+      if (!(weight >= 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "0 or more");
+      file_.weights.push_back(weight);
+    }
+    if (places_.time != absent) file_.times.push_back(value(places_.time) * layout_.time_unit);
+    if (places_.dimension > 0) file_.covariances.push_back(readCovariance());
+    file_.lines.push_back(line_);
+  }
+
+  Eigen::Vector3d readVector(const std::array<int, 3>& places) const {
+    return {value(places[0]), value(places[1]), value(places[2])};
+  }
+
+  /// Rows as the file rounds them pass silently; what was changed beyond that is counted.
+  void countNormalised(double error) {
+    if (error <= rounding) return;
+    ++file_.n_normalised;
+    file_.largest_norm_error = std::max(file_.largest_norm_error, error);
+  }
+
+  /// The norm, if it is one within the tolerance.
+  template <class Vector>
+  double checkedNorm(const Vector& vector, std::string_view what) {
+    const double squared = vector.squaredNorm();
+    // Squares of very large and very small numbers are lost, the message shall show the norm all the same.
+    const bool regular = squared > 1e-200 && squared < 1e200;
+    const double norm = regular ? std::sqrt(squared) : vector.stableNorm();
+    const double error = std::abs(norm - 1);
+    if (norm == 0) throw InputError(name_, line_, fmt::format("the {} is zero", what), "a unit vector");
+    if (!(error <= options_.norm_tolerance) || !regular) {
+      throw InputError(name_, line_, fmt::format("the norm of the {} is {:.6g}", what, norm),
+                       fmt::format("1 within {:g}", options_.norm_tolerance));
+    }
+    countNormalised(error);
+    return norm;
+  }
+
+  Eigen::Vector3d readDirection() {
+    const Eigen::Vector3d direction = readVector(places_.direction);
+    return direction / checkedNorm(direction, "direction");
+  }
+
+  Eigen::Quaterniond readRotation() {
+    if (places_.quaternion[0] != absent) {
+      const Eigen::Vector4d q(value(places_.quaternion[0]), value(places_.quaternion[1]), value(places_.quaternion[2]),
+                              value(places_.quaternion[3]));
+      const double norm = checkedNorm(q, "quaternion");
+      return Eigen::Quaterniond(Eigen::Vector4d(q / norm));
+    }
+    if (places_.rotation_vector[0] != absent) {
+      const Eigen::Vector3d r =
+          (options_.angles == AngleUnit::degrees ? units::degree : 1.0) * readVector(places_.rotation_vector);
+      const double angle = r.stableNorm();
+      // Beyond this the angle modulo a turn is rounding, not data.
+      if (!(angle < 1e6))
+        throw InputError(name_, line_, fmt::format("the rotation vector has length {:.6g}", angle),
+                         "an angle in radians");
+      if (angle > std::numbers::pi * (1 + 1e-6)) ++file_.n_beyond_half_turn;
+      if (options_.angles == AngleUnit::unsaid && angle > 2 * std::numbers::pi * (1 + 1e-6)) {
+        throw InputError(name_, line_,
+                         fmt::format("the rotation vector has length {:.6g}, more than a turn: in degrees?", angle),
+                         "radians, or --degrees; --radians takes them as they are");
+      }
+      file_.largest_rotation_vector = std::max(file_.largest_rotation_vector, angle);
+      const double scale = angle > 1e-150 ? std::sin(angle / 2) / angle : 0.5;
+      Eigen::Quaterniond q;
+      q.w() = std::cos(angle / 2);
+      q.vec() = scale * r;
+      return q;
+    }
+    if (places_.euler[0] != absent) {
+      const Eigen::Vector3d angles = readVector(places_.euler);
+      const double largest = angles.cwiseAbs().maxCoeff();
+      if (options_.angles == AngleUnit::unsaid && largest > 2 * std::numbers::pi * (1 + 1e-6)) {
+        throw InputError(name_, line_,
+                         fmt::format("an angle of roll, pitch, yaw is {:.6g}, more than a turn: in degrees?", largest),
+                         "radians, or --degrees; --radians takes them as they are");
+      }
+      if (!(largest < 1e6)) throw InputError(name_, line_, fmt::format("an angle is {:.6g}", largest), "radians");
+      const Eigen::Vector3d rad = (options_.angles == AngleUnit::degrees ? units::degree : 1.0) * angles;
+      return Eigen::Quaterniond(Eigen::AngleAxisd(rad[2], Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(rad[1], Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(rad[0], Eigen::Vector3d::UnitX()));
+    }
+    Eigen::Matrix3d matrix;
+    for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = value(places_.matrix[static_cast<std::size_t>(i)]);
+    const NearestRotation nearest = nearestRotation(matrix, options_.norm_tolerance, name_, line_);
+    countNormalised(nearest.error);
+    return Eigen::Quaterniond(nearest.rotation.params());
+  }
+
+  FeatureCovariance readCovariance() const {
+    const int n = places_.dimension;
+    FeatureCovariance covariance(n, n);
+    std::size_t next = 0;
+    for (int i = 0; i < n; ++i) {
+      for (int j = i; j < n; ++j) covariance(i, j) = covariance(j, i) = value(places_.covariance[next++]);
+    }
+    // The share of each variance that the components before it leave: the test does not depend on units.
+    const Eigen::LLT<FeatureCovariance> factor(covariance);
+    bool positive = factor.info() == Eigen::Success;
+    for (int i = 0; positive && i < n; ++i) {
+      const double pivot = factor.matrixLLT()(i, i);
+      positive = pivot * pivot > n * std::numeric_limits<double>::epsilon() * covariance(i, i);
+    }
+    if (positive) return covariance;
+    const Eigen::SelfAdjointEigenSolver<FeatureCovariance> solver(covariance, Eigen::EigenvaluesOnly);
+    throw InputError(name_, line_,
+                     fmt::format("the covariance is not positive definite (smallest eigenvalue {:.3g}, largest {:.3g})",
+                                 solver.eigenvalues()(0), solver.eigenvalues()(n - 1)),
+                     "positive eigenvalues");
+  }
+
+  std::string_view text_;
+  LineReader reader_;
+  std::string name_;
+  ReadingOptions options_;
+  RowLayout layout_;
+  FeatureColumns places_;
+  FeatureFile file_;
+  std::size_t line_ = 0;
+  std::vector<std::string_view> fields_;
+  std::vector<double> values_;
+};
+
+}  // namespace
+
+FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options) {
+  const TextFile file = loadText(path);
+  return readFeatures(file.text, file.name, options);
+}
+
+FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {
+  return FeatureReader(text, std::move(file), options).read();
+}
+
+}  // namespace liestat

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <formats/feature.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace liestat {
+
+/// The columns that a CSV file of features may have.
+const std::vector<std::string>& knownColumns();
+
+/// A covariance of the size that the feature has: 3x3, for frames 6x6, for directions 2x2. Its storage needs no heap.
+using FeatureCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+
+/// The features of a file, one entry a row in each list that is not empty. Which parts there are is said by `kind`.
+struct FeatureFile {
+  /// The kind of each row: the first feature of the table with exactly the file's parts.
+  Feature kind = Feature::point;
+  std::vector<Eigen::Quaterniond> rotations;  ///< unit quaternions
+  std::vector<Eigen::Vector3d> positions;     ///< points, or translations of frames
+  std::vector<Eigen::Vector3d> directions;    ///< unit vectors
+  std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
+  std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
+  std::vector<FeatureCovariance> covariances;  ///< positive definite, translation before rotation; empty if the file has none
+  std::vector<std::size_t> lines;       ///< the line that each row stands in
+  std::size_t n_normalised = 0;         ///< rows whose rotation or direction was off its norm by more than rounding
+  double largest_norm_error = 0;        ///< the largest such error
+  std::size_t n_beyond_half_turn = 0;   ///< rotation vectors longer than a half-turn, which no logarithm is
+  double largest_rotation_vector = 0;   ///< rad
+  std::string format;                   ///< the name of the format that was read
+
+  std::size_t size() const { return lines.size(); }
+};
+
+/// The unit of rotation vectors. Unsaid: radians, and one longer than a turn is an error, for degrees look like that.
+enum class AngleUnit { unsaid, radians, degrees };
+
+/// Options of readFeatureFile().
+struct ReadingOptions {
+  std::string format = "auto";  ///< one of formatNames(); `auto` looks at the first lines
+  /// A quaternion or direction whose norm is off by less is normalised, one off by more is an error. For rotation
+  /// matrices the error is half the Frobenius norm of RᵀR − I.
+  double norm_tolerance = 1e-3;
+  AngleUnit angles = AngleUnit::unsaid;
+  bool ignore_unknown = false;            ///< CSV columns without a meaning are passed over
+  bool without_covariances = false;       ///< the columns cov_00 … are passed over too
+  std::vector<std::string> columns = {};  ///< names of CSV columns that are not ours, each as "ours=theirs"
+};
+
+/// The names of the formats that are known (formats/feature_formats.cpp), `auto` first.
+std::vector<std::string> formatNames();
+
+/// Reads features from a file, `-` is standard input. Throws InputError.
+FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options = {});
+
+/// Reads features from memory; `name` stands for the file in messages. Throws InputError.
+FeatureFile readFeatures(std::string_view text, std::string name, const ReadingOptions& options = {});
+
+}  // namespace liestat

@@ -1,0 +1,116 @@
+#include <formats/imu.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/text.hpp>
+
+namespace liestat {
+namespace {
+
+constexpr double unit_norm_tolerance = 1e-3;
+
+void checkOrder(const ImuFile& file, const std::string& name) {
+  for (std::size_t i = 1; i < file.samples.size(); ++i)
+    requireAscending(file.samples[i - 1].time, file.lines[i - 1], file.samples[i].time, name, file.lines[i]);
+}
+
+void checkUnits(const ImuFile& file, const std::string& name) {
+  double force = 0, rate = 0;
+  for (const ImuSample<double>& s : file.samples) {
+    force += s.specific_force.norm() / static_cast<double>(file.samples.size());
+    rate += s.angular_rate.norm() / static_cast<double>(file.samples.size());
+  }
+  if (force > 0.5 && force < 2) {
+    throw InputError(name, 0, fmt::format("specific forces are {:.3g} in the mean: in g?", force),
+                     "m/s^2, some 9.8 at rest");
+  }
+  // Rockets have a tenth of this.
+  if (force > 500) {
+    throw InputError(name, 0, fmt::format("specific forces are {:.4g} in the mean: in mm/s^2?", force),
+                     "m/s^2, some 9.8 at rest");
+  }
+  // The fastest gyroscopes of vehicles end at 35 rad/s.
+  if (rate > 35) {
+    throw InputError(name, 0, fmt::format("angular rates are {:.3g} in the mean: in degrees a second?", rate), "rad/s");
+  }
+}
+
+}  // namespace
+
+ImuFile parseImu(std::string_view text, std::string name) {
+  ImuFile file;
+  LineReader first(text);
+  if (!first.next()) throw InputError(name, 0, "the file has no data");
+  std::vector<std::string_view> fields;
+  splitFields(first.line(), Separator::comma, fields);
+  if (isNanoseconds(fields[0])) {
+    file.format = "euroc";
+    static constexpr const char* columns[] = {"w_x", "w_y", "w_z", "a_x", "a_y", "a_z"};
+    StampedRows rows(text, name, columns);
+    while (rows.next()) {
+      const std::int64_t stamp = rows.stamp();
+      if (file.samples.empty()) file.start_ns = stamp;
+      file.samples.push_back({1e-9 * static_cast<double>(stamp - file.start_ns), rows.vector(0), rows.vector(3)});
+      file.lines.push_back(rows.line());
+    }
+  } else {
+    file.format = "csv";
+    const NumericTable table = parseTable(text, name, {"t", "wx", "wy", "wz", "ax", "ay", "az"});
+    for (std::size_t i = 0; i < table.rows(); ++i) {
+      file.samples.push_back({table(i, 0), Eigen::Vector3d(table(i, 1), table(i, 2), table(i, 3)),
+                              Eigen::Vector3d(table(i, 4), table(i, 5), table(i, 6))});
+      file.lines.push_back(table.line(i));
+    }
+  }
+  if (file.samples.size() < 2) throw InputError(name, 0, "there is one reading", "two at least");
+  checkOrder(file, name);
+  checkUnits(file, name);
+  return file;
+}
+
+ImuFile readImu(const std::string& path) {
+  const TextFile file = loadText(path);
+  return parseImu(file.text, file.name);
+}
+
+std::vector<GroundTruth> parseGroundTruth(std::string_view text, const std::string& name, std::int64_t start_ns) {
+  static constexpr const char* columns[] = {"p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z", "v_x", "v_y", "v_z"};
+  StampedRows rows(text, name, columns);
+  std::vector<GroundTruth> truth;
+  while (rows.next()) {
+    GroundTruth row;
+    row.time = 1e-9 * static_cast<double>(rows.stamp() - start_ns);
+    if (!truth.empty() && !(row.time > truth.back().time)) {
+      throw InputError(name, rows.line(), "the time is not after that of the row before", "times that ascend");
+    }
+    const Eigen::Quaterniond q(rows.number(3, "q_w"), rows.number(4, "q_x"), rows.number(5, "q_y"),
+                               rows.number(6, "q_z"));
+    if (!(std::abs(q.norm() - 1) < unit_norm_tolerance)) {
+      throw InputError(name, rows.line(), fmt::format("the quaternion has norm {:.6g}", q.norm()), "norm 1");
+    }
+    row.state = SE23d(SO3d(q), rows.vector(0), rows.vector(7));
+    if (rows.has(15)) row.bias = {rows.vector(10), rows.vector(13)};
+    truth.push_back(row);
+  }
+  if (truth.empty()) throw InputError(name, 0, "the file has no data");
+  return truth;
+}
+
+std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t start_ns) {
+  const TextFile file = loadText(path);
+  return parseGroundTruth(file.text, file.name, start_ns);
+}
+
+std::int64_t firstStamp(std::string_view text, const std::string& name) {
+  StampedRows rows(text, name, {});
+  if (!rows.next()) throw InputError(name, 0, "the file has no data");
+  return rows.stamp();
+}
+
+}  // namespace liestat

@@ -1,0 +1,122 @@
+#include <formats/measurements.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <formats/input_error.hpp>
+
+namespace liestat {
+
+namespace {
+
+/// det(Σ)^(-1/k), for covariances whose size is known at run time only.
+double weightOf(const FeatureCovariance& covariance) {
+  const Eigen::LLT<FeatureCovariance> factor(covariance);
+  double sum = 0;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) sum += std::log(factor.matrixLLT()(i, i));
+  return std::exp(-2 * sum / static_cast<double>(covariance.rows()));
+}
+
+}  // namespace
+
+Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command) {
+  const auto refuse = [&](const std::string& why) { throw InputError(command, 0, why); };
+  Measurements m;
+  m.feature = featureFromName(options.feature).value_or(file.kind);
+  const FeatureInfo& feature = info(m.feature);
+  const FeatureInfo& rows = info(file.kind);
+  if (!rows.parts.contains(feature.parts)) {
+    refuse(fmt::format("--feature {} does not fit a file of {}", feature.name, rows.plural));
+  }
+  if (!file.covariances.empty() && !(rows.parts == feature.parts)) {
+    m.notes.push_back(fmt::format("the file's covariances are those of whole {} and are not used", rows.plural));
+    file.covariances.clear();
+  }
+  if (file.n_beyond_half_turn > 0 && feature.parts.contains(FeaturePart::rotation)) {
+    m.notes.push_back(
+        fmt::format("{} rotation {} longer than a half-turn, {:.4g} rad at most, and taken modulo a turn (--degrees "
+                    "reads degrees)",
+                    file.n_beyond_half_turn, file.n_beyond_half_turn == 1 ? "vector is" : "vectors are",
+                    file.largest_rotation_vector));
+  }
+  const bool has_covariances = !file.covariances.empty();
+  const bool must_choose = has_covariances && feature.frameMatters() && options.covariance_at.empty();
+  const std::string choice =
+      "--covariance-at measured (they are given in the frame of each measurement, as a sensor knows them) or "
+      "--covariance-at estimated (in the frame of the mean, as for parts of one object)";
+
+  if (!feature.has_metric) {
+    m.criterion = Criterion::barycentre;
+    if (options.criterion == "maha") {
+      m.criterion = Criterion::maha;
+    } else if (!options.criterion.empty()) {
+      refuse("--criterion " + options.criterion +
+             " needs an invariant metric, which rigid motions have not: leave it out for the group's barycentre, or "
+             "take --feature frame");
+    }
+  } else if (options.criterion == "lsq") {
+    m.criterion = Criterion::lsq;
+  } else if (options.criterion == "wlsq") {
+    m.criterion = Criterion::wlsq;
+  } else if (options.criterion == "maha") {
+    m.criterion = Criterion::maha;
+  } else if (has_covariances) {
+    if (must_choose) {
+      refuse("the file has covariances of frames, and only you know where they belong: say " + choice +
+             ", or --criterion lsq to leave them aside");
+    }
+    m.criterion = Criterion::maha;
+  } else {
+    m.criterion = file.weights.empty() ? Criterion::lsq : Criterion::wlsq;
+  }
+
+  const bool maha = m.criterion == Criterion::maha;
+  if (maha && !has_covariances)
+    refuse("--criterion maha needs the columns cov_00 ... of the measurements' covariances");
+  if (maha && must_choose) refuse("--criterion maha on frames needs " + choice);
+  if (options.likelihood && !maha) refuse("--likelihood is an option of --criterion maha");
+  m.likelihood = options.likelihood;
+  m.covariance_at = options.covariance_at == "estimated" ? CovarianceAt::estimated : CovarianceAt::measured;
+  if (feature.has_isotropy && m.covariance_at == CovarianceAt::estimated) {
+    refuse(fmt::format("--covariance-at estimated is not there for {}: no frame is common to all points of a sphere",
+                       feature.plural));
+  }
+
+  m.weights.assign(file.size(), 1.0);
+  const bool uses_weights =
+      m.criterion == Criterion::wlsq || (m.criterion == Criterion::barycentre && !file.weights.empty());
+  if (uses_weights) {
+    if (!file.weights.empty()) {
+      m.weights = file.weights;
+    } else if (has_covariances) {
+      std::transform(file.covariances.begin(), file.covariances.end(), m.weights.begin(), weightOf);
+      m.notes.emplace_back("weights det(covariance)^(-1/k), as the file has none");
+    } else {
+      refuse("--criterion wlsq needs a column weight, or covariances to make weights of");
+    }
+    m.weighted = std::any_of(m.weights.begin(), m.weights.end(), [&](double w) { return w != m.weights.front(); });
+  } else if (!file.weights.empty()) {
+    m.notes.push_back("the file's weights are not used by " + name(m.criterion));
+  }
+
+  // LSQ's covariance from known noise wants the noise in the frame of the estimate. There is no difference on points
+  // and rotations, and directions carry it along; for frames measured elsewhere the residuals speak instead.
+  const bool least_squares = m.criterion == Criterion::lsq || m.criterion == Criterion::wlsq;
+  m.known_noise =
+      maha || (has_covariances && least_squares && (!feature.frameMatters() || options.covariance_at == "estimated"));
+  m.covariance_at_matters = m.known_noise && feature.frameMatters();
+  if (has_covariances && !m.known_noise) {
+    m.notes.emplace_back(least_squares && options.covariance_at == "measured"
+                             ? "the file's covariances are not in the frame of the mean: the covariance of the mean "
+                               "comes from the residuals"
+                             : "the file's covariances are not used");
+  }
+  m.file = std::move(file);
+  return m;
+}
+
+}  // namespace liestat

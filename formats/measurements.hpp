@@ -1,0 +1,48 @@
+#pragma once
+
+#include <formats/features.hpp>
+#include <formats/feature.hpp>
+#include <stats/maha.hpp>
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace liestat {
+
+
+/// The options of commands that read features; names as on the command line, empty: the file decides.
+struct MeasurementOptions {
+  std::string feature = {};
+  std::string criterion = {};
+  std::string covariance_at = {};
+  bool likelihood = false;
+};
+
+/// The measurements of a file and how they are to be averaged.
+struct Measurements {
+  FeatureFile file;
+  Feature feature = Feature::point;
+  Criterion criterion = Criterion::lsq;
+  CovarianceAt covariance_at = CovarianceAt::measured;
+  bool covariance_at_matters = false;  ///< both models differ for this feature, and covariances are used
+  bool likelihood = false;
+  std::vector<double> weights;          ///< one for each measurement, all one where none are used
+  bool weighted = false;                ///< some are not one
+  bool known_noise = false;             ///< the file's covariances are used
+  std::vector<std::string> notes = {};  ///< for the user, about these choices
+
+  std::size_t size() const { return file.size(); }
+  /// The criterion takes the weights.
+  bool usesWeights() const {
+    return criterion == Criterion::wlsq || (criterion == Criterion::barycentre && !file.weights.empty());
+  }
+};
+
+/// Decides what is averaged and how. `command` begins the messages. Throws InputError where the wish does not fit the
+/// file.
+Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command);
+
+}  // namespace liestat
