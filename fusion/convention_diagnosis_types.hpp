@@ -188,6 +188,7 @@ namespace detail {
 /// Names without the layout, which is the file's.
 inline std::vector<std::string> conventionNames(const std::vector<Convention>& conventions) {
   std::vector<std::string> names;
+  names.reserve(conventions.size());
   for (const Convention& c : conventions) names.push_back(conventionName(c, false));
   return names;
 }

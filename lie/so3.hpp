@@ -51,7 +51,7 @@ struct So3Math {
                   a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]);
   }
   static Params product(const Params& a, const Params& b) {
-    const Params q = quaternionProduct(a, b);
+    Params q = quaternionProduct(a, b);
     if constexpr (is_single_precision<S>) {
       // One Newton step of 1/|q|: keeps long chains on the sphere without a square root.
       return q * (S(0.5) * (S(3) - q.dot(q)));
