@@ -238,7 +238,7 @@ SquareOf<M> frameTransport(const M& x, const M& y) {
     const M p = between(x, y);
     // placement(x)·transvection(p) carries the origin to y along the exponential; its frame differs from
     // placement(y)'s by an isotropy element.
-    const SquareOf<M> turn = T::isotropy(T::placement(x), p);
+    SquareOf<M> turn = T::isotropy(T::placement(x), p);
     if constexpr (requires { T::transvection(p); }) {
       return turn * T::isotropy(T::transvection(p), T::origin());
     } else {

@@ -77,7 +77,7 @@ class TrajectoryConverter {
       result_.sampling_error = std::max(result_.sampling_error, moments.relative_error);
       return covarianceAsContent(to_.content, moments.second_moment);
     }
-    const Matrix6d converted = convertConvention(from_, to_, pose, matrix);
+    Matrix6d converted = convertConvention(from_, to_, pose, matrix);
     if (converted.array().isNaN().all()) {
       const bool cross = matrix.diagonal().allFinite();
       fault(cross ? ConversionFault::unknown_cross : ConversionFault::undetermined, row,

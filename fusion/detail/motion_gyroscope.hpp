@@ -52,7 +52,7 @@ MotionGyroscope::Between overFrames(std::size_t first, std::size_t second, bool 
   SO3d turned;
   GyroscopeRotation sum{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
   for (std::size_t k = first; k < second; ++k) {
-    const MotionGyroscope::Between one = step(k);
+    MotionGyroscope::Between one = step(k);
     if (!one.rotation) return one;
     const SO3d turn = SO3d::exp(one.rotation->rotation);
     const Eigen::Matrix3d R = isotropic ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : turn.matrix();
