@@ -15,13 +15,21 @@ set(LIESTAT_COMPILED_SOURCES_fusion
     robust_two_view two_view hand_eye motion)
 set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate convention_diagnosis trajectory_conversion recording_windows)
-set(LIESTAT_COMPILED_SOURCES_formats
-    calibration feature_columns feature_formats features gzip image_tracks imu measurements numeric_table
-    output_file pose_pairs result_zip rotation_matrix text tracks yaml_values messages pose_graph trajectory
-    trajectory_rows trajectory_writer)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats fmt json yaml zlib)
+
+# Sets <out> to the packages that a part lacks, in words.
+function(liestat_lacking out part)
+  set(lacking)
+  foreach(need IN LISTS LIESTAT_COMPILED_NEEDS_${part})
+    if(NOT TARGET liestat_${need})
+      list(APPEND lacking
+           "${part} needs ${LIESTAT_HEADER_${need}} (Debian and Ubuntu: ${LIESTAT_PACKAGE_${need}})")
+    endif()
+  endforeach()
+  set(${out} ${lacking} PARENT_SCOPE)
+endfunction()
 
 # liestat_compiled(PART ROOT LIBRARY): the static library liestat_PART of the sources below ROOT, known as liestat::PART, too.
 # LIBRARY is the target of the headers. There is none if a package is missing that the part needs.
@@ -38,20 +46,23 @@ function(liestat_compiled part root library)
   set(directory fusion/compiled)
   if(part STREQUAL "means")
     set(directory stats/compiled)
-  elseif(part STREQUAL "formats")
-    set(directory formats)
   endif()
   # With it the headers know that their definitions are linked (fusion/detail/compiled.hpp, stats/detail/compiled_mean.hpp).
   string(TOUPPER LIESTAT_COMPILED_${part} definition)
-  list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${directory}/ OUTPUT_VARIABLE sources)
-  list(TRANSFORM sources APPEND .cpp)
+  if(part STREQUAL "formats")
+    # All there are: a format is a source, and no list names it.
+    file(GLOB sources CONFIGURE_DEPENDS ${root}/formats/*.cpp ${root}/formats/detail/*.cpp)
+  else()
+    list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${directory}/ OUTPUT_VARIABLE sources)
+    list(TRANSFORM sources APPEND .cpp)
+  endif()
   list(TRANSFORM LIESTAT_COMPILED_NEEDS_${part} PREPEND liestat_ OUTPUT_VARIABLE packages)
   add_library(${target} STATIC EXCLUDE_FROM_ALL ${sources})
   if(part STREQUAL "formats")
     # Most of what its units cost is the headers that they share. Those of trajectories have names of their own.
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
     foreach(source IN LISTS sources)
-      if(source MATCHES "/(messages|pose_graph|trajectory[a-z_]*)[.]cpp$")
+      if(source MATCHES "/(pose_graph|trajectory[a-z_]*)[.]cpp$")
         set_source_files_properties(${source} PROPERTIES UNITY_GROUP trajectories)
       else()
         set_source_files_properties(${source} PROPERTIES UNITY_GROUP features)
@@ -59,7 +70,12 @@ function(liestat_compiled part root library)
     endforeach()
   endif()
   add_library(liestat::${part} ALIAS ${target})
-  target_link_libraries(${target} PUBLIC ${library} ${packages})
+  if(part STREQUAL "formats")
+    # No header of formats/ includes them.
+    target_link_libraries(${target} PUBLIC ${library} PRIVATE ${packages})
+  else()
+    target_link_libraries(${target} PUBLIC ${library} ${packages})
+  endif()
   target_compile_definitions(${target} PUBLIC ${definition})
   # Shared libraries, such as modules of Python, link them as well.
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)

@@ -9,7 +9,7 @@
 
 #include <formats/input_error.hpp>
 #include <formats/text.hpp>
-#include <formats/yaml_values.hpp>
+#include <formats/detail/yaml_values.hpp>
 
 namespace liestat {
 namespace {
@@ -20,27 +20,27 @@ constexpr double pose_tolerance = 1e-3;
 constexpr std::array densities = {"gyroscope_noise_density", "accelerometer_noise_density", "gyroscope_random_walk",
                                   "accelerometer_random_walk"};
 
-double density(const Section& sensor, const char* key) {
+double density(const detail::Section& sensor, const char* key) {
   const auto value = sensor.find(key);
   if (!value) {
     throw InputError(sensor.file, 0, fmt::format("there is no {}", key), "the densities of noise and walk of an IMU");
   }
   double number = 0;
   if (!value->node.IsScalar() || parseNumber(value->node.Scalar(), number) != NumberKind::finite || number < 0) {
-    throw InputError(sensor.file, value->line(), fmt::format("{} is {}", key, shown(value->node)),
+    throw InputError(sensor.file, value->line(), fmt::format("{} is {}", key, detail::shown(value->node)),
                      "a number of zero or more");
   }
   return number;
 }
 
-ImuNoise<double> imuNoise(const Section& sensor) {
+ImuNoise<double> imuNoise(const detail::Section& sensor) {
   return {.gyroscope = density(sensor, densities[0]),
           .accelerometer = density(sensor, densities[1]),
           .gyroscope_walk = density(sensor, densities[2]),
           .accelerometer_walk = density(sensor, densities[3])};
 }
 
-Distortion distortionOf(const Section& section) {
+Distortion distortionOf(const detail::Section& section) {
   const char* expected = "radtan (radial-tangential), equidistant or none; others are not supported";
   const auto model = section.find("distortion_model");
   if (!model) section.complainMissing("distortion_model", expected);
@@ -48,10 +48,10 @@ Distortion distortionOf(const Section& section) {
   if (name == "none") return Distortion::none;
   if (name == "radtan" || name == "radial-tangential" || name == "plumb_bob") return Distortion::radtan;
   if (name == "equidistant") return Distortion::equidistant;
-  model->complain("is " + shown(model->node), expected);
+  model->complain("is " + detail::shown(model->node), expected);
 }
 
-Eigen::Vector4d coefficientsOf(const Section& section, Distortion distortion) {
+Eigen::Vector4d coefficientsOf(const detail::Section& section, Distortion distortion) {
   const auto list = section.find(section.has("distortion_coeffs") ? "distortion_coeffs" : "distortion_coefficients");
   if (!list) {
     if (distortion == Distortion::none) return Eigen::Vector4d::Zero();
@@ -71,11 +71,11 @@ Eigen::Vector4d coefficientsOf(const Section& section, Distortion distortion) {
   return Eigen::Vector4d(values[0], values[1], values[2], values[3]);
 }
 
-Camera cameraOf(const Section& section) {
+Camera cameraOf(const detail::Section& section) {
   Camera camera;
   if (const auto model = section.find("camera_model");
       model && !(model->node.IsScalar() && model->node.Scalar() == "pinhole"))
-    model->complain("is " + shown(model->node), "pinhole; others are not supported");
+    model->complain("is " + detail::shown(model->node), "pinhole; others are not supported");
   const char* expected = "four numbers, fu fv cu cv in pixels";
   const auto intrinsics = section.find("intrinsics");
   if (!intrinsics) section.complainMissing("intrinsics", expected);
@@ -107,14 +107,14 @@ struct Parsed {
   std::string file;
 };
 
-void addCamera(const Section& section, std::string name, Parsed& parsed) {
+void addCamera(const detail::Section& section, std::string name, Parsed& parsed) {
   CameraCalibration result;
   result.name = std::move(name);
   result.camera = cameraOf(section);
   const auto T_cam_imu = section.find("T_cam_imu"), T_imu_cam = section.find("T_imu_cam"), T_BS = section.find("T_BS");
-  if (T_imu_cam) result.imu_T_cam = rigidMotion(*T_imu_cam);
+  if (T_imu_cam) result.imu_T_cam = detail::rigidMotion(*T_imu_cam);
   if (T_cam_imu) {
-    const SE3d inverse = rigidMotion(*T_cam_imu).inverse();
+    const SE3d inverse = detail::rigidMotion(*T_cam_imu).inverse();
     if (T_imu_cam) {
       const SE3d difference = result.imu_T_cam.inverse() * inverse;
       const double turn = difference.so3().log().norm(), shift = difference.translation().norm();
@@ -134,7 +134,7 @@ void addCamera(const Section& section, std::string name, Parsed& parsed) {
           "pose on the IMU",
           "T_cam_imu (takes the IMU's coordinates to the camera's) or T_imu_cam (its inverse), or EuRoC's T_BS");
     }
-    result.imu_T_cam = rigidMotion(*T_BS);
+    result.imu_T_cam = detail::rigidMotion(*T_BS);
   } else if (T_BS) {
     T_BS->complain("stands beside T_cam_imu or T_imu_cam", "one of them");
   }
@@ -156,21 +156,21 @@ std::string directoryOf(const std::string& path) {
   return path.substr(begin == std::string::npos ? 0 : begin + 1, end - (begin == std::string::npos ? 0 : begin + 1));
 }
 
-void addImu(const Section& section, Parsed& parsed) {
+void addImu(const detail::Section& section, Parsed& parsed) {
   parsed.calibration.imu = imuNoise(section);
-  if (const auto T_BS = section.find("T_BS")) parsed.body_T_imu = rigidMotion(*T_BS);
+  if (const auto T_BS = section.find("T_BS")) parsed.body_T_imu = detail::rigidMotion(*T_BS);
 }
 
 Parsed parseFile(std::string_view text, const std::string& name) {
-  return withRoot(text, name, [&](const Section& root) {
+  return detail::withRoot(text, name, [&](const detail::Section& root) {
     Parsed parsed;
     parsed.file = name;
     for (const auto& entry : root.node) {
       if (!entry.first.IsScalar()) continue;
       const std::string key = entry.first.Scalar();
       if (!entry.second.IsMap()) continue;
-      if (isCameraName(key)) addCamera(Section(entry.second, name, key), key, parsed);
-      if (key == "imu0") addImu(Section(entry.second, name, key), parsed);
+      if (isCameraName(key)) addCamera(detail::Section(entry.second, name, key), key, parsed);
+      if (key == "imu0") addImu(detail::Section(entry.second, name, key), parsed);
     }
     const auto sensor_type = root.find("sensor_type");
     const std::string type = sensor_type && sensor_type->node.IsScalar() ? sensor_type->node.Scalar() : "";
@@ -234,9 +234,9 @@ Calibration readCalibration(const std::vector<std::string>& paths) {
 }
 
 ImuNoise<double> parseImuNoise(std::string_view text, const std::string& name) {
-  return withRoot(text, name, [&](const Section& root) {
+  return detail::withRoot(text, name, [&](const detail::Section& root) {
     const YAML::Node section = root.node["imu0"];
-    return imuNoise(section && section.IsMap() ? Section(section, name, "imu0") : root);
+    return imuNoise(section && section.IsMap() ? detail::Section(section, name, "imu0") : root);
   });
 }
 

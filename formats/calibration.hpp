@@ -10,7 +10,6 @@
 
 namespace liestat {
 
-
 /// The contents of calibration files.
 struct Calibration {
   std::optional<ImuNoise<double>> imu;

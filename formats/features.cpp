@@ -10,11 +10,11 @@
 #include <numbers>
 #include <utility>
 
-#include <formats/feature_columns.hpp>
-#include <formats/feature_formats.hpp>
+#include <formats/detail/feature_columns.hpp>
+#include <formats/detail/feature_formats.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
-#include <formats/rotation_matrix.hpp>
+#include <formats/detail/rotation_matrix.hpp>
 #include <lie/units.hpp>
 
 namespace liestat {
@@ -37,7 +37,7 @@ class FeatureReader {
   FeatureFile read() {
     requireText(text_, name_);
     if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
-    const FeatureFormat& format = featureFormat(options_.format, reader_, name_);
+    const detail::FeatureFormat& format = detail::featureFormat(options_.format, reader_, name_);
     file_.format = std::string(format.name);
     if (!options_.columns.empty() && format.name != "csv") {
       throw InputError(name_, reader_.number(), fmt::format("--columns for a file of the format {}", format.name),
@@ -48,11 +48,12 @@ class FeatureReader {
       if (options_.without_covariances && column.rfind("cov_", 0) == 0) column.clear();
     }
     const std::size_t first_line = reader_.number();
-    places_ = findFeature(layout_.columns, name_, first_line);
+    places_ = detail::findFeature(layout_.columns, name_, first_line);
     if (layout_.has_header && !reader_.next()) {
       throw InputError(name_, first_line, "there is a header but no data", "at least one row after it");
     }
-    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == absent && places_.euler[0] == absent) {
+    if (options_.angles == AngleUnit::degrees && places_.rotation_vector[0] == detail::absent &&
+        places_.euler[0] == detail::absent) {
       throw InputError(name_, first_line, "--degrees, but there are no angles",
                        "the columns rx,ry,rz or roll,pitch,yaw");
     }
@@ -69,8 +70,8 @@ class FeatureReader {
     if (parts.contains(FeaturePart::rotation)) file_.rotations.reserve(rows);
     if (parts.contains(FeaturePart::position)) file_.positions.reserve(rows);
     if (parts.contains(FeaturePart::direction)) file_.directions.reserve(rows);
-    if (places_.weight != absent) file_.weights.reserve(rows);
-    if (places_.time != absent) file_.times.reserve(rows);
+    if (places_.weight != detail::absent) file_.weights.reserve(rows);
+    if (places_.time != detail::absent) file_.times.reserve(rows);
     values_.resize(layout_.columns.size());
     do {
       line_ = reader_.number();
@@ -82,7 +83,7 @@ class FeatureReader {
       }
       addRow();
     } while (reader_.next());
-    if (places_.weight != absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
+    if (places_.weight != detail::absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
       throw InputError(name_, file_.lines.front(), "every weight is 0", "one above 0");
     }
     // A text may have far more characters than its shortest rows would need.
@@ -101,12 +102,12 @@ class FeatureReader {
     if (parts.contains(FeaturePart::rotation)) file_.rotations.push_back(readRotation());
     if (parts.contains(FeaturePart::position)) file_.positions.push_back(readVector(places_.position));
     if (parts.contains(FeaturePart::direction)) file_.directions.push_back(readDirection());
-    if (places_.weight != absent) {
+    if (places_.weight != detail::absent) {
       const double weight = value(places_.weight);
       if (!(weight >= 0)) throw InputError(name_, line_, fmt::format("weight is {}", weight), "0 or more");
       file_.weights.push_back(weight);
     }
-    if (places_.time != absent) file_.times.push_back(value(places_.time) * layout_.time_unit);
+    if (places_.time != detail::absent) file_.times.push_back(value(places_.time) * layout_.time_unit);
     if (places_.dimension > 0) file_.covariances.push_back(readCovariance());
     file_.lines.push_back(line_);
   }
@@ -145,13 +146,13 @@ class FeatureReader {
   }
 
   Eigen::Quaterniond readRotation() {
-    if (places_.quaternion[0] != absent) {
+    if (places_.quaternion[0] != detail::absent) {
       const Eigen::Vector4d q(value(places_.quaternion[0]), value(places_.quaternion[1]), value(places_.quaternion[2]),
                               value(places_.quaternion[3]));
       const double norm = checkedNorm(q, "quaternion");
       return Eigen::Quaterniond(Eigen::Vector4d(q / norm));
     }
-    if (places_.rotation_vector[0] != absent) {
+    if (places_.rotation_vector[0] != detail::absent) {
       const Eigen::Vector3d r =
           (options_.angles == AngleUnit::degrees ? units::degree : 1.0) * readVector(places_.rotation_vector);
       const double angle = r.stableNorm();
@@ -172,7 +173,7 @@ class FeatureReader {
       q.vec() = scale * r;
       return q;
     }
-    if (places_.euler[0] != absent) {
+    if (places_.euler[0] != detail::absent) {
       const Eigen::Vector3d angles = readVector(places_.euler);
       const double largest = angles.cwiseAbs().maxCoeff();
       if (options_.angles == AngleUnit::unsaid && largest > 2 * std::numbers::pi * (1 + 1e-6)) {
@@ -188,7 +189,7 @@ class FeatureReader {
     }
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = value(places_.matrix[static_cast<std::size_t>(i)]);
-    const NearestRotation nearest = nearestRotation(matrix, options_.norm_tolerance, name_, line_);
+    const detail::NearestRotation nearest = detail::nearestRotation(matrix, options_.norm_tolerance, name_, line_);
     countNormalised(nearest.error);
     return Eigen::Quaterniond(nearest.rotation.params());
   }
@@ -219,8 +220,8 @@ class FeatureReader {
   LineReader reader_;
   std::string name_;
   ReadingOptions options_;
-  RowLayout layout_;
-  FeatureColumns places_;
+  detail::RowLayout layout_;
+  detail::FeatureColumns places_;
   FeatureFile file_;
   std::size_t line_ = 0;
   std::vector<std::string_view> fields_;
@@ -236,6 +237,12 @@ FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& optio
 
 FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {
   return FeatureReader(text, std::move(file), options).read();
+}
+
+std::vector<std::string> formatNames() {
+  std::vector<std::string> names = {"auto"};
+  for (const detail::FeatureFormat& format : detail::featureFormats()) names.emplace_back(format.name);
+  return names;
 }
 
 }  // namespace liestat

@@ -1,18 +1,22 @@
+// Points, rotations, directions, frames and rigid motions from files: CSV, TUM, EuRoC, KITTI.
+//
+//   const liestat::FeatureFile file = liestat::readFeatureFile("rotations.csv");
+//   const std::vector<liestat::SO3d> rotations = liestat::featuresOf<liestat::SO3d>(file);
 #pragma once
 
 #include <formats/feature.hpp>
+#include <stats/gaussian.hpp>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace liestat {
-
-/// The columns that a CSV file of features may have.
-const std::vector<std::string>& knownColumns();
 
 /// A covariance of the size that the feature has: 3x3, for frames 6x6, for directions 2x2. Its storage needs no heap.
 using FeatureCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
@@ -26,13 +30,14 @@ struct FeatureFile {
   std::vector<Eigen::Vector3d> directions;    ///< unit vectors
   std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
   std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
-  std::vector<FeatureCovariance> covariances;  ///< positive definite, translation before rotation; empty if the file has none
-  std::vector<std::size_t> lines;       ///< the line that each row stands in
-  std::size_t n_normalised = 0;         ///< rows whose rotation or direction was off its norm by more than rounding
-  double largest_norm_error = 0;        ///< the largest such error
-  std::size_t n_beyond_half_turn = 0;   ///< rotation vectors longer than a half-turn, which no logarithm is
-  double largest_rotation_vector = 0;   ///< rad
-  std::string format;                   ///< the name of the format that was read
+  std::vector<FeatureCovariance>
+      covariances;                     ///< positive definite, translation before rotation; empty if the file has none
+  std::vector<std::size_t> lines;      ///< the line that each row stands in
+  std::size_t n_normalised = 0;        ///< rows whose rotation or direction was off its norm by more than rounding
+  double largest_norm_error = 0;       ///< the largest such error
+  std::size_t n_beyond_half_turn = 0;  ///< rotation vectors longer than a half-turn, which no logarithm is
+  double largest_rotation_vector = 0;  ///< rad
+  std::string format;                  ///< the name of the format that was read
 
   std::size_t size() const { return lines.size(); }
 };
@@ -60,5 +65,45 @@ FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& optio
 
 /// Reads features from memory; `name` stands for the file in messages. Throws InputError.
 FeatureFile readFeatures(std::string_view text, std::string name, const ReadingOptions& options = {});
+
+/// The rows of a file as features of type M, whose parameters are its parts one after the other.
+template <class M>
+std::vector<M> featuresOf(const FeatureFile& file) {
+  std::vector<M> list;
+  list.reserve(file.size());
+  for (std::size_t i = 0; i < file.size(); ++i) {
+    Eigen::Matrix<double, 7, 1> params;
+    Eigen::Index n = 0;
+    for (const FeaturePart part : info<M>().parts) {
+      switch (part) {
+        case FeaturePart::rotation:
+          params.segment<4>(n) = file.rotations[i].coeffs(), n += 4;
+          break;
+        case FeaturePart::position:
+          params.segment<3>(n) = file.positions[i], n += 3;
+          break;
+        case FeaturePart::direction:
+          params.segment<3>(n) = file.directions[i], n += 3;
+          break;
+      }
+    }
+    if constexpr (std::is_same_v<M, Eigen::Vector3d>) {
+      list.push_back(params.head<3>());
+    } else {
+      list.push_back(M::fromParams(typename M::Params(params.head<M::num_parameters>())));
+    }
+  }
+  return list;
+}
+
+/// The same with their covariances.
+template <class M>
+std::vector<Gaussian<M>> gaussiansOf(const FeatureFile& file) {
+  const std::vector<M> features = featuresOf<M>(file);
+  std::vector<Gaussian<M>> list;
+  list.reserve(features.size());
+  for (std::size_t i = 0; i < features.size(); ++i) list.push_back({features[i], file.covariances[i]});
+  return list;
+}
 
 }  // namespace liestat

@@ -1,4 +1,4 @@
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 
 #include <fmt/format.h>
 
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <formats/input_error.hpp>
+#include <formats/detail/rows.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
 
@@ -33,7 +34,7 @@ Places readTimes(std::string_view text, const std::string& name, std::int64_t st
   Places places;
   std::vector<std::size_t> lines;
   const auto add = [&](std::size_t frame, double time, std::size_t line) {
-    if (!result.times.empty()) requireAscending(result.times.back(), lines.back(), time, name, line);
+    if (!result.times.empty()) detail::requireAscending(result.times.back(), lines.back(), time, name, line);
     const auto [place, is_new] = places.emplace(frame, result.times.size());
     if (!is_new) {
       throw InputError(name, line, fmt::format("frame {} again, as in line {}", frame, lines[place->second]),
@@ -46,9 +47,9 @@ Places readTimes(std::string_view text, const std::string& name, std::int64_t st
   LineReader first(text);
   std::vector<std::string_view> fields;
   if (first.next()) splitFields(first.line(), Separator::comma, fields);
-  if (!fields.empty() && isNanoseconds(fields[0])) {
+  if (!fields.empty() && detail::isNanoseconds(fields[0])) {
     result.format = "euroc";
-    StampedRows rows(text, name, {});
+    detail::StampedRows rows(text, name, {});
     while (rows.next()) {
       add(result.times.size(), 1e-9 * static_cast<double>(rows.stamp() - start_ns), rows.line());
     }
@@ -79,7 +80,8 @@ Places timesOfTracks(const NumericTable& table, std::int64_t start_ns, ImageTrac
   }
   std::sort(images.begin(), images.end(), [](const Image& a, const Image& b) { return a.frame < b.frame; });
   for (std::size_t i = 0; i < images.size(); ++i) {
-    if (i > 0) requireAscending(images[i - 1].time, images[i - 1].line, images[i].time, table.file(), images[i].line);
+    if (i > 0)
+      detail::requireAscending(images[i - 1].time, images[i - 1].line, images[i].time, table.file(), images[i].line);
     result.times.push_back(images[i].time);
     result.frames.push_back(images[i].frame);
     seen[images[i].frame] = i;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <formats/input_error.hpp>
+#include <formats/detail/rows.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
 
@@ -17,7 +18,7 @@ constexpr double unit_norm_tolerance = 1e-3;
 
 void checkOrder(const ImuFile& file, const std::string& name) {
   for (std::size_t i = 1; i < file.samples.size(); ++i)
-    requireAscending(file.samples[i - 1].time, file.lines[i - 1], file.samples[i].time, name, file.lines[i]);
+    detail::requireAscending(file.samples[i - 1].time, file.lines[i - 1], file.samples[i].time, name, file.lines[i]);
 }
 
 void checkUnits(const ImuFile& file, const std::string& name) {
@@ -49,10 +50,10 @@ ImuFile parseImu(std::string_view text, std::string name) {
   if (!first.next()) throw InputError(name, 0, "the file has no data");
   std::vector<std::string_view> fields;
   splitFields(first.line(), Separator::comma, fields);
-  if (isNanoseconds(fields[0])) {
+  if (detail::isNanoseconds(fields[0])) {
     file.format = "euroc";
     static constexpr const char* columns[] = {"w_x", "w_y", "w_z", "a_x", "a_y", "a_z"};
-    StampedRows rows(text, name, columns);
+    detail::StampedRows rows(text, name, columns);
     while (rows.next()) {
       const std::int64_t stamp = rows.stamp();
       if (file.samples.empty()) file.start_ns = stamp;
@@ -81,7 +82,7 @@ ImuFile readImu(const std::string& path) {
 
 std::vector<GroundTruth> parseGroundTruth(std::string_view text, const std::string& name, std::int64_t start_ns) {
   static constexpr const char* columns[] = {"p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z", "v_x", "v_y", "v_z"};
-  StampedRows rows(text, name, columns);
+  detail::StampedRows rows(text, name, columns);
   std::vector<GroundTruth> truth;
   while (rows.next()) {
     GroundTruth row;
@@ -108,7 +109,7 @@ std::vector<GroundTruth> readGroundTruth(const std::string& path, std::int64_t s
 }
 
 std::int64_t firstStamp(std::string_view text, const std::string& name) {
-  StampedRows rows(text, name, {});
+  detail::StampedRows rows(text, name, {});
   if (!rows.next()) throw InputError(name, 0, "the file has no data");
   return rows.stamp();
 }

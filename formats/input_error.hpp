@@ -15,13 +15,16 @@ std::string printable(std::string_view text, std::size_t limit = 40);
 /// The same of a text of several lines, uncut: newlines stay.
 std::string printableLines(std::string_view text);
 
-/// An error in an input (or an output path) that the user named. `what()` is one line that begins
+/// One line `file:line: found, expected …`, without the line if it is 0 and without what is empty.
+std::string errorLine(std::string_view file, std::size_t line, std::string_view found, std::string_view expected);
+
+/// An error in an input file (or an output path) that the user named. `what()` is one line that begins
 /// with `file:line: `, or `file: ` where no line is to blame.
 class InputError : public std::runtime_error {
  public:
   /// `line` counts from 1, 0 means none; `expected` may be empty where `found` says it all.
   InputError(std::string file, std::size_t line, std::string found, std::string expected = {})
-      : std::runtime_error(message(file, line, found, expected)),
+      : std::runtime_error(errorLine(file, line, found, expected)),
         file_(std::move(file)),
         line_(line),
         found_(std::move(found)),
@@ -33,20 +36,18 @@ class InputError : public std::runtime_error {
   const std::string& expected() const { return expected_; }
 
  private:
-  static std::string message(std::string_view file, std::size_t line, std::string_view found,
-                             std::string_view expected) {
-    std::string text(file);
-    if (line > 0) text += ":" + std::to_string(line);
-    text += ": ";
-    text += found;
-    if (!expected.empty()) (text += ", expected ") += expected;
-    return printable(text, text.size());
-  }
-
   std::string file_;
   std::size_t line_;
   std::string found_;
   std::string expected_;
+};
+
+/// An option that is misused: by itself, beside another, or with files that are in order. `what()` is one line that begins
+/// with the command or the option.
+class OptionError : public std::invalid_argument {
+ public:
+  explicit OptionError(std::string_view where, std::string_view found, std::string_view expected = {})
+      : std::invalid_argument(errorLine(where, 0, found, expected)) {}
 };
 
 }  // namespace liestat

@@ -3,7 +3,7 @@
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
-#include <formats/trajectory_rows.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 #include <lie/euler.hpp>
 #include <stats/convention_layouts.hpp>
 #include <stats/convention_presets.hpp>
@@ -21,23 +21,24 @@ namespace {
 
 /// A kind of line: its tag, what follows the ids, and the layout of an edge's matrix.
 struct GraphTag {
-  std::string_view format, tag;
+  GraphFormat format;
+  std::string_view tag;
   bool edge, planar;
   std::size_t pose;  ///< numbers of a pose: 3 planar, 6 with angles, 7 with a quaternion
   CovarianceLayout layout = CovarianceLayout::upper21;
 };
 constexpr GraphTag graph_tags[] = {
-    {"g2o", "VERTEX_SE3:QUAT", false, false, 7},
-    {"g2o", "EDGE_SE3:QUAT", true, false, 7},
-    {"g2o", "VERTEX_SE2", false, true, 3},
-    {"g2o", "EDGE_SE2", true, true, 3, CovarianceLayout::planar6},
-    {"toro", "VERTEX3", false, false, 6},
-    {"toro", "EDGE3", true, false, 6},
-    {"toro", "VERTEX2", false, true, 3},
-    {"toro", "EDGE2", true, true, 3, CovarianceLayout::toro6},
+    {GraphFormat::g2o, "VERTEX_SE3:QUAT", false, false, 7},
+    {GraphFormat::g2o, "EDGE_SE3:QUAT", true, false, 7},
+    {GraphFormat::g2o, "VERTEX_SE2", false, true, 3},
+    {GraphFormat::g2o, "EDGE_SE2", true, true, 3, CovarianceLayout::planar6},
+    {GraphFormat::toro, "VERTEX3", false, false, 6},
+    {GraphFormat::toro, "EDGE3", true, false, 6},
+    {GraphFormat::toro, "VERTEX2", false, true, 3},
+    {GraphFormat::toro, "EDGE2", true, true, 3, CovarianceLayout::toro6},
     // TORO's own files write these too.
-    {"toro", "VERTEX", false, true, 3},
-    {"toro", "EDGE", true, true, 3, CovarianceLayout::toro6},
+    {GraphFormat::toro, "VERTEX", false, true, 3},
+    {GraphFormat::toro, "EDGE", true, true, 3, CovarianceLayout::toro6},
 };
 
 const GraphTag* graphTag(std::string_view word) {
@@ -46,7 +47,7 @@ const GraphTag* graphTag(std::string_view word) {
   }
   return nullptr;
 }
-const GraphTag& graphTag(std::string_view format, bool edge, bool planar) {
+const GraphTag& graphTag(GraphFormat format, bool edge, bool planar) {
   for (const GraphTag& tag : graph_tags) {
     if (tag.format == format && tag.edge == edge && tag.planar == planar) return tag;
   }
@@ -65,15 +66,10 @@ class GraphReader {
 
   PoseGraph read() {
     while (reader_.next()) readLine();
-    if (graph_.format.empty()) throw InputError(graph_.name, 0, "the file has no vertices and no edges", "g2o or TORO");
+    if (graph_.vertices.empty() && graph_.edges.empty())
+      throw InputError(graph_.name, 0, "the file has no vertices and no edges", "g2o or TORO");
     graph_.n_normalised = scratch_.n_normalised;
-    if (graph_.format == "g2o" && graph_.planar) {
-      graph_.stated_convention = Convention{.perturbation = Perturbation::body_axes,
-                                            .content = CovarianceContent::information,
-                                            .layout = CovarianceLayout::planar6};
-    } else if (graph_.format == "toro" && !graph_.planar) {
-      graph_.stated_convention = conventionPreset("toro");
-    }
+    graph_.stated_convention = statedConvention(graph_.format, graph_.planar);
     return std::move(graph_);
   }
 
@@ -106,7 +102,7 @@ class GraphReader {
                        "vertices and edges of g2o (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX_SE2, EDGE_SE2, FIX) or TORO "
                        "(VERTEX3, EDGE3, VERTEX2, EDGE2); --ignore-unknown passes over others");
     }
-    if (graph_.format.empty()) graph_.format = std::string(tag->format), graph_.planar = tag->planar;
+    if (graph_.vertices.empty() && graph_.edges.empty()) graph_.format = tag->format, graph_.planar = tag->planar;
     if (graph_.format != tag->format || graph_.planar != tag->planar) {
       throw InputError(graph_.name, line(),
                        fmt::format("{} in a file of {}", tag->tag, graphTag(graph_.format, true, graph_.planar).tag),
@@ -115,7 +111,7 @@ class GraphReader {
     const std::size_t ids = tag->edge ? 2 : 1, begin = 1 + ids, end = begin + tag->pose;
     const std::size_t matrix = tag->edge ? layoutSize(tag->layout) : 0;
     // Public files of EDGE3 exist without their matrices.
-    const bool bare = fields_.size() == end && tag->format == "toro";
+    const bool bare = fields_.size() == end && tag->format == GraphFormat::toro;
     if (fields_.size() != end + matrix && !bare) {
       throwWrongWidth(fields_.size(), end + matrix, fmt::format("of {}", tag->tag), graph_.name, line());
     }
@@ -131,7 +127,7 @@ class GraphReader {
       for (std::size_t k = 0; k < matrix; ++k) numbers[k] = number(end + k);
     }
     scratch_.covariances.clear();
-    appendCovariance(scratch_, {.layout = tag->layout}, numbers, line());
+    detail::appendCovariance(scratch_, {.layout = tag->layout}, numbers, line());
     graph_.edges.push_back({id(1), id(2), pose, scratch_.covariances.back(), line()});
   }
 
@@ -144,7 +140,7 @@ class GraphReader {
       return SE3d(fromRollPitchYaw(number(begin + 3), number(begin + 4), number(begin + 5)), position);
     }
     const Eigen::Vector4d xyzw(number(begin + 3), number(begin + 4), number(begin + 5), number(begin + 6));
-    return poseOf(position, xyzw, norm_tolerance_, scratch_, line());
+    return detail::poseOf(position, xyzw, norm_tolerance_, scratch_, line());
   }
 
   LineReader reader_;
@@ -177,7 +173,13 @@ void writePose(std::back_insert_iterator<std::string> out, const GraphTag& tag, 
 
 }  // namespace
 
-std::vector<std::string> graphFormatNames() { return {"g2o", "toro"}; }
+std::optional<Convention> statedConvention(GraphFormat format, bool planar) {
+  if (format == GraphFormat::toro) return planar ? std::nullopt : conventionPreset("toro");
+  if (!planar) return std::nullopt;
+  return Convention{.perturbation = Perturbation::body_axes,
+                    .content = CovarianceContent::information,
+                    .layout = CovarianceLayout::planar6};
+}
 
 bool looksLikeGraph(std::string_view text) {
   LineReader reader(text);
@@ -185,6 +187,11 @@ bool looksLikeGraph(std::string_view text) {
   std::vector<std::string_view> fields;
   splitFields(reader.line(), Separator::blanks, fields);
   return fields[0] == "FIX" || graphTag(fields[0]) != nullptr;
+}
+
+PoseGraph readPoseGraph(const std::string& path, bool ignore_unknown, double norm_tolerance) {
+  const TextFile file = loadText(path);
+  return parseGraph(file.text, file.name, ignore_unknown, norm_tolerance);
 }
 
 PoseGraph parseGraph(std::string_view text, std::string name, bool ignore_unknown, double norm_tolerance) {
@@ -207,7 +214,7 @@ Convention conventionOf(const PoseGraph& graph, const std::optional<Convention>&
   return convention;
 }
 
-std::string formatGraph(const PoseGraph& graph, std::string_view format, const Convention& convention) {
+std::string formatGraph(const PoseGraph& graph, GraphFormat format, const Convention& convention) {
   const GraphTag& vertex = graphTag(format, false, graph.planar);
   const GraphTag& edge = graphTag(format, true, graph.planar);
   Convention layout = convention;
@@ -219,7 +226,7 @@ std::string formatGraph(const PoseGraph& graph, std::string_view format, const C
     writePose(out, vertex, v.pose);
     text += '\n';
   }
-  if (format == "g2o") {
+  if (format == GraphFormat::g2o) {
     for (const std::int64_t id : graph.fixed) fmt::format_to(out, "FIX {}\n", id);
   }
   for (const GraphEdge& e : graph.edges) {
@@ -228,10 +235,10 @@ std::string formatGraph(const PoseGraph& graph, std::string_view format, const C
     const PackedCovariance packed = packCovariance(layout, e.matrix);
     std::size_t n_unknown = 0;
     for (const double v : packed.numbers()) n_unknown += std::isnan(v);
-    if (n_unknown > 0 && (n_unknown < packed.size || format == "g2o")) {
+    if (n_unknown > 0 && (n_unknown < packed.size || format == GraphFormat::g2o)) {
       throw InputError(graph.name, e.line,
                        fmt::format("{} of {} numbers of this edge's matrix are not known", n_unknown, packed.size),
-                       fmt::format("all of them, which the format {} cannot do without", format));
+                       fmt::format("all of them, which the format {} cannot do without", liestat::name(format)));
     }
     if (n_unknown == 0) {
       for (const double v : packed.numbers()) fmt::format_to(out, " {:.17g}", v);

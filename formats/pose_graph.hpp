@@ -2,7 +2,9 @@
 #pragma once
 
 #include <formats/trajectory.hpp>
+#include <stats/words.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +14,11 @@
 
 namespace liestat {
 
+/// The program whose file it is. In three dimensions g2o's edges have quaternions, TORO's roll, pitch and yaw.
+enum class GraphFormat { g2o, toro };
+constexpr auto words(GraphFormat) { return std::array{"g2o", "toro"}; }
+
+/// A pose, and the line of the file that it stands in.
 struct GraphVertex {
   std::int64_t id = 0;
   SE3d pose;
@@ -28,8 +35,8 @@ struct GraphEdge {
 
 /// The vertices and edges of a file. Planar ones are rotated about z and have z = 0; their matrices know x, y and yaw.
 struct PoseGraph {
-  std::string name;    ///< the file's name, for messages
-  std::string format;  ///< g2o or toro
+  std::string name;  ///< the file's name, for messages
+  GraphFormat format = GraphFormat::g2o;
   bool planar = false;
   std::vector<GraphVertex> vertices;
   std::vector<GraphEdge> edges;
@@ -39,13 +46,14 @@ struct PoseGraph {
   std::size_t n_normalised = 0;                 ///< rotations that were off their norm by more than rounding
 };
 
-/// The names of the formats.
-std::vector<std::string> graphFormatNames();
-
 /// True if a text begins like a file of vertices and edges.
 bool looksLikeGraph(std::string_view text);
 
-/// Reads a graph; throws InputError. Tags that are none of theirs are passed over if asked for, and an error otherwise.
+/// The convention that a format fixes for the matrices of its edges; nothing where it is for the user to say.
+std::optional<Convention> statedConvention(GraphFormat format, bool planar);
+
+/// Reads a graph from a file, or from memory; throws InputError. Tags that are none of theirs are passed over if asked for, and an error otherwise.
+PoseGraph readPoseGraph(const std::string& path, bool ignore_unknown = false, double norm_tolerance = 1e-3);
 PoseGraph parseGraph(std::string_view text, std::string name, bool ignore_unknown = false,
                      double norm_tolerance = 1e-3);
 
@@ -56,6 +64,6 @@ Convention conventionOf(const PoseGraph& graph, const std::optional<Convention>&
 
 /// The text of a graph in a format, numbers with 17 digits. The matrices are in the convention, whose content has to be
 /// said. Edges without a matrix are written without one in TORO's format and are an InputError in g2o's.
-std::string formatGraph(const PoseGraph& graph, std::string_view format, const Convention& convention);
+std::string formatGraph(const PoseGraph& graph, GraphFormat format, const Convention& convention);
 
 }  // namespace liestat

@@ -16,8 +16,7 @@ namespace {
 FeatureFile readPoses(const std::string& path, const ReadingOptions& options) {
   FeatureFile file = readFeatureFile(path, options);
   if (file.kind == Feature::frame) return file;
-  throw InputError(sourceName(path), file.lines.front(),
-                   fmt::format("the file has {}", info(file.kind).plural),
+  throw InputError(sourceName(path), file.lines.front(), fmt::format("the file has {}", info(file.kind).plural),
                    "poses: a translation beside each rotation (TUM, KITTI, EuRoC, or the columns tx,ty,tz of a CSV)");
 }
 

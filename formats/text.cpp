@@ -15,7 +15,7 @@
 #include <limits>
 #include <numeric>
 
-#include <formats/gzip.hpp>
+#include <formats/detail/gzip.hpp>
 #include <formats/input_error.hpp>
 
 namespace liestat {
@@ -133,6 +133,15 @@ std::string withoutControls(std::string_view text, bool keep_newlines) {
 
 }  // namespace
 
+std::string errorLine(std::string_view file, std::size_t line, std::string_view found, std::string_view expected) {
+  std::string text(file);
+  if (line > 0) text += ":" + std::to_string(line);
+  text += ": ";
+  text += found;
+  if (!expected.empty()) (text += ", expected ") += expected;
+  return printable(text, text.size());
+}
+
 std::string printable(std::string_view text, std::size_t limit) {
   const bool cut = text.size() > limit;
   std::size_t end = cut ? limit : text.size();
@@ -171,7 +180,7 @@ TextFile loadText(const std::string& path) {
     size += static_cast<std::size_t>(count);
   }
   file.text.resize(size);
-  if (isGzip(file.text)) file.text = decompressed(file.text, file.name);
+  if (detail::isGzip(file.text)) file.text = detail::decompressed(file.text, file.name);
   return file;
 }
 

@@ -11,7 +11,7 @@
 
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
-#include <formats/rotation_matrix.hpp>
+#include <formats/detail/rotation_matrix.hpp>
 #include <formats/text.hpp>
 
 namespace liestat {
@@ -80,7 +80,8 @@ std::vector<CameraPose> readCameraPoses(const std::string& path) {
     pose.t = table(row, 1);
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = table(row, static_cast<std::size_t>(2 + i));
-    pose.R_camera_world = nearestRotation(matrix, rotation_tolerance, table.file(), table.line(row)).rotation.matrix();
+    pose.R_camera_world =
+        detail::nearestRotation(matrix, detail::rotation_tolerance, table.file(), table.line(row)).rotation.matrix();
     pose.c = Eigen::Vector3d(table(row, 11), table(row, 12), table(row, 13));
     poses.push_back(pose);
   }
@@ -126,6 +127,15 @@ std::vector<Eigen::Vector3d> readLandmarks(const std::string& path) {
   for (std::size_t row = 0; row < table.rows(); ++row)
     landmarks.emplace_back(table(row, 0), table(row, 1), table(row, 2));
   return landmarks;
+}
+
+std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
+  const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
+  std::vector<Eigen::Vector4d> matches;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    matches.emplace_back(table(i, 0), table(i, 1), table(i, 2), table(i, 3));
+  }
+  return matches;
 }
 
 }  // namespace liestat

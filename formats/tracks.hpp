@@ -1,12 +1,44 @@
+// Tracks of points in images: those of a camera over time, those of a stereo camera with its poses, matches of two images.
 #pragma once
 
+#include <fusion/camera_calibration.hpp>
 #include <fusion/stereo.hpp>
 
 #include <Eigen/Core>
+
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace liestat {
+
+/// The tracks that a camera saw over time.
+struct ImageTracks {
+  std::vector<double> times;                   ///< s since the start that the reader was given, ascending, one an image
+  std::vector<std::size_t> frames;             ///< the number of each image in the files
+  std::vector<PixelObservation> observations;  ///< by images, then by tracks
+  std::vector<std::size_t> track_ids;          ///< the number of each track in the file, ascending
+  std::size_t seen_once = 0;                   ///< tracks with one observation, which are of no use but kept
+  std::string format;                          ///< the times': euroc, csv (a file frame,t_s), or t_s (a column)
+};
+
+/// Reads tracks, CSV with the columns frame, track, u, v (or those of the left of a stereo pair, uL and vL) and, unless
+/// there is a file of times, t_s; and the times of the images, CSV with the columns frame and t_s, or EuRoC's
+/// cam0/data.csv (timestamp [ns], filename), whose rows are frames 0, 1, ... Frames may begin anywhere and leave some
+/// out; with a file of times an image is a row of it, seen into or not. Seconds are those of the clock of `start_ns`:
+/// it is subtracted. Throws InputError with the line: a frame and track again, a frame without a time, times that do
+/// not ascend, a time that contradicts another of its frame, what is not a finite number, numbers of frames or tracks
+/// that are not whole. `image_times` may be empty; `-` is standard input.
+ImageTracks readImageTracks(const std::string& tracks, const std::string& image_times, std::int64_t start_ns);
+/// The same from memory.
+ImageTracks parseImageTracks(std::string_view tracks_text, const std::string& tracks_name, std::string_view times_text,
+                             const std::string& times_name, std::int64_t start_ns);
+
+/// Where no image is among the readings: which unit the stamps of one of the two files may have, if not nanoseconds, in
+/// words. `image_time` is that of an image on the clock that shows start_ns at zero. Empty: no suspicion.
+std::string suspectedUnit(std::int64_t start_ns, double image_time);
 
 /// Rows `frame,track,uL,vL,uR,vR`. All four readers throw InputError, and `-` is standard input.
 std::vector<StereoObservation> readStereoTracks(const std::string& path);
@@ -19,5 +51,8 @@ StereoCamera readStereoCamera(const std::string& path);
 
 /// Rows `x,y,z` in m: row i is the landmark of track i.
 std::vector<Eigen::Vector3d> readLandmarks(const std::string& path);
+
+/// Rows `x1,y1,x2,y2`: a point in the first image and in the second, px. Throws InputError; `-` is standard input.
+std::vector<Eigen::Vector4d> readMatches(const std::string& path);
 
 }  // namespace liestat

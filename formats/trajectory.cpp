@@ -1,331 +1,54 @@
 #include <formats/trajectory.hpp>
 
-#include <formats/feature_values.hpp>
+#include <formats/detail/rows.hpp>
+#include <formats/detail/trajectory_formats.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
+#include <formats/output_file.hpp>
 #include <formats/text.hpp>
-#include <formats/trajectory_rows.hpp>
 #include <stats/convention_layouts.hpp>
 #include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <filesystem>
 #include <utility>
 
 namespace liestat {
 namespace {
 
-// --- Formats that the reader of features knows ----------------------------------------------------------------------
-
-/// The columns of the first line of a CSV file, under our names.
-std::vector<std::string> csvColumns(std::string_view text, const TrajectoryOptions& options) {
-  LineReader reader(text);
-  std::vector<std::string> names;
-  if (!reader.next()) return names;
-  std::vector<std::string_view> fields;
-  splitFields(reader.line(), Separator::comma_or_blanks, fields);
-  for (const std::string_view field : fields) {
-    names.emplace_back(field == "time" || field == "timestamp" ? "t" : field);
-    for (const std::string& wish : options.reading.columns) {
-      const std::size_t sign = wish.find('=');
-      if (sign != std::string::npos && wish.substr(sign + 1) == field) names.back() = wish.substr(0, sign);
-    }
+/// The format that the options name, or the one that recognises the beginning of a text; null if none does.
+const detail::TrajectoryFormat* formatOf(const detail::TrajectoryBeginning& beginning,
+                                         const TrajectoryOptions& options) {
+  if (options.format != "auto") return &detail::trajectoryFormat(options.format);
+  const bool with_layout = options.layout && beginning.numbers == 8 + layoutSize(*options.layout);
+  for (const detail::TrajectoryFormat& format : detail::trajectoryFormats()) {
+    if (with_layout ? format.takes_layout : format.recognises(beginning)) return &format;
   }
-  return names;
+  return nullptr;
 }
 
-/// Reads the fields of the rows whose poses have been read: those of a time, and of a covariance.
-void readFields(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  const bool csv = trajectory.format == "csv";
-  const std::vector<std::string> columns = csv ? csvColumns(text, options) : std::vector<std::string>();
-  const auto place = [&](const std::string& column) {
-    return static_cast<std::size_t>(std::find(columns.begin(), columns.end(), column) - columns.begin());
-  };
-  const std::size_t time = csv ? place("t") : 0;
-  const bool has_time = trajectory.format != "kitti" && (!csv || time < columns.size());
-  std::vector<std::size_t> covariance;
-  if (csv && std::any_of(columns.begin(), columns.end(), [](const auto& c) { return c.rfind("cov_", 0) == 0; })) {
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) {
-        const std::string column = fmt::format("cov_{}{}", i, j);
-        covariance.push_back(place(column));
-        if (covariance.back() == columns.size()) {
-          throw InputError(trajectory.name, 0, fmt::format("there is no column '{}'", column),
-                           "the upper triangle cov_00 ... cov_55");
-        }
-      }
-    }
-  }
-  LineReader reader(text);
-  std::vector<std::string_view> fields;
-  std::vector<double> numbers;
-  for (const std::size_t line : trajectory.lines) {
-    while (reader.number() < line && reader.next()) {
-    }
-    splitFields(reader.line(), Separator::comma_or_blanks, fields);
-    if (has_time && trajectory.format == "euroc") {
-      appendTicks(trajectory, fields[0], 9, line);
-    } else if (has_time) {
-      appendTime(trajectory, fields[time], line);
-    }
-    if (covariance.empty()) continue;
-    numbers.clear();
-    for (std::size_t k = 0; k < covariance.size(); ++k) {
-      numbers.push_back(numberOrUnknown(fields[covariance[k]], columns[covariance[k]], trajectory.name, line));
-    }
-    appendCovariance(trajectory, {.layout = CovarianceLayout::upper21}, numbers, line);
-  }
+/// A convention with what the format has of its own.
+Convention conventionIn(const detail::TrajectoryFormat& format, Convention convention) {
+  convention.order = format.order.value_or(convention.order);
+  convention.layout = format.layout.value_or(convention.layout);
+  return convention;
 }
 
-void readAsFeatures(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options,
-                    const std::string& format) {
-  ReadingOptions reading = options.reading;
-  reading.format = format;
-  reading.without_covariances = true;
-  const FeatureFile file = readFeatures(text, trajectory.name, reading);
-  if (file.kind != Feature::frame) {
-    throw InputError(trajectory.name, file.lines.front(),
-                     fmt::format("the file has {}", info(file.kind).plural),
-                     "poses: a translation beside each rotation");
-  }
-  trajectory.format = file.format;
-  trajectory.lines = file.lines;
-  trajectory.poses = featuresOf<SE3d>(file);
-  trajectory.n_normalised = file.n_normalised, trajectory.largest_norm_error = file.largest_norm_error;
-  readFields(text, trajectory, options);
-  if (!trajectory.hasCovariances()) return;
-  // The columns of a CSV are defined as the library's own, unless the file says otherwise.
-  const auto stated = statedConvention(text, trajectory.name);
-  trajectory.stated_convention = stated.value_or(Convention{});
-  trajectory.states_convention = stated.has_value();
-  trajectory.covariance_source = trajectory.name;
+/// Covariances between translation and rotation that are known, not zero, and have no place in the layout.
+std::size_t lostCrossBlocks(const Trajectory& trajectory, CovarianceLayout layout) {
+  if (layout != CovarianceLayout::blocks12 && layout != CovarianceLayout::diag6) return 0;
+  std::size_t n = 0;
+  for (const Matrix6d& C : trajectory.covariances) n += (C.topRightCorner<3, 3>().array().abs() > 0).any() ? 1 : 0;
+  return n;
 }
-void readTum(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
-void readKitti(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  readAsFeatures(text, trajectory, options, "kitti");
-}
-void readEuroc(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  readAsFeatures(text, trajectory, options, "euroc");
-}
-void readCsv(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  readAsFeatures(text, trajectory, options, "csv");
-}
-
-// --- Rows of t x y z qx qy qz qw and a covariance ---------------------------------------------------------------------
-
-/// Rows of the eight numbers of TUM and those of a layout after them. Rows without the latter are unknown if `optional`.
-void readStampedRows(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options,
-                     const Convention& layout, bool optional) {
-  constexpr std::string_view columns[] = {"t", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
-  const std::size_t with = 8 + layoutSize(layout.layout);
-  LineReader reader(text);
-  std::vector<std::string_view> fields;
-  std::vector<double> numbers;
-  while (reader.next()) {
-    const std::size_t line = reader.number();
-    splitFields(reader.line(), Separator::comma_or_blanks, fields);
-    if (fields.size() != with && !(optional && fields.size() == 8)) {
-      throwWrongWidth(fields.size(), with, fmt::format("(t tx ty tz qx qy qz qw and {})", name(layout.layout)),
-                      trajectory.name, line);
-    }
-    appendTime(trajectory, fields[0], line);
-    Eigen::Vector3d position;
-    Eigen::Vector4d xyzw;
-    for (int i = 0; i < 7; ++i) {
-      const auto k = static_cast<std::size_t>(i + 1);
-      (i < 3 ? position[i] : xyzw[i - 3]) = numberField(fields[k], columns[k], trajectory.name, line);
-    }
-    trajectory.poses.push_back(poseOf(position, xyzw, options.reading.norm_tolerance, trajectory, line));
-    trajectory.lines.push_back(line);
-    numbers.clear();
-    for (std::size_t k = 8; k < fields.size(); ++k) {
-      numbers.push_back(
-          numberOrUnknown(fields[k], fmt::format("number {} of the covariance", k - 7), trajectory.name, line));
-    }
-    // A row of zeros would be a pose that is known exactly; programs write it where they know nothing.
-    if (std::all_of(numbers.begin(), numbers.end(), [](double v) { return v == 0; })) {
-      numbers.assign(layoutSize(layout.layout), unknown_entry);
-    }
-    appendCovariance(trajectory, layout, numbers, line);
-  }
-  trajectory.covariance_source = trajectory.name;
-}
-
-void readTum(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  if (!options.layout) return readAsFeatures(text, trajectory, options, "tum");
-  readStampedRows(text, trajectory, options, {.layout = *options.layout}, false);
-}
-
-/// OpenVINS: the upper triangles of the rotation's and of the translation's covariance, in this order.
-void readOpenVins(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  readStampedRows(text, trajectory, options, {.layout = CovarianceLayout::blocks12}, true);
-  trajectory.fixed_order = CovarianceOrder::rotation_translation;
-  const bool none = std::all_of(trajectory.covariances.begin(), trajectory.covariances.end(),
-                                [](const Matrix6d& C) { return C.array().isNaN().all(); });
-  if (none) trajectory.covariances.clear(), trajectory.covariance_source.clear();
-}
-
-// --- CSV files whose header names the fields of messages --------------------------------------------------------------
-
-/// A CSV file by the names of its columns.
-class NamedColumns {
- public:
-  NamedColumns(std::string_view text, const std::string& file) : reader_(text), file_(file) {
-    if (!reader_.next()) throw InputError(file_, 0, "the file has no data, only blank lines and comments");
-    splitFields(reader_.line(), Separator::comma, fields_);
-    names_.assign(fields_.begin(), fields_.end());
-  }
-  /// The place of the first of the names that there is; throws InputError if it is required and there is none.
-  std::size_t find(const std::vector<std::string>& names, bool required = false) const {
-    for (const std::string& name : names) {
-      const auto found = std::find(names_.begin(), names_.end(), name);
-      if (found != names_.end()) return static_cast<std::size_t>(found - names_.begin());
-    }
-    if (required) {
-      throw InputError(file_, 1, fmt::format("there is no column '{}'", names.front()),
-                       "the fields of a message, with their names in the header");
-    }
-    return none;
-  }
-  bool next() {
-    if (!reader_.next()) return false;
-    splitFields(reader_.line(), Separator::comma, fields_);
-    if (fields_.size() != names_.size()) {
-      throwWrongWidth(fields_.size(), names_.size(), "as in the header", file_, reader_.number());
-    }
-    return true;
-  }
-  std::size_t line() const { return reader_.number(); }
-  std::string_view field(std::size_t column) const { return fields_[column]; }
-  double number(std::size_t column) const { return numberField(fields_[column], names_[column], file_, line()); }
-  double numberOrNan(std::size_t column) const {
-    return numberOrUnknown(fields_[column], names_[column], file_, line());
-  }
-  static constexpr std::size_t none = static_cast<std::size_t>(-1);
-
- private:
-  LineReader reader_;
-  const std::string& file_;
-  std::vector<std::string> names_;
-  std::vector<std::string_view> fields_;
-};
-
-/// Reads messages from named columns: x y z, quaternion, covariance (which may be absent), times in units of
-/// 10^-decimals s.
-struct MessageColumns {
-  std::size_t time = NamedColumns::none, decimals = 9;
-  std::array<std::size_t, 3> position{};
-  std::array<std::size_t, 4> xyzw{};
-  std::vector<std::size_t> covariance = {};
-  CovarianceLayout layout = CovarianceLayout::full36;
-};
-void readMessages(NamedColumns& table, const MessageColumns& columns, Trajectory& trajectory,
-                  const TrajectoryOptions& options) {
-  std::vector<double> numbers;
-  while (table.next()) {
-    if (columns.time != NamedColumns::none) {
-      appendTicks(trajectory, table.field(columns.time), columns.decimals, table.line());
-    }
-    Eigen::Vector3d position;
-    Eigen::Vector4d xyzw;
-    for (std::size_t i = 0; i < 3; ++i) position[static_cast<int>(i)] = table.number(columns.position[i]);
-    for (std::size_t i = 0; i < 4; ++i) xyzw[static_cast<int>(i)] = table.number(columns.xyzw[i]);
-    trajectory.poses.push_back(poseOf(position, xyzw, options.reading.norm_tolerance, trajectory, table.line()));
-    trajectory.lines.push_back(table.line());
-    if (columns.covariance.empty()) continue;
-    numbers.clear();
-    for (const std::size_t column : columns.covariance) numbers.push_back(table.numberOrNan(column));
-    applySentinels(numbers, columns.layout, options.unmeasured, trajectory);
-    appendCovariance(trajectory, {.layout = columns.layout}, numbers, table.line());
-  }
-  if (!columns.covariance.empty()) trajectory.covariance_source = trajectory.name;
-}
-
-/// `rostopic echo -p` of ROS 1: integer nanoseconds, a column for each field.
-void readRosCsv(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  NamedColumns table(text, trajectory.name);
-  MessageColumns columns;
-  columns.time = table.find({"field.header.stamp", "%time"});
-  const bool with_covariance = table.find({"field.pose.pose.position.x"}) != NamedColumns::none;
-  const std::string pose = with_covariance ? "field.pose.pose." : "field.pose.";
-  for (std::size_t i = 0; i < 3; ++i) {
-    columns.position[i] = table.find({pose + "position." + "xyz"[i]}, true);
-  }
-  for (std::size_t i = 0; i < 4; ++i) columns.xyzw[i] = table.find({pose + "orientation." + "xyzw"[i]}, true);
-  if (table.find({"field.pose.covariance0"}) != NamedColumns::none) {
-    for (int k = 0; k < 36; ++k) {
-      columns.covariance.push_back(table.find({fmt::format("field.pose.covariance{}", k)}, true));
-    }
-  }
-  readMessages(table, columns, trajectory, options);
-}
-
-/// A field of an array, q[0], q0 or q_0.
-std::vector<std::string> arrayNames(const char* array, int k) {
-  return {fmt::format("{}[{}]", array, k), fmt::format("{}{}", array, k), fmt::format("{}_{}", array, k)};
-}
-
-/// MAVLink's ODOMETRY as CSV of its fields: microseconds, a quaternion with w first.
-void readMavlinkCsv(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  NamedColumns table(text, trajectory.name);
-  MessageColumns columns;
-  columns.time = table.find({"time_usec", "usec"});
-  columns.decimals = 6;
-  for (std::size_t i = 0; i < 3; ++i) columns.position[i] = table.find({std::string(1, "xyz"[i])}, true);
-  for (std::size_t i = 0; i < 4; ++i) columns.xyzw[i] = table.find(arrayNames("q", static_cast<int>(i + 1) % 4), true);
-  columns.layout = CovarianceLayout::upper21;
-  for (const char* array : {"pose_covariance", "covariance"}) {
-    if (!columns.covariance.empty() || table.find(arrayNames(array, 0)) == NamedColumns::none) continue;
-    for (int k = 0; k < 21; ++k) columns.covariance.push_back(table.find(arrayNames(array, k), true));
-  }
-  readMessages(table, columns, trajectory, options);
-  if (trajectory.hasCovariances()) trajectory.stated_convention = conventionPreset("mavlink");
-}
-
-// --- The list of formats ----------------------------------------------------------------------------------------------
-
-/// The beginning of a file, by which formats are told apart.
-struct Look {
-  std::string_view line;  ///< the first with content
-  std::string_view text;
-  std::size_t numbers = 0;  ///< fields of that line if all are numbers
-};
-struct TrajectoryFormat {
-  std::string_view name;
-  bool (*recognises)(const Look& look);
-  void (*read)(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
-};
-
-bool contains(std::string_view line, std::string_view word) { return line.find(word) != std::string_view::npos; }
-bool isJson(const Look& look) { return !look.line.empty() && (look.line[0] == '{' || look.line[0] == '['); }
-
-constexpr TrajectoryFormat formats[] = {
-    {"mavlink-json", [](const Look& l) { return isJson(l) && looksMavlink(l.text); }, readMavlinkJson},
-    {"ros-json", [](const Look& l) { return isJson(l); }, readRosJson},
-    {"ros-csv", [](const Look& l) { return contains(l.line, "field.pose."); }, readRosCsv},
-    {"mavlink-csv", [](const Look& l) { return contains(l.line, "time_usec,") && contains(l.line, ",x,y,z,"); },
-     readMavlinkCsv},
-    {"ros-yaml",
-     [](const Look& l) { return l.line == "---" || l.line == "header:" || l.line == "pose:" || l.line == "poses:"; },
-     readRosYaml},
-    {"openvins", [](const Look& l) { return l.numbers == 20; }, readOpenVins},
-    {"tum", [](const Look& l) { return l.numbers == 8 && !contains(l.line, ","); }, readTum},
-    {"kitti", [](const Look& l) { return l.numbers == 12; }, readKitti},
-    {"euroc", [](const Look& l) { return contains(l.line, ",") && isNanoseconds(l.line.substr(0, l.line.find(','))); },
-     readEuroc},
-    // Whatever has a header; the reader of features names what it cannot read.
-    {"csv", [](const Look& l) { return l.numbers == 0; }, readCsv},
-};
 
 }  // namespace
 
 std::vector<std::string> trajectoryFormatNames() {
   std::vector<std::string> names = {"auto"};
-  for (const TrajectoryFormat& format : formats) names.emplace_back(format.name);
+  for (const detail::TrajectoryFormat& format : detail::trajectoryFormats()) names.emplace_back(format.name);
   return names;
 }
 
@@ -335,28 +58,28 @@ Trajectory parseTrajectory(std::string_view text, std::string name, const Trajec
   requireText(text, trajectory.name);
   LineReader reader(text);
   if (!reader.next()) throw InputError(trajectory.name, 0, "the file has no data, only blank lines and comments");
-  Look look{reader.line(), text};
+  detail::TrajectoryBeginning beginning{reader.line(), text};
   std::vector<std::string_view> fields;
-  splitFields(look.line, Separator::comma_or_blanks, fields);
-  if (looksNumeric(fields)) look.numbers = fields.size();
-  const bool automatic = options.format == "auto";
-  const bool tum_with_layout = automatic && options.layout && look.numbers == 8 + layoutSize(*options.layout);
-  for (const TrajectoryFormat& format : formats) {
-    if (tum_with_layout ? format.name != "tum" : automatic ? !format.recognises(look) : format.name != options.format) {
-      continue;
-    }
-    trajectory.format = std::string(format.name);
-    if (options.layout && format.name != "tum") {
-      throw InputError(trajectory.name, 0, fmt::format("--cov-layout for a file of the format {}", format.name),
-                       "a TUM file with further columns; the other formats have a layout of their own");
-    }
-    format.read(text, trajectory, options);
-    if (trajectory.poses.empty()) throw InputError(trajectory.name, 0, "the file has no poses", "at least one");
-    return trajectory;
+  splitFields(beginning.line, Separator::comma_or_blanks, fields);
+  if (detail::looksNumeric(fields)) beginning.numbers = fields.size();
+  const detail::TrajectoryFormat* const format = formatOf(beginning, options);
+  if (format == nullptr) {
+    throw InputError(trajectory.name, reader.number(), fmt::format("{} numbers without a header", beginning.numbers),
+                     "8 (TUM), 12 (KITTI), 20 (OpenVINS), EuRoC's nanoseconds, or a header that names the columns; "
+                     "--cov-layout says what follows TUM's eight");
   }
-  throw InputError(trajectory.name, reader.number(), fmt::format("{} numbers without a header", look.numbers),
-                   "8 (TUM), 12 (KITTI), 20 (OpenVINS), EuRoC's nanoseconds, or a header that names the columns; "
-                   "--cov-layout says what follows TUM's eight");
+  trajectory.format = std::string(format->name);
+  if (options.layout && !format->takes_layout) {
+    throw InputError(trajectory.name, 0, fmt::format("--cov-layout for a file of the format {}", format->name),
+                     "a TUM file with further columns; the other formats have a layout of their own");
+  }
+  format->read({text, *format, options}, trajectory);
+  if (trajectory.poses.empty()) throw InputError(trajectory.name, 0, "the file has no poses", "at least one");
+  trajectory.fixed_order = format->order;
+  if (trajectory.hasCovariances() && !format->preset.empty()) {
+    trajectory.stated_convention = conventionPreset(format->preset);
+  }
+  return trajectory;
 }
 
 Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& options) {
@@ -374,7 +97,7 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
                      "one of them");
   }
   trajectory.fixed_order.reset();
-  readSideFile(side, trajectory);
+  detail::readSideFile(side, trajectory);
   return trajectory;
 }
 
@@ -397,12 +120,12 @@ Convention conventionNamed(const std::string& text, std::string_view option) {
   for (const NamedConvention& c : convention_presets) names.emplace_back(c.name);
   for (const NamedConvention& c : convention_aliases) names.emplace_back(c.name);
   const std::string near = nearestName(text.substr(0, text.find(',')), names);
-  throw InputError(std::string(option), 0,
-                   fmt::format("there is no convention '{}'{}", printable(text),
-                               near.empty() || near == text ? "" : " (is it '" + near + "'?)"),
-                   fmt::format("one of {}, and after it order=tr|rt, unit=rad|half|double|deg, "
-                               "content=covariance|information|sigmas, perturbation=...",
-                               joined(names, ", ")));
+  throw OptionError(option,
+                    fmt::format("there is no convention '{}'{}", printable(text),
+                                near.empty() || near == text ? "" : " (is it '" + near + "'?)"),
+                    fmt::format("one of {}, and after it order=tr|rt, unit=rad|half|double|deg, "
+                                "content=covariance|information|sigmas, perturbation=...",
+                                joined(names, ", ")));
 }
 
 Convention conventionOf(const Trajectory& trajectory, const std::optional<Convention>& given, std::string_view option) {
@@ -434,6 +157,107 @@ std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Conv
     list.push_back(fromConvention(convention, trajectory.poses[i], trajectory.covariances[i]));
   }
   return list;
+}
+
+std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, std::string_view convention) {
+  std::optional<Convention> given;
+  if (!convention.empty()) given = conventionNamed(std::string(convention), "convention");
+  if (trajectory.hasCovariances()) return gaussiansOf(trajectory, conventionOf(trajectory, given, "convention"));
+  std::vector<Gaussian<SE3d>> list;
+  for (const SE3d& pose : trajectory.poses) list.push_back({pose, Matrix6d::Constant(unknown_entry)});
+  return list;
+}
+
+Trajectory trajectoryOf(std::span<const Gaussian<SE3d>> poses, std::span<const double> times) {
+  Trajectory trajectory;
+  trajectory.name = "trajectory";
+  for (const Gaussian<SE3d>& pose : poses) {
+    trajectory.poses.push_back(pose.mean);
+    trajectory.covariances.push_back(pose.covariance);
+  }
+  trajectory.lines.assign(poses.size(), 0);
+  trajectory.times.assign(times.begin(), times.end());
+  for (const double time : times) trajectory.time_texts.push_back(fmt::format("{}", time));
+  trajectory.stated_convention = Convention{};
+  return trajectory;
+}
+
+// --- Writing ----------------------------------------------------------------------------------------------------------
+
+Convention conventionToWrite(std::string_view format, const std::string& asked, const std::string& caller,
+                             std::string_view option) {
+  const detail::TrajectoryFormat& row = detail::trajectoryFormat(format);
+  if (!asked.empty()) {
+    Convention given = conventionNamed(asked, option);
+    const bool names_layout = asked.find("layout=") != std::string::npos;
+    if (row.selfDescribing() && !names_layout) given.layout = CovarianceLayout::upper21;
+    const Convention c = conventionIn(row, given);
+    if (c.layout != given.layout && names_layout) {
+      throw OptionError(caller, fmt::format("{} {}, but the format {} has its own layout", option, asked, format),
+                        std::string(name(c.layout)));
+    }
+    return c;
+  }
+  if (row.selfDescribing()) return conventionIn(row, {.layout = CovarianceLayout::upper21});
+  if (!row.preset.empty()) return *conventionPreset(row.preset);
+  throw OptionError(caller, fmt::format("the format {} cannot say what its covariances mean", format),
+                    fmt::format("{} with a convention (docs/which_convention.md)", option));
+}
+
+std::vector<std::string> notesOf(const TrajectoryText& text, std::string_view format, const Convention& convention) {
+  std::vector<std::string> notes;
+  if (text.n_rounded_times > 0) {
+    notes.push_back(fmt::format("{} times have digits that the format {} has not; they were cut off",
+                                text.n_rounded_times, format));
+  }
+  if (text.n_lost_cross > 0) {
+    notes.push_back(fmt::format("{} covariances have a cross block, for which the layout {} has no place",
+                                text.n_lost_cross, name(convention.layout)));
+  }
+  if (text.n_marked > 0) {
+    notes.push_back(fmt::format("{} unknown components are written as a variance of 1e6", text.n_marked));
+  }
+  return notes;
+}
+
+TrajectoryText formatTrajectory(const Trajectory& trajectory, std::string_view format, const Convention& convention) {
+  const detail::TrajectoryFormat& row = detail::trajectoryFormat(format);
+  if (row.times == detail::TrajectoryTimes::required && !trajectory.hasTimes()) {
+    throw InputError(trajectory.name, 0, "the file has no times",
+                     fmt::format("--times with a file of one time for each pose: the format {} needs them", format));
+  }
+  const Convention written = conventionIn(row, convention);
+  detail::TrajectorySink sink(trajectory, row, written);
+  row.write(sink);
+  if (row.covariances == detail::CovariancePlace::side_file && trajectory.hasCovariances()) sink.sideFile();
+  TrajectoryText result = sink.take();
+  result.n_lost_cross = lostCrossBlocks(trajectory, written.layout);
+  return result;
+}
+
+std::vector<std::string> writeTrajectory(const std::string& path, const Trajectory& trajectory,
+                                         const TrajectoryWritingOptions& options) {
+  const std::string& format = options.format.empty() ? trajectory.format : options.format;
+  Convention to;
+  Trajectory written = trajectory;
+  if (trajectory.hasCovariances()) {
+    to = options.convention ? conventionIn(detail::trajectoryFormat(format), *options.convention)
+                            : conventionToWrite(format, {}, sourceName(path), "the option convention");
+    const Convention from = conventionOf(trajectory, std::nullopt, "stated_convention");
+    for (std::size_t i = 0; i < written.size(); ++i) {
+      written.covariances[i] = convertConvention(from, to, written.poses[i], written.covariances[i]);
+    }
+  }
+  const TrajectoryText text = formatTrajectory(written, format, to);
+  if (!text.side_file.empty()) {
+    if (path == "-") {
+      throw InputError(sourceName(path), 0, "the covariances go to a file beside the poses, which it has not",
+                       "a file for the output, or a format that has them in its rows (csv)");
+    }
+    writeOutput(path + ".cov", text.side_file);
+  }
+  writeOutput(path, text.text);
+  return notesOf(text, format, to);
 }
 
 }  // namespace liestat

@@ -1,5 +1,11 @@
-// Trajectories with covariances from the files of many programs, as they are: whatever convention a matrix is in, it is
-// kept, and what the file does not say is said by the user or is an error.
+// Trajectories with covariances, from and to the files of many programs (docs/formats.md):
+//
+//   const liestat::Trajectory file = liestat::readTrajectory("poses.json");
+//   const std::vector<liestat::Gaussian<liestat::SE3d>> poses = liestat::gaussiansOf(file, "ros-fixed");
+//   liestat::writeTrajectory("poses.csv", file, {.format = "csv", .convention = liestat::Convention{}});
+//
+// A matrix is kept in the convention of its file. What the file does not say about it is said by the caller or is an
+// error, never guessed.
 #pragma once
 
 #include <formats/features.hpp>
@@ -12,6 +18,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -63,7 +70,8 @@ struct TrajectoryOptions {
   ReadingOptions reading;                   ///< norms, CSV columns; its format is not used
 };
 
-/// The names of the formats, `auto` first.
+/// The names of the formats, `auto` first: tum, kitti, euroc, csv, openvins, ros-csv, ros-json, ros-yaml, mavlink-csv,
+/// mavlink-json.
 std::vector<std::string> trajectoryFormatNames();
 
 /// Reads poses, and covariances if there are any, from a file; `-` is standard input. Throws InputError.
@@ -74,17 +82,62 @@ Trajectory parseTrajectory(std::string_view text, std::string name, const Trajec
 /// Sentences on what reading has changed: rotations normalised, components not measured.
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options);
 
+/// Poses and covariances in the library's convention (stats/gaussian.hpp); NaN for what is unknown, throughout if the
+/// trajectory has no covariances. `convention` is the name of that in which the file has them, such as ros-fixed
+/// (stats/convention_presets.hpp); it may be empty if file or format states it. Throws InputError where nothing says it,
+/// or where the two contradict each other.
+std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, std::string_view convention = {});
+/// The same of matrices in a convention, whatever the file states. Only for a trajectory that has covariances.
+std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Convention& convention);
+
+/// The trajectory of Gaussians, with their times in s if there are any (one for each).
+Trajectory trajectoryOf(std::span<const Gaussian<SE3d>> poses, std::span<const double> times = {});
+
 /// The convention in which the covariances of a trajectory are to be read: what the file states and what the user says
 /// with an option (its name is for messages). What the user says stands above the rule of a format, but must not
 /// contradict a header. Throws InputError where neither says it.
 Convention conventionOf(const Trajectory& trajectory, const std::optional<Convention>& given, std::string_view option);
 
-/// Poses and covariances in the library's convention; NaN for what is unknown. Only for a trajectory that has
-/// covariances.
-std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Convention& convention);
-
-/// The convention named by an option, as stats/convention_presets.hpp spells it; throws InputError with the names that
+/// The convention named by an option, as stats/convention_presets.hpp spells it; throws OptionError with the names that
 /// there are.
 Convention conventionNamed(const std::string& text, std::string_view option);
+
+/// Options of writeTrajectory.
+struct TrajectoryWritingOptions {
+  std::string format = {};  ///< one of trajectoryFormatNames() but `auto`; empty: the trajectory's
+  /// The convention of the matrices in the file, to which those of the trajectory are converted to first order. Nothing:
+  /// the library's where the file says so, MAVLink's in its messages; other formats need one.
+  std::optional<Convention> convention = {};
+};
+
+/// Writes a trajectory, numbers with 17 digits; `-` is standard output. Formats without a place for covariances (tum,
+/// kitti, euroc) get a side file, the path with .cov after it, whose header states the convention. Returns sentences on
+/// what the format has no place for. Throws InputError where the trajectory has covariances and does not state their
+/// convention, where the format needs times that are not there, or cannot say that an entry is unknown; OptionError
+/// where the format needs a convention.
+std::vector<std::string> writeTrajectory(const std::string& path, const Trajectory& trajectory,
+                                         const TrajectoryWritingOptions& options = {});
+
+/// A trajectory as text.
+struct TrajectoryText {
+  std::string text;
+  std::string side_file;            ///< of covariances, for formats without a place for them; empty if there are none
+  std::size_t n_rounded_times = 0;  ///< times with digits below the format's unit, which were cut off
+  std::size_t n_lost_cross = 0;     ///< covariances whose cross block the format or layout has no place for
+  std::size_t n_marked = 0;         ///< components written with the variance that means "not measured"
+};
+
+/// The text of a trajectory in a format. Its covariances are matrices of the convention, as conventionToWrite returns
+/// it. Throws InputError as writeTrajectory does.
+TrajectoryText formatTrajectory(const Trajectory& trajectory, std::string_view format, const Convention& convention);
+
+/// Sentences on what the format has no place for.
+std::vector<std::string> notesOf(const TrajectoryText& text, std::string_view format, const Convention& convention);
+
+/// The convention of a result in a format: the one that is asked for (as conventionNamed reads it; empty: none), or
+/// liestat's where the file can say so, with what the format has of its own: order, layout. Throws OptionError, which
+/// names the caller and its option.
+Convention conventionToWrite(std::string_view format, const std::string& asked, const std::string& caller,
+                             std::string_view option);
 
 }  // namespace liestat

@@ -15,6 +15,7 @@
 #include <formats/numeric_table.hpp>
 #include <formats/features.hpp>
 
+namespace liestat {
 namespace {
 
 void require(bool condition) {
@@ -27,7 +28,7 @@ bool isAbsentOrFull(const List& list, std::size_t n) {
 }
 
 void check(const FeatureFile& file) {
-  using Part;
+  using Part = FeaturePart;
   const std::size_t n = file.size();
   const auto& parts = info(file.kind).parts;
   require(n > 0);
@@ -70,3 +71,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   return 0;
 }
+
+}  // namespace liestat

@@ -12,10 +12,11 @@
 #include <string_view>
 
 #include <formats/calibration.hpp>
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
 
+namespace liestat {
 namespace {
 
 void require(bool condition) {
@@ -73,9 +74,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   });
   const std::size_t dots = text.find("\n...\n");
   if (dots != std::string_view::npos) {
-    attempt([&] {
-      check(parseImageTracks(text.substr(0, dots + 1), "fuzz", text.substr(dots + 5), "times", 0));
-    });
+    attempt([&] { check(parseImageTracks(text.substr(0, dots + 1), "fuzz", text.substr(dots + 5), "times", 0)); });
   }
   return 0;
 }
+
+}  // namespace liestat

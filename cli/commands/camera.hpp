@@ -6,7 +6,7 @@
 
 namespace liestat::cli {
 
-/// A pinhole camera of fu, fv, cu, cv, as --intrinsics gives them. Throws InputError unless these are four finite
+/// A pinhole camera of fu, fv, cu, cv, as --intrinsics gives them. Throws OptionError unless these are four finite
 /// numbers, the first two of them positive.
 Camera cameraFromIntrinsics(const std::vector<double>& intrinsics);
 

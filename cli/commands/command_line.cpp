@@ -270,6 +270,8 @@ int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& group
     return parseAndRun(argc, argv, groups);
   } catch (const InputError& error) {
     return complain(error.what());
+  } catch (const OptionError& error) {
+    return complain(error.what());
   } catch (const std::bad_alloc&) {
     return complain("liestat: not enough memory");
   } catch (const std::exception& error) {

@@ -93,7 +93,22 @@ class Command {
     return word(
         name, wordsOf<Enum>(), [&value](const std::string& given) { value = named<Enum>(given); }, description);
   }
-  /// The work: returns the exit code, and may throw InputError.
+  /// The same of some values of an enumeration, in this order; nothing where the option is not given.
+  template <class Enum>
+  Option choice(const std::string& name, std::optional<Enum>& value,
+                const std::vector<std::pair<std::string, Enum>>& values, const std::string& description) const {
+    std::vector<std::string> names;
+    for (const auto& [word, meaning] : values) names.push_back(word);
+    return word(
+        name, names,
+        [&value, values](const std::string& given) {
+          for (const auto& [word, meaning] : values) {
+            if (word == given) value = meaning;
+          }
+        },
+        description);
+  }
+  /// The work: returns the exit code, and may throw InputError or OptionError.
   void run(Run work) const;
 
  private:

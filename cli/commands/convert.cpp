@@ -4,8 +4,7 @@
 #include <formats/output_file.hpp>
 #include <formats/pose_graph.hpp>
 #include <formats/text.hpp>
-#include <formats/trajectory_rows.hpp>
-#include <formats/trajectory_writer.hpp>
+#include <formats/trajectory.hpp>
 #include <report/json.hpp>
 #include <fusion/trajectory_conversion.hpp>
 #include <stats/convention_presets.hpp>
@@ -94,8 +93,8 @@ void writeConverted(const ConvertOptions& options, ConvertOutput& output, const 
                     const std::string& side_file) {
   if (!side_file.empty()) {
     if (options.output == "-") {
-      throw InputError(convert_name, 0, "the covariances go to a file beside the poses, which standard output has not",
-                       "a file for the output, or a format that has them in its rows (csv)");
+      throw OptionError(convert_name, "the covariances go to a file beside the poses, which standard output has not",
+                        "a file for the output, or a format that has them in its rows (csv)");
     }
     writeOutput(options.output + ".cov", side_file);
   }
@@ -114,7 +113,8 @@ void readTimes(const std::string& path, Trajectory& trajectory) {
   std::vector<std::string_view> fields;
   while (reader.next()) {
     splitFields(reader.line(), Separator::comma_or_blanks, fields);
-    appendTime(times, fields[0], reader.number());
+    times.times.push_back(numberField(fields[0], "the time", file.name, reader.number()));
+    times.time_texts.emplace_back(fields[0]);
   }
   if (times.times.size() != trajectory.size()) {
     throw InputError(file.name, 0, fmt::format("{} times", times.times.size()),
@@ -151,20 +151,15 @@ void convertPoses(const ConvertOptions& options, ConvertOutput& output) {
 void convertGraph(const ConvertOptions& options, ConvertOutput& output, const TextFile& file) {
   PoseGraph graph =
       parseGraph(file.text, file.name, options.reading.reading.ignore_unknown, options.reading.reading.norm_tolerance);
-  output.from_format = graph.format, output.to_format = options.to.empty() ? graph.format : options.to;
+  output.from_format = name(graph.format), output.to_format = options.to.empty() ? output.from_format : options.to;
   output.poses = graph.edges.size();
-  const auto formats = graphFormatNames();
-  if (std::find(formats.begin(), formats.end(), output.to_format) == formats.end()) {
+  const std::optional<GraphFormat> format = named<GraphFormat>(output.to_format);
+  if (!format) {
     throw InputError(graph.name, 0, fmt::format("a graph of edges to the format {}", output.to_format), "g2o or toro");
   }
   const Convention from = conventionOf(graph, conventionGiven(options.cov_from, "--cov-from"), "--cov-from");
   PoseGraph target = graph;
-  target.format = output.to_format, target.stated_convention.reset();
-  if (output.to_format == "toro" && !graph.planar) target.stated_convention = conventionPreset("toro");
-  if (output.to_format == "g2o" && graph.planar) {
-    target.stated_convention =
-        Convention{.perturbation = Perturbation::body_axes, .content = CovarianceContent::information};
-  }
+  target.format = *format, target.stated_convention = statedConvention(*format, graph.planar);
   const Convention to = conventionOf(target, conventionGiven(options.cov_to, "--cov-to"), "--cov-to");
   std::vector<SE3d> poses;
   std::vector<Matrix6d> matrices;
@@ -174,8 +169,8 @@ void convertGraph(const ConvertOptions& options, ConvertOutput& output, const Te
   }
   output.conversion = converted(options, graph.name, poses, matrices, lines, from, to);
   for (std::size_t i = 0; i < graph.edges.size(); ++i) graph.edges[i].matrix = output.conversion.matrices[i];
-  const std::string text = formatGraph(graph, output.to_format, to);
-  if (!graph.fixed.empty() && output.to_format != "g2o")
+  const std::string text = formatGraph(graph, *format, to);
+  if (!graph.fixed.empty() && *format != GraphFormat::g2o)
     output.conversion.notes.emplace_back("FIX has no counterpart in TORO");
   writeConverted(options, output, text, {});
 }
@@ -187,12 +182,8 @@ int runConvert(const ConvertOptions& given, const Invocation& invocation) {
     setConventionField(c, "layout", options.cov_layout);
     options.reading.layout = c.layout;
   }
-  const auto graphs = graphFormatNames();
-  const auto isGraph = [&](const std::string& format) {
-    return std::find(graphs.begin(), graphs.end(), format) != graphs.end();
-  };
   ConvertOutput output;
-  bool graph = isGraph(options.reading.format);
+  bool graph = named<GraphFormat>(options.reading.format).has_value();
   TextFile file;
   if (graph || (options.reading.format == "auto" && options.input != "-")) {
     file = loadText(options.input);
@@ -201,7 +192,7 @@ int runConvert(const ConvertOptions& given, const Invocation& invocation) {
   if (graph) {
     convertGraph(options, output, file);
   } else {
-    if (isGraph(options.to)) {
+    if (named<GraphFormat>(options.to)) {
       throw InputError(sourceName(options.input), 0, fmt::format("poses to the format {}, which has edges", options.to),
                        "a file of g2o or TORO");
     }
@@ -231,7 +222,7 @@ void addConvertCommand(const CommandList& program) {
   command.option("IN", options->input, "Trajectory, or graph of g2o or TORO ('-': standard input)").required();
   command.option("OUT", options->output, "The result ('-': standard output); covariances may go to OUT.cov").required();
   std::vector<std::string> formats = trajectoryFormatNames();
-  for (const std::string& graph : graphFormatNames()) formats.push_back(graph);
+  for (const char* graph : words(GraphFormat{})) formats.emplace_back(graph);
   command.option("--from", options->reading.format, "Format of IN (default auto: by its first lines)").oneOf(formats);
   formats.erase(formats.begin());
   command.option("--to", options->to, "Format of OUT (default: that of IN)").oneOf(formats);

@@ -102,17 +102,17 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   std::string truth_path;
   if (has_truth || (o.plan && estimates.size() > 1)) {
     if (estimates.size() < 2) {
-      throw InputError(doctor_name, 0, "no ground truth", "ESTIMATE REFERENCE, or --no-truth, or --plan");
+      throw OptionError(doctor_name, "no ground truth", "ESTIMATE REFERENCE, or --no-truth, or --plan");
     }
     truth_path = estimates.back();
     estimates.pop_back();
   }
-  if (!has_truth && estimates.size() > 1) throw InputError(doctor_name, 0, "several estimates", "one without a truth");
+  if (!has_truth && estimates.size() > 1) throw OptionError(doctor_name, "several estimates", "one without a truth");
   std::vector<DiagnosedRun> runs;
   TextFile text;
   if (isGraph(estimates.front(), o.input.estimate.format, text)) {
     if (o.no_truth) throw InputError(text.name, 0, "edges, and --no-truth", "a trajectory, or the true vertices");
-    if (estimates.size() > 1) throw InputError(doctor_name, 0, "several graphs", "one, and its truth");
+    if (estimates.size() > 1) throw OptionError(doctor_name, "several graphs", "one, and its truth");
     const PoseGraph graph = parseGraph(text.text, text.name, true);
     if (graph.planar)
       throw InputError(graph.name, 0, "planar edges", "EDGE_SE3:QUAT or EDGE3, whose matrices have six rows");
@@ -157,7 +157,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
       runs.push_back(std::move(run));
     }
     if (runs.size() > 1 && !o.align.empty())
-      throw InputError(doctor_name, 0, "--align with several runs", "runs in the world of the truth");
+      throw OptionError(doctor_name, "--align with several runs", "runs in the world of the truth");
   }
   output.result = diagnoseCovariances(runs, options);
   if (o.json != "-") printLines(formatDiagnosis(output));

@@ -127,13 +127,13 @@ PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention
                          const Trajectory& estimate) {
   switch (e.status) {
     case EvaluationStatus::bad_options:
-      throw InputError("--delta", 0, fmt::format("{}", o.how.relative.delta), "a positive number, whole for frames");
+      throw OptionError("--delta", fmt::format("{}", o.how.relative.delta), "a positive number, whole for frames");
     case EvaluationStatus::other_unit:
-      throw InputError(evaluate_name, 0,
-                       fmt::format("--change_unit {} of errors in {}", name(*o.how.change_unit), e.ape_unit),
-                       "a unit of the same kind");
+      throw OptionError(evaluate_name,
+                        fmt::format("--change_unit {} of errors in {}", name(*o.how.change_unit), e.ape_unit),
+                        "a unit of the same kind");
     case EvaluationStatus::overlapping_pairs:
-      throw InputError(evaluate_name, 0, "--pairs-model with --all_pairs", "pairs that do not overlap");
+      throw OptionError(evaluate_name, "--pairs-model with --all_pairs", "pairs that do not overlap");
     default:
       refuse(e.status, e.reason, reference, estimate, o.input);
   }
@@ -170,8 +170,7 @@ void applyConditions(const EvaluateOptions& o, EvaluationOutput& output) {
     const std::string figure = condition.substr(0, at);
     if (at == std::string::npos ||
         parseNumber(std::string_view(condition).substr(at + 1), bound) != NumberKind::finite) {
-      throw InputError("--fail-if", 0, "'" + printable(condition) + "'",
-                       "a figure, < or >, and a number: ape_rmse>0.1");
+      throw OptionError("--fail-if", "'" + printable(condition) + "'", "a figure, < or >, and a number: ape_rmse>0.1");
     }
     for (const EvaluatedEstimate& e : output.estimates) {
       NamedFigures named_figures;
@@ -181,7 +180,7 @@ void applyConditions(const EvaluateOptions& o, EvaluationOutput& output) {
       if (found == figures.end()) {
         std::vector<std::string> names;
         for (const auto& f : figures) names.push_back(f.first);
-        throw InputError("--fail-if", 0, "'" + printable(figure) + "'", "one of " + joined(names, ", "));
+        throw OptionError("--fail-if", "'" + printable(figure) + "'", "one of " + joined(names, ", "));
       }
       const double value = found->second;
       if (std::isnan(value)) {
@@ -196,10 +195,10 @@ void applyConditions(const EvaluateOptions& o, EvaluationOutput& output) {
 int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
   o.settle();
   if (o.save_results.size() + o.save_rpe.size() > 0 && o.estimates.size() > 1) {
-    throw InputError(evaluate_name, 0, "--save_results with several estimates", "one estimate");
+    throw OptionError(evaluate_name, "--save_results with several estimates", "one estimate");
   }
   if (std::count(o.estimates.begin(), o.estimates.end(), "-") + (o.reference == "-" ? 1 : 0) > 1) {
-    throw InputError(evaluate_name, 0, "several files are standard input", "one");
+    throw OptionError(evaluate_name, "several files are standard input", "one");
   }
   EvaluationOutput output;
   output.reference = fileOf(o.reference);

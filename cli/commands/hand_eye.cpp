@@ -1,5 +1,5 @@
 #include <cli/commands/commands.hpp>
-#include <formats/feature_values.hpp>
+#include <formats/features.hpp>
 #include <formats/input_error.hpp>
 #include <formats/output_file.hpp>
 #include <formats/pose_pairs.hpp>
@@ -44,12 +44,11 @@ Eigen::Matrix<double, 6, 1> assumedSigma() {
 /// ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees, m) in the library's order and units.
 Eigen::Matrix<double, 6, 1> sigmaFrom(const std::vector<double>& values, const char* option) {
   if (values.size() != 2 && values.size() != 6) {
-    throw InputError(command_name, 0, fmt::format("{} has {} values", option, values.size()),
-                     "ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees and m)");
+    throw OptionError(command_name, fmt::format("{} has {} values", option, values.size()),
+                      "ROT,TRANS or rx,ry,rz,tx,ty,tz (degrees and m)");
   }
   for (const double value : values) {
-    if (!std::isfinite(value))
-      throw InputError(command_name, 0, fmt::format("{} is not finite", option), "finite ones");
+    if (!std::isfinite(value)) throw OptionError(command_name, fmt::format("{} is not finite", option), "finite ones");
   }
   Eigen::Matrix<double, 6, 1> sigma;
   for (std::size_t i = 0; i < 6; ++i) {
@@ -116,8 +115,7 @@ void requireDifferentPoses(const std::vector<PosePair>& pairs, const HandEyeOutp
 void requireNoise(const HandEyeOutput& output) {
   const auto exact = [](const HandEyeFile& file) { return file.noise == PoseNoise::option && file.sigma.isZero(0); };
   if (exact(output.a) && exact(output.b)) {
-    throw InputError(command_name, 0, "the poses of both files are exact (--sigma-a, --sigma-b)",
-                     "noise in one of them");
+    throw OptionError(command_name, "the poses of both files are exact (--sigma-a, --sigma-b)", "noise in one of them");
   }
 }
 
@@ -126,7 +124,7 @@ HandEyeOutput calibrate(Options options) {
                                  : options.in_radians ? AngleUnit::radians
                                                       : AngleUnit::unsaid;
   options.pairs.least = options.relative ? 2 : 3;
-  if (!std::isfinite(options.pairs.tolerance)) throw InputError(command_name, 0, "--tolerance is not finite", "s");
+  if (!std::isfinite(options.pairs.tolerance)) throw OptionError(command_name, "--tolerance is not finite", "s");
   const PosePairs pairs = readPosePairs(options.file_a, options.file_b, options.pairs);
   HandEyeOutput output;
   output.a = fileOf(pairs.a, options.file_a, options.sigma_a, "--sigma-a", options.invert_a, pairs.unmatched_a);
@@ -156,7 +154,7 @@ HandEyeOutput calibrate(Options options) {
         fmt::format("the covariances of this pose and of {}:{} are singular together", output.b.path, rows.line_b),
         "noise in one of them in each direction");
   }
-  if (output.result.fault) throw InputError(command_name, 0, describe(output.result.fault));
+  if (output.result.fault) throw OptionError(command_name, describe(output.result.fault));
   output.hint = explainHandEye(given, output.result, hints);
   return output;
 }

@@ -40,8 +40,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (interrupted) analysis.notes.emplace_back("interrupted: the search for other means did not go on");
   compareBlocks(analysis, measurements, how);
   if (how.inflate && !analysis.time_blocks) {
-    throw InputError("liestat mean", 0, "--inflate, but blocks of time cannot be compared",
-                     "rows with times (a column t), at least ten, and a mean with a covariance");
+    throw OptionError("liestat mean", "--inflate, but blocks of time cannot be compared",
+                      "rows with times (a column t), at least ten, and a mean with a covariance");
   }
   // Whoever asks for JSON on standard output wants nothing else there.
   if (options.json != "-") printLines(formatMean(options.input.file, measurements, analysis));

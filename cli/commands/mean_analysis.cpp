@@ -1,7 +1,6 @@
 #include <cli/commands/mean_analysis.hpp>
 
-#include <formats/feature_values.hpp>
-#include <formats/feature.hpp>
+#include <cli/commands/mean_input.hpp>
 #include <experiments/parallel.hpp>
 #include <stats/summarized_mean.hpp>
 

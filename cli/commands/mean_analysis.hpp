@@ -1,6 +1,6 @@
 #pragma once
 
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 #include <stats/charts.hpp>
 #include <stats/mean_summary.hpp>
 

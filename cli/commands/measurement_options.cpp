@@ -1,5 +1,9 @@
 #include <cli/commands/measurement_options.hpp>
 
+#include <string>
+#include <utility>
+#include <vector>
+
 namespace liestat::cli {
 
 void MeasurementInput::declare(const Command& app, bool file_required) {
@@ -8,14 +12,16 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
   app.option("--format", format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
   app.option("--columns", columns, "Names of CSV columns that are not ours: r00=R00,tx=cx (ours=the file's)").list();
   app.flag("--ignore-unknown", ignore_unknown, "Pass over CSV columns without a meaning");
-  app.option("--feature", options.feature, "What the rows are (default: as the file says; poses are frames)")
-      .oneOf(featureNames());
-  app.option("--criterion", options.criterion,
-             "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)")
-      .oneOf({"lsq", "wlsq", "maha"});
-  app.option("--covariance-at", options.covariance_at,
-             "Where covariances of frames belong: measured (the frame of each measurement) or estimated (of the mean)")
-      .oneOf({"measured", "estimated"});
+  std::vector<std::pair<std::string, Feature>> features;
+  for (const FeatureInfo& row : feature_rows) features.emplace_back(row.name, row.kind);
+  app.choice("--feature", options.feature, features, "What the rows are (default: as the file says; poses are frames)");
+  app.choice<Criterion>("--criterion", options.criterion,
+                        {{"lsq", Criterion::lsq}, {"wlsq", Criterion::wlsq}, {"maha", Criterion::maha}},
+                        "lsq, wlsq or maha (default: maha with covariances, wlsq with weights, else lsq)");
+  app.choice<CovarianceAt>(
+      "--covariance-at", options.covariance_at,
+      {{"measured", CovarianceAt::measured}, {"estimated", CovarianceAt::estimated}},
+      "Where covariances of frames belong: measured (the frame of each measurement) or estimated (of the mean)");
   app.flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
   const Option in_degrees = app.flag("--degrees", degrees, "Rotation vectors are in degrees");
   app.flag("--radians", radians, "Rotation vectors are in radians, those beyond a turn too").excludes(in_degrees);

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cli/commands/command_line.hpp>
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 
 #include <string>
 #include <vector>

@@ -36,9 +36,9 @@ void requirePlan(const MotionOptions& options, const MotionInput& input) {
     case MotionFault::none:
       return;
     case MotionFault::composition_over_intervals:
-      throw InputError(command_name, 0, inWords(fault), "--filter subspace or essential with --frames-apart");
+      throw OptionError(command_name, inWords(fault), "--filter subspace or essential with --frames-apart");
     case MotionFault::bias_without_gyroscope:
-      throw InputError(command_name, 0, "--bias asks for the bias of a gyroscope", "--rates or --imu");
+      throw OptionError(command_name, "--bias asks for the bias of a gyroscope", "--rates or --imu");
     case MotionFault::no_time:
       throw InputError(input.gyroscope_file, 0, inWords(fault), "times that ascend");
   }
@@ -74,9 +74,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   if (!options.report.empty()) {
     if (!window.has_looked_at()) {
-      throw InputError(fmt::format("--report-frame {}", window.looked_at()), 0,
-                       "there is no such frame with one before it",
-                       fmt::format("one of {} to {}", result.frames.front().frame, result.frames.back().frame));
+      throw OptionError(fmt::format("--report-frame {}", window.looked_at()),
+                        "there is no such frame with one before it",
+                        fmt::format("one of {} to {}", result.frames.front().frame, result.frames.back().frame));
     }
     writeMotionReport(options.report, invocation.command_line, result, studyFrame(window, result));
   }

@@ -1,11 +1,10 @@
 #include <cli/commands/motion_input.hpp>
 
 #include <cli/commands/camera.hpp>
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
-#include <formats/rotation_matrix.hpp>
 #include <formats/text.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/motion/gyroscope.hpp>
@@ -22,6 +21,8 @@ namespace liestat::cli {
 namespace {
 
 constexpr const char* motion_name = "liestat motion";
+/// A quaternion of the command line is a unit quaternion within this.
+constexpr double unit_tolerance = 1e-3;
 constexpr std::size_t most_frames = 1000000;
 /// Fewer observations than the filter asks for in one frame tell nothing of their unit.
 constexpr std::size_t least_observations_of_a_unit = 8;
@@ -33,7 +34,7 @@ Calibration calibrationOf(const MotionInputOptions& options) {
 Camera cameraOf(const MotionInputOptions& options, const Calibration& calibration) {
   if (!options.intrinsics.empty()) return cameraFromIntrinsics(options.intrinsics);
   if (options.calibration.empty()) {
-    throw InputError(motion_name, 0, "the camera is not known", "--intrinsics fu,fv,cu,cv or --calibration FILE");
+    throw OptionError(motion_name, "the camera is not known", "--intrinsics fu,fv,cu,cv or --calibration FILE");
   }
   if (calibration.cameras.empty()) throw InputError(joined(options.calibration, ", "), 0, "there is no camera", "one");
   return calibration.cameras.front().camera;
@@ -45,9 +46,9 @@ class TrackRays {
   TrackRays(const MotionInputOptions& options, const Camera& camera)
       : options_(options), camera_(camera), sigma_(options.sigma / std::sqrt(camera.fu * camera.fv)) {
     if (sigma_ > 0.1) {
-      throw InputError(motion_name, 0,
-                       fmt::format("--sigma {:g} is {:.3g} of the focal length {:g}", options.sigma, sigma_, camera.fu),
-                       "both in pixels");
+      throw OptionError(
+          motion_name, fmt::format("--sigma {:g} is {:.3g} of the focal length {:g}", options.sigma, sigma_, camera.fu),
+          "both in pixels");
     }
   }
 
@@ -133,16 +134,16 @@ SO3d cameraFromRates(const MotionInputOptions& options) {
   if (!options.rates_rotation.empty()) {
     const std::vector<double>& q = options.rates_rotation;
     const Eigen::Vector4d xyzw(q[0], q[1], q[2], q[3]);
-    if (!(std::abs(xyzw.norm() - 1) < rotation_tolerance)) {
-      throw InputError(motion_name, 0, fmt::format("--rates-rotation has the norm {:g}", xyzw.norm()),
-                       "a unit quaternion x,y,z,w");
+    if (!(std::abs(xyzw.norm() - 1) < unit_tolerance)) {
+      throw OptionError(motion_name, fmt::format("--rates-rotation has the norm {:g}", xyzw.norm()),
+                        "a unit quaternion x,y,z,w");
     }
     const Eigen::Vector4d unit = xyzw.normalized();
     return SO3d(Eigen::Quaterniond(unit[3], unit[0], unit[1], unit[2]));
   }
   if (options.axes == RateAxes::camera) {
     if (!options.camera_tilt.empty()) {
-      throw InputError(motion_name, 0, "--camera-tilt is that of a camera on a vehicle", "--rates-axes vehicle");
+      throw OptionError(motion_name, "--camera-tilt is that of a camera on a vehicle", "--rates-axes vehicle");
     }
     return {};
   }
@@ -186,11 +187,11 @@ ImuNoise<double> noiseOf(const MotionInputOptions& options, const Calibration& c
 
 MotionInput readMotionInput(const MotionInputOptions& options) {
   if (!options.rates.empty() && !options.imu.empty()) {
-    throw InputError(motion_name, 0, "there are both --rates and --imu", "one gyroscope");
+    throw OptionError(motion_name, "there are both --rates and --imu", "one gyroscope");
   }
   for (const auto* list : {&options.camera_tilt, &options.gyroscope_bias}) {
     if (std::all_of(list->begin(), list->end(), [](double x) { return std::isfinite(x); })) continue;
-    throw InputError(motion_name, 0, "--camera-tilt or --gyroscope-bias is not finite", "three numbers");
+    throw OptionError(motion_name, "--camera-tilt or --gyroscope-bias is not finite", "three numbers");
   }
   const Calibration calibration = calibrationOf(options);
   const Camera camera = cameraOf(options, calibration);
@@ -201,8 +202,8 @@ MotionInput readMotionInput(const MotionInputOptions& options) {
     return input;
   }
   if (calibration.cameras.empty()) {
-    throw InputError(motion_name, 0, "where the camera sits on the inertial sensor is not known",
-                     "--calibration with T_cam_imu or T_imu_cam");
+    throw OptionError(motion_name, "where the camera sits on the inertial sensor is not known",
+                      "--calibration with T_cam_imu or T_imu_cam");
   }
   input.gyroscope_file = options.imu;
   ImuFile imu = readImu(options.imu);

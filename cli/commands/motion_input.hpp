@@ -45,7 +45,7 @@ struct MotionInput {
   std::string gyroscope_file;
 };
 
-/// Reads the files that the options name. Throws InputError, also where focal lengths and image coordinates are in
+/// Reads the files that the options name. Throws InputError or OptionError, also where focal lengths and image coordinates are in
 /// different units, where there is one frame, and where an inertial sensor's readings cover none of the intervals.
 MotionInput readMotionInput(const MotionInputOptions& options);
 

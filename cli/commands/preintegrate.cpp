@@ -42,14 +42,14 @@ int runCommand(const Options& options, const Invocation& invocation) {
   const double begin = options.begin.value_or(imu.samples.front().time);
   const double end = options.end.value_or(imu.samples.back().time);
   if (!(end > begin)) {
-    throw InputError(command_name, 0, fmt::format("the interval is from {} to {} s", begin, end),
-                     "an end after the beginning");
+    throw OptionError(command_name, fmt::format("the interval is from {} to {} s", begin, end),
+                      "an end after the beginning");
   }
   const std::vector<TimeInterval> intervals = consecutiveWindows(begin, end, options.window, max_windows);
   if (intervals.empty()) {
     const double length = options.window.value_or(end - begin);
-    throw InputError(
-        command_name, 0,
+    throw OptionError(
+        command_name,
         fmt::format("windows of {} s fit {:.4g} times into {} s", length, (end - begin) / length, end - begin),
         fmt::format("once to {:g} times", max_windows));
   }

@@ -38,7 +38,7 @@ Enum byName(const List& all, const std::string& wanted) {
   for (const Enum value : all) {
     if (name(value) == wanted) return value;
   }
-  throw InputError(command_name, 0, "there is no " + wanted);
+  throw OptionError(command_name, "there is no " + wanted);
 }
 template <class List>
 std::vector<std::string> namesOf(const List& all) {
@@ -97,7 +97,7 @@ int runCommand(Options options, const Invocation& invocation) {
   scene_options.noise = byName<HandEyeNoise>(all_hand_eye_noises, options.noise);
   scene_options.outlier_kind = byName<HandEyeOutliers>(all_hand_eye_outliers, options.outlier_kind);
   for (const double value : {scene_options.noise_factor, scene_options.outliers}) {
-    if (!std::isfinite(value)) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+    if (!std::isfinite(value)) throw OptionError(command_name, "an option is not a finite number", "finite ones");
   }
   const bool tum = options.format == "tum";
   if (!options.overwrite) {

@@ -109,12 +109,12 @@ int runCommand(Options options) {
   const double seconds = static_cast<double>(how.frames) / how.frame_rate, readings = seconds * how.imu_rate;
   const double observations = static_cast<double>(how.frames) * static_cast<double>(how.scene.points);
   if (readings > max_readings || observations > max_observations) {
-    throw InputError(command_name, 0, fmt::format("{:.3g} observations and {:.3g} readings", observations, readings),
-                     fmt::format("{:g} and {:g} at most", max_observations, max_readings));
+    throw OptionError(command_name, fmt::format("{:.3g} observations and {:.3g} readings", observations, readings),
+                      fmt::format("{:g} and {:g} at most", max_observations, max_readings));
   }
   if (!options.gyroscope_bias.empty()) {
     how.gyroscope_bias << options.gyroscope_bias[0], options.gyroscope_bias[1], options.gyroscope_bias[2];
-    if (!how.gyroscope_bias.allFinite()) throw InputError(command_name, 0, "the bias is not finite", "rad/s");
+    if (!how.gyroscope_bias.allFinite()) throw OptionError(command_name, "the bias is not finite", "rad/s");
   }
   for (const char* name : motion_files) {
     const std::string path = options.path(name);

@@ -71,13 +71,13 @@ int runCommand(Options options, const Invocation& invocation) {
   }
   for (const double value : {scene_options.outliers, scene_options.sigma, scene_options.focal_length,
                              scene_options.width, scene_options.height}) {
-    if (!std::isfinite(value)) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+    if (!std::isfinite(value)) throw OptionError(command_name, "an option is not a finite number", "finite ones");
   }
   if (!options.overwrite) requireFree(options.output), requireFree(options.truth);
   const TwoViewScene scene(scene_options, options.seed);
   if (!scene.possible) {
-    throw InputError(
-        command_name, 0,
+    throw OptionError(
+        command_name,
         fmt::format("the motion '{}' takes all points out of images of {:g} x {:g} px at a focal length of {:g} px",
                     nameOf(scene_options.motion), scene_options.width, scene_options.height,
                     scene_options.focal_length),

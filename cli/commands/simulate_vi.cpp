@@ -57,14 +57,14 @@ void checkSize(const Options& options, double duration) {
   const double readings = duration * options.imu_rate;
   const double looks = duration * options.scene.image_rate * static_cast<double>(options.scene.landmarks);
   if (readings <= max_readings && looks <= max_looks) return;
-  throw InputError(command_name, 0, fmt::format("{:.3g} readings, and {:.3g} looks at a landmark", readings, looks),
-                   fmt::format("{:g} and {:g} at most", max_readings, max_looks));
+  throw OptionError(command_name, fmt::format("{:.3g} readings, and {:.3g} looks at a landmark", readings, looks),
+                    fmt::format("{:g} and {:g} at most", max_readings, max_looks));
 }
 
 SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
   if (!options.imu.empty()) {
     if (options.truth.empty())
-      throw InputError(command_name, 0, "there is no --truth", "where the body was that --imu recorded");
+      throw OptionError(command_name, "there is no --truth", "where the body was that --imu recorded");
     const ImuFile imu = readImu(options.imu);
     if (imu.format != "euroc")
       throw InputError(options.imu, 0, "the times are seconds", "nanoseconds, as in the truth (EuRoC)");
@@ -95,7 +95,7 @@ SimulatedRecording simulate(const Options& options, const Sensors& sensors) {
   std::optional<SplineTrajectory> motion;
   if (options.truth.empty()) {
     const double end = options.end.value_or(20);
-    if (!(end > 0)) throw InputError(command_name, 0, fmt::format("the end is at {:.10g} s", end), "one after 0 s");
+    if (!(end > 0)) throw OptionError(command_name, fmt::format("the end is at {:.10g} s", end), "one after 0 s");
     checkSize(options, end);
     motion = builtInTrajectory(end, options.scene.seed);
   } else {
@@ -129,16 +129,16 @@ void checkFinite(const Options& options) {
   for (const auto* list : {&options.box, &options.gyroscope_bias, &options.accelerometer_bias})
     values.insert(values.end(), list->begin(), list->end());
   const bool finite = std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-  if (!finite) throw InputError(command_name, 0, "an option is not a finite number", "finite ones");
+  if (!finite) throw OptionError(command_name, "an option is not a finite number", "finite ones");
 }
 
 int runCommand(Options options) {
   checkFinite(options);
   options.scene.box = given(options.box);
   if (options.begin && options.end && !(*options.begin < *options.end)) {
-    throw InputError(command_name, 0,
-                     fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),
-                     "an end after the beginning");
+    throw OptionError(command_name,
+                      fmt::format("the interval is from {:.10g} to {:.10g} s", *options.begin, *options.end),
+                      "an end after the beginning");
   }
   if (!options.overwrite) requireOwnFiles(options.output);
   const Sensors sensors = sensorsOf(options);
@@ -147,7 +147,7 @@ int runCommand(Options options) {
     writeRecording(recording, options.output);
     printLines(formatSimulatedRecording(recording, options.scene, !options.imu.empty(), options.output));
   } catch (const ImpossibleMotion& complaint) {
-    throw InputError(command_name, 0, complaint.found(), complaint.expected());
+    throw OptionError(command_name, complaint.found(), complaint.expected());
   }
   return exit_fine;
 }

@@ -1,7 +1,6 @@
 #include <cli/commands/split.hpp>
 
-#include <formats/feature_values.hpp>
-#include <formats/feature.hpp>
+#include <cli/commands/mean_input.hpp>
 #include <experiments/interruption.hpp>
 #include <experiments/parallel.hpp>
 #include <stats/summarized_mean_splits.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 #include <stats/split_validation_types.hpp>
 
 #include <cstddef>

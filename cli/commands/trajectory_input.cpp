@@ -45,12 +45,12 @@ void TrajectoryInputOptions::settle() {
   if (!layout.empty()) {
     Convention c;
     if (!setConventionField(c, "layout", layout)) {
-      throw InputError("--cov-layout", 0, "'" + printable(layout) + "'", "full36, upper21, lower21, blocks12 or diag6");
+      throw OptionError("--cov-layout", "'" + printable(layout) + "'", "full36, upper21, lower21, blocks12 or diag6");
     }
     estimate.layout = c.layout;
   }
   for (const double value : {association.offset, association.start.value_or(0), association.end.value_or(0)}) {
-    if (!std::isfinite(value)) throw InputError("liestat", 0, "a time that is not finite", "seconds");
+    if (!std::isfinite(value)) throw OptionError("liestat", "a time that is not finite", "seconds");
   }
 }
 

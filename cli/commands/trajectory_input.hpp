@@ -20,7 +20,7 @@ struct TrajectoryInputOptions {
 
   /// Declares them, evo's names included.
   void declare(const Command& command);
-  /// Takes over what is given as text. Throws InputError.
+  /// Takes over what is given as text. Throws OptionError.
   void settle();
 };
 

@@ -2,8 +2,8 @@
 #include <formats/calibration.hpp>
 #include <cli/commands/camera.hpp>
 #include <formats/input_error.hpp>
-#include <formats/numeric_table.hpp>
 #include <formats/output_file.hpp>
+#include <formats/tracks.hpp>
 #include <report/json.hpp>
 #include <cli/show/two_view.hpp>
 #include <fusion/two_view/two_view.hpp>
@@ -38,15 +38,6 @@ const std::map<std::string, TwoViewNode> node_names = {{"free_zoom", TwoViewNode
                                                        {"affine_epipolar", TwoViewNode::affine_epipolar},
                                                        {"shared_focal", TwoViewNode::shared_focal}};
 
-std::vector<Eigen::Vector4d> readMatches(const std::string& path) {
-  const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2"});
-  std::vector<Eigen::Vector4d> matches;
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    matches.emplace_back(table(i, 0), table(i, 1), table(i, 2), table(i, 3));
-  }
-  return matches;
-}
-
 void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
   if (!options.calibration.empty()) {
     const Calibration calibration = readCalibration(options.calibration);
@@ -57,14 +48,14 @@ void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
   }
   if (!options.intrinsics.empty()) estimate.first = cameraFromIntrinsics(options.intrinsics);
   if (!options.second_intrinsics.empty()) {
-    if (!estimate.first) throw InputError(command_name, 0, "only the second camera is known", "--intrinsics too");
+    if (!estimate.first) throw OptionError(command_name, "only the second camera is known", "--intrinsics too");
     estimate.second = cameraFromIntrinsics(options.second_intrinsics);
   }
   for (const std::string& node : options.nodes) estimate.nodes.push_back(node_names.at(node));
   if (!options.verticals.empty()) {
-    if (!estimate.first) throw InputError(command_name, 0, "verticals without a camera", "--intrinsics too");
+    if (!estimate.first) throw OptionError(command_name, "verticals without a camera", "--intrinsics too");
     const Eigen::Map<const Eigen::Vector3d> first(options.verticals.data()), second(options.verticals.data() + 3);
-    if (!(first.norm() > 0 && second.norm() > 0)) throw InputError(command_name, 0, "a vertical is zero", "directions");
+    if (!(first.norm() > 0 && second.norm() > 0)) throw OptionError(command_name, "a vertical is zero", "directions");
     estimate.verticals = TwoViewVerticals{first, second};
   }
   if (!options.image_size.empty()) estimate.image_size = Eigen::Vector2d(options.image_size[0], options.image_size[1]);

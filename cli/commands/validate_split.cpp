@@ -134,9 +134,9 @@ int show(const Split& split, const Options& options, const Invocation& invocatio
 
 int runCommand(const Options& options, const Invocation& invocation) {
   if (options.stereo.empty() == options.input.file.empty()) {
-    throw InputError(command_name, 0, "one input is needed, a FILE or --stereo PREFIX");
+    throw OptionError(command_name, "one input is needed, a FILE or --stereo PREFIX");
   }
-  if (options.settings.split.blocks % 2 != 0) throw InputError(command_name, 0, "--blocks must be even");
+  if (options.settings.split.blocks % 2 != 0) throw OptionError(command_name, "--blocks must be even");
   return options.stereo.empty() ? show(splitFile(options), options, invocation)
                                 : show(splitStereo(options), options, invocation);
 }

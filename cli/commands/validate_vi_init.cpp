@@ -37,7 +37,7 @@ int runTable1(const Options& options, const Invocation& invocation) {
 
 int runScene(const Options& options, const Invocation& invocation) {
   if (options.output.report.empty()) {
-    throw InputError("--scene", 0, "draws into a directory and none is named", "--report DIR");
+    throw OptionError("--scene", "draws into a directory and none is named", "--report DIR");
   }
   const auto found = twoSolutions(options.scene == "fig1" ? 1 : 2, options.seed);
   if (!found) {
@@ -69,7 +69,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   const std::vector<ViInitRow> rows =
       runTrials("validate vi-init", [&](const auto& progress) { return validateViInit(validation, progress); });
   if (endedBeforeTrials()) return exit_interrupted;
-  if (rows.empty()) throw InputError("--window", 0, "none of these checks has windows of this length");
+  if (rows.empty()) throw OptionError("--window", "none of these checks has windows of this length");
   return publish(
       options.output, invocation, options.seed, run_false_alarm, rows, formatViInitTables,
       [](const ViInitRow& row) { return toJson(row); }, writeViInitReport);

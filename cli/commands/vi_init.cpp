@@ -48,14 +48,14 @@ CameraCalibration cameraOf(const Options& options, const Calibration& calibratio
     if (named == calibration.cameras.end()) {
       std::string names;
       for (const CameraCalibration& c : calibration.cameras) names += (names.empty() ? "" : ", ") + c.name;
-      throw InputError(command_name, 0, fmt::format("no calibration has a camera {}", printable(options.camera)),
-                       names.empty() ? "a calibration with a camera" : "one of " + names);
+      throw OptionError(command_name, fmt::format("no calibration has a camera {}", printable(options.camera)),
+                        names.empty() ? "a calibration with a camera" : "one of " + names);
     }
     camera = *named;
   } else if (!calibration.cameras.empty()) {
     camera = calibration.cameras.front();
   } else if (options.intrinsics.empty()) {
-    throw InputError(command_name, 0, "no camera is known", "--calibration with a camera, or --intrinsics fu,fv,cu,cv");
+    throw OptionError(command_name, "no camera is known", "--calibration with a camera, or --intrinsics fu,fv,cu,cv");
   }
   if (!options.intrinsics.empty()) camera.camera = cameraFromIntrinsics(options.intrinsics);
   return camera;
@@ -70,12 +70,12 @@ ViRecording recordingOf(const Options& options) {
   recording.pose_assumed = calibration.cameras.empty();
   recording.noise = options.imu.noiseOver(calibration.imu.value_or(ImuNoise<double>{}));
   if (!(recording.noise.gyroscope > 0 && recording.noise.accelerometer > 0)) {
-    throw InputError(command_name, 0, "the inertial sensor's densities of noise are not known",
-                     "--calibration with an imu0, or --noise gyroscope,accelerometer");
+    throw OptionError(command_name, "the inertial sensor's densities of noise are not known",
+                      "--calibration with an imu0, or --noise gyroscope,accelerometer");
   }
   if (!options.truth.empty()) recording.truth = readGroundTruth(options.truth, recording.imu.start_ns);
   if (options.true_biases && recording.truth.empty()) {
-    throw InputError(command_name, 0, "--true-biases without --truth");
+    throw OptionError(command_name, "--true-biases without --truth");
   }
   return recording;
 }

@@ -17,14 +17,13 @@ void refuseFault(const VisualInertialResult& found, const VisualInertialRecordin
   const std::vector<double>& times = measured.image_times;
   const std::span<const ImuSample<double>> readings = measured.readings;
   if (times.empty() || readings.empty()) {
-    throw InputError(command, 0, times.empty() ? "there are no images" : "there are no readings",
-                     "a recording of both");
+    throw OptionError(command, times.empty() ? "there are no images" : "there are no readings", "a recording of both");
   }
   const double begin = how.begin.value_or(times.front()), end = how.end.value_or(times.back());
   if (found.fault != FaultKind::too_few_images) {
     const double windows = (end - begin) / (how.stride > 0 ? how.stride : how.window);
-    throw InputError(command, 0, fmt::format("{:.3g} windows from {:.3f} to {:.3f} s", windows, begin, end),
-                     fmt::format("at most {}", how.max_windows));
+    throw OptionError(command, fmt::format("{:.3g} windows from {:.3f} to {:.3f} s", windows, begin, end),
+                      fmt::format("at most {}", how.max_windows));
   }
   const double images_last = times.back() - times.front(), readings_last = readings.back().time - readings.front().time;
   // As many decimals as tell the ends apart.
@@ -36,8 +35,8 @@ void refuseFault(const VisualInertialResult& found, const VisualInertialRecordin
   // A thousand apart, as µs and ns are, or ms and µs.
   const bool unit = (ratio > 300 && ratio < 3000) || (1 / ratio > 300 && 1 / ratio < 3000);
   if (suspicion.empty() && unit) suspicion = "; does one clock count in µs where the other counts in ns?";
-  throw InputError(
-      command, 0,
+  throw OptionError(
+      command,
       fmt::format("no window of {} s fits: {} images from {:.{}f} to {:.{}f} s, {} of them outside of the "
                   "readings' {:.{}f} to {:.{}f} s{}",
                   how.window, times.size(), times.front(), decimals, times.back(), decimals, found.images_outside,

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <formats/calibration.hpp>
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 #include <formats/imu.hpp>
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>

@@ -2,7 +2,7 @@
 
 // Views of `liestat validate split`, of the measurements in a file and of landmarks that a stereo camera saw.
 
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
 #include <report/json.hpp>
 #include <stats/split_validation_types.hpp>

@@ -1,9 +1,12 @@
-// The program's readers of files for Python: columns by name.
-#include <formats/image_tracks.hpp>
+// The readers of formats/ for Python, but for those of trajectories: columns by name.
+#include <formats/calibration.hpp>
+#include <formats/features.hpp>
 #include <formats/imu.hpp>
 #include <formats/input_error.hpp>
-#include <formats/features.hpp>
-#include <python/src/binding.hpp>
+#include <formats/pose_pairs.hpp>
+#include <formats/tracks.hpp>
+#include <python/src/array_operations.hpp>
+#include <python/src/described.hpp>
 
 #include <pybind11/stl.h>
 
@@ -26,6 +29,16 @@ DoubleArray rowsOf(const List& list, py::ssize_t columns, Write write) {
   }
   return rows;
 }
+/// What a reader returns; others may run meanwhile.
+template <class Reader>
+auto released(Reader&& reader) {
+  const py::gil_scoped_release release;
+  return reader();
+}
+template <class M>
+DoubleArray arrayOfPoints(const std::vector<M>& points) {
+  return rowsOf(points, parametersOf<M>(), [](const M& x, double* out) { storePoint(x, out); });
+}
 py::array_t<std::int64_t> integers(const std::vector<std::int64_t>& list) {
   py::array_t<std::int64_t> array(static_cast<py::ssize_t>(list.size()));
   std::copy(list.begin(), list.end(), array.mutable_data());
@@ -42,21 +55,18 @@ py::dict readFeatures(const std::string& path, const std::string& format, double
                                          : AngleUnit::unsaid;
   options.ignore_unknown = ignore_unknown;
   options.columns = columns;
-  const FeatureFile file = [&] {
-    const py::gil_scoped_release released;
-    return readFeatureFile(path, options);
-  }();
+  const FeatureFile file = released([&] { return readFeatureFile(path, options); });
   const auto vector3 = [](const Eigen::Vector3d& v, double* out) { Eigen::Map<Eigen::Vector3d>{out} = v; };
   py::dict d;
-  d["kind"] = experiments::name(file.kind);
+  d["kind"] = liestat::name(file.kind);
   d["format"] = file.format;
   d["rotations"] = rowsOf(file.rotations, 4, [](const Eigen::Quaterniond& q, double* out) {
     Eigen::Map<Eigen::Vector4d>{out} = q.coeffs();
   });
   d["positions"] = rowsOf(file.positions, 3, vector3);
   d["directions"] = rowsOf(file.directions, 3, vector3);
-  d["weights"] = arrayOf(file.weights, {static_cast<py::ssize_t>(file.weights.size())});
-  d["times"] = arrayOf(file.times, {static_cast<py::ssize_t>(file.times.size())});
+  d["weights"] = python::arrayOf(file.weights, {static_cast<py::ssize_t>(file.weights.size())});
+  d["times"] = python::arrayOf(file.times, {static_cast<py::ssize_t>(file.times.size())});
   d["lines"] = integers(std::vector<std::int64_t>(file.lines.begin(), file.lines.end()));
   const py::ssize_t k = file.covariances.empty() ? 0 : static_cast<py::ssize_t>(file.covariances[0].rows());
   DoubleArray covariances({static_cast<py::ssize_t>(file.covariances.size()), k, k});
@@ -71,10 +81,7 @@ py::dict readFeatures(const std::string& path, const std::string& format, double
 }
 
 py::dict readImuFile(const std::string& path) {
-  const ImuFile file = [&] {
-    const py::gil_scoped_release released;
-    return readImu(path);
-  }();
+  const ImuFile file = released([&] { return readImu(path); });
   py::dict d;
   d["format"] = file.format;
   d["start_ns"] = file.start_ns;
@@ -87,10 +94,7 @@ py::dict readImuFile(const std::string& path) {
 }
 
 py::dict readTracksFile(const std::string& path, const std::string& image_times, std::int64_t start_ns) {
-  const ImageTracks file = [&] {
-    const py::gil_scoped_release released;
-    return readImageTracks(path, image_times, start_ns);
-  }();
+  const ImageTracks file = released([&] { return readImageTracks(path, image_times, start_ns); });
   std::vector<std::int64_t> images, tracks;
   for (const auto& seen : file.observations) {
     images.push_back(static_cast<std::int64_t>(seen.image));
@@ -98,7 +102,7 @@ py::dict readTracksFile(const std::string& path, const std::string& image_times,
   }
   py::dict d;
   d["format"] = file.format;
-  d["image_times"] = arrayOf(file.times, {static_cast<py::ssize_t>(file.times.size())});
+  d["image_times"] = python::arrayOf(file.times, {static_cast<py::ssize_t>(file.times.size())});
   d["frames"] = integers(std::vector<std::int64_t>(file.frames.begin(), file.frames.end()));
   d["track_ids"] = integers(std::vector<std::int64_t>(file.track_ids.begin(), file.track_ids.end()));
   d["images"] = integers(images);
@@ -110,6 +114,103 @@ py::dict readTracksFile(const std::string& path, const std::string& image_times,
   return d;
 }
 
+/// The densities in the order of preintegrate's argument `noise`.
+DoubleArray arrayOf(const ImuNoise<double>& noise) {
+  return python::arrayOf({noise.gyroscope, noise.accelerometer, noise.gyroscope_walk, noise.accelerometer_walk}, {4});
+}
+
+py::dict readCalibrationFiles(const std::vector<std::string>& paths) {
+  const Calibration file = released([&] { return readCalibration(paths); });
+  py::list cameras;
+  for (const CameraCalibration& c : file.cameras) {
+    py::dict d;
+    d["name"] = c.name;
+    d["camera"] =
+        py::make_tuple(c.camera.fu, c.camera.fv, c.camera.cu, c.camera.cv, static_cast<int>(c.camera.distortion),
+                       DictView::of(c.camera.coefficients), c.camera.width, c.camera.height);
+    d["imu_T_camera"] = DictView::of(c.imu_T_cam.params());
+    d["timeshift"] = c.timeshift_cam_imu;
+    cameras.append(d);
+  }
+  py::dict d;
+  d["imu_noise"] = file.imu ? py::object(arrayOf(*file.imu)) : py::none();
+  d["cameras"] = cameras;
+  return d;
+}
+
+py::dict readGroundTruthFile(const std::string& path, std::int64_t start_ns) {
+  const std::vector<GroundTruth> rows = released([&] { return readGroundTruth(path, start_ns); });
+  std::vector<double> times;
+  std::vector<SE23d> states;
+  for (const GroundTruth& row : rows) times.push_back(row.time), states.push_back(row.state);
+  py::dict d;
+  d["times"] = DictView::of(times), d["states"] = arrayOfPoints(states);
+  d["biases"] = rowsOf(rows, 6, [](const GroundTruth& row, double* out) {
+    Eigen::Map<Eigen::Vector3d>{out} = row.bias.gyroscope;
+    Eigen::Map<Eigen::Vector3d>{out + 3} = row.bias.accelerometer;
+  });
+  return d;
+}
+
+py::dict readStereoTracksFile(const std::string& path) {
+  const std::vector<StereoObservation> rows = released([&] { return readStereoTracks(path); });
+  std::vector<std::int64_t> frames, tracks;
+  for (const StereoObservation& row : rows) {
+    frames.push_back(static_cast<std::int64_t>(row.frame)), tracks.push_back(static_cast<std::int64_t>(row.track));
+  }
+  py::dict d;
+  d["frames"] = integers(frames), d["tracks"] = integers(tracks);
+  d["pixels"] = rowsOf(rows, 4, [](const StereoObservation& row, double* out) {
+    Eigen::Map<Eigen::Vector4d>{out} = Eigen::Vector4d(row.uL, row.vL, row.uR, row.vR);
+  });
+  return d;
+}
+
+py::dict readCameraPosesFile(const std::string& path) {
+  const std::vector<CameraPose> rows = released([&] { return readCameraPoses(path); });
+  std::vector<std::int64_t> frames;
+  std::vector<double> times;
+  std::vector<SE3d> poses;
+  for (const CameraPose& row : rows) {
+    frames.push_back(static_cast<std::int64_t>(row.frame)), times.push_back(row.t);
+    poses.emplace_back(SO3d(row.R_camera_world).inverse(), row.c);
+  }
+  py::dict d;
+  d["frames"] = integers(frames), d["times"] = DictView::of(times), d["world_T_camera"] = arrayOfPoints(poses);
+  return d;
+}
+
+py::dict readStereoCameraFile(const std::string& path) {
+  const StereoCamera camera = released([&] { return readStereoCamera(path); });
+  py::dict d;
+  d["fu"] = camera.fu, d["fv"] = camera.fv, d["cu"] = camera.cu, d["cv"] = camera.cv, d["baseline"] = camera.b;
+  d["pixel_variance"] = DictView::of(camera.pixel_variance);
+  return d;
+}
+
+py::dict readPosePairFiles(const std::string& path_a, const std::string& path_b, bool by_row, double tolerance,
+                           double norm_tolerance) {
+  PosePairOptions options;
+  options.by_row = by_row, options.tolerance = tolerance, options.reading.norm_tolerance = norm_tolerance;
+  const PosePairs pairs = released([&] { return readPosePairs(path_a, path_b, options); });
+  const std::vector<SE3d> all_a = featuresOf<SE3d>(pairs.a), all_b = featuresOf<SE3d>(pairs.b);
+  std::vector<SE3d> a, b;
+  std::vector<double> times;
+  for (const PoseRows& row : pairs.rows) {
+    a.push_back(all_a[row.a]), b.push_back(all_b[row.b]);
+    if (row.time) times.push_back(*row.time);
+  }
+  py::dict d;
+  d["a"] = arrayOfPoints(a), d["b"] = arrayOfPoints(b);
+  d["rows"] = rowsOf(pairs.rows, 2, [](const PoseRows& row, double* out) {
+    out[0] = static_cast<double>(row.a), out[1] = static_cast<double>(row.b);
+  });
+  d["times"] = pairs.by_time ? DictView::of(times) : py::none();
+  d["largest_gap"] = pairs.largest_gap;
+  d["unmatched_a"] = pairs.unmatched_a, d["unmatched_b"] = pairs.unmatched_b;
+  return d;
+}
+
 }  // namespace
 
 void bindReaders(py::module_& module) {
@@ -117,6 +218,15 @@ void bindReaders(py::module_& module) {
   module.def("read_features", &readFeatures);
   module.def("read_imu", &readImuFile);
   module.def("read_tracks", &readTracksFile);
+  module.def("read_calibration", &readCalibrationFiles);
+  module.def("read_imu_noise", [](const std::string& path) { return arrayOf(readImuNoise(path)); });
+  module.def("read_ground_truth", &readGroundTruthFile);
+  module.def("read_stereo_tracks", &readStereoTracksFile);
+  module.def("read_camera_poses", &readCameraPosesFile);
+  module.def("read_stereo_camera", &readStereoCameraFile);
+  module.def("read_landmarks", [](const std::string& path) { return arrayOfPoints(readLandmarks(path)); });
+  module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path)); });
+  module.def("read_pose_pairs", &readPosePairFiles);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

@@ -3,7 +3,6 @@
 #include <formats/pose_graph.hpp>
 #include <formats/text.hpp>
 #include <formats/trajectory.hpp>
-#include <formats/trajectory_writer.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/described.hpp>
 #include <stats/convention_presets.hpp>
@@ -34,9 +33,8 @@ py::object nameOf(const std::optional<Convention>& c) {
 }
 
 TrajectoryOptions readingOptions(const std::string& format, const std::string& covariance_file,
-                                      const std::string& layout, double unmeasured,
-                                      const std::vector<std::string>& columns, bool ignore_unknown,
-                                      double norm_tolerance) {
+                                 const std::string& layout, double unmeasured, const std::vector<std::string>& columns,
+                                 bool ignore_unknown, double norm_tolerance) {
   TrajectoryOptions options;
   options.format = format, options.covariance_file = covariance_file, options.unmeasured = unmeasured;
   options.reading.columns = columns, options.reading.ignore_unknown = ignore_unknown;
@@ -53,7 +51,7 @@ py::dict readTrajectory(const std::string& path, const std::string& convention, 
       readingOptions(format, covariance_file, layout, unmeasured, columns, ignore_unknown, norm_tolerance);
   const Trajectory t = [&] {
     const py::gil_scoped_release released;
-    return readTrajectory(path, options);
+    return liestat::readTrajectory(path, options);
   }();
   py::dict d;
   d["poses"] = arrayOfPoses(t.poses);
@@ -82,8 +80,7 @@ py::dict readTrajectory(const std::string& path, const std::string& convention, 
 py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm_tolerance) {
   const PoseGraph graph = [&] {
     const py::gil_scoped_release released;
-    const TextFile file = loadText(path);
-    return parseGraph(file.text, file.name, ignore_unknown, norm_tolerance);
+    return liestat::readPoseGraph(path, ignore_unknown, norm_tolerance);
   }();
   std::vector<SE3d> poses, measurements;
   std::vector<std::int64_t> ids, from, to;
@@ -93,7 +90,7 @@ py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm
     measurements.push_back(e.measurement), from.push_back(e.from), to.push_back(e.to), lines.push_back(e.line);
   }
   py::dict d;
-  d["format"] = graph.format, d["planar"] = graph.planar;
+  d["format"] = name(graph.format), d["planar"] = graph.planar;
   d["ids"] = DictView::of(ids), d["poses"] = arrayOfPoses(poses);
   d["sources"] = DictView::of(from), d["targets"] = DictView::of(to);
   d["measurements"] = arrayOfPoses(measurements);
@@ -105,7 +102,7 @@ py::dict readPoseGraph(const std::string& path, bool ignore_unknown, double norm
 
 /// The convention in which a format is written, as a name with its layout.
 std::string conventionToWrite(const std::string& format, const std::string& asked) {
-  return conventionName(conventionToWrite(format, asked, "write_trajectory", "convention"));
+  return conventionName(liestat::conventionToWrite(format, asked, "write_trajectory", "convention"));
 }
 
 /// The text of a file, of its side file, and notes. The matrices are in the convention that conventionToWrite returned.
@@ -127,7 +124,7 @@ py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleA
     t.lines.push_back(0);
   }
   const Convention c = convention.empty() ? Convention{} : *parseConvention(convention);
-  const TrajectoryText file = formatTrajectory(t, format, c);
+  const TrajectoryText file = liestat::formatTrajectory(t, format, c);
   return py::make_tuple(file.text, file.side_file, notesOf(file, format, c));
 }
 

@@ -2,7 +2,7 @@
 #include <cli/commands/commands.hpp>
 #include <formats/pose_graph.hpp>
 #include <formats/trajectory.hpp>
-#include <formats/trajectory_rows.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/random.hpp>
 
@@ -420,7 +420,7 @@ TEST_F(Convert, badFilesAreNamedWithLineValueAndExpectation) {
 
 TEST_F(Convert, sideFilesThatAreWrong) {
   const std::string poses = write("p.tum", "1.0 1 2 3 0.1 0.5 0.3 0.806225775\n2.0 1 2 3 0 0 0 1\n");
-  const std::string header = conventionHeader({.layout = CovarianceLayout::diag6});
+  const std::string header = detail::conventionHeader({.layout = CovarianceLayout::diag6});
   const auto side = [&](const std::string& text) {
     write("p.tum.cov", text);
     return refusal({poses, "--to", "csv"});
@@ -446,14 +446,14 @@ TEST_F(Convert, sideFilesThatAreWrong) {
 }
 
 TEST_F(Convert, timesKeepTheirDigits) {
-  EXPECT_EQ(secondsOfTicks("1403636579763555584", 9), "1403636579.763555584");
-  EXPECT_EQ(secondsOfTicks("7", 9), "0.000000007");
+  EXPECT_EQ(detail::secondsOfTicks("1403636579763555584", 9), "1403636579.763555584");
+  EXPECT_EQ(detail::secondsOfTicks("7", 9), "0.000000007");
   bool exact = false;
-  EXPECT_EQ(ticksOfSeconds("1403636579.763555584", 9, exact), "1403636579763555584");
+  EXPECT_EQ(detail::ticksOfSeconds("1403636579.763555584", 9, exact), "1403636579763555584");
   EXPECT_TRUE(exact);
-  EXPECT_EQ(ticksOfSeconds("0.0000000079", 9, exact), "7");
+  EXPECT_EQ(detail::ticksOfSeconds("0.0000000079", 9, exact), "7");
   EXPECT_FALSE(exact);
-  EXPECT_EQ(ticksOfSeconds("12", 6, exact), "12000000");
+  EXPECT_EQ(detail::ticksOfSeconds("12", 6, exact), "12000000");
   const std::string euroc =
       write("e.csv", "#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1403636579763555584,1,2,3,1,0,0,0\n");
   ASSERT_EQ(convert({euroc, path("e.tum"), "--to", "tum"}).status, 0);

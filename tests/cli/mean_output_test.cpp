@@ -1,6 +1,6 @@
 // Notes of `liestat mean` on a result: axes, digits, rivals, weights, rows that depend on each other.
 #include <cli/commands/mean_analysis.hpp>
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 #include <formats/features.hpp>
 #include <cli/show/mean.hpp>
 

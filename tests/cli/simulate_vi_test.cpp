@@ -2,7 +2,7 @@
 // noise of the size asked for, all of it read back from the files.
 
 #include <formats/calibration.hpp>
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 #include <formats/imu.hpp>
 #include <experiments/recording_files.hpp>
 #include <cli/show/simulated_recording.hpp>
@@ -25,7 +25,6 @@
 
 #include <cli/show/run_program.hpp>
 #include <support/temporary_directory.hpp>
-#include <formats/tracks.hpp>
 
 namespace liestat::cli {
 using namespace experiments;

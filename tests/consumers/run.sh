@@ -32,12 +32,14 @@ quietly() {
 }
 
 built_and_ran() {
-  "$1" >"$work/log" || {
+  local program=$1 what=$2
+  shift 2
+  "$program" "$@" >"$work/log" || {
     cat "$work/log"
-    echo "consumers: $2: the program failed" >&2
+    echo "consumers: $what: the program failed" >&2
     exit 1
   }
-  echo "consumers: $2: built and ran"
+  echo "consumers: $what: built and ran"
 }
 
 cd "$work/build"
@@ -117,15 +119,30 @@ quietly "$CMAKE" --install liestat
 mv "$work/prefix" "$work/moved"
 # The estimators for programs that compile them once (fusion/detail/compiled.hpp,
 # stats/detail/compiled_mean.hpp).
-for source in "$root"/fusion/compiled/*.cpp "$root"/stats/compiled/*.cpp; do
+for source in "$root"/fusion/compiled/*.cpp "$root"/stats/compiled/*.cpp "$root"/formats/*.cpp \
+  "$root"/formats/detail/*.cpp; do
   quietly test -s "$work/moved/include/liestat/${source#"$root"/}"
 done
 
 quietly "$CMAKE" -S "$here/find_package" -B find_package -DCMAKE_PREFIX_PATH="$work/moved" -DTRAJECTORIES=$trajectories
+cp "$work/log" "$work/configured"
 quietly "$CMAKE" --build find_package
 built_and_ran ./find_package/consumer "find_package"
 built_and_ran ./find_package/compiled "find_package with components"
 [ $trajectories = OFF ] || built_and_ran ./find_package/fusion "find_package with trajectories"
+# The readers of files, where their packages are; where one is not, the configuration names it and goes on.
+if [ -x find_package/formats ]; then
+  built_and_ran ./find_package/formats "find_package with formats" "$root/examples/data/odometry.json"
+else
+  echo "consumers: formats: SKIPPED, $(grep -h 'liestat: formats needs' "$work/configured" || echo "it is not there")"
+fi
+quietly "$CMAKE" -S "$here/find_package" -B without_fmt -DCMAKE_PREFIX_PATH="$work/moved" \
+  -DCMAKE_DISABLE_FIND_PACKAGE_fmt=ON
+if ! grep -q 'liestat: formats needs fmt/core.h (Debian and Ubuntu: libfmt-dev)' "$work/log"; then
+  cat "$work/log"
+  echo "consumers: failed: a package that formats lacks is not named" >&2
+  exit 1
+fi
 if "$CMAKE" -S "$here/find_package" -B bogus -DCMAKE_PREFIX_PATH="$work/moved" -DWANTED=bogus >"$work/log" 2>&1 ||
   ! grep -q 'There is no component bogus; there are means, fusion, trajectories' "$work/log"; then
   cat "$work/log"

@@ -1,4 +1,4 @@
-#include <formats/gzip.hpp>
+#include <formats/detail/gzip.hpp>
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -40,19 +40,19 @@ TEST(Gzip, MembersOfAnySizeWithPadding) {
   // Beyond the blocks in which zlib is fed and emptied: many bytes that say little, and bytes that say as much.
   for (const int n : {0, 1, 5000, 200000}) {
     const std::string text = rows(n);
-    EXPECT_EQ(decompressed(zipped(text), "f"), text) << n;
-    EXPECT_EQ(decompressed(zipped(text) + zipped(rows(3)), "f"), text + rows(3)) << n;
-    EXPECT_EQ(decompressed(zipped(text) + std::string(512, '\0'), "f"), text) << n;
+    EXPECT_EQ(detail::decompressed(zipped(text), "f"), text) << n;
+    EXPECT_EQ(detail::decompressed(zipped(text) + zipped(rows(3)), "f"), text + rows(3)) << n;
+    EXPECT_EQ(detail::decompressed(zipped(text) + std::string(512, '\0'), "f"), text) << n;
   }
   const std::string zeros(std::size_t{1} << 22, '\0');
-  EXPECT_EQ(decompressed(zipped(zeros), "f"), zeros);
-  EXPECT_EQ(decompressed(zipped(""), "f"), "");
+  EXPECT_EQ(detail::decompressed(zipped(zeros), "f"), zeros);
+  EXPECT_EQ(detail::decompressed(zipped(""), "f"), "");
 }
 
 TEST(Gzip, TruncatedDamagedAndFollowed) {
   const std::string whole = zipped(rows(40));
   for (std::size_t size = 2; size < whole.size(); ++size) {
-    EXPECT_EQ(errorOf([&] { decompressed(whole.substr(0, size), "f.gz"); }),
+    EXPECT_EQ(errorOf([&] { detail::decompressed(whole.substr(0, size), "f.gz"); }),
               "f.gz: the compressed data end too early, expected a complete gzip file")
         << size;
   }
@@ -60,9 +60,9 @@ TEST(Gzip, TruncatedDamagedAndFollowed) {
   for (std::size_t i = 10; i < whole.size(); ++i) {
     std::string other = whole;
     other[i] = static_cast<char>(other[i] ^ 0x10);
-    EXPECT_NE(errorOf([&] { decompressed(other, "f.gz"); }), "") << i;
+    EXPECT_NE(errorOf([&] { detail::decompressed(other, "f.gz"); }), "") << i;
   }
-  EXPECT_EQ(errorOf([&] { decompressed(whole + "x,y,z\n", "f.gz"); }),
+  EXPECT_EQ(errorOf([&] { detail::decompressed(whole + "x,y,z\n", "f.gz"); }),
             "f.gz: something follows the end of the compressed data, expected a gzip file alone");
 }
 

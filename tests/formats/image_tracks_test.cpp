@@ -1,6 +1,6 @@
 // Tracks of features over images, good and bad.
 
-#include <formats/image_tracks.hpp>
+#include <formats/tracks.hpp>
 
 #include <gtest/gtest.h>
 

@@ -46,12 +46,14 @@ inline std::string contentOf(const std::string& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-/// The message of an InputError, empty if there was none.
+/// The message of an InputError or OptionError, empty if there was none.
 template <class Action>
 std::string errorOf(Action&& action) {
   try {
     action();
   } catch (const InputError& error) {
+    return error.what();
+  } catch (const OptionError& error) {
     return error.what();
   }
   return {};

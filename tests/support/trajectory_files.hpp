@@ -1,7 +1,7 @@
 // Files of simulated trajectories for the tests of the program: TUM, and the side file of covariances.
 #pragma once
 
-#include <formats/trajectory_rows.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 #include <experiments/trajectory_scene.hpp>
 #include <stats/convention_layouts.hpp>
 
@@ -32,7 +32,7 @@ inline std::vector<SE3d> posesOf(const std::vector<Gaussian<SE3d>>& gaussians) {
 inline std::string covarianceFileOf(const std::vector<double>& times, const std::vector<Gaussian<SE3d>>& gaussians,
                                     Convention c) {
   c.layout = CovarianceLayout::upper21;
-  std::string text = conventionHeader(c);
+  std::string text = detail::conventionHeader(c);
   for (std::size_t i = 0; i < times.size(); ++i) {
     text += fmt::format("{:.9f}", times[i]);
     const PackedCovariance packed = packCovariance(c, toConvention(c, gaussians[i]));

@@ -1,9 +1,11 @@
-// ROS and MAVLink messages in JSON and YAML; the one unit that parses JSON.
+// Messages of ROS and MAVLink in JSON and YAML: a message, a list of messages, one message per line (JSON), or one per
+// document (YAML); of ROS PoseWithCovarianceStamped, Odometry, PoseStamped, Path, of MAVLink ODOMETRY and
+// VISION_POSITION_ESTIMATE.
 #include <formats/input_error.hpp>
 #include <formats/text.hpp>
-#include <formats/trajectory_rows.hpp>
+#include <formats/detail/trajectory_formats.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 #include <lie/euler.hpp>
-#include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -11,10 +13,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {
 
 using Json = nlohmann::json;
@@ -228,7 +232,8 @@ Json jsonOf(const YAML::Node& node) {
 
 // --- MAVLink ----------------------------------------------------------------------------------------------------------
 
-void readMavlinkMessage(const Part& message, Trajectory& trajectory, const TrajectoryOptions& options) {
+void readMavlinkMessage(const Part& message, Trajectory& trajectory, const TrajectorySource& source) {
+  const auto& [text, format, options] = source;
   constexpr std::array types{"ODOMETRY", "VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP"};
   const auto meta = message.find({"meta"});
   const auto type = meta ? meta->find({"type"}) : message.find({"mavpackettype"});
@@ -238,7 +243,7 @@ void readMavlinkMessage(const Part& message, Trajectory& trajectory, const Traje
     if (std::find(types.begin(), types.end(), name) == types.end()) return;
   }
   const Part fields = data ? *data : message;
-  appendTicks(trajectory, fields.at({"time_usec", "usec"}).whole(), 6, fields.line);
+  appendTicks(trajectory, fields.at({"time_usec", "usec"}).whole(), format.time_decimals, fields.line);
   const Eigen::Vector3d position = fields.vector<3>("xyz");
   if (const auto q = fields.find({"q"})) {
     const std::vector<double> wxyz = q->list(false);
@@ -257,10 +262,10 @@ void readMavlinkMessage(const Part& message, Trajectory& trajectory, const Traje
     if (numbers.size() != 21) {
       covariance->complain(fmt::format("has {} numbers", numbers.size()), "21, the upper triangle row by row");
     }
-    applySentinels(numbers, CovarianceLayout::upper21, options.unmeasured, trajectory);
+    applySentinels(numbers, *format.layout, options.unmeasured, trajectory);
     trajectory.covariance_source = trajectory.name;
   }
-  appendCovariance(trajectory, {.layout = CovarianceLayout::upper21}, numbers, fields.line);
+  appendCovariance(trajectory, {.layout = *format.layout}, numbers, fields.line);
   if (trajectory.size() > 1) return;
   for (const char* key : {"frame_id", "child_frame_id"}) {
     if (const auto frame = fields.find({key})) trajectory.frames.push_back("MAV_FRAME " + shown(frame->json));
@@ -269,27 +274,21 @@ void readMavlinkMessage(const Part& message, Trajectory& trajectory, const Traje
 
 }  // namespace
 
-bool looksMavlink(std::string_view text) {
-  const std::string_view beginning = text.substr(0, 4096);
-  return beginning.find("mavpackettype") != std::string_view::npos ||
-         beginning.find("\"meta\"") != std::string_view::npos || beginning.find("time_usec") != std::string_view::npos;
-}
-
-void readRosJson(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  forEachMessage(text, trajectory.name, [&](const Json& json, std::size_t line, const std::string& name) {
-    readRosMessage({json, name, trajectory.name, line}, trajectory, options);
+void readRosJson(const TrajectorySource& source, Trajectory& trajectory) {
+  forEachMessage(source.text, trajectory.name, [&](const Json& json, std::size_t line, const std::string& name) {
+    readRosMessage({json, name, trajectory.name, line}, trajectory, source.options);
   });
 }
 
-void readMavlinkJson(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
-  forEachMessage(text, trajectory.name, [&](const Json& json, std::size_t line, const std::string& name) {
-    readMavlinkMessage({json, name, trajectory.name, line}, trajectory, options);
+void readMavlinkJson(const TrajectorySource& source, Trajectory& trajectory) {
+  forEachMessage(source.text, trajectory.name, [&](const Json& json, std::size_t line, const std::string& name) {
+    readMavlinkMessage({json, name, trajectory.name, line}, trajectory, source);
   });
   if (trajectory.covariance_source.empty()) trajectory.covariances.clear();
-  if (trajectory.hasCovariances()) trajectory.stated_convention = conventionPreset("mavlink");
 }
 
-void readRosYaml(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options) {
+void readRosYaml(const TrajectorySource& source, Trajectory& trajectory) {
+  std::string_view text = source.text;
   // One document at a time: what yaml-cpp takes for a document grows faster than its length.
   std::size_t line = 1, begin_line = 1;
   std::string document;
@@ -304,7 +303,7 @@ void readRosYaml(std::string_view text, Trajectory& trajectory, const Trajectory
       }
       const bool list = json.is_array();
       for (const Json& message : list ? json : Json::array({json})) {
-        readRosMessage({message, "the message", trajectory.name, begin_line}, trajectory, options);
+        readRosMessage({message, "the message", trajectory.name, begin_line}, trajectory, source.options);
       }
     }
     document.clear();
@@ -328,4 +327,74 @@ void readRosYaml(std::string_view text, Trajectory& trajectory, const Trajectory
   take();
 }
 
-}  // namespace liestat
+void writeRosJson(TrajectorySink& sink) {
+  const auto out = std::back_inserter(sink.text());
+  sink.text() += "[\n";
+  for (std::size_t i = 0; i < sink.size(); ++i) {
+    const Eigen::Vector3d p = sink.position(i);
+    const Eigen::Vector4d q = sink.xyzw(i);
+    const bool with = sink.hasCovariances();
+    sink.text() += "{";
+    if (sink.hasTimes()) {
+      const auto [seconds, nanoseconds] = sink.stamp(i);
+      fmt::format_to(out, R"("header": {{"stamp": {{"sec": {}, "nanosec": {}}}, "frame_id": "{}"}}, )", seconds,
+                     nanoseconds, sink.frame());
+    }
+    fmt::format_to(out,
+                   R"("pose": {}{{"position": {{"x": {:.17g}, "y": {:.17g}, "z": {:.17g}}}, "orientation": )"
+                   R"({{"x": {:.17g}, "y": {:.17g}, "z": {:.17g}, "w": {:.17g}}}}})",
+                   with ? "{\"pose\": " : "", p[0], p[1], p[2], q[0], q[1], q[2], q[3]);
+    if (with) {
+      sink.text() += ", \"covariance\": ";
+      sink.list(sink.messageCovariance(i, 0));
+      sink.text() += "}";
+    }
+    sink.text() += i + 1 < sink.size() ? "},\n" : "}\n";
+  }
+  sink.text() += "]\n";
+}
+
+void writeRosYaml(TrajectorySink& sink) {
+  const auto out = std::back_inserter(sink.text());
+  const bool with = sink.hasCovariances();
+  const char* const indent = with ? "    " : "  ";
+  for (std::size_t i = 0; i < sink.size(); ++i) {
+    const Eigen::Vector3d p = sink.position(i);
+    const Eigen::Vector4d q = sink.xyzw(i);
+    if (sink.hasTimes()) {
+      const auto [seconds, nanoseconds] = sink.stamp(i);
+      fmt::format_to(out, "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: '{}'\n", seconds, nanoseconds,
+                     sink.frame());
+    }
+    sink.text() += with ? "pose:\n  pose:\n" : "pose:\n";
+    fmt::format_to(out, "{0}position:\n{0}  x: {1:.17g}\n{0}  y: {2:.17g}\n{0}  z: {3:.17g}\n", indent, p[0], p[1],
+                   p[2]);
+    fmt::format_to(out, "{0}orientation:\n{0}  x: {1:.17g}\n{0}  y: {2:.17g}\n{0}  z: {3:.17g}\n{0}  w: {4:.17g}\n",
+                   indent, q[0], q[1], q[2], q[3]);
+    if (with) {
+      sink.text() += "  covariance:\n";
+      for (const double v : sink.messageCovariance(i, 0)) fmt::format_to(out, "  - {:.17g}\n", v);
+    }
+    sink.text() += "---\n";
+  }
+}
+
+void writeMavlinkJson(TrajectorySink& sink) {
+  sink.text() += "[\n";
+  for (std::size_t i = 0; i < sink.size(); ++i) {
+    const Eigen::Vector3d p = sink.position(i);
+    const Eigen::Vector4d q = sink.wxyz(i);
+    fmt::format_to(std::back_inserter(sink.text()),
+                   R"({{"mavpackettype": "ODOMETRY", "time_usec": {}, "x": {:.17g}, "y": {:.17g}, "z": {:.17g}, )"
+                   R"("q": [{:.17g}, {:.17g}, {:.17g}, {:.17g}])",
+                   sink.ticks(i), p[0], p[1], p[2], q[0], q[1], q[2], q[3]);
+    if (sink.hasCovariances()) {
+      sink.text() += ", \"pose_covariance\": ";
+      sink.list(sink.messageCovariance(i, unknown_entry));
+    }
+    sink.text() += i + 1 < sink.size() ? "},\n" : "}\n";
+  }
+  sink.text() += "]\n";
+}
+
+}  // namespace liestat::detail

@@ -1,4 +1,4 @@
-#include <formats/measurements.hpp>
+#include <cli/commands/measurements.hpp>
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 
 #include <formats/input_error.hpp>
 
-namespace liestat {
+namespace liestat::cli {
 
 namespace {
 
@@ -24,9 +24,9 @@ double weightOf(const FeatureCovariance& covariance) {
 }  // namespace
 
 Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command) {
-  const auto refuse = [&](const std::string& why) { throw InputError(command, 0, why); };
+  const auto refuse = [&](const std::string& why) { throw OptionError(command, why); };
   Measurements m;
-  m.feature = featureFromName(options.feature).value_or(file.kind);
+  m.feature = options.feature.value_or(file.kind);
   const FeatureInfo& feature = info(m.feature);
   const FeatureInfo& rows = info(file.kind);
   if (!rows.parts.contains(feature.parts)) {
@@ -44,26 +44,22 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
                     file.largest_rotation_vector));
   }
   const bool has_covariances = !file.covariances.empty();
-  const bool must_choose = has_covariances && feature.frameMatters() && options.covariance_at.empty();
+  const bool must_choose = has_covariances && feature.frameMatters() && !options.covariance_at;
   const std::string choice =
       "--covariance-at measured (they are given in the frame of each measurement, as a sensor knows them) or "
       "--covariance-at estimated (in the frame of the mean, as for parts of one object)";
 
   if (!feature.has_metric) {
     m.criterion = Criterion::barycentre;
-    if (options.criterion == "maha") {
+    if (options.criterion == Criterion::maha) {
       m.criterion = Criterion::maha;
-    } else if (!options.criterion.empty()) {
-      refuse("--criterion " + options.criterion +
+    } else if (options.criterion) {
+      refuse("--criterion " + name(*options.criterion) +
              " needs an invariant metric, which rigid motions have not: leave it out for the group's barycentre, or "
              "take --feature frame");
     }
-  } else if (options.criterion == "lsq") {
-    m.criterion = Criterion::lsq;
-  } else if (options.criterion == "wlsq") {
-    m.criterion = Criterion::wlsq;
-  } else if (options.criterion == "maha") {
-    m.criterion = Criterion::maha;
+  } else if (options.criterion) {
+    m.criterion = *options.criterion;
   } else if (has_covariances) {
     if (must_choose) {
       refuse("the file has covariances of frames, and only you know where they belong: say " + choice +
@@ -80,7 +76,7 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
   if (maha && must_choose) refuse("--criterion maha on frames needs " + choice);
   if (options.likelihood && !maha) refuse("--likelihood is an option of --criterion maha");
   m.likelihood = options.likelihood;
-  m.covariance_at = options.covariance_at == "estimated" ? CovarianceAt::estimated : CovarianceAt::measured;
+  m.covariance_at = options.covariance_at.value_or(CovarianceAt::measured);
   if (feature.has_isotropy && m.covariance_at == CovarianceAt::estimated) {
     refuse(fmt::format("--covariance-at estimated is not there for {}: no frame is common to all points of a sphere",
                        feature.plural));
@@ -106,11 +102,11 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
   // LSQ's covariance from known noise wants the noise in the frame of the estimate. There is no difference on points
   // and rotations, and directions carry it along; for frames measured elsewhere the residuals speak instead.
   const bool least_squares = m.criterion == Criterion::lsq || m.criterion == Criterion::wlsq;
-  m.known_noise =
-      maha || (has_covariances && least_squares && (!feature.frameMatters() || options.covariance_at == "estimated"));
+  m.known_noise = maha || (has_covariances && least_squares &&
+                           (!feature.frameMatters() || options.covariance_at == CovarianceAt::estimated));
   m.covariance_at_matters = m.known_noise && feature.frameMatters();
   if (has_covariances && !m.known_noise) {
-    m.notes.emplace_back(least_squares && options.covariance_at == "measured"
+    m.notes.emplace_back(least_squares && options.covariance_at == CovarianceAt::measured
                              ? "the file's covariances are not in the frame of the mean: the covariance of the mean "
                                "comes from the residuals"
                              : "the file's covariances are not used");
@@ -119,4 +115,4 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
   return m;
 }
 
-}  // namespace liestat
+}  // namespace liestat::cli

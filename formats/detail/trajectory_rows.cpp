@@ -1,4 +1,4 @@
-#include <formats/trajectory_rows.hpp>
+#include <formats/detail/trajectory_rows.hpp>
 
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
@@ -13,7 +13,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {
 
 constexpr std::string_view side_file_title = "liestat-covariance";
@@ -259,4 +259,4 @@ void readSideFile(const std::string& path, Trajectory& trajectory) {
   trajectory.covariance_source = file.name;
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

@@ -1,4 +1,4 @@
-#include <formats/feature_columns.hpp>
+#include <formats/detail/feature_columns.hpp>
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <formats/features.hpp>
 #include <formats/text.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {
 
 std::string covarianceColumn(int row, int column) { return fmt::format("cov_{}{}", row, column); }
@@ -141,4 +141,4 @@ FeatureColumns findFeature(const std::vector<std::string>& columns, const std::s
   return found;
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

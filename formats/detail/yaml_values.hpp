@@ -13,7 +13,7 @@
 
 #include <formats/input_error.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 
 inline std::size_t lineOf(const YAML::Node& node) { return static_cast<std::size_t>(node.Mark().line + 1); }
 
@@ -78,4 +78,4 @@ auto withRoot(std::string_view text, const std::string& name, Function&& functio
   }
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

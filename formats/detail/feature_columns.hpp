@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace liestat {
+namespace liestat::detail {
 
 /// The index of a column that is not there.
 inline constexpr int absent = -1;
@@ -17,6 +17,9 @@ inline constexpr int absent = -1;
 /// The columns of features, in words.
 inline constexpr std::string_view feature_columns_text =
     "qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22 (with tx,ty,tz for frames), or x,y,z, or dx,dy,dz";
+
+/// The columns that a CSV file of features may have.
+const std::vector<std::string>& knownColumns();
 
 /// The columns of the parts of a feature. At most one of the four forms of a rotation is there.
 struct FeatureColumns {
@@ -37,4 +40,4 @@ struct FeatureColumns {
 /// they make no feature or several.
 FeatureColumns findFeature(const std::vector<std::string>& columns, const std::string& file, std::size_t line);
 
-}  // namespace liestat
+}  // namespace liestat::detail

@@ -1,4 +1,4 @@
-#include <formats/rotation_matrix.hpp>
+#include <formats/detail/rotation_matrix.hpp>
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 
 #include <formats/input_error.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 
 NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance, const std::string& file,
                                 std::size_t line) {
@@ -24,4 +24,4 @@ NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance,
   return {SO3d::fitToSO3(matrix), error};
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

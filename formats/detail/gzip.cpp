@@ -1,4 +1,4 @@
-#include <formats/gzip.hpp>
+#include <formats/detail/gzip.hpp>
 
 #include <zlib.h>
 
@@ -7,7 +7,7 @@
 
 #include <formats/input_error.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {
 
 /// zlib's state, for as long as it is needed.
@@ -64,4 +64,4 @@ std::string decompressed(std::string_view bytes, const std::string& file) {
   throw InputError(file, 0, "the compressed data end too early", "a complete gzip file");
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

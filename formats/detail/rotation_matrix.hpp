@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-namespace liestat {
+namespace liestat::detail {
 
 /// Files of calibrations and cameras print four digits at least; what is farther from a rotation than that is none.
 inline constexpr double rotation_tolerance = 1e-3;
@@ -22,4 +22,4 @@ struct NearestRotation {
 NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance, const std::string& file,
                                 std::size_t line);
 
-}  // namespace liestat
+}  // namespace liestat::detail

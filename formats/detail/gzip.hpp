@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace liestat {
+namespace liestat::detail {
 
 /// True if a file begins as gzip files do, which no text does.
 inline bool isGzip(std::string_view bytes) { return bytes.substr(0, 2) == "\x1F\x8B"; }
@@ -13,4 +13,4 @@ inline bool isGzip(std::string_view bytes) { return bytes.substr(0, 2) == "\x1F\
 /// InputError in the name of the file where it is damaged, ends too early, or something else follows.
 std::string decompressed(std::string_view bytes, const std::string& file);
 
-}  // namespace liestat
+}  // namespace liestat::detail

@@ -1,4 +1,4 @@
-#include <formats/yaml_values.hpp>
+#include <formats/detail/yaml_values.hpp>
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <set>
 #include <utility>
 
-#include <formats/rotation_matrix.hpp>
+#include <formats/detail/rotation_matrix.hpp>
 #include <formats/text.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {}  // namespace
 
 std::string shown(const YAML::Node& node) {
@@ -104,4 +104,4 @@ SE3d rigidMotion(const NamedNode& matrix) {
   }
 }
 
-}  // namespace liestat
+}  // namespace liestat::detail

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace liestat {
+namespace liestat::detail {
 
 /// A pose from position and quaternion (x y z w), whose norm is checked and counted in the trajectory. Throws InputError.
 SE3d poseOf(const Eigen::Vector3d& position, const Eigen::Vector4d& xyzw, double norm_tolerance, Trajectory& trajectory,
@@ -38,15 +38,6 @@ bool isWhole(std::string_view field);
 /// Adds a time in whole units of 10^-decimals s. Throws InputError if it is not a whole number.
 void appendTicks(Trajectory& trajectory, std::string_view ticks, std::size_t decimals, std::size_t line);
 
-/// ROS and MAVLink messages in a JSON or YAML text (formats/messages.cpp): a message, a list of messages, one message per
-/// line (JSON), or one per document (YAML); of ROS PoseWithCovarianceStamped, Odometry, PoseStamped, Path.
-void readRosJson(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
-void readRosYaml(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
-/// MAVLink's ODOMETRY and VISION_POSITION_ESTIMATE.
-void readMavlinkJson(std::string_view text, Trajectory& trajectory, const TrajectoryOptions& options);
-/// True if a JSON text is of MAVLink's messages.
-bool looksMavlink(std::string_view text);
-
 /// Reads `# key: value` lines of a liestat-covariance header into a convention; nothing if the text has no such header.
 /// Throws InputError for a header that is incomplete or has unknown values.
 std::optional<Convention> statedConvention(std::string_view text, const std::string& file);
@@ -57,4 +48,4 @@ std::string conventionHeader(const Convention& convention);
 /// trajectory has no times. Throws InputError.
 void readSideFile(const std::string& path, Trajectory& trajectory);
 
-}  // namespace liestat
+}  // namespace liestat::detail

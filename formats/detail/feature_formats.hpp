@@ -9,7 +9,7 @@
 #include <formats/features.hpp>
 #include <formats/text.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 
 /// The layout of a file's rows.
 struct RowLayout {
@@ -44,4 +44,4 @@ std::span<const FeatureFormat> featureFormats();
 /// where no format does, std::invalid_argument where there is no such name.
 const FeatureFormat& featureFormat(std::string_view name, const LineReader& reader, const std::string& file);
 
-}  // namespace liestat
+}  // namespace liestat::detail

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <formats/features.hpp>
-#include <formats/feature.hpp>
 #include <stats/maha.hpp>
 
 #include <Eigen/Core>
@@ -10,14 +9,13 @@
 #include <string_view>
 #include <vector>
 
-namespace liestat {
+namespace liestat::cli {
 
-
-/// The options of commands that read features; names as on the command line, empty: the file decides.
+/// The options of commands that read features; what is not given the file decides.
 struct MeasurementOptions {
-  std::string feature = {};
-  std::string criterion = {};
-  std::string covariance_at = {};
+  std::optional<Feature> feature = {};
+  std::optional<Criterion> criterion = {};  ///< none but lsq, wlsq, maha
+  std::optional<CovarianceAt> covariance_at = {};
   bool likelihood = false;
 };
 
@@ -41,8 +39,8 @@ struct Measurements {
   }
 };
 
-/// Decides what is averaged and how. `command` begins the messages. Throws InputError where the wish does not fit the
+/// Decides what is averaged and how. `command` begins the messages. Throws OptionError where the wish does not fit the
 /// file.
 Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& options, const std::string& command);
 
-}  // namespace liestat
+}  // namespace liestat::cli

@@ -1,4 +1,4 @@
-#include <formats/feature_formats.hpp>
+#include <formats/detail/feature_formats.hpp>
 
 #include <fmt/format.h>
 
@@ -6,11 +6,12 @@
 #include <array>
 #include <stdexcept>
 
-#include <formats/feature_columns.hpp>
+#include <formats/detail/feature_columns.hpp>
 #include <formats/input_error.hpp>
+#include <formats/detail/rows.hpp>
 #include <formats/numeric_table.hpp>
 
-namespace liestat {
+namespace liestat::detail {
 namespace {
 
 constexpr std::string_view known_columns_text =
@@ -228,10 +229,4 @@ const FeatureFormat& featureFormat(std::string_view name, const LineReader& read
                    joined(without_header, ", ") + ", or a CSV header that names the columns");
 }
 
-std::vector<std::string> formatNames() {
-  std::vector<std::string> names = {"auto"};
-  for (const FeatureFormat& format : formats) names.emplace_back(format.name);
-  return names;
-}
-
-}  // namespace liestat
+}  // namespace liestat::detail
