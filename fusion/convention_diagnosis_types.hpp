@@ -6,6 +6,7 @@
 #include <fusion/trajectories_types.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/conventions.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
 #include <array>
@@ -197,7 +198,8 @@ inline std::vector<std::string> conventionNames(const std::vector<Convention>& c
 
 template <class V>
 void describe(V& v, const HypothesisFit& f) {
-  v("convention", conventionName(f.convention, false))("fault", name(f.fault), "that was undone first");
+  v("convention", conventionName(f.convention, false), "as --cov-from takes it");
+  v("fault", name(f.fault), "in how the matrices were written, which was undone first");
   v("log_likelihood", f.log_likelihood, "relative to the best one", "nats");
   v("nees_ratio", f.nees_ratio, "NEES over its degrees of freedom");
   v("indefinite", f.indefinite, "matrices that are not positive definite");
@@ -205,28 +207,30 @@ void describe(V& v, const HypothesisFit& f) {
 
 template <class V>
 void describe(V& v, const ScaleProfile& s) {
-  v("convention", conventionName(s.convention, false))("translation", s.translation, "scale of the block, in variance");
+  v("convention", conventionName(s.convention, false), "in which the scales are measured");
+  v("translation", s.translation, "scale of the block, in variance");
   v("rotation", s.rotation, "scale of the block, in variance")("relative_sigma", s.relative_sigma, "of each");
   v("words", s.words(), "the scales by their names");
 }
 
 template <class V>
 void describe(V& v, const ChainFit& f) {
-  v("convention", conventionName(f.convention, false));
+  v("convention", conventionName(f.convention, false), "as --cov-from takes it");
   v("indefinite", f.indefinite, "share of the steps in which the covariance shrinks");
 }
 
 template <class V>
 void describe(V& v, const ChainDiagnosis& c) {
-  v("steps", c.steps)("is_chain", c.is_chain, "some convention makes it dead reckoning");
-  v("accepted", detail::conventionNames(c.accepted))("reason", c.reason);
-  v("increments_nees", c.increments.ratio(), "over its degrees of freedom")("increments_p", c.increments.p);
+  v("steps", c.steps, "from pose to pose")("is_chain", c.is_chain, "some convention makes it dead reckoning");
+  v("accepted", detail::conventionNames(c.accepted), "conventions that do")("reason", c.reason, "in words");
+  v("increments_nees", c.increments.ratio(), "of the steps, over its degrees of freedom");
+  v("increments_p", c.increments.p, "probability of a NEES as extreme");
   v("fits", c.fits, "conventions, the smallest share first");
 }
 
 template <class V>
 void describe(V& v, const ConventionDiagnosis& d) {
-  v("verdict", name(d.verdict), "identified, undecidable, inconsistent or none")("reason", d.reason);
+  v("verdict", name(d.verdict), "identified, undecidable, inconsistent or none")("reason", d.reason, "in words");
   v("notes", d.notes, "further findings")("accepted", detail::conventionNames(d.accepted), "that explain the errors");
   v("fault", name(d.fault), "in how the matrices were written")("skipped", d.skipped, "poses without a usable matrix");
   v("margin", d.margin, "within which hypotheses are accepted", "nats");
@@ -236,26 +240,29 @@ void describe(V& v, const ConventionDiagnosis& d) {
   v("growth", d.growth, "NEES of the second half over the first");
   v("tests", d.tests, "under the best hypothesis");
   v("scale", d.scale, "scales of the blocks, where they are free");
-  if (d.chain) v("chain", *d.chain);
+  if (shown(v, d.chain.has_value())) v("chain", d.chain.value_or(ChainDiagnosis{}), "whether it is dead reckoning");
   v("hypotheses", d.fits, "the best first; empty if correlated");
 }
 
 template <class V>
 void describe(V& v, const PlanRow& row) {
-  v("convention", conventionName(row.convention, false), "the truth")("nearest", conventionName(row.nearest, false));
-  v("divergence", row.divergence, "of the nearest", "nats per pose")("poses", row.poses,
-                                                                     "that tell them apart; 0: none");
+  v("convention", conventionName(row.convention, false), "the truth");
+  v("nearest", conventionName(row.nearest, false), "the other convention that is hardest to exclude");
+  v("divergence", row.divergence, "of the nearest", "nats per pose");
+  v("poses", row.poses, "that tell them apart; 0: none");
   v("equal", detail::conventionNames(row.equal), "conventions that write the same matrices here");
 }
 
 /// `chain`, the fields of the diagnosis, or `plan`: by the mode.
 template <class V>
 void describe(V& v, const CovarianceDiagnosis& d) {
-  v("mode", name(d.mode), "diagnosis, chain or plan")("what", d.what)("n", d.structure.n);
-  v("structure", d.structure.words(), "the looks of the matrices")("indefinite", d.structure.indefinite);
-  if (d.chain) v("chain", *d.chain);
-  if (d.diagnosis) describe(v, *d.diagnosis);
-  if (d.mode == DiagnosisMode::plan) v("plan", d.plan);
+  v("mode", name(d.mode), "diagnosis, chain or plan")("what", d.what,
+                                                      "the matrices belong to: poses, edges, or runs at a time");
+  v("n", d.structure.n, "matrices")("structure", d.structure.words(), "the looks of the matrices");
+  v("indefinite", d.structure.indefinite, "matrices that are not positive definite");
+  if (shown(v, d.chain.has_value())) v("chain", d.chain.value_or(ChainDiagnosis{}), "whether it is dead reckoning");
+  if (shown(v, d.diagnosis.has_value())) describe(v, d.diagnosis.value_or(ConventionDiagnosis{}));
+  if (shown(v, d.mode == DiagnosisMode::plan)) v("plan", d.plan, "with --plan: a row for each convention");
 }
 
 }  // namespace liestat

@@ -206,9 +206,10 @@ inline Verdict TrajectoryEvaluation::verdict() const {
 /// Fields that are the same for all estimates of a run.
 template <class V>
 void describeSetting(V& v, const TrajectoryEvaluation& e) {
-  v("reference_poses", e.reference_poses)("association", e.association, "in words");
-  v("ape_unit", e.ape_unit)("rpe_unit", e.rpe_unit);
-  v("pairs_model", e.pairs_model ? std::optional<std::string>(name(*e.pairs_model)) : std::nullopt);
+  v("reference_poses", e.reference_poses, "their number")("association", e.association, "in words");
+  v("ape_unit", e.ape_unit, "m, deg, … or empty")("rpe_unit", e.rpe_unit, "likewise");
+  v("pairs_model", e.pairs_model ? std::optional<std::string>(name(*e.pairs_model)) : std::nullopt,
+    "independent or chain: the errors of a pair");
 }
 
 template <class V>
@@ -217,13 +218,14 @@ void describe(V& v, const TrajectoryEvaluation& e) {
   v("poses", e.poses, "of the estimate")("matched", e.matched.size(), "of them that have a partner");
   v("by_time", e.by_time, "false: pose i with pose i");
   v("ape", e.ape_statistics, "absolute errors")("rpe", e.rpe_statistics, "relative errors");
-  v("rpe_pairs", e.pairs.size())("alignment", e.alignment, "of APE and RPE");
+  v("rpe_pairs", e.pairs.size(), "pairs of RPE")("alignment", e.alignment, "of APE and RPE");
   v("weighted_alignment", e.weighted, "of the verdict");
-  v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt);
+  v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt,
+    "of the file; null: it has no covariances");
   v("tests", e.consistency.tests, "of the whitened errors");
   v("rpe_nees", e.relative ? std::optional(e.relative->joint) : std::nullopt, "of relative motions");
   v("indefinite", e.consistency.indefinite, "matched poses whose covariance is not positive definite");
-  v("notes", e.notes);
+  v("notes", e.notes, "what is remarkable, in sentences");
 }
 
 /// One row for each matched pose, or for each pair of RPE.
@@ -243,7 +245,8 @@ void describeSeries(V& v, const TrajectoryEvaluation& e) {
   std::vector<std::size_t> from, to;
   for (const auto& [i, j] : e.pairs) from.push_back(i), to.push_back(j);
   v("rows", e.rows, "of the estimate")("times", e.times, "", "s");
-  v("ape_errors", e.ape)("rpe_errors", e.rpe)("pairs_from", from)("pairs_to", to);
+  v("ape_errors", e.ape, "", "ape_unit")("rpe_errors", e.rpe, "of the pairs", "rpe_unit")("pairs_from", from)(
+      "pairs_to", to);
   v("position_errors", e.position_errors, "", "m")("rotation_errors", e.rotation_errors, "", "rad");
   v("errors", xi, "after the weighted alignment, translation before rotation, body axes", "m, rad");
   v("covariances", covariances, "of the errors, row by row", "m, rad")("nees", nees, "chi-squared of 6");

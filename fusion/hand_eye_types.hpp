@@ -6,6 +6,7 @@
 #include <fusion/status.hpp>
 #include <lie/se3.hpp>
 #include <stats/gaussian.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -179,62 +180,81 @@ template <class V>
 void describe(V& v, const PoseCoordinates& x) {
   Eigen::Vector4d q = x.pose.so3().params();
   if (q[3] < 0) q = -q;
-  v("translation", Eigen::Vector3d(x.pose.translation()), "", "m")("quaternion_xyzw", q);
+  v("translation", Eigen::Vector3d(x.pose.translation()), "", "m")("quaternion_xyzw", q, "w >= 0");
   v("rotation_vector", Eigen::Vector3d(x.pose.so3().log()), "", "rad");
 }
 
-/// Standard deviations (m, rad), shown in m and degrees.
+/// Standard deviations (m, rad) of a translation and a rotation vector, shown in m and degrees.
 struct PoseSigmas {
   Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Zero();
-  const char* rotation = "rotation_deg";  ///< name of the rotation's field
 };
+/// Those of a local error.
+struct LocalPoseSigmas : PoseSigmas {};
+
 template <class V>
 void describe(V& v, const PoseSigmas& x) {
-  v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()));
-  v(x.rotation, Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()));
+  v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()), "", "m");
+  v("rotation_vector_deg", Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()), "", "deg");
+}
+template <class V>
+void describe(V& v, const LocalPoseSigmas& x) {
+  v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()), "", "m");
+  v("rotation_deg", Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()), "", "deg");
 }
 
 template <class V>
 void describe(V& v, const CalibratedPose& x) {
   describe(v, PoseCoordinates{x.pose.mean});
-  v("covariance", x.has_covariance ? std::optional(x.pose.covariance) : std::nullopt, "of local errors");
-  v("covariance_frame", std::string("the ") + x.child + "'s axes at its origin: " + x.name() + " Exp(e)");
-  v("standard_deviations", PoseSigmas{x.sigmas, "rotation_vector_deg"}, "null along open directions");
-  v("standard_deviations_local", PoseSigmas{x.local_sigmas});
+  v("covariance", x.has_covariance ? std::optional(x.pose.covariance) : std::nullopt, "of local errors, m and rad");
+  v("covariance_frame", std::string("the ") + x.child + "'s axes at its origin: " + x.name() + " Exp(e)", "in words");
+  v("standard_deviations", PoseSigmas{x.sigmas},
+    "along the parent's axes; null along axes in which an open direction has a component");
+  v("standard_deviations_local", LocalPoseSigmas{{x.local_sigmas}}, "of the local errors, likewise");
 }
 
 /// An open direction with the frames in which it is given.
 template <class V>
 void describe(V& v, const OpenDirection& d) {
-  v("excitation", d.excitation)("weak", d.weak)("twist", d.twist, "of X", "m, rad")("frame", "gripper");
-  if (d.has_Y) v("twist_of_Y", d.twist_of_Y, "", "m, rad")("frame_of_Y", "base");
-  v("description", describe(d, std::string("gripper")))("rotates", d.rotates);
+  v("excitation", d.excitation, "as in excitations")("weak", d.weak, "excited, but not enough to be trusted");
+  v("twist", d.twist, "of X", "m, rad")("frame", "gripper", "of the twist");
+  if (shown(v, d.has_Y)) {
+    v("twist_of_Y", d.twist_of_Y, "AX = YB", "m, rad")("frame_of_Y", "base", "of the twist of Y");
+  }
+  v("description", describe(d, std::string("gripper")), "in words")("rotates", d.rotates, "it rotates X");
 }
 
 template <class V>
 void describe(V& v, const PairFit& fit) {
   v("error_translation", Eigen::Vector3d(fit.error.head<3>()), "in the camera's frame", "m");
   v("error_rotation", Eigen::Vector3d(fit.error.tail<3>()), "", "rad");
-  v("chi2", fit.chi2, "6 expected")("inlier", fit.inlier);
+  v("chi2", fit.chi2, "squared length in units of its noise, 6 expected")("inlier", fit.inlier);
 }
 
 template <class V>
 void describe(V& v, const HandEyeResult& r) {
-  v("status", name(r.status))("ok", r.ok())("in_words", r.inWords())("problem", r.world ? "AX = YB" : "AX = XB");
+  v("status", name(r.status), "ok, undetermined, ambiguous, inconsistent, not_converged or bad_input");
+  v("ok", r.ok(), "the calibration is to be trusted")("in_words", r.inWords(), "the status");
+  v("problem", r.world ? "AX = YB" : "AX = XB", "AX = YB or AX = XB");
   const std::vector<CalibratedPose> poses = calibratedPoses(r);
   v("X", poses.front(), "gripper_T_camera");
   v("Y", r.world ? std::optional(poses.back()) : std::nullopt, "base_T_target");
-  v("covariance_order", "translation rotation")("covariance_side", "right");
+  v("covariance_order", "translation rotation", "of the covariances")("covariance_side", "right", "of the errors");
   v("covariance_frame",
-    "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known");
-  v("joint_covariance", r.world && poses.front().has_covariance ? std::optional(r.covariance) : std::nullopt);
+    "of X the camera's, of Y the target's: X Exp(e), Y Exp(e), m and rad; open directions count as known", "in words");
+  v("joint_covariance", r.world && poses.front().has_covariance ? std::optional(r.covariance) : std::nullopt,
+    "of X and Y");
   v("joint_covariance_order",
-    r.world ? std::optional<std::string>("X translation, X rotation, Y translation, Y rotation") : std::nullopt);
-  v("chi2", r.chi2)("degrees_of_freedom", r.degrees_of_freedom)("p", r.p, "null: the noise is not known");
-  v("variance_factor", r.variance_factor)("noise", r.known_noise ? "given" : "scaled");
-  v("excitations", r.excitations)("open_directions", r.directions);
+    r.world ? std::optional<std::string>("X translation, X rotation, Y translation, Y rotation") : std::nullopt,
+    "in words");
+  v("chi2", r.chi2, "squared distance of the inliers from their corrected poses, in units of their noise");
+  v("degrees_of_freedom", r.degrees_of_freedom, "of chi2");
+  v("p", r.p, "probability of a larger chi2; null: the noise is not known");
+  v("variance_factor", r.variance_factor, "by which the given covariances were multiplied");
+  v("noise", r.known_noise ? "given" : "scaled", "given or scaled");
+  v("excitations", r.excitations, "of the six directions, ascending");
+  v("open_directions", r.directions, "that the motions leave open");
   v("rival", r.rival ? std::optional(PoseCoordinates{*r.rival}) : std::nullopt, "X of a second solution");
-  v("starts", r.starts)("outliers", r.outliers, "numbers of the wrong pairs, from 0");
+  v("starts", r.starts, "that were compared")("outliers", r.outliers, "numbers of the wrong pairs, from 0");
 }
 
 /// The pairs: errors (n×6, translation and rotation, m and rad) and squared lengths in units of their noise.

@@ -53,7 +53,8 @@ struct NoiseCalibration {
 
 template <class V>
 void describe(V& v, const NoiseFactor& x) {
-  v("factor", x.factor)("low", x.low)("high", x.high);
+  v("factor", x.factor, "of the densities");
+  v("low", x.low, "lower end of its 95 % interval; null: no bound")("high", x.high, "upper end");
 }
 
 template <class V>
@@ -64,10 +65,13 @@ void describe(V& v, const ImuNoise<double>& x) {
 
 template <class V>
 void describe(V& v, const NoiseCalibration& x) {
-  v("status", name(x.status))("windows", x.windows)("meetings", x.meetings)("chi2", x.chi2);
-  v("calibrated_chi2", x.calibrated_chi2)("degrees_of_freedom", x.degrees_of_freedom)("common", x.common);
-  v("common_p", x.common_p)("separable", x.separable)("gyroscope", x.gyroscope)("accelerometer", x.accelerometer);
-  v("noise", x.noise);
+  v("status", name(x.status))("windows", x.windows, "that were refined");
+  v("meetings", x.meetings, "of windows, whose states must agree")("chi2", x.chi2, "with the given densities");
+  v("calibrated_chi2", x.calibrated_chi2, "with the calibrated ones");
+  v("degrees_of_freedom", x.degrees_of_freedom, "of both")("common", x.common, "one factor for both sensors");
+  v("common_p", x.common_p, "probability that two factors explain so much more than one, if they are one");
+  v("separable", x.separable, "the windows tell the sensors apart");
+  v("gyroscope", x.gyroscope)("accelerometer", x.accelerometer)("noise", x.noise, "the densities that were used");
 }
 
 /// Calibrates the densities of a recording's inertial sensor by its windows. Options as for initialiseRecording();

@@ -68,12 +68,13 @@ struct Alignment {
 };
 template <class V>
 void describe(V& v, const Alignment& a) {
-  v("model", name(a.model))("weighted", a.weighted, "by the covariances")("ok", a.ok)("scale", a.scale);
+  v("model", name(a.model), "none, origin, posyaw, se3, sim3 or scale")("weighted", a.weighted, "by the covariances");
+  v("ok", a.ok, "the poses determine it")("scale", a.scale, "of the estimate");
   v("translation", Eigen::Vector3d(a.transform.translation()), "of the world", "m");
-  v("quaternion_xyzw", Eigen::Vector4d(a.transform.so3().params()));
+  v("quaternion_xyzw", Eigen::Vector4d(a.transform.so3().params()), "of the world");
   v("parameters", a.parameters, "that were estimated")("poses", a.poses, "from which it was estimated");
   v("condition", a.condition, "of the information matrix")("covariance", a.covariance, "", "m, rad, 1");
-  v("covariance_order", "translation rotation log_scale, along the world's axes");
+  v("covariance_order", "translation rotation log_scale, along the world's axes", "in words");
 }
 
 /// A pose's error after alignment, in units of the estimate, and what is known about it.
@@ -120,7 +121,8 @@ struct ErrorStatistics {
 };
 template <class V>
 void describe(V& v, const ErrorStatistics& s) {
-  v("rmse", s.rmse)("mean", s.mean)("median", s.median)("std", s.std)("min", s.min)("max", s.max)("sse", s.sse);
+  v("rmse", s.rmse)("mean", s.mean)("median", s.median)("std", s.std);
+  v("min", s.min)("max", s.max)("sse", s.sse, "sum of squares");
 }
 
 /// The unit in which the distance of the poses of a pair is counted.

@@ -82,9 +82,10 @@ LIESTAT_TRAJECTORIES_API TrajectoryConversion convertTrajectory(std::span<const 
 /// See report/describe.hpp.
 template <class V>
 void describe(V& v, const TrajectoryConversion& c) {
-  v("covariances", c.matrices.size())("covariance_from", c.from, "null: the file has no covariances");
+  v("covariances", c.matrices.size(), "their number")("covariance_from", c.from, "null: the file has no covariances");
   v("covariance_to", c.to)("unknown", c.unknown, "matrices without any known entry");
-  v("partly_unknown", c.partly_unknown)("assumed_uncorrelated", c.assumed_uncorrelated);
+  v("partly_unknown", c.partly_unknown, "matrices with some unknown entries");
+  v("assumed_uncorrelated", c.assumed_uncorrelated, "matrices whose missing blocks were taken to be zero");
   v("indefinite", c.indefinite.size(), "matrices that are not positive semidefinite");
   v("zero_variances", c.zero_variances, "matrices with a variance of 0");
   v("round_trip_bound", c.round_trip_bound, "rounding of there and back", "sigma");
@@ -94,7 +95,7 @@ void describe(V& v, const TrajectoryConversion& c) {
 }
 template <class V>
 void describe(V& v, const UnconvertedMatrix& f) {
-  v("fault", name(f.fault))("row", f.row)("found", f.found)("expected", f.expected);
+  v("fault", name(f.fault))("row", f.row, "of the pose, from 0")("found", f.found, "in words")("expected", f.expected);
 }
 template <class V>
 void describeSeries(V& v, const TrajectoryConversion& c) {

@@ -5,6 +5,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/visual_inertial_types.hpp>
 #include <stats/quantile.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -109,8 +110,9 @@ struct TrackedFeature {
 };
 template <class V>
 void describe(V& v, const TrackedFeature& x) {
-  v("track", x.track)("observations", x.feature.observations)("used", x.feature.used)("residual", x.feature.residual);
-  v("parallax", x.feature.parallax)("depth_deviation", x.feature.depth_sigma);
+  v("track", x.track, "its name")("observations", x.feature.observations, "images that see it")("used", x.feature.used);
+  v("residual", x.feature.residual, "of its equations")("parallax", x.feature.parallax, "", "rad");
+  v("depth_deviation", x.feature.depth_sigma, "standard deviation of its depth", "m");
 }
 
 /// A refinement with the times of its states.
@@ -121,23 +123,31 @@ struct TimedRefinement {
 template <class V>
 void describe(V& v, const TimedRefinement& x) {
   const RefinementResult& r = x.result;
-  v("status", r.converged() ? "refined" : liestat::describe(r.status))("consistent", r.consistent())("cost", r.cost);
-  v("degrees_of_freedom", r.degrees_of_freedom)("features_used", r.features_used);
-  if (!r.converged()) return;
-  v("scale_sigma", r.scale_sigma)("tilt_sigma", r.tilt_sigma, "", "rad")("prior_p", r.prior_p);
+  v("status", r.converged() ? "refined" : liestat::describe(r.status),
+    "refined, or why not: then the fields from "
+    "scale_sigma on are missing");
+  v("consistent", r.consistent(), "the cost is that of the stated noise")("cost", r.cost, "chi-squared");
+  v("degrees_of_freedom", r.degrees_of_freedom, "of the cost")("features_used", r.features_used);
+  if (!shown(v, r.converged())) return;
+  v("scale_sigma", r.scale_sigma, "predicted standard deviation of the scale, relative");
+  v("tilt_sigma", r.tilt_sigma, "that of the vertical", "rad")("prior_p", r.prior_p, "of the biases under their prior");
   v("velocity", r.velocity(), "", "m/s")("gravity", r.gravity, "", "m/s²");
-  v("gyroscope_bias", r.bias.gyroscope)("accelerometer_bias", r.bias.accelerometer);
-  v("last_gyroscope_bias", r.last_bias.gyroscope)("last_accelerometer_bias", r.last_bias.accelerometer);
-  v("covariance", r.covariance.atFirst());
-  v("covariance_order", "velocity gravity gyroscope_bias accelerometer_bias");
-  v("covariance_frame", "axes of the body at the first image, m/s m/s^2 rad/s m/s^2");
-  v("covariance_content", "image noise, inertial noise and the priors of the biases");
-  v("last_covariance", r.covariance.atLast());
-  v("last_covariance_order", "position rotation velocity gravity gyroscope_bias accelerometer_bias");
-  v("last_covariance_side", "right: of the last state in its own axes; gravity in those of the first image");
+  v("gyroscope_bias", r.bias.gyroscope, "at the first image", "rad/s");
+  v("accelerometer_bias", r.bias.accelerometer, "at the first image", "m/s²");
+  v("last_gyroscope_bias", r.last_bias.gyroscope, "at the last image: another one if biases follow a random walk",
+    "rad/s");
+  v("last_accelerometer_bias", r.last_bias.accelerometer, "", "m/s²");
+  v("covariance", r.covariance.atFirst(), "at the first image");
+  v("covariance_order", "velocity gravity gyroscope_bias accelerometer_bias", "in words");
+  v("covariance_frame", "axes of the body at the first image, m/s m/s^2 rad/s m/s^2", "in words");
+  v("covariance_content", "image noise, inertial noise and the priors of the biases", "noise that it accounts for");
+  v("last_covariance", r.covariance.atLast(), "at the last image");
+  v("last_covariance_order", "position rotation velocity gravity gyroscope_bias accelerometer_bias", "in words");
+  v("last_covariance_side", "right: of the last state in its own axes; gravity in those of the first image",
+    "in words");
   std::vector<TimedState> states;
   for (std::size_t j = 0; j < r.states.size() && j < x.times.size(); ++j) states.push_back({x.times[j], r.states[j]});
-  v("states", states)("features", rowsOfPoints(r.features));
+  v("states", states, "at all images")("features", rowsOfPoints(r.features), "those that were used", "m");
 }
 
 struct StatusCounts {
@@ -153,16 +163,23 @@ void describe(V& v, const StatusCounts& x) {
 template <class V>
 void describe(V& v, const ClosedFormSolution& s) {
   v("velocity", s.velocity, "", "m/s")("gravity", s.gravity, "", "m/s²");
-  v("accelerometer_bias_change", s.accelerometer_bias)("roll", s.roll())("pitch", s.pitch());
-  v("cost", s.cost)("negative_depths", s.negative_depths)("features", detail::rowsOfPoints(s.features));
+  v("accelerometer_bias_change", s.accelerometer_bias, "against the one with which the readings were integrated",
+    "m/s²");
+  v("roll", s.roll(), "", "rad")("pitch", s.pitch(), "", "rad")("cost", s.cost, "chi-squared, or squared residuals");
+  v("negative_depths", s.negative_depths, "features behind a camera");
+  v("features", detail::rowsOfPoints(s.features), "a row for each track; null: not used", "m");
 }
 
 template <class V>
 void describe(V& v, const SecondMotion& second) {
-  v("tracks", second.inliers.size());
-  if (second.result.solutions.empty()) return;
-  v("velocity", second.result.solutions[0].velocity)("gravity", second.result.solutions[0].gravity);
-  if (second.result.covariance.size() > 0) v("covariance", Eigen::MatrixXd(second.result.covariance));
+  v("tracks", second.inliers.size(), "that agree on it");
+  const auto& solutions = second.result.solutions;
+  if (!shown(v, !solutions.empty())) return;
+  const ClosedFormSolution solution = solutions.empty() ? ClosedFormSolution() : solutions[0];
+  v("velocity", solution.velocity, "", "m/s")("gravity", solution.gravity, "", "m/s²");
+  if (shown(v, second.result.covariance.size() > 0)) {
+    v("covariance", Eigen::MatrixXd(second.result.covariance), "if it is known");
+  }
 }
 
 template <class V>
@@ -173,34 +190,48 @@ void describe(V& v, const InitialisationError& e) {
 /// Fields of a window; those of its steps only where the readings had no fault.
 template <class V>
 void describe(V& v, const ComparedWindow& w) {
-  v("begin", w.begin, "", "s")("end", w.end, "", "s")("status", name(w.verdict()))("ok", w.ok());
-  v("images", w.images.size())("tracks", w.tracks.size());
-  if (w.fault) {
-    v("fault_time", w.fault_time, "", "s");
-    return;
-  }
+  v("begin", w.begin, "", "s")("end", w.end, "", "s")("status", name(w.verdict()), "of the whole window");
+  v("ok", w.ok(), "the window is to be trusted")("images", w.images.size(), "the number of those used");
+  v("tracks", w.tracks.size(), "the number of those used");
+  if (shown(v, bool(w.fault)))
+    v("fault_time", w.fault_time, "of readings at fault; the fields below are then missing", "s");
+  if (!shown(v, !w.fault)) return;
   const ClosedFormResult& c = w.closedForm();
-  v("closed_form_status", name(c.status))("in_words", describe(c.status))("consistent", c.consistent);
-  v("null_dimension", c.null_dimension)("singular_values", c.singular_values);
-  v("largest_singular_value", c.largest_singular_value)("solutions", c.solutions);
+  v("closed_form_status", name(c.status))("in_words", describe(c.status), "the status of the closed form");
+  v("consistent", c.consistent, "its cost is that of the stated noise");
+  v("null_dimension", c.null_dimension, "of the scaled linear system")("singular_values", c.singular_values);
+  v("largest_singular_value", c.largest_singular_value)("solutions", c.solutions, "both, if there are two");
   std::vector<detail::TrackedFeature> features;
   for (std::size_t i = 0; i < c.features.size(); ++i) features.push_back({w.track_names[i], c.features[i]});
-  v("features", features)("features_used", c.features_used)("features_rejected", w.found.outliers.size());
-  v("images_used", c.images_used)("hypotheses", w.found.hypotheses)("degrees_of_freedom", c.degrees_of_freedom);
-  v("covariance", c.covariance.size() > 0 ? std::optional(Eigen::MatrixXd(c.covariance)) : std::nullopt);
-  v("covariance_content", describe(c.covariance_content));
-  v("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity");
-  v("scale_deviation", c.scale_sigma)("tilt_deviation", c.tilt_sigma);
-  v("unseen_speed_per_depth", c.unseen_speed_per_depth)("second_motion", w.found.second);
-  v("integrated_gyroscope_bias", w.measured.bias().gyroscope);
-  v("integrated_accelerometer_bias", w.measured.bias().accelerometer)("gyroscope_bias", w.found.gyroscope_bias);
+  v("features", features, "of the tracks")("features_used", c.features_used, "their number");
+  v("features_rejected", w.found.outliers.size(), "outliers")("images_used", c.images_used, "their number");
+  v("hypotheses", w.found.hypotheses, "random samples of the consensus")("degrees_of_freedom", c.degrees_of_freedom);
+  v("covariance", c.covariance.size() > 0 ? std::optional(Eigen::MatrixXd(c.covariance)) : std::nullopt,
+    "of the closed form");
+  v("covariance_content", describe(c.covariance_content), "noise that it accounts for");
+  v("covariance_order", c.covariance.rows() == 9 ? "velocity gravity accelerometer_bias" : "velocity gravity",
+    "in words");
+  v("scale_deviation", c.scale_sigma, "predicted standard deviation of the scale, relative");
+  v("tilt_deviation", c.tilt_sigma, "that of the vertical", "rad");
+  v("unseen_speed_per_depth", c.unseen_speed_per_depth,
+    "of a stationary window: uniform speed per metre of depth above which motion would have been detected", "1/s");
+  v("second_motion", w.found.second, "of an ambiguous window: that on which another group of tracks agrees");
+  v("integrated_gyroscope_bias", w.measured.bias().gyroscope, "with which the readings were integrated", "rad/s");
+  v("integrated_accelerometer_bias", w.measured.bias().accelerometer, "likewise", "m/s²");
+  v("gyroscope_bias", w.found.gyroscope_bias, "that was estimated", "rad/s");
   v("gyroscope_bias_status",
-    w.found.bias_status == FusionStatus::ok ? "the gyroscope's bias was found" : describe(w.found.bias_status));
-  v("refined", w.refined ? std::optional(detail::TimedRefinement{*w.refined, w.image_times}) : std::nullopt);
-  if (w.closed_form_error) v("closed_form_error", *w.closed_form_error);
-  if (w.refined_error) v("refined_error", *w.refined_error);
-  if (w.gyroscope_error) v("gyroscope_bias_error", *w.gyroscope_error, "", "rad/s");
-  if (w.nees) v("nees", *w.nees, "of velocity and gravity, 5 expected");
+    w.found.bias_status == FusionStatus::ok ? "the gyroscope's bias was found" : describe(w.found.bias_status),
+    "in words");
+  v("refined", w.refined ? std::optional(detail::TimedRefinement{*w.refined, w.image_times}) : std::nullopt,
+    "by all measurements");
+  const auto known = [&](const char* name, const auto& error, const char* meaning, const char* unit = "") {
+    using Error = std::remove_cvref_t<decltype(*error)>;
+    if (shown(v, error.has_value())) v(name, error ? *error : Error(), meaning, unit);
+  };
+  known("closed_form_error", w.closed_form_error, "with a truth");
+  known("refined_error", w.refined_error, "with a truth");
+  known("gyroscope_bias_error", w.gyroscope_error, "with a truth", "rad/s");
+  known("nees", w.nees, "with a truth: of velocity and gravity, 5 expected");
 }
 
 /// The best known of a window: refined, else of the closed form's first solution.
@@ -211,14 +242,17 @@ void describeSeries(V& v, const ComparedWindow& w) {
   const auto of = [&](const Eigen::Vector3d& fine, const auto& coarse) {
     return refined ? std::optional(fine) : any ? std::optional<Eigen::Vector3d>(coarse()) : std::nullopt;
   };
-  v("reason", w.fault ? describe(w.fault) : std::string(describe(w.verdict())));
-  v("velocity", of(refined ? w.refined->velocity() : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].velocity; }));
-  v("gravity", of(refined ? w.refined->gravity : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].gravity; }));
+  v("reason", w.fault ? describe(w.fault) : std::string(describe(w.verdict())), "the status in words");
+  v("velocity", of(refined ? w.refined->velocity() : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].velocity; }),
+    "at the first image, the best known", "m/s");
+  v("gravity", of(refined ? w.refined->gravity : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].gravity; }),
+    "likewise", "m/s²");
   const ImuBias<double> bias = w.bias();
   v("best_gyroscope_bias", bias.gyroscope, "", "rad/s")("accelerometer_bias", bias.accelerometer, "", "m/s²");
   using Joint = Eigen::Matrix<double, 27, 27>;
-  v("joint_covariance", refined ? std::optional<Joint>(w.refined->covariance.joint) : std::nullopt);
-  v("scale_sigma", refined ? w.refined->scale_sigma : c.scale_sigma);
+  v("joint_covariance", refined ? std::optional<Joint>(w.refined->covariance.joint) : std::nullopt,
+    "its blocks by `block`; None where the window was not refined");
+  v("scale_sigma", refined ? w.refined->scale_sigma : c.scale_sigma, "relative");
   v("tilt_sigma", refined ? w.refined->tilt_sigma : c.tilt_sigma, "", "rad");
   v("chi2", refined ? w.refined->cost : any ? c.solutions[0].cost : std::numeric_limits<double>::quiet_NaN());
   std::vector<std::uint64_t> inliers;
@@ -228,47 +262,56 @@ void describeSeries(V& v, const ComparedWindow& w) {
 
 template <class V>
 void describe(V& v, const ComparedStretch& f) {
-  v("begin", f.begin, "", "s")("end", f.end, "", "s")("windows", f.windows.size())("chi2", f.chi2);
-  v("degrees_of_freedom", f.degrees_of_freedom)("p", f.p)("ok", f.ok());
-  v("inflation", f.inflation)("inflated", f.inflated);
-  if (!f.has_state) return;
-  v("gravity_direction", f.down)("velocity", f.velocity, "", "m/s")("gyroscope_bias", f.gyroscope_bias, "", "rad/s");
+  v("begin", f.begin, "", "s")("end", f.end, "", "s")("windows", f.windows.size(), "their number");
+  v("chi2", f.chi2, "of their disagreement")("degrees_of_freedom", f.degrees_of_freedom, "of chi2");
+  v("p", f.p, "probability of a larger chi2")("ok", f.ok(), "p is 0.001 or more, or the covariance was inflated");
+  v("inflation", f.inflation, "factor by which the covariances are too small");
+  v("inflated", f.inflated, "the covariance was multiplied by it");
+  if (!shown(v, f.has_state)) return;
+  v("gravity_direction", f.down, "unit vector, downwards")("velocity", f.velocity, "", "m/s")(
+      "gyroscope_bias", f.gyroscope_bias, "", "rad/s");
   v("accelerometer_bias", f.accelerometer_bias, "", "m/s²")("covariance", f.state.covariance);
-  v("covariance_order", "gravity_direction(2) velocity gyroscope_bias resting_force");
-  v("covariance_frame", "axes of the body at the end; the direction's in the frame of its placement");
-  v("speed_error", f.speed_error, "", "m/s")("gravity_error", f.gravity_error, "", "rad");
-  v("gyroscope_bias_error", f.gyroscope_error, "", "rad/s");
-  v("accelerometer_bias_error", f.accelerometer_error, "", "m/s²")("nees", f.nees, "11 expected");
+  v("covariance_order", "gravity_direction(2) velocity gyroscope_bias resting_force", "in words");
+  v("covariance_frame", "axes of the body at the end; the direction's in the frame of its placement", "in words");
+  v("speed_error", f.speed_error, "null without a truth", "m/s")("gravity_error", f.gravity_error, "likewise", "rad");
+  v("gyroscope_bias_error", f.gyroscope_error, "likewise", "rad/s");
+  v("accelerometer_bias_error", f.accelerometer_error, "likewise", "m/s²")("nees", f.nees, "11 expected");
 }
 
 template <class V>
 void describe(V& v, const InitialisationErrors& e) {
-  v("windows", e.size())("speed_median", quantile(e.speed, 0.5), "", "m/s")("speed_95", quantile(e.speed, 0.95));
-  v("gravity_deg_median", quantile(e.gravity, 0.5))("gravity_deg_95", quantile(e.gravity, 0.95));
-  v("scale_percent_median", quantile(e.scale, 0.5))("scale_percent_95", quantile(e.scale, 0.95));
+  v("windows", e.size(), "that were compared")("speed_median", quantile(e.speed, 0.5), "", "m/s");
+  v("speed_95", quantile(e.speed, 0.95), "95 % quantile", "m/s");
+  v("gravity_deg_median", quantile(e.gravity, 0.5), "", "deg")("gravity_deg_95", quantile(e.gravity, 0.95), "", "deg");
+  v("scale_percent_median", quantile(e.scale, 0.5), "", "%")("scale_percent_95", quantile(e.scale, 0.95), "", "%");
 }
 
 template <class V>
 void describe(V& v, const ComparedRecording& r) {
   const Verdict verdict = r.verdict();
-  v("ok", verdict.isYes())("in_words", verdict.text)("images_outside", r.images_outside);
-  v("bearing_noise", r.bearing_noise, "", "rad");
-  if (r.windows_left > 0) v("interrupted", true)("windows_left", r.windows_left);
-  v("gravity", r.gravity, "that was given", "m/s²");
+  v("ok", verdict.isYes(), "the result is to be trusted")("in_words", verdict.text, "the verdict");
+  v("images_outside", r.images_outside, "that the readings do not cover");
+  v("bearing_noise", r.bearing_noise, "standard deviation of the bearings", "rad");
+  if (shown(v, r.windows_left > 0)) {
+    v("interrupted", true, "only then")("windows_left", r.windows_left, "not estimated, because of an interrupt");
+  }
+  v("gravity", r.gravity, "that was given; null: it was free", "m/s²");
   const InitialisationSummary summary = r.summary();
-  v("statuses", detail::StatusCounts{summary.statuses});
-  if (summary.closed_form.size() > 0) v("closed_form_errors", summary.closed_form);
-  if (summary.refined.size() > 0) v("refined_errors", summary.refined);
-  if (!summary.gyroscope.empty()) {
-    v("gyroscope_bias_error_median", quantile(summary.gyroscope, 0.5), "", "rad/s");
-    v("gyroscope_bias_error_95", quantile(summary.gyroscope, 0.95), "", "rad/s");
+  v("statuses", detail::StatusCounts{summary.statuses}, "number of windows of each status");
+  if (shown(v, summary.closed_form.size() > 0)) v("closed_form_errors", summary.closed_form, "with a truth");
+  if (shown(v, summary.refined.size() > 0)) v("refined_errors", summary.refined, "with a truth");
+  if (shown(v, !summary.gyroscope.empty())) {
+    v("gyroscope_bias_error_median", quantile(summary.gyroscope, 0.5), "with a truth", "rad/s");
+    v("gyroscope_bias_error_95", quantile(summary.gyroscope, 0.95), "with a truth: 95 % quantile", "rad/s");
   }
-  if (summary.with_nees > 0) v("nees_mean", summary.nees / static_cast<double>(summary.with_nees), "5 expected");
-  if (summary.degrees_of_freedom > 0) {
-    v("refined_chi2_per_degree", summary.cost / static_cast<double>(summary.degrees_of_freedom));
+  if (shown(v, summary.with_nees > 0)) {
+    v("nees_mean", summary.nees / static_cast<double>(summary.with_nees), "with a truth: 5 expected");
   }
-  v("frame", "axes of the body at the first image of each window; gravity points down");
-  v("windows", r.windows)("fusions", r.stretches);
+  if (shown(v, summary.degrees_of_freedom > 0)) {
+    v("refined_chi2_per_degree", summary.cost / static_cast<double>(summary.degrees_of_freedom), "1 expected");
+  }
+  v("frame", "axes of the body at the first image of each window; gravity points down", "in words");
+  v("windows", r.windows)("fusions", r.stretches, "of disjoint windows, for each stretch");
 }
 
 }  // namespace liestat

@@ -5,17 +5,19 @@
 //     v("statistic", t.statistic)("degrees_of_freedom", t.dof, "of chi-squared")("p", t.p);
 //   }
 //
-// which names each field once: v(name, value, meaning = "", unit = ""). It needs no include of this header. Views are
+// which names each field once: v(name, value, meaning = "", unit = ""); fields that a result may lack: stats/shown.hpp. It
+// needs no include of this header. Views are
 // visitors: JSON (report/json.hpp), Python's dictionaries (python/src/described.hpp), and those below. A value is a
 // number, a word, a matrix or vector of Eigen, a list of values, another described result, or an optional of one of these.
 // Numbers that belong to single poses, frames or windows in long series are described apart, by describeSeries(v, result).
 #pragma once
 
+#include <algorithm>
 #include <concepts>
-#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -36,54 +38,78 @@ concept Described = requires(AnyVisitor& v, const T& x) {
   describe(v, x);
 };
 
-/// A field of a result, for tables of fields: `path` joins the names of nested results by dots, and ends in `[]` where there
-/// is a list of them.
+/// A field of a result type, for tables of fields and the declarations of other languages.
 struct FieldDescription {
-  std::string path, meaning, unit;
+  enum class Kind { number, integer, boolean, text, array, result };
+  std::string name, meaning, unit;
+  Kind kind = Kind::number;
+  bool list = false, optional = false;
+  int rows = 0, columns = 0;  ///< of an array: 0 if any number, a vector has one column
+  std::string result = {};    ///< name of the type of a result, its fields are:
+  std::vector<FieldDescription> fields = {};
 };
 
-/// Lists the fields of a result; those of an empty optional or list of results are taken from a default-constructed one.
-class FieldNames {
+/// The name of a type, without namespaces and arguments.
+template <class T>
+std::string nameOfType() {
+  const std::string_view function = __PRETTY_FUNCTION__;
+  std::string_view type = function.substr(function.find("T = ") + 4);
+  type = type.substr(0, type.find_first_of("<;]"));
+  return std::string(type.substr(type.rfind(':') + 1));
+}
+
+/// Lists the fields that results of a type may have, each once.
+class FieldList {
  public:
-  explicit FieldNames(std::string prefix = {}) : prefix_(std::move(prefix)) {}
+  static constexpr bool every_field = true;  ///< see stats/shown.hpp
 
   template <class T>
-  FieldNames& operator()(const char* name, const T& value, const char* meaning = "", const char* unit = "") {
-    add(prefix_ + name, value, meaning, unit);
+  FieldList& operator()(const char* name, const T&, const char* meaning = "", const char* unit = "") {
+    for (const FieldDescription& field : fields_) {
+      if (field.name == name) return *this;
+    }
+    FieldDescription field{name, meaning, unit};
+    setType<T>(field);
+    fields_.push_back(std::move(field));
     return *this;
   }
   const std::vector<FieldDescription>& fields() const { return fields_; }
 
  private:
   template <class T>
-  void add(std::string path, const T& value, const char* meaning, const char* unit) {
+  static void setType(FieldDescription& field) {
+    using Kind = FieldDescription::Kind;
     if constexpr (Described<T>) {
-      fields_.push_back({path, meaning, unit});
-      FieldNames inner(path + ".");
-      describe(inner, value);
-      fields_.insert(fields_.end(), inner.fields_.begin(), inner.fields_.end());
-    } else if constexpr (requires { requires Described<typename T::value_type>; }) {
-      using Inner = typename T::value_type;
-      if constexpr (requires { value.has_value(); }) {
-        add(std::move(path), value.value_or(Inner{}), meaning, unit);
-      } else {
-        add(path + "[]", value.empty() ? Inner{} : value[0], meaning, unit);
-      }
-    } else {
-      fields_.push_back({std::move(path), meaning, unit});
+      FieldList inner;
+      describe(inner, T());
+      field.kind = Kind::result, field.result = nameOfType<T>(), field.fields = inner.fields_;
+    } else if constexpr (std::is_same_v<T, bool>) {
+      field.kind = Kind::boolean;
+    } else if constexpr (std::is_integral_v<T>) {
+      field.kind = Kind::integer;
+    } else if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+      field.kind = Kind::text;
+    } else if constexpr (requires { T::RowsAtCompileTime; }) {
+      field.kind = Kind::array;
+      field.rows = std::max<int>(0, T::RowsAtCompileTime), field.columns = std::max<int>(0, T::ColsAtCompileTime);
+    } else if constexpr (requires(const T& value) { value.has_value(); }) {
+      setType<typename T::value_type>(field);
+      field.optional = true;
+    } else if constexpr (requires { typename T::value_type; }) {
+      setType<typename T::value_type>(field);
+      field.list = true;
     }
   }
 
-  std::string prefix_;
   std::vector<FieldDescription> fields_;
 };
 
 /// The fields of a result type, in order.
 template <Described T>
-std::vector<FieldDescription> fieldsOf(const T& result = {}) {
-  FieldNames names;
-  describe(names, result);
-  return names.fields();
+std::vector<FieldDescription> fieldsOf() {
+  FieldList list;
+  describe(list, T());
+  return list.fields();
 }
 
 /// The numbers of a result by name, those of nested results as outer_inner: what `--fail-if` knows. Yes and no are 1 and

@@ -207,9 +207,10 @@ inline std::string conventionName(const Convention& c, bool with_layout = true) 
 /// See report/describe.hpp.
 template <class V>
 void describe(V& v, const Convention& c) {
-  v("name", conventionName(c), "as parseConvention reads it")("order", name(c.order))("perturbation",
-                                                                                      name(c.perturbation));
-  v("unit", name(c.unit), "of the rotation")("content", name(c.content))("layout", name(c.layout));
+  v("name", conventionName(c), "as --cov-from takes it")("order", name(c.order), "of the coordinates");
+  v("perturbation", name(c.perturbation), "the side and the frame of the errors")("unit", name(c.unit),
+                                                                                  "of the rotation");
+  v("content", name(c.content), "covariance or information")("layout", name(c.layout), "of the numbers in a row");
 }
 
 }  // namespace liestat

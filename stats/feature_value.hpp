@@ -6,6 +6,7 @@
 #include <lie/concepts.hpp>
 #include <lie/manifold.hpp>
 #include <lie/so3.hpp>
+#include <stats/shown.hpp>
 
 #include <Eigen/Core>
 
@@ -15,6 +16,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -50,13 +52,19 @@ struct FeatureValue {
 /// The parts that a feature has.
 template <class V>
 void describe(V& v, const FeatureValue& x) {
-  if (x.quaternion_xyzw) v("quaternion_xyzw", *x.quaternion_xyzw);
-  if (x.rotation_vector) v("rotation_vector", *x.rotation_vector, "", "rad");
-  if (x.translation) v("translation", *x.translation, "", "m");
-  if (x.velocity) v("velocity", *x.velocity, "", "m/s");
-  if (x.point) v("point", *x.point, "", "m");
-  if (x.direction) v("direction", *x.direction);
-  if (!x.quaternion_xyzw && !x.point && !x.direction) v("parameters", x.parameters);
+  const auto part = [&](const char* name, const auto& value, const char* meaning, const char* unit) {
+    using Value = std::remove_cvref_t<decltype(*value)>;
+    if (shown(v, value.has_value())) v(name, value ? *value : Value(), meaning, unit);
+  };
+  part("quaternion_xyzw", x.quaternion_xyzw, "w >= 0", "");
+  part("rotation_vector", x.rotation_vector, "", "rad");
+  part("translation", x.translation, "", "m");
+  part("velocity", x.velocity, "", "m/s");
+  part("point", x.point, "", "m");
+  part("direction", x.direction, "unit vector", "");
+  if (shown(v, !x.quaternion_xyzw && !x.point && !x.direction)) {
+    v("parameters", x.parameters, "of features that have none of these");
+  }
 }
 
 /// The parts of a feature of these parameters (a quaternion x y z w first, if there is a rotation in space).
@@ -184,7 +192,8 @@ struct CovarianceWords {
 
 template <class V>
 void describe(V& v, const CovarianceWords& x) {
-  v("covariance_order", x.order)("covariance_side", x.side)("covariance_frame", x.frame);
+  v("covariance_order", x.order, "coordinates of the covariance, with units");
+  v("covariance_side", x.side, "on which its errors are applied")("covariance_frame", x.frame, "its axes");
 }
 
 /// `group`: the type's exponential is that of a Lie group without an invariant metric (SE3), else each part's own.

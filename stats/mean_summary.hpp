@@ -5,6 +5,7 @@
 #include <lie/concepts.hpp>
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
+#include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/time_blocks_types.hpp>
 #include <stats/uniqueness_types.hpp>
@@ -52,7 +53,7 @@ struct NearRival {
 template <class V>
 void describe(V& v, const NearRival& x) {
   describe(v, x.feature);
-  v("z", x.z, "by so many standard deviations it is the worse");
+  v("z", x.z, "excess of its criterion in standard deviations");
 }
 
 /// The measurement farthest from the mean in one part of the tangent vector.
@@ -67,12 +68,9 @@ struct FarthestMeasurement {
 
 template <class V>
 void describe(V& v, const FarthestMeasurement& x) {
-  v("part", name(x.part))("distance", x.shown())("unit", unitOf(x.part).name);
-  if (x.line) {
-    v("line", *x.line, "of the file");
-  } else {
-    v("index", x.index, "among the measurements");
-  }
+  v("part", name(x.part), "of the tangent vector")("distance", x.shown(), "from the mean")("unit", unitOf(x.part).name);
+  if (shown(v, x.line.has_value())) v("line", x.line.value_or(0), "of the file");
+  if (shown(v, !x.line)) v("index", x.index, "among the measurements, if they are from no file");
 }
 
 /// A mean with its certificates and its covariance, whatever the type. Matrices are empty where there are none.
@@ -146,36 +144,47 @@ template <class V>
 void describe(V& v, const MeanSummary& m) {
   const auto where = [](bool there, auto value) { return there ? std::optional(std::move(value)) : std::nullopt; };
   const bool has = m.hasCovariance(), fits = m.fit_dof > 0;
-  v("feature", m.feature, "the type of the measurements")("criterion", name(m.criterion));
+  v("feature", m.feature, "the type of the measurements");
+  v("criterion", name(m.criterion), "lsq, wlsq, maha or barycentre");
   v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
     "frame of the measurements' covariances; null where it does not matter");
   v("likelihood", m.likelihood, "whether the volume element is in the criterion");
-  v("weighted", m.weighted)("n", m.n, "measurements that count");
-  v("status", name(m.status))("reason", where(m.status != Status::ok, m.reason), "in words, where status is not ok");
+  v("weighted", m.weighted, "whether weights were used")("n", m.n, "measurements that count: those with a weight");
+  v("status", name(m.status),
+    "ok, not_converged, ambiguous, ill_defined or too_few; not_applicable: a mean, but no covariance can be computed");
+  v("reason", where(m.status != Status::ok, m.reason), "in words, where status is not ok");
   v("converged", m.converged)("iterations", m.iterations)("residual", m.residual, "norm of the last step");
-  v("tolerance", m.tolerance)("mean", m.mean);
+  v("tolerance", m.tolerance, "of the norm of the last step")("mean", m.mean, "the parts that the feature has");
   v("covariance", where(has, m.covariance), "of the mean, in its own axes; null where it is withheld");
-  v("covariance_status", name(m.covariance_status));
+  v("covariance_status", name(m.covariance_status), "why there is no covariance; otherwise ok");
   describe(v, covarianceWords(m.parts, m.group));
-  if (m.tangent_basis) v("tangent_basis", *m.tangent_basis, "axes of the covariance of a direction");
-  v("covariance_from", where(has, std::string(m.known_noise ? "noise" : "residuals")));
-  v("covariance_law", where(has, std::string(m.known_noise ? "chi2" : "hotelling")), "of squared distances");
-  v("standard_deviations", partDeviations(m.parts, m.covariance), "along the axes of the mean");
-  v("standard_deviations_world", worldDeviations(m.parts, m.mean, m.covariance), "along the axes of the world");
+  if (shown(v, m.tangent_basis.has_value())) {
+    v("tangent_basis", m.tangent_basis, "directions: the axes of the two tangent coordinates, in columns");
+  }
+  v("covariance_from", where(has, std::string(m.known_noise ? "noise" : "residuals")), "noise or residuals");
+  v("covariance_law", where(has, std::string(m.known_noise ? "chi2" : "hotelling")),
+    "of squared distances from the truth: chi2 or hotelling");
+  v("standard_deviations", partDeviations(m.parts, m.covariance),
+    "along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg");
+  v("standard_deviations_world", worldDeviations(m.parts, m.mean, m.covariance),
+    "translation_m of frames along the axes of the world");
   v("dispersion", where(m.dispersion.size() > 0, m.dispersion), "the measurements' covariance about the mean");
-  v("dispersion_standard_deviations_world", worldDeviations(m.parts, m.mean, m.dispersion));
-  v("dispersion_standard_deviations", partDeviations(m.parts, m.dispersion));
+  v("dispersion_standard_deviations_world", worldDeviations(m.parts, m.mean, m.dispersion),
+    "as standard_deviations_world");
+  v("dispersion_standard_deviations", partDeviations(m.parts, m.dispersion), "as standard_deviations");
   v("farthest", m.farthest, "the farthest measurement in each part of the tangent vector");
-  v("unique", name(m.unique), "unique, ambiguous or not_certified")("proof", m.uniquenessInWords());
-  v("rivals", m.rivals, "other features of equal cost")("rivals_complete", !m.more_rivals);
+  v("unique", name(m.unique), "unique, ambiguous or not_certified");
+  v("proof", m.uniquenessInWords(), "of uniqueness, in words")("rivals", m.rivals, "other minimisers of equal cost");
+  v("rivals_complete", !m.more_rivals, "false: there are more, such as a circle, or the search ended early");
   v("r_star", m.r_star, "radius in which the criterion is convex and has no other minimum", "rad");
   v("cells", m.cells, "of the global search; 0: it was not needed");
-  v("near_ties", m.near_ties, "other minima that the measurements do not exclude");
+  v("near_ties", m.near_ties, "other minima that the noise does not exclude, which make the status ambiguous");
   v("cut_locus_mass", m.cut_locus_mass, "fraction of the measurements near the cut locus of the mean");
   v("hessian_change", m.hessian_change, "relative decrease of the Hessian averaged over the confidence region");
-  v("fit", where(fits, m.fit), "sum of the squared Mahalanobis distances")("fit_dof", where(fits, m.fit_dof));
+  v("fit", where(fits, m.fit), "sum of the squared Mahalanobis distances, if the noise is known");
+  v("fit_dof", where(fits, m.fit_dof), "its degrees of freedom");
   v("fit_p", where(fits, m.fit_p), "probability of so large a sum");
-  v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent");
+  v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
   v("notes", m.notes, "what is remarkable, in sentences");
 }
 

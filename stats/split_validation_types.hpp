@@ -5,6 +5,7 @@
 #include <stats/feature_value.hpp>
 #include <stats/laws.hpp>
 #include <stats/mean_summary.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 #include <stats/words.hpp>
 
@@ -81,10 +82,13 @@ inline constexpr double split_false_alarm = 1e-5;
 
 template <class V>
 void describe(V& v, const SplitSeries& s) {
-  v("splits", s.distances.size())("failures", s.failures, "splits without an estimate, which are left out");
-  v("index", s.index, "mean squared distance of the halves")("index_expected", s.dof)("index_se", s.standardError());
-  v("effective_dof", s.effective_dof, "degrees of freedom of the index")("p", s.pValue());
-  v("factor", s.factor(), "index over what is expected")("factor_low", s.factorLow())("factor_high", s.factorHigh());
+  v("splits", s.distances.size(), "that were done")("failures", s.failures, "splits without an estimate, left out");
+  v("index", s.index, "mean squared distance of the halves");
+  v("index_expected", s.dof)("index_se", s.standardError(), "standard error of the index");
+  v("effective_dof", s.effective_dof, "degrees of freedom of the index");
+  v("p", s.pValue(), "probability of so large an index, if errors are independent");
+  v("factor", s.factor(), "index over what is expected");
+  v("factor_low", s.factorLow(), "lower end of its 95 % interval")("factor_high", s.factorHigh(), "upper end");
 }
 
 /// A validation by splits, whatever the measurements are: of one object, or of several pooled.
@@ -141,14 +145,20 @@ struct SplitOutcome {
 
 template <class V>
 void describe(V& v, const SplitOutcome& o) {
-  v("feature", o.feature)("dof", o.dof)("known_noise", o.known_noise);
+  v("feature", o.feature, "the type of the measurements")("dof", o.dof, "degrees of freedom of a measurement");
+  v("known_noise", o.known_noise, "covariances follow from those of the measurements, not from residuals");
   v("splits", o.settings.splits, "of each kind")("blocks", o.settings.blocks, "of time");
-  v("random", o.random)("by_blocks", o.by_blocks);
+  v("random", o.random, "halves drawn at random")("by_blocks", o.by_blocks,
+                                                  "halves made of alternating blocks of time");
   v("inflation", o.by_blocks.factor(), "by which the covariance of the mean is too small");
-  v("inflation_low", o.by_blocks.factorLow())("inflation_high", o.by_blocks.factorHigh());
+  v("inflation_low", o.by_blocks.factorLow(), "lower end of its 95 % interval");
+  v("inflation_high", o.by_blocks.factorHigh(), "upper end");
   v("false_alarm", split_false_alarm, "probability that independent errors fail");
-  v("passed", o.passed());
-  if (o.interrupted()) v("interrupted", true)("trials_done", o.done())("trials_planned", o.planned());
+  v("passed", o.passed(), "halves made of blocks agree; false after an interrupt");
+  if (shown(v, o.interrupted())) {
+    v("interrupted", o.interrupted(), "only then")("trials_done", o.done(), "splits of both kinds");
+    v("trials_planned", o.planned(), "splits of both kinds");
+  }
 }
 
 /// The mean of a part of the measurements, whatever their type.
@@ -161,9 +171,9 @@ struct SplitHalf {
 
 template <class V>
 void describe(V& v, const SplitHalf& h) {
-  v("n", h.n)("mean", h.mean);
-  v("covariance", h.covariance.size() > 0 ? std::optional(h.covariance) : std::nullopt);
-  v("standard_deviations", partDeviations(h.parts, h.covariance));
+  v("n", h.n, "measurements")("mean", h.mean);
+  v("covariance", h.covariance.size() > 0 ? std::optional(h.covariance) : std::nullopt, "of the mean, in its own axes");
+  v("standard_deviations", partDeviations(h.parts, h.covariance), "by parts, in degrees and metres");
 }
 
 /// A SplitValidation of measurements of any type: splitMean() of stats/summarized_mean_splits.hpp.
@@ -183,12 +193,15 @@ struct SplitSummary : SplitOutcome {
 template <class V>
 void describe(V& v, const SplitSummary& s) {
   describe(v, static_cast<const SplitOutcome&>(s));
-  v("n", s.n)("criterion", name(s.criterion));
+  v("n", s.n, "measurements")("criterion", name(s.criterion));
   v("covariance_at",
-    s.covariance_at ? std::optional(std::string(name(*s.covariance_at))) : std::optional<std::string>());
+    s.covariance_at ? std::optional(std::string(name(*s.covariance_at))) : std::optional<std::string>(),
+    "frame of the measurements' covariances; null where it does not matter");
   describe(v, covarianceWords(s.parts, s.group));
   v("first", s.first, "the first half in time")("second", s.second)("merged", s.merged, "both halves fused");
-  v("squared_distance", s.squared_distance, "of the halves in time")("law", s.law)("p", s.p_value);
+  v("squared_distance", s.squared_distance, "of the halves in time")("law", s.law,
+                                                                     "of that distance: chi2 or hotelling");
+  v("p", s.p_value, "probability of a larger distance");
 }
 
 }  // namespace liestat

@@ -48,7 +48,7 @@ struct TimeBlocks {
 
 template <class V>
 void describe(V& v, const TimeBlocks& b) {
-  v("blocks", b.blocks, "of time")("splits", b.splits);
+  v("blocks", b.blocks, "of time")("splits", b.splits, "of the blocks into two halves");
   v("factor", b.factor, "squared distances of halves over what is expected");
   v("factor_low", b.low, "lower end of its 95 % interval")("factor_high", b.high, "upper end");
   v("p", b.p, "probability of so large a factor, if rows are independent");

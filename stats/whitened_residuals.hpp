@@ -57,7 +57,8 @@ struct ResidualTest {
 };
 template <class V>
 void describe(V& v, const ResidualTest& t) {
-  v("statistic", t.statistic)("degrees_of_freedom", t.dof)("ratio", t.ratio(), "1 is expected")("p", t.p);
+  v("statistic", t.statistic)("degrees_of_freedom", t.dof)("ratio", t.ratio(), "1 is expected");
+  v("p", t.p, "probability of a statistic as extreme, if the covariances are right");
 }
 
 /// The interval below and above which NEES lies with a probability of `tail` each if the covariances are right.

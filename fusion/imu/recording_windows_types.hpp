@@ -3,6 +3,7 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/imu/preintegrate.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -75,10 +76,11 @@ template <class V>
 void describe(V& v, const RecordingWindow& w) {
   v("begin", w.begin, "", "s")("status", w.status(), "ok, or the fault of the readings");
   v("duration", w.result.motion.duration(), "", "s")("largest_gap", w.result.max_gap, "between readings", "s");
-  if (!w.ok()) {
-    if (w.fault_time) v("fault_time", *w.fault_time, "of the reading that is at fault", "s");
-    return;
+  if (shown(v, !w.ok() && w.fault_time)) {
+    v("fault_time", w.fault_time.value_or(0),
+      "of the reading that is at fault, if any; the fields below are then missing", "s");
   }
+  if (!shown(v, w.ok())) return;
   const SE23d& x = w.result.motion.increment();
   v("quaternion_xyzw", Eigen::Vector4d(x.so3().params()))("rotation_vector", Eigen::Vector3d(x.so3().log()), "", "rad");
   v("position", Eigen::Vector3d(x.translation()), "", "m")("velocity", Eigen::Vector3d(x.velocity()), "", "m/s");
@@ -86,19 +88,27 @@ void describe(V& v, const RecordingWindow& w) {
   const bool with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
   v("covariance",
     with_noise ? std::optional(Eigen::Matrix<double, 9, 9>(w.result.motion.gaussian().covariance)) : std::nullopt,
-    "of position, rotation, velocity; null without noise");
+    "9 errors in m, rad, m/s; null without noise");
   v("bias_jacobian", w.result.motion.biasJacobian(), "by the biases of gyroscope and accelerometer");
-  if (w.error) v("error", *w.error, "against the truth: position, rotation, velocity", "m, rad, m/s");
-  if (w.squared_distance) v("squared_distance", *w.squared_distance, "of the error, 9 expected");
+  using Error = Eigen::Matrix<double, 9, 1>;
+  if (shown(v, w.error.has_value())) {
+    v("error", w.error.value_or(Error::Zero()), "with a truth: position, rotation, velocity", "m, rad, m/s");
+  }
+  if (shown(v, w.squared_distance.has_value())) {
+    v("squared_distance", w.squared_distance.value_or(0), "of the error, 9 expected; with a truth and noise");
+  }
 }
 
 template <class V>
 void describe(V& v, const RecordingWindows& r) {
-  v("covariance_order", "position rotation velocity")("covariance_side", "right");
-  v("covariance_frame", "axes of the body at the end of the window, m rad m/s")("windows", r.windows);
-  if (const auto test = r.test()) {
-    v("squared_distance", test->squared_distance, "sum over the windows");
-    v("degrees_of_freedom", test->degrees_of_freedom)("p", test->p, "probability of a larger sum");
+  v("covariance_order", "position rotation velocity", "of the windows' covariances");
+  v("covariance_side", "right", "on which errors are applied");
+  v("covariance_frame", "axes of the body at the end of the window, m rad m/s", "in words")("windows", r.windows);
+  const std::optional<IncrementTest> test = r.test();
+  if (shown(v, test.has_value())) {
+    const IncrementTest sum = test.value_or(IncrementTest{});
+    v("squared_distance", sum.squared_distance, "with a truth and noise: sum over the windows");
+    v("degrees_of_freedom", sum.degrees_of_freedom, "of the sum")("p", sum.p, "probability of a larger sum");
   }
   describe(v, r.verdict());
 }

@@ -4,6 +4,7 @@
 
 #include <fusion/motion/plan.hpp>
 #include <fusion/motion/types.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -160,17 +161,20 @@ void describe(V& v, const MotionFrame& x) {
   v("pairs", m.pairs, "usable pairs of points")("inliers", m.inliers, "those that the update used");
   v("covariance_judged", x.covariance_judged, "the covariance claims to bound the error");
   v("flags", x.flags(), "that are raised");
-  if (!x.no_gyroscope.empty()) v("no_gyroscope", x.no_gyroscope, "why there is no rotation of the gyroscope");
-  if (x.gyroscope_bias) {
-    v("gyroscope_bias", x.gyroscope_bias->mean, "measured minus true, in the sensor's axes", "rad/s");
-    v("gyroscope_bias_covariance", x.gyroscope_bias->covariance, "", "rad^2/s^2");
+  if (shown(v, !x.no_gyroscope.empty())) {
+    v("no_gyroscope", x.no_gyroscope, "why there is no rotation of the gyroscope, if there is none");
   }
-  if (x.with_truth) {
+  if (shown(v, x.gyroscope_bias.has_value())) {
+    const auto bias = x.gyroscope_bias.value_or(Gaussian<Eigen::Vector3d>());
+    v("gyroscope_bias", bias.mean, "if it is estimated: measured minus true, in the sensor's axes", "rad/s");
+    v("gyroscope_bias_covariance", bias.covariance, "", "rad^2/s^2");
+  }
+  if (shown(v, x.with_truth)) {
     const auto degrees = [](std::optional<double> angle) {
       return angle ? std::optional<double>(180 / std::numbers::pi * *angle) : std::nullopt;
     };
-    v("direction_error_deg", degrees(x.direction_error), "null: unknown, or hardly any motion", "deg");
-    v("rotation_error_deg", degrees(x.rotation_error), "per frame", "deg");
+    v("direction_error_deg", degrees(x.direction_error), "with a truth; null: unknown, or hardly any motion", "deg");
+    v("rotation_error_deg", degrees(x.rotation_error), "with a truth, per frame", "deg");
   }
 }
 
@@ -181,23 +185,32 @@ void describe(V& v, const MotionResult& x) {
   const std::size_t usable = x.usable();
   v("status", usable > 0 ? "ok" : "ill_defined", "ok if any frame may be used");
   v("verdict", verdict.text, "how many frames may be used")("causes", verdict.causes, "flags that forbid the others");
-  v("frames_usable", usable)("passes", x.passes, "over the sequence")("with_gyroscope", x.with_gyroscope);
+  v("frames_usable", usable, "their number")("passes", x.passes, "over the sequence");
+  v("with_gyroscope", x.with_gyroscope, "rotations of a gyroscope were given");
   v("frames_apart", x.frames_apart, "longest interval of a pair");
   v("observations_outside", x.outside, "without a ray ahead of the camera");
-  if (x.with_gyroscope) v("frames_without_gyroscope", x.withoutGyroscope());
+  if (shown(v, x.with_gyroscope)) {
+    v("frames_without_gyroscope", x.withoutGyroscope(), "with a gyroscope: frames that have no rotation of it");
+  }
   v("hand_overs", x.hand_overs, "to the essential filter")("fall_backs", x.fall_backs, "to the subspace filter");
   v("motion_of",
     "the points in the camera's axes (x right, y down, z forward), X2 = R X1 + T; one frame is the unit of time, the "
-    "camera moves against it");
-  v("covariance_order", "direction: two coordinates; rotation: x y z")("covariance_side", "right");
+    "camera moves against it",
+    "in words");
+  v("covariance_order", "direction: two coordinates; rotation: x y z", "in words");
+  v("covariance_side", "right", "on which errors are applied");
   v("covariance_frame",
-    "direction: local frame of S2 at the estimate, rad; rotation: the first frame's camera axes, rad");
-  if (x.with_bias) v("gyroscope_bias_of", "the readings, measured minus true, rad/s in the sensor's axes");
+    "direction: local frame of S2 at the estimate, rad; rotation: the first frame's camera axes, rad", "in words");
+  if (shown(v, x.with_bias)) {
+    v("gyroscope_bias_of", "the readings, measured minus true, rad/s in the sensor's axes",
+      "if it is estimated, in words");
+  }
   v("frames", x.frames, "the motion of each");
-  if (x.with_truth) {
+  if (shown(v, x.with_truth)) {
     const double degrees = 180 / std::numbers::pi;
-    v("median_direction_error_deg", degrees * x.medianError(&MotionFrame::direction_error), "", "deg");
-    v("median_rotation_error_deg", degrees * x.medianError(&MotionFrame::rotation_error), "per frame", "deg");
+    v("median_direction_error_deg", degrees * x.medianError(&MotionFrame::direction_error), "with a truth", "deg");
+    v("median_rotation_error_deg", degrees * x.medianError(&MotionFrame::rotation_error), "with a truth, per frame",
+      "deg");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <lie/essential.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/hierarchy_types.hpp>
+#include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
 
@@ -123,55 +124,68 @@ struct RelativePose {
 template <class V>
 void describe(V& v, const RelativePose& x) {
   v("quaternion_xyzw", Eigen::Vector4d(x.pose.mean.so3().params()));
-  v("direction", Eigen::Vector3d(x.pose.mean.direction().unit_vector()));
-  v("covariance", x.pose.covariance, "", "rad");
-  v("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction");
+  v("direction", Eigen::Vector3d(x.pose.mean.direction().unit_vector()), "of the translation, of length 1");
+  v("covariance", x.pose.covariance, "of the tangent", "rad");
+  v("covariance_order", "direction (2), rotation (3), rad, axes across and along the direction", "in words");
 }
 
 template <class V>
 void describe(V& v, const PhysicalParameters& x) {
   std::vector<double> deviations;
   for (std::size_t i = 0; i < x.size(); ++i) deviations.push_back(x.deviation(i));
-  v("names", x.names)("units", x.units)("values", x.values)("deviations", deviations, "standard deviations");
-  v("covariance", x.covariance);
+  v("names", x.names)("units", x.units, "rad or px")("values", x.values)("deviations", deviations,
+                                                                         "standard deviations");
+  v("covariance", x.covariance, "of the values");
 }
 
 template <class V>
 void describe(V& v, const TwoViewModelRow& row) {
-  v("model", row.name)("parents", row.parents)("free_parameters", row.free_parameters)("equations", row.equations);
-  v("evaluated", row.evaluated)("draws", row.draws);
-  v("status", row.hasEstimate() ? std::optional<std::string>(name(row.status)) : std::nullopt);
-  if (!row.hasEstimate()) return;
-  v("inliers", row.inliers)("relevance", row.relevance)("chi2", row.chi2)("degrees_of_freedom", row.degrees_of_freedom);
-  v("rms", row.rms, "", "px")("unsupported", row.unsupported, "its inliers could be chance");
-  v("rejection", name(row.rejection));
-  v("rejected_by", row.rejected_by.empty() ? std::nullopt : std::optional(row.rejected_by));
+  v("model", row.name)("parents", row.parents, "more general models")("free_parameters", row.free_parameters);
+  v("equations", row.equations, "of a match")("evaluated", row.evaluated, "its draws came to their end");
+  v("draws", row.draws, "random samples");
+  v("status", row.hasEstimate() ? std::optional<std::string>(name(row.status)) : std::nullopt,
+    "of its estimate; null: there is none, and the fields below are missing");
+  if (!shown(v, row.hasEstimate())) return;
+  v("inliers", row.inliers, "their number")("relevance", row.relevance, "by which models are compared");
+  v("chi2", row.chi2, "over its own inliers")("degrees_of_freedom", row.degrees_of_freedom, "of chi2");
+  v("rms", row.rms, "noise that its inliers show", "px")("unsupported", row.unsupported, "its inliers could be chance");
+  v("rejection", name(row.rejection), "why the model was not chosen");
+  v("rejected_by", row.rejected_by.empty() ? std::nullopt : std::optional(row.rejected_by), "the model that did it");
 }
 
 template <class V>
 void describe(V& v, const TwoViewMotionResult& x) {
-  v("matrix", x.matrix, "of norm 1");
-  v("matrix_acts_on", x.equations == 2 ? "second ~ matrix * first, pixels" : "second' * matrix * first = 0, pixels");
+  v("matrix", x.matrix, "homography or fundamental matrix of undistorted pixels, of norm 1");
+  v("matrix_acts_on", x.equations == 2 ? "second ~ matrix * first, pixels" : "second' * matrix * first = 0, pixels",
+    "its equation, in words");
   v("matrix_covariance", x.matrix_covariance.rows() == 9 ? std::optional(x.matrix_covariance) : std::nullopt,
     "of its entries column after column");
-  v("parameters", x.physical);
-  v("second_T_first", x.relative_pose ? std::optional(RelativePose{*x.relative_pose}) : std::nullopt);
+  v("parameters", x.physical,
+    "physical ones of the model; two sets for the two poses of a plane, otherwise one or none");
+  v("second_T_first", x.relative_pose ? std::optional(RelativePose{*x.relative_pose}) : std::nullopt,
+    "of the models with a pose");
 }
 
 template <class V>
 void describe(V& v, const TwoViewImageFrame& x) {
-  v("matches", x.matches)("sigma", x.sigma, "", "px")("calibrated", x.calibrated);
-  v("image_corner", x.image_corner, "", "px")("image_size", x.image_size, "", "px");
-  v("size_from_matches", x.size_from_matches)("repeated", x.repeated)("contradicted", x.contradicted);
+  v("matches", x.matches, "all that were given")("sigma", x.sigma, "of each coordinate", "px");
+  v("calibrated", x.calibrated, "with the cameras' intrinsics");
+  v("image_corner", x.image_corner, "the upper left one; zero where the size is known", "px");
+  v("image_size", x.image_size, "", "px")("size_from_matches", x.size_from_matches, "it is that of the matches' box");
+  v("repeated", x.repeated, "matches equal to another one, which counts for them");
+  v("contradicted", x.contradicted, "matches that take no part, because they contradict each other");
 }
 
 template <class V>
 void describe(V& v, const TwoViewMotionEstimate& x) {
   describe(v, static_cast<const TwoViewImageFrame&>(x));
-  v("status", name(x.status))("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason));
-  v("model", x.lattice.empty() ? std::string() : x.chosenModel().name)("inliers", x.inliers);
+  v("status", name(x.status), "ok, too_few, not_applicable, not_converged or ill_defined");
+  v("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason), "in words, where status is not ok");
+  v("model", x.lattice.empty() ? std::string() : x.chosenModel().name, "the chosen one");
+  v("inliers", x.inliers, "their number");
   describe(v, static_cast<const TwoViewMotionResult&>(x));
-  v("lattice", x.lattice)("inlier", x.inlier, "of each match")("squared_errors", x.errors, "in units of the noise");
+  v("lattice", x.lattice, "all models")("inlier", x.inlier, "of each match");
+  v("squared_errors", x.errors, "of each match, in units of the noise");
 }
 
 /// Adds the fields that the program does not print.
@@ -182,15 +196,17 @@ void describeSeries(V& v, const TwoViewMotionEstimate& x) {
 
 template <class V>
 void describe(V& v, const TwoViewStructure& x) {
-  v("model", x.model)("status", name(x.status))("inliers", x.inliers.size())("rms", x.rms, "", "px");
+  v("model", x.model)("status", name(x.status), "of the estimate from its own inliers");
+  v("inliers", x.inliers.size(), "their number")("rms", x.rms, "noise that its inliers show", "px");
   describe(v, static_cast<const TwoViewMotionResult&>(x));
 }
 
 template <class V>
 void describe(V& v, const TwoViewMotions& x) {
   describe(v, static_cast<const TwoViewImageFrame&>(x));
-  v("status", name(x.status))("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason));
-  v("motions", x.structures);
+  v("status", name(x.status), "as without --motions")("reason",
+                                                      x.reason.empty() ? std::nullopt : std::optional(x.reason));
+  v("motions", x.structures, "in the order in which they were found");
   std::vector<double> motion(x.matches, 0);
   for (std::size_t k = 0; k < x.structures.size(); ++k) {
     for (const std::size_t i : x.structures[k].inliers) motion[i] = static_cast<double>(k + 1);

@@ -15,10 +15,10 @@ _Shape = int | Sequence[int]
 _Axis = int | tuple[int, ...] | None
 _Rng = np.random.Generator | "CounterRng" | int | None
 _CovarianceAt = Literal["measured", "estimated"] | None
-_Convention = Literal[
+_ConventionWord = Literal[
     "body", "left", "world", "rotation_first", "left_rotation_first", "world_rotation_first", "chart"
 ]
-_Alignment = Literal["none", "origin", "posyaw", "se3", "sim3", "scale"]
+_AlignmentWord = Literal["none", "origin", "posyaw", "se3", "sim3", "scale"]
 _PoseRelation = Literal[
     "full", "trans_part", "rot_part", "angle_deg", "angle_rad", "point_distance", "point_distance_error_ratio"
 ]
@@ -199,8 +199,10 @@ class Uniqueness(str):
     def __ne__(self, other: object) -> bool: ...
     def __hash__(self) -> int: ...
 
-class MeanResult:
-    criterion: str
+class MeanResult(_MeanSummary):
+    law: Law
+    near_tie_z: Any
+    cost: Any
     shape: tuple[int, ...]
     def __init__(self, kind: Any, criterion: str, answers: Any, shape: tuple[int, ...]) -> None: ...
     def __getattr__(self, name: str) -> Any: ...
@@ -218,7 +220,7 @@ class MeanResult:
 class Gaussian:
     mean: Any
     covariance: _Array
-    def __init__(self, mean: Manifold, covariance: ArrayLike, convention: _Convention = "body") -> None: ...
+    def __init__(self, mean: Manifold, covariance: ArrayLike, convention: _ConventionWord = "body") -> None: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
     @property
@@ -232,7 +234,7 @@ class Gaussian:
     def between(self, other: Gaussian | Group) -> Gaussian: ...
     def moved(self, by: Any) -> Gaussian: ...
     def transported(self, to: Manifold) -> Gaussian: ...
-    def in_convention(self, convention: _Convention) -> _Array: ...
+    def in_convention(self, convention: _ConventionWord) -> _Array: ...
     def mahalanobis(self, x: Manifold | Gaussian) -> Any: ...
     def confidence_region(self, probability: float = 0.95, law: Law | None = None) -> ConfidenceRegion: ...
     def sample(self, size: _Shape | None = None, rng: _Rng = None) -> Any: ...
@@ -278,6 +280,10 @@ def mean(
     budget: int | None = None,
     threads: int = 0,
 ) -> MeanResult: ...
+class _Split(_SplitSummary):
+    verdict: str
+    causes: list[str]
+
 def validate_split(
     x: Manifold,
     weights: ArrayLike | None = None,
@@ -291,7 +297,7 @@ def validate_split(
     blocks: int = 10,
     seed: int = 1,
     threads: int = 0,
-) -> Result: ...
+) -> _Split: ...
 def group_mean(
     x: Group,
     weights: ArrayLike | None = None,
@@ -314,9 +320,9 @@ def fuse(
 def convert_covariance(
     x: Manifold,
     covariance: ArrayLike,
-    to: _Convention = "body",
+    to: _ConventionWord = "body",
     *,
-    source: _Convention = "body",
+    source: _ConventionWord = "body",
     threads: int = 1,
 ) -> _Array: ...
 def propagate(
@@ -351,17 +357,698 @@ class Result:
     def __getitem__(self, name: str) -> Any: ...
     def __getattr__(self, name: str) -> Any: ...
 
-class CalibratedPose(Result):
+# fields of results, written by ./run generate
+class _MeanSummary:
+    feature: Any  # text; the type of the measurements
+    criterion: Any  # text; lsq, wlsq, maha or barycentre
+    covariance_at: Any  # text or null; frame of the measurements' covariances; null where it does not matter
+    likelihood: Any  # bool; whether the volume element is in the criterion
+    weighted: Any  # bool; whether weights were used
+    n: Any  # integer; measurements that count: those with a weight
+    # text; ok, not_converged, ambiguous, ill_defined or too_few; not_applicable: a mean, but no covariance can be computed
+    status: Any
+    reason: Any  # text or null; in words, where status is not ok
+    converged: Any  # bool
+    iterations: Any  # integer
+    residual: Any  # number; norm of the last step
+    tolerance: Any  # number; of the norm of the last step
+    mean: Any  # object; the parts that the feature has
+    covariance: Any  # n×n or null; of the mean, in its own axes; null where it is withheld
+    covariance_status: Any  # text; why there is no covariance; otherwise ok
+    covariance_order: Any  # text; coordinates of the covariance, with units
+    covariance_side: Any  # text; on which its errors are applied
+    covariance_frame: Any  # text; its axes
+    tangent_basis: Any  # 3×2 or null; directions: the axes of the two tangent coordinates, in columns
+    covariance_from: Any  # text or null; noise or residuals
+    covariance_law: Any  # text or null; of squared distances from the truth: chi2 or hotelling
+    # by name or null; along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg
+    standard_deviations: Any
+    standard_deviations_world: Any  # by name or null; translation_m of frames along the axes of the world
+    dispersion: Any  # n×n or null; the measurements' covariance about the mean
+    dispersion_standard_deviations_world: Any  # by name or null; as standard_deviations_world
+    dispersion_standard_deviations: Any  # by name or null; as standard_deviations
+    farthest: Any  # list of objects; the farthest measurement in each part of the tangent vector
+    unique: Any  # text; unique, ambiguous or not_certified
+    proof: Any  # text; of uniqueness, in words
+    rivals: Any  # list of objects; other minimisers of equal cost
+    rivals_complete: Any  # bool; false: there are more, such as a circle, or the search ended early
+    r_star: Any  # number; radius in which the criterion is convex and has no other minimum; rad
+    cells: Any  # integer; of the global search; 0: it was not needed
+    near_ties: Any  # list of objects; other minima that the noise does not exclude, which make the status ambiguous
+    cut_locus_mass: Any  # number; fraction of the measurements near the cut locus of the mean
+    hessian_change: Any  # number; relative decrease of the Hessian averaged over the confidence region
+    fit: Any  # number or null; sum of the squared Mahalanobis distances, if the noise is known
+    fit_dof: Any  # number or null; its degrees of freedom
+    fit_p: Any  # number or null; probability of so large a sum
+    time_blocks: Any  # object or null; rows with times: whether their errors are independent; null without
+    notes: Any  # list of text; what is remarkable, in sentences
+
+class _SplitSeries(Result):
+    splits: int  # that were done
+    failures: int  # splits without an estimate, left out
+    index: float  # mean squared distance of the halves
+    index_expected: float
+    index_se: float  # standard error of the index
+    effective_dof: float  # degrees of freedom of the index
+    p: float  # probability of so large an index, if errors are independent
+    factor: float  # index over what is expected
+    factor_low: float  # lower end of its 95 % interval
+    factor_high: float  # upper end
+
+class _FeatureValue(Result):
+    quaternion_xyzw: _Array  # w >= 0
+    rotation_vector: _Array  # rad
+    translation: _Array  # m
+    velocity: _Array  # m/s
+    point: _Array  # m
+    direction: _Array  # unit vector
+    parameters: _Array  # of features that have none of these
+
+class _SplitHalf(Result):
+    n: int  # measurements
+    mean: _FeatureValue
+    covariance: _Array | None  # of the mean, in its own axes
+    standard_deviations: Result | None  # by parts, in degrees and metres
+
+class _SplitSummary(Result):
+    feature: str  # the type of the measurements
+    dof: int  # degrees of freedom of a measurement
+    known_noise: bool  # covariances follow from those of the measurements, not from residuals
+    splits: int  # of each kind
+    blocks: int  # of time
+    random: _SplitSeries  # halves drawn at random
+    by_blocks: _SplitSeries  # halves made of alternating blocks of time
+    inflation: float  # by which the covariance of the mean is too small
+    inflation_low: float  # lower end of its 95 % interval
+    inflation_high: float  # upper end
+    false_alarm: float  # probability that independent errors fail
+    passed: bool  # halves made of blocks agree; false after an interrupt
+    interrupted: bool  # only then
+    trials_done: int  # splits of both kinds
+    trials_planned: int  # splits of both kinds
+    n: int  # measurements
+    criterion: str
+    covariance_at: str | None  # frame of the measurements' covariances; null where it does not matter
+    covariance_order: str  # coordinates of the covariance, with units
+    covariance_side: str  # on which its errors are applied
+    covariance_frame: str  # its axes
+    first: _SplitHalf  # the first half in time
+    second: _SplitHalf
+    merged: _SplitHalf  # both halves fused
+    squared_distance: float  # of the halves in time
+    law: str  # of that distance: chi2 or hotelling
+    p: float  # probability of a larger distance
+
+class _ErrorStatistics(Result):
+    rmse: float
+    mean: float
+    median: float
+    std: float
+    min: float
+    max: float
+    sse: float  # sum of squares
+
+class _Alignment(Result):
+    model: str  # none, origin, posyaw, se3, sim3 or scale
+    weighted: bool  # by the covariances
+    ok: bool  # the poses determine it
+    scale: float  # of the estimate
+    translation: _Array  # of the world; m
+    quaternion_xyzw: _Array  # of the world
+    parameters: int  # that were estimated
+    poses: int  # from which it was estimated
+    condition: float  # of the information matrix
+    covariance: _Array  # m, rad, 1
+    covariance_order: str  # in words
+
+class _ResidualTest(Result):
+    statistic: float
+    degrees_of_freedom: float
+    ratio: float  # 1 is expected
+    p: float  # probability of a statistic as extreme, if the covariances are right
+
+class _WhitenedResidualTests(Result):
+    joint_nees: _ResidualTest
+    position_nees: _ResidualTest
+    rotation_nees: _ResidualTest
+    mean: _ResidualTest
+    covariance: _ResidualTest
+    tail: _ResidualTest
+    lag: _ResidualTest
+
+class _TrajectoryEvaluation(Result):
+    reference_poses: int  # their number
+    association: str  # in words
+    ape_unit: str  # m, deg, … or empty
+    rpe_unit: str  # likewise
+    pairs_model: str | None  # independent or chain: the errors of a pair
+    verdict: str  # the verdict in a sentence
+    consistent: bool | None  # whether; null: no verdict
+    causes: list[str]  # tests that speak against it, each with its likely cause
+    poses: int  # of the estimate
+    matched: int  # of them that have a partner
+    by_time: bool  # false: pose i with pose i
+    ape: _ErrorStatistics  # absolute errors
+    rpe: _ErrorStatistics  # relative errors
+    rpe_pairs: int  # pairs of RPE
+    alignment: _Alignment  # of APE and RPE
+    weighted_alignment: _Alignment  # of the verdict
+    covariance_convention: str | None  # of the file; null: it has no covariances
+    tests: _WhitenedResidualTests  # of the whitened errors
+    rpe_nees: _ResidualTest | None  # of relative motions
+    indefinite: _Array  # matched poses whose covariance is not positive definite
+    notes: list[str]  # what is remarkable, in sentences
+    rows: _Array  # of the estimate
+    times: _Array  # s
+    ape_errors: _Array  # ape_unit
+    rpe_errors: _Array  # of the pairs; rpe_unit
+    pairs_from: _Array
+    pairs_to: _Array
+    position_errors: _Array  # m
+    rotation_errors: _Array  # rad
+    errors: _Array  # after the weighted alignment, translation before rotation, body axes; m, rad
+    covariances: _Array  # of the errors, row by row; m, rad
+    nees: _Array  # chi-squared of 6
+
+class _Convention(Result):
+    name: str  # as --cov-from takes it
+    order: str  # of the coordinates
+    perturbation: str  # the side and the frame of the errors
+    unit: str  # of the rotation
+    content: str  # covariance or information
+    layout: str  # of the numbers in a row
+
+class _UnconvertedMatrix(Result):
+    fault: str
+    row: int  # of the pose, from 0
+    found: str  # in words
+    expected: str
+
+class _TrajectoryConversion(Result):
+    covariances: int  # their number
+    covariance_from: _Convention | None  # null: the file has no covariances
+    covariance_to: _Convention | None
+    unknown: int  # matrices without any known entry
+    partly_unknown: int  # matrices with some unknown entries
+    assumed_uncorrelated: int  # matrices whose missing blocks were taken to be zero
+    indefinite: int  # matrices that are not positive semidefinite
+    zero_variances: int  # matrices with a variance of 0
+    round_trip_bound: float  # rounding of there and back; sigma
+    largest_rotation_sigma_rad: float  # rad
+    beyond_first_order: int  # rotations for which the first order fails
+    sampling_error: float  # standard error of sampled variances, relative
+    notes: list[str]
+    matrices: _Array  # in the convention of the result
+    faults: list[_UnconvertedMatrix]  # matrices that were not converted
+
+class _ChainFit(Result):
+    convention: str  # as --cov-from takes it
+    indefinite: float  # share of the steps in which the covariance shrinks
+
+class _ChainDiagnosis(Result):
+    steps: int  # from pose to pose
+    is_chain: bool  # some convention makes it dead reckoning
+    accepted: list[str]  # conventions that do
+    reason: str  # in words
+    increments_nees: float  # of the steps, over its degrees of freedom
+    increments_p: float  # probability of a NEES as extreme
+    fits: list[_ChainFit]  # conventions, the smallest share first
+
+class _ScaleProfile(Result):
+    convention: str  # in which the scales are measured
+    translation: float  # scale of the block, in variance
+    rotation: float  # scale of the block, in variance
+    relative_sigma: float  # of each
+    words: list[str]  # the scales by their names
+
+class _HypothesisFit(Result):
+    convention: str  # as --cov-from takes it
+    fault: str  # in how the matrices were written, which was undone first
+    log_likelihood: float  # relative to the best one; nats
+    nees_ratio: float  # NEES over its degrees of freedom
+    indefinite: int  # matrices that are not positive definite
+
+class _PlanRow(Result):
+    convention: str  # the truth
+    nearest: str  # the other convention that is hardest to exclude
+    divergence: float  # of the nearest; nats per pose
+    poses: float  # that tell them apart; 0: none
+    equal: list[str]  # conventions that write the same matrices here
+
+class _CovarianceDiagnosis(Result):
+    mode: str  # diagnosis, chain or plan
+    what: str  # the matrices belong to: poses, edges, or runs at a time
+    n: int  # matrices
+    structure: list[str]  # the looks of the matrices
+    indefinite: int  # matrices that are not positive definite
+    chain: _ChainDiagnosis  # whether it is dead reckoning
+    verdict: str  # identified, undecidable, inconsistent or none
+    reason: str  # in words
+    notes: list[str]  # further findings
+    accepted: list[str]  # that explain the errors
+    fault: str  # in how the matrices were written
+    skipped: int  # poses without a usable matrix
+    margin: float  # within which hypotheses are accepted; nats
+    correlated: bool  # neighbouring errors are, so that absolute errors decide nothing
+    exact_coordinates: bool  # of each hypothesis, as the errors are large
+    increments_as_absolute: bool  # the matrices are those of single steps
+    growth: float  # NEES of the second half over the first
+    tests: _WhitenedResidualTests  # under the best hypothesis
+    scale: _ScaleProfile | None  # scales of the blocks, where they are free
+    hypotheses: list[_HypothesisFit]  # the best first; empty if correlated
+    plan: list[_PlanRow]  # with --plan: a row for each convention
+
+class _RecordingWindow(Result):
+    begin: float  # s
+    status: str  # ok, or the fault of the readings
+    duration: float  # s
+    largest_gap: float  # between readings; s
+    fault_time: float  # of the reading that is at fault, if any; the fields below are then missing; s
+    quaternion_xyzw: _Array
+    rotation_vector: _Array  # rad
+    position: _Array  # m
+    velocity: _Array  # m/s
+    covariance: _Array | None  # 9 errors in m, rad, m/s; null without noise
+    bias_jacobian: _Array  # by the biases of gyroscope and accelerometer
+    error: _Array  # with a truth: position, rotation, velocity; m, rad, m/s
+    squared_distance: float  # of the error, 9 expected; with a truth and noise
+
+class _RecordingWindows(Result):
+    covariance_order: str  # of the windows' covariances
+    covariance_side: str  # on which errors are applied
+    covariance_frame: str  # in words
+    windows: list[_RecordingWindow]
+    squared_distance: float  # with a truth and noise: sum over the windows
+    degrees_of_freedom: float  # of the sum
+    p: float  # probability of a larger sum
+    verdict: str  # the verdict in a sentence
+    consistent: bool | None  # whether; null: no verdict
+    causes: list[str]  # tests that speak against it, each with its likely cause
+
+class _ClosedFormSolution(Result):
+    velocity: _Array  # m/s
+    gravity: _Array  # m/s²
+    accelerometer_bias_change: _Array  # against the one with which the readings were integrated; m/s²
+    roll: float  # rad
+    pitch: float  # rad
+    cost: float  # chi-squared, or squared residuals
+    negative_depths: int  # features behind a camera
+    features: _Array  # a row for each track; null: not used; m
+
+class _TrackedFeature(Result):
+    track: int  # its name
+    observations: int  # images that see it
+    used: bool
+    residual: float  # of its equations
+    parallax: float  # rad
+    depth_deviation: float  # standard deviation of its depth; m
+
+class _SecondMotion(Result):
+    tracks: int  # that agree on it
+    velocity: _Array  # m/s
+    gravity: _Array  # m/s²
+    covariance: _Array  # if it is known
+
+class _TimedState(Result):
+    t: float  # s
+    quaternion_xyzw: _Array
+    position: _Array  # m
+    velocity: _Array  # m/s
+
+class _TimedRefinement(Result):
+    status: str  # refined, or why not: then the fields from scale_sigma on are missing
+    consistent: bool  # the cost is that of the stated noise
+    cost: float  # chi-squared
+    degrees_of_freedom: int  # of the cost
+    features_used: int
+    scale_sigma: float  # predicted standard deviation of the scale, relative
+    tilt_sigma: float  # that of the vertical; rad
+    prior_p: float  # of the biases under their prior
+    velocity: _Array  # m/s
+    gravity: _Array  # m/s²
+    gyroscope_bias: _Array  # at the first image; rad/s
+    accelerometer_bias: _Array  # at the first image; m/s²
+    last_gyroscope_bias: _Array  # at the last image: another one if biases follow a random walk; rad/s
+    last_accelerometer_bias: _Array  # m/s²
+    covariance: _Array  # at the first image
+    covariance_order: str  # in words
+    covariance_frame: str  # in words
+    covariance_content: str  # noise that it accounts for
+    last_covariance: _Array  # at the last image
+    last_covariance_order: str  # in words
+    last_covariance_side: str  # in words
+    states: list[_TimedState]  # at all images
+    features: _Array  # those that were used; m
+
+class _InitialisationError(Result):
+    speed: float  # m/s
+    gravity: float  # of its direction; rad
+    scale: float  # relative
+
+class _ComparedWindow(Result):
+    begin: float  # s
+    end: float  # s
+    status: str  # of the whole window
+    ok: bool  # the window is to be trusted
+    images: int  # the number of those used
+    tracks: int  # the number of those used
+    fault_time: float  # of readings at fault; the fields below are then missing; s
+    closed_form_status: str
+    in_words: str  # the status of the closed form
+    consistent: bool  # its cost is that of the stated noise
+    null_dimension: int  # of the scaled linear system
+    singular_values: _Array
+    largest_singular_value: float
+    solutions: list[_ClosedFormSolution]  # both, if there are two
+    features: list[_TrackedFeature]  # of the tracks
+    features_used: int  # their number
+    features_rejected: int  # outliers
+    images_used: int  # their number
+    hypotheses: int  # random samples of the consensus
+    degrees_of_freedom: int
+    covariance: _Array | None  # of the closed form
+    covariance_content: str  # noise that it accounts for
+    covariance_order: str  # in words
+    scale_deviation: float  # predicted standard deviation of the scale, relative
+    tilt_deviation: float  # that of the vertical; rad
+    # of a stationary window: uniform speed per metre of depth above which motion would have been detected; 1/s
+    unseen_speed_per_depth: float
+    second_motion: _SecondMotion | None  # of an ambiguous window: that on which another group of tracks agrees
+    integrated_gyroscope_bias: _Array  # with which the readings were integrated; rad/s
+    integrated_accelerometer_bias: _Array  # likewise; m/s²
+    gyroscope_bias: _Array  # that was estimated; rad/s
+    gyroscope_bias_status: str  # in words
+    refined: _TimedRefinement | None  # by all measurements
+    closed_form_error: _InitialisationError  # with a truth
+    refined_error: _InitialisationError  # with a truth
+    gyroscope_bias_error: float  # with a truth; rad/s
+    nees: float  # with a truth: of velocity and gravity, 5 expected
+    reason: str  # the status in words
+    velocity: _Array | None  # at the first image, the best known; m/s
+    gravity: _Array | None  # likewise; m/s²
+    best_gyroscope_bias: _Array  # rad/s
+    accelerometer_bias: _Array  # m/s²
+    joint_covariance: _Array | None  # its blocks by `block`; None where the window was not refined
+    scale_sigma: float  # relative
+    tilt_sigma: float  # rad
+    chi2: float
+    image_indices: _Array
+    track_names: _Array
+    inliers: _Array
+
+class _ComparedStretch(Result):
+    begin: float  # s
+    end: float  # s
+    windows: int  # their number
+    chi2: float  # of their disagreement
+    degrees_of_freedom: int  # of chi2
+    p: float  # probability of a larger chi2
+    ok: bool  # p is 0.001 or more, or the covariance was inflated
+    inflation: float  # factor by which the covariances are too small
+    inflated: bool  # the covariance was multiplied by it
+    gravity_direction: _Array  # unit vector, downwards
+    velocity: _Array  # m/s
+    gyroscope_bias: _Array  # rad/s
+    accelerometer_bias: _Array  # m/s²
+    covariance: _Array
+    covariance_order: str  # in words
+    covariance_frame: str  # in words
+    speed_error: float | None  # null without a truth; m/s
+    gravity_error: float | None  # likewise; rad
+    gyroscope_bias_error: float | None  # likewise; rad/s
+    accelerometer_bias_error: float | None  # likewise; m/s²
+    nees: float | None  # 11 expected
+
+class _InitialisationErrors(Result):
+    windows: int  # that were compared
+    speed_median: float  # m/s
+    speed_95: float  # 95 % quantile; m/s
+    gravity_deg_median: float  # deg
+    gravity_deg_95: float  # deg
+    scale_percent_median: float  # %
+    scale_percent_95: float  # %
+
+class _ComparedRecording(Result):
+    ok: bool  # the result is to be trusted
+    in_words: str  # the verdict
+    images_outside: int  # that the readings do not cover
+    bearing_noise: float  # standard deviation of the bearings; rad
+    interrupted: bool  # only then
+    windows_left: int  # not estimated, because of an interrupt
+    gravity: float | None  # that was given; null: it was free; m/s²
+    statuses: Result  # number of windows of each status
+    closed_form_errors: _InitialisationErrors  # with a truth
+    refined_errors: _InitialisationErrors  # with a truth
+    gyroscope_bias_error_median: float  # with a truth; rad/s
+    gyroscope_bias_error_95: float  # with a truth: 95 % quantile; rad/s
+    nees_mean: float  # with a truth: 5 expected
+    refined_chi2_per_degree: float  # 1 expected
+    frame: str  # in words
+    windows: list[InitialisedWindow]
+    fusions: list[_ComparedStretch]  # of disjoint windows, for each stretch
+
+class _NoiseFactor(Result):
+    factor: float  # of the densities
+    low: float  # lower end of its 95 % interval; null: no bound
+    high: float  # upper end
+
+class _ImuNoise(Result):
+    gyroscope: float  # rad/s/√Hz
+    accelerometer: float  # m/s²/√Hz
+    gyroscope_walk: float  # rad/s²/√Hz
+    accelerometer_walk: float  # m/s³/√Hz
+
+class _NoiseCalibration(Result):
+    status: str
+    windows: int  # that were refined
+    meetings: int  # of windows, whose states must agree
+    chi2: float  # with the given densities
+    calibrated_chi2: float  # with the calibrated ones
+    degrees_of_freedom: int  # of both
+    common: _NoiseFactor  # one factor for both sensors
+    common_p: float  # probability that two factors explain so much more than one, if they are one
+    separable: bool  # the windows tell the sensors apart
+    gyroscope: _NoiseFactor
+    accelerometer: _NoiseFactor
+    noise: _ImuNoise  # the densities that were used
+
+class _PoseSigmas(Result):
+    translation_m: _Array  # m
+    rotation_vector_deg: _Array  # deg
+
+class _LocalPoseSigmas(Result):
+    translation_m: _Array  # m
+    rotation_deg: _Array  # deg
+
+class _CalibratedPose(Result):
+    translation: _Array  # m
+    quaternion_xyzw: _Array  # w >= 0
+    rotation_vector: _Array  # rad
+    covariance: _Array | None  # of local errors, m and rad
+    covariance_frame: str  # in words
+    # along the parent's axes; null along axes in which an open direction has a component
+    standard_deviations: _PoseSigmas
+    standard_deviations_local: _LocalPoseSigmas  # of the local errors, likewise
+
+class _OpenDirection(Result):
+    excitation: float  # as in excitations
+    weak: bool  # excited, but not enough to be trusted
+    twist: _Array  # of X; m, rad
+    frame: str  # of the twist
+    twist_of_Y: _Array  # AX = YB; m, rad
+    frame_of_Y: str  # of the twist of Y
+    description: str  # in words
+    rotates: bool  # it rotates X
+
+class _PoseCoordinates(Result):
+    translation: _Array  # m
+    quaternion_xyzw: _Array  # w >= 0
+    rotation_vector: _Array  # rad
+
+class _HandEyeResult(Result):
+    status: str  # ok, undetermined, ambiguous, inconsistent, not_converged or bad_input
+    ok: bool  # the calibration is to be trusted
+    in_words: str  # the status
+    problem: str  # AX = YB or AX = XB
+    X: CalibratedPose  # gripper_T_camera
+    Y: CalibratedPose | None  # base_T_target
+    covariance_order: str  # of the covariances
+    covariance_side: str  # of the errors
+    covariance_frame: str  # in words
+    joint_covariance: _Array | None  # of X and Y
+    joint_covariance_order: str | None  # in words
+    chi2: float  # squared distance of the inliers from their corrected poses, in units of their noise
+    degrees_of_freedom: int  # of chi2
+    p: float  # probability of a larger chi2; null: the noise is not known
+    variance_factor: float  # by which the given covariances were multiplied
+    noise: str  # given or scaled
+    excitations: _Array  # of the six directions, ascending
+    open_directions: list[_OpenDirection]  # that the motions leave open
+    rival: CalibratedPose | None  # X of a second solution
+    starts: int  # that were compared
+    outliers: _Array  # numbers of the wrong pairs, from 0
+    errors: _Array  # of the pairs; m, rad
+    pair_chi2: _Array  # 6 expected
+
+class _PhysicalParameters(Result):
+    names: list[str]
+    units: list[str]  # rad or px
+    values: _Array
+    deviations: _Array  # standard deviations
+    covariance: _Array  # of the values
+
+class _RelativePose(Result):
+    quaternion_xyzw: _Array
+    direction: _Array  # of the translation, of length 1
+    covariance: _Array  # of the tangent; rad
+    covariance_order: str  # in words
+
+class _TwoViewModelRow(Result):
+    model: str
+    parents: list[str]  # more general models
+    free_parameters: int
+    equations: int  # of a match
+    evaluated: bool  # its draws came to their end
+    draws: int  # random samples
+    status: str | None  # of its estimate; null: there is none, and the fields below are missing
+    inliers: int  # their number
+    relevance: float  # by which models are compared
+    chi2: float  # over its own inliers
+    degrees_of_freedom: float  # of chi2
+    rms: float  # noise that its inliers show; px
+    unsupported: bool  # its inliers could be chance
+    rejection: str  # why the model was not chosen
+    rejected_by: str | None  # the model that did it
+
+class _TwoViewMotionEstimate(Result):
+    matches: int  # all that were given
+    sigma: float  # of each coordinate; px
+    calibrated: bool  # with the cameras' intrinsics
+    image_corner: _Array  # the upper left one; zero where the size is known; px
+    image_size: _Array  # px
+    size_from_matches: bool  # it is that of the matches' box
+    repeated: int  # matches equal to another one, which counts for them
+    contradicted: int  # matches that take no part, because they contradict each other
+    status: str  # ok, too_few, not_applicable, not_converged or ill_defined
+    reason: str | None  # in words, where status is not ok
+    model: str  # the chosen one
+    inliers: int  # their number
+    matrix: _Array  # homography or fundamental matrix of undistorted pixels, of norm 1
+    matrix_acts_on: str  # its equation, in words
+    matrix_covariance: _Array | None  # of its entries column after column
+    # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
+    parameters: list[_PhysicalParameters]
+    second_T_first: _RelativePose | None  # of the models with a pose
+    lattice: list[_TwoViewModelRow]  # all models
+    inlier: _Array  # of each match
+    squared_errors: _Array  # of each match, in units of the noise
+    threshold: float  # of the chosen model, on squared errors
+
+class _TwoViewStructure(Result):
+    model: str
+    status: str  # of the estimate from its own inliers
+    inliers: int  # their number
+    rms: float  # noise that its inliers show; px
+    matrix: _Array  # homography or fundamental matrix of undistorted pixels, of norm 1
+    matrix_acts_on: str  # its equation, in words
+    matrix_covariance: _Array | None  # of its entries column after column
+    # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
+    parameters: list[_PhysicalParameters]
+    second_T_first: _RelativePose | None  # of the models with a pose
+
+class _TwoViewMotions(Result):
+    matches: int  # all that were given
+    sigma: float  # of each coordinate; px
+    calibrated: bool  # with the cameras' intrinsics
+    image_corner: _Array  # the upper left one; zero where the size is known; px
+    image_size: _Array  # px
+    size_from_matches: bool  # it is that of the matches' box
+    repeated: int  # matches equal to another one, which counts for them
+    contradicted: int  # matches that take no part, because they contradict each other
+    status: str  # as without --motions
+    reason: str | None
+    motions: list[_TwoViewStructure]  # in the order in which they were found
+    motion: _Array  # of each match: the number of its motion, 0 for none
+
+class _MotionFrame(Result):
+    frame: int  # its number
+    usable: bool  # the direction may be used
+    meaning: str  # velocity: in the axes half-way; translation: over the interval, in the axes at its end
+    filter: str  # in charge
+    direction: _Array  # unit vector of the points' motion
+    direction_covariance: _Array  # local frame of S2 at the estimate; rad^2
+    rotation_vector: _Array  # over one frame; rad
+    rotation_covariance: _Array  # along the first frame's camera axes; rad^2
+    mean_inverse_depth: float  # |V|/Z, per frame
+    sign_evidence: float  # for positive depths, in its standard deviations; above 2 it is decided
+    innovation: float  # cost before the update over its degrees of freedom: 1 expected
+    pairs: int  # usable pairs of points
+    inliers: int  # those that the update used
+    covariance_judged: bool  # the covariance claims to bound the error
+    flags: list[str]  # that are raised
+    no_gyroscope: str  # why there is no rotation of the gyroscope, if there is none
+    gyroscope_bias: _Array  # if it is estimated: measured minus true, in the sensor's axes; rad/s
+    gyroscope_bias_covariance: _Array  # rad^2/s^2
+    direction_error_deg: float | None  # with a truth; null: unknown, or hardly any motion; deg
+    rotation_error_deg: float | None  # with a truth, per frame; deg
+
+class _MotionResult(Result):
+    status: str  # ok if any frame may be used
+    verdict: str  # how many frames may be used
+    causes: list[str]  # flags that forbid the others
+    frames_usable: int  # their number
+    passes: int  # over the sequence
+    with_gyroscope: bool  # rotations of a gyroscope were given
+    frames_apart: int  # longest interval of a pair
+    observations_outside: int  # without a ray ahead of the camera
+    frames_without_gyroscope: int  # with a gyroscope: frames that have no rotation of it
+    hand_overs: int  # to the essential filter
+    fall_backs: int  # to the subspace filter
+    motion_of: str  # in words
+    covariance_order: str  # in words
+    covariance_side: str  # on which errors are applied
+    covariance_frame: str  # in words
+    gyroscope_bias_of: str  # if it is estimated, in words
+    frames: list[_MotionFrame]  # the motion of each
+    median_direction_error_deg: float  # with a truth; deg
+    median_rotation_error_deg: float  # with a truth, per frame; deg
+    frame: _Array
+    usable: _Array
+    meaning: _Array
+    filter: _Array
+    direction: _Array
+    direction_covariance: _Array
+    rotation: _Array
+    rotation_covariance: _Array
+    mean_inverse_depth: _Array
+    sign_evidence: _Array
+    innovation: _Array
+    pairs: _Array
+    inliers: _Array
+    covariance_judged: _Array
+    bad_input: _Array
+    too_few: _Array
+    standstill: _Array
+    degenerate: _Array
+    ambiguous: _Array
+    undecided_sign: _Array
+    lost: _Array
+    outliers: _Array
+
+# end of fields
+
+class CalibratedPose(_CalibratedPose):
     @property
     def mean(self) -> SE3: ...
     @property
     def gaussian(self) -> Gaussian: ...
 
-class TwoViewResult(Result):
+class TwoViewResult(_TwoViewMotionEstimate):
     @property
     def relative_pose(self) -> Result | None: ...
 
-class InitialisedWindow(Result):
+class InitialisedWindow(_ComparedWindow):
+    states: SE23
     def block(self, row: str, column: str | None = None) -> _Array: ...
 
 VI_BLOCKS: dict[str, int]
@@ -388,6 +1075,14 @@ class Camera:
     ) -> None: ...
     def bearings(self, pixels: ArrayLike, sigma: float = 1.0) -> tuple[_Array, _Array]: ...
 
+class _Preintegrated(_RecordingWindows):
+    increment: SE23
+    covariance: _Array
+    covariance_with_bias: _Array
+    bias_jacobian: _Array
+    faults: list[str]
+    ok: Any
+
 def preintegrate(
     times: ArrayLike,
     rates: ArrayLike,
@@ -402,8 +1097,11 @@ def preintegrate(
     threads: int = 0,
     truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
     gravity: float = 9.81,
-) -> Result: ...
-class TrajectoryEvaluation(Result):
+) -> _Preintegrated: ...
+class TrajectoryEvaluation(_TrajectoryEvaluation):
+    pairs: _Array
+    position: _ErrorStatistics
+    rotation: _ErrorStatistics
     @property
     def consistency(self) -> Result | None: ...
 
@@ -423,8 +1121,8 @@ def evaluate_trajectory(
     t_start: float | None = None,
     t_end: float | None = None,
     pose_relation: _PoseRelation = "trans_part",
-    alignment: _Alignment = "none",
-    verdict_alignment: _Alignment | None = None,
+    alignment: _AlignmentWord = "none",
+    verdict_alignment: _AlignmentWord | None = None,
     n_to_align: int = 0,
     project_to_plane: Literal["xy", "xz", "yz"] | None = None,
     change_unit: Literal["mm", "cm", "m", "km", "deg", "rad"] | None = None,
@@ -449,7 +1147,7 @@ def hand_eye(
     gate: float = 22.457744484825327,
     samples: int = 80,
     seed: int = 1,
-) -> Result: ...
+) -> _HandEyeResult: ...
 def two_view(
     matches: ArrayLike,
     sigma: float = 1.0,
@@ -458,7 +1156,7 @@ def two_view(
     *,
     image_size: Sequence[float] | None = None,
     seed: int = 1,
-) -> Result: ...
+) -> TwoViewResult: ...
 def robust_two_view(
     model: Literal["homography", "fundamental", "pose"],
     matches: ArrayLike,
@@ -469,6 +1167,10 @@ def robust_two_view(
     max_draws: int = 100000,
     seed: int = 1,
 ) -> Result: ...
+class _Motion(_MotionResult):
+    direction: Any  # S2
+    rotation: Any  # SO3
+
 def motion(
     frames: ArrayLike,
     tracks: ArrayLike,
@@ -492,7 +1194,7 @@ def motion(
     min_motion: float = 0.1,
     span: int | None = None,
     essential: bool | None = None,
-) -> Result: ...
+) -> _Motion: ...
 def vi_init(
     times: ArrayLike,
     rates: ArrayLike,
@@ -517,7 +1219,7 @@ def vi_init(
     accelerometer_sigma: float = 0.15,
     seed: int = 1,
     truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
-) -> Result: ...
+) -> _ComparedRecording: ...
 def columns(x: Manifold) -> dict[str, _Array]: ...
 def from_columns(kind: type[_M], table: Any) -> _M: ...
 def read_features(
@@ -555,6 +1257,10 @@ def write_trajectory(
     source: str = "right",
     frames: Sequence[str] = (),
 ) -> Result: ...
+class _Conversion(_TrajectoryConversion):
+    sentence: str
+    decided: bool | None
+
 def convert_trajectory(
     poses: SE3,
     matrices: ArrayLike,
@@ -566,7 +1272,11 @@ def convert_trajectory(
     samples: int = 2000,
     seed: int = 1,
     lines: Sequence[int] | _Array | None = None,
-) -> Result: ...
+) -> _Conversion: ...
+class _Diagnosis(_CovarianceDiagnosis):
+    sentence: str
+    decided: bool | None
+
 def diagnose_conventions(
     estimate: SE3 | Sequence[SE3],
     matrices: ArrayLike | Sequence[ArrayLike],
@@ -588,5 +1298,5 @@ def diagnose_conventions(
     max_gap: float | None = None,
     max_difference: float = 0.01,
     offset: float = 0.0,
-) -> Result: ...
+) -> _Diagnosis: ...
 def read_tracks(path: Any, image_times: Any = "", *, start_ns: int = 0) -> Result: ...

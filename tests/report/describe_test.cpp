@@ -1,4 +1,5 @@
 #include <report/describe.hpp>
+#include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 #include <stats/words.hpp>
 #include <lie/linear.hpp>
@@ -30,24 +31,49 @@ struct Outer {
 template <class V>
 void describe(V& v, const Outer& x) {
   v("parts", x.parts, "of the whole")("best", x.best)("p", x.p)("axis", x.axis, "", "m")("word", x.word);
+  if (shown(v, x.p.has_value())) v("square", x.p.value_or(0) * x.p.value_or(0));
 }
 
-std::vector<std::string> pathsOf(const auto& fields) {
-  std::vector<std::string> paths;
-  for (const FieldDescription& f : fields) paths.push_back(f.path);
-  return paths;
+/// A view of values.
+struct Names {
+  std::vector<std::string> names;
+  template <class T>
+  Names& operator()(const char* name, const T&, const char* = "", const char* = "") {
+    names.push_back(name);
+    return *this;
+  }
+};
+
+/// Names, those of inner results after their own.
+std::vector<std::string> namesOf(const auto& fields) {
+  std::vector<std::string> names;
+  for (const FieldDescription& f : fields) {
+    names.push_back(f.name);
+    for (const std::string& inner : namesOf(f.fields)) names.push_back(f.name + "." + inner);
+  }
+  return names;
 }
 
 TEST(Describe, FieldsAreListedWhetherTheyHaveValuesOrNot) {
   static_assert(Described<Outer> && Described<Verdict> && !Described<double>);
-  const std::vector<std::string> expected{"parts[]", "parts[].ratio", "parts[].ok", "best", "best.ratio", "best.ok",
-                                          "p",       "axis",          "word"};
-  EXPECT_EQ(pathsOf(fieldsOf<Outer>()), expected);
-  Outer full;
-  full.parts.resize(2), full.best = Inner{}, full.p = 0.5;
-  EXPECT_EQ(pathsOf(fieldsOf(full)), expected);
-  EXPECT_EQ(fieldsOf(full).front().meaning, "of the whole");
-  EXPECT_EQ(fieldsOf(full)[7].unit, "m");
+  const std::vector<FieldDescription> fields = fieldsOf<Outer>();
+  const std::vector<std::string> expected{"parts",   "parts.ratio", "parts.ok", "best", "best.ratio",
+                                          "best.ok", "p",           "axis",     "word", "square"};
+  EXPECT_EQ(namesOf(fields), expected);
+  using Kind = FieldDescription::Kind;
+  EXPECT_EQ(fields[0].meaning, "of the whole");
+  EXPECT_EQ(fields[0].result, "Inner");
+  EXPECT_TRUE(fields[0].list && !fields[0].optional);
+  EXPECT_TRUE(fields[1].optional && fields[1].kind == Kind::result && fields[1].fields[1].kind == Kind::boolean);
+  EXPECT_TRUE(fields[2].optional && fields[2].kind == Kind::number);
+  EXPECT_TRUE(fields[3].kind == Kind::array && fields[3].rows == 3 && fields[3].columns == 1 && fields[3].unit == "m");
+  EXPECT_EQ(fields[4].kind, Kind::text);
+}
+
+TEST(Describe, ViewsOfValuesPassOverWhatAResultLacks) {
+  Names view;
+  describe(view, Outer{});
+  EXPECT_EQ(view.names.back(), "word");
 }
 
 TEST(Describe, FiguresAreTheNumbersByName) {
@@ -70,7 +96,7 @@ TEST(Verdict, NoneIsNeitherYesNorNo) {
   EXPECT_FALSE(Verdict::none("no verdict: not tested").isNo());
   EXPECT_EQ(Verdict().decided(), std::nullopt);
   EXPECT_EQ(Verdict::no("OVERCONFIDENT", {"joint"}).decided(), std::optional(false));
-  EXPECT_EQ(pathsOf(fieldsOf<Verdict>()), (std::vector<std::string>{"verdict", "consistent", "causes"}));
+  EXPECT_EQ(namesOf(fieldsOf<Verdict>()), (std::vector<std::string>{"verdict", "consistent", "causes"}));
 }
 
 TEST(Words, NumbersHaveTheDigitsAsked) {
