@@ -1,3 +1,6 @@
+// Calibrations of cameras and inertial sensors from YAML files: Kalibr, OpenVINS, TUM-VI, EuRoC.
+//
+//   const liestat::Calibration calibration = liestat::readCalibration({"camchain-imucam.yaml", "imu.yaml"});
 #pragma once
 
 #include <fusion/camera_calibration.hpp>

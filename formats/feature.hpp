@@ -129,8 +129,10 @@ static_assert(
 
 /// The name in options and JSON fields.
 inline std::string name(Feature feature) { return std::string(info(feature).name); }
+/// The dimension of the feature's tangent space.
 inline int degreesOfFreedom(Feature feature) { return info(feature).dof; }
 
+/// All names, in the order of the enumerators.
 inline std::vector<std::string> featureNames() {
   std::vector<std::string> names;
   for (const FeatureInfo& row : feature_rows) names.emplace_back(row.name);
@@ -145,6 +147,7 @@ inline std::optional<Feature> featureFromName(std::string_view text) {
   return std::nullopt;
 }
 
+/// The search of withFeature(), from row I of the table on.
 template <std::size_t I, class Result, class F>
 Result visitFeature(Feature kind, F& f) {
   if constexpr (I < feature_rows.size()) {

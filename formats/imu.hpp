@@ -1,3 +1,4 @@
+// Inertial readings and true states from files of EuRoC and TUM-VI, or readings from CSV.
 #pragma once
 
 #include <fusion/imu/ground_truth.hpp>

@@ -1,3 +1,4 @@
+// The errors that readers of files throw, and text from outside made fit for messages.
 #pragma once
 
 #include <cstddef>

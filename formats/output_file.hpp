@@ -1,3 +1,4 @@
+// Output that is complete or not there: files, directories, lines on standard output.
 #pragma once
 
 #include <string>

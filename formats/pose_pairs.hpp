@@ -10,8 +10,9 @@
 
 namespace liestat {
 
+/// Options of readPosePairs().
 struct PosePairOptions {
-  ReadingOptions reading;
+  ReadingOptions reading;   ///< of both files
   bool by_row = false;      ///< also where both files have times
   double tolerance = 0.01;  ///< s, between times that belong together
   std::size_t least = 3;    ///< pairs
@@ -24,6 +25,7 @@ struct PoseRows {
   std::optional<double> time;          ///< time stamp of the first file's row (s)
 };
 
+/// Two files of frames, and the rows of them that belong together.
 struct PosePairs {
   FeatureFile a, b;
   std::vector<PoseRows> rows;  ///< by time, or in the order of the files

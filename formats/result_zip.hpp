@@ -10,6 +10,7 @@
 
 namespace liestat {
 
+/// A file in an archive.
 struct ZipMember {
   std::string name;
   std::string content;

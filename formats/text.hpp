@@ -1,3 +1,4 @@
+// Texts of files: loading, lines, fields, numbers, misspelt names.
 #pragma once
 
 #include <cstddef>

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ struct Options {
   std::vector<std::string> features, noises, criteria;
   std::vector<std::size_t> n;
   std::vector<double> spreads;
-  std::string covariance_at = "estimated";
+  std::optional<CovarianceAt> covariance_at;
   ValidationOutput output;
   std::size_t trials = 0;
   std::uint64_t seed = 1;
@@ -26,7 +27,7 @@ struct Options {
 /// The front door's cells of the chosen features; none where the run is about certain rows of the experiments.
 std::vector<VerdictCell> chosenCells(const Options& options, const std::vector<Feature>& features) {
   const bool narrowed = !options.noises.empty() || !options.criteria.empty() || !options.n.empty() ||
-                        !options.spreads.empty() || options.covariance_at != "estimated";
+                        !options.spreads.empty() || options.covariance_at == CovarianceAt::measured;
   std::vector<VerdictCell> cells;
   if (narrowed) return cells;
   for (VerdictCell cell : verdictCells(options.full)) {
@@ -45,7 +46,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (!options.n.empty()) validation.n = options.n;
   validation.spreads = options.spreads;
   if (options.full && validation.spreads.empty()) validation.spreads = {1.0 / 3, 1.0};
-  validation.covariance_at = options.covariance_at == "measured" ? CovarianceAt::measured : CovarianceAt::estimated;
+  validation.covariance_at = options.covariance_at.value_or(CovarianceAt::estimated);
   validation.trials = options.trials != 0 ? options.trials : options.full ? 4000 : 1000;
   validation.seed = options.seed;
   validation.threads = options.threads;
@@ -84,9 +85,9 @@ void addValidateMeansCommand(const CommandList& validate) {
              "Factors of the report's standard deviations, a comma list (default 1, frames 1/3)")
       .list()
       .range(1e-9, 10.0);
-  app.option("--covariance-at", options->covariance_at,
-             "Frame in which the noise of frames is Gaussian and MAHA takes its covariances")
-      .oneOf({"estimated", "measured"});
+  app.choice<CovarianceAt>("--covariance-at", options->covariance_at,
+                           {{"estimated", CovarianceAt::estimated}, {"measured", CovarianceAt::measured}},
+                           "Frame in which the noise of frames is Gaussian and MAHA takes its covariances");
   addRunOptions(app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
   app.flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
   app.flag("--full", options->full, "4000 trials, both spreads, certified minima, all printed formulas; no time limit");

@@ -141,7 +141,7 @@ def build_sdist(sdist_directory, config_settings=None):
     base = f"liestat-{project['version']}"
     path = Path(sdist_directory) / f"{base}.tar.gz"
     names = ["CMakeLists.txt", "pyproject.toml", "LICENSE", "README.md", "cmake"]
-    names += ["lie", "stats", "fusion", "experiments", "cli", "python"]
+    names += ["lie", "stats", "fusion", "formats", "report", "experiments", "cli", "python"]
 
     def clean(info):
         return None if "__pycache__" in info.name else info

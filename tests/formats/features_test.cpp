@@ -17,7 +17,6 @@
 
 namespace liestat {
 
-
 namespace {
 
 FeatureFile read(const std::string& text, const ReadingOptions& options = {}) {

@@ -15,7 +15,6 @@
 
 namespace liestat {
 
-
 namespace {
 
 constexpr double pi = std::numbers::pi;
