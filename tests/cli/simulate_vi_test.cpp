@@ -23,7 +23,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 #include <formats/tracks.hpp>
 
