@@ -34,6 +34,32 @@ struct ComparedWindow : InitialisedWindow {
   std::optional<InitialisationError> closed_form_error, refined_error;
   std::optional<double> gyroscope_error;  ///< rad/s, of the best known bias
   std::optional<double> nees;             ///< the refined V and G's, 5 degrees of freedom
+
+  bool hasSolution() const { return !closedForm().solutions.empty(); }
+  /// The motion does not leave the scale open.
+  bool hasScale() const {
+    return closedForm().status != FusionStatus::scale_unobservable && closedForm().status != FusionStatus::stationary;
+  }
+  /// The best known motion at the first image: the refined one, else the closed form's first; zero without either.
+  ClosedFormSolution best() const {
+    ClosedFormSolution motion = hasSolution() ? closedForm().solutions[0] : ClosedFormSolution();
+    if (isRefined()) motion.velocity = refined->velocity(), motion.gravity = refined->gravity;
+    return motion;
+  }
+  /// Predicted standard deviations of the best known scale (relative) and vertical (rad).
+  double scaleSigma() const { return isRefined() ? refined->scale_sigma : closedForm().scale_sigma; }
+  double tiltSigma() const { return isRefined() ? refined->tilt_sigma : closedForm().tilt_sigma; }
+  /// χ² over its degrees of freedom, of the refinement or else of the closed form; NaN without degrees of freedom.
+  double costPerDegree() const {
+    if (refined && refined->degrees_of_freedom > 0) {
+      return refined->cost / static_cast<double>(refined->degrees_of_freedom);
+    }
+    return hasSolution() && closedForm().degrees_of_freedom > 0
+               ? closedForm().solutions[0].cost / static_cast<double>(closedForm().degrees_of_freedom)
+               : std::numeric_limits<double>::quiet_NaN();
+  }
+  /// The error of the best known motion, with a truth.
+  const std::optional<InitialisationError>& error() const { return refined_error ? refined_error : closed_form_error; }
 };
 
 /// The state that disjoint windows give together, compared with the ground truth where that is known.
@@ -238,22 +264,17 @@ void describe(V& v, const ComparedWindow& w) {
 template <class V>
 void describeSeries(V& v, const ComparedWindow& w) {
   const ClosedFormResult& c = w.closedForm();
-  const bool refined = w.isRefined(), any = !c.solutions.empty();
-  const auto of = [&](const Eigen::Vector3d& fine, const auto& coarse) {
-    return refined ? std::optional(fine) : any ? std::optional<Eigen::Vector3d>(coarse()) : std::nullopt;
-  };
+  const bool refined = w.isRefined(), any = w.hasSolution();
+  const auto where = [&](const Eigen::Vector3d& value) { return refined || any ? std::optional(value) : std::nullopt; };
   v("reason", w.fault ? describe(w.fault) : std::string(describe(w.verdict())), "the status in words");
-  v("velocity", of(refined ? w.refined->velocity() : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].velocity; }),
-    "at the first image, the best known", "m/s");
-  v("gravity", of(refined ? w.refined->gravity : Eigen::Vector3d::Zero(), [&] { return c.solutions[0].gravity; }),
-    "likewise", "m/s²");
+  v("velocity", where(w.best().velocity), "at the first image, the best known", "m/s");
+  v("gravity", where(w.best().gravity), "likewise", "m/s²");
   const ImuBias<double> bias = w.bias();
   v("best_gyroscope_bias", bias.gyroscope, "", "rad/s")("accelerometer_bias", bias.accelerometer, "", "m/s²");
   using Joint = Eigen::Matrix<double, 27, 27>;
   v("joint_covariance", refined ? std::optional<Joint>(w.refined->covariance.joint) : std::nullopt,
     "its blocks by `block`; None where the window was not refined");
-  v("scale_sigma", refined ? w.refined->scale_sigma : c.scale_sigma, "relative");
-  v("tilt_sigma", refined ? w.refined->tilt_sigma : c.tilt_sigma, "", "rad");
+  v("scale_sigma", w.scaleSigma(), "relative")("tilt_sigma", w.tiltSigma(), "", "rad");
   v("chi2", refined ? w.refined->cost : any ? c.solutions[0].cost : std::numeric_limits<double>::quiet_NaN());
   std::vector<std::uint64_t> inliers;
   for (const std::size_t i : w.found.inliers) inliers.push_back(w.track_names[i]);

@@ -1,7 +1,7 @@
+#include <report/publish.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/trajectory_input.hpp>
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
 #include <formats/pose_graph.hpp>
 #include <formats/text.hpp>
 #include <cli/show/diagnosis.hpp>
@@ -14,6 +14,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -160,12 +161,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
       throw OptionError(doctor_name, "--align with several runs", "runs in the world of the truth");
   }
   output.result = diagnoseCovariances(runs, options);
-  if (o.json != "-") printLines(formatDiagnosis(output));
-  if (!o.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line);
-    setDiagnosis(object, output);
-    writeJson(o.json, object);
-  }
+  publishResult(o.json, formatDiagnosis(output), invocation.command_line, std::nullopt, output);
   const Verdict verdict = output.result.verdict();
   if (!o.report.empty()) {
     // The reading that is assumed without a diagnosis, at the back, and the best one.

@@ -7,6 +7,7 @@
 #include <fusion/convention_diagnosis.hpp>
 #include <fusion/evaluate.hpp>
 #include <report/describe.hpp>
+#include <report/publish.hpp>
 
 #include <fmt/format.h>
 
@@ -211,12 +212,7 @@ int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
     output.estimates.push_back(evaluateOne(o, reference, reference_poses, path));
   }
   applyConditions(o, output);
-  if (o.json != "-") printLines(formatEvaluation(output));
-  if (!o.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line);
-    setEvaluation(object, output);
-    writeJson(o.json, object);
-  }
+  publishResult(o.json, formatEvaluation(output), invocation.command_line, std::nullopt, output);
   if (!o.save_results.empty())
     writeOutput(o.save_results, evoResult(output, output.estimates[0], false, o.save_results));
   if (!o.save_rpe.empty()) writeOutput(o.save_rpe, evoResult(output, output.estimates[0], true, o.save_rpe));

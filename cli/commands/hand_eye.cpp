@@ -1,11 +1,10 @@
 #include <cli/commands/commands.hpp>
 #include <formats/features.hpp>
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
 #include <formats/pose_pairs.hpp>
 #include <formats/text.hpp>
 #include <cli/show/hand_eye.hpp>
-#include <report/json.hpp>
+#include <report/publish.hpp>
 #include <cli/show/units.hpp>
 #include <fusion/hand_eye.hpp>
 #include <fusion/hand_eye_hints.hpp>
@@ -161,12 +160,8 @@ HandEyeOutput calibrate(Options options) {
 
 int runCommand(const Options& options, const Invocation& invocation) {
   const HandEyeOutput output = calibrate(options);
-  if (options.json != "-") printLines(formatHandEye(output));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, output.options.seed);
-    setHandEye(object, output);
-    writeJson(options.json, object);
-  }
+  publishResult(options.json, formatHandEye(output), invocation.command_line, output.options.seed,
+                [&](JsonObject& object) { setHandEye(object, output); });
   if (!options.report.empty()) writeHandEyeReport(options.report, invocation.command_line, output);
   return output.result.verdict().isNo() ? exit_not_trusted : exit_fine;
 }

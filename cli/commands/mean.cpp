@@ -1,5 +1,5 @@
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
+#include <report/publish.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include <cli/commands/measurement_options.hpp>
 
@@ -43,14 +44,11 @@ int runCommand(const Options& options, const Invocation& invocation) {
     throw OptionError("liestat mean", "--inflate, but blocks of time cannot be compared",
                       "rows with times (a column t), at least ten, and a mean with a covariance");
   }
-  // Whoever asks for JSON on standard output wants nothing else there.
-  if (options.json != "-") printLines(formatMean(options.input.file, measurements, analysis));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line);
-    if (interrupted) object.set("interrupted", true);
-    setMeanFields(object, options.input.file, measurements, analysis);
-    writeJson(options.json, object);
-  }
+  publishResult(options.json, formatMean(options.input.file, measurements, analysis), invocation.command_line,
+                std::nullopt, [&](JsonObject& object) {
+                  if (interrupted) object.set("interrupted", true);
+                  setMeanFields(object, options.input.file, measurements, analysis);
+                });
   if (!options.report.empty()) {
     writeMeanReport(options.report, invocation.command_line, options.input.file, measurements, analysis);
   }

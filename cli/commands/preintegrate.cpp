@@ -3,8 +3,7 @@
 #include <formats/imu.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
-#include <report/json.hpp>
+#include <report/publish.hpp>
 #include <cli/show/preintegration.hpp>
 #include <fusion/imu/recording_windows.hpp>
 
@@ -54,12 +53,12 @@ int runCommand(const Options& options, const Invocation& invocation) {
         fmt::format("once to {:g} times", max_windows));
   }
   const RecordingWindows result = preintegrateWindows(imu.samples, intervals, truth, how);
-  if (options.json != "-") printLines(formatPreintegration(result));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line);
-    object.set("file", options.imu.file).set("format", imu.format).set("readings", imu.samples.size());
-    writeJson(options.json, object.set("start_ns", imu.start_ns).fieldsOf(result));
-  }
+  publishResult(options.json, formatPreintegration(result), invocation.command_line, std::nullopt,
+                [&](JsonObject& object) {
+                  object("file", options.imu.file)("format", imu.format)("readings", imu.samples.size())("start_ns",
+                                                                                                         imu.start_ns);
+                  object.fieldsOf(result);
+                });
   if (!options.report.empty()) {
     PreintegratedReadings readings{imu, options.imu.file, begin, end, options.imu.largest_gap, noise};
     const auto first = std::find_if(result.windows.begin(), result.windows.end(), [](const auto& w) { return w.ok(); });

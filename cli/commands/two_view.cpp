@@ -2,9 +2,8 @@
 #include <formats/calibration.hpp>
 #include <cli/commands/camera.hpp>
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
 #include <formats/tracks.hpp>
-#include <report/json.hpp>
+#include <report/publish.hpp>
 #include <cli/show/two_view.hpp>
 #include <fusion/two_view/two_view.hpp>
 
@@ -64,12 +63,7 @@ void takeCameras(const Options& options, TwoViewMotionOptions& estimate) {
 int runSeveral(const Options& options, const TwoViewMotionOptions& estimate, TwoViewMotionsOutput output,
                const Invocation& invocation) {
   output.motions = estimateTwoViewMotions(output.matches, estimate, options.motions);
-  if (options.json != "-") printLines(formatTwoViewMotions(output));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, estimate.search.seed);
-    setTwoViewMotions(object, output);
-    writeJson(options.json, object);
-  }
+  publishResult(options.json, formatTwoViewMotions(output), invocation.command_line, estimate.search.seed, output);
   if (!options.report.empty()) writeTwoViewMotionsReport(options.report, invocation.command_line, output);
   return output.motions.verdict().isNo() ? exit_not_trusted : exit_fine;
 }
@@ -82,12 +76,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   takeCameras(options, estimate);
   if (options.motions > 1) return runSeveral(options, estimate, {output.file, output.matches, {}}, invocation);
   output.estimate = estimateTwoViewMotion(output.matches, estimate);
-  if (options.json != "-") printLines(formatTwoViewMotion(output));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, estimate.search.seed);
-    setTwoViewMotion(object, output);
-    writeJson(options.json, object);
-  }
+  publishResult(options.json, formatTwoViewMotion(output), invocation.command_line, estimate.search.seed, output);
   if (!options.report.empty()) writeTwoViewMotionReport(options.report, invocation.command_line, output);
   return output.estimate.verdict().isNo() ? exit_not_trusted : exit_fine;
 }

@@ -1,9 +1,9 @@
 #include <formats/calibration.hpp>
+#include <report/publish.hpp>
 #include <cli/commands/camera.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/imu_options.hpp>
 #include <formats/input_error.hpp>
-#include <formats/output_file.hpp>
 #include <cli/commands/validation_command.hpp>
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
@@ -157,12 +157,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   result.biases_given = options.known_biases || options.true_biases;
   result.noise = noise;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
-  if (options.json != "-") printLines(viInitTable(recording, result));
-  if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, how.initialisation.consensus.seed);
-    setViInit(object, recording, result);
-    writeJson(options.json, object);
-  }
+  publishResult(options.json, viInitTable(recording, result), invocation.command_line,
+                how.initialisation.consensus.seed, [&](JsonObject& object) { setViInit(object, recording, result); });
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
   if (result.windows_left > 0) return exit_interrupted;
   return result.verdict().isNo() ? exit_not_trusted : exit_fine;

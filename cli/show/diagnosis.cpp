@@ -1,7 +1,7 @@
 #include <cli/show/diagnosis.hpp>
 
 #include <formats/text.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
@@ -106,12 +106,6 @@ std::string formatDiagnosis(const DiagnosisOutput& output) {
   }
   if (d.chain) text += "\n" + chainInWords(*d.chain);
   return text;
-}
-
-void setDiagnosis(JsonObject& object, const DiagnosisOutput& output) {
-  object.set("files", output.files);
-  object.set("reference", output.reference.empty() ? std::nullopt : std::optional(output.reference));
-  object.set("file_notes", output.notes).fieldsOf(output.result);
 }
 
 }  // namespace liestat::cli

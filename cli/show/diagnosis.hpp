@@ -1,8 +1,8 @@
 #pragma once
 
-#include <report/json.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +15,14 @@ struct DiagnosisOutput {
   std::vector<std::string> notes;  ///< on the files
   CovarianceDiagnosis result;
 };
+template <class V>
+void describe(V& v, const DiagnosisOutput& output) {
+  v("files", output.files)("reference", output.reference.empty() ? std::nullopt : std::optional(output.reference));
+  v("file_notes", output.notes);
+  describe(v, output.result);
+}
 
 std::string formatDiagnosis(const DiagnosisOutput& output);
-void setDiagnosis(JsonObject& object, const DiagnosisOutput& output);
 /// `readings`: the file in the convention that is assumed without a diagnosis, then in the best one if it is another.
 void writeDiagnosisReport(const std::string& directory, const std::string& command_line, const DiagnosisOutput& output,
                           const std::vector<ConventionReading>& readings);

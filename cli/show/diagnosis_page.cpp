@@ -1,9 +1,9 @@
 #include <cli/show/diagnosis.hpp>
 
-#include <cli/show/outline.hpp>
-#include <cli/show/page.hpp>
+#include <report/outline.hpp>
+#include <report/page.hpp>
 #include <cli/show/pose_errors.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <stats/convention_presets.hpp>
 #include <stats/laws.hpp>
 
@@ -77,7 +77,7 @@ void showHypotheses(Report& report, const ConventionDiagnosis& d) {
       continue;
     }
     Series& series = is_right ? right : wrong;
-    series.x.push_back(below + 1), series.y.push_back(f.nees_ratio);
+    series.add(below + 1, f.nees_ratio);
   }
   report.paragraph(
       fmt::format("{} hypotheses were compared by the likelihood of the errors. One explains them if it is at most {} "
@@ -159,10 +159,9 @@ void showCalibration(Report& report, const TimesOfPoses& times, const std::vecto
     Series curve{.name = nameOf(r), .style = Style::lines, .x = {0}, .y = {0}, .colour = colour};
     const std::size_t step = std::max<std::size_t>(1, values.size() / 500);
     for (std::size_t i = step - 1; i < values.size(); i += step) {
-      curve.x.push_back(100 * (1 - chiSquaredSurvival(values[i], 6)));
-      curve.y.push_back(100 * static_cast<double>(i + 1) / n);
+      curve.add(100 * (1 - chiSquaredSurvival(values[i], 6)), 100 * static_cast<double>(i + 1) / n);
     }
-    curve.x.push_back(100), curve.y.push_back(100);
+    curve.add(100, 100);
     coverage.series.push_back(curve);
     nees.series.push_back(neesSeries(nameOf(r), c.errors, times));
     nees.series.back().colour = colour;
@@ -197,7 +196,7 @@ void showErrors(Report& report, const TimesOfPoses& times, const ConventionReadi
     Series band{.style = Style::filled_curve};
     for (std::size_t i = 0; i < assumed->consistency.errors.size(); ++i) {
       const double sigma = 3 * unit * std::sqrt(assumed->consistency.errors[i].covariance(k, k));
-      band.x.push_back(times.values[i]), band.low.push_back(-sigma), band.high.push_back(sigma);
+      band.addBand(times.values[i], -sigma, sigma);
     }
     band = outlineOf(band);
     panel.series.push_back(
@@ -233,8 +232,7 @@ void showDeviations(Report& report, const TimesOfPoses& times, const std::vector
       Series line{.name = nameOf(*readings[k]), .colour = k == 0 ? 1 : 0};
       for (std::size_t i = 0; i < readings[k]->poses.size(); ++i) {
         const double variance = readings[k]->poses[i].covariance.diagonal().segment<3>(from).maxCoeff();
-        line.x.push_back(times.values[i]);
-        line.y.push_back(coordinateOfError(from).second * std::sqrt(variance));
+        line.add(times.values[i], coordinateOfError(from).second * std::sqrt(variance));
       }
       panel.series.push_back(outlineOf(line));
     }

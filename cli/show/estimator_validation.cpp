@@ -1,7 +1,7 @@
 #include <cli/show/estimator_validation.hpp>
 
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/validation.hpp>
 
 #include <fmt/format.h>

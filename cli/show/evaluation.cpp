@@ -4,9 +4,9 @@
 #include <formats/output_file.hpp>
 #include <formats/result_zip.hpp>
 #include <formats/text.hpp>
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <cli/show/pose_errors.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 #include <fmt/format.h>
@@ -107,16 +107,6 @@ std::string formatEvaluation(const EvaluationOutput& output) {
   return text;
 }
 
-void setEvaluation(JsonObject& object, const EvaluationOutput& output) {
-  object.set("reference", output.reference);
-  describeSetting(object, output.setting());
-  std::vector<JsonObject> estimates;
-  for (const EvaluatedEstimate& e : output.estimates) {
-    estimates.push_back(JsonObject().set("file", e.name).fieldsOf(e.evaluation));
-  }
-  object.set("estimates", estimates).set("failed", output.failed);
-}
-
 // --- Page -------------------------------------------------------------------------------------------------------------
 
 namespace {
@@ -130,15 +120,14 @@ Plot trajectoryPlot(const EvaluationOutput& output) {
                 .equal_aspect = true};
     Series reference{.name = "reference"};
     for (const MatchedPose& p : output.setting().matched) {
-      reference.x.push_back(p.reference.mean.translation()[i]),
-          reference.y.push_back(p.reference.mean.translation()[j]);
+      reference.add(p.reference.mean.translation()[i], p.reference.mean.translation()[j]);
     }
     panel.series.push_back(reference);
     for (const EvaluatedEstimate& e : output.estimates) {
       Series estimate{.name = e.name};
       for (const MatchedPose& p : e.evaluation.matched) {
         const Eigen::Vector3d t = e.evaluation.alignment(p.estimate.mean).translation();
-        estimate.x.push_back(t[i]), estimate.y.push_back(t[j]);
+        estimate.add(t[i], t[j]);
       }
       panel.series.push_back(estimate);
     }

@@ -14,6 +14,11 @@ struct EvaluatedEstimate {
   TrajectoryEvaluation evaluation;
   std::string ape_title, rpe_title;  ///< as evo writes them, where it could have computed the same
 };
+template <class V>
+void describe(V& v, const EvaluatedEstimate& e) {
+  v("file", e.name);
+  describe(v, e.evaluation);
+}
 
 /// The result of `liestat evaluate`: at least one estimate.
 struct EvaluationOutput {
@@ -25,9 +30,14 @@ struct EvaluationOutput {
   /// Fields that all estimates have in common.
   const TrajectoryEvaluation& setting() const { return estimates.front().evaluation; }
 };
+template <class V>
+void describe(V& v, const EvaluationOutput& output) {
+  v("reference", output.reference);
+  describeSetting(v, output.setting());
+  v("estimates", output.estimates)("failed", output.failed);
+}
 
 std::string formatEvaluation(const EvaluationOutput& output);
-void setEvaluation(JsonObject& object, const EvaluationOutput& output);
 void writeEvaluationReport(const std::string& directory, const std::string& command_line,
                            const EvaluationOutput& output);
 

@@ -2,8 +2,8 @@
 
 #include <formats/output_file.hpp>
 #include <formats/text.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 #include <fmt/format.h>
@@ -27,8 +27,7 @@ std::string fixed(double value) {
   return text == "-0.00000" ? "0.00000" : text;
 }
 
-const std::vector<std::string> pose_headers{"", "x", "y", "z", "unit"};
-std::vector<std::vector<std::string>> poseRows(const CalibratedPose& unknown) {
+TableRows poseRows(const CalibratedPose& unknown, const std::string& heading = "") {
   const Vector6 sigma = unknown.sigmas;
   const Eigen::Vector3d t = unknown.pose.mean.translation(), r = degrees * unknown.pose.mean.so3().log();
   const auto row = [](const std::string& title, const auto& v, const char* unit, auto&& cell) {
@@ -38,9 +37,10 @@ std::vector<std::vector<std::string>> poseRows(const CalibratedPose& unknown) {
   const auto sigmas = [none](double x) {
     return std::isfinite(x) ? fmt::format("{:.2g}", x) : std::string(none ? "n/a" : "open");
   };
-  return {row("translation", t, "m", fixed), row("  sd", Eigen::Vector3d(sigma.head<3>()), "m", sigmas),
-          row("rotation vector", r, "deg", fixed),
-          row("  sd", Eigen::Vector3d(degrees * sigma.tail<3>()), "deg", sigmas)};
+  return {{heading, "x", "y", "z", "unit"},
+          {row("translation", t, "m", fixed), row("  sd", Eigen::Vector3d(sigma.head<3>()), "m", sigmas),
+           row("rotation vector", r, "deg", fixed),
+           row("  sd", Eigen::Vector3d(degrees * sigma.tail<3>()), "deg", sigmas)}};
 }
 std::string quaternionOf(const SE3d& pose) {
   Eigen::Vector4d q = pose.so3().params();
@@ -243,13 +243,12 @@ template <class Value>
 Panel pairPanel(const HandEyeOutput& output, const std::string& label, Value&& value) {
   Panel panel{.x = {.label = "pair"}, .y = {.label = label, .logarithmic = true}};
   for (const bool inlier : {true, false}) {
-    Series series{
-        .name = inlier ? "used" : "wrong", .style = Style::points, .colour = inlier ? inlier_colour : outlier_colour};
+    Series series = seriesOf(inlier ? "used" : "wrong", Style::points, inlier ? inlier_colour : outlier_colour);
     for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
       if (output.result.pairs[i].inlier != inlier) continue;
-      series.x.push_back(static_cast<double>(i + 1)), series.y.push_back(value(output.result.pairs[i]));
+      series.add(static_cast<double>(i + 1), value(output.result.pairs[i]));
     }
-    if (!series.x.empty()) panel.series.push_back(series);
+    panel.add({series});
   }
   return panel;
 }
@@ -277,16 +276,14 @@ Plot excitationPlot(const HandEyeOutput& output) {
   for (int k = 0; k < 6; ++k) {
     const double value = output.result.excitations[k];
     Series& series = value < o.least_excitation ? open : value < o.trusted_excitation ? weak : good;
-    series.x.push_back(k + 1), series.y.push_back(std::max(value, 1.02 * lowest)), series.width.push_back(0.6);
+    series.add(k + 1, std::max(value, 1.02 * lowest)), series.width.push_back(0.6);
     if (std::isfinite(value)) highest = std::max(highest, value);
   }
   Panel panel{.x = {.label = "direction", .low = 0.4, .high = 6.6},
               .y = {.label = "excitation", .low = lowest, .high = 3 * highest, .logarithmic = true},
               .references = {{ReferenceLine::Direction::horizontal, o.least_excitation},
                              {ReferenceLine::Direction::horizontal, o.trusted_excitation}}};
-  for (const Series& series : {open, weak, good}) {
-    if (!series.x.empty()) panel.series.push_back(series);
-  }
+  panel.add({open, weak, good});
   return {.name = "excitation",
           .caption = fmt::format(
               "Information of the motions over that which noise alone would make up, in the six "
@@ -329,9 +326,8 @@ std::string formatHandEye(const HandEyeOutput& output) {
   const HandEyeResult& r = output.result;
   std::string text = answer(output) + "\n";
   for (const CalibratedPose& unknown : calibratedPoses(r)) {
-    Table table({fmt::format("{} = {}", unknown.symbol, unknown.name()), "x", "y", "z", "unit"});
-    for (const auto& row : poseRows(unknown)) table.row(row);
-    text += table.str() + quaternionOf(unknown.pose.mean) + "\n\n";
+    text += Table(poseRows(unknown, fmt::format("{} = {}", unknown.symbol, unknown.name()))).str() +
+            quaternionOf(unknown.pose.mean) + "\n\n";
   }
   return text + summary(output) + rest(output);
 }
@@ -359,7 +355,7 @@ void writeHandEyeReport(const std::string& directory, const std::string& command
   report.section("Result");
   const std::vector<CalibratedPose> unknowns = calibratedPoses(r);
   for (const CalibratedPose& unknown : unknowns) {
-    report.table(pose_headers, poseRows(unknown),
+    report.table(poseRows(unknown),
                  fmt::format("{} = {}; {}", unknown.symbol, unknown.name(), quaternionOf(unknown.pose.mean)));
   }
   report.code(summary(output) + rest(output));

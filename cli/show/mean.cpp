@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include <formats/text.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 namespace liestat::cli {
@@ -58,8 +58,9 @@ ShownPart shownPart(const TangentBlock& part, const FeatureValue& value) {
 
 }  // namespace
 
-std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis) {
-  std::vector<std::vector<std::string>> rows;
+TableRows meanRows(const Measurements& measurements, const MeanAnalysis& analysis) {
+  TableRows table{{"", "x", "y", "z", "unit"}};
+  std::vector<std::vector<std::string>>& rows = table.rows;
   const auto add = [&](const std::string& what, const std::vector<double>& list, const TangentBlock& part) {
     std::vector<std::string> row{what};
     for (const double sd : list) row.push_back(number(sd));
@@ -90,7 +91,7 @@ std::vector<std::vector<std::string>> meanRows(const Measurements& measurements,
     if (has_covariance) addBoth("  sd", analysis.covariance);
     addBoth("  dispersion", analysis.dispersion);
   }
-  return rows;
+  return table;
 }
 
 std::string oneLine(const FeatureValue& value) {
@@ -157,9 +158,7 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   text += fmt::format("mean by {}: {} after {} {}\n\n", criterionInWords(measurements),
                       analysis.converged ? "converged" : "not converged", analysis.iterations,
                       analysis.iterations == 1 ? "step" : "steps");
-  Table table({"", "x", "y", "z", "unit"});
-  for (auto& row : meanRows(measurements, analysis)) table.row(row);
-  text += table.str() + "\n";
+  text += Table(meanRows(measurements, analysis)).str() + "\n";
   if (analysis.mean.quaternion_xyzw) {
     const Eigen::Vector4d& q = *analysis.mean.quaternion_xyzw;
     const int decimals = quaternionDecimals(measurements.feature, analysis);

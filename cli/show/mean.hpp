@@ -1,5 +1,7 @@
 #pragma once
 
+#include <report/table.hpp>
+
 #include <report/json.hpp>
 #include <cli/commands/mean_analysis.hpp>
 
@@ -21,7 +23,7 @@ std::string oneLine(const FeatureValue& value);
 
 /// Rows of a table with the columns name, x, y, z, unit: each part of the feature with the digits that its standard
 /// deviation leaves, and below it standard deviations and dispersion, for translations along both kinds of axes.
-std::vector<std::vector<std::string>> meanRows(const Measurements& measurements, const MeanAnalysis& analysis);
+TableRows meanRows(const Measurements& measurements, const MeanAnalysis& analysis);
 
 /// The origin of the covariance and how it is to be read, or the reason why there is none.
 std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis);

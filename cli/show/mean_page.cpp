@@ -1,6 +1,6 @@
 #include <cli/show/mean.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 
 #include <fmt/format.h>
 
@@ -35,8 +35,7 @@ struct Plane {
 Series scatter(std::string name, Style style, std::size_t colour, const Eigen::MatrixXd& data, Plane plane) {
   Series series{.name = std::move(name), .style = style, .colour = colour};
   for (Eigen::Index i = 0; i < data.cols(); ++i) {
-    series.x.push_back(data(plane.a, i));
-    series.y.push_back(data(plane.b, i));
+    series.add(data(plane.a, i), data(plane.b, i));
   }
   return series;
 }
@@ -246,7 +245,7 @@ void writeMeanReport(const std::string& directory, const std::string& command_li
     }
   }
   report.section("Numbers");
-  report.table({"", "x", "y", "z", "unit"}, meanRows(measurements, analysis));
+  report.table(meanRows(measurements, analysis));
   report.section("All that the program said");
   report.code(formatMean(source, measurements, analysis));
   if (analysis.covariance.size() > 0) {

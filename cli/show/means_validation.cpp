@@ -1,6 +1,6 @@
 #include <cli/show/means_validation.hpp>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/validation.hpp>
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 #include <cli/show/motion.hpp>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 #include <fmt/format.h>

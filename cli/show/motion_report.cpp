@@ -1,7 +1,7 @@
 #include <cli/show/motion_report.hpp>
 
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 #include <stats/quantile.hpp>
 
@@ -28,17 +28,9 @@ constexpr std::size_t estimate_ink = 0, second_ink = 1, third_ink = 2, fourth_in
 constexpr std::array<const char*, 3> axis_names = {"x", "y", "z"};
 constexpr std::array<std::size_t, 3> axis_inks = {estimate_ink, second_ink, third_ink};
 
-void addPoint(Series& series, double x, double y) { series.x.push_back(x), series.y.push_back(y); }
-void addBand(Series& series, double x, double middle, double sigma) {
-  series.x.push_back(x);
-  series.low.push_back(middle - 2 * sigma), series.high.push_back(middle + 2 * sigma);
-}
-Series named(std::string name, Style style, std::size_t ink, bool dashed = false) {
-  return {.name = std::move(name), .style = style, .colour = ink, .dashed = dashed};
-}
 Series star(std::string name, const Eigen::Vector2d& at, std::size_t ink) {
-  Series series = named(std::move(name), Style::stars, ink);
-  addPoint(series, at.x(), at.y());
+  Series series = seriesOf(std::move(name), Style::stars, ink);
+  series.add(at.x(), at.y());
   return series;
 }
 
@@ -72,35 +64,33 @@ struct Component {
   /// `frames_apart`: larger gaps between frames are left open.
   explicit Component(std::size_t frames_apart) : step_(static_cast<double>(frames_apart)) {
     for (std::size_t k = 0; k < 3; ++k) {
-      lines[k] = named(axis_names[k], Style::lines, axis_inks[k]);
-      bands[k] = named("", Style::filled_curve, axis_inks[k]);
-      truths[k] = named(k == 0 ? "truth" : "", Style::lines, truth_ink, true);
+      lines[k] = seriesOf(axis_names[k], Style::lines, axis_inks[k]);
+      bands[k] = seriesOf("", Style::filled_curve, axis_inks[k]);
+      truths[k] = seriesOf(k == 0 ? "truth" : "", Style::lines, truth_ink, true);
     }
   }
   void add(double frame, const Eigen::Vector3d& value, const Eigen::Vector3d& sigma, bool ok) {
     for (std::size_t k = 0; k < 3; ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       if (!lines[k].x.empty() && frame - lines[k].x.back() > step_) {
-        addPoint(lines[k], no_value, no_value);
-        addBand(bands[k], no_value, no_value, 0);
+        lines[k].add(no_value, no_value);
+        bands[k].addBand(no_value, no_value, no_value);
       }
-      addPoint(lines[k], frame, value[i]);
-      addBand(bands[k], frame, value[i], sigma[i]);
+      lines[k].add(frame, value[i]);
+      bands[k].addBand(frame, value[i] - 2 * sigma[i], value[i] + 2 * sigma[i]);
       if (ok) usable.add(value[i]), sigmas.push_back(2 * sigma[i]);
     }
   }
   void addTruth(double frame, const Eigen::Vector3d& value) {
     for (std::size_t k = 0; k < 3; ++k) {
-      if (!truths[k].x.empty() && frame - truths[k].x.back() > step_) addPoint(truths[k], no_value, no_value);
-      addPoint(truths[k], frame, value[static_cast<Eigen::Index>(k)]);
+      if (!truths[k].x.empty() && frame - truths[k].x.back() > step_) truths[k].add(no_value, no_value);
+      truths[k].add(frame, value[static_cast<Eigen::Index>(k)]);
       usable.add(truths[k].y.back());
     }
   }
   void drawOn(Panel& panel, std::size_t components = 3) const {
     for (std::size_t k = 0; k < components; ++k) panel.series.push_back(bands[k]);
-    for (std::size_t k = 0; k < components; ++k) {
-      if (!truths[k].x.empty()) panel.series.push_back(truths[k]);
-    }
+    for (std::size_t k = 0; k < components; ++k) panel.add({truths[k]});
     for (std::size_t k = 0; k < components; ++k) panel.series.push_back(lines[k]);
     // A frame that hardly says anything would take the scale.
     Extents seen = usable;
@@ -211,11 +201,16 @@ Grid gridOf(const ResidualMap& map) { return {map.grid.x, map.grid.y, map.grid.v
 Axis tangentAxis(int number) {
   return {.label = fmt::format("{} tangent coordinate, deg", number == 0 ? "first" : "second"), .low = -93, .high = 93};
 }
+Series othersOf(const ResidualMap& map) {
+  Series others = seriesOf("other local minima", Style::points, fourth_ink);
+  for (const Eigen::Vector2d& other : map.others) others.add(other.x(), other.y());
+  return others;
+}
 /// The image of a map.
 Panel mapPanel(std::string title, const ResidualGrid& grid, const Axis& colour) {
   Series image{.name = "residual", .style = Style::image, .value = grid.value};
   for (const double y : grid.y) {
-    for (const double x : grid.x) addPoint(image, x, y);
+    for (const double x : grid.x) image.add(x, y);
   }
   return {.title = std::move(title),
           .x = tangentAxis(0),
@@ -259,11 +254,7 @@ Plot residualPlot(const MotionFrameStudy& at, const FlowMaps& maps) {
   for (std::size_t k = 0; k < maps.size(); ++k) {
     const FlowMap& of = maps[k];
     Panel panel = mapPanel(of.name, of.map.grid, colour);
-    if (!of.map.others.empty()) {
-      Series others = named("other local minima", Style::points, fourth_ink);
-      for (const Eigen::Vector2d& other : of.map.others) addPoint(others, other.x(), other.y());
-      panel.series.push_back(others);
-    }
+    panel.add({othersOf(of.map)});
     panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
     panel.series.push_back(star("minimum", of.map.minimum, second_ink));
     const HemisphereChart chart(at.directionOf(of.flow).mean.unit_vector());
@@ -317,15 +308,15 @@ void residualTable(Report& report, const MotionFrameStudy& at, const FlowMaps& m
 
 /// The part of a way that is on one side of the chart.
 Series onSide(std::string name, const MotionTrace& trace, const HemisphereChart& chart, bool far, std::size_t ink) {
-  Series series = named(std::move(name), Style::linespoints, ink);
+  Series series = seriesOf(std::move(name), Style::linespoints, ink);
   Eigen::Vector3d before = trace.start;
   const auto add = [&](const Eigen::Vector3d& direction) {
     // The turn to the antipode is no way across the hemisphere.
-    if (direction.dot(before) < 0) addPoint(series, no_value, no_value);
+    if (direction.dot(before) < 0) series.add(no_value, no_value);
     before = direction;
     const bool here = chart.holds(direction) != far;
     const Eigen::Vector2d at = chart(direction);
-    addPoint(series, here ? at.x() : no_value, here ? at.y() : no_value);
+    series.add(here ? at.x() : no_value, here ? at.y() : no_value);
   };
   add(trace.start);
   for (const Eigen::Vector3d& direction : trace.directions) add(direction);
@@ -369,18 +360,18 @@ Panel tracePanel(std::string title, const MotionTrace& trace, const Eigen::Vecto
   Panel panel{
       .title = std::move(title), .x = {.label = "frame"}, .y = {.label = "component", .low = -1.05, .high = 1.05}};
   for (std::size_t k = 0; k < 3; ++k) {
-    Series line = named(axis_names[k], Style::lines, axis_inks[k]);
-    addPoint(line, beforeFirst(trace), trace.start[static_cast<Eigen::Index>(k)]);
+    Series line = seriesOf(axis_names[k], Style::lines, axis_inks[k]);
+    line.add(beforeFirst(trace), trace.start[static_cast<Eigen::Index>(k)]);
     for (std::size_t i = 0; i < trace.frames.size(); ++i) {
-      addPoint(line, static_cast<double>(trace.frames[i]), trace.directions[i][static_cast<Eigen::Index>(k)]);
+      line.add(static_cast<double>(trace.frames[i]), trace.directions[i][static_cast<Eigen::Index>(k)]);
     }
     panel.series.push_back(line);
   }
   for (std::size_t k = 0; k < 3; ++k) {
-    Series line = named(k == 0 ? "estimate" : "", Style::lines, axis_inks[k], true);
+    Series line = seriesOf(k == 0 ? "estimate" : "", Style::lines, axis_inks[k], true);
     line.colour = truth_ink;
     for (const std::size_t end : {trace.frames.front(), trace.frames.back()}) {
-      addPoint(line, static_cast<double>(end), reference[static_cast<Eigen::Index>(k)]);
+      line.add(static_cast<double>(end), reference[static_cast<Eigen::Index>(k)]);
     }
     panel.series.push_back(line);
   }
@@ -401,13 +392,13 @@ Plot signPlot(std::string name, std::string caption, const MotionTrace& held, co
                  .references = {{.at = 0}}};
   for (const bool free : {false, true}) {
     const MotionTrace& trace = free ? released : held;
-    Series angle = named(free ? "released" : "held", Style::linespoints, free ? second_ink : estimate_ink);
+    Series angle = seriesOf(free ? "released" : "held", Style::linespoints, free ? second_ink : estimate_ink);
     Series sign = angle;
-    addPoint(angle, beforeFirst(trace), angleBetween(trace.start, reference));
+    angle.add(beforeFirst(trace), angleBetween(trace.start, reference));
     for (std::size_t i = 0; i < trace.frames.size(); ++i) {
       const auto at = static_cast<double>(trace.frames[i]);
-      addPoint(angle, at, angleBetween(trace.directions[i], reference));
-      addPoint(sign, at, trace.evidence[i]);
+      angle.add(at, angleBetween(trace.directions[i], reference));
+      sign.add(at, trace.evidence[i]);
     }
     angles.series.push_back(angle), evidence.series.push_back(sign);
   }
@@ -450,13 +441,8 @@ Plot contourPlot(const MotionFrameStudy& at, const ResidualMap& subspace, const 
                 .colour = colour,
                 .series = {contours("residual", gridOf(map), contourLevels(map.grid))},
                 .equal_aspect = true};
-    if (!map.others.empty()) {
-      Series others = named("other local minima", Style::points, fourth_ink);
-      for (const Eigen::Vector2d& other : map.others) addPoint(others, other.x(), other.y());
-      panel.series.push_back(others);
-    }
-    panel.series.push_back(star("minimum", map.minimum, second_ink));
-    panel.series.push_back(star("estimate", Eigen::Vector2d::Zero(), estimate_ink));
+    panel.add({othersOf(map), star("minimum", map.minimum, second_ink),
+               star("estimate", Eigen::Vector2d::Zero(), estimate_ink)});
     plot.panels.push_back(panel);
   }
   return plot;
@@ -468,21 +454,22 @@ Panel structurePanel(std::string title, const MotionInterpretation& seen, int co
               .x = {.label = coordinate == 0 ? "to the right, translations of one frame"
                                              : "downwards, translations of one frame"},
               .y = {.label = "depth, translations of one frame"}};
-  Series ways = named("last frames", Style::lines, 5), points = named("last position", Style::errorbars, estimate_ink);
+  Series ways = seriesOf("last frames", Style::lines, 5),
+         points = seriesOf("last position", Style::errorbars, estimate_ink);
   std::vector<double> depths;
   Extents across, along;
   const std::size_t n = seen.points.back().size();
   for (std::size_t i = 0; i < n; ++i) {
     for (const auto& frame : seen.points) {
       const Eigen::Vector3d X = frame[i].position();
-      addPoint(ways, X[coordinate], X.z());
+      ways.add(X[coordinate], X.z());
       if (std::isfinite(X.z())) depths.push_back(X.z());
     }
-    addPoint(ways, no_value, no_value);
+    ways.add(no_value, no_value);
     const StructurePoint& p = seen.points.back()[i];
     const Eigen::Vector3d X = p.position();
     const double sigma = 2 * std::sqrt(p.variance), nearest = 1 / (p.inverse_depth + sigma);
-    addPoint(points, X[coordinate], X.z());
+    points.add(X[coordinate], X.z());
     points.low.push_back(nearest > 0 ? nearest : 0);
     points.high.push_back(p.inverse_depth > sigma ? 1 / (p.inverse_depth - sigma) : no_value);
   }
@@ -528,7 +515,7 @@ Plot distancesPlot(const MotionWindowRuns& runs) {
                 .x = {.label = "frame"},
                 .y = {.label = "change of the distance, %"},
                 .references = {{.at = 0}}};
-    Series lines = named("distances", Style::lines, rubbery ? second_ink : estimate_ink);
+    Series lines = seriesOf("distances", Style::lines, rubbery ? second_ink : estimate_ink);
     for (std::size_t i = 1; i < seen.points.front().size(); i += 2) {
       const auto length = [&](std::size_t k) {
         return (seen.points[k][i].position() - seen.points[k][i - 1].position()).norm();
@@ -536,9 +523,9 @@ Plot distancesPlot(const MotionWindowRuns& runs) {
       for (std::size_t k = 0; k < seen.points.size(); ++k) {
         const double change = 100 * (length(k) / length(0) - 1);
         if (std::isfinite(change)) changes.push_back(std::abs(change));
-        addPoint(lines, static_cast<double>(runs.frames[k]), change);
+        lines.add(static_cast<double>(runs.frames[k]), change);
       }
-      addPoint(lines, no_value, no_value);
+      lines.add(no_value, no_value);
     }
     panel.series.push_back(lines);
     plot.panels.push_back(panel);

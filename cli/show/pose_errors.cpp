@@ -1,6 +1,6 @@
 #include <cli/show/pose_errors.hpp>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 #include <fmt/format.h>
@@ -23,8 +23,8 @@ std::vector<Panel> errorPanels(const std::vector<PoseError>& errors, const Times
     for (std::size_t i = 0; i < errors.size(); ++i) {
       const double sigma = 3 * unit * std::sqrt(errors[i].covariance(k, k));
       if (!std::isfinite(sigma)) continue;
-      band.x.push_back(times.values[i]), band.low.push_back(-sigma), band.high.push_back(sigma);
-      error.x.push_back(times.values[i]), error.y.push_back(unit * errors[i].error[k]);
+      band.addBand(times.values[i], -sigma, sigma);
+      error.add(times.values[i], unit * errors[i].error[k]);
     }
     panels.push_back({.x = {.label = times.label()}, .y = {.label = label}, .series = {band, error}});
   }
@@ -41,7 +41,7 @@ Panel neesPanel(const TimesOfPoses& times) {
 Series neesSeries(std::string name, const std::vector<PoseError>& errors, const TimesOfPoses& times) {
   Series points{.name = std::move(name), .style = Style::points};
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    points.x.push_back(times.values[i]), points.y.push_back(errors[i].nees);
+    points.add(times.values[i], errors[i].nees);
   }
   return points;
 }

@@ -1,7 +1,7 @@
 // The panels that show the errors of poses, for the pages of `liestat evaluate` and `liestat doctor`.
 #pragma once
 
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <fusion/trajectories_types.hpp>
 
 #include <string>

@@ -1,6 +1,6 @@
 #include <cli/show/preintegration.hpp>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 #include <stats/quantile.hpp>
 
@@ -43,19 +43,15 @@ std::string errorSummary(const RecordingWindows& result) {
 
 }  // namespace
 
-std::vector<std::string> preintegrationHeaders(const RecordingWindows& result) {
-  std::vector<std::string> headers = {"begin s", "duration", "turn deg", "velocity m/s", "position m"};
+TableRows preintegrationTable(const RecordingWindows& result) {
+  TableRows table{{"begin s", "duration", "turn deg", "velocity m/s", "position m"}};
+  std::vector<std::string>& headers = table.headers;
   if (result.with_noise) headers.insert(headers.end(), {"sd turn deg", "sd velocity", "sd position"});
   if (result.with_truth) headers.insert(headers.end(), {"error deg", "error m/s", "error m"});
-  return headers;
-}
-
-std::vector<std::vector<std::string>> preintegrationRows(const RecordingWindows& result) {
-  std::vector<std::vector<std::string>> rows;
   for (const RecordingWindow& w : result.windows) {
     const SE23d& x = w.result.motion.increment();
     if (!w.ok()) {
-      rows.push_back({number(w.begin, 9), w.status()});
+      table.rows.push_back({number(w.begin, 9), w.status()});
       continue;
     }
     std::vector<std::string> cells = {number(w.begin, 9), number(w.result.motion.duration()),
@@ -70,9 +66,9 @@ std::vector<std::vector<std::string>> preintegrationRows(const RecordingWindows&
            {degrees * w.error->segment<3>(3).norm(), w.error->tail<3>().norm(), w.error->head<3>().norm()})
         cells.push_back(number(e, 3));
     }
-    rows.push_back(cells);
+    table.rows.push_back(cells);
   }
-  return rows;
+  return table;
 }
 
 std::string preintegrationRemarks(const RecordingWindows& result) {
@@ -80,9 +76,7 @@ std::string preintegrationRemarks(const RecordingWindows& result) {
 }
 
 std::string formatPreintegration(const RecordingWindows& result) {
-  Table table(preintegrationHeaders(result));
-  for (const std::vector<std::string>& cells : preintegrationRows(result)) table.row(cells);
-  std::string text = table.str() + preintegrationRemarks(result);
+  std::string text = Table(preintegrationTable(result)).str() + preintegrationRemarks(result);
   if (!result.with_truth) return text;
   const Verdict verdict = result.verdict();
   for (const std::string& cause : verdict.causes) text += cause + "\n";

@@ -3,6 +3,7 @@
 
 #include <formats/imu.hpp>
 #include <fusion/imu/recording_windows_types.hpp>
+#include <report/table.hpp>
 
 #include <string>
 #include <vector>
@@ -31,8 +32,7 @@ void writePreintegrationReport(const std::string& directory, const std::string& 
 /// The lines of formatPreintegration() below the table: where readings fail, and the errors against the truth.
 std::string preintegrationRemarks(const RecordingWindows& result);
 
-/// The columns and rows of its table.
-std::vector<std::string> preintegrationHeaders(const RecordingWindows& result);
-std::vector<std::vector<std::string>> preintegrationRows(const RecordingWindows& result);
+/// Its table.
+TableRows preintegrationTable(const RecordingWindows& result);
 
 }  // namespace liestat::cli

@@ -1,8 +1,8 @@
 #include <cli/show/preintegration.hpp>
 
-#include <cli/show/outline.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/outline.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 #include <stats/quantile.hpp>
 #include <stats/laws.hpp>
@@ -34,37 +34,20 @@ constexpr std::array increment_parts{IncrementPart{"rotation", "deg", degrees, &
                                      IncrementPart{"velocity", "m/s", 1, &IncrementSigmas::velocity, 6},
                                      IncrementPart{"position", "m", 1, &IncrementSigmas::position, 0}};
 
-/// The verdict in words, beside which windows have an increment.
-std::string preintegrationVerdict(const RecordingWindows& result) {
-  const std::size_t ok = result.okWindows(), all = result.windows.size();
-  if (ok == 0) return "NOT TO BE TRUSTED: no window has an increment, as the readings have faults.";
-  std::string text =
-      ok < all
-          ? fmt::format("INCOMPLETE: {} of {} windows have no increment, as the readings have faults.", all - ok, all)
-      : all == 1 ? "ok: the window has an increment."
-                 : fmt::format("ok: all of the {} windows have an increment.", all);
-  if (!result.with_truth) return text;
-  const Verdict verdict = result.verdict();
-  text = verdict.isNo() ? verdict.text + "." + (ok < all ? " " + text : "") : text + " " + verdict.text + ".";
-  for (const std::string& cause : verdict.causes) text += " " + cause + ".";
-  return text;
-}
-
 void showWindows(Report& report, const RecordingWindows& result) {
   report.section("Windows");
-  std::vector<std::string> headers = preintegrationHeaders(result);
+  TableRows table = preintegrationTable(result);
   // A page has the room for the units that the terminal leaves out.
-  for (std::string& header : headers) {
+  for (std::string& header : table.headers) {
     header += header == "duration" ? " s" : header == "sd velocity" ? " m/s" : header == "sd position" ? " m" : "";
   }
-  std::vector<std::vector<std::string>> rows = preintegrationRows(result);
-  const std::size_t all = rows.size();
-  if (all > most_rows) rows.resize(most_rows);
+  const std::size_t all = table.rows.size();
+  if (all > most_rows) table.rows.resize(most_rows);
   std::string caption = "Lengths of the increments";
   if (result.with_noise) caption += ", the largest of their standard deviations along the axes";
   if (result.with_truth) caption += ", lengths of their errors";
   if (all > most_rows) caption += fmt::format("; the first {} of {} windows", most_rows, all);
-  report.table(headers, rows, caption + ".");
+  report.table(table, caption + ".");
   const std::string remarks = preintegrationRemarks(result);
   if (!remarks.empty()) report.code(remarks.substr(remarks.find_first_not_of('\n')));
 }
@@ -86,10 +69,11 @@ void showIncrements(Report& report, const RecordingWindows& result) {
       const double length = part.scale * (part.begin == 3   ? x.so3().log().norm()
                                           : part.begin == 6 ? x.velocity().norm()
                                                             : x.translation().norm());
-      points.x.push_back(w.begin), points.y.push_back(length);
-      if (!bars) continue;
-      const double sd = part.scale * incrementSigmas(w.result.motion).*part.sigma;
-      points.low.push_back(length - sd), points.high.push_back(length + sd);
+      if (bars) {
+        points.addBar(w.begin, length, part.scale * incrementSigmas(w.result.motion).*part.sigma);
+      } else {
+        points.add(w.begin, length);
+      }
     }
     plot.panels.push_back({.x = {.label = "beginning of the window, s"},
                            .y = {.label = fmt::format("{}, {}", part.name, part.unit)},
@@ -114,7 +98,7 @@ void showGrowth(Report& report, const PreintegratedReadings& readings) {
   for (const IncrementPart& part : increment_parts) {
     Series line;
     for (const IncrementSigmas& d : readings.growth) {
-      line.x.push_back(d.duration), line.y.push_back(part.scale * d.*part.sigma);
+      line.add(d.duration, part.scale * d.*part.sigma);
     }
     plot.panels.push_back({.x = {.label = "duration, s", .low = 0.0},
                            .y = {.label = fmt::format("sd of {}, {}", part.name, part.unit), .low = 0.0},
@@ -139,11 +123,11 @@ void showErrors(Report& report, const RecordingWindows& result) {
       Series band{.name = "3 sd", .style = Style::filled_curve}, error{.name = "error", .style = Style::points};
       for (const RecordingWindow& w : result.windows) {
         if (!w.error) continue;
-        error.x.push_back(w.begin), error.y.push_back(part.scale * (*w.error)[part.begin + k]);
+        error.add(w.begin, part.scale * (*w.error)[part.begin + k]);
         if (!result.with_noise) continue;
         const double variance = w.result.motion.gaussian().covariance(part.begin + k, part.begin + k);
         const double reach = 3 * part.scale * std::sqrt(variance);
-        band.x.push_back(w.begin), band.low.push_back(-reach), band.high.push_back(reach);
+        band.addBand(w.begin, -reach, reach);
       }
       Panel panel{.x = {.label = "beginning of the window, s"},
                   .y = {.label = fmt::format("{} {}, {}", part.name, "xyz"[k], part.unit)}};
@@ -158,7 +142,7 @@ void showErrors(Report& report, const RecordingWindows& result) {
   const double low = chiSquaredQuantile(0.025, 9), high = chiSquaredThreshold(0.025, 9);
   Series points{.style = Style::points};
   for (const RecordingWindow& w : result.windows) {
-    if (w.squared_distance) points.x.push_back(w.begin), points.y.push_back(*w.squared_distance);
+    if (w.squared_distance) points.add(w.begin, *w.squared_distance);
   }
   Panel panel{.x = {.label = "beginning of the window, s"},
               .y = {.label = "squared distance to the truth", .logarithmic = true},
@@ -182,12 +166,12 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
   for (const ImuSample<double>& s : readings.imu.samples) {
     if (s.time < readings.begin || s.time > readings.end) continue;
     ++n;
-    rate.x.push_back(s.time), rate.y.push_back(s.angular_rate.norm());
-    force.x.push_back(s.time), force.y.push_back(s.specific_force.norm());
+    rate.add(s.time, s.angular_rate.norm());
+    force.add(s.time, s.specific_force.norm());
     if (before != nullptr) {
       const double step = s.time - before->time;
       intervals.push_back(1000 * step);
-      interval.x.push_back(s.time), interval.y.push_back(1000 * step);
+      interval.add(s.time, 1000 * step);
       gaps += step > readings.largest_gap;
       if (step > largest) largest = step, largest_at = before->time;
     }
@@ -227,10 +211,7 @@ void showReadings(Report& report, const PreintegratedReadings& readings) {
 void writePreintegrationReport(const std::string& directory, const std::string& command_line,
                                const RecordingWindows& result, const PreintegratedReadings& readings) {
   Report report(directory, "Preintegrated motions of " + readings.source);
-  report.verdict(!result.complete()  ? Verdict::Answer::no
-                 : result.with_truth ? result.verdict().answer
-                                     : Verdict::Answer::yes,
-                 preintegrationVerdict(result));
+  report.verdict(result.outcome());
   report.code(command_line);
   showIncrements(report, result);
   if (readings.growth.size() > 1) showGrowth(report, readings);

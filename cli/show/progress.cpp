@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <experiments/interruption.hpp>
 
 namespace liestat::cli {

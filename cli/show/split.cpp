@@ -1,8 +1,8 @@
 #include <cli/show/split.hpp>
 
 #include <cli/show/mean.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 
 #include <fmt/format.h>
 

@@ -13,9 +13,11 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
-
+namespace liestat {
 class Report;
+}
+
+namespace liestat::cli {
 
 /// The measurements of one file.
 struct FileSplit : SplitSummary {

@@ -1,6 +1,6 @@
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <cli/show/split.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <stats/gaussian.hpp>
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/table1.hpp>
 #include <cli/show/validation.hpp>
 

@@ -1,7 +1,7 @@
 #include <cli/show/units.hpp>
 #include <cli/show/two_solutions.hpp>
 
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <experiments/closed_form_cases.hpp>
 
 #include <fmt/format.h>

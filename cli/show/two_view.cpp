@@ -1,8 +1,8 @@
 #include <cli/show/two_view.hpp>
 
 #include <formats/output_file.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 
 #include <fmt/format.h>
@@ -34,18 +34,17 @@ std::string rejectionOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
   return row.unsupported && row.rejection == Rejection::none ? verdict + ", could be chance" : verdict;
 }
 
-const std::vector<std::string> lattice_headers{"model",     "free",   "draws",      "inliers",
-                                               "relevance", "rms px", "rejected by"};
-std::vector<std::vector<std::string>> latticeRows(const TwoViewMotionEstimate& estimate) {
-  std::vector<std::vector<std::string>> rows;
+TableRows latticeRows(const TwoViewMotionEstimate& estimate) {
+  TableRows table{{"model", "free", "draws", "inliers", "relevance", "rms px", "rejected by"}};
   for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
     const TwoViewModelRow& row = estimate.lattice[m];
     const bool found = row.hasEstimate();
-    rows.push_back({row.name, fmt::format("{}", row.free_parameters), row.draws > 0 ? fmt::format("{}", row.draws) : "",
-                    found ? fmt::format("{}", row.inliers) : "", found ? fmt::format("{:.3f}", row.relevance) : "",
-                    found ? number(row.rms, 3) : "", rejectionOf(estimate, m)});
+    table.rows.push_back(
+        {row.name, fmt::format("{}", row.free_parameters), row.draws > 0 ? fmt::format("{}", row.draws) : "",
+         found ? fmt::format("{}", row.inliers) : "", found ? fmt::format("{:.3f}", row.relevance) : "",
+         found ? number(row.rms, 3) : "", rejectionOf(estimate, m)});
   }
-  return rows;
+  return table;
 }
 /// The same for the terminal, which is narrower.
 std::string latticeTable(const TwoViewMotionEstimate& estimate) {
@@ -54,35 +53,45 @@ std::string latticeTable(const TwoViewMotionEstimate& estimate) {
     cells.erase(cells.begin() + relevance), cells.erase(cells.begin() + draws);
     return cells;
   };
-  Table table(narrow(lattice_headers));
-  for (const auto& row : latticeRows(estimate)) table.row(narrow(row));
-  return table.str();
+  TableRows table = latticeRows(estimate);
+  table.headers = narrow(table.headers);
+  for (auto& row : table.rows) row = narrow(row);
+  return Table(table).str();
 }
 
-/// The entries of the matrix, where they are all that is known.
-std::vector<std::vector<std::string>> matrixRows(const TwoViewMotionResult& e) {
-  std::vector<std::vector<std::string>> rows;
-  if (e.matrix_covariance.rows() != 9) return rows;
+/// A table and the line above it.
+struct HeadedTable {
+  std::string heading;
+  TableRows table{{"parameter", "value", "sd", "unit"}};
+};
+/// The parameters of a motion; the entries of its matrix, where they are all that is known.
+std::vector<HeadedTable> parameterTables(const TwoViewMotionResult& e) {
+  std::vector<HeadedTable> tables(e.physical.size());
+  for (std::size_t k = 0; k < e.physical.size(); ++k) {
+    const PhysicalParameters& physical = e.physical[k];
+    if (e.physical.size() > 1) {
+      tables[k].heading =
+          k == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
+                 : "the other one:\n";
+    }
+    for (std::size_t i = 0; i < physical.size(); ++i) {
+      const bool angle = physical.units[i] == "rad";
+      const double unit = angle ? degrees : 1;
+      tables[k].table.rows.push_back({physical.names[i],
+                                      number(unit * physical.values[static_cast<Eigen::Index>(i)], 5),
+                                      number(unit * physical.deviation(i), 2), angle ? "deg" : physical.units[i]});
+    }
+  }
+  if (!tables.empty() || e.matrix_covariance.rows() != 9) return tables;
+  tables.resize(1);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const double variance = e.matrix_covariance(3 * j + i, 3 * j + i);
-      rows.push_back({fmt::format("{}{}{}", e.equations == 2 ? 'H' : 'F', i + 1, j + 1), number(e.matrix(i, j), 6),
-                      number(std::sqrt(variance), 2), "px, norm 1"});
+      tables[0].table.rows.push_back({fmt::format("{}{}{}", e.equations == 2 ? 'H' : 'F', i + 1, j + 1),
+                                      number(e.matrix(i, j), 6), number(std::sqrt(variance), 2), "px, norm 1"});
     }
   }
-  return rows;
-}
-
-const std::vector<std::string> parameter_headers{"parameter", "value", "sd", "unit"};
-std::vector<std::vector<std::string>> parameterRows(const PhysicalParameters& physical) {
-  std::vector<std::vector<std::string>> rows;
-  for (std::size_t i = 0; i < physical.size(); ++i) {
-    const bool angle = physical.units[i] == "rad";
-    const double unit = angle ? degrees : 1;
-    rows.push_back({physical.names[i], number(unit * physical.values[static_cast<Eigen::Index>(i)], 5),
-                    number(unit * physical.deviation(i), 2), angle ? "deg" : physical.units[i]});
-  }
-  return rows;
+  return tables;
 }
 
 std::string summary(const std::string& file, const TwoViewImageFrame& frame) {
@@ -109,18 +118,10 @@ std::string answer(const TwoViewMotionOutput& output) {
   if (const Verdict verdict = e.verdict(); verdict.isNo()) text += verdict.text + "\n";
   return text;
 }
-/// The line above a table of physical parameters where there are two tables.
-std::string headingOf(const TwoViewMotionResult& e, std::size_t i) {
-  if (e.physical.size() < 2) return "";
-  return i == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
-                : "the other one:\n";
-}
-
 /// Each match as a line from its first to its second point.
 void addMatch(Series& lines, Series& ends, const Eigen::Vector4d& m) {
-  lines.x.insert(lines.x.end(), {m[0], m[2], nan});
-  lines.y.insert(lines.y.end(), {m[1], m[3], nan});
-  ends.x.push_back(m[2]), ends.y.push_back(m[3]);
+  lines.add(m[0], m[1]), lines.add(m[2], m[3]), lines.add(nan, nan);
+  ends.add(m[2], m[3]);
 }
 /// Some of the matches, in the frame of the image.
 Panel matchPanel(const std::string& title, const std::vector<std::size_t>& chosen, std::size_t colour,
@@ -172,8 +173,8 @@ Plot latticePlot(const TwoViewMotionEstimate& estimate) {
     for (const std::string& parent : row.parents) {
       const auto p = at.find(parent);
       if (p == at.end()) continue;
-      edges.x.insert(edges.x.end(), {at[row.name].x(), p->second.x(), nan});
-      edges.y.insert(edges.y.end(), {at[row.name].y(), p->second.y(), nan});
+      for (const Eigen::Vector2d& end : {at[row.name], p->second, Eigen::Vector2d(nan, nan)})
+        edges.add(end.x(), end.y());
     }
   }
   panel.series.push_back(edges);
@@ -188,14 +189,12 @@ Plot latticePlot(const TwoViewMotionEstimate& estimate) {
                    : !row.hasEstimate()               ? idle
                    : row.rejection == Rejection::none ? others
                                                       : rejected;
-    kind.x.push_back(at[row.name].x()), kind.y.push_back(at[row.name].y());
+    kind.add(at[row.name].x(), at[row.name].y());
     std::string text = row.name;
     if (row.hasEstimate()) text += fmt::format(": {} inliers, {} px", row.inliers, number(row.rms, 2));
     labels.push_back({.name = text, .style = Style::label, .x = {at[row.name].x()}, .y = {at[row.name].y() + 0.38}});
   }
-  for (const Series& kind : {chosen, rejected, others, idle}) {
-    if (!kind.x.empty()) panel.series.push_back(kind);
-  }
+  panel.add({chosen, rejected, others, idle});
   panel.series.insert(panel.series.end(), labels.begin(), labels.end());
   return {.name = "lattice",
           .caption =
@@ -223,24 +222,11 @@ Plot errorPlot(const TwoViewMotionOutput& output) {
 std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   std::string text = summary(output.file, output.estimate) + "\n" + answer(output);
-  for (std::size_t i = 0; i < e.physical.size(); ++i) {
-    Table table(parameter_headers);
-    for (const auto& row : parameterRows(e.physical[i])) table.row(row);
-    text += "\n" + headingOf(e, i) + table.str();
-  }
-  if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
-    Table table(parameter_headers);
-    for (const auto& row : matrixRows(e)) table.row(row);
-    text += "\n" + table.str();
-    if (e.chosenModel().name == "fundamental") {
-      text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
-    }
+  for (const HeadedTable& t : parameterTables(e)) text += "\n" + t.heading + Table(t.table).str();
+  if (e.physical.empty() && e.matrix_covariance.rows() == 9 && e.chosenModel().name == "fundamental") {
+    text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
   }
   return text + "\n" + latticeTable(e);
-}
-
-void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output) {
-  object.set("file", output.file).fieldsOf(output.estimate);
 }
 
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
@@ -250,20 +236,15 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   report.verdict(e.verdict().answer, answer(output));
   report.code(command_line);
   report.paragraph(summary(output.file, output.estimate));
-  if (!e.physical.empty()) report.section("Parameters");
-  for (std::size_t i = 0; i < e.physical.size(); ++i) {
-    report.table(parameter_headers, parameterRows(e.physical[i]), headingOf(e, i));
-  }
-  if (e.physical.empty() && e.matrix_covariance.rows() == 9) {
-    report.section("Parameters");
-    report.table(parameter_headers, matrixRows(e));
-  }
+  const std::vector<HeadedTable> parameters = parameterTables(e);
+  if (!parameters.empty()) report.section("Parameters");
+  for (const HeadedTable& t : parameters) report.table(t.table, t.heading);
   report.section("Matches");
   report.plot(matchPlot(output));
   if (e.threshold > 0) report.plot(errorPlot(output));
   report.section("Models");
   report.plot(latticePlot(e));
-  report.table(lattice_headers, latticeRows(e),
+  report.table(latticeRows(e),
                "The chosen model is the most specific one that no model which contains it rejects: by more support "
                "among matches that the specific one is far from, or by a better fit to the common inliers.");
   printLines("\n" + report.write() + "\n");
@@ -271,49 +252,31 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
 
 namespace {
 
-const std::vector<std::string> structure_headers{"motion", "model", "matches", "rms px"};
-std::vector<std::vector<std::string>> structureRows(const TwoViewMotions& motions) {
-  std::vector<std::vector<std::string>> rows;
+TableRows structureRows(const TwoViewMotions& motions) {
+  TableRows table{{"motion", "model", "matches", "rms px"}};
   for (std::size_t k = 0; k < motions.structures.size(); ++k) {
     const TwoViewStructure& s = motions.structures[k];
-    rows.push_back({fmt::format("{}", k + 1), s.model, fmt::format("{}", s.inliers.size()), number(s.rms, 3)});
+    table.rows.push_back({fmt::format("{}", k + 1), s.model, fmt::format("{}", s.inliers.size()), number(s.rms, 3)});
   }
-  return rows;
+  return table;
 }
 std::string endOf(const TwoViewMotionsOutput& output) {
   std::string text = fmt::format("{} matches belong to none\n", output.motions.rest.size());
   if (const Verdict verdict = output.motions.verdict(); verdict.isNo()) text += verdict.text + "\n";
   return text;
 }
-/// The parameters of a motion, or its matrix.
-std::vector<std::vector<std::string>> rowsOf(const TwoViewStructure& structure, std::size_t i) {
-  return structure.physical.empty() ? matrixRows(structure) : parameterRows(structure.physical[i]);
-}
-std::size_t tablesOf(const TwoViewStructure& structure) {
-  if (!structure.physical.empty()) return structure.physical.size();
-  return structure.matrix_covariance.rows() == 9 ? 1 : 0;
-}
 
 }  // namespace
 
 std::string formatTwoViewMotions(const TwoViewMotionsOutput& output) {
-  Table table(structure_headers);
-  for (const auto& row : structureRows(output.motions)) table.row(row);
-  std::string text = summary(output.file, output.motions) + "\n" + table.str() + endOf(output);
+  std::string text =
+      summary(output.file, output.motions) + "\n" + Table(structureRows(output.motions)).str() + endOf(output);
   for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
     const TwoViewStructure& s = output.motions.structures[k];
     text += fmt::format("\n{}: {}\n", k + 1, s.model);
-    for (std::size_t i = 0; i < tablesOf(s); ++i) {
-      Table parameters(parameter_headers);
-      for (const auto& row : rowsOf(s, i)) parameters.row(row);
-      text += headingOf(s, i) + parameters.str();
-    }
+    for (const HeadedTable& t : parameterTables(s)) text += t.heading + Table(t.table).str();
   }
   return text;
-}
-
-void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output) {
-  object.set("file", output.file).fieldsOf(output.motions);
 }
 
 void writeTwoViewMotionsReport(const std::string& directory, const std::string& command_line,
@@ -321,7 +284,7 @@ void writeTwoViewMotionsReport(const std::string& directory, const std::string& 
   Report report(directory, "Motions between two images");
   report.code(command_line);
   report.paragraph(summary(output.file, output.motions));
-  report.table(structure_headers, structureRows(output.motions), endOf(output));
+  report.table(structureRows(output.motions), endOf(output));
   std::vector<std::pair<std::string, std::vector<std::size_t>>> groups;
   for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
     const TwoViewStructure& s = output.motions.structures[k];
@@ -337,9 +300,9 @@ void writeTwoViewMotionsReport(const std::string& directory, const std::string& 
   }
   report.plot(plot);
   for (std::size_t k = 0; k < output.motions.structures.size(); ++k) {
-    const TwoViewStructure& s = output.motions.structures[k];
-    if (tablesOf(s) > 0) report.section(groups[k].first);
-    for (std::size_t i = 0; i < tablesOf(s); ++i) report.table(parameter_headers, rowsOf(s, i), headingOf(s, i));
+    const std::vector<HeadedTable> parameters = parameterTables(output.motions.structures[k]);
+    if (!parameters.empty()) report.section(groups[k].first);
+    for (const HeadedTable& t : parameters) report.table(t.table, t.heading);
   }
   printLines("\n" + report.write() + "\n");
 }

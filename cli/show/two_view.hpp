@@ -1,6 +1,5 @@
 #pragma once
 
-#include <report/json.hpp>
 #include <fusion/two_view/two_view_types.hpp>
 
 #include <Eigen/Core>
@@ -17,6 +16,11 @@ struct TwoViewMotionOutput {
   std::vector<Eigen::Vector4d> matches;  ///< px
   TwoViewMotionEstimate estimate;
 };
+template <class V>
+void describe(V& v, const TwoViewMotionOutput& output) {
+  v("file", output.file);
+  describe(v, output.estimate);
+}
 
 /// The results that `liestat two-view --motions` shows.
 struct TwoViewMotionsOutput {
@@ -24,12 +28,14 @@ struct TwoViewMotionsOutput {
   std::vector<Eigen::Vector4d> matches;  ///< px
   TwoViewMotions motions;
 };
+template <class V>
+void describe(V& v, const TwoViewMotionsOutput& output) {
+  v("file", output.file);
+  describe(v, output.motions);
+}
 
 /// The chosen model, its parameters and the lattice, for the terminal.
 std::string formatTwoViewMotion(const TwoViewMotionOutput& output);
-
-/// Adds the fields of the estimate.
-void setTwoViewMotion(JsonObject& object, const TwoViewMotionOutput& output);
 
 /// Writes a page with matches, errors and the lattice into a directory.
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
@@ -37,7 +43,6 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
 
 /// The same of several motions.
 std::string formatTwoViewMotions(const TwoViewMotionsOutput& output);
-void setTwoViewMotions(JsonObject& object, const TwoViewMotionsOutput& output);
 void writeTwoViewMotionsReport(const std::string& directory, const std::string& command_line,
                                const TwoViewMotionsOutput& output);
 

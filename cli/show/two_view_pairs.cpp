@@ -1,7 +1,7 @@
 #include <cli/show/two_view_pairs.hpp>
 
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/validation.hpp>
 #include <experiments/interruption.hpp>
 

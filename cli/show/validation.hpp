@@ -3,7 +3,7 @@
 // The parts that the views of the validations share.
 
 #include <report/json.hpp>
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <experiments/judged_report.hpp>
 
 #include <optional>

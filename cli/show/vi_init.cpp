@@ -1,4 +1,4 @@
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/units.hpp>
 #include <cli/show/vi_init.hpp>
 
@@ -16,45 +16,6 @@
 namespace liestat::cli {
 namespace {
 
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-
-/// The velocity and gravity in a window's line: the refined ones, or else those of the closed form.
-struct Best {
-  Eigen::Vector3d velocity, gravity;
-
-  explicit Best(const ComparedWindow& w) {
-    if (w.isRefined()) {
-      velocity = w.refined->velocity();
-      gravity = w.refined->gravity;
-    } else {
-      velocity = w.closedForm().solutions[0].velocity;
-      gravity = w.closedForm().solutions[0].gravity;
-    }
-  }
-  double roll() const { return std::atan2(-gravity.y(), -gravity.z()); }
-  double pitch() const { return std::atan2(gravity.x(), std::hypot(gravity.y(), gravity.z())); }
-};
-
-bool hasSolution(const ComparedWindow& w) { return !w.closedForm().solutions.empty(); }
-
-/// Relative.
-double scaleSigma(const ComparedWindow& w) {
-  return w.isRefined() ? w.refined->scale_sigma : w.closedForm().scale_sigma;
-}
-
-double costPerDegree(const ComparedWindow& w) {
-  if (w.refined && w.refined->degrees_of_freedom > 0) {
-    return w.refined->cost / static_cast<double>(w.refined->degrees_of_freedom);
-  }
-  const ClosedFormResult& closed = w.closedForm();
-  return closed.degrees_of_freedom > 0 ? closed.solutions[0].cost / static_cast<double>(closed.degrees_of_freedom)
-                                       : not_a_number;
-}
-
-std::optional<InitialisationError> errorOf(const ComparedWindow& w) {
-  return w.refined_error ? w.refined_error : w.closed_form_error;
-}
-
 std::string windowTable(const ViInitResult& result, bool with_truth) {
   // With the errors it still fits into 80 columns.
   std::vector<std::string> headers = {"s", "status", "m/s", "roll", "pitch", "sd %", "chi2", "tracks"};
@@ -62,17 +23,16 @@ std::string windowTable(const ViInitResult& result, bool with_truth) {
   Table table(headers);
   for (const ComparedWindow& w : result.windows) {
     std::vector<std::string> cells = {fmt::format("{:.1f}", w.begin), std::string(name(w.verdict()))};
-    if (!w.fault && hasSolution(w)) {
-      const Best best(w);
-      const bool has_scale = w.closedForm().status != FusionStatus::scale_unobservable &&
-                             w.closedForm().status != FusionStatus::stationary;
+    if (!w.fault && w.hasSolution()) {
+      const ClosedFormSolution best = w.best();
+      const bool has_scale = w.hasScale();
       cells.push_back(has_scale ? fmt::format("{:.2f}", best.velocity.norm()) : "");
       cells.push_back(fmt::format("{:.1f}", degrees * best.roll()));
       cells.push_back(fmt::format("{:.1f}", degrees * best.pitch()));
-      cells.push_back(has_scale ? fmt::format("{:.1f}", 100 * scaleSigma(w)) : "");
-      cells.push_back(has_scale ? fmt::format("{:.2f}", costPerDegree(w)) : "");
+      cells.push_back(has_scale ? fmt::format("{:.1f}", 100 * w.scaleSigma()) : "");
+      cells.push_back(has_scale ? fmt::format("{:.2f}", w.costPerDegree()) : "");
       cells.push_back(fmt::format("{}/{}", w.found.inliers.size(), w.tracks.size()));
-      if (const auto error = errorOf(w); error && has_scale) {
+      if (const auto& error = w.error(); error && has_scale) {
         cells.push_back(fmt::format("{:.3f}", error->speed));
         cells.push_back(fmt::format("{:.2f}", degrees * error->gravity));
         cells.push_back(fmt::format("{:.1f}", 100 * error->scale));

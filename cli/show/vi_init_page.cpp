@@ -8,7 +8,7 @@
 #include <utility>
 
 #include <cli/show/units.hpp>
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 #include <cli/show/vi_init.hpp>
 
 namespace liestat::cli {
@@ -18,22 +18,11 @@ constexpr double gap = std::numeric_limits<double>::quiet_NaN();
 // The palette's colours by what they stand for.
 constexpr std::size_t estimate_colour = 0, second_colour = 1, fused_colour = 2, truth_colour = 6;
 
-/// Adds a value with so many of its deviations on either side.
-void addBar(Series& series, double x, double y, double deviation) {
-  series.x.push_back(x);
-  series.y.push_back(y);
-  series.low.push_back(y - 2 * deviation);
-  series.high.push_back(y + 2 * deviation);
-}
-
-Series bars(std::string name, std::size_t colour) {
-  return {.name = std::move(name), .style = Style::errorbars, .colour = colour};
-}
+Series bars(std::string name, std::size_t colour) { return seriesOf(std::move(name), Style::errorbars, colour); }
+Series dots(std::string name, std::size_t colour) { return seriesOf(std::move(name), Style::points, colour); }
 Series line(std::string name, std::size_t colour, bool dashed = false) {
-  return {.name = std::move(name), .style = Style::lines, .colour = colour, .dashed = dashed};
+  return seriesOf(std::move(name), Style::lines, colour, dashed);
 }
-
-bool isRefined(const ComparedWindow& w) { return w.isRefined(); }
 
 /// The rotation that makes gravity point along -z, heading left as it is.
 SO3d levelling(const Eigen::Vector3d& gravity) {
@@ -48,12 +37,11 @@ Panel trajectoryPanel(const ViRecording& recording, const ViInitResult& result, 
               .y = {.label = labels[vertical]},
               .equal_aspect = true};
   Series truth = line("truth", truth_colour, true), found = line("windows", estimate_colour);
-  Series starts{.name = "their first images", .style = Style::points, .colour = second_colour};
+  Series starts = dots("their first images", second_colour);
   if (!result.windows.empty()) {
     for (const GroundTruth& g : recording.truth) {
       if (g.time < result.windows.front().begin || g.time > result.windows.back().end) continue;
-      truth.x.push_back(g.state.translation()[horizontal]);
-      truth.y.push_back(g.state.translation()[vertical]);
+      truth.add(g.state.translation()[horizontal], g.state.translation()[vertical]);
     }
   }
   for (const ComparedWindow& w : result.windows) {
@@ -64,28 +52,21 @@ Panel trajectoryPanel(const ViRecording& recording, const ViInitResult& result, 
       world_R_body = at->state.so3();
       start = at->state.translation();
     } else if (recording.truth.empty()) {
-      world_R_body = levelling(isRefined(w) ? w.refined->gravity : w.closedForm().solutions[0].gravity);
+      world_R_body = levelling(w.best().gravity);
     } else {
       continue;
     }
     for (const SE23d& x : w.states()) {
       const Eigen::Vector3d p = start + world_R_body * Eigen::Vector3d(x.translation());
-      found.x.push_back(p[horizontal]);
-      found.y.push_back(p[vertical]);
+      found.add(p[horizontal], p[vertical]);
     }
-    found.x.push_back(gap);
-    found.y.push_back(gap);
-    starts.x.push_back(start[horizontal]);
-    starts.y.push_back(start[vertical]);
+    found.add(gap, gap);
+    starts.add(start[horizontal], start[vertical]);
   }
-  if (!truth.x.empty()) panel.series.push_back(truth);
-  panel.series.push_back(found);
-  if (!recording.truth.empty()) panel.series.push_back(starts);
+  panel.add({truth, found});
+  if (!recording.truth.empty()) panel.add({starts});
   return panel;
 }
-
-double rollOf(const Eigen::Vector3d& g) { return degrees * std::atan2(-g.y(), -g.z()); }
-double pitchOf(const Eigen::Vector3d& g) { return degrees * std::atan2(g.x(), std::hypot(g.y(), g.z())); }
 
 /// The truth, ten times a second over the windows.
 template <class Value>
@@ -101,8 +82,7 @@ Series truthLine(const ViRecording& recording, const ViInitResult& result, const
     const double y = value(*at);
     // An angle that goes round is no stroke across the picture.
     const bool round = !series.x.empty() && std::abs(y - previous) > 180;
-    series.x.push_back(t);
-    series.y.push_back(round ? gap : y);
+    series.add(t, round ? gap : y);
     previous = y;
   }
   return series;
@@ -110,19 +90,21 @@ Series truthLine(const ViRecording& recording, const ViInitResult& result, const
 
 /// Roll or pitch at the first image of each window.
 Panel anglePanel(const ViRecording& recording, const ViInitResult& result, bool roll) {
-  const auto angle = roll ? rollOf : pitchOf;
+  const auto angle = [roll](const Eigen::Vector3d& gravity) {
+    ClosedFormSolution motion;
+    motion.gravity = gravity;
+    return degrees * (roll ? motion.roll() : motion.pitch());
+  };
   Panel panel{.title = roll ? "roll" : "pitch", .x = {.label = "s"}, .y = {.label = "deg"}};
-  Series found{.name = "windows", .style = Style::points, .colour = estimate_colour};
+  Series found = dots("windows", estimate_colour);
   for (const ComparedWindow& w : result.windows) {
     if (w.closedForm().solutions.empty()) continue;
-    found.x.push_back(w.begin);
-    found.y.push_back(angle(isRefined(w) ? w.refined->gravity : w.closedForm().solutions[0].gravity));
+    found.add(w.begin, angle(w.best().gravity));
   }
   const Series truth = truthLine(recording, result, [&](const GroundTruth& g) {
     return angle(SO3d(g.state.so3()).inverse() * Eigen::Vector3d(0, 0, -1));
   });
-  if (!truth.x.empty()) panel.series.push_back(truth);
-  panel.series.push_back(found);
+  panel.add({truth, found});
   return panel;
 }
 
@@ -132,13 +114,12 @@ Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
   Series found = bars("windows, two standard deviations", estimate_colour);
   const Series truth = truthLine(recording, result, [](const GroundTruth& g) { return g.state.velocity().norm(); });
   for (const ComparedWindow& w : result.windows) {
-    if (!isRefined(w)) continue;
+    if (!w.isRefined()) continue;
     const Eigen::Vector3d V = w.refined->velocity(), u = V.normalized();
-    addBar(found, w.begin, V.norm(),
-           std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)));
+    found.addBar(w.begin, V.norm(),
+                 2 * std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)));
   }
-  if (!truth.x.empty()) panel.series.push_back(truth);
-  panel.series.push_back(found);
+  panel.add({truth, found});
   return panel;
 }
 
@@ -147,17 +128,12 @@ Panel scalePanel(const ViInitResult& result) {
               .x = {.label = "s"},
               .y = {.label = "%"},
               .references = {{.at = 0}}};
-  Series closed{.name = "closed form", .style = Style::points, .colour = second_colour};
-  Series refined{.name = "refined", .style = Style::points, .colour = estimate_colour};
+  Series closed = dots("closed form", second_colour), refined = dots("refined", estimate_colour);
   for (const ComparedWindow& w : result.windows) {
     if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {
-      closed.x.push_back(w.begin);
-      closed.y.push_back(100 * w.closed_form_error->scale);
+      closed.add(w.begin, 100 * w.closed_form_error->scale);
     }
-    if (w.refined_error) {
-      refined.x.push_back(w.begin);
-      refined.y.push_back(100 * w.refined_error->scale);
-    }
+    if (w.refined_error) refined.add(w.begin, 100 * w.refined_error->scale);
   }
   panel.series = {closed, refined};
   return panel;
@@ -165,18 +141,12 @@ Panel scalePanel(const ViInitResult& result) {
 
 Panel gravityErrorPanel(const ViInitResult& result) {
   Panel panel{.title = "gravity against the truth", .x = {.label = "s"}, .y = {.label = "deg", .low = 0}};
-  Series refined{.name = "windows", .style = Style::points, .colour = estimate_colour};
-  Series fused{.name = "fused", .style = Style::points, .colour = fused_colour};
+  Series refined = dots("windows", estimate_colour), fused = dots("fused", fused_colour);
   for (const ComparedWindow& w : result.windows) {
-    const auto& error = w.refined_error ? w.refined_error : w.closed_form_error;
-    if (!error) continue;
-    refined.x.push_back(w.begin);
-    refined.y.push_back(degrees * error->gravity);
+    if (w.error()) refined.add(w.begin, degrees * w.error()->gravity);
   }
   for (const ComparedStretch& f : result.stretches) {
-    if (!f.gravity_error) continue;
-    fused.x.push_back(f.end);
-    fused.y.push_back(degrees * *f.gravity_error);
+    if (f.gravity_error) fused.add(f.end, degrees * *f.gravity_error);
   }
   panel.series = {refined, fused};
   return panel;
@@ -191,18 +161,16 @@ Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool g
   const auto of = [&](const ImuBias<double>& b) { return (gyroscope ? b.gyroscope : b.accelerometer)[axis]; };
   const Series truth = truthLine(recording, result, [&](const GroundTruth& g) { return of(g.bias); });
   for (const ComparedWindow& w : result.windows) {
-    if (!isRefined(w)) continue;
+    if (!w.isRefined()) continue;
     const int i = (gyroscope ? InitialCovariance::gyroscope_bias : InitialCovariance::accelerometer_bias) + axis;
-    addBar(found, w.begin, of(w.refined->bias), std::sqrt(w.refined->covariance.joint(i, i)));
+    found.addBar(w.begin, of(w.refined->bias), 2 * std::sqrt(w.refined->covariance.joint(i, i)));
   }
   for (const ComparedStretch& f : result.stretches) {
     if (!f.has_state) continue;
-    addBar(fused, f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
-           gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma);
+    fused.addBar(f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
+                 2 * (gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma));
   }
-  if (!truth.x.empty()) panel.series.push_back(truth);
-  panel.series.push_back(found);
-  if (!fused.x.empty()) panel.series.push_back(fused);
+  panel.add({truth, found, fused});
   return panel;
 }
 
@@ -222,8 +190,7 @@ Panel solutionsPanel(const ComparedWindow& w) {
     Series body = line(fmt::format("solution {}", k + 1), colour);
     Series features{.style = Style::points, .colour = colour};
     const auto add = [&reach](Series& series, const Eigen::Vector3d& p) {
-      series.x.push_back(p.x());
-      series.y.push_back(p.y());
+      series.add(p.x(), p.y());
       reach = std::max({reach, std::abs(p.x()), std::abs(p.y())});
     };
     for (const BiasedImage& b : images) {

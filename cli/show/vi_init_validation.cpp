@@ -1,4 +1,4 @@
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <cli/show/validation.hpp>
 #include <cli/show/vi_init_validation.hpp>
 #include <cli/show/vi_init_validation_groups.hpp>

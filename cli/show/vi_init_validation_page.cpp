@@ -1,6 +1,6 @@
 #include <cli/show/validation.hpp>
-#include <cli/show/page.hpp>
-#include <cli/show/table.hpp>
+#include <report/page.hpp>
+#include <report/table.hpp>
 #include <cli/show/vi_init_validation.hpp>
 #include <cli/show/vi_init_validation_groups.hpp>
 

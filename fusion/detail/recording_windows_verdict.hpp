@@ -112,4 +112,19 @@ LIESTAT_FUSION_INLINE Verdict RecordingWindows::verdict(double false_alarm) cons
   return Verdict::yes("consistent with the truth: " + figures);
 }
 
+LIESTAT_FUSION_INLINE Verdict RecordingWindows::outcome() const {
+  const std::size_t ok = okWindows(), all = windows.size();
+  if (ok == 0) return Verdict::no("NOT TO BE TRUSTED: no window has an increment, as the readings have faults.");
+  std::string text = ok < all ? "INCOMPLETE: " + std::to_string(all - ok) + " of " + std::to_string(all) +
+                                    " windows have no increment, as the readings have faults."
+                     : all == 1 ? "ok: the window has an increment."
+                                : "ok: all of the " + std::to_string(all) + " windows have an increment.";
+  Verdict result = with_truth ? verdict() : Verdict::yes("");
+  if (with_truth) {
+    text = result.isNo() ? result.text + "." + (ok < all ? " " + text : "") : text + " " + result.text + ".";
+    for (const std::string& cause : result.causes) text += " " + cause + ".";
+  }
+  return {ok < all ? Verdict::Answer::no : result.answer, text, result.causes};
+}
+
 }  // namespace liestat

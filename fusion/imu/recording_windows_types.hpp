@@ -65,6 +65,9 @@ struct RecordingWindows {
   /// Windows that follow each other share the truth at their common end, so that its error counts in both, and with
   /// opposite signs. None without truth or without noise.
   Verdict verdict(double false_alarm = 1e-5) const;
+  /// Verdict on the windows together: no, if one has no increment or the covariances are not those of the errors; with
+  /// a truth as verdict(), else yes.
+  Verdict outcome() const;
   /// Every window has an increment.
   bool complete() const { return okWindows() > 0 && okWindows() == windows.size(); }
   /// There is an increment, and the verdict is not no.

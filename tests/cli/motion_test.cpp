@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 #include <experiments/motion_scene.hpp>
 

@@ -23,7 +23,7 @@
 #include <report/json.hpp>
 #include <formats/output_file.hpp>
 #include <cli/show/progress.hpp>
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 #include <support/temporary_directory.hpp>
 #include <experiments/interruption.hpp>
 

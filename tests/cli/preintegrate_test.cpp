@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <formats/calibration.hpp>
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <formats/imu.hpp>
 #include <support/temporary_directory.hpp>
 #include <cli/show/preintegration_validation.hpp>

@@ -23,7 +23,7 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 
 namespace liestat::cli {

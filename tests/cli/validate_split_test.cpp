@@ -2,7 +2,7 @@
 
 #include <cli/commands/measurement_options.hpp>
 #include <cli/commands/split.hpp>
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <cli/show/split.hpp>
 #include <support/temporary_directory.hpp>
 #include <experiments/interruption.hpp>

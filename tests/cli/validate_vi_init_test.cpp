@@ -1,6 +1,6 @@
 // `liestat validate vi-init`: what it shows and writes. What it finds: tests/experiments/.
 
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <cli/show/table1.hpp>
 #include <cli/show/vi_init_validation.hpp>
 #include <support/temporary_directory.hpp>

@@ -1,4 +1,4 @@
-#include <cli/show/axes.hpp>
+#include <report/axes.hpp>
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 constexpr double letter_width = 7, letter_gap = 9, line_height = 20;  // px, of 12 px letters
@@ -127,4 +127,4 @@ Ticks logarithmicTicks(double low, double high, const AxisOnPaper& paper) {
   });
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,4 +1,4 @@
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 
 #include <fmt/format.h>
 
@@ -12,13 +12,13 @@
 #include <numbers>
 #include <utility>
 
-#include <cli/show/run_program.hpp>
-#include <cli/show/plots.hpp>
+#include <report/run_program.hpp>
+#include <report/plots.hpp>
 #include <report/json.hpp>
 #include <formats/output_file.hpp>
 #include <formats/text.hpp>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 constexpr std::string_view style_sheet = R"css(
@@ -386,4 +386,4 @@ std::string Report::write() {
   return path("index.html");
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

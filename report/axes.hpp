@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// A mark on an axis.
 struct Tick {
@@ -37,4 +37,4 @@ Ticks linearTicks(double low, double high, const AxisOnPaper& paper, double min_
 /// and so on; on an axis shorter than a decade at the multiples of a step.
 Ticks logarithmicTicks(double low, double high, const AxisOnPaper& paper);
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -5,10 +5,16 @@
 #include <string_view>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// A number for people: so many significant digits, `n/a` for what is not finite.
 std::string number(double value, int digits = 4);
+
+/// Rows of cells below headers, for the terminal (Table) and for a page (Report::table).
+struct TableRows {
+  std::vector<std::string> headers;
+  std::vector<std::vector<std::string>> rows = {};
+};
 
 /// A table for the terminal, at most 80 columns wide. Columns of numbers are aligned at the decimal point, others to
 /// the left. What does not fit is set as a second table below with the first column repeated; long texts are shortened,
@@ -16,6 +22,9 @@ std::string number(double value, int digits = 4);
 class Table {
  public:
   explicit Table(std::vector<std::string> headers);
+  explicit Table(const TableRows& table) : Table(table.headers) {
+    for (const auto& cells : table.rows) row(cells);
+  }
 
   /// Adds a row; missing cells are empty, more than there are headers are misuse.
   void row(std::vector<std::string> cells);
@@ -35,4 +44,4 @@ std::string wrapped(std::string_view text, std::size_t width = 80, std::size_t i
 /// Columns that a text takes on the terminal, for UTF-8 without wide or combining characters.
 std::size_t displayWidth(std::string_view text);
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,4 +1,4 @@
-#include <cli/show/table.hpp>
+#include <report/table.hpp>
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 
 #include <formats/text.hpp>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 constexpr std::size_t gap = 2;
@@ -167,4 +167,4 @@ std::string wrapped(std::string_view text, std::size_t width, std::size_t indent
   }
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,4 +1,4 @@
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -12,7 +12,7 @@
 
 extern char** environ;
 
-namespace liestat::cli {
+namespace liestat {
 
 ProgramResult runProgram(const std::vector<std::string>& arguments, const std::string& directory) {
   ProgramResult result;
@@ -55,4 +55,4 @@ ProgramResult runProgram(const std::vector<std::string>& arguments, const std::s
   return result;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,5 +1,5 @@
-#include <cli/show/axes.hpp>
-#include <cli/show/plots.hpp>
+#include <report/axes.hpp>
+#include <report/plots.hpp>
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include <optional>
 #include <string_view>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 // Distinct in hue and in lightness, also to eyes that miss red or green.
@@ -450,4 +450,4 @@ std::string plotScript(const Plot& plot, const std::string& name) {
   return script;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,4 +1,4 @@
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,12 +13,12 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/run_program.hpp>
-#include <cli/show/axes.hpp>
-#include <cli/show/plots.hpp>
+#include <report/run_program.hpp>
+#include <report/axes.hpp>
+#include <report/plots.hpp>
 #include <support/temporary_directory.hpp>
 
-namespace liestat::cli {
+namespace liestat {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -393,4 +393,4 @@ TEST(RunProgram, SaysWhatHappened) {
 }
 
 }  // namespace
-}  // namespace liestat::cli
+}  // namespace liestat

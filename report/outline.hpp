@@ -1,7 +1,7 @@
 // Long series as a page can show them.
 #pragma once
 
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// A series of lines, points or a filled curve over ascending x as its smallest and largest values in so many spans: on a
 /// screen it looks the same. One that is not longer than four times that stays as it is.
@@ -39,4 +39,4 @@ inline Series outlineOf(const Series& series, std::size_t spans = 1000) {
   return outline;
 }
 
-}  // namespace liestat::cli
+}  // namespace liestat

@@ -1,15 +1,18 @@
 #pragma once
 
+#include <report/table.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// The style in which a series is drawn.
 enum class Style {
@@ -37,7 +40,22 @@ struct Series {
   std::vector<double> value = {};          ///< values of images and contours
   std::optional<std::size_t> colour = {};  ///< the number of the palette's colour; series of one colour belong together
   bool dashed = false;
+
+  /// Adds a point; NaN is a gap in a line.
+  void add(double at, double ordinate) { x.push_back(at), y.push_back(ordinate); }
+  /// Adds a point with a bar from middle - reach to middle + reach.
+  void addBar(double at, double middle, double reach) { add(at, middle), addBand(at, middle - reach, middle + reach); }
+  /// Adds a place of an area; behind a point, its bar.
+  void addBand(double at, double from, double to) {
+    if (x.size() == low.size()) x.push_back(at);
+    low.push_back(from), high.push_back(to);
+  }
 };
+
+/// An empty series.
+inline Series seriesOf(std::string name, Style style, std::size_t colour, bool dashed = false) {
+  return {.name = std::move(name), .style = style, .colour = colour, .dashed = dashed};
+}
 
 /// One axis of a panel.
 struct Axis {
@@ -64,6 +82,13 @@ struct Panel {
   std::vector<Series> series = {};
   std::vector<ReferenceLine> references = {};
   bool equal_aspect = false;  ///< a unit is as long on both axes
+
+  /// Adds the series that have points.
+  void add(std::initializer_list<Series> list) {
+    for (const Series& one : list) {
+      if (!one.x.empty()) series.push_back(one);
+    }
+  }
 };
 
 /// A figure of one panel or several.
@@ -113,6 +138,7 @@ class Report {
   /// Columns whose cells are all numbers are set to the right.
   void table(const std::vector<std::string>& headers, const std::vector<std::vector<std::string>>& rows,
              std::string_view caption = {});
+  void table(const TableRows& table, std::string_view caption = {}) { this->table(table.headers, table.rows, caption); }
   /// Draws at once and writes the plot's files. Of very many points only a part is drawn, and the caption says so.
   void plot(const Plot& plot);
 
@@ -137,4 +163,4 @@ class Report {
   bool has_gnuplot_ = true;
 };
 
-}  // namespace liestat::cli
+}  // namespace liestat

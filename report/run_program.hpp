@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// The end of a program.
 struct ProgramResult {
@@ -16,4 +16,4 @@ struct ProgramResult {
 /// input.
 ProgramResult runProgram(const std::vector<std::string>& arguments, const std::string& directory);
 
-}  // namespace liestat::cli
+}  // namespace liestat

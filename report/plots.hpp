@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include <cli/show/page.hpp>
+#include <report/page.hpp>
 
-namespace liestat::cli {
+namespace liestat {
 
 /// The data of a plot as CSV: panel,series,x,y,low,high,width, and value in one with images or contours. Series are separated by two blank lines, by which
 /// gnuplot counts.
@@ -18,4 +18,4 @@ inline constexpr std::size_t most_points_drawn = 5000;
 /// texts of the plot hold, gnuplot takes it as text.
 std::string plotScript(const Plot& plot, const std::string& name);
 
-}  // namespace liestat::cli
+}  // namespace liestat
