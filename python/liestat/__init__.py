@@ -26,7 +26,20 @@ from ._conversions import (
     read_trajectory,
     write_trajectory,
 )
-from ._files import read_features, read_imu, read_tracks
+from ._files import (
+    read_calibration,
+    read_camera_poses,
+    read_features,
+    read_ground_truth,
+    read_imu,
+    read_imu_noise,
+    read_landmarks,
+    read_matches,
+    read_pose_pairs,
+    read_stereo_camera,
+    read_stereo_tracks,
+    read_tracks,
+)
 from ._gaussians import (
     CONVENTIONS,
     CounterRng,

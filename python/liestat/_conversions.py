@@ -53,7 +53,7 @@ def read_trajectory(
     ignore_unknown=False,
     norm_tolerance=1e-3,
 ):
-    """Poses, times and covariances from a file of any format that the program reads (docs/program.md).
+    """Poses, times and covariances from a file of any format that the program reads (docs/formats.md).
 
     Parameters
     ----------

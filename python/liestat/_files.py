@@ -5,8 +5,9 @@ import os
 import numpy as np
 
 from . import _core
-from ._manifolds import R3, S2, SE3, SO3, Frame3, NonOrientedFrame3, SemiOrientedFrame3
-from ._sensors import Result
+from ._manifolds import R3, S2, SE3, SE23, SO3, Frame3, NonOrientedFrame3, SemiOrientedFrame3
+from ._results import Result
+from ._sensors import Camera
 
 _KINDS = {
     "point": R3,
@@ -20,8 +21,8 @@ _POSES: tuple = (Frame3, SE3, SemiOrientedFrame3, NonOrientedFrame3)
 def _reader(name):
     if not hasattr(_core, name):
         raise NotImplementedError(
-            f"{name}: the module was built without the libraries that readers of files need: {{fmt}} and zlib, and for "
-            "trajectories nlohmann/json and yaml-cpp"
+            f"{name}: the module was built without the libraries that readers of files need: {{fmt}}, zlib, nlohmann/json "
+            "and yaml-cpp"
         )
     return getattr(_core, name)
 
@@ -29,7 +30,7 @@ def _reader(name):
 def read_features(
     path, kind=None, *, format="auto", norm_tolerance=1e-3, angles=None, ignore_unknown=False, columns=None
 ):
-    """Features from a file of the program: CSV, TUM, EuRoC or KITTI (docs/program.md).
+    """Features from a file of the program: CSV, TUM, EuRoC or KITTI (docs/formats.md).
 
     Parameters
     ----------
@@ -117,3 +118,126 @@ def read_tracks(path, image_times="", *, start_ns=0):
         from 0), `pixels`; `frames` and `track_ids` are the numbers in the file.
     """
     return Result("tracks", **_reader("read_tracks")(os.fspath(path), os.fspath(image_times), int(start_ns)))
+
+
+def read_calibration(*paths):
+    """Cameras and noise of an inertial sensor, from one YAML file or several that belong together.
+
+    Chains of Kalibr, OpenVINS and TUM-VI (cam0 ..., imu0), and EuRoC's sensor.yaml (docs/formats.md).
+
+    Returns
+    -------
+    Result
+        `cameras`, a list of Results with `name`, `camera` (Camera), `imu_T_camera` (SE3) and `timeshift`
+        (s: t_imu = t_camera + timeshift); `imu_noise`, as `read_imu_noise` returns it, or None.
+    """
+    d = _reader("read_calibration")([os.fspath(path) for path in paths])
+    cameras = []
+    for c in d["cameras"]:
+        fu, fv, cu, cv, distortion, coefficients, width, height = c["camera"]
+        camera = Camera(fu, fv, cu, cv, Camera._names[distortion], coefficients, width, height)
+        pose = SE3._of(c["imu_T_camera"])
+        cameras.append(Result("camera", name=c["name"], camera=camera, imu_T_camera=pose, timeshift=c["timeshift"]))
+    return Result("calibration", cameras=cameras, imu_noise=d["imu_noise"])
+
+
+def read_imu_noise(path):
+    """Noise densities of an inertial sensor from a YAML file (EuRoC's sensor.yaml, or imu0 of a chain).
+
+    Returns
+    -------
+    ndarray, shape (4,)
+        Gyroscope (rad/s/√Hz), accelerometer (m/s²/√Hz), and the random walks of their biases (rad/s²/√Hz, m/s³/√Hz):
+        the argument `noise` of `preintegrate` and `vi_init`.
+    """
+    return _reader("read_imu_noise")(os.fspath(path))
+
+
+def read_ground_truth(path, *, start_ns=0):
+    """True states of a body from EuRoC's state_groundtruth_estimate.
+
+    Parameters
+    ----------
+    path : str or path
+    start_ns : int
+        Subtracted from the time stamps: `start_ns` of `read_imu`.
+
+    Returns
+    -------
+    Result
+        `times` (s), `states` (SE23) and `biases`, shape (n, 6), gyroscope before accelerometer; zeros where the file has
+        none. `(r.times, r.states, r.biases)` is the argument `truth` of `preintegrate` and `vi_init`.
+    """
+    d = _reader("read_ground_truth")(os.fspath(path), int(start_ns))
+    return Result("true states", times=d["times"], states=SE23._of(d["states"]), biases=d["biases"])
+
+
+def read_stereo_tracks(path):
+    """Tracks of a rectified stereo camera: CSV with frame, track, uL, vL, uR, vR.
+
+    Returns
+    -------
+    Result
+        `frames` and `tracks`, shape (n,), and `pixels`, shape (n, 4): uL, vL, uR, vR.
+    """
+    return Result("stereo tracks", **_reader("read_stereo_tracks")(os.fspath(path)))
+
+
+def read_camera_poses(path):
+    """Poses of a camera: CSV with frame, t_s, R00 ... R22 (world to camera), cx, cy, cz (its centre, m).
+
+    Returns
+    -------
+    Result
+        `frames`, `times` (s) and `world_T_camera` (SE3), each of shape (n,).
+    """
+    d = _reader("read_camera_poses")(os.fspath(path))
+    return Result("camera poses", frames=d["frames"], times=d["times"], world_T_camera=SE3._of(d["world_T_camera"]))
+
+
+def read_stereo_camera(path):
+    """A rectified stereo pair: rows name,value with fu, fv, cu, cv, b and, where known, y_var0 ... y_var3.
+
+    Returns
+    -------
+    Result
+        `fu`, `fv`, `cu`, `cv` (px), `baseline` (m) and `pixel_variance` of uL, vL, uR, vR (px²), or None.
+    """
+    return Result("stereo camera", **_reader("read_stereo_camera")(os.fspath(path)))
+
+
+def read_landmarks(path):
+    """Points of R3 from CSV with x, y, z (m): row i is the landmark of track i."""
+    return R3._of(_reader("read_landmarks")(os.fspath(path)))
+
+
+def read_matches(path):
+    """Matches of two images from CSV with x1, y1, x2, y2 (px), shape (n, 4): the argument `matches` of `two_view`."""
+    return _reader("read_matches")(os.fspath(path))
+
+
+def read_pose_pairs(path_a, path_b, *, by_row=False, tolerance=0.01, norm_tolerance=1e-3):
+    """Poses of two files that belong together, for `hand_eye`.
+
+    Parameters
+    ----------
+    path_a, path_b : str or path
+    by_row : bool
+        Row i belongs to row i even if both files have times; otherwise the rows whose times are nearest to each other
+        in both directions.
+    tolerance : float
+        s, between times that belong together.
+    norm_tolerance : float
+        As in `read_features`.
+
+    Returns
+    -------
+    Result
+        `a` and `b` (SE3, shape (n,)), `rows` of the files, shape (n, 2), from 0; `times` (s, of the first file; None
+        if rows were paired by their order), `largest_gap` (s), `unmatched_a`, `unmatched_b`.
+    """
+    d = _reader("read_pose_pairs")(
+        os.fspath(path_a), os.fspath(path_b), bool(by_row), float(tolerance), float(norm_tolerance)
+    )
+    a, b, rows = SE3._of(d.pop("a")), SE3._of(d.pop("b")), d.pop("rows").astype(int)
+    return Result("pairs of poses", a=a, b=b, rows=rows, **d)

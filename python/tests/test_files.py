@@ -54,6 +54,72 @@ class Files(unittest.TestCase):
         np.testing.assert_array_equal(tracks.pixels, [[1, 2], [3, 4], [5, 6]])
         np.testing.assert_array_equal(tracks.track_ids, [7, 9])
 
+    def test_calibration(self):
+        self.path.write_text(
+            "cam0:\n  camera_model: pinhole\n  intrinsics: [460, 458, 367, 248]\n  distortion_model: radtan\n"
+            "  distortion_coeffs: [-0.28, 0.07, 0.0002, 1.7e-05]\n  resolution: [752, 480]\n  timeshift_cam_imu: 0.01\n"
+            "  T_cam_imu:\n  - [0, -1, 0, 0.1]\n  - [1, 0, 0, 0.2]\n  - [0, 0, 1, 0.3]\n  - [0, 0, 0, 1]\n"
+            "imu0:\n  gyroscope_noise_density: 1.0e-4\n  accelerometer_noise_density: 2.0e-3\n"
+            "  gyroscope_random_walk: 3.0e-5\n  accelerometer_random_walk: 4.0e-3\n"
+        )
+        calibration = liestat.read_calibration(self.path)
+        (cam0,) = calibration.cameras
+        self.assertEqual((cam0.name, cam0.timeshift, cam0.camera.distortion), ("cam0", 0.01, "radtan"))
+        self.assertEqual((cam0.camera.fu, cam0.camera.cv, cam0.camera.width), (460, 248, 752))
+        # The inverse of T_cam_imu: Rᵀ and -Rᵀ t.
+        np.testing.assert_allclose(cam0.imu_T_camera.translation, [-0.2, 0.1, -0.3], atol=1e-15)
+        np.testing.assert_array_equal(calibration.imu_noise, [1e-4, 2e-3, 3e-5, 4e-3])
+        np.testing.assert_array_equal(liestat.read_imu_noise(self.path), calibration.imu_noise)
+        with self.assertRaisesRegex(ValueError, r"file\.csv"):
+            liestat.read_calibration(self.write("x", [[1]]))
+
+    def test_ground_truth(self):
+        x = support.features("SE23", 3)
+        q = x.params[:, :4]
+        rows = np.column_stack([x.params[:, 4:7], q[:, 3], q[:, :3], x.params[:, 7:], np.arange(18.0).reshape(3, 6)])
+        lines = [f"{10**18 + k * 10**8}," + ",".join(f"{v:.17g}" for v in row) for k, row in enumerate(rows)]
+        self.path.write_text("#timestamp\n" + "\n".join(lines) + "\n")
+        truth = liestat.read_ground_truth(self.path, start_ns=10**18)
+        np.testing.assert_allclose(truth.times, [0, 0.1, 0.2], atol=1e-12)
+        np.testing.assert_allclose(truth.states.params, x.params, atol=1e-12)
+        np.testing.assert_array_equal(truth.biases, rows[:, 10:])
+
+    def test_stereo_recording(self):
+        rows = [[0, 7, 1, 2, 3, 4], [2, 9, 5, 6, 7, 8]]
+        tracks = liestat.read_stereo_tracks(self.write("frame,track,uL,vL,uR,vR", rows))
+        self.assertEqual((tracks.frames.tolist(), tracks.tracks.tolist()), ([0, 2], [7, 9]))
+        np.testing.assert_array_equal(tracks.pixels, np.array(rows)[:, 2:])
+        x = support.features("SO3", 2)
+        header = "frame,t_s," + ",".join(f"R{i}{j}" for i in range(3) for j in range(3)) + ",cx,cy,cz"
+        rows = np.column_stack([[3, 5], [0.5, 0.75], x.as_matrix().reshape(2, 9), [[1, 2, 3], [4, 5, 6]]])
+        poses = liestat.read_camera_poses(self.write(header, rows))
+        self.assertEqual((poses.frames.tolist(), poses.times.tolist()), ([3, 5], [0.5, 0.75]))
+        # The file has world to camera, and the centre of the camera.
+        np.testing.assert_allclose(poses.world_T_camera.translation, rows[:, 11:])
+        turn = SO3(poses.world_T_camera.params[:, :4]) * x
+        np.testing.assert_allclose(turn.log(), 0, atol=1e-12)
+        self.path.write_text("name,value\nfu,700\nfv,701\ncu,320\ncv,240\nb,0.12\n")
+        camera = liestat.read_stereo_camera(self.path)
+        self.assertEqual((camera.fu, camera.cv, camera.baseline, camera.pixel_variance), (700, 240, 0.12, None))
+        points = liestat.read_landmarks(self.write("x,y,z", [[1, 2, 3], [4, 5, 6]]))
+        np.testing.assert_array_equal(points.params, [[1, 2, 3], [4, 5, 6]])
+        matches = liestat.read_matches(self.write("x1,y1,x2,y2,note", [[1, 2, 3, 4, 0]]))
+        np.testing.assert_array_equal(matches, [[1, 2, 3, 4]])
+
+    def test_pairs_of_poses(self):
+        a, b = support.features("SE3", 4), support.features("SE3", 4)
+        header = "t,qx,qy,qz,qw,tx,ty,tz"
+        first = self.write(header, np.column_stack([[0, 1, 2, 3], a.params])).rename(self.path.with_name("a.csv"))
+        second = self.write(header, np.column_stack([[1.001, 2.002, 3, 9], b.params]))
+        pairs = liestat.read_pose_pairs(first, second)
+        self.assertEqual((pairs.rows.tolist(), pairs.unmatched_a, pairs.unmatched_b), ([[1, 0], [2, 1], [3, 2]], 1, 1))
+        np.testing.assert_array_equal(pairs.times, [1, 2, 3])
+        np.testing.assert_allclose(pairs.a.params, a.params[1:], atol=1e-15)
+        np.testing.assert_allclose(pairs.b.params, b.params[:3], atol=1e-15)
+        self.assertAlmostEqual(pairs.largest_gap, 0.002)
+        pairs = liestat.read_pose_pairs(first, second, by_row=True)
+        self.assertEqual((len(pairs.a), pairs.times), (4, None))
+
     def test_messages(self):
         path = self.write("qx,qy,qz,qw", [[0, 0, 0, 1], [0, 0, 0, 2]])
         with self.assertRaisesRegex(ValueError, r"file\.csv:3: "):
