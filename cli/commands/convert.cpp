@@ -39,6 +39,12 @@ struct ConvertOutput {
   TrajectoryConversion conversion;
   std::vector<std::string> files;
 };
+template <class V>
+void describe(V& v, const ConvertOutput& output) {
+  v("from", output.from_format)("to", output.to_format)("poses", output.poses);
+  describe(v, output.conversion);
+  v("files", output.files);
+}
 
 /// Sentences of the library put the names of its options between backquotes; here they are options of the command line.
 std::string withFlags(std::string text) {
@@ -77,11 +83,6 @@ std::string formatConvert(const ConvertOutput& output) {
   for (const std::string& note : c.notes) text += "note: " + note + "\n";
   for (const std::string& file : output.files) text += "written: " + file + "\n";
   return text;
-}
-
-void setConvert(JsonObject& object, const ConvertOutput& output) {
-  object.set("from", output.from_format).set("to", output.to_format).set("poses", output.poses);
-  object.fieldsOf(output.conversion).set("files", output.files);
 }
 
 std::optional<Convention> conventionGiven(const std::string& text, const char* option) {
@@ -206,9 +207,7 @@ int runConvert(const ConvertOptions& given, const Invocation& invocation) {
     printLines(summary);
   }
   if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, options.seed);
-    setConvert(object, output);
-    writeJson(options.json, object);
+    writeJson(options.json, jsonEnvelope(invocation.command_line, options.seed).fieldsOf(output));
   }
   return output.conversion.verdict().isNo() ? exit_not_trusted : exit_fine;
 }

@@ -68,9 +68,7 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.json != "-" && options.output != "-") printLines(formatMotion(result));
   if (!options.output.empty()) writeOutput(options.output, motionCsv(result));
   if (!options.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line);
-    object.set("file", options.input.tracks).fieldsOf(result);
-    writeJson(options.json, object);
+    writeJson(options.json, jsonEnvelope(invocation.command_line)("file", options.input.tracks).fieldsOf(result));
   }
   if (!options.report.empty()) {
     if (!window.has_looked_at()) {

@@ -209,30 +209,16 @@ std::string rest(const HandEyeOutput& output) {
 
 // --- JSON -----------------------------------------------------------------------------------------------------------
 
-JsonObject toJson(const HandEyeFile& file) {
-  JsonObject o;
-  o.set("file", file.path).set("rows", file.rows).set("unmatched", file.unmatched).set("inverted", file.inverted);
-  o.set("noise", file.noise == PoseNoise::columns ? "columns" : file.noise == PoseNoise::option ? "option" : "assumed");
-  if (file.noise == PoseNoise::columns) return o.set("sigma", nullptr);
-  return o("sigma", PoseSigmas{file.sigma});
-}
-JsonObject toJson(const PoseRows& rows, const PairFit& fit) {
-  JsonObject o;
-  o.set("row_a", rows.a + 1).set("row_b", rows.b + 1).set("line_a", rows.line_a).set("line_b", rows.line_b);
-  return o.set("time", rows.time).fieldsOf(fit);
-}
 const char* nameOf(CovarianceReading reading) {
   constexpr const char* names[] = {"right", "left", "rotation_first", "world_axes"};
   return names[static_cast<std::size_t>(reading)];
 }
-JsonObject toJson(const HandEyeHint& hint, const HandEyeOutput& output) {
-  std::string text = hintInWords(output);
-  text.erase(0, text.find(": ") + 2), text.pop_back();
+JsonObject toJson(const HandEyeFile& file) {
   JsonObject o;
-  o.set("text", text);
-  o.set("covariance_a", nameOf(hint.reading.a.covariance)).set("covariance_b", nameOf(hint.reading.b.covariance));
-  o.set("one_file_inverted", hint.reading.b.inverted != output.b.inverted);
-  return o.set("chi2_per_degree", hint.chi2_per_degree).set("p", hint.p).set("agrees", hint.agrees);
+  o("file", file.path)("rows", file.rows)("unmatched", file.unmatched)("inverted", file.inverted);
+  const bool columns = file.noise == PoseNoise::columns;
+  o("noise", columns ? "columns" : file.noise == PoseNoise::option ? "option" : "assumed");
+  return o("sigma", columns ? std::nullopt : std::optional(LocalPoseSigmas{{file.sigma}}));
 }
 
 // --- Page -----------------------------------------------------------------------------------------------------------
@@ -334,17 +320,25 @@ std::string formatHandEye(const HandEyeOutput& output) {
 
 void setHandEye(JsonObject& object, const HandEyeOutput& output) {
   object.fieldsOf(output.result);
+  const auto by_time = [&](double value) { return output.by_time ? std::optional(value) : std::nullopt; };
   std::vector<JsonObject> hints, pairs;
-  if (output.hint) hints.push_back(toJson(*output.hint, output));
-  object.set("hints", hints).set("notes", output.notes);
-  object.set("A", toJson(output.a)).set("B", toJson(output.b));
-  object.set("association", output.by_time ? "time" : "row");
-  object.set("tolerance", output.by_time ? std::optional(output.tolerance) : std::nullopt);
-  object.set("largest_gap", output.by_time ? std::optional(output.largest_gap) : std::nullopt);
-  for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
-    pairs.push_back(toJson(output.rows[i], output.result.pairs[i]));
+  if (const auto& hint = output.hint) {
+    const std::string text = hintInWords(output);
+    const std::size_t begin = text.find(": ") + 2;
+    JsonObject& o = hints.emplace_back()("text", text.substr(begin, text.size() - 1 - begin));
+    o("covariance_a", nameOf(hint->reading.a.covariance))("covariance_b", nameOf(hint->reading.b.covariance));
+    o("one_file_inverted", hint->reading.b.inverted != output.b.inverted);
+    o("chi2_per_degree", hint->chi2_per_degree)("p", hint->p)("agrees", hint->agrees);
   }
-  object.set("pairs", pairs);
+  object("hints", hints)("notes", output.notes)("A", toJson(output.a))("B", toJson(output.b));
+  object("association", output.by_time ? "time" : "row")("tolerance", by_time(output.tolerance));
+  object("largest_gap", by_time(output.largest_gap));
+  for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
+    const PoseRows& rows = output.rows[i];
+    JsonObject& o = pairs.emplace_back()("row_a", rows.a + 1)("row_b", rows.b + 1);
+    o("line_a", rows.line_a)("line_b", rows.line_b)("time", rows.time).fieldsOf(output.result.pairs[i]);
+  }
+  object("pairs", pairs);
 }
 
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {

@@ -159,6 +159,12 @@ TEST(RecordingWindows, WhatIsNotTestedHasNoVerdict) {
   EXPECT_NEAR(some.windows[1].time_before_fault.value_or(0), 1.495, 1e-12);
   EXPECT_NEAR(some.windows[1].fault_time.value_or(0), 1.65, 1e-12);
   EXPECT_EQ(some.verdict(), Answer::yes);
+  // The outcome is that of all windows.
+  EXPECT_EQ(some.outcome(), Answer::no);
+  EXPECT_EQ(some.outcome().text.rfind("INCOMPLETE: 1 of 4 windows", 0), 0U) << some.outcome().text;
+  EXPECT_EQ(recording.windows().outcome(), Answer::yes);
+  EXPECT_EQ(without_truth.windows().outcome(), Answer::yes);
+  EXPECT_EQ(broken.windows().outcome().text.rfind("NOT TO BE TRUSTED", 0), 0U);
 }
 
 TEST(RecordingWindows, AreWholeOnes) {
