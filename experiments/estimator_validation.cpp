@@ -1,14 +1,10 @@
 #include <experiments/estimator_validation.hpp>
 
 #include <experiments/conic_scene.hpp>
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
-#include <experiments/part_of_run.hpp>
 #include <experiments/rotated_pairs.hpp>
 #include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/models.hpp>
-#include <stats/validation.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -225,7 +221,7 @@ Outcomes trial(const Plan& plan, const EstimatorValidation& validation, std::uin
       return correctedPointTrial(plan.sigma, validation.noise_factor, number, rng);
     case Experiment::homography:
     case Experiment::fundamental:
-      return twoViewTrial(plan.experiment, validation.noise_factor, validation.seed * 1000003 + number);
+      return twoViewTrial(plan.experiment, validation.noise_factor, validation.run.seed * 1000003 + number);
     default:
       return rotationTrial(plan.experiment, validation.noise_factor, rng);
   }
@@ -242,62 +238,35 @@ double covarianceDeviation(const ValidationReportOf<Outcome>& report) {
 }  // namespace
 
 std::string name(EstimatorExperiment experiment) {
-  switch (experiment) {
-    case Experiment::conic:
-      return "conic";
-    case Experiment::corrected_points:
-      return "corrected_points";
-    case Experiment::rotation_numbers:
-      return "rotation_numbers";
-    case Experiment::rotation:
-      return "rotation";
-    case Experiment::prior_numbers:
-      return "prior_numbers";
-    case Experiment::prior:
-      return "prior";
-    case Experiment::homography:
-      return "homography";
-    case Experiment::fundamental:
-      return "fundamental";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"conic", "corrected_points", "rotation_numbers", "rotation", "prior_numbers",
+                                   "prior", "homography",       "fundamental"};
+  return names[static_cast<std::size_t>(experiment)];
 }
 
 std::string name(EstimatorQuantity quantity) {
-  switch (quantity) {
-    case Quantity::criterion:
-      return "criterion";
-    case Quantity::parameter:
-      return "parameter";
-    case Quantity::correction:
-      return "correction";
-    case Quantity::corrected_point:
-      return "corrected_point";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"criterion", "parameter", "correction", "corrected_point"};
+  return names[static_cast<std::size_t>(quantity)];
 }
 
-std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validation,
-                                            const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validation, const RunProgress& progress) {
   std::vector<Plan> plans;
+  std::vector<CellSize> cells;
+  double judged = 0;
   for (const Experiment experiment : validation.experiments) {
-    for (const Plan& plan : plansOf(experiment)) plans.push_back(plan);
+    for (const Plan& plan : plansOf(experiment)) {
+      plans.push_back(plan);
+      cells.push_back({validation.run.trials, plan.cost});
+      for (const RowPlan& row : plan.rows) judged += row.promise ? 1 : 0;
+    }
   }
-  double all = 0, before = 0, judged = 0;
-  for (const Plan& plan : plans) {
-    all += plan.cost;
-    for (const RowPlan& row : plan.rows) judged += row.promise ? 1 : 0;
-  }
-  trials_of_run.planned += plans.size() * validation.trials;
+  CellRun run(validation.run, cells, progress);
   std::vector<EstimatorRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options = trialsOf(validation, 16, {before, plan.cost, all}, progress);
     std::vector<ReferenceLaw> laws;
     for (const RowPlan& row : plan.rows) laws.push_back(ReferenceLaw::chiSquared(row.dof));
-    auto reports =
-        validateAll(ProgramExecutor{validation.threads}, options, laws,
-                    [&](CounterRng& rng, std::uint64_t number) { return trial(plan, validation, number, rng); });
-    if (!countTrials(reports[0].trials)) break;
+    auto reports = run.reports(
+        16, laws, [&](CounterRng& rng, std::uint64_t number) { return trial(plan, validation, number, rng); });
+    if (run.ended()) break;
     for (std::size_t i = 0; i < plan.rows.size(); ++i) {
       EstimatorRow& row = rows.emplace_back();
       row.experiment = plan.experiment;
@@ -306,14 +275,18 @@ std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validatio
       row.has_iterations = plan.experiment != Experiment::homography && plan.experiment != Experiment::fundamental;
       row.note_index = plan.rows[i].note_index, row.note_coverage = plan.rows[i].note_coverage;
       if (row.quantity == Quantity::corrected_point) row.covariance_deviation = covarianceDeviation(reports[i]);
-      row.promise = plan.rows[i].promise;
-      row.setReport(std::move(reports[i]));
-      row.judge(run_false_alarm / judged);
-      row.forgetDistances();
+      row.conclude(std::move(reports[i]), plan.rows[i].promise, run_false_alarm / judged);
     }
-    before += plan.cost;
   }
   return rows;
+}
+
+Judgement judgementOf(const std::vector<EstimatorRow>& rows) {
+  Judgement judgement{.promises = {}, .where = "where first order holds"};
+  for (const EstimatorRow& row : rows) {
+    judgement.promises.push_back(promiseAbout(row, name(row.experiment) + " " + name(row.quantity)));
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

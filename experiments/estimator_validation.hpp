@@ -1,12 +1,11 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <stats/validation_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -43,9 +42,7 @@ std::string name(EstimatorQuantity quantity);
 
 struct EstimatorValidation {
   std::vector<EstimatorExperiment> experiments{all_estimator_experiments.begin(), all_estimator_experiments.end()};
-  std::size_t trials = 2000;  ///< a row
-  std::uint64_t seed = 1;
-  int threads = 0;
+  RunSize run{.trials = 2000};  ///< trials of a row
   /// Standard deviation of the noise that is drawn over that which the estimator is told.
   double noise_factor = 1;
 };
@@ -62,9 +59,23 @@ struct EstimatorRow : JudgedReport {
   double covariance_deviation = std::numeric_limits<double>::quiet_NaN();
 };
 
+template <class V>
+void describe(V& v, const EstimatorRow& row) {
+  v("experiment", name(row.experiment))("quantity", name(row.quantity))("sigma", row.sigma, "that is told");
+  v("in_domain", row.promise.has_value());
+  describeReport(v, row.report);
+  v("tail", row.tail)("failures", row.report.failures);
+  const auto iterations = [&](auto value) { return row.has_iterations ? std::optional(value) : std::nullopt; };
+  v("iterations", iterations(row.report.mean_iterations));
+  v("max_iterations", iterations(static_cast<double>(row.report.max_iterations)));
+  v("note_index", row.note_index, "of an independent prototype")("note_coverage95", row.note_coverage);
+  v("covariance_deviation", row.covariance_deviation)("passed", row.passed);
+}
+
 /// Runs everything; rows in the order of the experiments.
-std::vector<EstimatorRow> validateEstimator(
-    const EstimatorValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<EstimatorRow> validateEstimator(const EstimatorValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows.
+Judgement judgementOf(const std::vector<EstimatorRow>& rows);
 
 }  // namespace liestat::experiments

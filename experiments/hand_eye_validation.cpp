@@ -1,11 +1,9 @@
 #include <experiments/hand_eye_validation.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
-#include <experiments/part_of_run.hpp>
 #include <fusion/hand_eye.hpp>
 #include <stats/propagation.hpp>
-#include <stats/validation.hpp>
+
+#include <fmt/format.h>
 
 #include <cmath>
 #include <iterator>
@@ -212,40 +210,50 @@ std::string name(HandEyeFormulation formulation) {
   return names[static_cast<std::size_t>(formulation)];
 }
 
-Tally countedTally(const std::vector<HandEyeRow>& rows) {
-  Tally count;
-  for (const HandEyeRow& row : rows) {
-    count.judged += row.right_passed.has_value();
-    count.failed += !row.right_passed.value_or(true);
-  }
-  return count;
+std::string noiseName(const HandEyeRow& row) {
+  return row.scale == 1 ? name(row.noise) : fmt::format("{} x{:g}", name(row.noise), row.scale);
 }
 
-std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation,
-                                        const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+std::string label(const HandEyeRow& row) {
+  std::string text = fmt::format("{} {} n = {}", name(row.formulation), noiseName(row), row.pairs);
+  if (row.motion != HandEyeMotion::general) text += " " + name(row.motion);
+  if (row.outliers) text += " " + name(*row.outliers);
+  return row.fit ? text + ", fit" : text;
+}
+
+Judgement judgementOf(const std::vector<HandEyeRow>& rows) {
+  Judgement judgement{.promises = {}, .where = "where they are promised"};
+  for (const HandEyeRow& row : rows) {
+    const std::string text = name(row.experiment) + " " + label(row);
+    judgement.promises.push_back({text, row.right_passed, fmt::format("{} of {} trials right", row.right, row.trials),
+                                  static_cast<double>(row.right), static_cast<double>(row.trials)});
+    judgement.promises.push_back(promiseAbout(row, text));
+  }
+  return judgement;
+}
+
+std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation, const RunProgress& progress) {
   std::vector<Plan> plans;
+  std::vector<CellSize> cells;
+  double judged = 0;
   for (const Experiment experiment : validation.experiments) {
-    for (Plan& plan : plansOf(experiment, validation)) plans.push_back(std::move(plan));
+    for (Plan& plan : plansOf(experiment, validation)) {
+      cells.push_back({validation.run.trials, plan.cost()});
+      judged += (plan.calibration ? 1 : 0) + (plan.fit ? 1 : 0);
+      plans.push_back(std::move(plan));
+    }
   }
-  double all = 0, before = 0, judged = 0;
-  for (const Plan& plan : plans) {
-    all += plan.cost();
-    judged += (plan.calibration ? 1 : 0) + (plan.fit ? 1 : 0);
-  }
-  trials_of_run.planned += plans.size() * validation.trials;
+  CellRun run(validation.run, cells, progress);
   std::vector<HandEyeRow> rows;
   for (const Plan& plan : plans) {
-    const ValidationOptions options = trialsOf(validation, 4, {before, plan.cost(), all}, progress);
     const bool independent = plan.row.formulation == Formulation::motions;
     const int n = static_cast<int>(plan.row.pairs), open = openDimension(plan.row.motion);
-    auto reports = validateAll(
-        ProgramExecutor{validation.threads}, options,
-        {ReferenceLaw::chiSquared(6 - open), ReferenceLaw::chiSquared(6 * n - (independent ? 6 : 12) + open)},
+    auto reports = run.reports(
+        4, {ReferenceLaw::chiSquared(6 - open), ReferenceLaw::chiSquared(6 * n - (independent ? 6 : 12) + open)},
         [&](CounterRng&, std::uint64_t number) {
-          return runTrial(plan, validation.noise_factor, validation.seed, number);
+          return runTrial(plan, validation.noise_factor, validation.run.seed, number);
         });
-    before += plan.cost();
-    if (!countTrials(reports[0].trials)) break;
+    if (run.ended()) break;
 
     HandEyeRow row = plan.row;
     row.trials = reports[0].trials;
@@ -266,10 +274,7 @@ std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation,
       HandEyeRow judged_row = row;
       judged_row.fit = fit;
       if (fit) judged_row.right_passed.reset();
-      judged_row.promise = fit ? plan.fit : plan.calibration;
-      judged_row.setReport(std::move(reports[fit ? 1 : 0]));
-      judged_row.judge(run_false_alarm / judged);
-      judged_row.forgetDistances();
+      judged_row.conclude(std::move(reports[fit ? 1 : 0]), fit ? plan.fit : plan.calibration, run_false_alarm / judged);
       rows.push_back(std::move(judged_row));
     }
   }

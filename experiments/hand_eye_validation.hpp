@@ -1,13 +1,12 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/hand_eye_scene.hpp>
 #include <experiments/judged_report.hpp>
 #include <stats/validation_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -39,10 +38,8 @@ std::string name(HandEyeFormulation formulation);
 
 struct HandEyeValidation {
   std::vector<HandEyeExperiment> experiments{all_hand_eye_experiments.begin(), all_hand_eye_experiments.end()};
-  std::size_t trials = 100;  ///< a row
-  bool many_pairs = false;   ///< rows with 200 pairs, too
-  std::uint64_t seed = 1;
-  int threads = 0;
+  bool many_pairs = false;     ///< rows with 200 pairs, too
+  RunSize run{.trials = 100};  ///< trials of a row
   /// Standard deviation of the noise that is drawn over that which the estimator is told.
   double noise_factor = 1;
 };
@@ -78,12 +75,30 @@ struct HandEyeRow : JudgedReport {
   }
 };
 
-/// The tally of what must be right in all trials.
-Tally countedTally(const std::vector<HandEyeRow>& rows);
+template <class V>
+void describe(V& v, const HandEyeRow& row) {
+  v("experiment", name(row.experiment))("formulation", name(row.formulation))("motion", name(row.motion));
+  v("noise", name(row.noise))("noise_scale", row.scale)("pairs", row.pairs);
+  v("outliers", row.outliers ? std::optional(name(*row.outliers)) : std::nullopt);
+  v("quantity", row.fit ? "fit" : "calibration")("in_domain", row.promise.has_value());
+  describeReport(v, row.report);
+  v("rms_rotation", row.rms_rotation, "", "rad")("rms_translation", row.rms_translation, "", "m");
+  v("note_rms_rotation", row.note_rotation, "of an independent prototype", "rad");
+  v("note_rms_translation", row.note_translation, "", "m");
+  v("chi2_per_dof", row.chi2_per_dof)("right", row.right, "trials")("right_passed", row.right_passed);
+  v("lost", row.lost, "share of the right pairs that were taken for wrong ones");
+  v("failures", row.report.failures)("passed", row.passed);
+}
+
+/// The noise of a row, with its factor.
+std::string noiseName(const HandEyeRow& row);
+/// A row in words.
+std::string label(const HandEyeRow& row);
 
 /// Rows in the order of the experiments.
-std::vector<HandEyeRow> validateHandEye(
-    const HandEyeValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<HandEyeRow> validateHandEye(const HandEyeValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows: what must be right in all trials, and the distances.
+Judgement judgementOf(const std::vector<HandEyeRow>& rows);
 
 }  // namespace liestat::experiments

@@ -18,6 +18,13 @@ struct TrialsOfRun {
   bool incomplete() const { return stop && done < planned; }
 };
 inline TrialsOfRun trials_of_run;
+
+/// The fields of a run that an interrupt left incomplete; else there are none.
+template <class V>
+void describe(V& v, const TrialsOfRun& run) {
+  if (!run.incomplete()) return;
+  v("interrupted", true)("trials_done", run.done.load())("trials_planned", run.planned.load());
+}
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
 inline bool runStopped() { return trials_of_run.stop.load(std::memory_order_relaxed); }

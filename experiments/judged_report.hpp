@@ -1,6 +1,7 @@
-// The parts that the program's validations share: a report, what is promised of it, and the verdict.
+// The part that most rows of the program's validations share: a report, what is promised of it, and the verdict.
 #pragma once
 
+#include <experiments/judgement.hpp>
 #include <stats/validation_report.hpp>
 
 #include <cmath>
@@ -12,8 +13,16 @@
 
 namespace liestat::experiments {
 
-/// False-alarm probability of a whole run, shared evenly by the rows that are judged.
-inline constexpr double run_false_alarm = 1e-5;
+/// The fields of a report in the JSON of a validation; null, but for the trials, without distances.
+template <class V>
+void describeReport(V& v, const ValidationReport& r, bool has_distances = true) {
+  const auto given = [&]<class T>(const T& value) { return has_distances ? std::optional<T>(value) : std::nullopt; };
+  v("trials", r.trials)("dof", given(r.dof), "degrees of freedom of the law")("law", given(std::string(r.law.name())));
+  v("index", given(r.index), "mean squared Mahalanobis distance of the truth")("index_se", given(r.index_se));
+  v("index_expected", given(r.law.mean()))("variance", given(r.variance), "of the distances");
+  v("ks_statistic", given(r.ks_statistic), "Kolmogorov-Smirnov distance from the law")("ks_p", given(r.ks_p_value));
+  v("coverage95", given(r.coverage[2].observed), "fraction of truths inside the 95 % region");
+}
 
 /// The squared distances of one estimator in one experiment against their law, and the verdict on them. A row of a
 /// validation is one of these and the experiment that it is about.
@@ -39,8 +48,13 @@ struct JudgedReport {
     passed = verdict == ValidationVerdict::passed;
   }
 
-  /// Gives back the memory of the distances: a hundred rows of a million would fill it.
-  void forgetDistances() { report.mu2 = {}; }
+  /// All of this, and gives back the memory of the distances: a hundred rows of a million would fill it.
+  void conclude(ValidationReport of, const std::optional<ValidationTolerance>& promised, double false_alarm) {
+    setReport(std::move(of));
+    promise = promised;
+    judge(false_alarm);
+    report.mu2 = {};
+  }
 
   /// The index over the mean of its law, 1 expected; NaN where the law has none.
   double relativeIndex() const {
@@ -49,21 +63,10 @@ struct JudgedReport {
   }
 };
 
-/// How many rows were judged, and how many of these failed.
-struct Tally {
-  std::size_t judged = 0, failed = 0;
-  /// A run in which nothing was judged has not passed.
-  bool passed() const { return judged > 0 && failed == 0; }
-  Tally operator+(const Tally& other) const { return {judged + other.judged, failed + other.failed}; }
-};
+/// The promise of a row as data; `text` names the row.
 template <class Row>
-Tally tally(const std::vector<Row>& rows) {
-  Tally count;
-  for (const Row& row : rows) {
-    count.judged += row.passed.has_value();
-    count.failed += !row.passed.value_or(true);
-  }
-  return count;
+Promise promiseAbout(const Row& row, std::string text) {
+  return {std::move(text), row.passed, reason(row.verdict)};
 }
 
 }  // namespace liestat::experiments

@@ -6,7 +6,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -92,9 +91,7 @@ using MeansReport = ValidationReportOf<MeansOutcome>;  // experiments/means_repo
 /// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
 /// each of `methods` that is wanted, in their order; its law is χ²_k for known noise and Hotelling's for residuals. The
 /// ratios compare a method's error with MAHA's of the same trial (the corrected one; the report's for the report's LSQ
-/// and WLSQ), and the report's MAHA with the corrected one; they are absent where that is not wanted. `progress(trials
-/// done, all)` is called from any thread, never twice at the same time.
-std::vector<MeansReport> run(const MeansExperiment& experiment, int threads,
-                             const std::function<void(std::size_t, std::size_t)>& progress = {});
+/// and WLSQ), and the report's MAHA with the corrected one; they are absent where that is not wanted.
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads);
 
 }  // namespace liestat::experiments

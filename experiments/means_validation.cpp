@@ -1,5 +1,7 @@
-#include <experiments/interruption.hpp>
+#include <experiments/means_trial.hpp>
 #include <experiments/means_validation.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +19,57 @@ bool hasLeastSquaresNoise(const MeansExperiment& experiment) {
   return !info(experiment.feature).frameMatters() || experiment.covariance_at == CovarianceAt::estimated;
 }
 
+/// Logarithm of the ratio of two errors.
+double logRatio(double error, double reference) { return std::log(error / reference); }
+
+/// The outcomes of which the reports are made, in the order of the methods that are wanted.
+std::vector<MeansOutcome> wantedOutcomes(const MeansExperiment& experiment, const MethodOutcomes& outcomes) {
+  std::vector<MeansOutcome> list;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    const MethodOutcome& o = outcomes[m];
+    const bool is_maha = methods[m].criterion == Criterion::maha;
+    const MethodOutcome& reference = outcomes[methodIndex({Criterion::maha, methods[m].corrected || is_maha, true})];
+    MeansOutcome outcome;
+    outcome.mu2 = o.mahalanobis_squared;
+    outcome.iterations = o.iterations;
+    outcome.log_ratio_rotation = logRatio(o.rotation_error, reference.rotation_error);
+    outcome.log_ratio_translation = logRatio(o.translation_error, reference.translation_error);
+    list.push_back(outcome);
+  }
+  return list;
+}
+
+/// The next cell: a report for each of the methods that are wanted, in their order.
+std::vector<MeansReport> runCell(const MeansExperiment& experiment, CellRun& run) {
+  const int k = degreesOfFreedom(experiment.feature);
+  std::vector<ReferenceLaw> laws;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    if (!experiment.wanted[m]) continue;
+    laws.push_back(methods[m].known_noise ? ReferenceLaw::chiSquared(k)
+                                          : ReferenceLaw::hotelling(k, static_cast<int>(experiment.n)));
+  }
+  return run.reports(16, laws, [&](CounterRng& rng, std::uint64_t) {
+    return wantedOutcomes(experiment, meansTrial(experiment, rng));
+  });
+}
+
 }  // namespace
+
+std::size_t methodIndex(const Method& method) {
+  std::size_t i = 0;
+  while (i + 1 < methods.size() &&
+         !(methods[i].criterion == method.criterion && methods[i].corrected == method.corrected &&
+           methods[i].known_noise == method.known_noise)) {
+    ++i;
+  }
+  return i;
+}
+
+std::vector<MeansReport> run(const MeansExperiment& experiment, int threads) {
+  CellRun alone({experiment.trials, experiment.seed, threads}, {{experiment.trials, 1}}, {});
+  return runCell(experiment, alone);
+}
 
 double MeansRow::ratio(ErrorRatio of) const {
   return std::exp((of == log_ratio_rotation ? rotation_ratio : translation_ratio).mean);
@@ -26,13 +78,17 @@ double MeansRow::logDeviation(ErrorRatio of) const {
   return (of == log_ratio_rotation ? rotation_ratio : translation_ratio).standard_deviation;
 }
 
-std::vector<MeansRow> validateMeans(const MeansValidation& validation,
-                                    const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  struct Run {
+std::vector<MeansRow> validateMeans(const MeansValidation& validation, const RunProgress& progress) {
+  struct Cell {
     MeansExperiment experiment;
     MethodMask keep;
   };
-  std::vector<Run> runs;
+  std::vector<Cell> cells;
+  std::vector<CellSize> sizes;
+  const auto addCell = [&](const MeansExperiment& experiment, const MethodMask& keep) {
+    cells.push_back({experiment, keep});
+    sizes.push_back({experiment.trials, static_cast<double>(experiment.n * experiment.trials)});
+  };
   const std::size_t printed_maha = methodIndex({Criterion::maha, false, true});
   for (const Feature feature : validation.features) {
     std::vector<double> spreads = validation.spreads;
@@ -45,8 +101,8 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
                                      .n = n,
                                      .spread = spread,
                                      .covariance_at = validation.covariance_at,
-                                     .trials = validation.trials,
-                                     .seed = validation.seed,
+                                     .trials = validation.run.trials,
+                                     .seed = validation.run.seed,
                                      .certify = validation.certify};
           MethodMask keep{};
           for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -61,36 +117,26 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
           if (listed(validation.criteria, Criterion::maha)) {
             experiment.wanted[methodIndex({Criterion::maha, true, true})] = true;
           }
-          runs.push_back({experiment, frequent});
+          addCell(experiment, frequent);
           if (rare) {
             MeansExperiment printed = experiment;
-            printed.trials = std::max<std::size_t>(1, validation.trials / 10);
+            printed.trials = std::max<std::size_t>(1, experiment.trials / 10);
             printed.wanted = {};
             printed.wanted[printed_maha] = printed.wanted[methodIndex({Criterion::maha, true, true})] = true;
             MethodMask only{};
             only[printed_maha] = true;
-            runs.push_back({printed, only});
+            addCell(printed, only);
           }
         }
       }
     }
   }
 
-  // Work goes with the number of measurements.
-  const auto work = [](const MeansExperiment& e) { return static_cast<std::uint64_t>(e.n); };
-  std::uint64_t all = 0, before = 0;
-  for (const Run& r : runs) {
-    all += work(r.experiment) * r.experiment.trials;
-    trials_of_run.planned += r.experiment.trials;
-  }
-
+  CellRun run(validation.run, sizes, progress);
   std::vector<MeansRow> rows;
-  for (const Run& r : runs) {
-    auto reports = run(r.experiment, validation.threads, [&](std::size_t done, std::size_t) {
-      if (progress) progress(before + work(r.experiment) * done, all);
-    });
-    before += work(r.experiment) * r.experiment.trials;
-    if (!countTrials(reports.empty() ? r.experiment.trials : reports[0].trials)) break;
+  for (const Cell& r : cells) {
+    auto reports = runCell(r.experiment, run);
+    if (run.ended()) break;
     std::size_t next = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (!r.experiment.wanted[m]) continue;
@@ -109,6 +155,22 @@ std::vector<MeansRow> validateMeans(const MeansValidation& validation,
       std::count_if(rows.begin(), rows.end(), [](const MeansRow& row) { return row.promise.has_value(); }));
   for (MeansRow& row : rows) row.judge(run_false_alarm / judged);
   return rows;
+}
+
+Judgement judgementOf(const MeansValidationResult& result) {
+  Judgement judgement{.promises = {}, .where = "in the promised domain"};
+  for (const MeansRow& row : result.rows) {
+    judgement.promises.push_back(promiseAbout(
+        row, fmt::format("{} {} n={} spread {:.3g} {} {}", name(row.experiment.feature), name(row.experiment.noise),
+                         row.experiment.n, row.experiment.spread, name(row.method.criterion),
+                         row.method.known_noise ? "known noise" : "residuals")));
+  }
+  for (const VerdictRow& row : result.verdicts) {
+    judgement.promises.push_back(
+        {fmt::format("{} {} {:.3g} n={}", name(row.cell.feature), name(row.cell.law), row.cell.parameter, row.cell.n),
+         row.passed, row.failure});
+  }
+  return judgement;
 }
 
 // The tolerances are twice the differences from the law that runs of 4000 trials and more show, which are of second

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <experiments/means_experiment.hpp>
 #include <experiments/means_report.hpp>
+#include <experiments/means_verdicts.hpp>
 
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,9 +21,7 @@ struct MeansValidation {
   /// Empty: the report's spread for points, rotations and directions, a third of it for frames.
   std::vector<double> spreads;
   CovarianceAt covariance_at = CovarianceAt::estimated;
-  std::size_t trials = 1000;
-  std::uint64_t seed = 1;
-  int threads = 0;
+  RunSize run{.trials = 1000};  ///< trials of a row
   bool certify = false;
   /// Every trial also for the report's MAHA on frames, which takes most of the time; else one in ten.
   bool all_printed = false;
@@ -45,8 +43,35 @@ struct MeansRow : JudgedReport {
   TrialStatistic rotation_ratio, translation_ratio;  ///< the logarithms
 };
 
+template <class V>
+void describe(V& v, const MeansRow& row) {
+  const MeansExperiment& e = row.experiment;
+  const bool frame = info(e.feature).frameMatters() && row.method.criterion == Criterion::maha;
+  v("feature", name(e.feature))("noise", name(e.noise))("criterion", name(row.method.criterion));
+  v("covariance_at", frame ? std::optional(std::string(name(e.covariance_at))) : std::nullopt);
+  v("formula", row.method.corrected ? "corrected" : "printed")("known_noise", row.method.known_noise);
+  v("in_domain", row.promise.has_value())("n", e.n)("spread", e.spread, "over the report's");
+  describeReport(v, row.report);
+  v("tail", row.tail)("iterations", row.report.mean_iterations)("failures", row.report.failures);
+  v("ratio_rotation", row.ratio(log_ratio_rotation), "of the error to that of MAHA, geometric mean");
+  v("ratio_rotation_logsd", row.logDeviation(log_ratio_rotation));
+  v("ratio_translation", row.ratio(log_ratio_translation));
+  v("ratio_translation_logsd", row.logDeviation(log_ratio_translation))("passed", row.passed);
+}
+
+struct MeansValidationResult {
+  std::vector<MeansRow> rows;        ///< in the order of the lists
+  std::vector<VerdictRow> verdicts;  ///< of certifiedMean
+};
+template <class V>
+void describe(V& v, const MeansValidationResult& result) {
+  v("rows", result.rows)("verdicts", result.verdicts);
+}
+
 /// Runs everything; rows in the order of the lists.
-std::vector<MeansRow> validateMeans(const MeansValidation& validation,
-                                    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<MeansRow> validateMeans(const MeansValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows and on the verdicts.
+Judgement judgementOf(const MeansValidationResult& result);
 
 }  // namespace liestat::experiments

@@ -1,8 +1,6 @@
 #include <experiments/means_verdicts.hpp>
 
 #include <experiments/means_experiment.hpp>
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <experiments/scattered_features.hpp>
 #include <lie/units.hpp>
 #include <stats/certified_mean.hpp>
@@ -51,13 +49,13 @@ class Sampler {
   FisherLaw<M> fisher_;
 };
 
-void add(VerdictRow& a, const VerdictRow& b) {
-  a.ok += b.ok, a.ambiguous += b.ambiguous, a.ill_defined += b.ill_defined;
-  a.outside += b.outside, a.wrong += b.wrong, a.plain_outside += b.plain_outside;
-}
+/// The outcomes of one trial: counts of 0 and 1.
+struct Outcome {
+  bool ok = false, ambiguous = false, ill_defined = false, outside = false, wrong = false, plain_outside = false;
+};
 
 template <class M>
-void judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, CounterRng& rng, VerdictRow& row) {
+Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, CounterRng& rng) {
   std::vector<M> samples;
   samples.reserve(n);
   for (std::size_t i = 0; i < n; ++i) samples.push_back(sampler.draw(i, rng));
@@ -69,37 +67,33 @@ void judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Count
   const auto misses = [&](const SquareOf<M>& covariance) {
     return !(mahalanobisSquared(Gaussian<M>{result.mean.mean, covariance}, truth) <= quantile);
   };
-  row.plain_outside += misses(covarianceFromResiduals(result.mean));
-  row.ambiguous += result.status == Status::ambiguous;
-  row.ill_defined += result.status == Status::ill_defined;
-  if (result.status != Status::ok) return;
-  ++row.ok;
-  row.outside += misses(result.estimate->covariance);
+  Outcome outcome{.ok = result.status == Status::ok,
+                  .ambiguous = result.status == Status::ambiguous,
+                  .ill_defined = result.status == Status::ill_defined,
+                  .plain_outside = misses(covarianceFromResiduals(result.mean))};
+  if (!outcome.ok) return outcome;
+  outcome.outside = misses(result.estimate->covariance);
   const TangentOf<M> error = log(result.mean.mean, truth);
-  row.wrong += std::abs(error[ManifoldTraits<M>::DoF - 1]) > 0.25 * fold<M> * pi;
+  outcome.wrong = std::abs(error[ManifoldTraits<M>::DoF - 1]) > 0.25 * fold<M> * pi;
+  return outcome;
 }
 
 template <Metric M>
-VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, int threads, const std::function<void()>& done) {
+VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
   const Sampler<M> sampler(cell);
   const double quantile = ReferenceLaw::hotelling(ManifoldTraits<M>::DoF, static_cast<int>(cell.n)).quantile(0.95);
-  constexpr std::size_t trials_a_chunk = 16;
-  const std::size_t chunks = (cell.trials + trials_a_chunk - 1) / trials_a_chunk;
-  VerdictRow row = ProgramExecutor{threads}.reduce(
-      chunks,
-      [&](std::size_t chunk) {
-        VerdictRow part;
-        if (runStopped()) return part;
-        const std::size_t end = std::min(cell.trials, (chunk + 1) * trials_a_chunk);
-        for (std::size_t t = chunk * trials_a_chunk; t < end; ++t) {
-          CounterRng rng(seed, t, 7);
-          judgeTrial(sampler, quantile, cell.n, rng, part);
-        }
-        return part;
-      },
-      [&](VerdictRow& a, const VerdictRow& b) { add(a, b); });
+  VerdictRow row;
   row.cell = cell;
-  done();
+  // Its rates are of all of its trials.
+  for (const Outcome& o : run.outcomes(
+           [&](std::uint64_t number) {
+             CounterRng rng(seed, number, 7);
+             return judgeTrial(sampler, quantile, cell.n, rng);
+           },
+           true)) {
+    row.ok += o.ok, row.ambiguous += o.ambiguous, row.ill_defined += o.ill_defined;
+    row.outside += o.outside, row.wrong += o.wrong, row.plain_outside += o.plain_outside;
+  }
   return row;
 }
 
@@ -130,17 +124,8 @@ void giveVerdict(VerdictRow& row) {
 }  // namespace
 
 std::string name(VerdictLaw law) {
-  switch (law) {
-    case VerdictLaw::fisher:
-      return "fisher";
-    case VerdictLaw::report:
-      return "report";
-    case VerdictLaw::isotropic:
-      return "isotropic";
-    case VerdictLaw::clouds:
-      return "clouds";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"fisher", "report", "isotropic", "clouds"};
+  return names[static_cast<std::size_t>(law)];
 }
 
 VerdictPromise promiseOf(const VerdictCell& cell) {
@@ -222,31 +207,23 @@ std::vector<VerdictCell> verdictCells(bool full) {
 }
 
 std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std::uint64_t seed, int threads,
-                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  std::uint64_t all = 0, finished = 0;
-  for (const VerdictCell& cell : cells) all += cell.n * cell.trials, trials_of_run.planned += cell.trials;
+                                      const RunProgress& progress) {
+  std::vector<CellSize> sizes;
+  for (const VerdictCell& cell : cells) sizes.push_back({cell.trials, static_cast<double>(cell.n * cell.trials)});
+  CellRun run({.seed = seed, .threads = threads}, sizes, progress);
   std::vector<VerdictRow> rows;
   for (const VerdictCell& cell : cells) {
-    if (runStopped()) break;
-    const auto done = [&] {
-      finished += cell.n * cell.trials;
-      if (progress) progress(finished, all);
-    };
-    rows.push_back(withFeature(cell.feature, [&]<class M>() -> VerdictRow {
+    VerdictRow row = withFeature(cell.feature, [&]<class M>() -> VerdictRow {
       if constexpr (Metric<M>) {
-        return judge<M>(cell, seed, threads, done);
+        return judge<M>(cell, seed, run);
       } else {
         return {};
       }
-    }));
-    // Its rates are of all of its trials.
-    if (runStopped()) {
-      rows.pop_back();
-      break;
-    }
-    countTrials(cell.trials);
-    rows.back().promise = promiseOf(cell);
-    giveVerdict(rows.back());
+    });
+    if (run.ended()) break;
+    row.promise = promiseOf(cell);
+    giveVerdict(row);
+    rows.push_back(std::move(row));
   }
   return rows;
 }

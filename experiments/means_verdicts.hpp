@@ -1,10 +1,10 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <formats/feature.hpp>
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,11 +59,21 @@ struct VerdictRow {
   double coverage() const { return ok > 0 ? 1 - static_cast<double>(outside) / static_cast<double>(ok) : 1; }
 };
 
+template <class V>
+void describe(V& v, const VerdictRow& row) {
+  v("feature", name(row.cell.feature))("law", name(row.cell.law))("parameter", row.cell.parameter);
+  v("n", row.cell.n)("trials", row.cell.trials)("ok", row.rate(row.ok), "fraction of the trials");
+  v("ambiguous", row.rate(row.ambiguous))("ill_defined", row.rate(row.ill_defined));
+  v("ok_but_outside", row.rate(row.outside))("coverage", row.coverage(), "of those that are ok");
+  v("ok_on_the_wrong_side", row.rate(row.wrong))("first_order_coverage", 1 - row.rate(row.plain_outside));
+  v("passed", row.passed);
+}
+
 /// The cells of a default run, or all of them with 4000 trials each (400 of two clouds of 1000).
 std::vector<VerdictCell> verdictCells(bool full);
 
 /// Runs the cells; the same counts on any number of threads.
 std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std::uint64_t seed, int threads,
-                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress = {});
+                                      const RunProgress& progress = {});
 
 }  // namespace liestat::experiments

@@ -1,12 +1,13 @@
 #include <experiments/motion_validation.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <stats/quantile.hpp>
 #include <fusion/motion/motion_filter.hpp>
+#include <fusion/motion/plan.hpp>
 #include <fusion/motion/search.hpp>
 #include <fusion/motion/track_pairs.hpp>
 #include <stats/laws.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -97,6 +98,7 @@ std::unique_ptr<Runner> runnerOf(const MotionRow& row, const MotionScene& scene,
                                  std::uint64_t number) {
   MotionFilterOptions options;
   options.outliers = row.scene.outliers > 0;
+  options.flow = planOf({}, {.given = row.scene.gyroscope_sigma > 0}).settings.flow;
   CounterRng rng(seed, number, 4);
   switch (row.method) {
     case MotionMethod::single_start:
@@ -151,11 +153,9 @@ std::unique_ptr<Runner> runnerOf(const MotionRow& row, const MotionScene& scene,
       return std::make_unique<IntervalRunner>(options, row.scene.world == MotionWorld::orbit ? 6 : 4, scene);
     case MotionMethod::gyroscope_bias:
       options.estimate_bias = true, options.bias_sigma = row.scene.gyroscope_bias * degree;
-      [[fallthrough]];
+      break;
     case MotionMethod::gyroscope:
     case MotionMethod::gyroscope_robust:
-      options.flow = Flow::discrete;
-      break;
     case MotionMethod::subspace:
       break;
   }
@@ -165,9 +165,9 @@ std::unique_ptr<Runner> runnerOf(const MotionRow& row, const MotionScene& scene,
 Trial runTrial(const MotionRow& row, const MotionValidation& validation, std::uint64_t number) {
   MotionSceneOptions options = row.scene;
   options.sigma *= validation.noise_factor;
-  MotionScene scene(options, validation.seed, number);
+  MotionScene scene(options, validation.run.seed, number);
   scene.told_sigma = row.scene.sigma;
-  const auto runner = runnerOf(row, scene, validation.seed, number);
+  const auto runner = runnerOf(row, scene, validation.run.seed, number);
   Trial trial;
   std::size_t next = 0;
   for (int frame = 1; frame <= motion_frames.back(); ++frame) {
@@ -227,321 +227,91 @@ struct PromisedCell {
   std::size_t points;
   MotionPromise promise;
 };
+using M = MotionMethod;
+using W = MotionWorld;
 constexpr PromisedCell promised_cells[] = {
-    {MotionMethod::subspace, MotionWorld::orbit, 1, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.49, 0.33, 0.32}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::orbit, 4, 5, 0, 0, 0, 20, {{0.62, 0.78, 0.86}, {7.29, 4.38, 3.01}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::orbit, 8, 5, 0, 0, 0, 20, {{0, 0.32, 0.45}, {0, 0, 11.47}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::general, 4, 5, 0, 0, 0, 20, {{0.69, 0.83, 0.89}, {7.24, 4.43, 3.07}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::general, 8, 5, 0, 0, 0, 20, {{0, 0.31, 0.45}, {0, 0, 11.6}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::orbit, 8, 10, 0, 0, 0, 20, {{0.64, 0.77, 0.87}, {7.02, 4.45, 3.05}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::orbit, 1, 5, 0, 0, 0.15, 20, {{0.95, 0.97, 0.97}, {1.35, 1, 0.97}, 0}},
-    {MotionMethod::subspace, MotionWorld::general, 1, 5, 0, 0, 0.15, 20, {{0.98, 0.98, 0.99}, {2.11, 1.57, 1.36}, 0}},
-    {MotionMethod::subspace, MotionWorld::turning, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
-    {MotionMethod::subspace, MotionWorld::turning, 4, 5, 0, 0, 0, 20, {{0.69, 0.82, 0.89}, {7.08, 4.35, 3.07}, 0.95}},
-    {MotionMethod::essential, MotionWorld::orbit, 1, 5, 0, 0, 0, 20, {{0.97, 0.99, 0.99}, {1.02, 0.48, 0.29}, 0.95}},
-    {MotionMethod::essential, MotionWorld::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.98, 0.61, 0.53}, 0.95}},
-    {MotionMethod::essential_near,
-     MotionWorld::orbit,
-     1,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.5, 0.29, 0.23}, 0.95}},
-    {MotionMethod::essential_near,
-     MotionWorld::orbit,
-     4,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.91, 0.93, 0.96}, {3.4, 2.16, 1.46}, 0.95}},
-    {MotionMethod::essential_near, MotionWorld::orbit, 8, 5, 0, 0, 0, 20, {{0.72, 0.83, 0.88}, {7.23, 5.63, 4.52}, 0}},
-    {MotionMethod::essential_near,
-     MotionWorld::general,
-     1,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.91, 0.99, 0.99}, {1.52, 0.71, 0.57}, 0.95}},
-    {MotionMethod::essential_near,
-     MotionWorld::general,
-     4,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.69, 0.74, 0.77}, {6.92, 5.78, 5.34}, 0}},
-    {MotionMethod::essential_near,
-     MotionWorld::general,
-     8,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.48, 0.57, 0.64}, {10.88, 9.35, 8.05}, 0}},
-    {MotionMethod::composition, MotionWorld::orbit, 1, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.48, 0.26, 0.22}, 0.95}},
-    {MotionMethod::composition, MotionWorld::orbit, 4, 5, 0, 0, 0, 20, {{0.62, 0.78, 0.85}, {7.29, 4.38, 3.13}, 0.95}},
-    {MotionMethod::composition, MotionWorld::orbit, 8, 5, 0, 0, 0, 20, {{0, 0.32, 0.45}, {0, 0, 11.47}, 0.95}},
-    {MotionMethod::composition, MotionWorld::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.87, 0.6, 0.54}, 0.95}},
-    {MotionMethod::composition, MotionWorld::general, 4, 5, 0, 0, 0, 20, {{0.69, 0.83, 0.89}, {7.24, 4.43, 3.2}, 0.95}},
-    {MotionMethod::composition, MotionWorld::general, 8, 5, 0, 0, 0, 20, {{0, 0.31, 0.45}, {0, 0, 11.6}, 0.95}},
-    {MotionMethod::composition,
-     MotionWorld::turning,
-     1,
-     5,
-     0,
-     0,
-     0,
-     20,
-     {{0.99, 0.98, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
-    {MotionMethod::intervals, MotionWorld::orbit, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.27, 0.29, 0.29}, 0.95}},
-    {MotionMethod::intervals, MotionWorld::orbit, 4, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.6, 0.43, 0.43}, 0.95}},
-    {MotionMethod::intervals, MotionWorld::orbit, 8, 5, 0, 0, 0, 20, {{0.95, 0.98, 0.98}, {1.58, 0.72, 0.61}, 0.95}},
-    {MotionMethod::intervals, MotionWorld::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.01, 0.93, 0.96}, 0}},
-    {MotionMethod::intervals, MotionWorld::general, 4, 5, 0, 0, 0, 20, {{0.94, 0.98, 0.99}, {2.89, 1.93, 1.56}, 0}},
-    {MotionMethod::intervals, MotionWorld::general, 8, 5, 0, 0, 0, 20, {{0.67, 0.83, 0.91}, {7.27, 4.25, 2.96}, 0}},
-    {MotionMethod::intervals, MotionWorld::orbit, 10, 5, 0, 0, 0, 20, {{0.9, 0.97, 0.98}, {2.3, 1.01, 0.73}, 0.95}},
-    {MotionMethod::intervals, MotionWorld::general, 10, 5, 0, 0, 0, 20, {{0.52, 0.73, 0.83}, {10.15, 6.21, 4.16}, 0}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.22, 0.18, 0.18}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.32, 0.29, 0.27}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.5, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.39, 0.31, 0.3}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.59, 0.34, 0.26}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.69, 0.44, 0.35}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.5, 0, 0, 20, {{0.98, 0.98, 0.98}, {1.37, 0.87, 0.7}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 8, 5, 0.02, 0, 0, 20, {{0.97, 0.98, 0.98}, {1.57, 0.92, 0.65}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 8, 5, 0.1, 0, 0, 20, {{0.97, 0.98, 0.98}, {1.63, 0.96, 0.71}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 8, 5, 0.5, 0, 0, 20, {{0.97, 0.98, 0.98}, {2.48, 1.52, 1.18}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 10, 5, 0.1, 0, 0, 20, {{0.96, 0.97, 0.97}, {2.33, 1.39, 1}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::general, 1, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.3, 0.29, 0.3}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     1,
-     5,
-     0.1,
-     0,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.44, 0.43, 0.44}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     1,
-     5,
-     0.5,
-     0,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.79, 0.58, 0.58}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     4,
-     5,
-     0.02,
-     0,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.87, 0.61, 0.53}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::general, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.02, 0.7, 0.61}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     4,
-     5,
-     0.5,
-     0,
-     0,
-     20,
-     {{0.98, 0.99, 0.99}, {2.28, 1.46, 1.15}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     8,
-     5,
-     0.02,
-     0,
-     0,
-     20,
-     {{0.98, 0.99, 0.99}, {2.28, 1.46, 1.04}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     8,
-     5,
-     0.1,
-     0,
-     0,
-     20,
-     {{0.98, 0.99, 0.99}, {2.31, 1.51, 1.08}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::general, 8, 5, 0.5, 0, 0, 20, {{0.95, 0.97, 0.99}, {3.9, 2.53, 1.81}, 0.95}},
-    {MotionMethod::gyroscope,
-     MotionWorld::general,
-     10,
-     5,
-     0.1,
-     0,
-     0,
-     20,
-     {{0.95, 0.97, 0.99}, {3.29, 2.18, 1.53}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.1, 0, 0, 2, {{0.93, 0.97, 0.98}, {1.1, 0.57, 0.46}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.1, 0, 0, 2, {{0.8, 0.93, 0.96}, {3.68, 1.72, 1.06}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.1, 0, 0, 3, {{0.98, 0.99, 0.99}, {0.68, 0.43, 0.36}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.1, 0, 0, 3, {{0.91, 0.97, 0.98}, {2.31, 1.08, 0.71}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 1, 5, 0.1, 0, 0, 5, {{0.99, 0.99, 0.99}, {0.51, 0.35, 0.31}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::orbit, 4, 5, 0.1, 0, 0, 5, {{0.97, 0.99, 0.99}, {1.54, 0.76, 0.52}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::plane, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.58, 0.53, 0.53}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::plane, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.35, 0.97, 0.86}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::narrow, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.19, 0.88, 0.79}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::narrow, 4, 5, 0.1, 0, 0, 20, {{0.79, 0.92, 0.97}, {5.19, 3.24, 2.29}, 0.95}},
-    {MotionMethod::gyroscope, MotionWorld::turning, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {2.07, 1.85, 1.85}, 0}},
-    {MotionMethod::gyroscope, MotionWorld::turning, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {2.69, 2.12, 2.26}, 0}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::orbit,
-     1,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.4, 0.3, 0.29}, 0.95}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::orbit,
-     4,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.98, 0.98, 0.99}, {1.37, 0.98, 0.82}, 0.95}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::orbit,
-     8,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.97, 0.98, 0.98}, {2.44, 1.81, 1.54}, 0.95}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::general,
-     1,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.55}, 0.95}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::general,
-     4,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {2.25, 1.83, 1.63}, 0.95}},
-    {MotionMethod::gyroscope_bias,
-     MotionWorld::general,
-     8,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.97, 0.97, 0.97}, {3.7, 3.05, 2.74}, 0.95}},
-    {MotionMethod::gyroscope_robust,
-     MotionWorld::orbit,
-     1,
-     5,
-     0.1,
-     0,
-     0.15,
-     20,
-     {{0.99, 0.99, 0.99}, {0.54, 0.44, 0.43}, 0}},
-    {MotionMethod::gyroscope_robust,
-     MotionWorld::orbit,
-     4,
-     5,
-     0.1,
-     0,
-     0.15,
-     20,
-     {{0.96, 0.98, 0.98}, {2.49, 1.46, 0.98}, 0}},
-    {MotionMethod::gyroscope_robust,
-     MotionWorld::general,
-     1,
-     5,
-     0.1,
-     0,
-     0.15,
-     20,
-     {{0.99, 0.99, 0.99}, {0.73, 0.58, 0.58}, 0}},
-    {MotionMethod::gyroscope_robust,
-     MotionWorld::general,
-     4,
-     5,
-     0.1,
-     0,
-     0.15,
-     20,
-     {{0.98, 0.99, 0.99}, {2.54, 1.48, 1.09}, 0}},
-    {MotionMethod::essential_bias,
-     MotionWorld::orbit,
-     1,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.38, 0.31, 0.29}, 0.95}},
-    {MotionMethod::essential_bias,
-     MotionWorld::orbit,
-     4,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.98, 0.98, 0.99}, {1.4, 1.04, 0.8}, 0.95}},
-    {MotionMethod::essential_bias,
-     MotionWorld::orbit,
-     8,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.97, 0.98, 0.98}, {2.45, 1.84, 1.53}, 0.95}},
-    {MotionMethod::essential_bias,
-     MotionWorld::general,
-     1,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.56}, 0.95}},
-    {MotionMethod::essential_bias,
-     MotionWorld::general,
-     4,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.99, 0.99, 0.99}, {2.2, 1.84, 1.59}, 0.95}},
-    {MotionMethod::essential_bias,
-     MotionWorld::general,
-     8,
-     5,
-     0.1,
-     0.115,
-     0,
-     20,
-     {{0.97, 0.97, 0.97}, {3.73, 3.03, 2.65}, 0.95}},
+    {M::subspace, W::orbit, 1, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.49, 0.33, 0.32}, 0.95}},
+    {M::subspace, W::orbit, 4, 5, 0, 0, 0, 20, {{0.62, 0.78, 0.86}, {7.29, 4.38, 3.01}, 0.95}},
+    {M::subspace, W::orbit, 8, 5, 0, 0, 0, 20, {{0, 0.32, 0.45}, {0, 0, 11.47}, 0.95}},
+    {M::subspace, W::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
+    {M::subspace, W::general, 4, 5, 0, 0, 0, 20, {{0.69, 0.83, 0.89}, {7.24, 4.43, 3.07}, 0.95}},
+    {M::subspace, W::general, 8, 5, 0, 0, 0, 20, {{0, 0.31, 0.45}, {0, 0, 11.6}, 0.95}},
+    {M::subspace, W::orbit, 8, 10, 0, 0, 0, 20, {{0.64, 0.77, 0.87}, {7.02, 4.45, 3.05}, 0.95}},
+    {M::subspace, W::orbit, 1, 5, 0, 0, 0.15, 20, {{0.95, 0.97, 0.97}, {1.35, 1, 0.97}, 0}},
+    {M::subspace, W::general, 1, 5, 0, 0, 0.15, 20, {{0.98, 0.98, 0.99}, {2.11, 1.57, 1.36}, 0}},
+    {M::subspace, W::turning, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
+    {M::subspace, W::turning, 4, 5, 0, 0, 0, 20, {{0.69, 0.82, 0.89}, {7.08, 4.35, 3.07}, 0.95}},
+    {M::essential, W::orbit, 1, 5, 0, 0, 0, 20, {{0.97, 0.99, 0.99}, {1.02, 0.48, 0.29}, 0.95}},
+    {M::essential, W::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.98, 0.61, 0.53}, 0.95}},
+    {M::essential_near, W::orbit, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.5, 0.29, 0.23}, 0.95}},
+    {M::essential_near, W::orbit, 4, 5, 0, 0, 0, 20, {{0.91, 0.93, 0.96}, {3.4, 2.16, 1.46}, 0.95}},
+    {M::essential_near, W::orbit, 8, 5, 0, 0, 0, 20, {{0.72, 0.83, 0.88}, {7.23, 5.63, 4.52}, 0}},
+    {M::essential_near, W::general, 1, 5, 0, 0, 0, 20, {{0.91, 0.99, 0.99}, {1.52, 0.71, 0.57}, 0.95}},
+    {M::essential_near, W::general, 4, 5, 0, 0, 0, 20, {{0.69, 0.74, 0.77}, {6.92, 5.78, 5.34}, 0}},
+    {M::essential_near, W::general, 8, 5, 0, 0, 0, 20, {{0.48, 0.57, 0.64}, {10.88, 9.35, 8.05}, 0}},
+    {M::composition, W::orbit, 1, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.48, 0.26, 0.22}, 0.95}},
+    {M::composition, W::orbit, 4, 5, 0, 0, 0, 20, {{0.62, 0.78, 0.85}, {7.29, 4.38, 3.13}, 0.95}},
+    {M::composition, W::orbit, 8, 5, 0, 0, 0, 20, {{0, 0.32, 0.45}, {0, 0, 11.47}, 0.95}},
+    {M::composition, W::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.87, 0.6, 0.54}, 0.95}},
+    {M::composition, W::general, 4, 5, 0, 0, 0, 20, {{0.69, 0.83, 0.89}, {7.24, 4.43, 3.2}, 0.95}},
+    {M::composition, W::general, 8, 5, 0, 0, 0, 20, {{0, 0.31, 0.45}, {0, 0, 11.6}, 0.95}},
+    {M::composition, W::turning, 1, 5, 0, 0, 0, 20, {{0.99, 0.98, 0.99}, {0.92, 0.62, 0.57}, 0.95}},
+    {M::intervals, W::orbit, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.27, 0.29, 0.29}, 0.95}},
+    {M::intervals, W::orbit, 4, 5, 0, 0, 0, 20, {{0.98, 0.99, 0.99}, {0.6, 0.43, 0.43}, 0.95}},
+    {M::intervals, W::orbit, 8, 5, 0, 0, 0, 20, {{0.95, 0.98, 0.98}, {1.58, 0.72, 0.61}, 0.95}},
+    {M::intervals, W::general, 1, 5, 0, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.01, 0.93, 0.96}, 0}},
+    {M::intervals, W::general, 4, 5, 0, 0, 0, 20, {{0.94, 0.98, 0.99}, {2.89, 1.93, 1.56}, 0}},
+    {M::intervals, W::general, 8, 5, 0, 0, 0, 20, {{0.67, 0.83, 0.91}, {7.27, 4.25, 2.96}, 0}},
+    {M::intervals, W::orbit, 10, 5, 0, 0, 0, 20, {{0.9, 0.97, 0.98}, {2.3, 1.01, 0.73}, 0.95}},
+    {M::intervals, W::general, 10, 5, 0, 0, 0, 20, {{0.52, 0.73, 0.83}, {10.15, 6.21, 4.16}, 0}},
+    {M::gyroscope, W::orbit, 1, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.22, 0.18, 0.18}, 0.95}},
+    {M::gyroscope, W::orbit, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.32, 0.29, 0.27}, 0.95}},
+    {M::gyroscope, W::orbit, 1, 5, 0.5, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.39, 0.31, 0.3}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.59, 0.34, 0.26}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.69, 0.44, 0.35}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.5, 0, 0, 20, {{0.98, 0.98, 0.98}, {1.37, 0.87, 0.7}, 0.95}},
+    {M::gyroscope, W::orbit, 8, 5, 0.02, 0, 0, 20, {{0.97, 0.98, 0.98}, {1.57, 0.92, 0.65}, 0.95}},
+    {M::gyroscope, W::orbit, 8, 5, 0.1, 0, 0, 20, {{0.97, 0.98, 0.98}, {1.63, 0.96, 0.71}, 0.95}},
+    {M::gyroscope, W::orbit, 8, 5, 0.5, 0, 0, 20, {{0.97, 0.98, 0.98}, {2.48, 1.52, 1.18}, 0.95}},
+    {M::gyroscope, W::orbit, 10, 5, 0.1, 0, 0, 20, {{0.96, 0.97, 0.97}, {2.33, 1.39, 1}, 0.95}},
+    {M::gyroscope, W::general, 1, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.3, 0.29, 0.3}, 0.95}},
+    {M::gyroscope, W::general, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.44, 0.43, 0.44}, 0.95}},
+    {M::gyroscope, W::general, 1, 5, 0.5, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.79, 0.58, 0.58}, 0.95}},
+    {M::gyroscope, W::general, 4, 5, 0.02, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.87, 0.61, 0.53}, 0.95}},
+    {M::gyroscope, W::general, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.02, 0.7, 0.61}, 0.95}},
+    {M::gyroscope, W::general, 4, 5, 0.5, 0, 0, 20, {{0.98, 0.99, 0.99}, {2.28, 1.46, 1.15}, 0.95}},
+    {M::gyroscope, W::general, 8, 5, 0.02, 0, 0, 20, {{0.98, 0.99, 0.99}, {2.28, 1.46, 1.04}, 0.95}},
+    {M::gyroscope, W::general, 8, 5, 0.1, 0, 0, 20, {{0.98, 0.99, 0.99}, {2.31, 1.51, 1.08}, 0.95}},
+    {M::gyroscope, W::general, 8, 5, 0.5, 0, 0, 20, {{0.95, 0.97, 0.99}, {3.9, 2.53, 1.81}, 0.95}},
+    {M::gyroscope, W::general, 10, 5, 0.1, 0, 0, 20, {{0.95, 0.97, 0.99}, {3.29, 2.18, 1.53}, 0.95}},
+    {M::gyroscope, W::orbit, 1, 5, 0.1, 0, 0, 2, {{0.93, 0.97, 0.98}, {1.1, 0.57, 0.46}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.1, 0, 0, 2, {{0.8, 0.93, 0.96}, {3.68, 1.72, 1.06}, 0.95}},
+    {M::gyroscope, W::orbit, 1, 5, 0.1, 0, 0, 3, {{0.98, 0.99, 0.99}, {0.68, 0.43, 0.36}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.1, 0, 0, 3, {{0.91, 0.97, 0.98}, {2.31, 1.08, 0.71}, 0.95}},
+    {M::gyroscope, W::orbit, 1, 5, 0.1, 0, 0, 5, {{0.99, 0.99, 0.99}, {0.51, 0.35, 0.31}, 0.95}},
+    {M::gyroscope, W::orbit, 4, 5, 0.1, 0, 0, 5, {{0.97, 0.99, 0.99}, {1.54, 0.76, 0.52}, 0.95}},
+    {M::gyroscope, W::plane, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {0.58, 0.53, 0.53}, 0.95}},
+    {M::gyroscope, W::plane, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.35, 0.97, 0.86}, 0.95}},
+    {M::gyroscope, W::narrow, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {1.19, 0.88, 0.79}, 0.95}},
+    {M::gyroscope, W::narrow, 4, 5, 0.1, 0, 0, 20, {{0.79, 0.92, 0.97}, {5.19, 3.24, 2.29}, 0.95}},
+    {M::gyroscope, W::turning, 1, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {2.07, 1.85, 1.85}, 0}},
+    {M::gyroscope, W::turning, 4, 5, 0.1, 0, 0, 20, {{0.99, 0.99, 0.99}, {2.69, 2.12, 2.26}, 0}},
+    {M::gyroscope_bias, W::orbit, 1, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {0.4, 0.3, 0.29}, 0.95}},
+    {M::gyroscope_bias, W::orbit, 4, 5, 0.1, 0.115, 0, 20, {{0.98, 0.98, 0.99}, {1.37, 0.98, 0.82}, 0.95}},
+    {M::gyroscope_bias, W::orbit, 8, 5, 0.1, 0.115, 0, 20, {{0.97, 0.98, 0.98}, {2.44, 1.81, 1.54}, 0.95}},
+    {M::gyroscope_bias, W::general, 1, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.55}, 0.95}},
+    {M::gyroscope_bias, W::general, 4, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {2.25, 1.83, 1.63}, 0.95}},
+    {M::gyroscope_bias, W::general, 8, 5, 0.1, 0.115, 0, 20, {{0.97, 0.97, 0.97}, {3.7, 3.05, 2.74}, 0.95}},
+    {M::gyroscope_robust, W::orbit, 1, 5, 0.1, 0, 0.15, 20, {{0.99, 0.99, 0.99}, {0.54, 0.44, 0.43}, 0}},
+    {M::gyroscope_robust, W::orbit, 4, 5, 0.1, 0, 0.15, 20, {{0.96, 0.98, 0.98}, {2.49, 1.46, 0.98}, 0}},
+    {M::gyroscope_robust, W::general, 1, 5, 0.1, 0, 0.15, 20, {{0.99, 0.99, 0.99}, {0.73, 0.58, 0.58}, 0}},
+    {M::gyroscope_robust, W::general, 4, 5, 0.1, 0, 0.15, 20, {{0.98, 0.99, 0.99}, {2.54, 1.48, 1.09}, 0}},
+    {M::essential_bias, W::orbit, 1, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {0.38, 0.31, 0.29}, 0.95}},
+    {M::essential_bias, W::orbit, 4, 5, 0.1, 0.115, 0, 20, {{0.98, 0.98, 0.99}, {1.4, 1.04, 0.8}, 0.95}},
+    {M::essential_bias, W::orbit, 8, 5, 0.1, 0.115, 0, 20, {{0.97, 0.98, 0.98}, {2.45, 1.84, 1.53}, 0.95}},
+    {M::essential_bias, W::general, 1, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {0.79, 0.61, 0.56}, 0.95}},
+    {M::essential_bias, W::general, 4, 5, 0.1, 0.115, 0, 20, {{0.99, 0.99, 0.99}, {2.2, 1.84, 1.59}, 0.95}},
+    {M::essential_bias, W::general, 8, 5, 0.1, 0.115, 0, 20, {{0.97, 0.97, 0.97}, {3.73, 3.03, 2.65}, 0.95}},
 };
 std::optional<MotionPromise> promiseOf(MotionMethod method, const MotionSceneOptions& scene) {
   for (const PromisedCell& cell : promised_cells) {
@@ -589,46 +359,15 @@ void judge(MotionRow& row, const std::vector<Trial>& trials, double false_alarm)
 }  // namespace
 
 std::string name(MotionMethod method) {
-  switch (method) {
-    case MotionMethod::subspace:
-      return "subspace";
-    case MotionMethod::single_start:
-      return "single_start";
-    case MotionMethod::forward:
-      return "forward";
-    case MotionMethod::discrete:
-      return "discrete";
-    case MotionMethod::gauss_newton:
-      return "gauss_newton";
-    case MotionMethod::released:
-      return "released";
-    case MotionMethod::near_start:
-      return "near_start";
-    case MotionMethod::search:
-      return "search";
-    case MotionMethod::essential:
-      return "essential";
-    case MotionMethod::essential_near:
-      return "essential_near";
-    case MotionMethod::composition:
-      return "composition";
-    case MotionMethod::intervals:
-      return "intervals";
-    case MotionMethod::gyroscope:
-      return "gyroscope";
-    case MotionMethod::gyroscope_bias:
-      return "gyroscope_bias";
-    case MotionMethod::gyroscope_robust:
-      return "gyroscope_robust";
-    case MotionMethod::essential_bias:
-      return "essential_bias";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"subspace",     "single_start",   "forward",          "discrete",
+                                   "gauss_newton", "released",       "near_start",       "search",
+                                   "essential",    "essential_near", "composition",      "intervals",
+                                   "gyroscope",    "gyroscope_bias", "gyroscope_robust", "essential_bias"};
+  return names[static_cast<std::size_t>(method)];
 }
 
 std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
   std::vector<MotionRow> cells;
-  using M = MotionMethod;
   const auto add = [&](M method, const MotionSceneOptions& scene) {
     if (std::find(methods.begin(), methods.end(), method) == methods.end()) return;
     MotionRow row;
@@ -715,35 +454,43 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
   return cells;
 }
 
-std::vector<MotionRow> validateMotion(const MotionValidation& validation,
-                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  std::vector<MotionRow> rows = motionCells(validation.methods);
-  const auto costOf = [](const MotionRow& row) -> std::uint64_t { return row.method == MotionMethod::search ? 20 : 1; };
-  std::uint64_t all = 0, done = 0;
+std::string sceneOf(const MotionRow& row) {
+  const MotionSceneOptions normal;
+  std::string text = nameOf(row.scene.world);
+  if (row.scene.rotation != normal.rotation) text += fmt::format(" {:g} deg", row.scene.rotation);
+  if (row.scene.points != normal.points) text += fmt::format(" N={}", row.scene.points);
+  if (row.scene.gyroscope_sigma > 0) text += fmt::format(" g {:g}", row.scene.gyroscope_sigma);
+  if (row.scene.gyroscope_bias > 0) text += fmt::format(" b {:g}", row.scene.gyroscope_bias);
+  if (row.scene.outliers > 0) text += fmt::format(" {:g} % out", 100 * row.scene.outliers);
+  return text;
+}
+
+std::vector<MotionRow> validateMotion(const MotionValidation& validation, const RunProgress& progress) {
+  const std::vector<MotionRow> cells = motionCells(validation.methods);
+  std::vector<CellSize> sizes;
   std::size_t tests = 0;
-  for (const MotionRow& row : rows) {
-    all += costOf(row);
-    tests += row.promise ? testsOf(*row.promise) : 0;
+  for (const MotionRow& cell : cells) {
+    sizes.push_back({validation.run.trials, cell.method == MotionMethod::search ? 20. : 1.});
+    tests += cell.promise ? testsOf(*cell.promise) : 0;
   }
-  trials_of_run.planned += rows.size() * validation.trials;
-  for (MotionRow& row : rows) {
-    const std::vector<Trial> trials = ProgramExecutor{validation.threads}.reduce(
-        validation.trials,
-        [&](std::size_t i) {
-          return runStopped() ? std::vector<Trial>{} : std::vector<Trial>{runTrial(row, validation, i)};
-        },
-        [](std::vector<Trial>& left, const std::vector<Trial>& right) {
-          left.insert(left.end(), right.begin(), right.end());
-        });
-    if (!countTrials(trials.size())) break;
-    row = summarised(row, trials);
-    judge(row, trials, run_false_alarm / static_cast<double>(std::max<std::size_t>(tests, 1)));
-    done += costOf(row);
-    if (progress) progress(done, all);
+  CellRun run(validation.run, sizes, progress);
+  std::vector<MotionRow> rows;
+  for (const MotionRow& cell : cells) {
+    const auto trials = run.outcomes([&](std::uint64_t number) { return runTrial(cell, validation, number); });
+    if (run.ended()) break;
+    rows.push_back(summarised(cell, trials));
+    judge(rows.back(), trials, run_false_alarm / static_cast<double>(std::max<std::size_t>(tests, 1)));
   }
-  // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
-  std::erase_if(rows, [](const MotionRow& row) { return row.trials == 0; });
   return rows;
+}
+
+Judgement judgementOf(const std::vector<MotionRow>& rows) {
+  Judgement judgement{.promises = {}, .where = "with a promise"};
+  for (const MotionRow& row : rows) {
+    judgement.promises.push_back(
+        {fmt::format("{}, {}, {:g} px", name(row.method), sceneOf(row), row.scene.sigma), row.passed, row.reason});
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

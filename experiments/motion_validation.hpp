@@ -1,13 +1,12 @@
 // Monte-Carlo trials of the filters of fusion/motion/: how many find the direction, how well, and is its covariance true?
 #pragma once
 
-#include <experiments/judged_report.hpp>
+#include <experiments/cell_run.hpp>
+#include <experiments/judgement.hpp>
 #include <experiments/motion_scene.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,10 +43,8 @@ std::string name(MotionMethod method);
 
 struct MotionValidation {
   std::vector<MotionMethod> methods{all_motion_methods.begin(), all_motion_methods.end()};
-  std::size_t trials = 300;  ///< a row
-  std::uint64_t seed = 1;
-  int threads = 0;
-  double noise_factor = 1;  ///< standard deviation of the noise that is drawn over that which the filters are told
+  RunSize run{.trials = 300};  ///< trials of a row
+  double noise_factor = 1;     ///< standard deviation of the noise that is drawn over that which the filters are told
 };
 
 /// The frames at which a run is looked at.
@@ -80,11 +77,36 @@ struct MotionRow {
   std::string reason;  ///< the failed criteria, in words
 };
 
+template <class V>
+void describe(V& v, const MotionRow& row) {
+  v("method", name(row.method))("scene", nameOf(row.scene.world))("sigma_px", row.scene.sigma, "", "px");
+  v("points", row.scene.points)("rotation_deg", row.scene.rotation, "of a frame", "deg");
+  v("outliers", row.scene.outliers, "share")("gyroscope_sigma_deg", row.scene.gyroscope_sigma, "", "deg");
+  v("gyroscope_bias_deg", row.scene.gyroscope_bias, "", "deg")("trials", row.trials);
+  const MotionPromise promise = row.promise.value_or(MotionPromise{});
+  for (std::size_t k = 0; k < motion_frames.size(); ++k) {
+    const std::string at = "_" + std::to_string(motion_frames[k]);
+    v(("successes" + at).c_str(), row.successes[k], "trials")(("median_deg" + at).c_str(), row.median[k], "", "deg");
+    v(("consistency" + at).c_str(), row.consistency[k], "1 where the covariance is right");
+    if (promise.success[k] > 0) v(("promised_success" + at).c_str(), promise.success[k], "share");
+    if (promise.median[k] > 0) v(("promised_median_deg" + at).c_str(), promise.median[k], "", "deg");
+  }
+  v("coverage95", row.coverage)("convergence_frame", row.convergence);
+  if (promise.coverage > 0) v("promised_coverage95", promise.coverage);
+  v("usable", row.usable)("usable_wrong", row.usable_wrong)("in_domain", row.promise.has_value());
+  v("passed", row.passed)("reason", row.reason);
+}
+
+/// A scene in one cell of a table: the world and what is not the default.
+std::string sceneOf(const MotionRow& row);
+
 /// The cells of some methods, in their order.
 std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods);
 
 /// Runs everything.
-std::vector<MotionRow> validateMotion(const MotionValidation& validation,
-                                      const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<MotionRow> validateMotion(const MotionValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows.
+Judgement judgementOf(const std::vector<MotionRow>& rows);
 
 }  // namespace liestat::experiments

@@ -1,14 +1,11 @@
 #include <experiments/preintegration_validation.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
-#include <experiments/part_of_run.hpp>
 #include <experiments/recording.hpp>
 #include <fusion/imu/preintegration.hpp>
 #include <stats/random.hpp>
-#include <stats/validation.hpp>
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <cmath>
 #include <utility>
 
@@ -80,45 +77,46 @@ double trial(PreintegrationCheck check, double window, double scale, CounterRng&
 
 int degreesOfFreedom(PreintegrationCheck check) { return check == PreintegrationCheck::motion_and_bias ? 15 : 9; }
 
-std::vector<PreintegrationRow> validatePreintegration(
-    const PreintegrationValidation& validation, const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  std::vector<PreintegrationRow> rows;
+std::vector<PreintegrationRow> validatePreintegration(const PreintegrationValidation& validation,
+                                                      const RunProgress& progress) {
+  std::vector<PreintegrationRow> cells, rows;
+  std::vector<CellSize> sizes;
+  double judged = 0;
   for (const PreintegrationCheck check : validation.checks) {
     for (const double window : validation.windows) {
       for (const double noise : validation.noises) {
-        PreintegrationRow& row = rows.emplace_back();
-        row.check = check;
-        row.window = window;
-        row.noise = noise;
-        if (noise <= preintegration_promise) row.promise = ValidationTolerance{};
+        PreintegrationRow& row = cells.emplace_back();
+        row.check = check, row.window = window, row.noise = noise;
+        judged += noise <= preintegration_promise ? 1 : 0;
+        sizes.push_back({validation.run.trials, window});  // the work is that of the readings
       }
     }
   }
-  const auto judged = static_cast<double>(
-      std::count_if(rows.begin(), rows.end(), [](const PreintegrationRow& row) { return row.promise.has_value(); }));
-  // The amount of work is that of the readings.
-  double all = 0, before = 0;
-  for (const PreintegrationRow& row : rows) all += row.window;
-  trials_of_run.planned += rows.size() * validation.trials;
-  for (PreintegrationRow& row : rows) {
-    const ValidationOptions options = trialsOf(validation, 16, {before, row.window, all}, progress);
-    std::vector<ValidationReport> reports =
-        validateAll(ProgramExecutor{validation.threads}, options,
-                    std::vector<ReferenceLaw>{ReferenceLaw::chiSquared(degreesOfFreedom(row.check))},
-                    [&](CounterRng& rng, std::uint64_t) {
-                      TrialOutcome outcome;
-                      outcome.mu2 = trial(row.check, row.window, row.noise, rng);
-                      return std::vector<TrialOutcome>{outcome};
-                    });
-    if (!countTrials(reports.front().trials)) break;
-    row.setReport(std::move(reports.front()));
-    row.judge(run_false_alarm / judged);
-    row.forgetDistances();
-    before += row.window;
+  CellRun run(validation.run, sizes, progress);
+  for (PreintegrationRow& row : cells) {
+    auto reports =
+        run.reports(16, {ReferenceLaw::chiSquared(degreesOfFreedom(row.check))}, [&](CounterRng& rng, std::uint64_t) {
+          TrialOutcome outcome;
+          outcome.mu2 = trial(row.check, row.window, row.noise, rng);
+          return std::vector<TrialOutcome>{outcome};
+        });
+    if (run.ended()) break;
+    row.conclude(std::move(reports.front()),
+                 row.noise <= preintegration_promise ? std::optional(ValidationTolerance{}) : std::nullopt,
+                 run_false_alarm / judged);
+    rows.push_back(std::move(row));
   }
-  // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
-  std::erase_if(rows, [](const PreintegrationRow& row) { return row.report.trials == 0; });
   return rows;
+}
+
+Judgement judgementOf(const std::vector<PreintegrationRow>& rows) {
+  Judgement judgement{.promises = {},
+                      .where = fmt::format("in the promised domain (noise up to {:g})", preintegration_promise)};
+  for (const PreintegrationRow& row : rows) {
+    judgement.promises.push_back(
+        promiseAbout(row, fmt::format("{} {} s, noise {}", name(row.check), row.window, row.noise)));
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

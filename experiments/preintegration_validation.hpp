@@ -1,11 +1,10 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,9 +31,7 @@ struct PreintegrationValidation {
   std::vector<PreintegrationCheck> checks{all_preintegration_checks.begin(), all_preintegration_checks.end()};
   std::vector<double> windows{0.1, 0.5, 1.0, 2.0};  ///< s
   std::vector<double> noises{1, 10, 100};           ///< densities over those of an ADIS16448
-  std::size_t trials = 2000;
-  std::uint64_t seed = 1;
-  int threads = 0;
+  RunSize run{.trials = 2000};                      ///< trials of a row
 };
 
 /// One row. The distances themselves are not kept.
@@ -47,8 +44,18 @@ struct PreintegrationRow : JudgedReport {
 /// Up to this multiple of the ADIS16448's noise the laws are promised (docs/preintegration.md).
 inline constexpr double preintegration_promise = 10;
 
-std::vector<PreintegrationRow> validatePreintegration(
-    const PreintegrationValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+template <class V>
+void describe(V& v, const PreintegrationRow& row) {
+  v("check", name(row.check))("window", row.window, "", "s")("noise", row.noise, "over that of an ADIS16448");
+  v("in_domain", row.passed.has_value());
+  describeReport(v, row.report);
+  v("failures", row.report.failures)("passed", row.passed);
+}
+
+std::vector<PreintegrationRow> validatePreintegration(const PreintegrationValidation& validation,
+                                                      const RunProgress& progress = {});
+
+/// The promises on the rows.
+Judgement judgementOf(const std::vector<PreintegrationRow>& rows);
 
 }  // namespace liestat::experiments

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <stats/validation.hpp>
+#include <stats/random.hpp>
+#include <stats/validation_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -48,17 +47,13 @@ struct PropagationExperiment {
   /// The largest standard deviation of a rotation (rad) and of a translation or point (m); along the other axes 2/3 and
   /// 1/3 of it, of the logarithm of a scale 1/3. Correlation 1/2 between neighbouring coordinates.
   double spread = 0.1;
-  std::size_t trials = 1000;
-  std::uint64_t seed = 1;
   std::vector<PropagationMethod> methods{propagation_methods.begin(), propagation_methods.end()};
 };
 
 /// Degrees of freedom of an operation's result.
 int degreesOfFreedom(Propagated feature, Operation operation);
 
-/// Runs the trials on the given number of threads (0: all); the same bits for any number of threads. One report for
-/// each of the methods. `progress(trials done, all)` is called from any thread, never twice at the same time.
-std::vector<ValidationReport> run(const PropagationExperiment& experiment, int threads,
-                                  const std::function<void(std::size_t, std::size_t)>& progress = {});
+/// One trial of an experiment: an outcome for each of its methods.
+std::vector<TrialOutcome> propagationTrial(const PropagationExperiment& experiment, CounterRng& rng);
 
 }  // namespace liestat::experiments

@@ -1,4 +1,4 @@
-#include <experiments/propagation_trial.hpp>
+#include <experiments/propagation_experiment.hpp>
 
 #include <lie/sim3.hpp>
 #include <stats/propagation.hpp>

@@ -1,11 +1,17 @@
-#include <experiments/interruption.hpp>
 #include <experiments/propagation_validation.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace liestat::experiments {
+
+int degreesOfFreedom(Propagated feature, Operation operation) {
+  if (operation == Operation::act || feature == Propagated::rotation) return 3;
+  return feature == Propagated::pose ? 6 : 7;
+}
 
 std::optional<ValidationTolerance> PropagationPromise::at(double noise) const {
   if (!(noise <= spread)) return std::nullopt;
@@ -65,56 +71,59 @@ std::optional<double> consistentUpTo(const std::vector<PropagationRow>& rows, Pr
   return largest;
 }
 
-std::vector<PropagationRow> validatePropagation(const PropagationValidation& validation,
-                                                const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+std::vector<PropagationRow> validatePropagation(const PropagationValidation& validation, const RunProgress& progress) {
   std::vector<double> spreads = validation.spreads;
   std::sort(spreads.begin(), spreads.end());
   spreads.erase(std::unique(spreads.begin(), spreads.end()), spreads.end());
-  std::vector<PropagationMethod> methods;
+  std::vector<PropagationMethod> chosen;
   for (const PropagationMethod& method : propagation_methods) {
     const auto& wanted = validation.operations;
-    if (std::find(wanted.begin(), wanted.end(), method.operation) != wanted.end()) methods.push_back(method);
+    if (std::find(wanted.begin(), wanted.end(), method.operation) != wanted.end()) chosen.push_back(method);
   }
-
   double judged = 0;
   for (const Propagated feature : validation.features) {
-    for (const PropagationMethod& method : methods) {
+    for (const PropagationMethod& method : chosen) {
       for (const double spread : spreads) judged += propagationPromise(feature, method).at(spread).has_value();
     }
   }
 
-  const std::uint64_t all = validation.trials * spreads.size() * validation.features.size();
-  trials_of_run.planned += all;
-  std::uint64_t before = 0;
+  CellRun run(validation.run,
+              std::vector<CellSize>(spreads.size() * validation.features.size(), {validation.run.trials, 1}), progress);
   std::vector<PropagationRow> rows;
   for (const Propagated feature : validation.features) {
     const std::size_t first = rows.size();
-    rows.resize(first + methods.size() * spreads.size());
-    for (std::size_t s = 0; s < spreads.size(); ++s) {
-      const PropagationExperiment experiment{.feature = feature,
-                                             .spread = spreads[s],
-                                             .trials = validation.trials,
-                                             .seed = validation.seed,
-                                             .methods = methods};
-      auto reports = run(experiment, validation.threads, [&](std::size_t done, std::size_t) {
-        if (progress) progress(before + done, all);
-      });
-      before += validation.trials;
-      if (!countTrials(reports.empty() ? validation.trials : reports[0].trials)) break;
-      for (std::size_t m = 0; m < methods.size(); ++m) {
+    rows.resize(first + chosen.size() * spreads.size());
+    for (std::size_t s = 0; s < spreads.size() && !run.ended(); ++s) {
+      const PropagationExperiment experiment{.feature = feature, .spread = spreads[s], .methods = chosen};
+      std::vector<ReferenceLaw> laws;
+      for (const PropagationMethod& method : chosen) {
+        laws.push_back(ReferenceLaw::chiSquared(degreesOfFreedom(feature, method.operation)));
+      }
+      // A trial takes microseconds.
+      auto reports =
+          run.reports(256, laws, [&](CounterRng& rng, std::uint64_t) { return propagationTrial(experiment, rng); });
+      if (run.ended()) break;
+      for (std::size_t m = 0; m < chosen.size(); ++m) {
         PropagationRow& row = rows[first + m * spreads.size() + s];
         row.experiment = experiment;
-        row.method = methods[m];
-        row.setReport(std::move(reports[m]));
-        row.promise = propagationPromise(feature, methods[m]).at(spreads[s]);
-        row.judge(run_false_alarm / judged);
-        row.forgetDistances();
+        row.method = chosen[m];
+        row.conclude(std::move(reports[m]), propagationPromise(feature, chosen[m]).at(spreads[s]),
+                     run_false_alarm / judged);
       }
     }
   }
   // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
   std::erase_if(rows, [](const PropagationRow& row) { return row.report.trials == 0; });
   return rows;
+}
+
+Judgement judgementOf(const std::vector<PropagationRow>& rows) {
+  Judgement judgement{.promises = {}, .where = "in the promised domain"};
+  for (const PropagationRow& row : rows) {
+    judgement.promises.push_back(promiseAbout(row, fmt::format("{} {} spread {:.3g}", name(row.experiment.feature),
+                                                               label(row.method), row.experiment.spread)));
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

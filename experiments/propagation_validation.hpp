@@ -1,10 +1,9 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <experiments/propagation_experiment.hpp>
 
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,9 +15,7 @@ struct PropagationValidation {
   std::vector<Propagated> features{all_propagated.begin(), all_propagated.end()};
   std::vector<Operation> operations{all_operations.begin(), all_operations.end()};
   std::vector<double> spreads{0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 1.0};
-  std::size_t trials = 20000;
-  std::uint64_t seed = 1;
-  int threads = 0;
+  RunSize run{.trials = 20000};  ///< trials of a spread of a feature
 };
 
 /// The tolerances that docs/propagation.md promises of a propagated covariance.
@@ -38,6 +35,15 @@ struct PropagationRow : JudgedReport {
   PropagationMethod method{};
 };
 
+template <class V>
+void describe(V& v, const PropagationRow& row) {
+  v("feature", name(row.experiment.feature))("operation", name(row.method.operation));
+  v("order", row.method.fourth_order ? 4 : 1)("in_domain", row.promise.has_value());
+  v("spread", row.experiment.spread, "largest standard deviation", "rad, m");
+  describeReport(v, row.report);
+  v("tail", row.tail)("failures", row.report.failures)("passed", row.passed);
+}
+
 /// An index that is off by less is called consistent.
 inline constexpr double consistent_deviation = 0.05;
 
@@ -46,9 +52,11 @@ std::optional<double> consistentUpTo(const std::vector<PropagationRow>& rows, Pr
                                      const PropagationMethod& method);
 
 /// Runs everything; rows in the order of features, methods and spreads (ascending).
-std::vector<PropagationRow> validatePropagation(
-    const PropagationValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<PropagationRow> validatePropagation(const PropagationValidation& validation,
+                                                const RunProgress& progress = {});
+
+/// The promises on the rows.
+Judgement judgementOf(const std::vector<PropagationRow>& rows);
 
 /// compose, or compose 4th for the fourth order.
 std::string label(const PropagationMethod& method);

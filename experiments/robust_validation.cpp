@@ -1,15 +1,13 @@
 #include <experiments/robust_validation.hpp>
 
 #include <experiments/conic_scene.hpp>
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
-#include <experiments/part_of_run.hpp>
 #include <experiments/semidefinite_distance.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/homography_solvers.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/robust_search.hpp>
-#include <stats/validation.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -235,7 +233,7 @@ struct Case {
 Trial runTrial(const Case& one, const RobustValidation& validation, std::uint64_t number, CounterRng& rng) {
   const std::size_t good = validation.measurements - one.bad;
   const double share = static_cast<double>(good) / static_cast<double>(validation.measurements);
-  const std::uint64_t seed = validation.seed * 1000003 + number;
+  const std::uint64_t seed = validation.run.seed * 1000003 + number;
   if (one.structure == RobustStructure::conic) {
     return searchedByAll(ConicModel(good, one.bad, validation.noise_factor, rng), validation, share, one.needed, seed);
   }
@@ -288,33 +286,28 @@ std::optional<ValidationTolerance> promiseOf(const Case& one) {
 std::string name(RobustStructure structure) { return structure == RobustStructure::conic ? "conic" : "homography"; }
 
 std::string name(RobustScore score) {
-  switch (score) {
-    case RobustScore::relevance:
-      return "relevance";
-    case RobustScore::truncated_cost:
-      return "truncated_cost";
-    case RobustScore::inlier_count:
-      return "inlier_count";
-    case RobustScore::trimmed_quantile:
-      return "trimmed_quantile";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"relevance", "truncated_cost", "inlier_count", "trimmed_quantile"};
+  return names[static_cast<std::size_t>(score)];
 }
 
-Tally RobustValidationResult::tally() const {
-  Tally count;
-  for (const RobustRow& row : rows) {
-    count.judged += row.found_passed.has_value();
-    count.failed += !row.found_passed.value_or(true);
+Judgement judgementOf(const RobustValidationResult& result) {
+  Judgement judgement{.promises = {}, .where = fmt::format("with up to {:g} % outliers", 100 * robust_promise)};
+  for (const RobustRow& row : result.rows) {
+    const std::string which =
+        fmt::format("{}, {:g} % outliers, {}", name(row.structure), 100 * row.outliers, name(row.score));
+    judgement.promises.push_back(
+        {which, row.found_passed,
+         fmt::format("found in {} of {} trials, {:g} % are promised", row.found, row.trials, 100 * row.confidence),
+         static_cast<double>(row.found), row.confidence * static_cast<double>(row.trials)});
+    judgement.promises.push_back(promiseAbout(row, which));
   }
-  return count;
+  return judgement;
 }
 
-RobustValidationResult validateRobust(const RobustValidation& validation,
-                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+RobustValidationResult validateRobust(const RobustValidation& validation, const RunProgress& progress) {
   std::vector<Case> cases;
-  double all = 0, before = 0, judged = 0;
-  const auto costOf = [](const Case& one) { return 30 + static_cast<double>(one.needed); };
+  std::vector<CellSize> sizes;
+  double judged = 0;
   for (const RobustStructure structure : validation.structures) {
     for (const double outliers : validation.outliers) {
       const auto bad = static_cast<std::size_t>(std::lround(outliers * static_cast<double>(validation.measurements)));
@@ -323,20 +316,18 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
       cases.push_back(
           {structure, outliers, bad,
            sampleCount(validation.measurements - bad, validation.measurements, sample, validation.confidence)});
-      all += costOf(cases.back());
+      sizes.push_back({validation.run.trials, 30 + static_cast<double>(cases.back().needed)});
       judged += static_cast<double>(validation.scores.size()) * (promiseOf(cases.back()) ? 2 : 0);
     }
   }
-  trials_of_run.planned += cases.size() * validation.trials;
+  CellRun run(validation.run, sizes, progress);
   RobustValidationResult result;
   for (const Case& one : cases) {
-    const ValidationOptions options = trialsOf(validation, 4, {before, costOf(one), all}, progress);
     const bool conic = one.structure == RobustStructure::conic;
     const int k = conic ? ConicModel::free_parameters : PlaneModel::free_parameters;
     const int equations = conic ? ConicModel::equations : PlaneModel::equations;
-    std::vector<Trial> trials(validation.trials);
-    auto reports = validateAll(ProgramExecutor{validation.threads}, options,
-                               std::vector<ReferenceLaw>(validation.scores.size(), ReferenceLaw::chiSquared(k)),
+    std::vector<Trial> trials(validation.run.trials);
+    auto reports = run.reports(4, std::vector<ReferenceLaw>(validation.scores.size(), ReferenceLaw::chiSquared(k)),
                                [&](CounterRng& rng, std::uint64_t number) {
                                  trials[number] = runTrial(one, validation, number, rng);
                                  std::vector<TrialOutcome> outcomes;
@@ -345,8 +336,8 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
                                  }
                                  return outcomes;
                                });
-    const std::size_t n_trials = reports.empty() ? validation.trials : reports[0].trials;
-    if (!countTrials(n_trials)) break;
+    if (run.ended()) break;
+    const std::size_t n_trials = reports.empty() ? validation.run.trials : reports[0].trials;
     trials.resize(n_trials);
     for (std::size_t i = 0; i < validation.scores.size(); ++i) {
       RobustRow& row = result.rows.emplace_back();
@@ -361,17 +352,13 @@ RobustValidationResult validateRobust(const RobustValidation& validation,
         row.wrong += search.wrong / n;
       }
       row.cut_factor = cutFactor(equations);
-      row.setReport(std::move(reports[i]));
-      row.promise = promiseOf(one);
+      row.conclude(std::move(reports[i]), promiseOf(one), run_false_alarm / judged);
       if (row.promise) {
         row.found_passed =
             binomialSurvival(row.trials - row.found, row.trials, 1 - validation.confidence) >= run_false_alarm / judged;
       }
-      row.judge(run_false_alarm / judged);
-      row.forgetDistances();
     }
     if (one.structure == RobustStructure::conic) result.thresholds.push_back(thresholdRow(one, trials));
-    before += costOf(one);
   }
   return result;
 }

@@ -1,12 +1,11 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <stats/validation_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -33,11 +32,9 @@ struct RobustValidation {
   std::vector<RobustScore> scores{all_robust_scores.begin(), all_robust_scores.end()};
   std::vector<double> outliers{0, 0.3, 0.5, 0.7};  ///< shares of the measurements
   std::size_t measurements = 100;
-  std::size_t trials = 100;  ///< a row
-  std::uint64_t seed = 1;
-  int threads = 0;
-  double confidence = 0.99;  ///< that one of the draws was of inliers alone: the search's stop rule
-  double draw_factor = 1;    ///< so many times the draws that the rule asks for
+  RunSize run{.trials = 100};  ///< trials of a row
+  double confidence = 0.99;    ///< that one of the draws was of inliers alone: the search's stop rule
+  double draw_factor = 1;      ///< so many times the draws that the rule asks for
   /// Standard deviation of the noise that is drawn over that which the search is told.
   double noise_factor = 1;
 };
@@ -79,14 +76,35 @@ struct ThresholdRow {
   double moments_median = 0, moments_tenth = 0;  ///< median and tenth of √T; 4.42 expected
 };
 
+template <class V>
+void describe(V& v, const RobustRow& row) {
+  v("structure", name(row.structure))("score", name(row.score))("outliers", row.outliers, "share");
+  describeReport(v, row.report);
+  v("cut_factor", row.cut_factor, "of the distances, as inliers' errors are cut")("tail", row.tail);
+  v("in_domain", row.promise.has_value())("found", row.found, "trials")("confidence", row.confidence);
+  v("found_passed", row.found_passed)("inliers_right", row.right)("outliers_wrong", row.wrong);
+  v("draws", row.draws)("draws_needed", row.needed)("passed", row.passed);
+}
+template <class V>
+void describe(V& v, const ThresholdRow& row) {
+  v("structure", name(row.structure))("outliers", row.outliers, "share")("trials", row.trials);
+  v("histogram_found", row.histogram_found)("histogram_mean", row.histogram_mean)("histogram_sd", row.histogram_sd);
+  v("moments_found", row.moments_found)("moments_median", row.moments_median)("moments_tenth", row.moments_tenth);
+}
+
 struct RobustValidationResult {
   std::vector<RobustRow> rows;
   std::vector<ThresholdRow> thresholds;
-  Tally tally() const;  ///< counts whether enough structures were found
 };
+template <class V>
+void describe(V& v, const RobustValidationResult& result) {
+  v("rows", result.rows)("thresholds", result.thresholds);
+}
 
 /// Runs everything; rows in the order of structures, outliers, scores.
-RobustValidationResult validateRobust(const RobustValidation& validation,
-                                      const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+RobustValidationResult validateRobust(const RobustValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows: whether enough structures were found, and the distances.
+Judgement judgementOf(const RobustValidationResult& result);
 
 }  // namespace liestat::experiments

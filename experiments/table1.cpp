@@ -1,14 +1,13 @@
 #include <experiments/table1.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <experiments/vi_init_errors.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <experiments/closed_form_cases.hpp>
 #include <experiments/scene_readings.hpp>
-#include <stats/executor.hpp>
 #include <stats/inference.hpp>
 #include <stats/random.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -80,25 +79,14 @@ Recognised recognise(const NoisyClosedFormCase& c, CounterRng& rng) {
 }
 
 template <class Case>
-void fill(Table1Row& row, const Case& c, std::size_t scenes, std::uint64_t seed, int threads) {
+void fill(Table1Row& row, const Case& c, std::uint64_t seed, CellRun& run) {
   row.images = c.scene.images;
   row.features = c.scene.features;
   row.bias = c.bias;
-  using List = std::vector<Recognised>;
-  const std::size_t n_chunks = chunkCount(scenes, 8);
-  const List all = ProgramExecutor{threads}.reduce(
-      n_chunks,
-      [&](std::size_t chunk) {
-        List part;
-        if (runStopped()) return part;
-        const ChunkRange range = chunkRange(scenes, n_chunks, chunk);
-        for (std::size_t i = range.begin; i < range.end; ++i) {
-          CounterRng rng(seed, i);
-          part.push_back(recognise(c, rng));
-        }
-        return part;
-      },
-      [](List& done, const List& next) { done.insert(done.end(), next.begin(), next.end()); });
+  const std::vector<Recognised> all = run.outcomes([&](std::uint64_t number) {
+    CounterRng rng(seed, number);
+    return recognise(c, rng);
+  });
   row.scenes = all.size();
   for (const Recognised& r : all) {
     row.null_right += r.null_right;
@@ -239,60 +227,59 @@ const std::vector<Table1Correction>& table1Corrections() {
   return list;
 }
 
-std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, int threads,
-                                       const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  std::vector<Table1Row> rows;
+std::vector<Table1Row> recogniseTable1(const RunSize& size, const RunProgress& progress) {
   const auto& entries = table1Entries();
-  std::size_t all = 0;
+  std::vector<CellSize> sizes;
   for (const Table1Entry& entry : entries) {
-    all += entry.exact.size() + 9 * entry.noisy.size();
-    trials_of_run.planned += (entry.exact.size() + entry.noisy.size()) * scenes;
+    sizes.insert(sizes.end(), entry.exact.size(), {size.trials, 1});
+    sizes.insert(sizes.end(), entry.noisy.size(), {size.trials, 9});
   }
-  std::size_t done = 0;
+  CellRun run(size, sizes, progress);
   const double false_alarm =
       run_false_alarm / static_cast<double>(closedFormCases().size() + noisyClosedFormCases().size());
-  const auto judge = [&](Table1Row& row, double allowed) {
+  std::vector<Table1Row> rows;
+  // The next case; `allowed` of its scenes may come out otherwise.
+  const auto add = [&](std::size_t e, const auto& cases, const std::pair<const char*, const char*>& wanted, bool noisy,
+                       const auto& expect) {
+    const auto c = std::find_if(cases.begin(), cases.end(),
+                                [&](const auto& one) { return one.name == std::string(wanted.first); });
+    if (c == cases.end() || run.ended()) return;
+    Table1Row row;
+    row.entry = e, row.name = wanted.first, row.corrections = wanted.second, row.noisy = noisy;
+    const double allowed = expect(row, *c);
+    fill(row, *c, size.seed, run);
+    if (run.ended()) return;
     row.passed = binomialSurvival(row.wrong, row.scenes, allowed) >= false_alarm;
-  };
-  const auto find = [](const auto& list, const std::string& wanted) {
-    return std::find_if(list.begin(), list.end(), [&](const auto& c) { return c.name == wanted; });
+    rows.push_back(std::move(row));
   };
   for (std::size_t e = 0; e < entries.size(); ++e) {
-    for (const auto& [wanted, corrections] : entries[e].exact) {
-      const auto c = find(closedFormCases(), wanted);
-      if (c == closedFormCases().end()) continue;
-      Table1Row row;
-      row.entry = e;
-      row.name = wanted;
-      row.corrections = corrections;
-      row.null = c->null;
-      row.expected = {c->status};
-      if (c->or_status != c->status) row.expected.push_back(c->or_status);
-      fill(row, *c, scenes, seed, threads);
-      if (!countTrials(row.scenes)) return rows;
-      judge(row, table1_near_another_case);
-      rows.push_back(std::move(row));
-      done += 1;
-      if (progress) progress(done, all);
+    for (const auto& wanted : entries[e].exact) {
+      add(e, closedFormCases(), wanted, false, [](Table1Row& row, const ClosedFormCase& c) {
+        row.null = c.null;
+        row.expected = {c.status};
+        if (c.or_status != c.status) row.expected.push_back(c.or_status);
+        return table1_near_another_case;
+      });
     }
-    for (const auto& [wanted, corrections] : entries[e].noisy) {
-      const auto c = find(noisyClosedFormCases(), wanted);
-      if (c == noisyClosedFormCases().end()) continue;
-      Table1Row row;
-      row.entry = e;
-      row.name = wanted;
-      row.corrections = corrections;
-      row.noisy = true;
-      row.expected = c->expected;
-      fill(row, *c, scenes, seed, threads);
-      if (!countTrials(row.scenes)) return rows;
-      judge(row, 1 - c->share);
-      rows.push_back(std::move(row));
-      done += 9;
-      if (progress) progress(done, all);
+    for (const auto& wanted : entries[e].noisy) {
+      add(e, noisyClosedFormCases(), wanted, true, [](Table1Row& row, const NoisyClosedFormCase& c) {
+        row.expected = c.expected;
+        return 1 - c.share;
+      });
     }
   }
   return rows;
+}
+
+Judgement judgementOf(const std::vector<Table1Row>& rows) {
+  Judgement judgement{.promises = {}, .where = "of the corrected table"};
+  for (const Table1Row& row : rows) {
+    judgement.promises.push_back(
+        {fmt::format("{}, {}", row.name, row.noisy ? "with noise" : "exact"), row.passed,
+         fmt::format("{} of {} scenes came out otherwise than the corrected table says", row.wrong, row.scenes),
+         static_cast<double>(row.wrong)});
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <experiments/judged_report.hpp>
+#include <experiments/cell_run.hpp>
+#include <experiments/judgement.hpp>
 #include <fusion/init/closed_form_types.hpp>
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -51,10 +51,36 @@ struct Table1Row {
   std::optional<bool> passed;  ///< always there
 };
 
+/// Statuses and in how many scenes they were, as fields.
+struct Table1Statuses {
+  const Table1Row* row = nullptr;
+};
+template <class V>
+void describe(V& v, const Table1Statuses& statuses) {
+  if (statuses.row == nullptr) return;
+  for (const auto& [status, count] : statuses.row->statuses) v(std::string(name(status)).c_str(), count, "scenes");
+}
+template <class V>
+void describe(V& v, const Table1Row& row) {
+  const Table1Entry& entry = table1Entries()[row.entry];
+  v("row", row.entry + 1)("cases", entry.cases)("paper", entry.paper)("case", row.name);
+  v("corrections", row.corrections)("data", row.noisy ? "noise" : "exact");
+  v("images", row.images)("features", row.features)("bias", row.bias)("scenes", row.scenes);
+  v("null", row.noisy ? std::nullopt : std::optional(row.null), "dimension of the null space as it must be");
+  v("null_right", row.noisy ? std::nullopt : std::optional(row.null_right), "scenes in which it was found");
+  v("one_solution", row.solutions[0])("two_solutions", row.solutions[1])("infinite_solutions", row.solutions[2]);
+  v("recognised", Table1Statuses{&row});
+  std::vector<std::string> expected;
+  for (const FusionStatus status : row.expected) expected.push_back(name(status));
+  v("expected", expected)("otherwise", row.wrong, "scenes")("passed", row.passed);
+}
+
 /// Probability that a scene drawn at random is so near to another case that it counts as that, with exact data.
 inline constexpr double table1_near_another_case = 1e-3;
 /// Recognises all cases of the table in so many scenes each; the same for any number of threads.
-std::vector<Table1Row> recogniseTable1(std::size_t scenes, std::uint64_t seed, int threads,
-                                       const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<Table1Row> recogniseTable1(const RunSize& size, const RunProgress& progress = {});
+
+/// The promise on each case: it comes out as the corrected table says.
+Judgement judgementOf(const std::vector<Table1Row>& rows);
 
 }  // namespace liestat::experiments

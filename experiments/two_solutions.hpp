@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 namespace liestat::experiments {
 
@@ -27,6 +28,32 @@ std::optional<TwoSolutions> twoSolutions(int figure, std::uint64_t seed);
 
 /// The second solution's lengths over the first's: the mean of the features'.
 double measuredScale(const TwoSolutions& found);
+
+/// One of the solutions, as fields.
+struct SolutionOfTwo {
+  const TwoSolutions* found = nullptr;
+  std::size_t k = 0;
+};
+template <class V>
+void describe(V& v, const SolutionOfTwo& x) {
+  const ClosedFormSolution s = x.found == nullptr ? ClosedFormSolution{} : x.found->result.solutions[x.k];
+  v("truth", x.found != nullptr && x.k == x.found->truth)("velocity", s.velocity, "", "m/s");
+  v("gravity", s.gravity, "", "m/s^2")("roll", s.roll(), "", "rad")("pitch", s.pitch(), "", "rad")("cost", s.cost);
+  Eigen::MatrixXd features(static_cast<Eigen::Index>(s.features.size()), 3);
+  for (Eigen::Index i = 0; i < features.rows(); ++i) features.row(i) = s.features[static_cast<std::size_t>(i)];
+  v("negative_depths", s.negative_depths)("features", features, "", "m");
+}
+template <class V>
+void describe(V& v, const TwoSolutions& found) {
+  v("figure", found.figure)("scene_seed", found.seed)("images", found.scene.times.size());
+  v("features", found.scene.features.size())("times", found.scene.times, "", "s");
+  v("status", name(found.result.status))("null_dimension", found.result.null_dimension);
+  v("singular_values", found.result.singular_values)("features_scale", measuredScale(found));
+  v("axes", "body at the first image");
+  std::vector<SolutionOfTwo> solutions;
+  for (std::size_t k = 0; k < found.result.solutions.size(); ++k) solutions.push_back({&found, k});
+  v("solutions", solutions);
+}
 
 /// Where the body is at a time according to a solution: in its axes at the first image, from there (m).
 Eigen::Vector3d positionAt(const InertialScene& scene, const ClosedFormSolution& solution, double t);

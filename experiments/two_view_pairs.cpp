@@ -1,7 +1,5 @@
 #include <experiments/two_view_pairs.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/repeated_extraction.hpp>
@@ -12,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -245,18 +242,6 @@ double medianOf(const std::vector<Run>& runs, double Run::*number) {
   return median(values);
 }
 
-/// f(seed) for all runs, on several threads.
-template <class F>
-auto repeat(const TwoViewPairsValidation& how, const F& f) {
-  using Run = decltype(f(std::uint64_t{}));
-  return ProgramExecutor{how.threads}.reduce(
-      how.runs, [&](std::size_t k) { return std::vector<Run>{f(how.seed + k)}; },
-      [](std::vector<Run> all, std::vector<Run> more) {
-        std::move(more.begin(), more.end(), std::back_inserter(all));
-        return all;
-      });
-}
-
 PairChoice summarise(const Normalised& pair, const std::vector<ChoiceRun>& runs) {
   PairChoice row;
   row.family = pair.pair->family, row.name = pair.pair->name;
@@ -307,10 +292,10 @@ PairPlane summarise(const Normalised& pair, const std::vector<PlaneRun>& runs) {
 }
 
 /// The promises: shares of the twelve pairs of each kind, rounded in favour of the promise where there are others.
-std::vector<PairCheck> checksOf(const TwoViewPairsResult& result) {
-  std::vector<PairCheck> checks;
+std::vector<Promise> checksOf(const TwoViewPairsResult& result) {
+  std::vector<Promise> checks;
   const auto add = [&](std::string text, double value, double bound, bool at_least) {
-    checks.push_back({std::move(text), value, bound, at_least ? value >= bound : value <= bound});
+    checks.push_back({std::move(text), at_least ? value >= bound : value <= bound, {}, value, bound});
   };
   double n[2] = {0, 0}, right[2] = {0, 0}, beyond[2] = {0, 0}, by_rule[2] = {0, 0};
   for (const PairChoice& row : result.choices) {
@@ -329,8 +314,7 @@ std::vector<PairCheck> checksOf(const TwoViewPairsResult& result) {
   }
   for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
     if (n[k] == 0) continue;
-    checks.push_back({name(pair_families[k]) + ": pairs that DEGENSAC's rule tells right", by_rule[k],
-                      std::numeric_limits<double>::quiet_NaN(), std::nullopt});
+    checks.push_back({name(pair_families[k]) + ": pairs that DEGENSAC's rule tells right", {}, {}, by_rule[k]});
   }
   if (n[0] > 0 && n[1] > 0) {
     add("both: pairs with the right choice", right[0] + right[1], std::ceil(2 * (n[0] + n[1]) / 3), true);
@@ -390,31 +374,36 @@ std::vector<std::size_t> bestAssignment(const Eigen::MatrixXd& overlaps) {
 }
 
 TwoViewPairsResult validateTwoViewPairs(const std::vector<TwoViewPair>& pairs, const TwoViewPairsValidation& validation,
-                                        const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+                                        const RunProgress& progress) {
   TwoViewPairsResult result;
-  std::uint64_t all = 0, done = 0;
-  for (const TwoViewPair& pair : pairs) all += pair.matches.size();
-  trials_of_run.planned += pairs.size() * validation.runs;
+  std::vector<CellSize> cells;
+  for (const TwoViewPair& pair : pairs)
+    cells.push_back({validation.run.trials, static_cast<double>(pair.matches.size())});
+  CellRun run(validation.run, cells, progress);
   for (const TwoViewPair& pair : pairs) {
-    // All runs of a pair or none: a pair takes seconds.
     if (runStopped()) break;
     const Normalised normalised(pair, validation);
+    const auto add = [&](auto& rows, const auto& runOnce) {
+      // All runs of a pair or none: a pair takes seconds.
+      const auto runs =
+          run.outcomes([&](std::uint64_t k) { return runOnce(normalised, validation.run.seed + k); }, true);
+      if (!run.ended()) rows.push_back(summarise(normalised, runs));
+    };
     if (pair.family == PairFamily::adelaide) {
-      result.structures.push_back(summarise(
-          normalised, repeat(validation, [&](std::uint64_t seed) { return runStructures(normalised, seed); })));
+      add(result.structures, runStructures);
     } else if (pair.family == PairFamily::evd) {
-      result.planes.push_back(
-          summarise(normalised, repeat(validation, [&](std::uint64_t seed) { return runPlane(normalised, seed); })));
+      add(result.planes, runPlane);
     } else {
-      result.choices.push_back(
-          summarise(normalised, repeat(validation, [&](std::uint64_t seed) { return runChoice(normalised, seed); })));
+      add(result.choices, runChoice);
     }
-    countTrials(validation.runs);
-    done += pair.matches.size();
-    if (progress) progress(done, all);
+    if (run.ended()) break;
   }
   result.checks = checksOf(result);
   return result;
+}
+
+Judgement judgementOf(const TwoViewPairsResult& result) {
+  return {.promises = result.checks, .where = "of promises", .false_alarm = 0};
 }
 
 }  // namespace liestat::experiments

@@ -10,15 +10,13 @@
 // defaults but for ten hypotheses of a model that are refined.
 #pragma once
 
-#include <experiments/judged_report.hpp>
+#include <experiments/cell_run.hpp>
+#include <experiments/judgement.hpp>
 #include <stats/hierarchy_types.hpp>
 
 #include <Eigen/Core>
 
 #include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,10 +46,8 @@ struct TwoViewPair {
 };
 
 struct TwoViewPairsValidation {
-  double sigma = 1;       ///< px
-  std::size_t runs = 10;  ///< runs a pair; medians are over these
-  std::uint64_t seed = 1;
-  int threads = 0;
+  double sigma = 1;           ///< px
+  RunSize run{.trials = 10};  ///< runs of a pair; medians are over these
   /// Matches that others contradict (fusion/two_view/contradictions.hpp) take part.
   bool contradicted = false;
 };
@@ -97,25 +93,52 @@ struct PairPlane {
   std::size_t supported = 0, runs = 0;  ///< runs that found a homography that chance does not explain
 };
 
-/// A promise about all pairs of a kind, a count with its bound; or a count to compare it with, which is not judged.
-struct PairCheck {
-  std::string text;
-  double value = 0, bound = 0;
-  std::optional<bool> passed;
+/// The models that were chosen and how often, as fields.
+struct ChosenInPair {
+  const PairChoice* choice = nullptr;
 };
+template <class V>
+void describe(V& v, const ChosenInPair& chosen) {
+  if (chosen.choice == nullptr) return;
+  for (const auto& [model, count] : chosen.choice->chosen) v(model.c_str(), count, "runs");
+}
+template <class V>
+void describe(V& v, const PairChoice& row) {
+  v("family", name(row.family))("pair", row.name)("tentative", row.tentative, "matches")("kept", row.kept);
+  v("runs", row.runs)("right", row.right)("chosen", ChosenInPair{&row});
+  v("homography_inliers", row.homography_inliers)("fundamental_inliers", row.fundamental_inliers);
+  v("far", row.far)("explained", row.explained)("explained_by_chance", row.allowed);
+  v("homography_cost", row.homography_cost)("fundamental_cost", row.fundamental_cost);
+  v("degenerate_samples", row.degenerate, "runs")("validation_error_px", row.validation_error, "", "px");
+}
+template <class V>
+void describe(V& v, const PairStructures& row) {
+  v("pair", row.name)("matches", row.matches)("planes", row.labelled)("found", row.found)("wrong", row.wrong);
+  v("purity", row.purity)("coverage", row.coverage)("first_wrong", row.first_wrong);
+}
+template <class V>
+void describe(V& v, const PairPlane& row) {
+  v("pair", row.name)("matches", row.matches)("right", row.labelled)("runs", row.runs)("runs_found", row.supported);
+  v("inliers", row.inliers)("inliers_right", row.right)("distance_px", row.label_error, "", "px");
+}
 
 struct TwoViewPairsResult {
   std::vector<PairChoice> choices;
   std::vector<PairStructures> structures;
   std::vector<PairPlane> planes;
-  std::vector<PairCheck> checks;
-  Tally tally() const { return experiments::tally(checks); }
+  std::vector<Promise> checks;  ///< promises about all pairs of a kind, and counts to compare them with
 };
+template <class V>
+void describe(V& v, const TwoViewPairsResult& result) {
+  v("choices", result.choices)("structures", result.structures)("planes", result.planes)("checks", result.checks);
+}
 
 /// Runs everything, in the order of the pairs.
-TwoViewPairsResult validateTwoViewPairs(
-    const std::vector<TwoViewPair>& pairs, const TwoViewPairsValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+TwoViewPairsResult validateTwoViewPairs(const std::vector<TwoViewPair>& pairs, const TwoViewPairsValidation& validation,
+                                        const RunProgress& progress = {});
+
+/// The promises: bounds, which no chance excuses.
+Judgement judgementOf(const TwoViewPairsResult& result);
 
 /// For each row of a table of overlaps the column that it is given, so that their sum is largest and no column is given
 /// twice; columns() for none.

@@ -1,12 +1,11 @@
 #include <experiments/two_view_rules.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
 #include <stats/model_choice.hpp>
 #include <stats/model_choice_f_test.hpp>
-#include <stats/validation.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
@@ -84,53 +83,51 @@ std::size_t TwoViewRuleRow::worst() const {
   return worst;
 }
 
-std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& comparison,
-                                                const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& comparison, const RunProgress& progress) {
   std::vector<TwoViewRuleRow> rows;
   for (const Rule& rule : rules()) rows.push_back({rule.name, {}, {}});
-  const std::uint64_t all = comparison.trials * default_two_view_motions.size();
-  trials_of_run.planned += all;
-  std::uint64_t before = 0;
+  CellRun run(comparison.run, std::vector<CellSize>(default_two_view_motions.size(), {comparison.run.trials, 1}),
+              progress);
   for (std::size_t k = 0; k < default_two_view_motions.size(); ++k) {
     const TwoViewSceneOptions options{.motion = default_two_view_motions[k],
                                       .matches = comparison.matches,
                                       .outliers = comparison.outliers,
                                       .sigma = comparison.sigma};
-    // A row of each trial, a column of each rule.
-    std::vector<char> right(comparison.trials * rules().size(), 0);
-    const ValidationOptions how{.trials = comparison.trials,
-                                .seed = comparison.seed,
-                                .chunk_size = 4,
-                                .progress =
-                                    [&](std::size_t done, std::size_t) {
-                                      if (progress) progress(before + done, all);
-                                    },
-                                .stop = runStopped};
-    const auto reports =
-        validateAll(ProgramExecutor{comparison.threads}, how, {ReferenceLaw::chiSquared(1)},
-                    [&](CounterRng&, std::uint64_t number) {
-                      const std::uint64_t seed = comparison.seed * 1000003 + number;
-                      const TwoViewScene scene(options, seed);
-                      const double sigma = options.sigma / options.focal_length;
-                      const TwoViewImages images{{sigma, sigma},
-                                                 Eigen::Vector2d(options.width, options.height) / options.focal_length};
-                      Search search(twoViewModels(images), {.seed = seed, .all_models = true});
-                      search.add(scene.matches);
-                      while (search.iterate()) {
-                      }
-                      for (std::size_t r = 0; r < rules().size(); ++r) {
-                        const std::size_t m = rules()[r].choose(search, sigma);
-                        right[number * rules().size() + r] = search.models()[m]->name() == nameOf(options.motion);
-                      }
-                      return std::vector<TrialOutcome>{TrialOutcome{}};
-                    });
-    before += comparison.trials;
-    const std::size_t done = reports[0].trials;
-    if (!countTrials(done)) return k == 0 ? std::vector<TwoViewRuleRow>{} : rows;
-    for (std::size_t i = 0; i < done * rows.size(); ++i) rows[i % rows.size()].right[k] += right[i] != 0;
-    for (TwoViewRuleRow& row : rows) row.trials[k] = done;
+    // Of each trial, which rules were right.
+    const std::vector<std::vector<bool>> trials = run.outcomes([&](std::uint64_t number) {
+      const std::uint64_t seed = comparison.run.seed * 1000003 + number;
+      const TwoViewScene scene(options, seed);
+      const double sigma = options.sigma / options.focal_length;
+      const TwoViewImages images{{sigma, sigma}, Eigen::Vector2d(options.width, options.height) / options.focal_length};
+      Search search(twoViewModels(images), {.seed = seed, .all_models = true});
+      search.add(scene.matches);
+      while (search.iterate()) {
+      }
+      std::vector<bool> right;
+      for (const Rule& rule : rules()) {
+        right.push_back(search.models()[rule.choose(search, sigma)]->name() == nameOf(options.motion));
+      }
+      return right;
+    });
+    if (run.ended()) return k == 0 ? std::vector<TwoViewRuleRow>{} : rows;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      rows[r].trials[k] = trials.size();
+      for (const std::vector<bool>& right : trials) rows[r].right[k] += right[r];
+    }
   }
   return rows;
+}
+
+Verdict verdictOf(const std::vector<TwoViewRuleRow>& rows) {
+  const auto best = std::max_element(rows.begin(), rows.end(), [](const TwoViewRuleRow& a, const TwoViewRuleRow& b) {
+    return a.average() < b.average();
+  });
+  const double right = rows.front().average();
+  return Verdict::yes(fmt::format(
+      "The default rule chooses the right model in {:.1f} % of the trials{}. Nothing is promised of the rules.",
+      100 * right,
+      best->average() > right ? fmt::format(", and '{}' in {:.1f} %", best->rule, 100 * best->average())
+                              : ", and no other rule in more"));
 }
 
 }  // namespace liestat::experiments

@@ -1,11 +1,10 @@
 #include <experiments/two_view_validation.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <experiments/two_view_lattice.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
-#include <stats/validation.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -73,46 +72,42 @@ double TwoViewValidationResult::average() const {
   return sum / count;
 }
 
-Tally TwoViewValidationResult::tally() const {
-  Tally count = experiments::tally(choices);
-  count.judged += average_passed.has_value();
-  count.failed += !average_passed.value_or(true);
-  return count;
+Judgement judgementOf(const TwoViewValidationResult& result) {
+  Judgement judgement{.promises = {}, .where = "of distances and choices"};
+  for (const TwoViewRow& row : result.rows) judgement.promises.push_back(promiseAbout(row, name(row.motion)));
+  for (const TwoViewChoice& choice : result.choices) {
+    judgement.promises.push_back({name(choice.truth), choice.passed,
+                                  fmt::format("chosen in {} of {} trials, {:.0f} % are promised", choice.right(),
+                                              choice.trials, 100 * promised_row),
+                                  static_cast<double>(choice.right()),
+                                  promised_row * static_cast<double>(choice.trials)});
+  }
+  judgement.promises.push_back({"mean of the diagonal", result.average_passed,
+                                fmt::format("{:.0f} % are promised", 100 * promised_average), result.average(),
+                                promised_average});
+  return judgement;
 }
 
-TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
-                                        const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+TwoViewValidationResult validateTwoView(const TwoViewValidation& validation, const RunProgress& progress) {
   TwoViewValidationResult result;
-  const std::uint64_t all = validation.trials * validation.motions.size();
-  trials_of_run.planned += all;
-  std::uint64_t before = 0;
+  CellRun run(validation.run, std::vector<CellSize>(validation.motions.size(), {validation.run.trials, 1}), progress);
   for (const TwoViewMotion motion : validation.motions) {
     const TwoViewSceneOptions options{
         .motion = motion, .matches = validation.matches, .outliers = validation.outliers, .sigma = validation.sigma};
     const int k = dimensionOf(options);
-    std::vector<std::size_t> chosen(validation.trials);
-    const ValidationOptions how{.trials = validation.trials,
-                                .seed = validation.seed,
-                                .chunk_size = 4,
-                                .progress =
-                                    [&](std::size_t done, std::size_t) {
-                                      if (progress) progress(before + done, all);
-                                    },
-                                .stop = runStopped};
-    auto reports = validateAll(ProgramExecutor{validation.threads}, how, {ReferenceLaw::chiSquared(std::max(k, 1))},
-                               [&](CounterRng&, std::uint64_t number) {
-                                 // Each trial has a place of its own.
-                                 const Trial trial = runTrial(options, validation.seed * 1000003 + number);
-                                 chosen[number] = trial.chosen;
-                                 TrialOutcome outcome;
-                                 outcome.failed = !trial.distance && k > 0;
-                                 outcome.mu2 = trial.distance.value_or(0);
-                                 return std::vector<TrialOutcome>{outcome};
-                               });
-    before += validation.trials;
-    if (!countTrials(reports[0].trials)) return result;
-    chosen.resize(reports[0].trials);
     TwoViewChoice choice;
+    std::vector<std::size_t> chosen(validation.run.trials);
+    auto reports = run.reports(4, {ReferenceLaw::chiSquared(std::max(k, 1))}, [&](CounterRng&, std::uint64_t number) {
+      // Each trial has a place of its own.
+      const Trial trial = runTrial(options, validation.run.seed * 1000003 + number);
+      chosen[number] = trial.chosen;
+      TrialOutcome outcome;
+      outcome.failed = !trial.distance && k > 0;
+      outcome.mu2 = trial.distance.value_or(0);
+      return std::vector<TrialOutcome>{outcome};
+    });
+    if (run.ended()) return result;
+    chosen.resize(reports[0].trials);
     choice.truth = motion;
     choice.trials = chosen.size();
     for (const std::size_t c : chosen) ++choice.chosen[c];
@@ -121,14 +116,12 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
     if (k == 0) continue;
     TwoViewRow row;
     row.motion = motion;
-    row.setReport(std::move(reports[0]));
     // Errors beyond the 0.99 quantile are cut off, outliers below it are not: what that makes of the index, and the
     // curvature of the longest motions (docs/two_view.md).
-    row.promise = ValidationTolerance{.index = 0.1, .ks = 0.05, .failure_fraction = 0.01, .tail = 0.02};
+    ValidationTolerance promise{.index = 0.1, .ks = 0.05, .failure_fraction = 0.01, .tail = 0.02};
     // One that may be refused has distances where it was chosen, and how often that is, is judged above.
-    if (motion == TwoViewMotion::shared_focal) row.promise->failure_fraction = 1 - promised_row;
-    row.judge(run_false_alarm / static_cast<double>(validation.motions.size()));
-    row.forgetDistances();
+    if (motion == TwoViewMotion::shared_focal) promise.failure_fraction = 1 - promised_row;
+    row.conclude(std::move(reports[0]), promise, run_false_alarm / static_cast<double>(validation.motions.size()));
     result.rows.push_back(std::move(row));
   }
   if (trials_of_run.incomplete()) return result;
@@ -136,7 +129,7 @@ TwoViewValidationResult validateTwoView(const TwoViewValidation& validation,
     return std::find(validation.motions.begin(), validation.motions.end(), motion) != validation.motions.end();
   };
   if (std::all_of(default_two_view_motions.begin(), default_two_view_motions.end(), asked)) {
-    const auto nine = static_cast<double>(validation.trials * default_two_view_motions.size());
+    const auto nine = static_cast<double>(validation.run.trials * default_two_view_motions.size());
     result.average_passed = reaches(result.average() * nine, nine, promised_average);
   }
   return result;

@@ -1,13 +1,12 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <experiments/two_view_scene.hpp>
 #include <stats/validation_report.hpp>
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,9 +18,7 @@ namespace liestat::experiments {
 /// lattice and that model.
 struct TwoViewValidation {
   std::vector<TwoViewMotion> motions{default_two_view_motions.begin(), default_two_view_motions.end()};
-  std::size_t trials = 50;  ///< a motion
-  std::uint64_t seed = 1;
-  int threads = 0;
+  RunSize run{.trials = 50};  ///< trials of a motion
   std::size_t matches = 100;
   double outliers = 0.2;  ///< share of the matches
   double sigma = 0.5;     ///< px
@@ -54,12 +51,40 @@ struct TwoViewValidationResult {
   std::vector<TwoViewChoice> choices;  ///< all motions
   std::optional<bool> average_passed;  ///< where all nine were asked for
   double average() const;              ///< share of right choices among them; NaN of none
-  Tally tally() const;                 ///< counts the choices and their average
 };
 
+template <class V>
+void describe(V& v, const TwoViewRow& row) {
+  v("motion", name(row.motion));
+  describeReport(v, row.report);
+  v("tail", row.tail)("failures", row.report.failures)("passed", row.passed);
+}
+
+/// The models that were chosen, as fields.
+struct ChosenModels {
+  const TwoViewChoice* choice = nullptr;
+};
+template <class V>
+void describe(V& v, const ChosenModels& models) {
+  for (std::size_t m = 0; models.choice != nullptr && m < all_two_view_motions.size(); ++m) {
+    // The default lattice, and the model that this motion is tried with.
+    if (m >= default_two_view_motions.size() && all_two_view_motions[m] != models.choice->truth) continue;
+    v(name(all_two_view_motions[m]).c_str(), models.choice->chosen[m], "trials");
+  }
+}
+template <class V>
+void describe(V& v, const TwoViewChoice& choice) {
+  v("motion", name(choice.truth))("trials", choice.trials)("chosen", ChosenModels{&choice})("passed", choice.passed);
+}
+template <class V>
+void describe(V& v, const TwoViewValidationResult& result) {
+  v("rows", result.rows)("choices", result.choices);
+}
+
 /// Runs everything; in the order of the motions.
-TwoViewValidationResult validateTwoView(
-    const TwoViewValidation& validation,
-    const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+TwoViewValidationResult validateTwoView(const TwoViewValidation& validation, const RunProgress& progress = {});
+
+/// The promises: the distances, the choices, and their average.
+Judgement judgementOf(const TwoViewValidationResult& result);
 
 }  // namespace liestat::experiments

@@ -1,9 +1,8 @@
 #include <experiments/vi_init_validation.hpp>
 
-#include <experiments/interruption.hpp>
-#include <experiments/parallel.hpp>
 #include <experiments/vi_init_evaluation.hpp>
-#include <stats/executor.hpp>
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -82,14 +81,12 @@ struct Experiment {
   };
   std::vector<Row> rows;
   std::size_t share = 1;  ///< it has only one trial of so many
-  /// So many trials: the values of each row.
-  std::function<std::vector<ViInitValues>(std::size_t trials, const ViInitValidation&,
-                                          const std::function<void(std::size_t)>& progress)>
-      run = {};
+  /// The trials of the next cell: the values of each row.
+  std::function<std::vector<ViInitValues>(const ViInitValidation&, CellRun&)> run = {};
 
   std::size_t trials(const ViInitValidation& validation) const {
     if (check == Check::noise) return validation.recordings;
-    return std::max<std::size_t>(1, validation.trials / share);
+    return std::max<std::size_t>(1, validation.run.trials / share);
   }
   /// Milliseconds of all its trials, about: for the progress bar.
   double work(const ViInitValidation& validation) const {
@@ -104,32 +101,16 @@ struct Experiment {
 };
 
 template <class Outcome>
-std::vector<Outcome> runTrials(ViInitTrial<Outcome> trial, const ViInitWindow& window, std::size_t trials,
-                               const ViInitValidation& validation, const std::function<void(std::size_t)>& progress) {
-  using Outcomes = std::vector<Outcome>;
-  // One trial a chunk: some experiments have ten trials of a second each.
-  return ProgramExecutor{validation.threads}.reduce(
-      trials,
-      [&](std::size_t i) {
-        if (runStopped()) return Outcomes{};
-        CounterRng rng(validation.seed, i);
-        return Outcomes{trial(window, validation.noise, rng)};
-      },
-      [&](Outcomes& done, const Outcomes& next) {
-        done.insert(done.end(), next.begin(), next.end());
-        progress(done.size());
-      });
-}
-
-template <class Outcome>
 Experiment experiment(Check check, ViInitTrial<Outcome> trial, const ViInitWindow& window,
                       const std::vector<Column<Outcome>>& columns) {
   Experiment e{.check = check, .window = window, .rows = {}};
   for (const Column<Outcome>& c : columns) e.rows.push_back({c.estimator, c.quantity, c.dof});
-  e.run = [trial, window, columns](std::size_t trials, const ViInitValidation& validation,
-                                   const std::function<void(std::size_t)>& progress) {
+  e.run = [trial, window, columns](const ViInitValidation& validation, CellRun& run) {
     std::vector<ViInitValues> values(columns.size());
-    for (const Outcome& outcome : runTrials(trial, window, trials, validation, progress)) {
+    for (const Outcome& outcome : run.outcomes([&](std::uint64_t number) {
+           CounterRng rng(validation.run.seed, number);
+           return trial(window, validation.noise, rng);
+         })) {
       for (std::size_t k = 0; k < columns.size(); ++k) {
         values[k].value.push_back(columns[k].value(outcome));
         if (columns[k].chi2_dof != nullptr) values[k].dof.push_back(columns[k].chi2_dof(outcome));
@@ -280,41 +261,70 @@ std::string name(ViInitQuantity quantity) { return entry(quantity).name; }
 std::string unit(ViInitQuantity quantity) { return entry(quantity).unit; }
 ViInitStatistic statistic(ViInitQuantity quantity) { return entry(quantity).statistic; }
 
-std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
-                                      const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+std::vector<ViInitRow> validateViInit(const ViInitValidation& validation, const RunProgress& progress) {
   const std::vector<Experiment> list = experiments(validation);
-  std::vector<ViInitRow> rows;
-  double all = 0, before = 0;
+  std::vector<std::vector<ViInitRow>> cells;
+  std::vector<CellSize> sizes;
+  std::size_t judged = 0;
   for (const Experiment& e : list) {
-    all += e.work(validation);
-    trials_of_run.planned += e.trials(validation);
-    for (const Experiment::Row& of : e.rows) {
-      ViInitRow row;
-      row.check = e.check;
-      row.estimator = of.estimator;
-      row.quantity = of.quantity;
-      row.window = e.window;
-      row.promise = viInitPromise(row);
-      rows.push_back(std::move(row));
+    sizes.push_back({e.trials(validation), e.work(validation)});
+    std::vector<ViInitRow>& cell = cells.emplace_back(e.rows.size());
+    for (std::size_t k = 0; k < cell.size(); ++k) {
+      cell[k].check = e.check, cell[k].window = e.window;
+      cell[k].estimator = e.rows[k].estimator, cell[k].quantity = e.rows[k].quantity;
+      cell[k].promise = viInitPromise(cell[k]);
+      judged += cell[k].promise.has_value();
     }
   }
-  const auto judged = std::count_if(rows.begin(), rows.end(), [](const ViInitRow& row) { return row.promise; });
-  const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::ptrdiff_t>(1, judged));
-  auto row = rows.begin();
-  for (const Experiment& e : list) {
-    const std::vector<ViInitValues> values = e.run(e.trials(validation), validation, [&](std::size_t done) {
-      const double share = static_cast<double>(done) / static_cast<double>(e.trials(validation));
-      if (progress) progress(static_cast<std::uint64_t>(1e6 * (before + share * e.work(validation)) / all), 1000000);
-    });
-    // Rows have their places beforehand; those that an interrupt left without a trial are no rows.
-    if (!countTrials(values.empty() ? e.trials(validation) : values[0].value.size())) {
-      rows.erase(row, rows.end());
-      break;
+  const double false_alarm = run_false_alarm / static_cast<double>(std::max<std::size_t>(1, judged));
+  CellRun run(validation.run, sizes, progress);
+  std::vector<ViInitRow> rows;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::vector<ViInitValues> values = list[i].run(validation, run);
+    if (run.ended()) break;
+    for (std::size_t k = 0; k < cells[i].size(); ++k) {
+      evaluate(cells[i][k], values[k], list[i].rows[k].dof, false_alarm);
+      rows.push_back(std::move(cells[i][k]));
     }
-    for (std::size_t k = 0; k < e.rows.size(); ++k, ++row) evaluate(*row, values[k], e.rows[k].dof, false_alarm);
-    before += e.work(validation);
   }
   return rows;
+}
+
+const ViInitRow* ViInitGroup::of(ViInitQuantity quantity) const {
+  const auto found =
+      std::find_if(rows.begin(), rows.end(), [&](const ViInitRow* row) { return row->quantity == quantity; });
+  return found == rows.end() ? nullptr : *found;
+}
+
+std::optional<bool> ViInitGroup::passed() const {
+  std::optional<bool> passed;
+  for (const ViInitRow* row : rows) {
+    if (row->passed) passed = passed.value_or(true) && *row->passed;
+  }
+  return passed;
+}
+
+std::vector<ViInitGroup> groups(const std::vector<ViInitRow>& rows, ViInitCheck check) {
+  std::vector<ViInitGroup> list;
+  for (const ViInitRow& row : rows) {
+    if (row.check != check) continue;
+    auto group = std::find_if(list.begin(), list.end(), [&](const ViInitGroup& g) {
+      return g.first().estimator == row.estimator && g.first().window == row.window;
+    });
+    if (group == list.end()) group = list.insert(list.end(), ViInitGroup{});
+    group->rows.push_back(&row);
+  }
+  return list;
+}
+
+Judgement judgementOf(const std::vector<ViInitRow>& rows) {
+  Judgement judgement{.promises = {}, .where = "with a promise"};
+  for (const ViInitRow& row : rows) {
+    judgement.promises.push_back(
+        promiseAbout(row, fmt::format("{} {} {}, {:g} s, {} images, {} features", name(row.check), name(row.estimator),
+                                      name(row.quantity), row.window.seconds, row.window.images, row.window.features)));
+  }
+  return judgement;
 }
 
 }  // namespace liestat::experiments

@@ -1,12 +1,10 @@
 #pragma once
 
+#include <experiments/cell_run.hpp>
 #include <experiments/judged_report.hpp>
 #include <experiments/vi_init_trials.hpp>
-#include <stats/validation.hpp>
 
 #include <array>
-#include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -110,11 +108,9 @@ struct ViInitPromise {
 struct ViInitValidation {
   std::vector<ViInitCheck> checks{all_vi_init_checks.begin(), all_vi_init_checks.end()};
   std::vector<double> windows;  ///< s; of those that there are; all of them for none
-  std::size_t trials = 600;     ///< windows a row; of slow motion a tenth of them
+  RunSize run{.trials = 600};   ///< windows of a row; of slow motion a tenth of them
   std::size_t recordings = 10;  ///< a row of the calibration of noise
   double noise = 1;             ///< simulated noise over the noise that the estimators are told
-  std::uint64_t seed = 1;
-  int threads = 0;
 };
 
 /// One line of the JSON. Numbers that do not apply are NaN.
@@ -134,11 +130,42 @@ struct ViInitRow {
   ValidationVerdict verdict = ValidationVerdict::passed;  ///< the same with the reason
 };
 
+template <class V>
+void describe(V& v, const ViInitRow& row) {
+  v("check", name(row.check))("estimator", name(row.estimator))("quantity", name(row.quantity));
+  v("unit", unit(row.quantity), "of median and p95");
+  v("window", row.window.seconds, "", "s")("images", row.window.images)("features", row.window.features);
+  v("in_domain", row.promise.has_value());
+  ValidationReport none;
+  none.trials = row.trials;
+  describeReport(v, row.report.value_or(none), row.report.has_value());
+  v("failures", row.failures)("median", row.median, "of the errors")("p95", row.p95);
+  v("value", row.value, "chi-squared per degree of freedom, or a fraction")("value_se", row.value_se);
+  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
+  v("promised_median", promise.median)("promised_p95", promise.p95);
+  v("note_median", promise.note_median, "of an independent prototype")("note_p95", promise.note_p95);
+  v("passed", row.passed);
+}
+
+/// The rows of one estimator in one kind of window.
+struct ViInitGroup {
+  std::vector<const ViInitRow*> rows;
+
+  const ViInitRow& first() const { return *rows.front(); }
+  const ViInitRow* of(ViInitQuantity quantity) const;  ///< null without one
+  /// True if all that was judged passes; none if nothing was.
+  std::optional<bool> passed() const;
+};
+/// The groups of a check, in the order of the rows.
+std::vector<ViInitGroup> groups(const std::vector<ViInitRow>& rows, ViInitCheck check);
+
 /// The promise made about a row, if there is one.
 std::optional<ViInitPromise> viInitPromise(const ViInitRow& row);
 
 /// Runs the checks; rows in the order of the checks, windows and quantities. The same for any number of threads.
-std::vector<ViInitRow> validateViInit(const ViInitValidation& validation,
-                                      const std::function<void(std::uint64_t done, std::uint64_t all)>& progress = {});
+std::vector<ViInitRow> validateViInit(const ViInitValidation& validation, const RunProgress& progress = {});
+
+/// The promises on the rows.
+Judgement judgementOf(const std::vector<ViInitRow>& rows);
 
 }  // namespace liestat::experiments

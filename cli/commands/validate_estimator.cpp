@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/estimator_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/estimator_validation.hpp>
 
 #include <memory>
 #include <string>
@@ -13,20 +14,16 @@ namespace {
 struct Options {
   EstimatorValidation validation;
   std::vector<std::string> experiments;
-  std::size_t trials = 0;
-  bool full = false;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
   EstimatorValidation validation = options.validation;
   validation.experiments = chosen(all_estimator_experiments, options.experiments);
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 40000 : 2000;
-  const std::vector<EstimatorRow> rows =
+  validation.run = options.run.size(2000, 40000);
+  const auto rows =
       runTrials("validate estimator", [&](const auto& progress) { return validateEstimator(validation, progress); });
-  return publish(
-      options.output, invocation, validation.seed, run_false_alarm, rows, formatEstimatorTables,
-      [](const EstimatorRow& row) { return toJson(row); }, writeEstimatorReport);
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 }  // namespace
@@ -43,9 +40,8 @@ void addValidateEstimatorCommand(const CommandList& validate) {
   app.option("--noise-factor", options->validation.noise_factor,
              "Standard deviation of the noise over what the estimator is told (default 1)")
       .range(0.01, 100.0);
-  app.flag("--full", options->full, "40000 trials a row");
-  addRunOptions(app, "2000, with --full 40000", options->trials, options->validation.seed, options->validation.threads,
-                options->output);
+  app.flag("--full", options->run.full, "40000 trials a row");
+  options->run.declare(app, "2000, with --full 40000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/hand_eye_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/hand_eye_validation.hpp>
 
 #include <memory>
 #include <string>
@@ -13,23 +14,17 @@ namespace {
 struct Options {
   HandEyeValidation validation;
   std::vector<std::string> experiments;
-  std::size_t trials = 0;
-  bool full = false;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
   HandEyeValidation validation = options.validation;
   validation.experiments = chosen(all_hand_eye_experiments, options.experiments);
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
-  validation.many_pairs = options.full;
-  const std::vector<HandEyeRow> rows =
+  validation.run = options.run.size(100, 2000);
+  validation.many_pairs = options.run.full;
+  const auto rows =
       runTrials("validate hand-eye", [&](const auto& progress) { return validateHandEye(validation, progress); });
-  FurtherRows counted;
-  counted.tally = countedTally(rows);
-  return publish(
-      options.output, invocation, validation.seed, run_false_alarm, rows, formatHandEyeTables,
-      [](const HandEyeRow& row) { return toJson(row); }, writeHandEyeReport, counted);
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 }  // namespace
@@ -45,9 +40,8 @@ void addValidateHandEyeCommand(const CommandList& validate) {
   app.option("--noise-factor", options->validation.noise_factor,
              "Standard deviation of the noise over what the estimator is told (default 1)")
       .range(0.01, 100.0);
-  app.flag("--full", options->full, "2000 trials a row, and rows with 200 pairs");
-  addRunOptions(app, "100, with --full 2000", options->trials, options->validation.seed, options->validation.threads,
-                options->output);
+  app.flag("--full", options->run.full, "2000 trials a row, and rows with 200 pairs");
+  options->run.declare(app, "100, with --full 2000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

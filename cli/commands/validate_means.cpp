@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/means_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/means_validation.hpp>
 
 #include <algorithm>
 #include <memory>
@@ -17,11 +18,8 @@ struct Options {
   std::vector<std::size_t> n;
   std::vector<double> spreads;
   std::optional<CovarianceAt> covariance_at;
-  ValidationOutput output;
-  std::size_t trials = 0;
-  std::uint64_t seed = 1;
-  int threads = 0;
-  bool certify = false, full = false;
+  bool certify = false;
+  RunOptions run;
 };
 
 /// The front door's cells of the chosen features; none where the run is about certain rows of the experiments.
@@ -30,9 +28,9 @@ std::vector<VerdictCell> chosenCells(const Options& options, const std::vector<F
                         !options.spreads.empty() || options.covariance_at == CovarianceAt::measured;
   std::vector<VerdictCell> cells;
   if (narrowed) return cells;
-  for (VerdictCell cell : verdictCells(options.full)) {
+  for (VerdictCell cell : verdictCells(options.run.full)) {
     if (std::find(features.begin(), features.end(), cell.feature) == features.end()) continue;
-    if (options.trials != 0) cell.trials = std::min(cell.trials, options.trials);
+    if (options.run.trials != 0) cell.trials = std::min(cell.trials, options.run.trials);
     cells.push_back(cell);
   }
   return cells;
@@ -45,29 +43,18 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.criteria = chosen(all_criteria, options.criteria);
   if (!options.n.empty()) validation.n = options.n;
   validation.spreads = options.spreads;
-  if (options.full && validation.spreads.empty()) validation.spreads = {1.0 / 3, 1.0};
+  if (options.run.full && validation.spreads.empty()) validation.spreads = {1.0 / 3, 1.0};
   validation.covariance_at = options.covariance_at.value_or(CovarianceAt::estimated);
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 4000 : 1000;
-  validation.seed = options.seed;
-  validation.threads = options.threads;
-  validation.certify = options.certify || options.full;
-  validation.all_printed = options.full;
+  validation.run = options.run.size(1000, 4000);
+  validation.certify = options.certify || options.run.full;
+  validation.all_printed = options.run.full;
 
-  const std::vector<MeansRow> rows =
-      runTrials("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
-  const std::vector<VerdictRow> verdicts = runTrials("verdicts", [&](const auto& progress) {
-    return judgeVerdicts(chosenCells(options, validation.features), options.seed, options.threads, progress);
+  MeansValidationResult result;
+  result.rows = runTrials("validate means", [&](const auto& progress) { return validateMeans(validation, progress); });
+  result.verdicts = runTrials("verdicts", [&](const auto& progress) {
+    return judgeVerdicts(chosenCells(options, validation.features), options.run.seed, options.run.threads, progress);
   });
-  FurtherRows further{"verdicts", {}, tally(verdicts)};
-  for (const VerdictRow& row : verdicts) further.rows.push_back(toJson(row));
-  return publish(
-      options.output, invocation, options.seed, run_false_alarm, rows,
-      [&](const std::vector<MeansRow>& list) { return formatMeansTables(list, verdicts); },
-      [](const MeansRow& row) { return toJson(row); },
-      [&](const std::string& directory, const std::string& command_line, const std::vector<MeansRow>& list) {
-        writeMeansReport(directory, command_line, list, verdicts);
-      },
-      further);
+  return publish(options.run, invocation, viewOf(result));
 }
 
 }  // namespace
@@ -88,9 +75,10 @@ void addValidateMeansCommand(const CommandList& validate) {
   app.choice<CovarianceAt>("--covariance-at", options->covariance_at,
                            {{"estimated", CovarianceAt::estimated}, {"measured", CovarianceAt::measured}},
                            "Frame in which the noise of frames is Gaussian and MAHA takes its covariances");
-  addRunOptions(app, "1000, with --full 4000", options->trials, options->seed, options->threads, options->output);
+  options->run.declare(app, "1000, with --full 4000");
   app.flag("--certify", options->certify, "Certify the global minimum of LSQ and WLSQ by branch and bound");
-  app.flag("--full", options->full, "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
+  app.flag("--full", options->run.full,
+           "4000 trials, both spreads, certified minima, all printed formulas; no time limit");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/motion_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/motion_validation.hpp>
 
 #include <memory>
 #include <string>
@@ -13,23 +14,16 @@ namespace {
 struct Options {
   MotionValidation validation;
   std::vector<std::string> methods;
-  std::size_t trials = 0;
-  bool full = false;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
   MotionValidation validation = options.validation;
   validation.methods = chosen(all_motion_methods, options.methods);
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 300;
-  const std::vector<MotionRow> rows =
+  validation.run = options.run.size(300, 2000);
+  const auto rows =
       runTrials("validate motion", [&](const auto& progress) { return validateMotion(validation, progress); });
-  return publish(
-      options.output, invocation, validation.seed, run_false_alarm, rows,
-      [](const auto& list) { return formatMotionTables(list); }, [](const MotionRow& row) { return toJson(row); },
-      [](const std::string& directory, const std::string& command_line, const auto& list) {
-        writeMotionReport(directory, command_line, list);
-      });
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 }  // namespace
@@ -45,9 +39,8 @@ void addValidateMotionCommand(const CommandList& validate) {
   app.option("--noise-factor", options->validation.noise_factor,
              "Standard deviation of the noise over what the filters are told (default 1)")
       .range(0.01, 100.0);
-  app.flag("--full", options->full, "2000 trials a row");
-  addRunOptions(app, "300, with --full 2000", options->trials, options->validation.seed, options->validation.threads,
-                options->output);
+  app.flag("--full", options->run.full, "2000 trials a row");
+  options->run.declare(app, "300, with --full 2000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/preintegration_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/preintegration_validation.hpp>
 
 #include <memory>
 
@@ -9,21 +10,20 @@ using namespace experiments;
 namespace {
 
 struct Options {
-  PreintegrationValidation validation;
   std::vector<std::string> checks;
   std::vector<double> windows, noises;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
-  PreintegrationValidation validation = options.validation;
+  PreintegrationValidation validation;
   validation.checks = chosen(all_preintegration_checks, options.checks);
   if (!options.windows.empty()) validation.windows = options.windows;
   if (!options.noises.empty()) validation.noises = options.noises;
-  const std::vector<PreintegrationRow> rows = runTrials(
-      "validate preintegration", [&](const auto& progress) { return validatePreintegration(validation, progress); });
-  return publish(options.output, invocation, validation.seed, run_false_alarm, rows, formatPreintegrationTable, toJson,
-                 writePreintegrationReport);
+  validation.run = options.run.size(validation.run.trials);
+  const auto rows = runTrials("validate preintegration",
+                              [&](const auto& progress) { return validatePreintegration(validation, progress); });
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 }  // namespace
@@ -39,8 +39,7 @@ void addValidatePreintegrationCommand(const CommandList& validate) {
   app.option("--noise", options->noises, "Multiples of an ADIS16448's noise, a comma list (default 1,10,100)")
       .list()
       .range(1e-3, 1e4);
-  addRunOptions(app, "2000", options->validation.trials, options->validation.seed, options->validation.threads,
-                options->output);
+  options->run.declare(app, "2000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/propagation_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/propagation_validation.hpp>
 
 #include <memory>
 
@@ -9,22 +10,20 @@ using namespace experiments;
 namespace {
 
 struct Options {
-  PropagationValidation validation;
   std::vector<std::string> features, operations;
   std::vector<double> spreads;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
-  PropagationValidation validation = options.validation;
+  PropagationValidation validation;
   validation.features = chosen(all_propagated, options.features);
   validation.operations = chosen(all_operations, options.operations);
   if (!options.spreads.empty()) validation.spreads = options.spreads;
-
-  const std::vector<PropagationRow> rows = runTrials(
-      "validate propagation", [&](const auto& progress) { return validatePropagation(validation, progress); });
-  return publish(options.output, invocation, validation.seed, run_false_alarm, rows, formatPropagationTables, toJson,
-                 writePropagationReport);
+  validation.run = options.run.size(validation.run.trials);
+  const auto rows = runTrials("validate propagation",
+                              [&](const auto& progress) { return validatePropagation(validation, progress); });
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 }  // namespace
@@ -44,8 +43,7 @@ void addValidatePropagationCommand(const CommandList& validate) {
              "Largest standard deviations, rad and m, a comma list (default 0.01,0.03,0.1,0.2,0.3,0.5,1)")
       .list()
       .range(1e-6, 10.0);
-  addRunOptions(app, "20000", options->validation.trials, options->validation.seed, options->validation.threads,
-                options->output);
+  options->run.declare(app, "20000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,6 +1,7 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/robust_validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/robust_validation.hpp>
 
 #include <memory>
 #include <string>
@@ -14,9 +15,7 @@ struct Options {
   RobustValidation validation;
   std::vector<std::string> structures, scores;
   std::vector<double> outliers;
-  std::size_t trials = 0;
-  bool full = false;
-  ValidationOutput output;
+  RunOptions run;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
@@ -24,19 +23,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
   validation.structures = chosen(all_robust_structures, options.structures);
   validation.scores = chosen(all_robust_scores, options.scores);
   if (!options.outliers.empty()) validation.outliers = options.outliers;
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 2000 : 100;
-  const RobustValidationResult result =
+  validation.run = options.run.size(100, 2000);
+  const auto result =
       runTrials("validate robust", [&](const auto& progress) { return validateRobust(validation, progress); });
-  // The share of structures that were found is judged beside the distances.
-  FurtherRows thresholds{"thresholds", {}, result.tally()};
-  for (const ThresholdRow& row : result.thresholds) thresholds.rows.push_back(toJson(row));
-  return publish(
-      options.output, invocation, validation.seed, run_false_alarm, result.rows,
-      [&](const auto&) { return formatRobustTables(result); }, [](const RobustRow& row) { return toJson(row); },
-      [&](const std::string& directory, const std::string& command_line, const auto&) {
-        writeRobustReport(directory, command_line, result);
-      },
-      thresholds);
+  return publish(options.run, invocation, viewOf(result));
 }
 
 }  // namespace
@@ -65,9 +55,8 @@ void addValidateRobustCommand(const CommandList& validate) {
   app.option("--noise-factor", options->validation.noise_factor,
              "Standard deviation of the noise over what the search is told (default 1)")
       .range(0.01, 100.0);
-  app.flag("--full", options->full, "2000 trials a row");
-  addRunOptions(app, "100, with --full 2000", options->trials, options->validation.seed, options->validation.threads,
-                options->output);
+  app.flag("--full", options->run.full, "2000 trials a row");
+  options->run.declare(app, "100, with --full 2000");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -127,7 +127,10 @@ template <class Split>
 int show(const Split& split, const Options& options, const Invocation& invocation) {
   if (endedBeforeTrials()) return exit_interrupted;
   if (options.json != "-") printLines(formatSplit(split));
-  if (!options.json.empty()) writeJson(options.json, toJson(split, invocation.command_line));
+  if (!options.json.empty()) {
+    JsonObject object = jsonEnvelope(invocation.command_line, options.settings.split.seed);
+    writeJson(options.json, object.set("file", split.source).fieldsOf(split));
+  }
   if (!options.report.empty()) writeSplitReport(options.report, invocation.command_line, split);
   return exitCode(split.passed());
 }

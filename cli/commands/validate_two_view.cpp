@@ -1,15 +1,13 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <cli/show/validations.hpp>
 #include <experiments/two_view_pair_files.hpp>
-#include <cli/show/two_view_pairs.hpp>
-#include <cli/show/two_view_rules.hpp>
-#include <cli/show/two_view_validation.hpp>
 #include <experiments/two_view_rules.hpp>
+#include <experiments/two_view_validation.hpp>
 
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -19,57 +17,30 @@ namespace {
 struct Options {
   TwoViewValidation validation;
   std::vector<std::string> motions;
-  std::size_t trials = 0;
   std::optional<double> sigma;
-  bool full = false, rules = false;
+  bool rules = false;
   std::string pairs;
   bool all_matches = false;
-  ValidationOutput output;
+  RunOptions run;
 };
+
+constexpr const char* bar = "validate two-view";
 
 int runPairs(const Options& options, const Invocation& invocation) {
   const std::vector<TwoViewPair> pairs = readTwoViewPairs(options.pairs);
-  TwoViewPairsValidation validation;
+  TwoViewPairsValidation validation{.run = options.run.size(10), .contradicted = options.all_matches};
   validation.sigma = options.sigma.value_or(validation.sigma);
-  validation.runs = options.trials != 0 ? options.trials : validation.runs;
-  validation.seed = options.validation.seed, validation.threads = options.validation.threads;
-  validation.contradicted = options.all_matches;
-  const TwoViewPairsResult result = runTrials(
-      "validate two-view", [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
-  if (endedBeforeTrials()) return exit_interrupted;
-  if (options.output.json != "-") printLines(formatTwoViewPairs(result));
-  if (!options.output.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, validation.seed);
-    setVerdict(object, result.tally().failed == 0);
-    writeJson(options.output.json, toJson(result, std::move(object)));
-  }
-  if (!options.output.report.empty()) {
-    writeTwoViewPairsReport(options.output.report, invocation.command_line, result);
-  }
-  return exitCode(result.tally().failed == 0);
+  const auto result =
+      runTrials(bar, [&](const auto& progress) { return validateTwoViewPairs(pairs, validation, progress); });
+  return publish(options.run, invocation, viewOf(result));
 }
 
-/// Nothing is promised of the rules, so nothing is judged.
 int compareRules(const Options& options, const Invocation& invocation) {
-  TwoViewRuleComparison comparison;
-  comparison.trials = options.trials != 0 ? options.trials : options.full ? 500 : 20;
-  comparison.seed = options.validation.seed, comparison.threads = options.validation.threads;
-  comparison.matches = options.validation.matches, comparison.outliers = options.validation.outliers;
+  TwoViewRuleComparison comparison{
+      .run = options.run.size(20, 500), .matches = options.validation.matches, .outliers = options.validation.outliers};
   comparison.sigma = options.sigma.value_or(comparison.sigma);
-  const std::vector<TwoViewRuleRow> rows =
-      runTrials("validate two-view", [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
-  if (endedBeforeTrials()) return exit_interrupted;
-  if (options.output.json != "-") printLines(formatTwoViewRules(rows));
-  if (!options.output.json.empty()) {
-    JsonObject object = jsonEnvelope(invocation.command_line, comparison.seed);
-    std::vector<JsonObject> list;
-    for (const TwoViewRuleRow& row : rows) list.push_back(toJson(row));
-    writeJson(options.output.json, setInterrupted(object).set("rules", list));
-  }
-  if (!options.output.report.empty()) {
-    writeTwoViewRulesReport(options.output.report, invocation.command_line, rows);
-  }
-  return exitCode(true);
+  const auto rows = runTrials(bar, [&](const auto& progress) { return compareTwoViewRules(comparison, progress); });
+  return publish(options.run, invocation, viewOf(rows));
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
@@ -77,19 +48,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (options.rules) return compareRules(options, invocation);
   TwoViewValidation validation = options.validation;
   validation.sigma = options.sigma.value_or(validation.sigma);
-  if (options.full || !options.motions.empty()) validation.motions = chosen(all_two_view_motions, options.motions);
-  validation.trials = options.trials != 0 ? options.trials : options.full ? 500 : 50;
-  const TwoViewValidationResult result =
-      runTrials("validate two-view", [&](const auto& progress) { return validateTwoView(validation, progress); });
-  FurtherRows choices{"choices", {}, result.tally()};
-  for (const TwoViewChoice& choice : result.choices) choices.rows.push_back(toJson(choice));
-  return publish(
-      options.output, invocation, validation.seed, run_false_alarm, result.rows,
-      [&](const auto&) { return formatTwoViewTables(result); }, [](const TwoViewRow& row) { return toJson(row); },
-      [&](const std::string& directory, const std::string& command_line, const auto&) {
-        writeTwoViewReport(directory, command_line, result);
-      },
-      choices);
+  if (options.run.full || !options.motions.empty()) validation.motions = chosen(all_two_view_motions, options.motions);
+  validation.run = options.run.size(50, 500);
+  const auto result = runTrials(bar, [&](const auto& progress) { return validateTwoView(validation, progress); });
+  return publish(options.run, invocation, viewOf(result));
 }
 
 std::string optionalNames() {
@@ -115,7 +77,7 @@ void addValidateTwoViewCommand(const CommandList& validate) {
   app.option("--outliers", options->validation.outliers, "Share of wrong matches (default 0.2)").range(0.0, 0.9);
   app.option("--sigma", options->sigma, "Standard deviation of image coordinates, px (default 0.5, of real pairs 1)")
       .range(1e-3, 10.0);
-  app.flag("--full", options->full, "500 trials a motion, optional models too");
+  app.flag("--full", options->run.full, "500 trials a motion, optional models too");
   app.option("--pairs", options->pairs,
              "Real pairs instead: a directory with the folders homogr, kusvod2, adelaide-rmf, evd, or some of them")
       .excludes("--motion")
@@ -127,8 +89,7 @@ void addValidateTwoViewCommand(const CommandList& validate) {
            "Compare rules by which the model may be chosen instead; all models are estimated")
       .excludes("--pairs")
       .excludes("--motion");
-  addRunOptions(app, "50, with --full 500, of real pairs 10", options->trials, options->validation.seed,
-                options->validation.threads, options->output);
+  options->run.declare(app, "50, with --full 500, of real pairs 10");
   app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }
 

@@ -1,9 +1,7 @@
-#include <cli/show/hand_eye_validation.hpp>
-
-#include <report/page.hpp>
 #include <report/table.hpp>
 #include <cli/show/units.hpp>
-#include <cli/show/validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/hand_eye_validation.hpp>
 
 #include <fmt/format.h>
 
@@ -20,9 +18,6 @@ using Rows = std::vector<HandEyeRow>;
 std::string orNothing(double value, int digits = 3) { return std::isnan(value) ? "" : number(value, digits); }
 std::string inDegrees(double radians) { return orNothing(degrees * radians); }
 std::string inMillimetres(double metres) { return orNothing(1e3 * metres); }
-std::string noiseName(const HandEyeRow& row) {
-  return row.scale == 1 ? name(row.noise) : fmt::format("{} x{:g}", name(row.noise), row.scale);
-}
 /// The index where there are distances.
 std::string indexCell(const HandEyeRow& row) { return row.report.index > 0 ? number(row.report.index, 3) : ""; }
 std::string coverageCell(const HandEyeRow& row) {
@@ -106,89 +101,35 @@ const Part parts[] = {
                number(row.chi2_per_dof, 3)};
      }}};
 
-std::vector<Cells> cellsOf(const Part& part, const Rows& rows) {
-  std::vector<Cells> list;
+ValidationTable tableOf(const Part& part, const Rows& rows) {
+  ValidationTable table{.title = part.title, .caption = part.caption, .headers = part.headers};
+  Plot histograms{.name = fmt::format("histograms_{}", &part - parts),
+                  .caption = "Distances of the trials with the density that they should have.",
+                  .columns = 4};
   for (const HandEyeRow& row : rows) {
-    if (row.experiment == part.experiment && row.fit == part.fit) list.push_back(part.cells(row));
+    if (row.experiment != part.experiment || row.fit != part.fit) continue;
+    table.rows.push_back(part.cells(row));
+    if (row.report.index > 0) histograms.panels.push_back(histogramPanel(row, label(row)));
   }
-  return list;
-}
-std::string titleOf(const HandEyeRow& row) {
-  std::string text = fmt::format("{} {} n = {}", name(row.formulation), noiseName(row), row.pairs);
-  if (row.motion != HandEyeMotion::general) text += " " + name(row.motion);
-  if (row.outliers) text += " " + name(*row.outliers);
-  return row.fit ? text + ", fit" : text;
+  table.plots = {std::move(histograms)};
+  return table;
 }
 
 }  // namespace
 
-std::string formatHandEyeTables(const Rows& rows) {
-  std::string text;
-  for (const Part& part : parts) {
-    const std::vector<Cells> cells = cellsOf(part, rows);
-    if (cells.empty()) continue;
-    Table table(part.headers);
-    for (const Cells& row : cells) table.row(row);
-    text += fmt::format("\n{}\n{}\n{}", part.title, part.caption, table.str());
-  }
-  std::string reasons;
-  for (const HandEyeRow& row : rows) {
-    if (!row.right_passed.value_or(true)) {
-      reasons += fmt::format("FAILED {} {}: {} of {} trials right\n", name(row.experiment), titleOf(row), row.right,
-                             row.trials);
-    }
-    if (!row.passed.value_or(true)) {
-      reasons += fmt::format("FAILED {} {}: {}\n", name(row.experiment), titleOf(row), reason(row.verdict));
-    }
-  }
-  return fmt::format("{}\n{}{}", text, reasons,
-                     verdictLines(tally(rows) + countedTally(rows), "where they are promised"));
-}
-
-JsonObject toJson(const HandEyeRow& row) {
-  JsonObject o;
-  o.set("experiment", name(row.experiment)).set("formulation", name(row.formulation)).set("motion", name(row.motion));
-  o.set("noise", name(row.noise)).set("noise_scale", row.scale).set("pairs", row.pairs);
-  if (row.outliers) {
-    o.set("outliers", name(*row.outliers));
-  } else {
-    o.set("outliers", nullptr);
-  }
-  o.set("quantity", row.fit ? "fit" : "calibration").set("in_domain", row.promise.has_value());
-  setStatistics(o, row.report);
-  o.set("rms_rotation", row.rms_rotation).set("rms_translation", row.rms_translation);
-  o.set("note_rms_rotation", row.note_rotation).set("note_rms_translation", row.note_translation);
-  o.set("chi2_per_dof", row.chi2_per_dof).set("right", row.right).set("right_passed", row.right_passed);
-  o.set("lost", row.lost).set("failures", row.report.failures).set("passed", row.passed);
-  return o;
-}
-
-void writeHandEyeReport(const std::string& directory, const std::string& command_line, const Rows& rows) {
-  Report report(directory, "Hand-eye calibration: do errors, residuals and open directions follow their laws?");
-  showVerdict(report, formatHandEyeTables(rows));
-  report.paragraph(
-      "Each trial draws the poses of a camera on a gripper that looks at a target, with noise in both poses, and "
-      "estimates gripper_T_camera from them. The squared Mahalanobis distance of the truth follows a chi-square law "
-      "with "
-      "as many degrees of freedom as the motion determines, that of the poses from the corrected ones a law with the "
-      "residual degrees of freedom.");
-  report.code(command_line);
-  for (const Part& part : parts) {
-    const std::vector<Cells> cells = cellsOf(part, rows);
-    if (cells.empty()) continue;
-    report.section(part.title);
-    report.table(part.headers, cells, part.caption);
-    std::vector<Panel> histograms;
-    for (const HandEyeRow& row : rows) {
-      if (row.experiment != part.experiment || row.fit != part.fit || !(row.report.index > 0)) continue;
-      histograms.push_back(histogramPanel(row, titleOf(row)));
-    }
-    report.plot({.name = fmt::format("histograms_{}", &part - parts),
-                 .caption = "Distances of the trials with the density that they should have.",
-                 .panels = histograms,
-                 .columns = 4});
-  }
-  report.write();
+ValidationView viewOf(const Rows& rows) {
+  ValidationView view{
+      .title = "Hand-eye calibration: do errors, residuals and open directions follow their laws?",
+      .introduction =
+          "Each trial draws the poses of a camera on a gripper that looks at a target, with noise in both poses, and "
+          "estimates gripper_T_camera from them. The squared Mahalanobis distance of the truth follows a chi-square "
+          "law "
+          "with as many degrees of freedom as the motion determines, that of the poses from the corrected ones a law "
+          "with the residual degrees of freedom.",
+      .judgement = judgementOf(rows),
+      .fields = [&rows](JsonObject& object) { object("rows", rows); }};
+  for (const Part& part : parts) view.tables.push_back(tableOf(part, rows));
+  return view;
 }
 
 }  // namespace liestat::cli

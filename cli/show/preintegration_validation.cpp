@@ -1,8 +1,6 @@
-#include <cli/show/preintegration_validation.hpp>
-
-#include <report/page.hpp>
 #include <report/table.hpp>
-#include <cli/show/validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/preintegration_validation.hpp>
 
 #include <fmt/format.h>
 
@@ -12,41 +10,10 @@ namespace liestat::cli {
 
 using namespace experiments;
 
-std::string formatPreintegrationTable(const std::vector<PreintegrationRow>& rows) {
-  Table table({"check", "window s", "noise", "k", "index", "SE", "index/k", "K-S p", "95 % covers", "verdict"});
-  std::string reasons;
-  for (const PreintegrationRow& row : rows) {
-    const ValidationReport& r = row.report;
-    table.row({name(row.check), number(row.window), number(row.noise), fmt::format("{}", r.dof), number(r.index),
-               number(r.index_se, 2), fmt::format("{:.3f}", row.relativeIndex()), number(r.ks_p_value, 2),
-               fmt::format("{:.1f}", 100 * r.coverage[2].observed), verdictCell(row.passed)});
-    if (row.passed.value_or(true)) continue;
-    reasons +=
-        fmt::format("FAILED {} {} s, noise {}: {}\n", name(row.check), row.window, row.noise, reason(row.verdict));
-  }
-  return fmt::format(
-      "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n{}\n{}{}",
-      table.str(110), reasons,
-      verdictLines(tally(rows), fmt::format("in the promised domain (noise up to {:g})", preintegration_promise)));
-}
+namespace {
 
-JsonObject toJson(const PreintegrationRow& row) {
-  JsonObject o;
-  o.set("check", name(row.check)).set("window", row.window).set("noise", row.noise);
-  o.set("in_domain", row.passed.has_value());
-  setStatistics(o, row.report);
-  o.set("failures", row.report.failures).set("passed", row.passed);
-  return o;
-}
-
-void writePreintegrationReport(const std::string& directory, const std::string& command_line,
-                               const std::vector<PreintegrationRow>& rows) {
-  Report report(directory, "Preintegration: is the covariance true?");
-  showVerdict(report, formatPreintegrationTable(rows));
-  report.paragraph(
-      "Each trial makes a motion, readings of it with noise and walking biases, and takes the squared Mahalanobis "
-      "distance of the true increment under the covariance. If that is true, the distances follow a chi-square law.");
-  report.code(command_line);
+/// The page: plots over the windows, and a table.
+void drawPage(Report& report, const std::vector<PreintegrationRow>& rows) {
   // A panel for each noise; what is checked, as a curve over the windows.
   const auto panels = [&](const std::string& quantity, double expected, const auto& value) {
     std::vector<Panel> list;
@@ -86,7 +53,31 @@ void writePreintegrationReport(const std::string& directory, const std::string& 
   }
   report.table({"check", "window s", "noise", "trials", "index", "SE", "expected", "K-S p", "95 % covers", "verdict"},
                table);
-  report.write();
+}
+
+}  // namespace
+
+ValidationView viewOf(const std::vector<PreintegrationRow>& rows) {
+  ValidationTable table{
+      .headers = {"check", "window s", "noise", "k", "index", "SE", "index/k", "K-S p", "95 % covers", "verdict"},
+      .width = 110};
+  for (const PreintegrationRow& row : rows) {
+    const ValidationReport& r = row.report;
+    table.rows.push_back({name(row.check), number(row.window), number(row.noise), fmt::format("{}", r.dof),
+                          number(r.index), number(r.index_se, 2), fmt::format("{:.3f}", row.relativeIndex()),
+                          number(r.ks_p_value, 2), fmt::format("{:.1f}", 100 * r.coverage[2].observed),
+                          verdictCell(row.passed)});
+  }
+  return {.title = "Preintegration: is the covariance true?",
+          .introduction =
+              "Each trial makes a motion, readings of it with noise and walking biases, and takes the squared "
+              "Mahalanobis distance of the true increment under the covariance. If that is true, the distances follow "
+              "a chi-square law.",
+          .judgement = judgementOf(rows),
+          .fields = [&rows](JsonObject& object) { object("rows", rows); },
+          .head = "Squared Mahalanobis distances of true increments; noise in multiples of an ADIS16448's\n\n",
+          .tables = {std::move(table)},
+          .page = [&rows](Report& report) { drawPage(report, rows); }};
 }
 
 }  // namespace liestat::cli

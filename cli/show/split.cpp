@@ -81,11 +81,6 @@ std::string formatSplit(const FileSplit& split) {
   return text;
 }
 
-JsonObject toJson(const FileSplit& split, const std::string& command_line) {
-  JsonObject object = jsonEnvelope(command_line, split.settings.seed);
-  return object.set("file", split.source).fieldsOf(split);
-}
-
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split) {
   Report report(directory, "Split of the measurements in " + split.source);
   report.verdict(split.verdict());

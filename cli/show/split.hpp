@@ -4,7 +4,6 @@
 
 #include <cli/commands/measurements.hpp>
 #include <cli/commands/mean_analysis.hpp>
-#include <report/json.hpp>
 #include <stats/split_validation_types.hpp>
 
 #include <Eigen/Core>
@@ -37,6 +36,14 @@ struct LandmarkSplit {
   double squaredSurveyDistance() const;  ///< under the covariance of the mean; NaN without one of the two
 };
 
+template <class V>
+void describe(V& v, const LandmarkSplit& row) {
+  v("track", row.track)("n", row.split.n)("random", row.split.random.index, "index of halves at random");
+  v("by_blocks", row.split.by_blocks.index)("inflation", row.split.by_blocks.factor());
+  v("mean", row.whole.mean.point.value_or(Eigen::Vector3d::Zero()))("squared_distance", row.split.squared_distance);
+  v("survey_distance", row.surveyDistance(), "", "m")("survey_squared_distance", row.squaredSurveyDistance());
+}
+
 /// Several landmarks, pooled.
 struct LandmarkSplits : SplitOutcome {
   std::string source;       ///< the prefix of the files
@@ -50,12 +57,18 @@ struct LandmarkSplits : SplitOutcome {
   double surveySquaredDistance() const;  ///< mean over the landmarks; 3 expected
 };
 
+template <class V>
+void describe(V& v, const LandmarkSplits& split) {
+  describe(v, static_cast<const SplitOutcome&>(split));
+  v("criterion", name(split.criterion))("skipped", split.skipped, "landmarks with too few observations");
+  const auto surveyed = [&](double value) { return split.surveyed ? std::optional(value) : std::nullopt; };
+  v("survey_rms", surveyed(split.surveyRms()), "", "m");
+  v("survey_squared_distance", surveyed(split.surveySquaredDistance()), "3 expected")("landmarks", split.landmarks);
+}
+
 /// Lines for the terminal, the verdict last.
 std::string formatSplit(const FileSplit& split);
 std::string formatSplit(const LandmarkSplits& split);
-
-JsonObject toJson(const FileSplit& split, const std::string& command_line);
-JsonObject toJson(const LandmarkSplits& split, const std::string& command_line);
 
 /// The page with its plots.
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split);

@@ -60,29 +60,6 @@ std::string formatSplit(const LandmarkSplits& split) {
   return text + splitVerdict(split);
 }
 
-JsonObject toJson(const LandmarkSplits& split, const std::string& command_line) {
-  JsonObject object = jsonEnvelope(command_line, split.settings.seed);
-  object.set("file", split.source)
-      .fieldsOf<SplitOutcome>(split)
-      .set("criterion", name(split.criterion))
-      .set("skipped", split.skipped);
-  if (split.surveyed) {
-    object.set("survey_rms", split.surveyRms()).set("survey_squared_distance", split.surveySquaredDistance());
-  } else {
-    object.set("survey_rms", nullptr).set("survey_squared_distance", nullptr);
-  }
-  std::vector<JsonObject> list;
-  for (const LandmarkSplit& row : split.landmarks) {
-    JsonObject o;
-    o.set("track", row.track).set("n", row.split.n).set("random", row.split.random.index);
-    o.set("by_blocks", row.split.by_blocks.index).set("inflation", row.split.by_blocks.factor());
-    o.set("mean", *row.whole.mean.point).set("squared_distance", row.split.squared_distance);
-    o.set("survey_distance", row.surveyDistance()).set("survey_squared_distance", row.squaredSurveyDistance());
-    list.push_back(std::move(o));
-  }
-  return object.set("landmarks", list);
-}
-
 void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split) {
   Report report(directory, "Split of the landmarks in " + split.source);
   report.verdict(split.verdict());

@@ -1,8 +1,7 @@
 #include <cli/show/units.hpp>
-#include <cli/show/two_solutions.hpp>
-
-#include <report/page.hpp>
+#include <cli/show/validations.hpp>
 #include <experiments/closed_form_cases.hpp>
+#include <experiments/two_solutions.hpp>
 
 #include <fmt/format.h>
 
@@ -138,9 +137,7 @@ std::string summary(const TwoSolutions& found) {
   return text;
 }
 
-}  // namespace
-
-std::string formatTwoSolutions(const TwoSolutions& found) {
+std::string textOf(const TwoSolutions& found) {
   std::string text = fmt::format("Figure {} of A. Martinelli (2012), scene of seed {}\n{}\n\n", found.figure,
                                  found.seed, summary(found));
   for (std::size_t k = 0; k < 2; ++k) {
@@ -152,44 +149,8 @@ std::string formatTwoSolutions(const TwoSolutions& found) {
   return text;
 }
 
-JsonObject toJson(const TwoSolutions& found, const std::string& command_line, std::uint64_t seed) {
-  JsonObject o = jsonEnvelope(command_line, seed);
-  o.set("figure", found.figure).set("scene_seed", found.seed).set("images", found.scene.times.size());
-  o.set("features", found.scene.features.size()).set("times", found.scene.times);
-  o.set("status", name(found.result.status)).set("null_dimension", found.result.null_dimension);
-  o.set("singular_values", found.result.singular_values).set("features_scale", measuredScale(found));
-  o.set("axes", "body at the first image");
-  std::vector<JsonObject> solutions;
-  for (std::size_t k = 0; k < found.result.solutions.size(); ++k) {
-    const ClosedFormSolution& solution = found.result.solutions[k];
-    JsonObject s;
-    s.set("truth", k == found.truth).set("velocity", solution.velocity).set("gravity", solution.gravity);
-    s.set("roll", solution.roll()).set("pitch", solution.pitch()).set("cost", solution.cost);
-    Eigen::Matrix3Xd features(3, static_cast<Eigen::Index>(solution.features.size()));
-    for (std::size_t i = 0; i < solution.features.size(); ++i) {
-      features.col(static_cast<Eigen::Index>(i)) = solution.features[i];
-    }
-    s.set("negative_depths", solution.negative_depths).set("features", Eigen::MatrixXd(features.transpose()));
-    solutions.push_back(s);
-  }
-  return o.set("solutions", solutions);
-}
-
-void writeTwoSolutionsReport(const std::string& directory, const std::string& command_line, const TwoSolutions& found) {
-  Report report(directory, fmt::format("Two solutions: figure {} of the paper", found.figure));
-  report.paragraph(found.figure == 1
-                       ? "A. Martinelli's figure 1 (2012): one feature seen in four images, two distinct solutions."
-                       : "A. Martinelli's figure 2 (2012): three features in seven images, constant acceleration, two "
-                         "distinct solutions.");
-  report.paragraph(summary(found));
-  report.paragraph(
-      "The paper gives no numbers for its figures: this scene is a simulated one, the first from the seed on that has "
-      "two solutions with all features in front of the camera and can be drawn. Both solutions are the closed form's, "
-      "from exact bearings and readings. The body at t0 is the same for both; the axes are its own, turned so that the "
-      "true vertical is z. Each solution has a vertical of its own (its direction down is drawn at t0). Strokes are "
-      "the "
-      "body's axes at the images, dashed lines the feature's first bearing, which both solutions share.");
-  report.code(command_line);
+/// The page: both solutions drawn, and tables of them.
+void drawPage(Report& report, const TwoSolutions& found) {
   const std::vector<Curve> list = curves(found);
   report.plot({.name = fmt::format("fig{}", found.figure),
                .caption = "Positions and axes of the body and features (stars) of both solutions.",
@@ -205,7 +166,27 @@ void writeTwoSolutionsReport(const std::string& directory, const std::string& co
                      vectorText(positionAt(found.scene, found.result.solutions[1], t))});
   }
   report.table({"image", "t s", "body, solution 1, m", "body, solution 2, m"}, times, "In the body's axes at t0.");
-  report.write();
+}
+
+}  // namespace
+
+ValidationView viewOf(const TwoSolutions& found) {
+  const char* figure = found.figure == 1
+                           ? "A. Martinelli's figure 1 (2012): one feature seen in four images, two distinct solutions."
+                           : "A. Martinelli's figure 2 (2012): three features in seven images, constant acceleration, "
+                             "two distinct solutions.";
+  return {.title = fmt::format("Two solutions: figure {} of the paper", found.figure),
+          .introduction = fmt::format(
+              "{}\n{}\nThe paper gives no numbers for its figures: this scene is a simulated one, the first from the "
+              "seed on that has two solutions with all features in front of the camera and can be drawn. Both "
+              "solutions are the closed form's, from exact bearings and readings. The body at t0 is the same for both; "
+              "the axes are its own, turned so that the true vertical is z. Each solution has a vertical of its own "
+              "(its direction down is drawn at t0). Strokes are the body's axes at the images, dashed lines the "
+              "feature's first bearing, which both solutions share.",
+              figure, summary(found)),
+          .fields = [&found](JsonObject& object) { object.fieldsOf(found); },
+          .head = textOf(found),
+          .page = [&found](Report& report) { drawPage(report, found); }};
 }
 
 }  // namespace liestat::cli

@@ -1,15 +1,10 @@
-#include <cli/show/two_view_pairs.hpp>
-
-#include <report/page.hpp>
 #include <report/table.hpp>
-#include <cli/show/validation.hpp>
-#include <experiments/interruption.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/two_view_pairs.hpp>
 
 #include <fmt/format.h>
 
-#include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -87,120 +82,42 @@ constexpr const char* plane_notes =
     "inliers, "
     "those that are right, and the distance of the right ones from it.";
 
-std::string cellsAsTable(const std::vector<std::string>& headers, const Rows& rows) {
-  Table table(headers);
-  for (const auto& row : rows) table.row(row);
-  return table.str();
+Rows checkRows(const std::vector<Promise>& checks) {
+  Rows rows;
+  for (const Promise& check : checks) {
+    rows.push_back(
+        {check.text, number(check.value), check.passed ? number(check.bound) : "", verdictCell(check.passed)});
+  }
+  return rows;
 }
 
 }  // namespace
 
-std::string formatTwoViewPairs(const TwoViewPairsResult& result) {
-  std::string text;
-  const auto add = [&](const char* title, const std::vector<std::string>& headers, const Rows& rows) {
-    if (!rows.empty()) text += fmt::format("\n{}\n{}", title, cellsAsTable(headers, rows));
-  };
+ValidationView viewOf(const TwoViewPairsResult& result) {
+  ValidationView view{.title = "Two-view motion: what the hierarchy makes of real pairs",
+                      .introduction = "",
+                      .judgement = judgementOf(result),
+                      .fields = [&result](JsonObject& object) { object.fieldsOf(result); }};
   for (const PairFamily family : {PairFamily::homogr, PairFamily::kusvod2}) {
-    add(titleOf(family), choice_headers, choiceRows(result.choices, family));
+    view.tables.push_back({.title = titleOf(family),
+                           .headers = choice_headers,
+                           .rows = choiceRows(result.choices, family),
+                           .page_caption = choice_notes});
   }
-  add("adelaide-rmf: planes one after the other, against labels", structure_headers, structureRows(result.structures));
-  add("evd: a plane from far apart, few right matches", plane_headers, planeRows(result.planes));
-  Table checks({"promise", "measured", "bound", "verdict"});
-  for (const PairCheck& check : result.checks) {
-    checks.row({check.text, number(check.value), check.passed ? number(check.bound) : "", verdictCell(check.passed)});
-  }
-  if (!result.checks.empty()) text += "\n" + checks.str();
-  const Tally count = result.tally();
-  if (trials_of_run.incomplete()) {
-    return text + "\n" + verdictLines(count, "of promises");
-  }
-  return text + fmt::format("\n{} of {} promises are kept\n{}\n", count.judged - count.failed, count.judged,
-                            count.judged == 0 ? "nothing was promised"
-                            : count.passed()  ? "PASSED"
-                                              : "FAILED");
-}
-
-JsonObject toJson(const TwoViewPairsResult& result, JsonObject envelope) {
-  std::vector<JsonObject> choices, structures, planes, checks;
-  for (const PairChoice& row : result.choices) {
-    JsonObject chosen;
-    for (const auto& [model, count] : row.chosen) chosen.set(model, count);
-    choices.push_back(JsonObject()
-                          .set("family", name(row.family))
-                          .set("pair", row.name)
-                          .set("tentative", row.tentative)
-                          .set("kept", row.kept)
-                          .set("runs", row.runs)
-                          .set("right", row.right)
-                          .set("chosen", chosen)
-                          .set("homography_inliers", row.homography_inliers)
-                          .set("fundamental_inliers", row.fundamental_inliers)
-                          .set("far", row.far)
-                          .set("explained", row.explained)
-                          .set("explained_by_chance", row.allowed)
-                          .set("homography_cost", row.homography_cost)
-                          .set("fundamental_cost", row.fundamental_cost)
-                          .set("degenerate_samples", row.degenerate)
-                          .set("validation_error_px", row.validation_error));
-  }
-  for (const PairStructures& row : result.structures) {
-    structures.push_back(JsonObject()
-                             .set("pair", row.name)
-                             .set("matches", row.matches)
-                             .set("planes", row.labelled)
-                             .set("found", row.found)
-                             .set("wrong", row.wrong)
-                             .set("purity", row.purity)
-                             .set("coverage", row.coverage)
-                             .set("first_wrong", row.first_wrong));
-  }
-  for (const PairPlane& row : result.planes) {
-    planes.push_back(JsonObject()
-                         .set("pair", row.name)
-                         .set("matches", row.matches)
-                         .set("right", row.labelled)
-                         .set("runs", row.runs)
-                         .set("runs_found", row.supported)
-                         .set("inliers", row.inliers)
-                         .set("inliers_right", row.right)
-                         .set("distance_px", row.label_error));
-  }
-  for (const PairCheck& check : result.checks) {
-    checks.push_back(JsonObject()
-                         .set("promise", check.text)
-                         .set("measured", check.value)
-                         .set("bound", check.bound)
-                         .set("passed", check.passed));
-  }
-  return envelope.set("choices", choices).set("structures", structures).set("planes", planes).set("checks", checks);
-}
-
-void writeTwoViewPairsReport(const std::string& directory, const std::string& command_line,
-                             const TwoViewPairsResult& result) {
-  Report report(directory, "Two-view motion: what the hierarchy makes of real pairs");
-  if (result.tally().judged > 0) showVerdict(report, formatTwoViewPairs(result));
-  report.code(command_line);
-  const auto add = [&](const char* title, const std::vector<std::string>& headers, const Rows& rows,
-                       const char* notes) {
-    if (rows.empty()) return;
-    report.section(title);
-    report.table(headers, rows, notes);
-  };
-  for (const PairFamily family : {PairFamily::homogr, PairFamily::kusvod2}) {
-    add(titleOf(family), choice_headers, choiceRows(result.choices, family), choice_notes);
-  }
-  add("adelaide-rmf: planes one after the other", structure_headers, structureRows(result.structures), structure_notes);
-  add("evd: a plane from far apart", plane_headers, planeRows(result.planes), plane_notes);
-  if (!result.checks.empty()) {
-    report.section("Promises");
-    Rows rows;
-    for (const PairCheck& check : result.checks) {
-      rows.push_back(
-          {check.text, number(check.value), check.passed ? number(check.bound) : "", verdictCell(check.passed)});
-    }
-    report.table({"promise", "measured", "bound", "verdict"}, rows);
-  }
-  report.write();
+  view.tables.push_back({.title = "adelaide-rmf: planes one after the other, against labels",
+                         .headers = structure_headers,
+                         .rows = structureRows(result.structures),
+                         .page_title = "adelaide-rmf: planes one after the other",
+                         .page_caption = structure_notes});
+  view.tables.push_back({.title = "evd: a plane from far apart, few right matches",
+                         .headers = plane_headers,
+                         .rows = planeRows(result.planes),
+                         .page_title = "evd: a plane from far apart",
+                         .page_caption = plane_notes});
+  view.tables.push_back({.headers = {"promise", "measured", "bound", "verdict"},
+                         .rows = checkRows(result.checks),
+                         .page_title = "Promises"});
+  return view;
 }
 
 }  // namespace liestat::cli

@@ -1,13 +1,9 @@
-#include <cli/show/two_view_rules.hpp>
-
-#include <report/page.hpp>
 #include <report/table.hpp>
-#include <cli/show/validation.hpp>
-#include <experiments/interruption.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/two_view_rules.hpp>
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -41,50 +37,33 @@ Panel panelOf(const TwoViewRuleRow& row) {
 
 }  // namespace
 
-std::string formatTwoViewRules(const std::vector<TwoViewRuleRow>& rows) {
-  Table table(rule_headers);
-  for (const TwoViewRuleRow& row : rows) table.row(cells(row));
-  const std::string text = "\nRules of choice over the same trials, all models estimated\n" + table.str();
-  return trials_of_run.incomplete() ? text + "\n" + interruptedLines("trials", "") : text;
-}
-
-JsonObject toJson(const TwoViewRuleRow& row) {
-  JsonObject o, right;
-  for (std::size_t k = 0; k < row.right.size(); ++k) right.set(nameOf(default_two_view_motions[k]), row.share(k));
-  o.set("rule", row.rule).set("trials", *std::max_element(row.trials.begin(), row.trials.end()));
-  return o.set("average", row.average()).set("right", right);
-}
-
-void writeTwoViewRulesReport(const std::string& directory, const std::string& command_line,
-                             const std::vector<TwoViewRuleRow>& rows) {
-  Report report(directory, "Rules by which a model of two-view motion is chosen");
-  if (trials_of_run.incomplete()) {
-    showVerdict(report, formatTwoViewRules(rows));
-  } else {
-    const auto best = std::max_element(rows.begin(), rows.end(), [](const TwoViewRuleRow& a, const TwoViewRuleRow& b) {
-      return a.average() < b.average();
-    });
-    const double right = rows.front().average();
-    report.verdict(true, fmt::format("The default rule chooses the right model in {:.1f} % of the trials{}. Nothing is "
-                                     "promised of the rules.",
-                                     100 * right,
-                                     best->average() > right
-                                         ? fmt::format(", and '{}' in {:.1f} %", best->rule, 100 * best->average())
-                                         : ", and no other rule in more"));
-  }
-  report.code(command_line);
-  std::vector<std::vector<std::string>> rules, motions;
-  for (const TwoViewRuleRow& row : rows) rules.push_back(cells(row));
-  report.table(rule_headers, rules, "Shares of right choices over all motions, and of the motion with the fewest.");
-  for (std::size_t k = 0; k < default_two_view_motions.size(); ++k) {
-    motions.push_back({fmt::format("{}", k + 1), nameOf(default_two_view_motions[k]),
-                       fmt::format("{}", rows.front().trials[k]), number(100 * rows.front().share(k))});
-  }
-  report.table({"number", "motion", "trials", "right by default, %"}, motions);
+ValidationView viewOf(const std::vector<TwoViewRuleRow>& rows) {
+  ValidationTable rules{.title = "Rules of choice over the same trials, all models estimated",
+                        .headers = rule_headers,
+                        .page_title = "",
+                        .page_caption = "Shares of right choices over all motions, and of the motion with the fewest."};
   Plot plot{.name = "rules", .caption = "Shares of right choices of each rule and motion.", .columns = 3};
-  for (const TwoViewRuleRow& row : rows) plot.panels.push_back(panelOf(row));
-  report.plot(plot);
-  report.write();
+  for (const TwoViewRuleRow& row : rows) {
+    rules.rows.push_back(cells(row));
+    plot.panels.push_back(panelOf(row));
+  }
+  ValidationView view{.title = "Rules by which a model of two-view motion is chosen",
+                      .introduction = "",
+                      .fields = [&rows](JsonObject& object) { object("rules", rows); },
+                      .tables = {std::move(rules)}};
+  if (rows.empty()) return view;
+  view.verdict = verdictOf(rows);
+  view.page = [&rows, table = view.tables[0], plot](Report& report) {
+    report.table(table.headers, table.rows, *table.page_caption);
+    std::vector<std::vector<std::string>> motions;
+    for (std::size_t k = 0; k < default_two_view_motions.size(); ++k) {
+      motions.push_back({fmt::format("{}", k + 1), nameOf(default_two_view_motions[k]),
+                         fmt::format("{}", rows.front().trials[k]), number(100 * rows.front().share(k))});
+    }
+    report.table({"number", "motion", "trials", "right by default, %"}, motions);
+    report.plot(plot);
+  };
+  return view;
 }
 
 }  // namespace liestat::cli

@@ -1,8 +1,6 @@
-#include <cli/show/two_view_validation.hpp>
-
-#include <report/page.hpp>
 #include <report/table.hpp>
-#include <cli/show/validation.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/two_view_validation.hpp>
 
 #include <fmt/format.h>
 
@@ -41,25 +39,6 @@ std::vector<std::string> optionalCells(const TwoViewChoice& choice) {
   }
   return {nameOf(choice.truth), percent(choice.right(), choice), others};
 }
-struct ChoiceTables {
-  std::vector<std::vector<std::string>> nine, optional;
-};
-ChoiceTables choiceTables(const TwoViewValidationResult& result) {
-  ChoiceTables tables;
-  for (const TwoViewChoice& choice : result.choices) {
-    if (choice.optional()) {
-      tables.optional.push_back(optionalCells(choice));
-    } else {
-      tables.nine.push_back(choiceCells(choice));
-    }
-  }
-  return tables;
-}
-std::string tableText(const std::vector<std::string>& headers, const std::vector<std::vector<std::string>>& rows) {
-  Table table(headers);
-  for (const auto& row : rows) table.row(row);
-  return table.str();
-}
 const std::vector<std::string> distance_headers{"model", "k", "index", "SE", "95 % covers", "K-S p", "verdict"};
 std::vector<std::string> distanceCells(const TwoViewRow& row) {
   const ValidationReport& r = row.report;
@@ -74,93 +53,44 @@ std::vector<std::string> distanceCells(const TwoViewRow& row) {
 
 }  // namespace
 
-std::string formatTwoViewTables(const TwoViewValidationResult& result) {
-  Table distances(distance_headers);
-  for (const TwoViewRow& row : result.rows) distances.row(distanceCells(row));
-  const ChoiceTables choices = choiceTables(result);
-  std::string text;
-  if (!choices.nine.empty()) {
-    text += fmt::format("\nModels that were chosen, %\n{}mean of the diagonal: {:.1f} %\n",
-                        tableText(choiceHeaders(), choices.nine), 100 * result.average());
-  }
-  if (!choices.optional.empty()) {
-    text += "\nOptional models, each beside the default lattice\n" + tableText(optional_headers, choices.optional);
-  }
-  if (!result.rows.empty()) {
-    text += fmt::format("\nSquared distance of the truth from the true model's estimate; index k expected\n{}",
-                        distances.str());
-  }
-  for (const TwoViewRow& row : result.rows) {
-    if (!row.passed.value_or(true)) text += fmt::format("\nFAILED {}: {}", name(row.motion), reason(row.verdict));
-  }
+ValidationView viewOf(const TwoViewValidationResult& result) {
+  const double average = 100 * result.average();
+  ValidationTable nine{.title = "Models that were chosen, %",
+                       .headers = choiceHeaders(),
+                       .below = fmt::format("mean of the diagonal: {:.1f} %\n", average),
+                       .page_title = "Models that were chosen",
+                       .page_caption = fmt::format("Per cent of the trials; mean of the diagonal {:.1f} %.", average)};
+  ValidationTable optional{.title = "Optional models, each beside the default lattice",
+                           .headers = optional_headers,
+                           .page_title = "",
+                           .page_caption = "Optional models, each beside the default lattice."};
   for (const TwoViewChoice& choice : result.choices) {
-    if (!choice.passed.value_or(true)) {
-      text += fmt::format("\nFAILED {}: chosen in {} of {} trials, {:.0f} % are promised", name(choice.truth),
-                          choice.right(), choice.trials, 100 * promised_row);
+    if (choice.optional()) {
+      optional.rows.push_back(optionalCells(choice));
+    } else {
+      nine.rows.push_back(choiceCells(choice));
     }
   }
-  if (!result.average_passed.value_or(true)) {
-    text += fmt::format("\nFAILED mean of the diagonal: {:.0f} % are promised", 100 * promised_average);
+  if (nine.rows.empty()) optional.page_title = nine.page_title;
+  ValidationTable distances{.title = "Squared distance of the truth from the true model's estimate; index k expected",
+                            .headers = distance_headers,
+                            .page_title = "Distances of the truth"};
+  Plot histograms{
+      .name = "distances", .caption = "Squared distances with the density that they should have.", .columns = 4};
+  for (const TwoViewRow& row : result.rows) {
+    distances.rows.push_back(distanceCells(row));
+    histograms.panels.push_back(histogramPanel(row, name(row.motion)));
   }
-  const Tally count = tally(result.rows) + result.tally();
-  if (count.failed > 0) text += "\n";
-  return text + "\n" + verdictLines(count, "of distances and choices");
-}
-
-JsonObject toJson(const TwoViewRow& row) {
-  JsonObject o;
-  o.set("motion", name(row.motion));
-  setStatistics(o, row.report);
-  o.set("tail", row.tail).set("failures", row.report.failures).set("passed", row.passed);
-  return o;
-}
-
-JsonObject toJson(const TwoViewChoice& choice) {
-  JsonObject o, chosen;
-  for (std::size_t m = 0; m < choice.chosen.size(); ++m) {
-    // The default lattice, and the model that this motion is tried with.
-    if (m >= default_two_view_motions.size() && all_two_view_motions[m] != choice.truth) continue;
-    chosen.set(name(all_two_view_motions[m]), choice.chosen[m]);
-  }
-  o.set("motion", name(choice.truth)).set("trials", choice.trials).set("chosen", chosen).set("passed", choice.passed);
-  return o;
-}
-
-void writeTwoViewReport(const std::string& directory, const std::string& command_line,
-                        const TwoViewValidationResult& result) {
-  Report report(directory, "Two-view motion: is the right model chosen, and is its covariance true?");
-  showVerdict(report, formatTwoViewTables(result));
-  report.paragraph(
-      "Each trial moves a camera by one motion, takes matches with noise and outliers, and runs the hierarchy of "
-      "models over them. The table has the models that were chosen. For the true model's estimate the squared "
-      "Mahalanobis "
-      "distance of the true parameter follows a chi-square law if the covariance is true; its mean, the index, is then "
-      "the number k of free parameters.");
-  report.code(command_line);
-  report.section("Models that were chosen");
-  std::vector<std::vector<std::string>> distances;
-  const ChoiceTables choices = choiceTables(result);
-  if (!choices.nine.empty()) {
-    report.table(choiceHeaders(), choices.nine,
-                 fmt::format("Per cent of the trials; mean of the diagonal {:.1f} %.", 100 * result.average()));
-  }
-  if (!choices.optional.empty()) {
-    report.table(optional_headers, choices.optional, "Optional models, each beside the default lattice.");
-  }
-  if (!result.rows.empty()) {
-    report.section("Distances of the truth");
-    std::vector<Panel> histograms;
-    for (const TwoViewRow& row : result.rows) {
-      distances.push_back(distanceCells(row));
-      histograms.push_back(histogramPanel(row, name(row.motion)));
-    }
-    report.table(distance_headers, distances);
-    report.plot({.name = "distances",
-                 .caption = "Squared distances with the density that they should have.",
-                 .panels = histograms,
-                 .columns = 4});
-  }
-  report.write();
+  distances.plots = {std::move(histograms)};
+  return {.title = "Two-view motion: is the right model chosen, and is its covariance true?",
+          .introduction =
+              "Each trial moves a camera by one motion, takes matches with noise and outliers, and runs the hierarchy "
+              "of models over them. The table has the models that were chosen. For the true model's estimate the "
+              "squared Mahalanobis distance of the true parameter follows a chi-square law if the covariance is true; "
+              "its mean, the index, is then the number k of free parameters.",
+          .judgement = judgementOf(result),
+          .fields = [&result](JsonObject& object) { object.fieldsOf(result); },
+          .tables = {std::move(nine), std::move(optional), std::move(distances)}};
 }
 
 }  // namespace liestat::cli

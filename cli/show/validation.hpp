@@ -1,42 +1,52 @@
 #pragma once
 
-// The parts that the views of the validations share.
+// The view of a validation: terminal, JSON and page are made of one description.
 
 #include <report/json.hpp>
 #include <report/page.hpp>
 #include <experiments/judged_report.hpp>
 
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <vector>
 
 namespace liestat::cli {
 
-/// The fields of a row in JSON that are the same in every validation.
-void setStatistics(JsonObject& o, const ValidationReport& report);
+/// A table of a validation. On the terminal title and caption stand above it; the page has a section of that title.
+struct ValidationTable {
+  std::string title = {}, caption = {};
+  std::vector<std::string> headers = {};
+  std::vector<std::vector<std::string>> rows = {};  ///< none: the table is not shown
+  std::vector<Plot> plots = {};                     ///< on the page, below the table
+  std::string below = {};                           ///< on the terminal, a line below the table
+  /// On the page, in place of title and caption.
+  std::optional<std::string> page_title = {}, page_caption = {};
+  std::size_t width = 80;  ///< columns on the terminal
+};
 
-/// The verdict in JSON: `passed`, which is false after an interrupt, and then the fields of setInterrupted().
-JsonObject& setVerdict(JsonObject& o, bool passed);
+/// A validation as it is shown. The page may refer to the rows of which the view was made.
+struct ValidationView {
+  std::string title, introduction;                       ///< of the page; a line of the latter is a paragraph
+  std::optional<experiments::Judgement> judgement = {};  ///< none: nothing is promised
+  std::function<void(JsonObject&)> fields = {};          ///< adds those of JSON to the verdict
+  std::string head = {};                                 ///< lines on the terminal above the tables
+  std::vector<ValidationTable> tables = {};
+  std::string legend = {};                 ///< lines on the terminal below the tables
+  std::function<void(Report&)> page = {};  ///< draws the page, in place of the tables
+  std::optional<Verdict> verdict = {};     ///< of the page, where nothing is promised
 
-/// After an interrupt `interrupted` (true) with the numbers of trials, `trials_done` and `trials_planned`; else nothing.
-JsonObject& setInterrupted(JsonObject& o);
-
-/// Says so where an interrupt came before any trial ended, so that there is nothing to show.
-bool endedBeforeTrials();
+  /// The lines for the terminal, the verdict last.
+  std::string text() const;
+  /// The object written by `--json`.
+  JsonObject json(const std::string& command_line, std::uint64_t seed) const;
+  /// Writes the page with its plots.
+  void writePage(const std::string& directory, const std::string& command_line) const;
+};
 
 /// A cell of a table: pass, FAIL, or empty where nothing was judged.
 std::string verdictCell(const std::optional<bool>& passed);
-
-/// The last lines on the terminal: how many of the judged rows pass, where they are (`in the promised domain`), and
-/// PASSED or FAILED, which a run without a judged row has too, or INTERRUPTED after how many trials.
-std::string verdictLines(const experiments::Tally& tally, const std::string& where);
-
-/// The last lines of a run in which an interrupt left trials undone: how many `units` (trials, splits) were done, what they
-/// say `so far`, and INTERRUPTED.
-std::string interruptedLines(const std::string& units, const std::string& so_far);
-
-/// The same verdict on the page: `text` is what the terminal shows, which ends with verdictLines().
-void showVerdict(Report& report, std::string_view text);
 
 /// Histogram of the squared distances with the density that they should have.
 Panel histogramPanel(const experiments::JudgedReport& row, const std::string& title);

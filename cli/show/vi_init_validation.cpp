@@ -1,13 +1,13 @@
 #include <report/table.hpp>
-#include <cli/show/validation.hpp>
-#include <cli/show/vi_init_validation.hpp>
-#include <cli/show/vi_init_validation_groups.hpp>
+#include <cli/show/validations.hpp>
+#include <experiments/vi_init_validation.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace liestat::cli {
@@ -18,6 +18,31 @@ using Check = ViInitCheck;
 using Quantity = ViInitQuantity;
 using Group = ViInitGroup;
 
+/// The factors of the densities of gyroscope and accelerometer in the calibration's rows.
+std::string inWords(ViInitEstimator estimator) {
+  std::string text = name(estimator).substr(std::string_view("noise_").size());
+  std::replace(text.begin(), text.end(), '_', ',');
+  return text;
+}
+
+/// The subject of a check, in a line.
+const char* subjectOf(ViInitCheck check) {
+  constexpr const char* names[] = {
+      "Refinement under its covariance, biases drawn from their priors: index (degrees of freedom)",
+      "Refinement under its covariance, biases that also walk: index (degrees of freedom)",
+      "Closed form under its covariance, image noise alone: index (degrees of freedom)",
+      "Closed form with the sensor's noise, biases known: errors, median / 95 %",
+      "A gyroscope's bias of 0.05 rad/s: errors, median / 95 %",
+      "Densities that are g and a times the given ones: how often 95 % intervals of the calibration hold that",
+      "At rest, and slow among features 2 to 8 m away: told right, that it moves, and the covariance at rest",
+      "40 % of the tracks drift by 8 px an image: errors, median / 95 %"};
+  return names[static_cast<std::size_t>(check)];
+}
+
+std::string windowOf(const Group& g) {
+  const ViInitWindow& w = g.first().window;
+  return fmt::format("{:g} s, {}, {}", w.seconds, w.images, w.features);
+}
 std::string index(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.2f}", row->report->index); }
 std::string ratio(const ViInitRow* row) { return row == nullptr ? "" : fmt::format("{:.3f}", row->value); }
 std::string covered(const ViInitRow* row) {
@@ -43,7 +68,7 @@ Table distancesTable(const std::vector<Group>& list) {
   headers.insert(headers.end(), {"χ²/dof", "95 %", "lost", "verdict"});
   Table table(headers);
   for (const Group& g : list) {
-    std::vector<std::string> cells{g.window()};
+    std::vector<std::string> cells{windowOf(g)};
     if (refined && !walks) cells.push_back(index(g.of(Quantity::nees_v)));
     cells.push_back(index(g.of(Quantity::nees_v_g)));
     cells.push_back(index(g.of(Quantity::nees_all)));
@@ -52,7 +77,7 @@ Table distancesTable(const std::vector<Group>& list) {
     cells.push_back(ratio(g.of(Quantity::chi2_per_dof)));
     cells.push_back(covered(g.of(Quantity::nees_v_g)));
     cells.push_back(fmt::format("{}", g.of(Quantity::nees_v_g)->failures));
-    cells.push_back(g.verdict());
+    cells.push_back(verdictCell(g.passed()));
     table.row(cells);
   }
   return table;
@@ -68,7 +93,7 @@ Table errorsTable(const std::vector<Group>& list) {
   Table table(headers);
   for (const Group& g : list) {
     const Quantity leading = check == Check::gyroscope_bias ? Quantity::bias : Quantity::speed;
-    std::vector<std::string> cells{name(g.first().estimator), g.window(), errors(g.of(leading)),
+    std::vector<std::string> cells{name(g.first().estimator), windowOf(g), errors(g.of(leading)),
                                    errors(g.of(Quantity::gravity)), errors(g.of(Quantity::scale))};
     if (check == Check::consistency) cells.push_back(errors(g.of(Quantity::scale_of_features)));
     if (check == Check::drift) cells.push_back(ratio(g.of(Quantity::selection)));
@@ -92,8 +117,8 @@ Table restTable(const std::vector<Group>& list) {
   Table table({"", "T, n, N", "told right", "moves", "gravity, biases (8)", "95 %", "verdict"});
   for (const Group& g : list) {
     const ViInitRow* nees = g.of(Quantity::nees_at_rest);
-    table.row({name(g.first().estimator), g.window(), ratio(g.of(Quantity::told)), ratio(g.of(Quantity::moving)),
-               index(nees), covered(nees), g.verdict()});
+    table.row({name(g.first().estimator), windowOf(g), ratio(g.of(Quantity::told)), ratio(g.of(Quantity::moving)),
+               index(nees), covered(nees), verdictCell(g.passed())});
   }
   return table;
 }
@@ -102,16 +127,14 @@ Table restTable(const std::vector<Group>& list) {
 Table noiseTable(const std::vector<Group>& list) {
   Table table({"factors g, a", "T, n, N", "recordings", "gyroscope's", "accelerometer's", "of both", "verdict"});
   for (const Group& g : list) {
-    table.row({inWords(g.first().estimator), g.window(), fmt::format("{}", g.first().trials),
+    table.row({inWords(g.first().estimator), windowOf(g), fmt::format("{}", g.first().trials),
                ratio(g.of(Quantity::gyroscope_interval)), ratio(g.of(Quantity::accelerometer_interval)),
-               ratio(g.of(Quantity::common_interval)), g.verdict()});
+               ratio(g.of(Quantity::common_interval)), verdictCell(g.passed())});
   }
   return table;
 }
 
-}  // namespace
-
-std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
+std::string viInitTables(const std::vector<ViInitRow>& rows) {
   std::string text;
   for (const Check check : all_vi_init_checks) {
     const std::vector<Group> list = groups(rows, check);
@@ -119,7 +142,7 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
     if (text.empty()) {
       text = fmt::format("{} windows a row, of T seconds, n images and N features\n\n", list.front().first().trials);
     }
-    text += fmt::format("{}\n\n", describe(check));
+    text += fmt::format("{}\n\n", subjectOf(check));
     if (hasDistances(check)) text += distancesTable(list).str() + "\n";
     if (check == Check::rest) {
       text += restTable(list).str() + "\n";
@@ -129,37 +152,170 @@ std::string formatViInitTables(const std::vector<ViInitRow>& rows) {
       text += errorsTable(list).str() + "\n";
     }
   }
-  for (const ViInitRow& row : rows) {
-    if (row.passed.value_or(true)) continue;
-    text += fmt::format("FAILED {} {} {}, {:g} s, {} images, {} features: {}\n", name(row.check), name(row.estimator),
-                        name(row.quantity), row.window.seconds, row.window.images, row.window.features,
-                        reason(row.verdict));
-  }
-  return text + verdictLines(tally(rows), "with a promise");
+  // The verdict brings its own empty line.
+  if (!text.empty()) text.pop_back();
+  return text;
 }
 
-JsonObject toJson(const ViInitRow& row) {
-  JsonObject o;
-  o.set("check", name(row.check)).set("estimator", name(row.estimator)).set("quantity", name(row.quantity));
-  o.set("unit", unit(row.quantity));
-  o.set("window", row.window.seconds).set("images", row.window.images).set("features", row.window.features);
-  o.set("in_domain", row.promise.has_value());
-  if (row.report) {
-    setStatistics(o, *row.report);
-  } else {
-    o.set("trials", row.trials);
-    for (const char* field :
-         {"dof", "law", "index", "index_se", "index_expected", "variance", "ks_statistic", "ks_p", "coverage95"}) {
-      o.set(field, nullptr);
+/// A panel of curves over the windows' length, one for each estimator, of those windows that have 20 features and an
+/// image every tenth of a second.
+template <class Value>
+Panel overWindows(const std::vector<ViInitRow>& rows, Check check, Quantity quantity, const std::string& title,
+                  const std::string& label, const Value& value) {
+  Panel panel{.title = title, .x = {.label = "window, s", .low = 0.5, .high = 4.5}, .y = {.label = label}};
+  for (const ViInitRow& row : rows) {
+    const auto steps = static_cast<double>(row.window.images - 1);
+    if (row.check != check || row.quantity != quantity || row.window.features != 20 ||
+        std::abs(steps / row.window.seconds - 10) > 0.1) {
+      continue;
+    }
+    if (panel.series.empty() || panel.series.back().name != name(row.estimator)) {
+      auto found = std::find_if(panel.series.begin(), panel.series.end(),
+                                [&](const Series& s) { return s.name == name(row.estimator); });
+      if (found == panel.series.end()) {
+        panel.series.push_back({.name = name(row.estimator), .style = Style::linespoints});
+      } else {
+        std::rotate(found, found + 1, panel.series.end());
+      }
+    }
+    panel.series.back().x.push_back(row.window.seconds);
+    panel.series.back().y.push_back(value(row));
+  }
+  return panel;
+}
+
+/// The rows with distances of a check as points with bars of three standard errors, numbered.
+Panel indexPanel(const std::vector<ViInitRow>& rows, Check check) {
+  Panel panel{.title = check == Check::consistency ? "refinement" : "closed form, image noise alone",
+              .x = {.label = "kind of window, in the table's order"},
+              .y = {.label = "index / k"},
+              .references = {{.at = 1}}};
+  std::vector<Group> list = groups(rows, check);
+  for (const Quantity quantity :
+       {Quantity::nees_v, Quantity::nees_v_g, Quantity::nees_all, Quantity::nees_last_state}) {
+    Series series{.name = name(quantity), .style = Style::errorbars};
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const ViInitRow* row = list[i].of(quantity);
+      if (row == nullptr) continue;
+      const double k = row->report->law.mean();
+      // Side by side.
+      series.x.push_back(static_cast<double>(i + 1) + 0.12 * (static_cast<double>(panel.series.size()) - 1.5));
+      series.y.push_back(row->report->index / k);
+      series.low.push_back((row->report->index - 3 * row->report->index_se) / k);
+      series.high.push_back((row->report->index + 3 * row->report->index_se) / k);
+    }
+    if (!series.x.empty()) panel.series.push_back(series);
+  }
+  panel.x.low = 0.5;
+  panel.x.high = static_cast<double>(list.size()) + 0.5;
+  return panel;
+}
+
+Panel coveragePanel(const std::vector<ViInitRow>& rows, Check check) {
+  Panel panel = indexPanel(rows, check);
+  panel.y = {.label = "inside the 95 % region"};
+  panel.references = {{.at = 0.95}};
+  std::vector<Group> list = groups(rows, check);
+  for (Series& series : panel.series) {
+    std::size_t k = 0;
+    for (const Group& g : list) {
+      for (const ViInitRow* row : g.rows) {
+        if (name(row->quantity) != series.name) continue;
+        const Coverage& c = row->report->coverage[2];
+        series.y[k] = c.observed;
+        series.low[k] = c.observed - 3 * c.standard_error;
+        series.high[k] = std::min(1., c.observed + 3 * c.standard_error);
+        ++k;
+      }
     }
   }
-  o.set("failures", row.failures).set("median", row.median).set("p95", row.p95);
-  o.set("value", row.value).set("value_se", row.value_se);
-  const ViInitPromise promise = row.promise.value_or(ViInitPromise{});
-  o.set("promised_median", promise.median).set("promised_p95", promise.p95);
-  o.set("note_median", promise.note_median).set("note_p95", promise.note_p95);
-  o.set("passed", row.passed);
-  return o;
+  return panel;
+}
+
+/// The page: plots of indices and errors over the windows, and a table for each check.
+void drawPage(Report& report, const std::vector<ViInitRow>& rows) {
+  std::vector<Panel> distances;
+  for (const Check check : {Check::consistency, Check::closed_form}) {
+    if (groups(rows, check).empty()) continue;
+    distances.push_back(indexPanel(rows, check));
+    distances.push_back(coveragePanel(rows, check));
+  }
+  if (!distances.empty()) {
+    report.plot({.name = "consistency",
+                 .caption =
+                     "Index over its expectation, and the fraction of truths in the 95 % region, both with three "
+                     "standard errors; dotted, what is expected.",
+                 .panels = distances});
+  }
+  std::vector<Panel> accuracy;
+  for (const Quantity quantity : {Quantity::speed, Quantity::gravity, Quantity::scale}) {
+    Panel panel = overWindows(rows, Check::accuracy, quantity, name(quantity), unit(quantity),
+                              [](const ViInitRow& row) { return row.median; });
+    Panel refined =
+        overWindows(rows, Check::consistency, quantity, "", "", [](const ViInitRow& row) { return row.median; });
+    panel.series.insert(panel.series.end(), refined.series.begin(), refined.series.end());
+    const std::size_t medians = panel.series.size();
+    for (const Check check : {Check::accuracy, Check::consistency}) {
+      Panel high = overWindows(rows, check, quantity, "", "", [](const ViInitRow& row) { return row.p95; });
+      panel.series.insert(panel.series.end(), high.series.begin(), high.series.end());
+    }
+    for (std::size_t i = medians; i < panel.series.size(); ++i) {
+      panel.series[i].name += ", 95 %";
+      panel.series[i].dashed = true;
+    }
+    for (std::size_t i = 0; i < panel.series.size(); ++i)
+      panel.series[i].colour = i % std::max<std::size_t>(1, medians);
+    panel.y.logarithmic = true;
+    if (!panel.series.empty()) accuracy.push_back(panel);
+  }
+  if (!accuracy.empty()) {
+    report.plot({.name = "errors",
+                 .caption =
+                     "Medians of the errors over the length of the window, and their 95 % quantiles (dashed). 20 "
+                     "features, ten images a second. The refinement does not know the biases, the others do.",
+                 .panels = accuracy,
+                 .columns = 3});
+  }
+  for (const Check check : all_vi_init_checks) {
+    const std::vector<Group> list = groups(rows, check);
+    if (list.empty()) continue;
+    report.section(subjectOf(check));
+    std::vector<std::vector<std::string>> table;
+    for (const Group& g : list) {
+      for (const ViInitRow* row : g.rows) {
+        const bool law = row->report.has_value(), error = std::isfinite(row->median);
+        table.push_back({name(row->estimator), windowOf(g), name(row->quantity), fmt::format("{}", row->trials),
+                         fmt::format("{}", row->failures),
+                         law                         ? number(row->report->index)
+                         : std::isfinite(row->value) ? number(row->value)
+                                                     : "",
+                         law                            ? number(row->report->index_se, 2)
+                         : std::isfinite(row->value_se) ? number(row->value_se, 2)
+                                                        : "",
+                         law ? number(row->report->law.mean()) : "", law ? number(row->report->ks_p_value, 2) : "",
+                         law ? number(100 * row->report->coverage[2].observed) : "",
+                         error ? number(row->median, 3) : "", error ? number(row->p95, 3) : "", unit(row->quantity),
+                         verdictCell(row->passed)});
+      }
+    }
+    report.table({"estimator", "T, images, features", "quantity", "trials", "lost", "index or value", "SE", "expected",
+                  "K-S p", "95 % covers", "median", "95 %", "unit", "verdict"},
+                 table);
+  }
+}
+
+}  // namespace
+
+ValidationView viewOf(const std::vector<ViInitRow>& rows) {
+  return {.title = "Visual-inertial initialisation: are its covariances true, and how good is it?",
+          .introduction =
+              "Each trial draws a scene, what a camera and an inertial sensor measure of it, and solves the window. If "
+              "a covariance is true, the squared Mahalanobis distances of the truth under it follow a chi-square law "
+              "with k degrees of freedom, and their mean, the index, is k.",
+          .judgement = judgementOf(rows),
+          .fields = [&rows](JsonObject& object) { object("rows", rows); },
+          .head = viInitTables(rows),
+          .page = [&rows](Report& report) { drawPage(report, rows); }};
 }
 
 }  // namespace liestat::cli

@@ -453,34 +453,5 @@ TEST(HandEyeCommand, badInputIsNamed) {
   EXPECT_EQ(run({"hand-eye", directory / "none.csv", directory / "a.csv"}).exit_code, 2);
 }
 
-TEST(ValidateHandEye, writesRowsAndAPage) {
-  const TemporaryDirectory directory;
-  const std::string json_file = directory / "rows.json", page = directory / "page";
-  const ProgramOutput out = run({"validate", "hand-eye", "--trials", "3", "--json", json_file, "--report", page});
-  EXPECT_EQ(out.exit_code, 0) << out.output;
-  EXPECT_TRUE(contains(out.output, "PASSED"));
-  std::istringstream lines(out.output);
-  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
-  const Json rows = Json::parse(contentOf(json_file))["rows"];
-  ASSERT_EQ(rows.size(), 24U + 16U + 12U + 10U);
-  for (const Json& row : rows) {
-    for (const char* field :
-         {"experiment",   "formulation", "motion",       "noise", "noise_scale", "pairs",        "outliers",
-          "quantity",     "in_domain",   "trials",       "dof",   "index",       "rms_rotation", "note_rms_rotation",
-          "chi2_per_dof", "right",       "right_passed", "lost",  "failures",    "passed"}) {
-      EXPECT_TRUE(row.contains(field)) << field;
-    }
-    EXPECT_EQ(row["passed"].is_null(), !row["in_domain"].get<bool>());
-  }
-  EXPECT_TRUE(contains(contentOf(page + "/index.html"), "</html>"));
-  // Noise that is half as large again as said.
-  EXPECT_EQ(run({"validate", "hand-eye", "--trials", "20", "--experiment", "accuracy", "--noise-factor", "1.5",
-                 "--json", json_file})
-                .exit_code,
-            1);
-  EXPECT_EQ(Json::parse(contentOf(json_file))["passed"], false);
-  EXPECT_EQ(run({"validate", "hand-eye", "--experiment", "nothing"}).exit_code, 2);
-}
-
 }  // namespace
 }  // namespace liestat::cli

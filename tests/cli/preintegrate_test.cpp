@@ -14,10 +14,8 @@
 #include <report/run_program.hpp>
 #include <formats/imu.hpp>
 #include <support/temporary_directory.hpp>
-#include <cli/show/preintegration_validation.hpp>
 
 namespace liestat::cli {
-using namespace experiments;
 namespace {
 
 using Json = nlohmann::json;
@@ -192,31 +190,6 @@ TEST(Preintegrate, WhatCannotBeUsedIsSaid) {
     EXPECT_EQ(preintegrate(directory, {"--imu", "f.csv", "--window", window}).status, 2) << window;
   }
   EXPECT_EQ(preintegrate(directory, {"--imu", "none.csv"}).status, 2);
-}
-
-// The rows themselves: tests/experiments/preintegration_validation_test.cpp.
-TEST(ValidatePreintegration, TheTableCountsWhatIsPromised) {
-  PreintegrationValidation validation;
-  validation.trials = 200;
-  validation.windows = {0.1};
-  validation.noises = {1, 100};
-  const std::vector<PreintegrationRow> rows = validatePreintegration(validation);
-  const std::string table = formatPreintegrationTable(rows);
-  EXPECT_NE(table.find("3 of 3 rows in the promised domain (noise up to 10) pass"), std::string::npos) << table;
-}
-
-TEST(ValidatePreintegration, TheProgramWritesItsRows) {
-  const TemporaryDirectory directory;
-  const ProgramResult result = runProgram({LIESTAT_PROGRAM, "validate", "preintegration", "--trials", "50", "--window",
-                                           "0.1", "--noise", "1", "--json", "out.json", "--report", "page"},
-                                          directory.path().string());
-  ASSERT_EQ(result.status, 0) << result.errors;
-  const Json json = Json::parse(contentOf(directory / "out.json"));
-  ASSERT_EQ(json["rows"].size(), 3U);
-  EXPECT_EQ(json["rows"][2]["check"], "motion_and_bias");
-  EXPECT_EQ(json["rows"][2]["dof"], 15);
-  EXPECT_TRUE(json["rows"][0]["in_domain"].get<bool>());
-  EXPECT_TRUE(std::filesystem::exists(directory / "page/index.html"));
 }
 
 // The data's README: over a second, with the biases of the ground truth, medians of 1.3e-3 rad, 4.3e-2 m/s, 2.5e-2 m.

@@ -2,7 +2,6 @@
 
 #include <cli/commands/measurement_options.hpp>
 #include <cli/commands/split.hpp>
-#include <report/run_program.hpp>
 #include <cli/show/split.hpp>
 #include <support/temporary_directory.hpp>
 #include <experiments/interruption.hpp>
@@ -10,7 +9,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include <cstddef>
 #include <string>
@@ -18,8 +16,6 @@
 
 namespace liestat::cli {
 namespace {
-
-using Json = nlohmann::json;
 
 /// Points with covariances, in the order of time.
 std::string pointsFile(std::size_t n) {
@@ -98,27 +94,6 @@ TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
   const SplitSummary ended = splits.stoppedAfter(40);
   EXPECT_EQ(ended.by_blocks.distances, whole.by_blocks.distances);
   EXPECT_NE(splits.textOf(ended).find("\nPASSED: "), std::string::npos);
-}
-
-TEST(ValidateSplitProgram, anInterruptLeavesWhatWasComputed) {
-  const TemporaryDirectory directory;
-  directory.write("f.csv", pointsFile(2000));
-  // As in validate_propagation_test.cpp.
-  const ProgramResult result =
-      runProgram({"env", "--default-signal=INT", "timeout", "--preserve-status", "-s", "INT", "1.5", LIESTAT_PROGRAM,
-                  "validate", "split", "f.csv", "--splits", "1000000", "--json", "out.json", "--report", "report"},
-                 directory.path().string());
-  EXPECT_EQ(result.status, 130) << result.errors;
-  EXPECT_NE(result.errors.find("liestat: interrupted"), std::string::npos) << result.errors;
-  if (result.errors.find("nothing to write") != std::string::npos) return;
-  const Json json = Json::parse(contentOf(directory / "out.json"));
-  EXPECT_EQ(json["passed"], false);
-  EXPECT_EQ(json["interrupted"], true);
-  EXPECT_EQ(json["trials_planned"], 2000000U);
-  EXPECT_EQ(json["trials_done"], json["random"]["splits"].get<int>() + json["by_blocks"]["splits"].get<int>());
-  EXPECT_EQ(json["merged"]["n"], 2000);
-  EXPECT_NE(contentOf(directory / "report/index.html").find("<p class=\"verdict none\">– INTERRUPTED: "),
-            std::string::npos);
 }
 
 }  // namespace

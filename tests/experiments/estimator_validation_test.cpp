@@ -13,7 +13,7 @@ namespace {
 
 EstimatorValidation small(std::size_t trials) {
   EstimatorValidation validation;
-  validation.trials = trials;
+  validation.run.trials = trials;
   return validation;
 }
 
@@ -37,7 +37,7 @@ TEST(EstimatorValidation, JudgesWhatIsPromised) {
     }
     EXPECT_EQ(std::isfinite(row.covariance_deviation), row.quantity == EstimatorQuantity::corrected_point);
   }
-  EXPECT_EQ(tally(rows).judged, judged);
+  EXPECT_EQ(judgementOf(rows).judged(), judged);
   EXPECT_EQ(judged, 17U);
 }
 
@@ -59,9 +59,9 @@ TEST(EstimatorValidation, AWrongNoiseFails) {
 TEST(EstimatorValidation, IsTheSameForAnyNumberOfThreads) {
   EstimatorValidation validation = small(50);
   validation.experiments = {EstimatorExperiment::corrected_points, EstimatorExperiment::fundamental};
-  validation.threads = 1;
+  validation.run.threads = 1;
   const std::vector<EstimatorRow> one = validateEstimator(validation);
-  validation.threads = 2;
+  validation.run.threads = 2;
   const std::vector<EstimatorRow> two = validateEstimator(validation);
   ASSERT_EQ(one.size(), two.size());
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].report.index, two[i].report.index);

@@ -34,15 +34,15 @@ TEST(MeansValidation, anyNumberOfTrialsPasses) {
   for (const std::size_t trials : {1U, 3U, 10U, 40U}) {
     MeansValidation validation;
     validation.n = {5, 10};
-    validation.trials = trials;
-    validation.seed = 3;
+    validation.run.trials = trials;
+    validation.run.seed = 3;
     for (const MeansRow& row : validateMeans(validation)) EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
   }
 }
 
 TEST(MeansValidation, whatIsJudgedIsCounted) {
   MeansValidation validation = liestat_test::mahaOnFrames();
-  validation.trials = 20;
+  validation.run.trials = 20;
   validation.n = {5, 10};
   const std::vector<MeansRow> rows = validateMeans(validation);
   for (const MeansRow& row : rows) {
@@ -50,8 +50,8 @@ TEST(MeansValidation, whatIsJudgedIsCounted) {
     EXPECT_EQ(row.passed.has_value(), row.method.corrected && row.experiment.n == 10);
     EXPECT_EQ(row.histogram.size(), 30U);
   }
-  EXPECT_EQ(tally(rows).judged, 2U);
-  EXPECT_EQ(tally(rows).failed, 0U);
+  EXPECT_EQ(judgementOf({rows, {}}).judged(), 2U);
+  EXPECT_EQ(judgementOf({rows, {}}).failed(), 0U);
 }
 
 }  // namespace

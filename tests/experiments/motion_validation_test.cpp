@@ -16,7 +16,7 @@ namespace {
 MotionValidation small(std::vector<MotionMethod> methods, std::size_t trials) {
   MotionValidation validation;
   validation.methods = std::move(methods);
-  validation.trials = trials;
+  validation.run.trials = trials;
   return validation;
 }
 
@@ -53,7 +53,7 @@ TEST(MotionScene, MovesAsItSays) {
 TEST(MotionValidation, JudgesWhatIsPromised) {
   const std::vector<MotionRow> rows =
       validateMotion(small({MotionMethod::subspace, MotionMethod::single_start, MotionMethod::gyroscope_bias}, 24));
-  EXPECT_EQ(tally(rows).judged, 11U + 6U);
+  EXPECT_EQ(judgementOf(rows).judged(), 11U + 6U);
   for (const MotionRow& row : rows) {
     EXPECT_EQ(row.passed.has_value(), row.promise.has_value());
     EXPECT_TRUE(row.passed.value_or(true)) << name(row.method) << " " << nameOf(row.scene.world) << ": " << row.reason;
@@ -69,15 +69,15 @@ TEST(MotionValidation, AWrongNoiseFails) {
   MotionValidation validation = small({MotionMethod::gyroscope_bias}, 40);
   validation.noise_factor = 4;
   const std::vector<MotionRow> rows = validateMotion(validation);
-  EXPECT_GE(tally(rows).failed, 3U);
+  EXPECT_GE(judgementOf(rows).failed(), 3U);
   for (const MotionRow& row : rows) EXPECT_EQ(row.reason.empty(), row.passed.value_or(true));
 }
 
 TEST(MotionValidation, IsTheSameForAnyNumberOfThreads) {
   MotionValidation validation = small({MotionMethod::intervals}, 9);
-  validation.threads = 1;
+  validation.run.threads = 1;
   const std::vector<MotionRow> one = validateMotion(validation);
-  validation.threads = 2;
+  validation.run.threads = 2;
   const std::vector<MotionRow> two = validateMotion(validation);
   ASSERT_EQ(one.size(), two.size());
   for (std::size_t i = 0; i < one.size(); ++i) {

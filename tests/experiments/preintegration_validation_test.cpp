@@ -11,7 +11,7 @@ namespace {
 
 TEST(PreintegrationValidation, JudgesWhatIsPromised) {
   PreintegrationValidation validation;
-  validation.trials = 200;
+  validation.run.trials = 200;
   validation.windows = {0.1};
   validation.noises = {1, 100};
   const std::vector<PreintegrationRow> rows = validatePreintegration(validation);
@@ -22,7 +22,7 @@ TEST(PreintegrationValidation, JudgesWhatIsPromised) {
     EXPECT_EQ(row.passed.has_value(), row.noise == 1) << "promised up to ten times the sensor's noise";
     EXPECT_TRUE(row.passed.value_or(true)) << name(row.verdict);
   }
-  EXPECT_EQ(tally(rows).judged, 3U);
+  EXPECT_EQ(judgementOf(rows).judged(), 3U);
 }
 
 }  // namespace

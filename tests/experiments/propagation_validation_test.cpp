@@ -13,7 +13,7 @@ namespace {
 
 PropagationValidation small(std::size_t trials) {
   PropagationValidation validation;
-  validation.trials = trials;
+  validation.run.trials = trials;
   return validation;
 }
 
@@ -63,7 +63,7 @@ TEST(PropagationValidation, anOperationsDrawsAreItsOwn) {
   validation.spreads = {0.1};
   const std::vector<PropagationRow> all = validatePropagation(validation);
   validation.operations = {Operation::act};
-  validation.threads = 1;
+  validation.run.threads = 1;
   for (const PropagationRow& row : validatePropagation(validation)) {
     EXPECT_EQ(row.report.index, find(all, row.experiment.feature, Operation::act, false, 0.1).report.index)
         << "whatever else is run, on any number of threads";
@@ -72,8 +72,14 @@ TEST(PropagationValidation, anOperationsDrawsAreItsOwn) {
 
 TEST(PropagationValidation, aBrokenPromiseIsSeen) {
   // Judged at the largest spread by what is promised at the largest promised.
-  PropagationExperiment experiment{.feature = Propagated::pose, .spread = 1.0, .trials = 2000};
-  const auto reports = run(experiment, 1);
+  const PropagationExperiment experiment{.feature = Propagated::pose, .spread = 1.0};
+  std::vector<ReferenceLaw> laws;
+  for (const PropagationMethod& method : experiment.methods) {
+    laws.push_back(ReferenceLaw::chiSquared(degreesOfFreedom(experiment.feature, method.operation)));
+  }
+  CellRun run({.threads = 1}, {{2000, 1}}, {});
+  const auto reports =
+      run.reports(256, laws, [&](CounterRng& rng, std::uint64_t) { return propagationTrial(experiment, rng); });
   for (std::size_t m = 0; m < experiment.methods.size(); ++m) {
     const Operation operation = experiment.methods[m].operation;
     // The inverse is exact, the fourth order still right, and so many trials do not refute a point moved by a pose.

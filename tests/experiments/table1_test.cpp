@@ -38,7 +38,7 @@ TEST(Table1, hasEveryCaseOnce) {
 }
 
 TEST(Table1, isRecognisedAsCorrected) {
-  const auto rows = recogniseTable1(16, 3, 0);
+  const auto rows = recogniseTable1({.trials = 16, .seed = 3});
   EXPECT_EQ(rows.size(), closedFormCases().size() + noisyClosedFormCases().size());
   for (const Table1Row& row : rows) {
     EXPECT_TRUE(*row.passed) << row.name;

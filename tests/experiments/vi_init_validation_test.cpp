@@ -21,7 +21,7 @@ namespace {
 ViInitValidation small(std::vector<ViInitCheck> checks, std::size_t trials) {
   ViInitValidation validation;
   validation.checks = std::move(checks);
-  validation.trials = trials;
+  validation.run.trials = trials;
   validation.recordings = 1;
   return validation;
 }
@@ -144,9 +144,9 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
 TEST(ValidateViInit, doesNotDependOnThreads) {
   ViInitValidation validation = small({ViInitCheck::accuracy, ViInitCheck::drift}, 20);
   validation.windows = {2};
-  validation.threads = 1;
+  validation.run.threads = 1;
   const auto one = validateViInit(validation);
-  validation.threads = 3;
+  validation.run.threads = 3;
   const auto three = validateViInit(validation);
   ASSERT_EQ(one.size(), three.size());
   for (std::size_t i = 0; i < one.size(); ++i) {
