@@ -143,6 +143,7 @@ std::string tableOf(const ResultType& type) {
 /// Classes of the module that have the fields of a result and more.
 const std::map<std::string, std::string> python_classes{{"CalibratedPose", "CalibratedPose"},
                                                         {"PoseCoordinates", "CalibratedPose"},
+                                                        {"ComparedStretch", "_FusedWindows"},
                                                         {"ComparedWindow", "InitialisedWindow"}};
 
 std::string pythonType(const FieldDescription& f, bool series) {

@@ -805,7 +805,7 @@ class _ComparedRecording(Result):
     refined_chi2_per_degree: float  # 1 expected
     frame: str  # in words
     windows: list[InitialisedWindow]
-    fusions: list[_ComparedStretch]  # of disjoint windows, for each stretch
+    fusions: list[_FusedWindows]  # of disjoint windows, for each stretch
 
 class _NoiseFactor(Result):
     factor: float  # of the densities
@@ -1050,6 +1050,9 @@ class TwoViewResult(_TwoViewMotionEstimate):
 class InitialisedWindow(_ComparedWindow):
     states: SE23
     def block(self, row: str, column: str | None = None) -> _Array: ...
+
+class _FusedWindows(_ComparedStretch):
+    window_indices: _Array
 
 VI_BLOCKS: dict[str, int]
 

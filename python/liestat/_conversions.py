@@ -201,9 +201,7 @@ def convert_trajectory(
     -------
     Result
         `matrices` in the convention `to`; `faults` (`row`, `fault`, `found`, `expected`) of those that could not be
-        converted and are NaN. The program's figures: `covariances` (their number), `covariance_from`, `covariance_to`,
-        `unknown`, `partly_unknown`, `assumed_uncorrelated`, `indefinite`, `zero_variances`, `round_trip_bound`,
-        `largest_rotation_sigma_rad`, `beyond_first_order`, `sampling_error`, `notes`. The verdict: `sentence`, and
+        converted and are NaN; the fields of ``liestat convert --json`` (docs/program.md). The verdict: `sentence`, and
         `decided`, True, False (faults, indefinite matrices) or None (no covariances).
 
     Warns
@@ -300,8 +298,8 @@ def diagnose_conventions(
     Returns
     -------
     Result
-        The fields of the program's JSON (docs/doctor.md): `verdict`, `reason`, `accepted`, `fault`, `tests`, `scale`,
-        `hypotheses`, …, or `chain`, or `plan`. The verdict in words is `sentence`; `decided` is True (one convention,
+        The fields of ``liestat doctor --json`` (docs/program.md): those of the diagnosis, or `chain`, or
+        `plan`. The verdict in words is `sentence`; `decided` is True (one convention,
         and the errors follow it), False (they do not) or None (undecidable).
     """
     caller = "diagnose_conventions"

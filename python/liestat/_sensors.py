@@ -119,10 +119,8 @@ def preintegrate(
     Result
         `increment` (SE23: rotation, position, velocity), `covariance` (..., 9, 9) in its tangent (position, rotation,
         velocity), `covariance_with_bias` (..., 15, 15), `bias_jacobian` (..., 9, 6), `faults` (list of str, empty
-        where there is none) and `ok`; and the fields of the program's JSON: `windows` (a list with the fields of each
-        interval, `error` and `squared_distance` among them with a truth), `verdict` (a sentence), `consistent` (bool;
-        None: no verdict), `causes` and, with a truth and noise, the summed `squared_distance` with its
-        `degrees_of_freedom` and `p`.
+        where there is none) and `ok`; and the fields of ``liestat preintegrate --json`` (docs/program.md): `windows`,
+        `verdict`, `consistent`, `causes`, ….
 
     Warns
     -----
@@ -232,10 +230,8 @@ def hand_eye(
     Returns
     -------
     Result
-        The fields of the program's JSON: `status`, `ok`, `in_words`, `X` and `Y` (CalibratedPose: gripper_T_camera,
-        base_T_target; Y is None with `relative`), `joint_covariance` (12, 12), `open_directions` that the motions leave
-        open, `excitations`, `outliers`, `chi2`, `degrees_of_freedom`, `p`, `variance_factor`, `rival` …; and `errors`
-        and `pair_chi2` of the pairs.
+        The fields of ``liestat hand-eye --json`` (docs/program.md), `X` and `Y` of type CalibratedPose:
+        gripper_T_camera, base_T_target (None with `relative`); and `errors` and `pair_chi2` of the pairs.
 
     Warns
     -----
@@ -375,11 +371,8 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     Returns
     -------
     Result
-        The fields of the program's JSON: `status`, `reason` (None where ok), `model` (its name), `matrix` (H or F in
-        pixels) with `matrix_covariance` (9, 9, of entries column after column), `parameters` (list; each with `names`,
-        `units`, `values`, `deviations`, `covariance`), `second_T_first` (`quaternion_xyzw`, `direction`, `covariance`
-        of the tangent (direction, rotation); x' = R x + t), `inliers` (their number), `inlier`, `squared_errors`,
-        `lattice` …; and the `threshold` on squared errors.
+        The fields of ``liestat two-view --json`` (docs/program.md): `status`, `model`, `matrix`, `parameters`,
+        `second_T_first` (x' = R x + t), `inlier`, …; and the `threshold` on squared errors.
 
     Warns
     -----
@@ -542,9 +535,8 @@ def vi_init(
     Returns
     -------
     Result
-        The fields of the program's JSON: `ok` and `in_words` (whether the result is to be trusted), `windows` (list of
-        InitialisedWindow), `fusions` of disjoint windows (with `window_indices`), `statuses`, `images_outside`, with a
-        truth `refined_errors`, `nees_mean` ….
+        The fields of ``liestat vi-init --json`` (docs/program.md): `ok` and `in_words`, `windows` (list of
+        InitialisedWindow), `fusions` of disjoint windows (with `window_indices`), ….
     """
     readings = _readings("vi_init", times, rates, forces)
     stamps = _vector(image_times, "vi_init: image_times")

@@ -271,9 +271,8 @@ def validate_split(
     Returns
     -------
     Result
-        The fields of the program's JSON; `passed`, `inflation` (by which the covariance of the mean is too small) with
-        `inflation_low` and `inflation_high`, `random` and `by_blocks`, and `first`, `second` (the halves in time) and
-        `merged` with their means. Besides `verdict`, the verdict in words, and `causes`.
+        The fields of ``liestat validate split --json`` (docs/validation.md): `passed`, `inflation`, `random`,
+        `by_blocks`, …. Besides `verdict`, the verdict in words, and `causes`.
     """
     if blocks < 2 or blocks % 2:
         raise ValueError(f"validate_split: blocks must be even and positive, got {blocks}")

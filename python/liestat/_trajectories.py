@@ -144,14 +144,12 @@ def evaluate_trajectory(
     Returns
     -------
     TrajectoryEvaluation
-        The fields of the program's JSON: `verdict` (a sentence), `consistent` (True, False or None: no verdict),
-        `causes`, `poses`, `matched`, `by_time`, `ape` and `rpe` (rmse, mean, median, std, min, max, sse in `ape_unit`
-        and `rpe_unit`), `rpe_pairs`, `alignment`, `weighted_alignment` with its covariance, `tests` (`joint_nees`, … with
-        `statistic`, `degrees_of_freedom`, `ratio`, `p`), `rpe_nees`, `indefinite`, `notes`, `covariance_convention`,
-        `reference_poses`, `association`, `pairs_model`. Besides, for each matched pose: `rows` of the estimate, `times`,
-        `ape_errors`, `position_errors` (m) and `rotation_errors` (rad) with statistics `position` and `rotation`; after
-        the weighted alignment `errors` (n, 6), their `covariances` (n, 6, 6) and `nees`. For each pair: `pairs` (k, 2)
-        and `rpe_errors`. An alignment also has `transform` (SE3) and `fault`.
+        The fields of ``liestat evaluate --json`` (docs/program.md): `verdict` (a sentence), `consistent` (True, False
+        or None: no verdict), `ape` and `rpe` (`rmse`, …), `alignment`, `tests` (`joint_nees`, …), …. Besides, for each
+        matched pose: `rows` of the estimate, `times`, `ape_errors`, `position_errors` (m) and `rotation_errors` (rad)
+        with statistics `position` and `rotation`; after the weighted alignment `errors` (n, 6), their `covariances` (n,
+        6, 6) and `nees`. For each pair: `pairs` (k, 2) and `rpe_errors`. An alignment also has `transform` (SE3) and
+        `fault`.
 
     Raises
     ------

@@ -1,6 +1,7 @@
 """The program's JSON and a result of the module, field by field. Both show what the library describes, so that they have
 the same fields and the same values, to the last bit."""
 
+import ast
 import json
 import math
 import os
@@ -63,15 +64,52 @@ def plain(value):
     return value
 
 
+def declarations():
+    """What `__init__.pyi` declares: the attributes of each class with their annotations, and what functions return."""
+    with open(os.path.join(os.path.dirname(liestat.__file__), "__init__.pyi"), encoding="utf-8") as file:
+        nodes = ast.parse(file.read()).body
+    found = {node.name: node for node in nodes if isinstance(node, ast.ClassDef)}
+
+    def attributes(name):
+        own = [line for line in found[name].body if isinstance(line, ast.AnnAssign)]
+        bases = [ast.unparse(base) for base in found[name].bases]
+        inherited = {k: v for base in bases if base in found for k, v in attributes(base).items()}
+        return inherited | {line.target.id: ast.unparse(line.annotation) for line in own}
+
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef) and node.returns]
+    return {name: attributes(name) for name in found}, {node.name: ast.unparse(node.returns) for node in functions}
+
+
+def undeclared(result, function):
+    """Attributes of the result of a function that `__init__.pyi` does not declare, those of results inside too."""
+    classes, returned = declarations()
+
+    def missing(value, annotation, path):
+        name = annotation.replace(" | None", "").removeprefix("list[").removesuffix("]")
+        if isinstance(value, list):
+            return [m for element in value[:1] for m in missing(element, annotation, path)]
+        if not isinstance(value, liestat.Result) or not classes.get(name):
+            return []
+        declared = classes[name]
+        found = [f"{path}.{key}" for key in value.keys() if key not in declared]
+        return found + [m for key in value.keys() if key in declared for m in missing(value[key], declared[key], key)]
+
+    return missing(result, returned[function], function)
+
+
 @unittest.skipUnless(PROGRAM, "LIESTAT_PROGRAM is not set: ./run python sets it")
 class ParityTest(unittest.TestCase):
     """`assert_equal_results(json, result, series)`: the fields are equal in name and value. `series` are names of fields
     that only the module has: one row for each pose, frame or window, which the program writes to its report."""
 
     maxDiff = None
+    #: Function of the module whose results have the attributes that are declared.
+    function = None
 
     def assert_equal_results(self, program_json, result, series=(), path=""):
         ours, theirs = plain(result), dict(program_json)
+        if self.function and isinstance(result, liestat.Result):
+            self.assertEqual(undeclared(result, self.function), [])
         for name in ENVELOPE | {"exit_code"}:
             theirs.pop(name, None)
         for name in series:

@@ -34,6 +34,8 @@ def with_flags(notes):
 
 
 class ConvertParity(ParityTest):
+    function = "convert_trajectory"
+
     def setUp(self):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)

@@ -49,6 +49,8 @@ def rounded(value, digits):
 
 
 class DoctorParity(ParityTest):
+    function = "diagnose_conventions"
+
     def setUp(self):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)

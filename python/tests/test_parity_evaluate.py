@@ -82,6 +82,8 @@ def exactly_normed(poses, g):
 
 
 class Evaluate(ParityTest):
+    function = "evaluate_trajectory"
+
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.TemporaryDirectory()

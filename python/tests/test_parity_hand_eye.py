@@ -16,6 +16,8 @@ OF_FILES = ("hints", "notes", "A", "B", "association", "tolerance", "largest_gap
 
 
 class HandEyeParity(parity.ParityTest):
+    function = "hand_eye"
+
     def run_both(self, *simulated, options=(), status="ok", **keywords):
         with tempfile.TemporaryDirectory() as directory:
             parity.simulate("hand-eye", "--output", directory, "--overwrite", *simulated)

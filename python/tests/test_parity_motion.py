@@ -27,6 +27,8 @@ AHEAD = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], dtype=float)
 
 
 class MotionParity(parity.ParityTest):
+    function = "motion"
+
     def setUp(self):
         directory = tempfile.TemporaryDirectory()
         self.addCleanup(directory.cleanup)

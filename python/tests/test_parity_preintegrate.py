@@ -15,6 +15,8 @@ NOISE = (1.6968e-4, 2e-3, 1.9393e-5, 3e-3)
 
 
 class PreintegrateParity(parity.ParityTest):
+    function = "preintegrate"
+
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.TemporaryDirectory()

@@ -15,6 +15,8 @@ DATA = os.path.join(os.path.dirname(__file__), "..", "..", "examples", "data")
 
 
 class SplitParity(ParityTest):
+    function = "validate_split"
+
     def assert_equal_splits(self, path, options=(), kind=None, use=(), **arguments):
         """Equal fields, and the verdict is that of the terminal. Returns JSON and result."""
         json = program("validate", "split", path, *options, codes=(0, 1))

@@ -14,6 +14,8 @@ INTRINSICS = (600, 600, 320, 240)
 
 
 class TwoViewParity(parity.ParityTest):
+    function = "two_view"
+
     def run_both(self, *simulated, options=(), codes=(0,), **keywords):
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "matches.csv")

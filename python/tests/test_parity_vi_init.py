@@ -37,6 +37,8 @@ WINDOW_SERIES += ("scale_sigma", "tilt_sigma", "chi2", "image_indices", "track_n
 
 
 class ViInitParity(parity.ParityTest):
+    function = "vi_init"
+
     @classmethod
     def setUpClass(cls):
         if not parity.PROGRAM:
@@ -64,6 +66,7 @@ class ViInitParity(parity.ParityTest):
             json.pop(name)
         result = liestat.vi_init(*self.measured, **keywords)
         self.assertEqual(json["exit_code"] == 0, result.ok)
+        self.assertEqual(parity.undeclared(result, self.function), [])
         plain = parity.plain(result)
         for window in plain["windows"]:
             for name in WINDOW_SERIES:

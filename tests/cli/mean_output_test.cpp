@@ -32,7 +32,8 @@ struct Analysed {
   }
   /// The numbers of a row of the table.
   std::vector<double> row(const std::string& name) const {
-    for (const auto& cells : meanRows(measurements, analysis)) {
+    const TableRows table = meanRows(measurements, analysis);
+    for (const auto& cells : table.rows) {
       if (cells[0] != name) continue;
       std::vector<double> numbers;
       for (std::size_t i = 1; i < 4; ++i) numbers.push_back(std::stod(cells[i]));
