@@ -39,7 +39,7 @@ class FeatureReader {
     if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
     const detail::FeatureFormat& format = detail::featureFormat(options_.format, reader_, name_);
     file_.format = std::string(format.name);
-    if (!options_.columns.empty() && format.name != "csv") {
+    if (!options_.columns.empty() && !format.names_columns) {
       throw InputError(name_, reader_.number(), fmt::format("--columns for a file of the format {}", format.name),
                        "a CSV file, whose header names the columns");
     }

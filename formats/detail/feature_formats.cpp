@@ -205,7 +205,7 @@ constexpr std::array formats{
     FeatureFormat{"tum", "8 (TUM: t tx ty tz qx qy qz qw)", isTum, readTum},
     FeatureFormat{"euroc", "", isEuroc, readEuroc},
     FeatureFormat{"kitti", "12 (KITTI: a 3x4 matrix)", isKitti, readKitti},
-    FeatureFormat{"csv", "", isCsv, readCsv},
+    FeatureFormat{"csv", "", isCsv, readCsv, true},
 };
 
 }  // namespace

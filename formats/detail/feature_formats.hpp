@@ -35,6 +35,7 @@ struct FeatureFormat {
   bool (*recognises)(const FirstLine& first);
   /// Reads how the rows are laid out; the reader stands at the first line with content. Throws InputError.
   RowLayout (*reads)(const LineReader& reader, const std::string& file, const ReadingOptions& options);
+  bool names_columns = false;  ///< a header does, under names that may be the user's
 };
 
 /// All formats, in the order in which they are tried.
