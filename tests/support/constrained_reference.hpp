@@ -63,13 +63,15 @@ struct ReferenceEstimate {
       const auto J = constraint.linearize(parameter);
       G = J.by_parameter, c = J.value;
     }
+    // In units of the information, so that the system is as well conditioned as the problem.
+    const double unit = information.norm();
     const Eigen::Index p = G.rows();
     Eigen::MatrixXd kkt = Eigen::MatrixXd::Zero(N + p, N + p);
-    kkt << information, G.transpose(), G, Eigen::MatrixXd::Zero(p, p);
+    kkt << information / unit, G.transpose(), G, Eigen::MatrixXd::Zero(p, p);
     Eigen::VectorXd right(N + p);
-    right << b, -c;
+    right << b / unit, -c;
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factor(kkt);
-    covariance = factor.pseudoInverse().topLeftCorner(N, N);
+    covariance = factor.pseudoInverse().topLeftCorner(N, N) / unit;
     return factor.solve(right).head(N);
   }
 };
