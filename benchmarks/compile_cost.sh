@@ -24,7 +24,7 @@ done
 [ ${#compilers[@]} -gt 0 ] || { echo "compile_cost: no compiler" >&2; exit 2; }
 
 header_only="-DLIESTAT_HEADER_ONLY"
-linked="-DLIESTAT_COMPILED_MEANS -DLIESTAT_COMPILED_FUSION -DLIESTAT_COMPILED_TRAJECTORIES"
+linked="-DLIESTAT_COMPILED_MEANS -DLIESTAT_COMPILED_ESTIMATION -DLIESTAT_COMPILED_FUSION -DLIESTAT_COMPILED_TRAJECTORIES"
 
 # milliseconds COMPILER [FLAGS…]: of a unit on standard input; - where it doesn't compile, for want of a package.
 milliseconds() {

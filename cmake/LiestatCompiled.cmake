@@ -2,14 +2,16 @@
 # that adds its directory, or one that finds the installed package. A unit that links one reads declarations only.
 #
 #   means          Fréchet, Mahalanobis and certified means of the common features in double
+#   estimation     the core of constrained estimation
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
 #   formats        readers and writers of files ({fmt}, zlib, yaml-cpp, nlohmann/json)
 
-set(LIESTAT_COMPILED_PARTS means fusion trajectories formats)
+set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
 set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
+set(LIESTAT_COMPILED_SOURCES_estimation constrained)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
     robust_two_view two_view hand_eye motion)
@@ -18,6 +20,8 @@ set(LIESTAT_COMPILED_SOURCES_trajectories
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats fmt json yaml zlib)
+# Parts that a part links.
+set(LIESTAT_COMPILED_USES_fusion estimation)
 
 # Sets <out> to the packages that a part lacks, in words.
 function(liestat_lacking out part)
@@ -43,11 +47,15 @@ function(liestat_compiled part root library)
       return()
     endif()
   endforeach()
+  foreach(use IN LISTS LIESTAT_COMPILED_USES_${part})
+    liestat_compiled(${use} ${root} ${library})
+  endforeach()
   set(directory fusion/compiled)
-  if(part STREQUAL "means")
+  if(part STREQUAL "means" OR part STREQUAL "estimation")
     set(directory stats/compiled)
   endif()
-  # With it the headers know that their definitions are linked (fusion/detail/compiled.hpp, stats/detail/compiled_mean.hpp).
+  # With it the headers know that their definitions are linked (stats/detail/compiled.hpp, fusion/detail/compiled.hpp,
+  # stats/detail/compiled_mean.hpp).
   string(TOUPPER LIESTAT_COMPILED_${part} definition)
   if(part STREQUAL "formats")
     # All there are: a format is a source, and no list names it.
@@ -56,7 +64,8 @@ function(liestat_compiled part root library)
     list(TRANSFORM LIESTAT_COMPILED_SOURCES_${part} PREPEND ${root}/${directory}/ OUTPUT_VARIABLE sources)
     list(TRANSFORM sources APPEND .cpp)
   endif()
-  list(TRANSFORM LIESTAT_COMPILED_NEEDS_${part} PREPEND liestat_ OUTPUT_VARIABLE packages)
+  set(packages ${LIESTAT_COMPILED_NEEDS_${part}} ${LIESTAT_COMPILED_USES_${part}})
+  list(TRANSFORM packages PREPEND liestat_)
   add_library(${target} STATIC EXCLUDE_FROM_ALL ${sources})
   if(part STREQUAL "formats")
     # Most of what its units cost is the headers that they share. Those of trajectories have names of their own.
@@ -68,6 +77,10 @@ function(liestat_compiled part root library)
         set_source_files_properties(${source} PROPERTIES UNITY_GROUP features)
       endif()
     endforeach()
+  endif()
+  if(part STREQUAL "estimation")
+    # Loops whose lengths are run-time numbers, which g++ turns into vector instructions at -O3 alone.
+    set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release,RelWithDebInfo>:-O3>)
   endif()
   add_library(liestat::${part} ALIAS ${target})
   if(part STREQUAL "formats")

@@ -4,7 +4,8 @@
 #pragma once
 
 #include <stats/constrained_types.hpp>
-#include <stats/detail/constrained_channel.hpp>
+#include <stats/detail/constrained_problem.hpp>
+#include <stats/detail/measurement_block.hpp>
 #include <stats/measurement_noise.hpp>
 
 #include <limits>

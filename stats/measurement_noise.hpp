@@ -29,6 +29,7 @@ class IsotropicNoise {
   explicit IsotropicNoise(double sigma) : variance_(sigma * sigma) {}
   /// True if the variance is a positive finite number.
   bool valid() const { return variance_ > 0 && std::isfinite(variance_); }
+  double variance() const { return variance_; }
   /// V Dᵀ.
   template <int P>
   Eigen::Matrix<double, N, P> spread(const Eigen::Matrix<double, P, N>& D) const {
@@ -49,7 +50,12 @@ class DiagonalNoise {
  public:
   static constexpr int dimension = N;
   explicit DiagonalNoise(const Eigen::Matrix<double, N, 1>& sigmas) : variances_(sigmas.cwiseAbs2()) {}
-  bool valid() const { return variances_.minCoeff() > 0 && variances_.allFinite(); }
+  bool valid() const {
+    bool valid = true;
+    for (int i = 0; i < N; ++i) valid = valid && variances_[i] > 0 && std::isfinite(variances_[i]);
+    return valid;
+  }
+  const Eigen::Matrix<double, N, 1>& variances() const { return variances_; }
   template <int P>
   Eigen::Matrix<double, N, P> spread(const Eigen::Matrix<double, P, N>& D) const {
     Eigen::Matrix<double, N, P> result;
@@ -92,15 +98,16 @@ struct SemidefiniteParts {
         skewed = std::max(skewed, std::abs(A(i, j) - A(j, i)) / (scale[i] * scale[j]));
       }
     }
-    if (!scaled.allFinite() || skewed > 1e-6) return;
+    for (int i = 0; i < N * N; ++i) {
+      if (!std::isfinite(scaled(i / N, i % N))) return;
+    }
+    if (skewed > 1e-6) return;
     // Singular vectors of a symmetric matrix are eigenvectors, with u = -v where the eigenvalue is negative.
     const SmallSvd svd(BasicSmallMatrix<N>::template of<N, N>(scaled));
     const double least = 10 * N * std::numeric_limits<double>::epsilon() * svd.value(0);
     valid = true;
-    using Vector = Eigen::Matrix<double, N, 1>;
     for (int k = 0; k < N; ++k) {
-      Vector v;
-      double sign = 0;
+      double v[N], sign = 0;
       for (int i = 0; i < N; ++i) v[i] = svd.v(k, i) / scale[i], sign += svd.u(k, i) * svd.v(k, i);
       if (svd.value(k) > least) {
         if (sign < 0 && svd.value(k) > 10 * least) valid = false;
@@ -109,20 +116,40 @@ struct SemidefiniteParts {
         }
       } else {
         // A v = 0; orthonormal by Gram and Schmidt.
-        Vector w = v.normalized();
-        for (int j = 0; j < null_dimension; ++j) w -= null_basis.col(j).dot(w) * null_basis.col(j);
-        null_basis.col(null_dimension++) = w.normalized();
+        normalise(v);
+        for (int j = 0; j < null_dimension; ++j) {
+          double along = 0;
+          for (int i = 0; i < N; ++i) along += null_basis(i, j) * v[i];
+          for (int i = 0; i < N; ++i) v[i] -= along * null_basis(i, j);
+        }
+        normalise(v);
+        for (int i = 0; i < N; ++i) null_basis(i, null_dimension) = v[i];
+        ++null_dimension;
       }
     }
     // The sum is a generalised inverse. Without its part along the null space it is Moore and Penrose's.
     for (int k = 0; k < null_dimension; ++k) {
-      const Vector w = null_basis.col(k);
-      const Vector along = product(inverse, w);
-      const double both = w.dot(along);
+      double along[N], both = 0;
       for (int i = 0; i < N; ++i) {
-        for (int j = 0; j < N; ++j) inverse(i, j) += both * w[i] * w[j] - w[i] * along[j] - along[i] * w[j];
+        along[i] = 0;
+        for (int j = 0; j < N; ++j) along[i] += inverse(i, j) * null_basis(j, k);
+        both += null_basis(i, k) * along[i];
+      }
+      for (int i = 0; i < N; ++i) {
+        const double w = null_basis(i, k);
+        for (int j = 0; j < N; ++j) {
+          inverse(i, j) += both * w * null_basis(j, k) - w * along[j] - along[i] * null_basis(j, k);
+        }
       }
     }
+  }
+
+ private:
+  static void normalise(double (&v)[N]) {
+    double squared = 0;
+    for (const double x : v) squared += x * x;
+    if (!(squared > 0)) return;
+    for (double& x : v) x /= std::sqrt(squared);
   }
 };
 

@@ -1,11 +1,14 @@
 // How the estimators of fusion/ are compiled. Their headers declare them; the definitions, in fusion/detail/, are compiled
 // once by the CMake targets liestat::fusion and liestat::trajectories, or by a project that compiles fusion/compiled/*.cpp
 // itself and defines LIESTAT_COMPILED_FUSION and LIESTAT_COMPILED_TRAJECTORIES for all of its units, as the targets do. With
-// LIESTAT_HEADER_ONLY defined for all units the headers include the definitions and nothing is linked.
+// LIESTAT_HEADER_ONLY defined for all units the headers include the definitions and nothing is linked. Two views and
+// hand-eye calibration use constrained estimation, liestat::estimation (stats/detail/compiled.hpp).
 //
 // A unit with neither may include the headers and use the types. A call of an estimator is an error at compile time that
 // names the target and the macro, rather than an undefined symbol.
 #pragma once
+
+#include <stats/detail/compiled.hpp>
 
 /// The linkage of definitions.
 #ifdef LIESTAT_HEADER_ONLY
@@ -14,16 +17,6 @@
 #define LIESTAT_FUSION_INLINE
 #endif
 
-/// They stand before the declarations of estimators. g++ diagnoses a call, clang any use outside of a function that is
-/// marked itself: clang 14 overlooks calls that may throw with the attribute of g++.
-#ifdef __clang__
-#define LIESTAT_NOT_LINKED(target)                                                                               \
-  __attribute__((unavailable("liestat: link the CMake target " target ", or define LIESTAT_HEADER_ONLY for all " \
-                             "units")))
-#else
-#define LIESTAT_NOT_LINKED(target) \
-  [[gnu::error("liestat: link the CMake target " target ", or define LIESTAT_HEADER_ONLY for all units")]]
-#endif
 #if defined(LIESTAT_HEADER_ONLY) || defined(LIESTAT_COMPILED_FUSION)
 #define LIESTAT_FUSION_API
 #else

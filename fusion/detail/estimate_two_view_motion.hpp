@@ -67,15 +67,17 @@ inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel
     Eigen::MatrixXd J(9, covariance.rows());
     for (int k = 0; k < 5; ++k) J.col(k) = entriesFrom(D * matrixFrom(Entries(by_pose.col(k))) * D);
     if (with_focal_length) J.col(5) = entriesFrom(-(flat * M + M * flat));
-    covariance = J * covariance * J.transpose();
+    covariance = covarianceThrough(J, covariance);
   }
   if (covariance.rows() != 9) return {};
   M = A * M * B;
   const Entries unit = entriesFrom(M / M.norm());
-  Eigen::Matrix<double, 9, 9> J;
-  for (int k = 0; k < 9; ++k) J.col(k) = entriesFrom(A * matrixFrom(Entries(Entries::Unit(k))) * B) / M.norm();
-  J -= unit * (unit.transpose() * J).eval();
-  return J * covariance * J.transpose();
+  Eigen::MatrixXd J(9, 9);
+  for (int k = 0; k < 9; ++k) {
+    const Entries moved = entriesFrom(A * matrixFrom(Entries(Entries::Unit(k))) * B) / M.norm();
+    J.col(k) = moved - unit.dot(moved) * unit;
+  }
+  return covarianceThrough(J, covariance);
 }
 
 inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel>& search, std::size_t m,

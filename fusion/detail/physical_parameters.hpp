@@ -7,13 +7,13 @@
 #include <fusion/two_view/focal_lengths.hpp>
 #include <fusion/two_view/pose.hpp>
 #include <fusion/two_view/two_view.hpp>
+#include <lie/detail/small_orthogonal.hpp>
 #include <lie/detail/trig.hpp>
 #include <lie/essential.hpp>
 #include <lie/s2.hpp>
 #include <lie/so3.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include <array>
 #include <cmath>
@@ -57,11 +57,22 @@ inline Eigen::Matrix<double, 3, 2> axesAcross(const Eigen::Vector3d& direction) 
 
 /// The covariance of p of which the entries of a matrix are a function with derivative J, or NaN where J does not tell p.
 inline Eigen::MatrixXd coordinateCovariance(const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance) {
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(J);
-  const Eigen::Index n = J.cols();
-  if (qr.rank() < n || !J.allFinite()) return Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::quiet_NaN());
-  const Eigen::MatrixXd G = qr.solve(Eigen::MatrixXd::Identity(J.rows(), J.rows()));
-  return G * covariance * G.transpose();
+  // Rows are nine, columns no more: filled up to a square.
+  const int n = static_cast<int>(J.cols()), rows = static_cast<int>(J.rows());
+  BasicSmallMatrix<9> square(rows, rows);
+  for (int i = 0; i < rows; ++i) {
+    for (int j = 0; j < n; ++j) square(i, j) = J(i, j);
+  }
+  const SmallSvd svd(square);
+  const bool is_told = svd.value(n - 1) > 10 * rows * std::numeric_limits<double>::epsilon() * svd.value(0);
+  Eigen::MatrixXd inverse(n, rows);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < rows; ++j) {
+      inverse(i, j) = is_told ? 0 : std::numeric_limits<double>::quiet_NaN();
+      for (int k = 0; k < n; ++k) inverse(i, j) += svd.v(k, i) * svd.u(k, j) / svd.value(k);
+    }
+  }
+  return covarianceThrough(inverse, covariance);
 }
 
 /// Derivative of the entries of A R B by the error of R·Exp(e).
@@ -96,7 +107,7 @@ inline PhysicalParameters planeParameters(const PlanePose& plane, const Eigen::M
   list.add("rotation", "rad", SO3d::fitToSO3(R).log());
   list.add("translation/distance", "", t);
   list.add("normal", "", n);
-  return list.with(shown * coordinateCovariance(J, covariance) * shown.transpose());
+  return list.with(covarianceThrough(shown, coordinateCovariance(J, covariance)));
 }
 
 /// F ~ K'⁻¹ [t]× R K⁻¹: focal lengths, rotation and direction of the translation.
@@ -129,7 +140,7 @@ inline PhysicalParameters uncalibratedParameters(const PhysicalMotion& motion, c
   list.add("second focal length", "px", focal.second);
   list.add("rotation", "rad", SO3d::fitToSO3(R).log());
   list.add("direction", "", t);
-  return list.with(shown * coordinateCovariance(J, covariance) * shown.transpose());
+  return list.with(covarianceThrough(shown, coordinateCovariance(J, covariance)));
 }
 
 }  // namespace detail
@@ -156,12 +167,12 @@ LIESTAT_FUSION_INLINE std::vector<PhysicalParameters> physicalParameters(
     list.add("direction", "", pose.direction().unit_vector());
     shown.block<3, 3>(focal, 2) = pose.so3().matrix().transpose() * A;
     shown.block<3, 2>(focal + 3, 0) = A.leftCols<2>();
-    return {list.with(shown * covariance * shown.transpose())};
+    return {list.with(detail::covarianceThrough(shown, covariance))};
   }
   if (covariance.rows() != 9) return {};
   // Parameters that are linear in the entries.
   const auto linear = [&](const Eigen::MatrixXd& by_entries) {
-    return list.with(by_entries * covariance * by_entries.transpose());
+    return list.with(detail::covarianceThrough(by_entries, covariance));
   };
   if (model == "zoom") {
     list.add("zoom", "", M(0, 0));

@@ -70,6 +70,23 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   return result;
 }
 
+/// J C Jᵀ, by plain loops: Eigen's products of run-time sizes take a compiler seconds.
+inline Eigen::MatrixXd covarianceThrough(const Eigen::MatrixXd& J, const Eigen::MatrixXd& C) {
+  const Eigen::Index m = J.rows(), n = J.cols();
+  Eigen::MatrixXd half(m, n), result(m, m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      half(i, j) = 0;
+      for (Eigen::Index k = 0; k < n; ++k) half(i, j) += J(i, k) * C(k, j);
+    }
+    for (Eigen::Index j = 0; j < m; ++j) {
+      result(i, j) = 0;
+      for (Eigen::Index k = 0; k < n; ++k) result(i, j) += half(i, k) * J(j, k);
+    }
+  }
+  return result;
+}
+
 /// Name, parents and dimensions of a model of the lattice.
 struct TwoViewModelCard {
   std::string name;

@@ -5,10 +5,10 @@
 #include <fusion/two_view/epipolar_solvers.hpp>
 #include <fusion/two_view/pose.hpp>
 #include <fusion/two_view/solutions.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 #include <lie/essential.hpp>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -104,8 +104,10 @@ inline bool polishSharedFocal(std::span<const Eigen::Vector4d> matches, SharedFo
   // Directions that are hardly told do not run away.
   const double damping = 1e-9 * A.trace();
   A.diagonal().array() += damping;
-  const Eigen::Matrix<double, 6, 1> step = -A.ldlt().solve(g);
-  if (!step.allFinite() || !(std::abs(step[5]) < 2) || !(step.head<5>().norm() < 1)) return false;
+  Eigen::Matrix<double, 6, 1> step;
+  if (!solveStep<double, 6>(A, -g, step) || !step.allFinite() || !(std::abs(step[5]) < 2) ||
+      !(step.head<5>().norm() < 1))
+    return false;
   motion.pose = exp(motion.pose, Eigen::Matrix<double, 5, 1>(step.head<5>()));
   motion.focal_length *= std::exp(step[5]);
   return true;

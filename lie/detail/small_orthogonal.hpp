@@ -1,8 +1,9 @@
 // Orthogonal factorisations of a few columns (singular values, triangular factors), which do not square the matrix and
 // so decide ranks at 1e-12. One of the headers of small matrices, which lie/detail/small_matrix.hpp lists.
 //
-// Sizes are run-time numbers of at most `Most`, 13 for SmallMatrix, and everything is plain loops in double: the fixed-size expressions of half
-// a dozen sizes took a compiler forty seconds, and these cost it nothing.
+// Sizes are run-time numbers of at most `Most`, 13 for SmallMatrix, and everything is plain loops in double: the
+// fixed-size expressions of half a dozen sizes took a compiler forty seconds, and these cost it nothing. `Most` may be
+// Eigen::Dynamic, which allocates.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,17 +13,28 @@
 #include <cstddef>
 #include <limits>
 #include <utility>
+#include <vector>
 
 namespace liestat::detail {
+
+/// At most `Size` numbers, zero at first; allocated where that is Eigen::Dynamic.
+template <int Size>
+struct SmallList : std::array<double, static_cast<std::size_t>(Size)> {
+  explicit SmallList(int) : std::array<double, static_cast<std::size_t>(Size)>{} {}
+};
+template <>
+struct SmallList<Eigen::Dynamic> : std::vector<double> {
+  explicit SmallList(int n) : std::vector<double>(static_cast<std::size_t>(n)) {}
+};
 
 /// A matrix of at most Most×Most in row-major order, zero at first. No allocation.
 template <int Most>
 struct BasicSmallMatrix {
   static constexpr int most = Most;
   int rows = 0, cols = 0;
-  std::array<double, static_cast<std::size_t>(Most* Most)> value{};
+  SmallList<Most == Eigen::Dynamic ? Most : Most * Most> value;
 
-  BasicSmallMatrix(int r, int c) : rows(r), cols(c) {}
+  BasicSmallMatrix(int r, int c) : rows(r), cols(c), value(r * c) {}
   static BasicSmallMatrix identity(int n) {
     BasicSmallMatrix m(n, n);
     for (int i = 0; i < n; ++i) m(i, i) = 1;
@@ -37,8 +49,9 @@ struct BasicSmallMatrix {
     return m;
   }
 
-  double* row(int i) { return value.data() + i * most; }
-  const double* row(int i) const { return value.data() + i * most; }
+  double* row(int i) { return value.data() + i * stride(); }
+  const double* row(int i) const { return value.data() + i * stride(); }
+  int stride() const { return most == Eigen::Dynamic ? cols : most; }
   double& operator()(int i, int j) { return row(i)[j]; }
   const double& operator()(int i, int j) const { return row(i)[j]; }
 
@@ -99,10 +112,11 @@ template <int Most>
 struct SmallSvd {
   int n;
   BasicSmallMatrix<Most> u, v;
-  std::array<double, static_cast<std::size_t>(Most)> values{};
+  SmallList<Most> values;
   int sweeps = 0;
 
-  explicit SmallSvd(const BasicSmallMatrix<Most>& a) : n(a.cols), u(n, n), v(BasicSmallMatrix<Most>::identity(n)) {
+  explicit SmallSvd(const BasicSmallMatrix<Most>& a)
+      : n(a.cols), u(n, n), v(BasicSmallMatrix<Most>::identity(n)), values(n), rounding_(n) {
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) u(i, j) = a(j, i);
     }
@@ -168,7 +182,7 @@ struct SmallSvd {
   }
   /// The image of a null vector says nothing: the unit vector that is furthest from the rows before, made orthogonal.
   void complete(int i) {
-    std::array<double, static_cast<std::size_t>(Most)> best{};
+    SmallList<Most> best(n);
     double longest = -1;
     for (int unit = 0; unit < n; ++unit) {
       for (int j = 0; j < n; ++j) u(i, j) = j == unit;
@@ -186,7 +200,7 @@ struct SmallSvd {
     for (int j = 0; j < n; ++j) u(i, j) = best[static_cast<std::size_t>(j)];
   }
 
-  std::array<double, static_cast<std::size_t>(Most)> rounding_{};  // squares: what the rotations left in each column
+  SmallList<Most> rounding_;  // squares: what the rotations left in each column
 };
 
 /// The pseudo-inverse of a symmetric positive semi-definite 3×3 matrix; eigenvalues below 1e-12 of the trace are zero.

@@ -1,5 +1,6 @@
-// One measurement of a constrained estimate: its equations linearised, its own correction eliminated (Viéville, Lingrand
-// and Gaspard 2000, appendix A, corrected). Fixed sizes: P equations, N parameters, K coordinates of the measurement.
+// One measurement of fixed size, P equations, N parameters, K coordinates: its equations linearised, its own correction
+// eliminated (Viéville, Lingrand and Gaspard 2000, appendix A, corrected). The errors of single measurements and the implicit
+// filter use it; constrained estimates do the same with sizes at run time (stats/detail/constrained_core.hpp).
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
@@ -81,12 +82,6 @@ struct MeasurementBlock {
   Values whitened(const Values& values) const {
     return root.template halfSolve<1>(free.dimension > 0 ? Values(product(free.selection, values)) : values);
   }
-  /// The multipliers of the equations as they were given, from λ̂; with the sign of ½ ‖ε‖² + λᵀ c.
-  Values lagrange(const Values& whitened_multipliers) const {
-    Values lambda = -root.halfSolveTransposed(whitened_multipliers);
-    if (free.dimension > 0) return product(free.selection.transpose(), lambda);
-    return lambda;
-  }
 
  private:
   void eliminateFree(const Eigen::Matrix<double, K, K>& basis) {
@@ -146,51 +141,5 @@ template <class Noise>
 double typicalDeviation(const Noise& noise) {
   return std::sqrt(noise.covariance().trace() / Noise::dimension);
 }
-
-/// The same with the curvature of its equations: W = Q + Σ λ_k ∂²c_k/∂m², H_qm = Σ λ_k ∂²c_k/∂q∂m. The correction is
-/// base + slope δ, and the criterion gains ½ δᵀ A δ − bᵀ δ.
-template <int P, int N, int K>
-struct CurvedBlock {
-  Eigen::Matrix<double, N, N> A;
-  Eigen::Matrix<double, N, 1> b;
-  Eigen::Matrix<double, K, 1> base;
-  Eigen::Matrix<double, K, N> slope;
-  bool valid = false;  ///< false: W is not positive definite
-
-  /// `at` is ε₀.
-  CurvedBlock(const MeasurementBlock<P, N, K>& block, const Eigen::Matrix<double, K, K>& information,
-              const Eigen::Matrix<double, K, 1>& at, const Eigen::Matrix<double, N + K, N + K>& curvature) {
-    if (block.free.dimension > 0) return;
-    const Eigen::Matrix<double, K, K> W = information + curvature.template bottomRightCorner<K, K>();
-    const Cholesky<double, K> by_measurement(W);
-    if (!by_measurement.ok()) return;
-    // Δε = W⁻¹ (first - D̂ᵀ λ), D̂ Δε = second; columns: δ, and 1.
-    using First = Eigen::Matrix<double, K, N + 1>;
-    using Second = Eigen::Matrix<double, P, N + 1>;
-    First first;
-    first.template leftCols<N>() = -curvature.template bottomLeftCorner<K, N>();
-    first.template rightCols<1>() = -product(information, at);
-    Second second;
-    second.template leftCols<N>() = -block.C;
-    second.template rightCols<1>() = -block.value;
-    const First unconstrained = by_measurement.template solve<N + 1>(first);
-    const Eigen::Matrix<double, K, P> response =
-        by_measurement.template solve<P>(Eigen::Matrix<double, K, P>(block.D.transpose()));
-    Eigen::Matrix<double, P, P> S = product(block.D, response);
-    for (int k = block.root.rank(); k < P; ++k) S(k, k) = 1;  // equations that were left out
-    const Cholesky<double, P> by_equations(S);
-    if (!by_equations.ok()) return;
-    valid = true;
-    const Second lambda = by_equations.template solve<N + 1>(Second(product(block.D, unconstrained) - second));
-    const First solved = unconstrained - product(response, lambda);
-    slope = solved.template leftCols<N>();
-    base = at + solved.template rightCols<1>();
-    // H_qq δ + H_qm Δε + Ĉᵀ λ = A δ - b.
-    const Eigen::Matrix<double, N, K> mixed = curvature.template topRightCorner<N, K>();
-    const Eigen::Matrix<double, N, N + 1> sum = product(mixed, solved) + product(block.C.transpose(), lambda);
-    A = curvature.template topLeftCorner<N, N>() + sum.template leftCols<N>();
-    b = -sum.template rightCols<1>();
-  }
-};
 
 }  // namespace liestat::detail

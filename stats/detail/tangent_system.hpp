@@ -1,188 +1,181 @@
-// The dense core of a constrained step: n unknowns, a quadratic criterion, linear constraints that may be redundant.
+// The dense part of a constrained step: n unknowns, a quadratic criterion, linear constraints that may be redundant.
+// Definitions of stats/detail/constrained_core.hpp.
 #pragma once
 
 #include <lie/detail/small_orthogonal.hpp>
-#include <lie/detail/small_products.hpp>
-
-#include <Eigen/Core>
+#include <stats/detail/constrained_core.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace liestat::detail {
 
-/// The null space and solution of P linear equations C δ = d in N unknowns. Singular values of C with unit rows that are
-/// below 5e-8 count as zero, so the scale of an equation does not matter; redundant ones are met in least squares.
-template <int N, int P>
-class ConstraintBasis {
- public:
-  static constexpr int size = N > P ? N : P;
-  using Step = Eigen::Matrix<double, N, 1>;
-  using Values = Eigen::Matrix<double, P, 1>;
+/// Row vectors of n numbers.
+inline double dot(const double* a, const double* b, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i) sum += a[i] * b[i];
+  return sum;
+}
+inline void addScaled(double* sum, double factor, const double* a, int n) {
+  for (int i = 0; i < n; ++i) sum[i] += factor * a[i];
+}
+inline double norm(const double* a, int n) { return std::sqrt(dot(a, a, n)); }
+inline double norm(const Numbers& a) { return norm(a.data(), static_cast<int>(a.size())); }
+inline double dot(const Numbers& a, const Numbers& b) { return dot(a.data(), b.data(), static_cast<int>(a.size())); }
+inline bool allFinite(const double* a, std::size_t n) {
+  return std::all_of(a, a + n, [](double x) { return std::isfinite(x); });
+}
+inline bool allFinite(const Numbers& a) { return allFinite(a.data(), a.size()); }
+inline bool allFinite(const Rows& A) { return allFinite(A.data(), static_cast<std::size_t>(A.rows() * A.cols())); }
+inline std::size_t number(int n) { return static_cast<std::size_t>(n); }
+inline void multiply(const Rows& A, const Numbers& x, Numbers& result) {
+  for (int i = 0; i < A.rows(); ++i) result[number(i)] = dot(A[i], x.data(), A.cols());
+}
 
-  /// No equations.
-  ConstraintBasis() {
-    for (int k = 0; k < N; ++k) Z_.row(k) = Step::Unit(k).transpose();
+LIESTAT_ESTIMATION_INLINE ConstraintBasis::ConstraintBasis(int unknowns, int equations)
+    : n_(unknowns),
+      p_(equations),
+      Z_(n_, n_),
+      Y_(std::max(n_, p_), n_),
+      U_(std::max(n_, p_), p_),
+      values_(number(std::max(n_, p_))),
+      scale_(number(p_)) {
+  for (int k = 0; k < n_; ++k) Z_[k][k] = 1;
+}
+LIESTAT_ESTIMATION_INLINE void ConstraintBasis::compute(const Rows& C) {
+  const int size = std::max(n_, p_);
+  Z_.setZero();
+  rank_ = 0;
+  // Filled up to a square; the zeros that fill it up are never mixed with the rest.
+  BasicSmallMatrix<Eigen::Dynamic> rows(size, size);
+  for (int k = 0; k < p_; ++k) {
+    const double length = norm(C[k], n_);
+    scale_[number(k)] = length > 0 && std::isfinite(length) ? 1 / length : 0;
+    for (int j = 0; j < n_; ++j) rows(k, j) = scale_[number(k)] * C[k][j];
   }
-  explicit ConstraintBasis(const Eigen::Matrix<double, P, N>& C) {
-    // Filled up to a square; the zeros that fill it up are never mixed with the rest.
-    BasicSmallMatrix<size> rows(size, size);
-    for (int k = 0; k < P; ++k) {
-      const double length = C.row(k).norm();
-      scale_[k] = length > 0 && std::isfinite(length) ? 1 / length : 0;
-      for (int j = 0; j < N; ++j) rows(k, j) = scale_[k] * C(k, j);
-    }
-    const SmallSvd svd(rows);
-    int free = 0;
-    for (int k = 0; k < size; ++k) {
-      Step v;
-      for (int j = 0; j < N; ++j) v[j] = svd.v(k, j);
-      if (svd.value(k) > 5e-8) {
-        values_[rank_] = svd.value(k);
-        Y_.row(rank_) = v.transpose();
-        for (int j = 0; j < P; ++j) U_(rank_, j) = svd.u(k, j);
-        ++rank_;
-      } else if (v.squaredNorm() > 0.5) {
-        Z_.row(free++) = v.transpose();
-      }
+  const SmallSvd svd(rows);
+  int free = 0;
+  for (int k = 0; k < size; ++k) {
+    const double* v = svd.v.row(k);
+    if (svd.value(k) > 5e-8) {
+      values_[number(rank_)] = svd.value(k);
+      std::copy(v, v + n_, Y_[rank_]);
+      std::copy(svd.u.row(k), svd.u.row(k) + p_, U_[rank_]);
+      ++rank_;
+    } else if (dot(v, v, n_) > 0.5) {
+      std::copy(v, v + n_, Z_[free++]);
     }
   }
+}
+LIESTAT_ESTIMATION_INLINE void ConstraintBasis::shortest(const Numbers& d, double factor, Numbers& step) const {
+  std::fill(step.begin(), step.end(), 0.);
+  for (int k = 0; k < rank_; ++k) addScaled(step.data(), factor * fixedCoordinate(k, d), Y_[k], n_);
+}
+LIESTAT_ESTIMATION_INLINE double ConstraintBasis::shortestLength(const Numbers& d) const {
+  double sum = 0;
+  for (int k = 0; k < rank_; ++k) sum += std::pow(fixedCoordinate(k, d), 2);
+  return std::sqrt(sum);
+}
+LIESTAT_ESTIMATION_INLINE double ConstraintBasis::fixedLength(const Numbers& g) const {
+  double sum = 0;
+  for (int k = 0; k < rank_; ++k) sum += std::pow(along(k, g), 2);
+  return std::sqrt(sum);
+}
+LIESTAT_ESTIMATION_INLINE void ConstraintBasis::multipliers(const Numbers& g, Numbers& lambda) const {
+  std::fill(lambda.begin(), lambda.end(), 0.);
+  for (int k = 0; k < rank_; ++k) {
+    const double coordinate = -along(k, g) / values_[number(k)];
+    for (int j = 0; j < p_; ++j) lambda[number(j)] += scale_[number(j)] * U_[k][j] * coordinate;
+  }
+}
+LIESTAT_ESTIMATION_INLINE double ConstraintBasis::largest(const Numbers& c) const {
+  double most = 0;
+  for (std::size_t k = 0; k < c.size(); ++k) most = std::max(most, std::abs(c[k]) * (scale_[k] > 0 ? scale_[k] : 1));
+  return most;
+}
+LIESTAT_ESTIMATION_INLINE double ConstraintBasis::along(int k, const Numbers& g) const {
+  return dot(Y_[k], g.data(), n_);
+}
+LIESTAT_ESTIMATION_INLINE double ConstraintBasis::fixedCoordinate(int k, const Numbers& d) const {
+  double sum = 0;
+  for (int j = 0; j < p_; ++j) sum += U_[k][j] * scale_[number(j)] * d[number(j)];
+  return sum / values_[number(k)];
+}
 
-  int rank() const { return rank_; }
-  /// Rows: an orthonormal basis of what is free, N - rank() of them.
-  const Eigen::Matrix<double, N, N>& freeBasis() const { return Z_; }
-  /// The shortest solution of C δ = d; its length is that of fixedCoordinates().
-  Step shortest(const Values& d) const {
-    Step sum = Step::Zero();
-    for (int k = 0; k < rank_; ++k) sum += fixedCoordinate(k, d) * Y_.row(k).transpose();
-    return sum;
+LIESTAT_ESTIMATION_INLINE void TangentSystem::compute(const Rows& A, const Rows& basis, int free, bool indefinite) {
+  // Information is a sum of squares: what is a smaller part of it is rounding.
+  constexpr double min_ratio = 1e-13;
+  const int n = A.rows();
+  A_ = A, free_ = free, null_dimension_ = 0;
+  axes_.setZero();
+  BasicSmallMatrix<Eigen::Dynamic> reduced(free, free);
+  Numbers half(number(n)), scale(number(n), 1.);
+  double largest = 0;
+  for (int i = 0; i < free; ++i) {
+    std::fill(half.begin(), half.end(), 0.);
+    for (int k = 0; k < n; ++k) addScaled(half.data(), basis[i][k], A[k], n);
+    for (int j = 0; j < free; ++j) reduced(i, j) = dot(half.data(), basis[j], n);
+    largest = std::max(largest, std::abs(reduced(i, i)));
   }
-  double shortestLength(const Values& d) const {
-    double sum = 0;
-    for (int k = 0; k < rank_; ++k) sum += fixedCoordinate(k, d) * fixedCoordinate(k, d);
-    return std::sqrt(sum);
+  // Coordinates of one scale, so that the rank does not depend on units; rounding is not blown up.
+  for (int i = 0; i < free; ++i) {
+    const double d = std::max(std::abs(reduced(i, i)), 1e-14 * largest);
+    if (d > 0) scale[number(i)] = 1 / std::sqrt(d);
   }
-  /// The length of the part of g that the equations fix.
-  double fixedLength(const Step& g) const {
-    double sum = 0;
-    for (int k = 0; k < rank_; ++k) sum += along(k, g) * along(k, g);
-    return std::sqrt(sum);
+  for (int i = 0; i < free; ++i) {
+    for (int j = 0; j < free; ++j) reduced(i, j) *= scale[number(i)] * scale[number(j)];
   }
-  /// The shortest λ with Cᵀ λ = g on that part.
-  Values multipliers(const Step& g) const {
-    Values lambda = Values::Zero();
-    for (int k = 0; k < rank_; ++k) {
-      for (int j = 0; j < P; ++j) lambda[j] += scale_[j] * U_(k, j) * along(k, g) / values_[k];
-    }
-    return lambda;
+  const SmallSvd svd(reduced);
+  for (int k = 0; k < free; ++k) {
+    double& value = values_[number(k)];
+    value = svd.value(k);
+    if (indefinite) value = std::max(value, 1e-6 * svd.value(0));
+    if (!(value > min_ratio * svd.value(0))) value = 0, ++null_dimension_;
+    for (int i = 0; i < free; ++i) addScaled(axes_[k], svd.v(k, i) * scale[number(i)], basis[i], n);
   }
-  /// The largest |c_k| over the length of its gradient, those left out included; where there is no gradient, |c_k|: nothing
-  /// will ever meet that equation.
-  double largest(const Values& c) const {
-    double most = 0;
-    for (int k = 0; k < P; ++k) most = std::max(most, std::abs(c[k]) * (scale_[k] > 0 ? scale_[k] : 1));
-    return most;
+}
+LIESTAT_ESTIMATION_INLINE void TangentSystem::solve(const Numbers& b, Numbers& step) const {
+  Numbers rest(b.size());
+  multiply(A_, step, rest);
+  for (std::size_t i = 0; i < b.size(); ++i) rest[i] = b[i] - rest[i];
+  for (int k = 0; k < free_; ++k) {
+    const double value = values_[number(k)];
+    if (value > 0) addScaled(step.data(), dot(axes_[k], rest.data(), A_.rows()) / value, axes_[k], A_.rows());
   }
-
- private:
-  double along(int k, const Step& g) const {
-    double sum = 0;
-    for (int j = 0; j < N; ++j) sum += Y_(k, j) * g[j];
-    return sum;
+}
+LIESTAT_ESTIMATION_INLINE Rows TangentSystem::nullBasis() const {
+  const int n = A_.rows();
+  Rows found(n, n), basis(n, n);
+  const auto normalise = [n](double* v) {
+    const double length = norm(v, n);
+    for (int i = 0; i < n && length > 0; ++i) v[i] /= length;
+  };
+  int next = 0;
+  for (int k = 0; k < free_; ++k) {
+    if (values_[number(k)] > 0) continue;
+    double* v = found[next];
+    std::copy(axes_[k], axes_[k] + n, v);
+    normalise(v);
+    for (int j = 0; j < next; ++j) addScaled(v, -dot(found[j], v, n), found[j], n);
+    normalise(v);
+    for (int i = 0; i < n; ++i) basis[i][next] = v[i];
+    ++next;
   }
-  double fixedCoordinate(int k, const Values& d) const {
-    double sum = 0;
-    for (int j = 0; j < P; ++j) sum += U_(k, j) * scale_[j] * d[j];
-    return sum / values_[k];
-  }
-
-  Eigen::Matrix<double, N, N> Z_ = Eigen::Matrix<double, N, N>::Zero();
-  Eigen::Matrix<double, size, N> Y_ = Eigen::Matrix<double, size, N>::Zero();
-  Eigen::Matrix<double, size, P> U_ = Eigen::Matrix<double, size, P>::Zero();
-  Eigen::Matrix<double, size, 1> values_ = Eigen::Matrix<double, size, 1>::Zero();
-  Values scale_ = Values::Zero();
-  int rank_ = 0;
-};
-
-/// The minimum of ½ δᵀ A δ - bᵀ δ along the directions that are free. Where A does not determine δ, it stays at zero.
-template <int N>
-class TangentSystem {
- public:
-  using Step = Eigen::Matrix<double, N, 1>;
-  using Square = Eigen::Matrix<double, N, N>;
-
-  TangentSystem() = default;
-  /// `basis`: orthonormal rows, `free` of them. A may be the Hessian of a Lagrangian: eigenvalues count by their size,
-  /// where `indefinite` no less than a millionth of the largest.
-  TangentSystem(const Square& A, const Square& basis, int free, bool indefinite = false) : A_(A), free_(free) {
-    BasicSmallMatrix<N> reduced(free, free);
-    const Square half = product(basis, A);
-    double largest = 0;
-    for (int i = 0; i < free; ++i) {
-      for (int j = 0; j < free; ++j) {
-        for (int k = 0; k < N; ++k) reduced(i, j) += half(i, k) * basis(j, k);
-      }
-      largest = std::max(largest, std::abs(reduced(i, i)));
-    }
-    // Coordinates of one scale, so that the rank does not depend on units; rounding is not blown up.
-    Step scale = Step::Ones();
-    for (int i = 0; i < free; ++i) {
-      const double d = std::max(std::abs(reduced(i, i)), 1e-14 * largest);
-      if (d > 0) scale[i] = 1 / std::sqrt(d);
-    }
-    for (int i = 0; i < free; ++i) {
-      for (int j = 0; j < free; ++j) reduced(i, j) *= scale[i] * scale[j];
-    }
-    const SmallSvd svd(reduced);
-    for (int k = 0; k < free; ++k) {
-      values_[k] = svd.value(k);
-      if (indefinite) values_[k] = std::max(values_[k], 1e-6 * svd.value(0));
-      if (!(values_[k] > min_ratio * svd.value(0))) values_[k] = 0, ++null_dimension_;
-      for (int i = 0; i < free; ++i) axes_.row(k) += svd.v(k, i) * scale[i] * basis.row(i);
+  return basis;
+}
+LIESTAT_ESTIMATION_INLINE Rows TangentSystem::covariance() const {
+  const int n = A_.rows();
+  Rows sum(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      if (null_dimension_ > 0) sum[i][j] = std::numeric_limits<double>::quiet_NaN();
+      for (int k = 0; k < free_ && null_dimension_ == 0; ++k)
+        sum[i][j] += axes_[k][i] * axes_[k][j] / values_[number(k)];
     }
   }
-
-  /// δ, from its part that the constraints fix.
-  Step solve(const Step& b, Step fixed) const {
-    const Step rest = b - product(A_, fixed);
-    for (int k = 0; k < free_; ++k) {
-      if (values_[k] > 0) fixed += axes_.row(k).transpose() * (axes_.row(k).dot(rest) / values_[k]);
-    }
-    return fixed;
-  }
-  /// The number of directions that A leaves open, and an orthonormal basis of them in the first columns.
-  int nullDimension() const { return null_dimension_; }
-  Square nullBasis() const {
-    Square basis = Square::Zero();
-    int next = 0;
-    for (int k = 0; k < free_; ++k) {
-      if (values_[k] > 0) continue;
-      Step v = axes_.row(k).transpose().normalized();
-      for (int j = 0; j < next; ++j) v -= basis.col(j).dot(v) * basis.col(j);
-      basis.col(next++) = v.normalized();
-    }
-    return basis;
-  }
-  /// Z (Zᵀ A Z)⁻¹ Zᵀ; NaN where a direction is open.
-  Square covariance() const {
-    if (null_dimension_ > 0) return Square::Constant(std::numeric_limits<double>::quiet_NaN());
-    Square sum = Square::Zero();
-    for (int k = 0; k < free_; ++k) {
-      for (int i = 0; i < N; ++i) {
-        for (int j = 0; j < N; ++j) sum(i, j) += axes_(k, i) * axes_(k, j) / values_[k];
-      }
-    }
-    return sum;
-  }
-
- private:
-  /// Information is a sum of squares: what is a smaller part of it is rounding.
-  static constexpr double min_ratio = 1e-13;
-
-  Square A_ = Square::Zero(), axes_ = Square::Zero();
-  Step values_ = Step::Zero();
-  int free_ = 0, null_dimension_ = 0;
-};
+  return sum;
+}
 
 }  // namespace liestat::detail

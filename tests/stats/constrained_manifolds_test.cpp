@@ -4,6 +4,7 @@
 #include <lie/product.hpp>
 #include <lie/s2.hpp>
 #include <support/constrained_models.hpp>
+#include <support/constrained_reference.hpp>
 #include <stats/maha.hpp>
 
 #include <gtest/gtest.h>
@@ -134,6 +135,58 @@ TEST(ConstrainedManifolds, UsesKindsOfMeasurementsTogether) {
   EXPECT_EQ(both.degrees_of_freedom, 15 + 10 - 3);
   EXPECT_LE((both.information - first.information - second.information).norm(), 0.05 * both.information.norm());
   EXPECT_GE(both.chi2, first.chi2 + second.chi2 - 1e-9);
+}
+
+// ---------------------------------------------------------------------------------- against blocks of fixed size
+
+/// Everything to 1e-12 of its size; corrections, which iterations of either end at 1e-9 standard deviations, of sigma.
+template <class Q, class Channel, class Constraint>
+void expectReference(const Q& start, const Channel& channel, const Constraint& constraint, double sigma) {
+  ConstrainedEstimator estimator(start, constraint, ConstrainedOptions<Q>{.tolerance = 1e-11}, channel);
+  while (estimator.iterate()) {
+  }
+  const ConstrainedResult<Q>& r = estimator.result();
+  ASSERT_TRUE(r.ok()) << name(r.end);
+  const ReferenceEstimate<Q, Channel> expected(start, channel, constraint);
+  EXPECT_LE(log(expected.parameter, r.parameter).norm(), 1e-12);
+  EXPECT_LE((r.information - expected.information).norm(), 1e-12 * expected.information.norm());
+  EXPECT_LE((r.covariance - expected.covariance).norm(), 1e-12 * expected.covariance.norm());
+  EXPECT_NEAR(r.chi2, expected.chi2, 1e-12 * (1 + expected.chi2));
+  for (std::size_t i = 0; i < channel.size(); ++i) {
+    EXPECT_LE((estimator.correction(i) - expected.corrections[i]).norm(), 1e-10 * sigma) << i;
+  }
+}
+
+TEST(ConstrainedReference, SizesAtRunTimeGiveWhatFixedSizesGive) {
+  const Ellipse ellipse(30, 0.005, 4);
+  const auto on_conic = autoDiff(OnConic{});
+  const auto unit = autoDiff(UnitLength{});
+  const Eigen::Matrix2d half{{1, 0}, {0.3, 0.7}}, V = 2.5e-5 * half * half.transpose();
+  expectReference(ellipse.truth, measurements(ellipse.points, IsotropicNoise<2>(0.005), on_conic), unit, 0.005);
+  expectReference(ellipse.truth, measurements(ellipse.points, DiagonalNoise<2>({0.005, 0.008}), on_conic), unit, 0.005);
+  expectReference(ellipse.truth, measurements(ellipse.points, CovarianceNoise<2>(V), on_conic), unit, 0.005);
+  expectReference(ellipse.truth, measurements(ellipse.points, InformationNoise<2>(V.inverse()), on_conic), unit, 0.005);
+
+  // Six constraints of nine numbers; the same on the manifold; measurements of which one coordinate is free.
+  const RotatedPairs data(12, 5);
+  Eigen::Matrix<double, 6, 6> free = data.sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  free(4, 4) = 0;
+  const auto rotates = autoDiff(Rotates{});
+  const auto pairs = measurements(data.pairs, DiagonalNoise<6>(data.sigmas), rotates);
+  expectReference(elements(data.truth), pairs, autoDiff(Orthogonal{}), 0.01);
+  expectReference(data.truth, pairs, NoConstraint{}, 0.01);
+  expectReference(data.truth, measurements(data.pairs, InformationNoise<6>(free), rotates), NoConstraint{}, 0.01);
+
+  // Directions: equations of which two of three are independent, measurements on a manifold.
+  CounterRng rng(11);
+  std::vector<Pair> directions;
+  for (int i = 0; i < 12; ++i) {
+    const S2d a(rng.normalVector<3>().normalized()), b(data.truth * a.unit_vector());
+    directions.emplace_back(exp(a, Eigen::Vector2d(0.01 * rng.normalVector<2>())),
+                            exp(b, Eigen::Vector2d(0.01 * rng.normalVector<2>())));
+  }
+  expectReference(data.truth, measurements(directions, IsotropicNoise<4>(0.01), autoDiff(Turns{})), NoConstraint{},
+                  0.01);
 }
 
 }  // namespace

@@ -1,0 +1,358 @@
+// The iteration of a constrained estimate (docs/theory/constrained.md, section 5): steps, their curvature, the line search
+// on an exact penalty function, the result. Definitions of stats/detail/constrained_core.hpp.
+#pragma once
+
+#include <stats/detail/constrained_channel.hpp>
+#include <stats/detail/tangent_system.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+LIESTAT_ESTIMATION_INLINE ConstrainedCore::ConstrainedCore(const ParameterFunctions& parameter,
+                                                           std::vector<ChannelRecord> channels,
+                                                           ConstrainedSettings settings, bool valid)
+    : parameter_(parameter),
+      settings_(std::move(settings)),
+      N(parameter.dimension),
+      P(parameter.constraints),
+      A_(N, N),
+      curved_A_(N, N),
+      C_(P, N),
+      prior_J_(N, N),
+      b_(number(N)),
+      curved_b_(b_),
+      prior_slope_(b_),
+      delta_(b_),
+      gradient_(b_),
+      error_(b_),
+      further_(b_),
+      basis_(N, P),
+      system_(N),
+      curved_system_(N),
+      constraint_values_(number(P)),
+      trial_values_(constraint_values_),
+      constraint_multipliers_(constraint_values_) {
+  result_.information = result_.unobservable_basis = Rows(N, N);
+  result_.covariance = Rows(N, N);
+  std::fill_n(result_.covariance.data(), N * N, std::numeric_limits<double>::quiet_NaN());
+  if (!valid) result_.end = ConstrainedEnd::bad_input;
+  channels_.reserve(channels.size());
+  for (ChannelRecord& channel : channels) {
+    measurements_ += channel.size;
+    channels_.emplace_back(std::move(channel), N);
+  }
+}
+
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::iterate(void* problem) {
+  if (result_.end != ConstrainedEnd::running) return false;
+  if (result_.iterations >= settings_.max_iterations) return finish(problem, ConstrainedEnd::capped);
+  const bool curved = slow_steps_ >= 3 && settings_.curvature && result_.iterations > 0;
+  linearize(problem);
+  if (!finite_ || !allFinite(A_) || !allFinite(b_) || !allFinite(constraint_values_)) {
+    return finish(problem, result_.iterations == 0 ? ConstrainedEnd::bad_input : ConstrainedEnd::stalled);
+  }
+  ++result_.iterations;
+  result_.used_curvature = result_.used_curvature || curved;
+  if (curved) linearizeCurved(problem);
+  return step(problem, curved);
+}
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::stop(void* problem) {
+  if (result_.end == ConstrainedEnd::running) finish(problem, ConstrainedEnd::stopped);
+}
+
+/// eᵀ Q e of the prior.
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::weighed(const Numbers& e) const {
+  double sum = 0;
+  for (int i = 0; i < N && hasPrior(); ++i) {
+    sum += e[number(i)] * dot(settings_.prior_information.data() + i * N, e.data(), N);
+  }
+  return sum;
+}
+
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearize(void* problem) {
+  A_.setZero();
+  std::fill(b_.begin(), b_.end(), 0.);
+  prior_cost_ = 0;
+  if (hasPrior()) {
+    parameter_.priorError(problem, ParameterPoint::current, error_.data(), prior_J_.data());
+    Numbers row(number(N));
+    for (int i = 0; i < N; ++i) {
+      const double* Q = settings_.prior_information.data() + i * N;
+      std::fill(row.begin(), row.end(), 0.);
+      for (int k = 0; k < N; ++k) addScaled(row.data(), Q[k], prior_J_[k], N);
+      for (int j = 0; j < N; ++j) addScaled(A_[j], prior_J_[i][j], row.data(), N);
+      addScaled(b_.data(), -dot(Q, error_.data(), N), prior_J_[i], N);
+    }
+    prior_cost_ = weighed(error_);
+  }
+  for (int i = 0; i < N; ++i) prior_slope_[number(i)] = -b_[number(i)];
+  finite_ = true;
+  const void* q = point(problem, ParameterPoint::current);
+  for (ConstrainedChannel& channel : channels_) finite_ = channel.linearize(q, A_, b_) && finite_;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < i; ++j) A_[i][j] = A_[j][i];
+  }
+  if (P > 0) {
+    parameter_.linearizeConstraint(problem, ParameterPoint::current, constraint_values_.data(), C_.data());
+    // The derivative of linear constraints is what it was.
+    if (!parameter_.linear || !have_basis_) {
+      if (!allFinite(C_)) {
+        std::fill(constraint_values_.begin(), constraint_values_.end(), std::numeric_limits<double>::quiet_NaN());
+        C_.setZero();
+      }
+      basis_.compute(C_);
+      have_basis_ = true;
+    }
+  }
+  system_.compute(A_, basis_.freeBasis(), N - basis_.rank());
+}
+
+/// The same with the curvature of all equations under the multipliers of the last step.
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearizeCurved(void* problem) {
+  Rows A(N, N);
+  Numbers b(number(N));
+  if (hasPrior()) {
+    Numbers row(number(N));
+    for (int i = 0; i < N; ++i) {
+      const double* Q = settings_.prior_information.data() + i * N;
+      std::fill(row.begin(), row.end(), 0.);
+      for (int k = 0; k < N; ++k) addScaled(row.data(), Q[k], prior_J_[k], N);
+      for (int j = 0; j < N; ++j) addScaled(A[j], prior_J_[i][j], row.data(), N);
+      b[number(i)] = -prior_slope_[number(i)];
+    }
+  }
+  const double h = differenceStep(problem);
+  for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b);
+  if (P > 0) addConstraintCurvature(problem, h, A);
+  if (!allFinite(A) || !allFinite(b)) return;
+  curved_A_ = A, curved_b_ = b;
+  curved_system_.compute(A, basis_.freeBasis(), N - basis_.rank(), true);
+}
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::differenceStep(const void* problem) const {
+  if (!parameter_.is_vector) return curvature_step;
+  Numbers q(number(N));
+  parameter_.coordinates(problem, q.data());
+  return curvature_step * differenceScale(q.data(), N);
+}
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::addConstraintCurvature(void* problem, double h, Rows& A) {
+  Rows H(N, N), C(P, N), transport(N, N);
+  Numbers shift(number(N)), values(number(P)), gradient(number(N)), moved(number(N));
+  for (int k = 0; k < N; ++k) {
+    for (const double sign : {1., -1.}) {
+      std::fill(shift.begin(), shift.end(), 0.);
+      shift[number(k)] = sign * h;
+      parameter_.move(problem, ParameterPoint::current, ParameterPoint::shifted, shift.data());
+      parameter_.linearizeConstraint(problem, ParameterPoint::shifted, values.data(), C.data());
+      std::fill(gradient.begin(), gradient.end(), 0.);
+      for (int p = 0; p < P; ++p) {
+        addScaled(gradient.data(), sign * constraint_multipliers_[number(p)] / (2 * h), C[p], N);
+      }
+      if (!parameter_.is_vector) {
+        parameter_.transport(problem, transport.data());
+        moved = gradient;
+        std::fill(gradient.begin(), gradient.end(), 0.);
+        for (int j = 0; j < N; ++j) addScaled(gradient.data(), moved[number(j)], transport[j], N);
+      }
+      addScaled(H[k], 1, gradient.data(), N);
+    }
+  }
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) A[i][j] += 0.5 * (H[i][j] + H[j][i]);
+  }
+}
+
+LIESTAT_ESTIMATION_INLINE ConstrainedCore::Merit ConstrainedCore::meritOf(const ChannelMerit& sum, double prior_cost,
+                                                                          const Numbers& constraints) const {
+  return {sum.cost + prior_cost, sum.violation, sum.squared_violation, basis_.shortestLength(constraints)};
+}
+/// The same with the prior and the constraints at a point.
+LIESTAT_ESTIMATION_INLINE ConstrainedCore::Merit ConstrainedCore::meritAt(const void* problem, ParameterPoint which,
+                                                                          const ChannelMerit& sum) {
+  if (hasPrior()) parameter_.priorError(problem, which, error_.data(), nullptr);
+  if (P > 0) parameter_.constraint(problem, which, trial_values_.data());
+  return meritOf(sum, weighed(error_), trial_values_);
+}
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::phi(const Merit& merit) const {
+  return 0.5 * merit.cost + penalty_ * merit.violation + constraint_penalty_ * merit.constraint;
+}
+
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::parameterSize(const void* problem) const {
+  if (!parameter_.is_vector) return 1;
+  Numbers q(number(N));
+  parameter_.coordinates(problem, q.data());
+  return 1 + norm(q);
+}
+/// The length of one rounding error in each coordinate, in units of the noise.
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::rounding(const void* problem) const {
+  double squared = 0;
+  for (const ConstrainedChannel& channel : channels_) squared += channel.roundingSquared();
+  Numbers q(number(N), 1.), weighted(number(N));
+  if (parameter_.is_vector) parameter_.coordinates(problem, q.data());
+  multiply(A_, q, weighted);
+  const double of_parameter = std::abs(dot(q, weighted));
+  return std::sqrt(squared + of_parameter * std::pow(std::numeric_limits<double>::epsilon(), 2));
+}
+
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::step(void* problem, bool curved) {
+  Numbers wanted(number(N));
+  basis_.shortest(constraint_values_, -1, wanted);
+  delta_ = wanted;
+  curved ? curved_system_.solve(curved_b_, delta_) : system_.solve(b_, delta_);
+  Merit here;
+  double slope = 0, length = 0;
+  for (bool with_curvature = curved;; with_curvature = false) {
+    double largest = 0, squared = 0, free = 0, along = 0;
+    ChannelMerit sum;
+    for (ConstrainedChannel& channel : channels_) {
+      largest = std::max(largest, channel.step(delta_, with_curvature));
+      channel.stepLengths(squared, along);
+      free = std::max(free, channel.freeStep());
+      channel.addMerit(sum);
+    }
+    multiply(A_, delta_, gradient_);
+    const double quadratic = dot(delta_, gradient_);
+    for (int i = 0; i < N; ++i) gradient_[number(i)] -= b_[number(i)];
+    penalty_ = std::max(penalty_, 2 * largest);
+    if (basis_.rank() > 0) {
+      // At least a millionth of what an error of one standard deviation would ask for: where the measurements are met as
+      // they stand, constraints that are not must have a price, or any step is as good as another.
+      double trace = 0;
+      for (int i = 0; i < N; ++i) trace += A_[i][i];
+      const double least = 1e-6 * std::sqrt(trace / N);
+      constraint_penalty_ = std::max({constraint_penalty_, 2 * basis_.fixedLength(gradient_), least});
+      basis_.multipliers(gradient_, constraint_multipliers_);
+    }
+    here = meritOf(sum, prior_cost_, constraint_values_);
+    slope = along + dot(prior_slope_, delta_) - penalty_ * here.violation - constraint_penalty_ * here.constraint;
+    length = std::sqrt(std::max(0.0, squared + quadratic));
+    free_step_ = free;
+    if (!with_curvature || slope < 0 || length <= settings_.tolerance) break;
+    // Not a direction of descent: the step without curvature is one.
+    delta_ = wanted;
+    system_.solve(b_, delta_);
+  }
+  if (!std::isfinite(length) || !std::isfinite(slope)) return finish(problem, ConstrainedEnd::stalled);
+
+  const double size = parameterSize(problem), parameter_step = norm(delta_) / size;
+  const bool met = here.constraint <= 1e-9 * size;
+  // As small as asked, or as rounding lets it be.
+  const double tolerance = std::max(settings_.tolerance, 4 * rounding(problem));
+  if (length <= tolerance && std::sqrt(here.squared_violation) <= 10 * tolerance && free_step_ <= 1e-9 && met &&
+      parameter_step <= 1e-6) {
+    parameter_.move(problem, ParameterPoint::current, ParameterPoint::current, delta_.data());
+    for (ConstrainedChannel& channel : channels_) channel.acceptFull();
+    return finish(problem, ConstrainedEnd::converged);
+  }
+  const double ratio = last_length_ > 0 ? length / last_length_ : 0;
+  // Linear convergence: the curvature joins, and stays.
+  slow_steps_ = ratio > 0.4 || cut_ ? slow_steps_ + 1 : slow_steps_ >= 3 ? slow_steps_ : 0;
+  last_length_ = length;
+  return search(problem, here, slope, length, parameter_step, met);
+}
+
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::search(void* problem, const Merit& here, double slope, double length,
+                                                       double parameter_step, bool met) {
+  // Rounding of the sum, and of equations that are met as well as rounding lets them be.
+  const double value = phi(here);
+  const double slack =
+      1e-13 * (1 + std::abs(value)) + 4 * penalty_ * std::sqrt(static_cast<double>(measurements_)) * rounding(problem);
+  const void* q = point(problem, ParameterPoint::trial);
+  Numbers part(number(N));
+  double alpha = 1;
+  for (int halving = 0; halving < 30; ++halving, alpha *= 0.5) {
+    for (int i = 0; i < N; ++i) part[number(i)] = alpha * delta_[number(i)];
+    parameter_.move(problem, ParameterPoint::current, ParameterPoint::trial, part.data());
+    ChannelMerit sum;
+    for (ConstrainedChannel& channel : channels_) channel.tryStep(q, alpha, sum);
+    const double bound = value + 1e-4 * alpha * slope + slack;
+    const double there = phi(meritAt(problem, ParameterPoint::trial, sum));
+    cut_ = halving > 0;
+    if (there <= bound) return accept(problem);
+    if (halving > 6) continue;
+    // Second-order correction: the equations at the trial point, linearised as here. Repeated, because one leaves what
+    // is of third order, and that is much of a long step.
+    double violation = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 4; ++k) {
+      std::fill(part.begin(), part.end(), 0.);
+      for (const ConstrainedChannel& channel : channels_) channel.addCorrectionSums(part);
+      basis_.shortest(trial_values_, -1, further_);
+      system_.solve(part, further_);
+      parameter_.move(problem, ParameterPoint::trial, ParameterPoint::trial, further_.data());
+      ChannelMerit after;
+      for (ConstrainedChannel& channel : channels_) channel.tryCorrected(q, further_, after);
+      const Merit merit = meritAt(problem, ParameterPoint::trial, after);
+      if (phi(merit) <= bound) return accept(problem);
+      const double left = phi(merit) - 0.5 * merit.cost;
+      if (!(left < 0.5 * violation)) break;
+      violation = left;
+    }
+  }
+  const bool close = length <= 1e-6 && parameter_step <= 1e-7 && met;
+  return finish(problem, close ? ConstrainedEnd::converged : ConstrainedEnd::stalled);
+}
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::accept(void* problem) {
+  parameter_.move(problem, ParameterPoint::trial, ParameterPoint::current, nullptr);
+  for (ConstrainedChannel& channel : channels_) channel.accept();
+  return true;
+}
+
+/// Fills in the result; always false.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::finish(void* problem, ConstrainedEnd end) {
+  result_.end = end;
+  if (end == ConstrainedEnd::bad_input) return false;
+  linearize(problem);
+  ChannelMerit sum;
+  int unmet = 0;
+  result_.equations = result_.dropped_equations = 0;
+  result_.uninformative = 0;
+  for (ConstrainedChannel& channel : channels_) {
+    channel.addMerit(sum);
+    result_.equations += channel.keptEquations();
+    result_.dropped_equations += channel.droppedEquations();
+    unmet += channel.unmetEquations(point(problem, ParameterPoint::current));
+    result_.uninformative += channel.uninformative();
+  }
+  result_.constraints = basis_.rank();
+  result_.dropped_constraints = P - result_.constraints;
+  result_.free_parameters = N - result_.constraints;
+  result_.information = A_;
+  result_.covariance = system_.covariance();
+  result_.unobservable = system_.nullDimension();
+  result_.unobservable_basis = system_.nullBasis();
+  result_.chi2 = sum.cost + prior_cost_;
+  result_.equation_error = equationError(problem);
+  result_.degrees_of_freedom =
+      result_.constraints + result_.equations + settings_.prior_rank - N + result_.unobservable;
+  if (end != ConstrainedEnd::converged && end != ConstrainedEnd::stalled) return false;
+  if (basis_.largest(constraint_values_) > 1e-7 * parameterSize(problem) ||
+      (end == ConstrainedEnd::converged && unmet > 0)) {
+    result_.end = ConstrainedEnd::contradictory;
+  } else if (end == ConstrainedEnd::converged && result_.equations == 0 && !hasPrior() && result_.unobservable > 0) {
+    result_.end = ConstrainedEnd::too_few;
+  } else if (end == ConstrainedEnd::converged && result_.unobservable > 0) {
+    result_.end = ConstrainedEnd::unobservable;
+  }
+  return false;
+}
+/// E²: the squared length of the second-order correction at the end.
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::equationError(void* problem) {
+  ChannelMerit sum;
+  Numbers b(number(N)), step(number(N));
+  for (ConstrainedChannel& channel : channels_) {
+    channel.tryStep(point(problem, ParameterPoint::current), 0, sum);
+    channel.addCorrectionSums(b);
+  }
+  basis_.shortest(constraint_values_, -1, step);
+  system_.solve(b, step);
+  double squared = weighed(step);
+  for (const ConstrainedChannel& channel : channels_) squared += channel.correctionSquared(step);
+  return squared;
+}
+
+}  // namespace liestat::detail
