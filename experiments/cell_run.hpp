@@ -1,5 +1,5 @@
-// The trials of a validation, cell after cell: the one place where they are counted, interrupted, spread over threads and
-// told to a progress bar.
+// The trials of a validation, cell after cell: the one place where they are counted, interrupted, spread over threads
+// and told to a progress bar.
 #pragma once
 
 #include <experiments/interruption.hpp>

@@ -1,5 +1,5 @@
-// The promises of a validation and what became of them, as data. The verdict is made here once; terminal, page, JSON and
-// exit code show it.
+// The promises of a validation and what became of them, as data. The verdict is made here once; terminal, page, JSON
+// and exit code show it.
 #pragma once
 
 #include <experiments/interruption.hpp>
@@ -37,8 +37,8 @@ struct Judgement {
 
   std::size_t judged() const;
   std::size_t failed() const;
-  /// True if no promise is broken. A run of tests that judged nothing has not passed, nor has one that an interrupt left
-  /// incomplete.
+  /// True if no promise is broken. A run of tests that judged nothing has not passed, nor has one that an interrupt
+  /// left incomplete.
   bool passed() const;
   /// The last line but one of the terminal: how many promises are kept, and the false alarm.
   std::string sentence() const;

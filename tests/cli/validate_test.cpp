@@ -1,6 +1,8 @@
 // `liestat validate`, all subjects: what they write is described, fits the terminal, and says the same everywhere. What
 // they find: tests/experiments/.
 
+#include <cli/commands/measurement_options.hpp>
+#include <cli/commands/split.hpp>
 #include <cli/show/split.hpp>
 #include <experiments/estimator_validation.hpp>
 #include <experiments/hand_eye_validation.hpp>
@@ -42,7 +44,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Words = std::vector<std::string>;
 
-Words split(const std::string& text) {
+Words wordsOf(const std::string& text) {
   std::istringstream stream(text);
   Words words;
   for (std::string word; stream >> word;) words.push_back(word);
@@ -146,7 +148,7 @@ struct ValidationRun {
     Words words{"sh", "-c", "\"$@\" > out.txt", "sh"};
     words.insert(words.end(), before.begin(), before.end());
     words.insert(words.end(), {LIESTAT_PROGRAM, "validate"});
-    for (const std::string& word : split(command)) words.push_back(word);
+    for (const std::string& word : wordsOf(command)) words.push_back(word);
     words.insert(words.end(), {"--json", "out.json", "--report", "page"});
     result = runProgram(words, directory.path().string());
     text = contentOf(directory / "out.txt");
@@ -250,8 +252,8 @@ TEST(Validate, AnInterruptLeavesWhatWasComputed) {
 TEST(Validate, RefusesWhatItDoesNotKnow) {
   for (const Subject& subject : subjects()) {
     for (const std::string& options : subject.refused) {
-      Words words{LIESTAT_PROGRAM, "validate", split(subject.command)[0]};
-      for (const std::string& word : split(options)) words.push_back(word);
+      Words words{LIESTAT_PROGRAM, "validate", wordsOf(subject.command)[0]};
+      for (const std::string& word : wordsOf(options)) words.push_back(word);
       const ProgramResult result = runProgram(words, ".");
       EXPECT_EQ(result.status, 2) << subject.command << ": " << options;
       EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
@@ -292,6 +294,75 @@ TEST(ValidateSplit, SaysTheSameEverywhereAndAfterAnInterrupt) {
   EXPECT_EQ(run.json["trials_done"],
             run.json["random"]["splits"].get<int>() + run.json["by_blocks"]["splits"].get<int>());
   EXPECT_NE(run.page.find("<p class=\"verdict none\">– INTERRUPTED: "), std::string::npos);
+}
+
+/// Splits of a file in the process, which an interrupt stops.
+struct StoppedSplits {
+  Measurements measurements;
+  SplitSettings settings;
+
+  StoppedSplits() {
+    const TemporaryDirectory directory;
+    MeasurementInput input;
+    input.file = directory.write("f.csv", pointsFile(60));
+    measurements = input.read("test");
+    settings.threads = 1;
+    settings.split.splits = 20;
+  }
+  ~StoppedSplits() { start(0); }
+  SplitSummary run(std::size_t splits) {
+    settings.split.splits = splits;
+    start(splits);
+    return splitMeasurements(measurements, settings);
+  }
+  /// An interrupt comes after so many splits of both kinds.
+  SplitSummary stoppedAfter(std::size_t count) {
+    settings.split.splits = 20;
+    start(20);
+    std::size_t done = 0;
+    return splitMeasurements(measurements, settings, [&] { trials_of_run.stop = ++done >= count; });
+  }
+  void start(std::size_t splits) const {
+    TrialsOfRun& run = trials_of_run;
+    run.stop = false, run.done = 0, run.planned = 2 * splits;
+  }
+  /// The lines on the terminal, as they are now.
+  static std::string textOf(const SplitSummary& result) {
+    const FileSplit split{result, "f.csv", "", {}};
+    return formatSplit(split);
+  }
+};
+
+std::vector<double> firstOf(const std::vector<double>& list, std::size_t n) {
+  return {list.begin(), list.begin() + static_cast<std::ptrdiff_t>(n)};
+}
+
+TEST(ValidateSplit, anInterruptLeavesTheFirstSplitsWithTheirDegreesOfFreedom) {
+  StoppedSplits splits;
+  const SplitSummary whole = splits.run(20), seven = splits.run(7);
+  const SplitSummary early = splits.stoppedAfter(7);
+  EXPECT_EQ(trials_of_run.done, 7U);
+  EXPECT_EQ(early.random.distances, firstOf(whole.random.distances, 7));
+  EXPECT_EQ(early.random.effective_dof, seven.random.effective_dof);
+  EXPECT_NE(early.random.effective_dof, whole.random.effective_dof);
+  EXPECT_TRUE(early.by_blocks.distances.empty());
+  EXPECT_EQ(early.merged.mean.point, whole.merged.mean.point);
+  const std::string text = splits.textOf(early);
+  EXPECT_NE(text.find("halves of 10 blocks    none was done\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nINTERRUPTED: 7 of 40 splits were done, none of them by blocks of time,"), std::string::npos)
+      << text;
+
+  const SplitSummary late = splits.stoppedAfter(27);
+  EXPECT_EQ(late.random.distances, whole.random.distances);
+  EXPECT_EQ(late.random.effective_dof, whole.random.effective_dof);
+  EXPECT_EQ(late.by_blocks.distances, firstOf(whole.by_blocks.distances, 7));
+  EXPECT_EQ(late.by_blocks.effective_dof, seven.by_blocks.effective_dof);
+  EXPECT_NE(splits.textOf(late).find("\nINTERRUPTED: 27 of 40 splits were done. Halves"), std::string::npos);
+
+  // One that comes after the last split interrupts nothing.
+  const SplitSummary ended = splits.stoppedAfter(40);
+  EXPECT_EQ(ended.by_blocks.distances, whole.by_blocks.distances);
+  EXPECT_NE(splits.textOf(ended).find("\nPASSED: "), std::string::npos);
 }
 
 }  // namespace
