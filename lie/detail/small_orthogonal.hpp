@@ -145,7 +145,8 @@ struct SmallSvd {
     double &left = rounding_[static_cast<std::size_t>(p)], &right = rounding_[static_cast<std::size_t>(q)];
     if (a <= left || b <= right) return false;
     const double zeta = (b - a) / (2 * c);
-    const double t = std::copysign(1 / (std::abs(zeta) + std::hypot(1, zeta)), zeta), k = 1 / std::hypot(1, t);
+    const double t = std::copysign(1 / (std::abs(zeta) + std::sqrt(1 + zeta * zeta)), zeta),
+                 k = 1 / std::sqrt(1 + t * t);
     const double unit = std::pow(8 * std::numeric_limits<double>::epsilon(), 2);
     const double of_p = k * k * (left + unit * a), of_q = k * k * (right + unit * b);
     left = of_p + t * t * of_q, right = t * t * of_p + of_q;
