@@ -139,7 +139,10 @@ struct SmallSvd {
     return sum;
   }
   bool rotate(int p, int q) {
-    const double a = dot(p, p), b = dot(q, q), c = dot(p, q);
+    // Three sums at once, which do not wait for each other.
+    const double *x = u.row(p), *y = u.row(q);
+    double a = 0, b = 0, c = 0;
+    for (int i = 0; i < n; ++i) a += x[i] * x[i], b += y[i] * y[i], c += x[i] * y[i];
     // Written so that NaN ends the sweeps.
     if (!(std::abs(c) > 2 * std::numeric_limits<double>::epsilon() * std::sqrt(a) * std::sqrt(b))) return false;
     double &left = rounding_[static_cast<std::size_t>(p)], &right = rounding_[static_cast<std::size_t>(q)];
@@ -151,10 +154,11 @@ struct SmallSvd {
     const double of_p = k * k * (left + unit * a), of_q = k * k * (right + unit * b);
     left = of_p + t * t * of_q, right = t * t * of_p + of_q;
     for (BasicSmallMatrix<Most>* m : {&u, &v}) {
+      double *first = m->row(p), *second = m->row(q);
       for (int i = 0; i < n; ++i) {
-        const double x = (*m)(p, i), y = (*m)(q, i);
-        (*m)(p, i) = k * (x - t * y);
-        (*m)(q, i) = k * (t * x + y);
+        const double before = first[i], after = second[i];
+        first[i] = k * (before - t * after);
+        second[i] = k * (t * before + after);
       }
     }
     return true;
