@@ -15,8 +15,10 @@
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <limits>
 
 namespace liestat {
@@ -107,45 +109,50 @@ struct SemidefiniteParts {
     const double least = 10 * N * std::numeric_limits<double>::epsilon() * svd.value(0);
     valid = true;
     for (int k = 0; k < N; ++k) {
-      double v[N], sign = 0;
-      for (int i = 0; i < N; ++i) v[i] = svd.v(k, i) / scale[i], sign += svd.u(k, i) * svd.v(k, i);
+      std::array<double, static_cast<std::size_t>(N)> v{};
+      double sign = 0;
+      for (int i = 0; i < N; ++i)
+        v[static_cast<std::size_t>(i)] = svd.v(k, i) / scale[i], sign += svd.u(k, i) * svd.v(k, i);
       if (svd.value(k) > least) {
         if (sign < 0 && svd.value(k) > 10 * least) valid = false;
         for (int i = 0; i < N; ++i) {
-          for (int j = 0; j < N; ++j) inverse(i, j) += v[i] * v[j] / svd.value(k);
+          for (int j = 0; j < N; ++j)
+            inverse(i, j) += v[static_cast<std::size_t>(i)] * v[static_cast<std::size_t>(j)] / svd.value(k);
         }
       } else {
         // A v = 0; orthonormal by Gram and Schmidt.
         normalise(v);
         for (int j = 0; j < null_dimension; ++j) {
           double along = 0;
-          for (int i = 0; i < N; ++i) along += null_basis(i, j) * v[i];
-          for (int i = 0; i < N; ++i) v[i] -= along * null_basis(i, j);
+          for (int i = 0; i < N; ++i) along += null_basis(i, j) * v[static_cast<std::size_t>(i)];
+          for (int i = 0; i < N; ++i) v[static_cast<std::size_t>(i)] -= along * null_basis(i, j);
         }
         normalise(v);
-        for (int i = 0; i < N; ++i) null_basis(i, null_dimension) = v[i];
+        for (int i = 0; i < N; ++i) null_basis(i, null_dimension) = v[static_cast<std::size_t>(i)];
         ++null_dimension;
       }
     }
     // The sum is a generalised inverse. Without its part along the null space it is Moore and Penrose's.
     for (int k = 0; k < null_dimension; ++k) {
-      double along[N], both = 0;
+      std::array<double, static_cast<std::size_t>(N)> along{};
+      double both = 0;
       for (int i = 0; i < N; ++i) {
-        along[i] = 0;
-        for (int j = 0; j < N; ++j) along[i] += inverse(i, j) * null_basis(j, k);
-        both += null_basis(i, k) * along[i];
+        along[static_cast<std::size_t>(i)] = 0;
+        for (int j = 0; j < N; ++j) along[static_cast<std::size_t>(i)] += inverse(i, j) * null_basis(j, k);
+        both += null_basis(i, k) * along[static_cast<std::size_t>(i)];
       }
       for (int i = 0; i < N; ++i) {
         const double w = null_basis(i, k);
         for (int j = 0; j < N; ++j) {
-          inverse(i, j) += both * w * null_basis(j, k) - w * along[j] - along[i] * null_basis(j, k);
+          inverse(i, j) += both * w * null_basis(j, k) - w * along[static_cast<std::size_t>(j)] -
+                           along[static_cast<std::size_t>(i)] * null_basis(j, k);
         }
       }
     }
   }
 
  private:
-  static void normalise(double (&v)[N]) {
+  static void normalise(std::array<double, static_cast<std::size_t>(N)>& v) {
     double squared = 0;
     for (const double x : v) squared += x * x;
     if (!(squared > 0)) return;

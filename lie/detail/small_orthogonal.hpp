@@ -139,21 +139,26 @@ struct SmallSvd {
     return sum;
   }
   bool rotate(int p, int q) {
-    const double a = dot(p, p), b = dot(q, q), c = dot(p, q);
+    // Three sums at once, which do not wait for each other.
+    const double *x = u.row(p), *y = u.row(q);
+    double a = 0, b = 0, c = 0;
+    for (int i = 0; i < n; ++i) a += x[i] * x[i], b += y[i] * y[i], c += x[i] * y[i];
     // Written so that NaN ends the sweeps.
     if (!(std::abs(c) > 2 * std::numeric_limits<double>::epsilon() * std::sqrt(a) * std::sqrt(b))) return false;
     double &left = rounding_[static_cast<std::size_t>(p)], &right = rounding_[static_cast<std::size_t>(q)];
     if (a <= left || b <= right) return false;
     const double zeta = (b - a) / (2 * c);
-    const double t = std::copysign(1 / (std::abs(zeta) + std::hypot(1, zeta)), zeta), k = 1 / std::hypot(1, t);
+    const double t = std::copysign(1 / (std::abs(zeta) + std::sqrt(1 + zeta * zeta)), zeta),
+                 k = 1 / std::sqrt(1 + t * t);
     const double unit = std::pow(8 * std::numeric_limits<double>::epsilon(), 2);
     const double of_p = k * k * (left + unit * a), of_q = k * k * (right + unit * b);
     left = of_p + t * t * of_q, right = t * t * of_p + of_q;
     for (BasicSmallMatrix<Most>* m : {&u, &v}) {
+      double *first = m->row(p), *second = m->row(q);
       for (int i = 0; i < n; ++i) {
-        const double x = (*m)(p, i), y = (*m)(q, i);
-        (*m)(p, i) = k * (x - t * y);
-        (*m)(q, i) = k * (t * x + y);
+        const double before = first[i], after = second[i];
+        first[i] = k * (before - t * after);
+        second[i] = k * (t * before + after);
       }
     }
     return true;

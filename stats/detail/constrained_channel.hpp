@@ -1,6 +1,7 @@
 // The measurements of one kind in a constrained estimate: each measurement's equations linearised, its own correction
 // eliminated (Viéville, Lingrand and Gaspard 2000, appendix A, corrected). Definitions of
-// stats/detail/constrained_core.hpp.
+// stats/detail/constrained_core.hpp. What the front does not call is inline, so that position-independent code calls none of
+// it through a table.
 #pragma once
 
 #include <stats/detail/tangent_system.hpp>
@@ -18,10 +19,10 @@ namespace liestat::detail {
 
 // ------------------------------------------------------------------------------------------------------------ noises
 
-LIESTAT_ESTIMATION_INLINE std::size_t NoiseTable::stride() const {
+inline std::size_t NoiseTable::stride() const {
   return number(form == Form::isotropic ? 1 : form == Form::diagonal ? dimension : dimension * dimension);
 }
-LIESTAT_ESTIMATION_INLINE double NoiseTable::squaredNorm(std::size_t i, const double* e) const {
+inline double NoiseTable::squaredNorm(std::size_t i, const double* e) const {
   const double* Q = information.data() + index(i) * stride();
   double sum = 0;
   switch (form) {
@@ -35,7 +36,7 @@ LIESTAT_ESTIMATION_INLINE double NoiseTable::squaredNorm(std::size_t i, const do
       return sum;
   }
 }
-LIESTAT_ESTIMATION_INLINE void NoiseTable::spread(std::size_t i, const double* D, int rows, double* result) const {
+inline void NoiseTable::spread(std::size_t i, const double* D, int rows, double* result) const {
   const double* V = covariance.data() + index(i) * stride();
   for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
     for (int k = 0; k < dimension; ++k) {
@@ -43,7 +44,7 @@ LIESTAT_ESTIMATION_INLINE void NoiseTable::spread(std::size_t i, const double* D
     }
   }
 }
-LIESTAT_ESTIMATION_INLINE void NoiseTable::matrix(const Numbers& list, std::size_t i, double* result) const {
+inline void NoiseTable::matrix(const Numbers& list, std::size_t i, double* result) const {
   const double* values = list.data() + index(i) * stride();
   for (int k = 0; k < dimension; ++k) {
     for (int l = 0; l < dimension; ++l, ++result) {
@@ -51,7 +52,7 @@ LIESTAT_ESTIMATION_INLINE void NoiseTable::matrix(const Numbers& list, std::size
     }
   }
 }
-LIESTAT_ESTIMATION_INLINE double NoiseTable::typicalDeviation(std::size_t i) const {
+inline double NoiseTable::typicalDeviation(std::size_t i) const {
   const double* V = covariance.data() + index(i) * stride();
   double trace = 0;
   for (int k = 0; k < dimension; ++k) {
@@ -143,7 +144,7 @@ inline double differenceScale(const double* x, int n) {
   return size > 0 ? size : 1;
 }
 
-LIESTAT_ESTIMATION_INLINE ConstrainedChannel::ConstrainedChannel(ChannelRecord record, int parameters)
+inline ConstrainedChannel::ConstrainedChannel(ChannelRecord record, int parameters)
     : record_(std::move(record)),
       N(parameters),
       P(record_.functions->equations),
@@ -172,19 +173,18 @@ LIESTAT_ESTIMATION_INLINE ConstrainedChannel::ConstrainedChannel(ChannelRecord r
   }
 }
 
-LIESTAT_ESTIMATION_INLINE double* ConstrainedChannel::block(Numbers& list, std::size_t i, int size) const {
+inline double* ConstrainedChannel::block(Numbers& list, std::size_t i, int size) const {
   return list.data() + i * number(size);
 }
-LIESTAT_ESTIMATION_INLINE const double* ConstrainedChannel::block(const Numbers& list, std::size_t i, int size) const {
+inline const double* ConstrainedChannel::block(const Numbers& list, std::size_t i, int size) const {
   return list.data() + i * number(size);
 }
-LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::freeOf(std::size_t i) const {
+inline int ConstrainedChannel::freeOf(std::size_t i) const {
   return record_.noise.can_be_free ? record_.noise.null_dimension[record_.noise.index(i)] : 0;
 }
 
 /// L⁻¹ B of the rows that are kept, in the first of P rows; the others are zero.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::halfSolve(std::size_t i, const double* B, int cols,
-                                                             double* X) const {
+inline void ConstrainedChannel::halfSolve(std::size_t i, const double* B, int cols, double* X) const {
   const double* root = block(root_, i, P * P);
   const int *order = order_.data() + i * number(P), rank = ranks_[i];
   for (int k = 0; k < rank; ++k, root += P) {
@@ -201,20 +201,20 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::halfSolve(std::size_t i, cons
   std::fill(X + rank * cols, X + P * cols, 0.);
 }
 /// Values of the equations in units of the noise.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::whitened(std::size_t i, const double* values, double* result) const {
+inline void ConstrainedChannel::whitened(std::size_t i, const double* values, double* result) const {
   if (freeOf(i) == 0) return halfSolve(i, values, 1, result);
   double* selected = scratch_.data();
   multiply(block(selection_, i, P * P), values, P, P, 1, selected);
   halfSolve(i, selected, 1, result);
 }
-LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::selected(std::size_t i) const {
+inline int ConstrainedChannel::selected(std::size_t i) const {
   const double* selection = block(selection_, i, P * P);
   int rows = 0;
   for (int k = 0; k < P; ++k) rows += dot(selection + k * P, selection + k * P, P) > 0;
   return rows;
 }
 
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::eliminateFree(std::size_t i) {
+inline void ConstrainedChannel::eliminateFree(std::size_t i) {
   const int free = freeOf(i), size = std::max(P, K);
   const double *D = block(free_D_, i, P * K),
                *basis = record_.noise.null_basis.data() + record_.noise.index(i) * number(K * K);
@@ -245,8 +245,8 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::eliminateFree(std::size_t i) 
 }
 
 /// The block of a measurement from its derivatives. False if something is not finite.
-LIESTAT_ESTIMATION_INLINE bool ConstrainedChannel::build(std::size_t i, const double* values,
-                                                         const double* by_parameter, const double* by_measurement) {
+inline bool ConstrainedChannel::build(std::size_t i, const double* values, const double* by_parameter,
+                                      const double* by_measurement) {
   double *observed = scratch_.data(), *S = observed + P, *spread = S + P * P, *work = spread + P * K;
   const double* at = block(at_, i, K);
   for (int p = 0; p < P; ++p) observed[p] = dot(by_measurement + p * K, at, K) - values[p];
@@ -278,7 +278,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedChannel::build(std::size_t i, const do
   return finite;
 }
 
-LIESTAT_ESTIMATION_INLINE bool ConstrainedChannel::linearize(const void* q, Rows& A, Numbers& b) {
+inline bool ConstrainedChannel::linearize(const void* q, Rows& A, Numbers& b) {
   bool finite = true;
   for (std::size_t first = 0; first < n_; first += channel_batch) {
     const std::size_t count = std::min(channel_batch, n_ - first);
@@ -299,7 +299,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedChannel::linearize(const void* q, Rows
 }
 
 /// The multipliers of the equations as they were given; with the sign of ½ ‖ε‖² + λᵀ c.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::lagrange(std::size_t i, double* lambda) const {
+inline void ConstrainedChannel::lagrange(std::size_t i, double* lambda) const {
   double *y = scratch_.data(), *x = y + P;
   const double *given = block(multipliers_, i, P), *root = block(root_, i, P * P);
   std::copy(given, given + P, y);
@@ -318,8 +318,8 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::lagrange(std::size_t i, doubl
   for (int k = 0; k < P; ++k) addScaled(lambda, x[k], selection + k * P, P);
 }
 
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parameter, void* problem,
-                                                                   double parameter_step, Rows& A, Numbers& b) {
+inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parameter, void* problem,
+                                                double parameter_step, Rows& A, Numbers& b) {
   const int size = N + K;
   base_.resize(n_ * number(K)), slope_.resize(n_ * number(K * N)), curved_.assign(n_, 0);
   // Second derivatives of λᵀ c with respect to parameter and measurement, by central differences of the first.
@@ -368,7 +368,7 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::linearizeCurved(const Paramet
 }
 
 /// With W = Q + Σ λ_k ∂²c_k/∂m², H_qm = Σ λ_k ∂²c_k/∂q∂m, the criterion gains ½ δᵀ A δ − bᵀ δ. H is made symmetric.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Numbers& b) {
+inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Numbers& b) {
   const int size = N + K, cols = N + 1;
   for (int k = 0; k < size; ++k) {
     for (int l = 0; l < k; ++l) H[k * size + l] = H[l * size + k] = 0.5 * (H[k * size + l] + H[l * size + k]);
@@ -428,8 +428,8 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::addCurved(std::size_t i, doub
 }
 
 /// Corrections from the shortest one, in place: what the free directions add. `observed` counts times `sign`.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::recover(std::size_t i, double* correction, const double* observed,
-                                                           double sign, const Numbers& delta) const {
+inline void ConstrainedChannel::recover(std::size_t i, double* correction, const double* observed, double sign,
+                                        const Numbers& delta) const {
   if (freeOf(i) == 0) return;
   double* open = scratch_.data() + 2 * P;
   const double *C = block(free_C_, i, P * N), *D = block(free_D_, i, P * K), *recovery = block(recovery_, i, K * P);
@@ -439,7 +439,7 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::recover(std::size_t i, double
   for (int k = 0; k < K; ++k) correction[k] += dot(recovery + k * P, open, P);
 }
 
-LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::step(const Numbers& delta, bool curved) {
+inline double ConstrainedChannel::step(const Numbers& delta, bool curved) {
   double largest = 0;
   for (std::size_t i = 0; i < n_; ++i) {
     const double *C = block(C_, i, P * N), *r = block(r_, i, P), *G = block(G_, i, P * K);
@@ -458,7 +458,7 @@ LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::step(const Numbers& delta, 
   return std::sqrt(largest);
 }
 
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::stepLengths(double& squared, double& slope) const {
+inline void ConstrainedChannel::stepLengths(double& squared, double& slope) const {
   double* change = scratch_.data();
   for (std::size_t i = 0; i < n_; ++i) {
     const double *next = block(next_, i, K), *at = block(at_, i, K);
@@ -469,7 +469,7 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::stepLengths(double& squared, 
   }
 }
 
-LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::freeStep() const {
+inline double ConstrainedChannel::freeStep() const {
   double largest = 0;
   for (std::size_t i = 0; i < n_ && record_.noise.can_be_free; ++i) {
     if (freeOf(i) == 0) continue;
@@ -481,17 +481,17 @@ LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::freeStep() const {
   return largest;
 }
 
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::add(std::size_t i, const double* correction, const double* whitened,
-                                                       ChannelMerit& sum) const {
+inline void ConstrainedChannel::add(std::size_t i, const double* correction, const double* whitened,
+                                    ChannelMerit& sum) const {
   const double squared = dot(whitened, whitened, P);
   sum.cost += record_.noise.squaredNorm(i, correction);
   sum.violation += std::sqrt(squared);
   sum.squared_violation += squared;
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::addMerit(ChannelMerit& sum) const {
+inline void ConstrainedChannel::addMerit(ChannelMerit& sum) const {
   for (std::size_t i = 0; i < n_; ++i) add(i, block(at_, i, K), block(value_, i, P), sum);
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::evaluate(const void* q, ChannelMerit& sum) {
+inline void ConstrainedChannel::evaluate(const void* q, ChannelMerit& sum) {
   if (n_ == 0) return;
   record_.functions->evaluate(record_.channel, q, 0, n_, trial_.data(), values_.data());
   double* in_noise = scratch_.data() + P;
@@ -500,11 +500,11 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::evaluate(const void* q, Chann
     add(i, block(trial_, i, K), in_noise, sum);
   }
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::tryStep(const void* q, double alpha, ChannelMerit& sum) {
+inline void ConstrainedChannel::tryStep(const void* q, double alpha, ChannelMerit& sum) {
   for (std::size_t k = 0; k < trial_.size(); ++k) trial_[k] = at_[k] + alpha * (next_[k] - at_[k]);
   evaluate(q, sum);
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::addCorrectionSums(Numbers& b) const {
+inline void ConstrainedChannel::addCorrectionSums(Numbers& b) const {
   double* in_noise = scratch_.data() + P;
   for (std::size_t i = 0; i < n_; ++i) {
     whitened(i, block(values_, i, P), in_noise);
@@ -512,8 +512,7 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::addCorrectionSums(Numbers& b)
   }
 }
 /// The change of ε that takes the equations at the trial point to zero to first order.
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::correctionOf(std::size_t i, const Numbers& delta,
-                                                                double* correction) const {
+inline void ConstrainedChannel::correctionOf(std::size_t i, const Numbers& delta, double* correction) const {
   double* lambda = scratch_.data() + P;
   const double *C = block(C_, i, P * N), *G = block(G_, i, P * K);
   whitened(i, block(values_, i, P), lambda);
@@ -523,7 +522,7 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::correctionOf(std::size_t i, c
   }
   if (freeOf(i) > 0) recover(i, correction, block(values_, i, P), -1, delta);
 }
-LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::correctionSquared(const Numbers& delta) const {
+inline double ConstrainedChannel::correctionSquared(const Numbers& delta) const {
   double sum = 0, *correction = scratch_.data() + 3 * P;
   for (std::size_t i = 0; i < n_; ++i) {
     correctionOf(i, delta, correction);
@@ -531,8 +530,7 @@ LIESTAT_ESTIMATION_INLINE double ConstrainedChannel::correctionSquared(const Num
   }
   return sum;
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::tryCorrected(const void* q, const Numbers& delta,
-                                                                ChannelMerit& sum) {
+inline void ConstrainedChannel::tryCorrected(const void* q, const Numbers& delta, ChannelMerit& sum) {
   double* correction = scratch_.data() + 3 * P;
   for (std::size_t i = 0; i < n_; ++i) {
     correctionOf(i, delta, correction);
@@ -541,12 +539,12 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedChannel::tryCorrected(const void* q, c
   evaluate(q, sum);
 }
 
-LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::keptEquations() const {
+inline int ConstrainedChannel::keptEquations() const {
   int sum = 0;
   for (const int rank : ranks_) sum += rank;
   return sum;
 }
-LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::droppedEquations() const {
+inline int ConstrainedChannel::droppedEquations() const {
   const int rank = record_.functions->rank;
   int sum = 0;
   for (std::size_t i = 0; i < n_; ++i) {
@@ -556,7 +554,7 @@ LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::droppedEquations() const {
   }
   return sum;
 }
-LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::unmetEquations(const void* q) {
+inline int ConstrainedChannel::unmetEquations(const void* q) {
   int sum = 0;
   for (std::size_t i = 0; i < n_; ++i) {
     if (freeOf(i) > 0 || ranks_[i] >= record_.functions->rank) continue;
@@ -571,7 +569,7 @@ LIESTAT_ESTIMATION_INLINE int ConstrainedChannel::unmetEquations(const void* q) 
   }
   return sum;
 }
-LIESTAT_ESTIMATION_INLINE std::size_t ConstrainedChannel::uninformative() const {
+inline std::size_t ConstrainedChannel::uninformative() const {
   std::size_t sum = 0;
   for (std::size_t i = 0; i < n_; ++i) sum += freeOf(i) > 0 && selected(i) == 0;
   return sum;

@@ -34,7 +34,7 @@ inline void multiply(const Rows& A, const Numbers& x, Numbers& result) {
   for (int i = 0; i < A.rows(); ++i) result[number(i)] = dot(A[i], x.data(), A.cols());
 }
 
-LIESTAT_ESTIMATION_INLINE ConstraintBasis::ConstraintBasis(int unknowns, int equations)
+inline ConstraintBasis::ConstraintBasis(int unknowns, int equations)
     : n_(unknowns),
       p_(equations),
       Z_(n_, n_),
@@ -44,7 +44,7 @@ LIESTAT_ESTIMATION_INLINE ConstraintBasis::ConstraintBasis(int unknowns, int equ
       scale_(number(p_)) {
   for (int k = 0; k < n_; ++k) Z_[k][k] = 1;
 }
-LIESTAT_ESTIMATION_INLINE void ConstraintBasis::compute(const Rows& C) {
+inline void ConstraintBasis::compute(const Rows& C) {
   const int size = std::max(n_, p_);
   Z_.setZero();
   rank_ = 0;
@@ -69,42 +69,40 @@ LIESTAT_ESTIMATION_INLINE void ConstraintBasis::compute(const Rows& C) {
     }
   }
 }
-LIESTAT_ESTIMATION_INLINE void ConstraintBasis::shortest(const Numbers& d, double factor, Numbers& step) const {
+inline void ConstraintBasis::shortest(const Numbers& d, double factor, Numbers& step) const {
   std::fill(step.begin(), step.end(), 0.);
   for (int k = 0; k < rank_; ++k) addScaled(step.data(), factor * fixedCoordinate(k, d), Y_[k], n_);
 }
-LIESTAT_ESTIMATION_INLINE double ConstraintBasis::shortestLength(const Numbers& d) const {
+inline double ConstraintBasis::shortestLength(const Numbers& d) const {
   double sum = 0;
   for (int k = 0; k < rank_; ++k) sum += std::pow(fixedCoordinate(k, d), 2);
   return std::sqrt(sum);
 }
-LIESTAT_ESTIMATION_INLINE double ConstraintBasis::fixedLength(const Numbers& g) const {
+inline double ConstraintBasis::fixedLength(const Numbers& g) const {
   double sum = 0;
   for (int k = 0; k < rank_; ++k) sum += std::pow(along(k, g), 2);
   return std::sqrt(sum);
 }
-LIESTAT_ESTIMATION_INLINE void ConstraintBasis::multipliers(const Numbers& g, Numbers& lambda) const {
+inline void ConstraintBasis::multipliers(const Numbers& g, Numbers& lambda) const {
   std::fill(lambda.begin(), lambda.end(), 0.);
   for (int k = 0; k < rank_; ++k) {
     const double coordinate = -along(k, g) / values_[number(k)];
     for (int j = 0; j < p_; ++j) lambda[number(j)] += scale_[number(j)] * U_[k][j] * coordinate;
   }
 }
-LIESTAT_ESTIMATION_INLINE double ConstraintBasis::largest(const Numbers& c) const {
+inline double ConstraintBasis::largest(const Numbers& c) const {
   double most = 0;
   for (std::size_t k = 0; k < c.size(); ++k) most = std::max(most, std::abs(c[k]) * (scale_[k] > 0 ? scale_[k] : 1));
   return most;
 }
-LIESTAT_ESTIMATION_INLINE double ConstraintBasis::along(int k, const Numbers& g) const {
-  return dot(Y_[k], g.data(), n_);
-}
-LIESTAT_ESTIMATION_INLINE double ConstraintBasis::fixedCoordinate(int k, const Numbers& d) const {
+inline double ConstraintBasis::along(int k, const Numbers& g) const { return dot(Y_[k], g.data(), n_); }
+inline double ConstraintBasis::fixedCoordinate(int k, const Numbers& d) const {
   double sum = 0;
   for (int j = 0; j < p_; ++j) sum += U_[k][j] * scale_[number(j)] * d[number(j)];
   return sum / values_[number(k)];
 }
 
-LIESTAT_ESTIMATION_INLINE void TangentSystem::compute(const Rows& A, const Rows& basis, int free, bool indefinite) {
+inline void TangentSystem::compute(const Rows& A, const Rows& basis, int free, bool indefinite) {
   // Information is a sum of squares: what is a smaller part of it is rounding.
   constexpr double min_ratio = 1e-13;
   const int n = A.rows();
@@ -136,7 +134,7 @@ LIESTAT_ESTIMATION_INLINE void TangentSystem::compute(const Rows& A, const Rows&
     for (int i = 0; i < free; ++i) addScaled(axes_[k], svd.v(k, i) * scale[number(i)], basis[i], n);
   }
 }
-LIESTAT_ESTIMATION_INLINE void TangentSystem::solve(const Numbers& b, Numbers& step) const {
+inline void TangentSystem::solve(const Numbers& b, Numbers& step) const {
   Numbers rest(b.size());
   multiply(A_, step, rest);
   for (std::size_t i = 0; i < b.size(); ++i) rest[i] = b[i] - rest[i];
@@ -145,7 +143,7 @@ LIESTAT_ESTIMATION_INLINE void TangentSystem::solve(const Numbers& b, Numbers& s
     if (value > 0) addScaled(step.data(), dot(axes_[k], rest.data(), A_.rows()) / value, axes_[k], A_.rows());
   }
 }
-LIESTAT_ESTIMATION_INLINE Rows TangentSystem::nullBasis() const {
+inline Rows TangentSystem::nullBasis() const {
   const int n = A_.rows();
   Rows found(n, n), basis(n, n);
   const auto normalise = [n](double* v) {
@@ -165,7 +163,7 @@ LIESTAT_ESTIMATION_INLINE Rows TangentSystem::nullBasis() const {
   }
   return basis;
 }
-LIESTAT_ESTIMATION_INLINE Rows TangentSystem::covariance() const {
+inline Rows TangentSystem::covariance() const {
   const int n = A_.rows();
   Rows sum(n, n);
   for (int i = 0; i < n; ++i) {
