@@ -34,7 +34,7 @@
 #include <utility>
 #include <vector>
 
-#include <cli/show/run_program.hpp>
+#include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
