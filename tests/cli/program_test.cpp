@@ -329,8 +329,8 @@ TEST_F(Program, AnInterruptEndsTheSearchForOtherMeansAndLeavesTheMean) {
   // in the background interrupts are ignored, and the program would heed that.
   ProgramResult result;
   for (const char* seconds : {"1", "4", "16", "64"}) {
-    result = runProgram({"env", "--default-signal=INT", "timeout", "--preserve-status", "-s", "INT", seconds,
-                         LIESTAT_PROGRAM, "mean", "f.csv", "--feature", "non_oriented_frame", "--budget",
+    result = runProgram({"env", "--default-signal=INT", "timeout", "--foreground", "--preserve-status", "-s", "INT",
+                         seconds, LIESTAT_PROGRAM, "mean", "f.csv", "--feature", "non_oriented_frame", "--budget",
                          "1000000000000", "--json", "out.json", "--report", "report"},
                         directory_.path().string());
     if (std::filesystem::exists(directory_ / "report/index.html")) break;
