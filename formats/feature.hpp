@@ -161,8 +161,8 @@ Result visitFeature(Feature kind, F& f) {
   }
 }
 
-/// Calls f.operator()<M>() with the type of a feature: withFeature(kind, [&]<class M>() { return …; }). The call compiles
-/// f for every feature; f may restrict itself to some by a constraint, such as []<Metric M>() { … }, and then throws
+/// Calls a template with the type of a feature: `withFeature(kind, [&]<class M>() { return …; })`. The call compiles f for
+/// every feature; f may restrict itself to some by a constraint, such as `[]<Metric M>() { … }`, and then throws
 /// std::invalid_argument for the others. Points have to be among them.
 template <class F>
 auto withFeature(Feature kind, F&& f) {
