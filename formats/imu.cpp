@@ -44,7 +44,7 @@ void checkUnits(const ImuFile& file, const std::string& name) {
 
 }  // namespace
 
-ImuFile parseImu(std::string_view text, std::string name) {
+ImuFile parseImu(std::string_view text, const std::string& name) {
   ImuFile file;
   LineReader first(text);
   if (!first.next()) throw InputError(name, 0, "the file has no data");

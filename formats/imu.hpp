@@ -29,7 +29,7 @@ struct ImuFile {
 /// are those of other units: forces of some 1 (g), rates of hundreds (degrees a second).
 ImuFile readImu(const std::string& path);
 /// The same from memory.
-ImuFile parseImu(std::string_view text, std::string name);
+ImuFile parseImu(std::string_view text, const std::string& name);
 
 /// Reads EuRoC's ground truth: timestamp [ns], p x y z, q w x y z, v x y z and, if there, b_w x y z, b_a x y z. Throws
 /// InputError.

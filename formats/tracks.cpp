@@ -79,7 +79,7 @@ std::vector<CameraPose> readCameraPoses(const std::string& path) {
                        fmt::format("frame {} again, as in line {}", pose.frame, first->second), "it once");
     pose.t = table(row, 1);
     Eigen::Matrix3d matrix;
-    for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = table(row, static_cast<std::size_t>(2 + i));
+    for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = table(row, 2 + static_cast<std::size_t>(i));
     pose.R_camera_world =
         detail::nearestRotation(matrix, detail::rotation_tolerance, table.file(), table.line(row)).rotation.matrix();
     pose.c = Eigen::Vector3d(table(row, 11), table(row, 12), table(row, 13));

@@ -83,7 +83,7 @@ SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const M
   using S = ScalarOf<M>;
   SquareOf<M> sum = SquareOf<M>::Zero();
   for (std::size_t i = 0; i < mean.n; ++i) {
-    const M x = samples[i];
+    const M& x = samples[i];
     const S p = S(weights[i]);
     sum += p * p * (noise.size() == mean.n ? transport(Gaussian<M>{x, noise[i]}, mean.mean).covariance : noise[0]);
   }

@@ -197,7 +197,7 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       const auto to_rival = T::placement(found.mean).inverse();
       double sum = 0, squares = 0, ratio = 0;
       for (std::size_t i = 0; i < n; ++i) {
-        const M x = samples[i];
+        const M& x = samples[i];
         const double half = 0.5 * (squaredAngle(to_rival, x) - squaredAngle(to_mean, x));
         const double e = static_cast<double>(weights[i]) * half;
         sum += e, squares += e * e;

@@ -133,7 +133,7 @@ std::string TrajectorySink::ticks(std::size_t i) {
                      fmt::format("0 or more, for the format {}", format_.name));
   }
   bool exact = true;
-  const std::string whole = ticksOfSeconds(time, format_.time_decimals, exact);
+  std::string whole = ticksOfSeconds(time, format_.time_decimals, exact);
   if (!isWhole(whole)) {
     throw InputError(trajectory_.name, trajectory_.lines[i], fmt::format("the time is {}", time),
                      fmt::format("one that fits into the format {}", format_.name));

@@ -67,9 +67,9 @@ struct Part {
   }
   /// The digits of a whole number.
   std::string whole() const {
-    const std::string digits = json.is_string()           ? json.get<std::string>()
-                               : json.is_number_integer() ? json.dump()
-                                                          : std::string();
+    std::string digits = json.is_string()           ? json.get<std::string>()
+                         : json.is_number_integer() ? json.dump()
+                                                    : std::string();
     if (!isWhole(digits)) complain("is " + shown(json), "a whole number of 0 or more");
     return digits;
   }

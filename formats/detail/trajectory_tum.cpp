@@ -5,6 +5,7 @@
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
 #include <stats/convention_layouts.hpp>
+#include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
 
@@ -32,7 +33,7 @@ void readStampedRows(const TrajectorySource& source, Trajectory& trajectory, Cov
     Eigen::Vector3d position;
     Eigen::Vector4d xyzw;
     for (int i = 0; i < 7; ++i) {
-      const auto k = static_cast<std::size_t>(i + 1);
+      const auto k = static_cast<std::size_t>(i) + 1;
       (i < 3 ? position[i] : xyzw[i - 3]) = numberField(fields[k], columns[k], trajectory.name, line);
     }
     trajectory.poses.push_back(poseOf(position, xyzw, source.options.reading.norm_tolerance, trajectory, line));

@@ -58,7 +58,7 @@ SE3d rigidMotion(const NamedNode& matrix) {
     const double r = NamedNode{rows, matrix.file, matrix.name + ": rows"}.number("4");
     const double c = NamedNode{cols, matrix.file, matrix.name + ": cols"}.number("4");
     if ((r != 3 && r != 4) || c != 4) complainSize(fmt::format("is {} by {}", r, c));
-    if (list.size() != static_cast<std::size_t>(4 * r)) complainSize(fmt::format("has {} numbers", list.size()));
+    if (list.size() != 4 * static_cast<std::size_t>(r)) complainSize(fmt::format("has {} numbers", list.size()));
   }
   const YAML::Node data = map.IsMap() ? map["data"] : map;
   if (!data.IsSequence()) complainSize("is " + shown(data));

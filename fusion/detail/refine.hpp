@@ -52,7 +52,7 @@ inline Eigen::Matrix<double, 27, 27> jointCovariance(const RefinementProblem& pr
 /// The relative standard deviation of the scale of the images' positions p: of Σ p·δp / Σ p².
 inline double scaleSigma(const RefinementProblem& problem, const ReducedSystem& system) {
   const std::vector<SE23d>& X = problem.state().X;
-  std::vector<double> gradient(static_cast<std::size_t>(3 * problem.blocks()));
+  std::vector<double> gradient(3 * static_cast<std::size_t>(problem.blocks()));
   double squares = 0;
   for (std::size_t j = 1; j < X.size(); ++j) {
     const Eigen::Vector3d p = X[j].translation(), in_body = X[j].so3().inverse() * p;

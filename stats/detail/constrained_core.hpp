@@ -18,7 +18,8 @@ namespace liestat::detail {
 class Rows {
  public:
   Rows() = default;
-  Rows(int rows, int cols) : rows_(rows), cols_(cols), values_(static_cast<std::size_t>(rows * cols)) {}
+  Rows(int rows, int cols)
+      : rows_(rows), cols_(cols), values_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols)) {}
   int rows() const { return rows_; }
   int cols() const { return cols_; }
   double* operator[](int i) { return values_.data() + i * cols_; }

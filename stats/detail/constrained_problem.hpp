@@ -35,7 +35,7 @@ template <Homogeneous M>
 SquareOf<M> logJacobian(const M& y, const M& x) {
   using T = ManifoldTraits<M>;
   const typename T::Group f = T::placement(y).inverse();
-  const SquareOf<M> dlog = T::dlogOrigin(T::act(f, x));
+  SquareOf<M> dlog = T::dlogOrigin(T::act(f, x));
   if constexpr (HasTrivialIsotropy<M>) {
     return dlog;
   } else {

@@ -28,7 +28,9 @@ inline bool allFinite(const double* a, std::size_t n) {
   return std::all_of(a, a + n, [](double x) { return std::isfinite(x); });
 }
 inline bool allFinite(const Numbers& a) { return allFinite(a.data(), a.size()); }
-inline bool allFinite(const Rows& A) { return allFinite(A.data(), static_cast<std::size_t>(A.rows() * A.cols())); }
+inline bool allFinite(const Rows& A) {
+  return allFinite(A.data(), static_cast<std::size_t>(A.rows()) * static_cast<std::size_t>(A.cols()));
+}
 inline std::size_t number(int n) { return static_cast<std::size_t>(n); }
 inline void multiply(const Rows& A, const Numbers& x, Numbers& result) {
   for (int i = 0; i < A.rows(); ++i) result[number(i)] = dot(A[i], x.data(), A.cols());
