@@ -72,7 +72,9 @@ TEST(Trajectories, EveryFormatKeepsWhatItIsGiven) {
     EXPECT_EQ(notes.size(), format == "openvins" ? 1u : 0u) << format;
     const Trajectory file = readTrajectory(path);
     EXPECT_EQ(file.format, format);
-    if (format != "kitti") EXPECT_EQ(file.times, times) << format;
+    if (format != "kitti") {
+      EXPECT_EQ(file.times, times) << format;
+    }
     const auto read = gaussiansOf(file, "g2o-full,content=covariance");
     ASSERT_EQ(read.size(), poses.size()) << format;
     for (std::size_t i = 0; i < poses.size(); ++i) {
