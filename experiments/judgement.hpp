@@ -29,7 +29,7 @@ void describe(V& v, const Promise& p) {
   v("promise", p.text)("measured", p.value)("bound", p.bound)("passed", p.passed, "null: not judged");
 }
 
-/// What a run of a validation says about its promises.
+/// The promises of a run of a validation, each judged, and the verdict on all of them.
 struct Judgement {
   std::vector<Promise> promises;
   std::string where = {};                ///< the rows that are judged: "in the promised domain"

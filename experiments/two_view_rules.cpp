@@ -93,7 +93,7 @@ std::vector<TwoViewRuleRow> compareTwoViewRules(const TwoViewRuleComparison& com
                                       .matches = comparison.matches,
                                       .outliers = comparison.outliers,
                                       .sigma = comparison.sigma};
-    // Of each trial, which rules were right.
+    // A row for each trial: which rules were right.
     const std::vector<std::vector<bool>> trials = run.outcomes([&](std::uint64_t number) {
       const std::uint64_t seed = comparison.run.seed * 1000003 + number;
       const TwoViewScene scene(options, seed);

@@ -1,4 +1,4 @@
-// What a command says, on the terminal and as JSON.
+// The output of a command, on the terminal and as JSON.
 #pragma once
 
 #include <formats/output_file.hpp>

@@ -8,7 +8,7 @@
 
 namespace liestat {
 
-/// Whether a view takes the fields that a result has if `there` holds.
+/// True if a view takes the fields that a result has where `there` holds: always for views that list a type's fields.
 template <class V>
 constexpr bool shown(const V&, bool there) {
   return there || requires { V::every_field; };

@@ -54,7 +54,7 @@ auto runTrials(const std::string& label, const Run& run) {
   return withProgressBar(label, run);
 }
 
-/// What every validation takes on the command line.
+/// Options that every validation takes.
 struct RunOptions {
   std::size_t trials = 0;  ///< 0: the default
   std::uint64_t seed = 1;

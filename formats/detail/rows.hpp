@@ -1,4 +1,4 @@
-// What the readers of rows share: headers, time stamps, and EuRoC's rows that begin with one.
+// Helpers that the readers of rows share: headers, time stamps, and EuRoC's rows that begin with one.
 #pragma once
 
 #include <formats/text.hpp>

@@ -80,7 +80,7 @@ class TrajectorySink {
 using TrajectoryReader = void(const TrajectorySource& source, Trajectory& trajectory);
 using TrajectoryWriter = void(TrajectorySink& sink);
 
-/// Whether poses have times.
+/// Times beside the poses: never there, there in some files, or always.
 enum class TrajectoryTimes { none, optional, required };
 /// Where covariances stand, and who says what they mean.
 enum class CovariancePlace {

@@ -29,7 +29,7 @@ DoubleArray rowsOf(const List& list, py::ssize_t columns, Write write) {
   }
   return rows;
 }
-/// What a reader returns; others may run meanwhile.
+/// Calls a reader without the interpreter's lock, so that other threads of Python run meanwhile.
 template <class Reader>
 auto released(Reader&& reader) {
   const py::gil_scoped_release release;

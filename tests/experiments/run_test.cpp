@@ -146,7 +146,7 @@ TEST(Judgement, OneBrokenPromiseFailsTheRun) {
   EXPECT_EQ(judgement.failures(), "FAILED d 2 s: the index is too large\n");
   EXPECT_TRUE(judgement.sentence().starts_with("2 of 3 rows")) << judgement.sentence();
 
-  // What an interrupt left is neither passed nor failed.
+  // A run that an interrupt ended is neither passed nor failed.
   trials_of_run.stop = true, trials_of_run.planned = 8, trials_of_run.done = 5;
   EXPECT_FALSE(judgement.passed());
   EXPECT_TRUE(judgement.verdict().isNone());
