@@ -8,6 +8,7 @@
 #include <formats/output_file.hpp>
 #include <formats/text.hpp>
 #include <stats/convention_layouts.hpp>
+#include <stats/convention_losses.hpp>
 #include <stats/convention_presets.hpp>
 
 #include <fmt/format.h>
@@ -162,7 +163,16 @@ std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Conv
 std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, std::string_view convention) {
   std::optional<Convention> given;
   if (!convention.empty()) given = conventionNamed(std::string(convention), "convention");
-  if (trajectory.hasCovariances()) return gaussiansOf(trajectory, conventionOf(trajectory, given, "convention"));
+  if (trajectory.hasCovariances()) {
+    const Convention stated = conventionOf(trajectory, given, "convention");
+    for (std::size_t i = 0; i < trajectory.size(); ++i) {
+      if (isSemidefinite(trajectory.covariances[i])) continue;
+      throw InputError(trajectory.covariance_source.empty() ? trajectory.name : trajectory.covariance_source,
+                       trajectory.covariance_source == trajectory.name ? trajectory.lines[i] : 0,
+                       fmt::format("the matrix of pose {} is indefinite", i), "a positive semidefinite one");
+    }
+    return gaussiansOf(trajectory, stated);
+  }
   std::vector<Gaussian<SE3d>> list;
   for (const SE3d& pose : trajectory.poses) list.push_back({pose, Matrix6d::Constant(unknown_entry)});
   return list;

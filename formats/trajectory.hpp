@@ -85,7 +85,7 @@ std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryO
 /// Poses and covariances in the library's convention (stats/gaussian.hpp); NaN for what is unknown, throughout if the
 /// trajectory has no covariances. `convention` is the name of that in which the file has them, such as ros-fixed
 /// (stats/convention_presets.hpp); it may be empty if file or format states it. Throws InputError where nothing says it,
-/// or where the two contradict each other.
+/// where the two contradict each other, and where a matrix is indefinite, which no covariance is.
 std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, std::string_view convention = {});
 /// The same of matrices in a convention, whatever the file states. Only for a trajectory that has covariances.
 std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Convention& convention);

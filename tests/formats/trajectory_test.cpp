@@ -51,6 +51,14 @@ TEST(Trajectories, ANamedConventionIsThatOfTheGaussians) {
             "odometry.json: the format ros-json does not say what its cov");
   EXPECT_NE(errorOf([&] { (void)gaussiansOf(file, "rosfixed"); }).find("is it 'ros-fixed'"), std::string::npos);
 }
+TEST(Trajectories, AnIndefiniteMatrixIsNoGaussian) {
+  Trajectory file = parseTrajectory(ros_message, "odometry.json");
+  file.covariances[0](0, 1) = file.covariances[0](1, 0) = 3;  // of variances 1 and 4
+  EXPECT_NE(errorOf([&] { (void)gaussiansOf(file, "ros-fixed"); }).find("the matrix of pose 0 is indefinite"),
+            std::string::npos);
+  file.covariances[0](0, 1) = file.covariances[0](1, 0) = 2;
+  EXPECT_EQ(errorOf([&] { (void)gaussiansOf(file, "ros-fixed"); }), "");
+}
 
 TEST(Trajectories, WithoutCovariancesNothingIsKnown) {
   const auto poses = gaussiansOf(parseTrajectory("0 1 2 3 0 0 0 1\n", "a.tum"));
