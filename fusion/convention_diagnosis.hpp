@@ -84,5 +84,5 @@ LIESTAT_TRAJECTORIES_API ConventionReading readInConvention(std::span<const Diag
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/diagnose_conventions.hpp>
+#include <fusion/trajectories/detail/diagnose_conventions.hpp>
 #endif

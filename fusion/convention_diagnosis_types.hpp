@@ -268,5 +268,5 @@ void describe(V& v, const CovarianceDiagnosis& d) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/diagnosis_words.hpp>
+#include <fusion/trajectories/detail/diagnosis_words.hpp>
 #endif

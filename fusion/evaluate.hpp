@@ -47,5 +47,5 @@ LIESTAT_TRAJECTORIES_API TrajectoryEvaluation evaluateTrajectory(const PoseTraje
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/evaluate_trajectory.hpp>
+#include <fusion/trajectories/detail/evaluate_trajectory.hpp>
 #endif

@@ -39,5 +39,5 @@ LIESTAT_FUSION_API HandEyeResult estimateHandEye(std::span<const PosePair> motio
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/estimate_hand_eye.hpp>
+#include <fusion/hand_eye/detail/estimate_hand_eye.hpp>
 #endif

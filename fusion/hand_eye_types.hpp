@@ -272,5 +272,5 @@ void describeSeries(V& v, const HandEyeResult& r) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/hand_eye_results.hpp>
+#include <fusion/hand_eye/detail/hand_eye_results.hpp>
 #endif

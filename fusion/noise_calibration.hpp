@@ -83,5 +83,5 @@ calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOpt
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/calibrate_noise.hpp>
+#include <fusion/init/detail/calibrate_noise.hpp>
 #endif

@@ -97,5 +97,5 @@ relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pai
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/evaluate_trajectories.hpp>
+#include <fusion/trajectories/detail/evaluate_trajectories.hpp>
 #endif

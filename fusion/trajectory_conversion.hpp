@@ -105,5 +105,5 @@ void describeSeries(V& v, const TrajectoryConversion& c) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/convert_trajectory.hpp>
+#include <fusion/trajectories/detail/convert_trajectory.hpp>
 #endif

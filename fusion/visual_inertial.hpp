@@ -32,5 +32,5 @@ initialiseRecording(const VisualInertialRecording& recording, const VisualInerti
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/initialise_recording.hpp>
+#include <fusion/init/detail/initialise_recording.hpp>
 #endif

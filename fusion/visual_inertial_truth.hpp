@@ -48,5 +48,5 @@ LIESTAT_FUSION_API ComparedRecording compareWithTruth(VisualInertialResult found
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/compare_with_truth.hpp>
+#include <fusion/init/detail/compare_with_truth.hpp>
 #endif

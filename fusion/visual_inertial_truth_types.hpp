@@ -338,5 +338,5 @@ void describe(V& v, const ComparedRecording& r) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/initialisation_summary.hpp>
+#include <fusion/init/detail/initialisation_summary.hpp>
 #endif

@@ -161,5 +161,5 @@ struct VisualInertialResult {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/closed_form_states.hpp>
+#include <fusion/init/detail/closed_form_states.hpp>
 #endif

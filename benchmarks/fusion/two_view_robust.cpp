@@ -13,7 +13,7 @@
 // OpenCV's default of 1000 hypotheses (2000 for H) ends its search before that confidence at 60 % outliers: the rows
 // "capped" have it on both sides, the others 100000; RANSAC, which would take minutes, 10000.
 #include <experiments/two_view_scene.hpp>
-#include <fusion/detail/robust_two_view.hpp>
+#include <fusion/two_view/detail/robust_two_view.hpp>
 #include <fusion/two_view/pose.hpp>
 #include <fusion/two_view/robust.hpp>
 #include <lie/units.hpp>

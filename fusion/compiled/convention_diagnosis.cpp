@@ -3,5 +3,5 @@
 #define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
-#include <fusion/detail/diagnose_conventions.hpp>
-#include <fusion/detail/diagnosis_words.hpp>
+#include <fusion/trajectories/detail/diagnose_conventions.hpp>
+#include <fusion/trajectories/detail/diagnosis_words.hpp>

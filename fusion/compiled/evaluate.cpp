@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
-#include <fusion/detail/evaluate_trajectory.hpp>
+#include <fusion/trajectories/detail/evaluate_trajectory.hpp>

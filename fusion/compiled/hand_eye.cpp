@@ -3,5 +3,5 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/estimate_hand_eye.hpp>
-#include <fusion/detail/hand_eye_results.hpp>
+#include <fusion/hand_eye/detail/estimate_hand_eye.hpp>
+#include <fusion/hand_eye/detail/hand_eye_results.hpp>

@@ -4,9 +4,9 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/estimate_epipolar_gyroscope_bias.hpp>
-#include <fusion/detail/estimate_gyroscope_bias.hpp>
-#include <fusion/detail/inertial_window.hpp>
-#include <fusion/detail/initialise_robustly.hpp>
-#include <fusion/detail/solve_closed_form.hpp>
-#include <fusion/detail/solve_closed_form_robustly.hpp>
+#include <fusion/init/detail/estimate_epipolar_gyroscope_bias.hpp>
+#include <fusion/init/detail/estimate_gyroscope_bias.hpp>
+#include <fusion/imu/detail/inertial_window.hpp>
+#include <fusion/init/detail/initialise_robustly.hpp>
+#include <fusion/init/detail/solve_closed_form.hpp>
+#include <fusion/init/detail/solve_closed_form_robustly.hpp>

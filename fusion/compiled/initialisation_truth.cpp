@@ -3,5 +3,5 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/compare_with_truth.hpp>
-#include <fusion/detail/initialisation_summary.hpp>
+#include <fusion/init/detail/compare_with_truth.hpp>
+#include <fusion/init/detail/initialisation_summary.hpp>

@@ -3,8 +3,8 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/motion_engine_run.hpp>
-#include <fusion/detail/motion_filter_run.hpp>
-#include <fusion/detail/motion_gyroscope.hpp>
-#include <fusion/detail/motion_sequence.hpp>
-#include <fusion/detail/motion_study.hpp>
+#include <fusion/motion/detail/motion_engine_run.hpp>
+#include <fusion/motion/detail/motion_filter_run.hpp>
+#include <fusion/motion/detail/motion_gyroscope.hpp>
+#include <fusion/motion/detail/motion_sequence.hpp>
+#include <fusion/motion/detail/motion_study.hpp>

@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/calibrate_noise.hpp>
+#include <fusion/init/detail/calibrate_noise.hpp>

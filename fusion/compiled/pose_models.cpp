@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/pose_models.hpp>
+#include <fusion/two_view/detail/pose_models.hpp>

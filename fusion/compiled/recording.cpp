@@ -3,7 +3,7 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/closed_form_states.hpp>
-#include <fusion/detail/fuse_windows.hpp>
-#include <fusion/detail/initialise_recording.hpp>
-#include <fusion/detail/refine.hpp>
+#include <fusion/init/detail/closed_form_states.hpp>
+#include <fusion/init/detail/fuse_windows.hpp>
+#include <fusion/init/detail/initialise_recording.hpp>
+#include <fusion/init/detail/refine.hpp>

@@ -3,5 +3,5 @@
 #define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
-#include <fusion/detail/preintegrate_windows.hpp>
-#include <fusion/detail/recording_windows_verdict.hpp>
+#include <fusion/imu/detail/preintegrate_windows.hpp>
+#include <fusion/imu/detail/recording_windows_verdict.hpp>

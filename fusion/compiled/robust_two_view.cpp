@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/robust_two_view.hpp>
+#include <fusion/two_view/detail/robust_two_view.hpp>

@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
-#include <fusion/detail/convert_trajectory.hpp>
+#include <fusion/trajectories/detail/convert_trajectory.hpp>

@@ -3,6 +3,6 @@
 #define LIESTAT_COMPILED_FUSION
 #endif
 
-#include <fusion/detail/estimate_two_view_motion.hpp>
-#include <fusion/detail/physical_parameters.hpp>
-#include <fusion/detail/two_view_results.hpp>
+#include <fusion/two_view/detail/estimate_two_view_motion.hpp>
+#include <fusion/two_view/detail/physical_parameters.hpp>
+#include <fusion/two_view/detail/two_view_results.hpp>

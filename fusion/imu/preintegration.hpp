@@ -20,8 +20,8 @@
 // docs/theory/visual_inertial.md, section 2; C. Forster et al., "On-manifold preintegration", IEEE T-RO 33, 2017.
 #pragma once
 
-#include <fusion/detail/increment_covariance.hpp>
-#include <fusion/detail/step_matrices.hpp>
+#include <fusion/imu/detail/increment_covariance.hpp>
+#include <fusion/imu/detail/step_matrices.hpp>
 #include <fusion/imu/readings.hpp>
 #include <lie/detail/always_inline.hpp>
 #include <lie/detail/small_products.hpp>

@@ -59,5 +59,5 @@ LIESTAT_TRAJECTORIES_API std::vector<IncrementSigmas> growthOfSigmas(std::span<c
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/preintegrate_windows.hpp>
+#include <fusion/imu/detail/preintegrate_windows.hpp>
 #endif

@@ -119,5 +119,5 @@ void describe(V& v, const RecordingWindows& r) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/recording_windows_verdict.hpp>
+#include <fusion/imu/detail/recording_windows_verdict.hpp>
 #endif

@@ -118,5 +118,5 @@ inline Eigen::Vector3d bearingInBody(const std::vector<SE3d>& cameras, const Tra
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/inertial_window.hpp>
+#include <fusion/imu/detail/inertial_window.hpp>
 #endif

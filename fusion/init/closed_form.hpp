@@ -27,5 +27,5 @@ LIESTAT_FUSION_API ClosedFormResult solveClosedForm(const ClosedFormWindow& wind
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/solve_closed_form.hpp>
+#include <fusion/init/detail/solve_closed_form.hpp>
 #endif

@@ -36,5 +36,5 @@ LIESTAT_FUSION_API ConsensusResult solveClosedFormRobustly(const ClosedFormWindo
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/solve_closed_form_robustly.hpp>
+#include <fusion/init/detail/solve_closed_form_robustly.hpp>
 #endif

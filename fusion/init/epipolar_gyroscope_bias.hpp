@@ -37,5 +37,5 @@ LIESTAT_FUSION_API EpipolarBiasResult estimateEpipolarGyroscopeBias(const Inerti
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/estimate_epipolar_gyroscope_bias.hpp>
+#include <fusion/init/detail/estimate_epipolar_gyroscope_bias.hpp>
 #endif

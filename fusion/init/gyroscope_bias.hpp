@@ -43,5 +43,5 @@ LIESTAT_FUSION_API GyroscopeBiasResult estimateGyroscopeBias(InertialWindow wind
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/estimate_gyroscope_bias.hpp>
+#include <fusion/init/detail/estimate_gyroscope_bias.hpp>
 #endif

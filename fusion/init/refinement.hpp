@@ -35,5 +35,5 @@ LIESTAT_FUSION_API RefinementResult refineAtRest(InertialWindow window, const Ei
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/refine.hpp>
+#include <fusion/init/detail/refine.hpp>
 #endif

@@ -24,5 +24,5 @@ LIESTAT_FUSION_API RobustInitialisation initialiseRobustly(const InertialWindow&
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/initialise_robustly.hpp>
+#include <fusion/init/detail/initialise_robustly.hpp>
 #endif

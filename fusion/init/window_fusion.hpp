@@ -122,5 +122,5 @@ class WindowFusion {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/fuse_windows.hpp>
+#include <fusion/init/detail/fuse_windows.hpp>
 #endif

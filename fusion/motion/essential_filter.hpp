@@ -12,7 +12,7 @@
 // With MotionFilterOptions::estimate_bias a gyroscope's bias is a state too.
 #pragma once
 
-#include <fusion/detail/motion_engine.hpp>
+#include <fusion/motion/detail/motion_engine.hpp>
 #include <fusion/motion/types.hpp>
 #include <lie/essential.hpp>
 

@@ -117,5 +117,5 @@ LIESTAT_FUSION_API std::string reasonWithoutCover(const MotionGyroscope& gyrosco
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/motion_gyroscope.hpp>
+#include <fusion/motion/detail/motion_gyroscope.hpp>
 #endif

@@ -137,5 +137,5 @@ LIESTAT_FUSION_API Gaussian<S2d> velocityDirection(const MotionEstimate& estimat
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/motion_filter_run.hpp>
+#include <fusion/motion/detail/motion_filter_run.hpp>
 #endif

@@ -49,5 +49,5 @@ LIESTAT_FUSION_API void compareWithTruth(MotionResult& result, const std::map<st
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/motion_sequence.hpp>
+#include <fusion/motion/detail/motion_sequence.hpp>
 #endif

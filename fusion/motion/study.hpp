@@ -19,5 +19,5 @@ LIESTAT_FUSION_API MotionFrameStudy studyFrame(const MotionWindow& window, const
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/motion_study.hpp>
+#include <fusion/motion/detail/motion_study.hpp>
 #endif

@@ -13,7 +13,7 @@
 // gyroscope), or one that a rotation alone explains, is only predicted. MotionFlags says so, and the state is kept.
 #pragma once
 
-#include <fusion/detail/motion_engine.hpp>
+#include <fusion/motion/detail/motion_engine.hpp>
 #include <fusion/motion/types.hpp>
 
 #include <span>

@@ -4,9 +4,9 @@
 // as of [t]× R with |t| = 1. Which samples have no solution: fusion/two_view/solvers.hpp.
 #pragma once
 
-#include <fusion/detail/match_sums.hpp>
-#include <fusion/detail/null_vectors.hpp>
-#include <fusion/detail/real_roots.hpp>
+#include <fusion/two_view/detail/match_sums.hpp>
+#include <fusion/two_view/detail/null_vectors.hpp>
+#include <fusion/two_view/detail/real_roots.hpp>
 #include <fusion/two_view/solutions.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/trig.hpp>

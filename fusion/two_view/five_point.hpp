@@ -7,9 +7,9 @@
 // so that the equations hold to rounding and the matrix is [t]× R exactly.
 #pragma once
 
-#include <fusion/detail/five_point_equations.hpp>
-#include <fusion/detail/null_vectors.hpp>
-#include <fusion/detail/real_roots.hpp>
+#include <fusion/two_view/detail/five_point_equations.hpp>
+#include <fusion/two_view/detail/null_vectors.hpp>
+#include <fusion/two_view/detail/real_roots.hpp>
 #include <fusion/two_view/epipolar_solvers.hpp>
 #include <fusion/two_view/solutions.hpp>
 #include <lie/detail/essential_matrix.hpp>

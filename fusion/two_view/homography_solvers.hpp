@@ -2,8 +2,8 @@
 // fusion/two_view/solvers.hpp.
 #pragma once
 
-#include <fusion/detail/match_sums.hpp>
-#include <fusion/detail/null_vectors.hpp>
+#include <fusion/two_view/detail/match_sums.hpp>
+#include <fusion/two_view/detail/null_vectors.hpp>
 #include <fusion/two_view/solutions.hpp>
 
 #include <Eigen/Core>

@@ -2,7 +2,7 @@
 // Which samples have no solution: fusion/two_view/solvers.hpp.
 #pragma once
 
-#include <fusion/detail/match_sums.hpp>
+#include <fusion/two_view/detail/match_sums.hpp>
 #include <fusion/two_view/solutions.hpp>
 
 #include <Eigen/Core>

@@ -126,7 +126,7 @@ LIESTAT_FUSION_API inline TwoViewModels twoViewModels(const TwoViewImages& image
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/epipolar_models.hpp>
-#include <fusion/detail/homography_models.hpp>
-#include <fusion/detail/pose_models.hpp>
+#include <fusion/two_view/detail/epipolar_models.hpp>
+#include <fusion/two_view/detail/homography_models.hpp>
+#include <fusion/two_view/detail/pose_models.hpp>
 #endif

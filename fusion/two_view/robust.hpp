@@ -98,5 +98,5 @@ LIESTAT_FUSION_API RobustEssential robustEssential(std::span<const Eigen::Vector
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/robust_two_view.hpp>
+#include <fusion/two_view/detail/robust_two_view.hpp>
 #endif

@@ -70,6 +70,6 @@ LIESTAT_FUSION_API std::vector<PhysicalParameters> physicalParameters(const std:
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/estimate_two_view_motion.hpp>
-#include <fusion/detail/physical_parameters.hpp>
+#include <fusion/two_view/detail/estimate_two_view_motion.hpp>
+#include <fusion/two_view/detail/physical_parameters.hpp>
 #endif

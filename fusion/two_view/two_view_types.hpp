@@ -217,5 +217,5 @@ void describe(V& v, const TwoViewMotions& x) {
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/detail/two_view_results.hpp>
+#include <fusion/two_view/detail/two_view_results.hpp>
 #endif

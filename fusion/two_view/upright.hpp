@@ -2,7 +2,7 @@
 // vertical in each camera's frame; what is left of the rotation is a turn about it.
 #pragma once
 
-#include <fusion/detail/real_roots.hpp>
+#include <fusion/two_view/detail/real_roots.hpp>
 #include <fusion/two_view/epipolar_solvers.hpp>
 #include <fusion/two_view/solutions.hpp>
 #include <lie/detail/trig.hpp>

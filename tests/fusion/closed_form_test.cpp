@@ -3,8 +3,8 @@
 
 #include <fusion/init/closed_form.hpp>
 #include <experiments/closed_form_cases.hpp>
-#include <fusion/detail/closed_form_input.hpp>
-#include <fusion/detail/closed_form_solver.hpp>
+#include <fusion/init/detail/closed_form_input.hpp>
+#include <fusion/init/detail/closed_form_solver.hpp>
 #include <lie/so3.hpp>
 #include <support/vi_scene.hpp>
 

@@ -1,7 +1,7 @@
 // The gyroscope's bias from rotations alone: among drifting tracks, with a covariance that is true, with and without
 // parallax, and what it refuses.
 
-#include <fusion/detail/epipolar_residual.hpp>
+#include <fusion/init/detail/epipolar_residual.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/epipolar_gyroscope_bias.hpp>
 #include <support/vi_recorded.hpp>

@@ -2,8 +2,8 @@
 // directions, wrong pairs, traps with covariances, bad input.
 
 #include <experiments/hand_eye_scene.hpp>
-#include <fusion/detail/hand_eye_problem.hpp>
-#include <fusion/detail/hand_eye_refine.hpp>
+#include <fusion/hand_eye/detail/hand_eye_problem.hpp>
+#include <fusion/hand_eye/detail/hand_eye_refine.hpp>
 #include <fusion/hand_eye.hpp>
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // The refinement (docs/theory/visual_inertial.md, section 3.7) against an independent prototype's tables of accuracy
 // and consistency.
 
-#include <fusion/detail/reduced_system.hpp>
-#include <fusion/detail/refinement_problem.hpp>
+#include <fusion/init/detail/reduced_system.hpp>
+#include <fusion/init/detail/refinement_problem.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/refinement.hpp>

@@ -3,7 +3,7 @@
 
 #include <experiments/two_view_lattice.hpp>
 #include <experiments/two_view_scene.hpp>
-#include <fusion/detail/two_view_constraints.hpp>
+#include <fusion/two_view/detail/two_view_constraints.hpp>
 #include <fusion/two_view/models.hpp>
 #include <stats/hierarchy.hpp>
 

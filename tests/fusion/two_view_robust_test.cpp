@@ -2,7 +2,7 @@
 // benchmarks/fusion/two_view_robust.cpp has more matches.
 
 #include <experiments/two_view_scene.hpp>
-#include <fusion/detail/seven_points.hpp>
+#include <fusion/two_view/detail/seven_points.hpp>
 #include <fusion/two_view/robust.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/gaussian.hpp>

@@ -2,7 +2,7 @@
 // that do not tell the focal length.
 
 #include <experiments/two_view_lattice.hpp>
-#include <fusion/detail/two_view_constraints.hpp>
+#include <fusion/two_view/detail/two_view_constraints.hpp>
 #include <fusion/two_view/models.hpp>
 #include <fusion/two_view/shared_focal.hpp>
 #include <stats/hierarchy.hpp>

@@ -1,0 +1,350 @@
+// Definitions of fusion/hand_eye.hpp.
+#pragma once
+
+#include <fusion/hand_eye/detail/hand_eye_directions.hpp>
+#include <fusion/hand_eye/detail/hand_eye_problem.hpp>
+#include <fusion/hand_eye/detail/hand_eye_refine.hpp>
+#include <fusion/hand_eye/detail/hand_eye_starts.hpp>
+#include <fusion/detail/median.hpp>
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/random.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+namespace detail {
+
+/// One calibration, from the pairs to the result.
+template <class Equation>
+class HandEyeRun {
+ public:
+  static constexpr bool world = std::is_same_v<Equation, RobotWorldEquation>;
+  using Indices = std::vector<std::size_t>;
+
+  HandEyeRun(std::span<const PosePair> pairs, const HandEyeOptions& options)
+      : options_(options), pairs_(pairs.begin(), pairs.end()), order_(pairs.size()) {
+    result_.world = world, result_.known_noise = options_.known_noise;
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
+  }
+
+  HandEyeResult run() {
+    result_.fault = fault();
+    if (result_.fault) return std::move(result_);
+    sortByContent();
+    Indices all(pairs_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    fitAll(all);
+    // Where the noise is not known, wrong pairs may have been taken for noise.
+    const bool suspicious = !options_.known_noise || *std::max_element(errors_.begin(), errors_.end()) > options_.gate;
+    if (options_.find_outliers && pairs_.size() >= min_pairs_for_search && suspicious) findOutliers();
+    estimate();
+    return std::move(result_);
+  }
+
+ private:
+  static constexpr int parameters = world ? 12 : 6;
+  /// With fewer, three pairs and one more that agree by chance would be a majority.
+  static constexpr std::size_t min_pairs_for_search = 6;
+  /// The median of χ²₆.
+  static constexpr double median_error = 5.348120627447116;
+
+  Fault fault() const {
+    const HandEyeOptions& o = options_;
+    if (!(o.gate > 0 && o.samples >= 0 && o.least_excitation > 0 && o.trusted_excitation >= o.least_excitation &&
+          o.least_p >= 0)) {
+      return FaultKind::bad_option;
+    }
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const PosePair& pair = pairs_[i];
+      if (!pair.a.mean.params().allFinite() || !pair.b.mean.params().allFinite())
+        return {FaultKind::pose_not_finite, i};
+      // Six equations need six errors; whether these are independent shows in the frames of the estimate.
+      const PosePairNoise noise(pair.a.covariance, pair.b.covariance);
+      if (!noise.valid() || !noise.coversAllDirections()) return {FaultKind::bad_covariance, i};
+    }
+    if (pairs_.size() < (world ? 3 : 2)) return {FaultKind::too_few_poses, pairs_.size()};
+    return {};
+  }
+  /// By the numbers in the pairs, so that sums and samples do not depend on the order of the input.
+  void sortByContent() {
+    using Key = std::array<double, 86>;
+    std::vector<std::pair<Key, std::size_t>> keys(pairs_.size());
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      std::size_t n = 0;
+      const auto put = [&](const auto& values) {
+        for (Eigen::Index k = 0; k < values.size(); ++k) keys[i].first[n++] = values.data()[k];
+      };
+      put(pairs_[i].b.mean.params()), put(pairs_[i].a.mean.params());
+      put(pairs_[i].b.covariance), put(pairs_[i].a.covariance);
+      keys[i].second = i;
+    }
+    std::sort(keys.begin(), keys.end());
+    std::vector<PosePair> sorted;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      order_[i] = keys[i].second;
+      sorted.push_back(pairs_[keys[i].second]);
+    }
+    pairs_ = std::move(sorted);
+  }
+
+  void rescale(double factor) {
+    if (!(factor > 0 && std::isfinite(factor))) return;
+    for (PosePair& pair : pairs_) pair.a.covariance *= factor, pair.b.covariance *= factor;
+    for (double& error : errors_) error /= factor;
+    for (HandEyeFit& fit : candidates_) fit.cost /= factor;
+    result_.variance_factor *= factor;
+  }
+
+  HandEyeFit refined(const HandEyeFit& fit, const Indices& indices, int iterations = 30, double factor = 1) const {
+    return refineHandEye(fit, pairs_, indices, world, options_.trusted_excitation, iterations, factor);
+  }
+  std::vector<double> errorsAt(const HandEyeValue& value) const {
+    std::vector<double> errors;
+    for (const PosePair& pair : pairs_) {
+      const double error = handEyeSquaredError(value, pair);
+      errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::max());
+    }
+    return errors;
+  }
+  static Indices below(const std::vector<double>& errors, double bound) {
+    Indices list;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (errors[i] <= bound) list.push_back(i);
+    }
+    return list;
+  }
+  static double truncated(const std::vector<double>& errors, double bound) {
+    double sum = 0;
+    for (const double error : errors) sum += std::min(error, bound);
+    return sum;
+  }
+  void take(const std::vector<HandEyeFit>& fits, Indices inliers) {
+    candidates_ = fits;
+    inliers_ = std::move(inliers);
+    errors_ = errorsAt(fits.front().value);
+  }
+
+  /// The best of all starts, from all pairs. Where the noise is not known its factor follows from the median error, which
+  /// a minority of wrong pairs does not move much; what is excited depends on it, so that it is found twice.
+  void fitAll(const Indices& all) {
+    for (int round = 0; round < (options_.known_noise ? 1 : 3); ++round) {
+      std::vector<HandEyeFit> fits;
+      for (const HandEyeValue& value : handEyeStarts(pairs_, all, world, options_.seed)) {
+        const double cost = handEyeCost(value, pairs_, all);
+        if (std::isfinite(cost)) fits.push_back({value, cost, false});
+      }
+      result_.starts = static_cast<int>(fits.size());
+      if (fits.empty()) fits.push_back({});
+      keepBest(fits);
+      for (HandEyeFit& fit : fits) fit = refined(fit, all);
+      keepBest(fits);
+      take(fits, all);
+      if (!options_.known_noise) {
+        const double share = 1 - static_cast<double>(parameters) / (6 * static_cast<double>(pairs_.size()));
+        rescale(median(errors_) / (median_error * share));
+      }
+    }
+  }
+  static void keepBest(std::vector<HandEyeFit>& fits) {
+    std::stable_sort(fits.begin(), fits.end(), [](const auto& x, const auto& y) { return x.cost < y.cost; });
+    if (fits.size() > 3) fits.resize(3);
+  }
+
+  /// Wrong pairs by consensus: minimal samples of three pairs in closed form, the three best refined from the pairs within
+  /// a gate that closes. A minimal estimate has errors of its own, which inflate those of right pairs; hence the wide gates
+  /// at first.
+  void findOutliers() {
+    const bool known = options_.known_noise;
+    std::vector<HandEyeFit> fits;
+    for (int s = 0; s < options_.samples; ++s) {
+      CounterRng rng(options_.seed, static_cast<std::uint64_t>(s), 2);
+      std::array<std::size_t, 3> sample;
+      for (std::size_t k = 0; k < 3; ++k) {
+        do {
+          sample[k] = static_cast<std::size_t>(rng() % pairs_.size());
+        } while (std::find(sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(k), sample[k]) !=
+                 sample.begin() + static_cast<std::ptrdiff_t>(k));
+      }
+      std::sort(sample.begin(), sample.end());
+      const HandEyeMoments moments(pairs_, sample, world);
+      const HandEyeValue value = closedFormStart(moments, pairs_, sample, world);
+      const std::vector<double> errors = errorsAt(value);
+      fits.push_back({value, known ? truncated(errors, 4 * options_.gate) : median(errors), false});
+      if (fits.size() > 64) keepBest(fits);
+    }
+    if (fits.empty()) return;
+    keepBest(fits);
+    for (HandEyeFit& fit : fits) {
+      std::vector<double> errors = errorsAt(fit.value);
+      for (double widening : {4.0, 2.0, 1.0}) {
+        // A scale that was found in the errors has grown with them.
+        if (!known) widening = 1;
+        const double gate = gateFor(errors);
+        const Indices inliers = below(errors, widening * gate);
+        if (inliers.size() < 3) break;
+        fit = refined(fit, inliers, 5, gate / options_.gate);
+        errors = errorsAt(fit.value);
+      }
+      fit.cost = known ? truncated(errors, options_.gate) : median(errors);
+    }
+    keepBest(fits);
+    HandEyeFit best = fits.front();
+    std::vector<double> errors = errorsAt(best.value);
+    double gate = gateFor(errors);
+    Indices inliers = below(errors, gate);
+    for (int round = 0; round < 20 && inliers.size() >= 3; ++round) {
+      best = refined(best, inliers, 30, gate / options_.gate);
+      errors = errorsAt(best.value);
+      gate = gateFor(errors);
+      Indices next = below(errors, gate);
+      const bool same = next == inliers;
+      inliers = std::move(next);
+      if (same) break;
+    }
+    // Less than half is no consensus: the residuals are not those of the noise, whichever pairs are taken.
+    if (2 * inliers.size() < pairs_.size() || inliers.size() < 4) return;
+    fits.front() = best;
+    // Candidates are compared on the pairs of the best.
+    for (HandEyeFit& fit : fits) fit.cost = handEyeCost(fit.value, pairs_, inliers);
+    take(fits, inliers);
+    if (!known) rescale(gate / options_.gate);
+  }
+  /// The gate in units of the given covariances.
+  double gateFor(const std::vector<double>& errors) const {
+    if (options_.known_noise) return options_.gate;
+    // The median of all, which wrong pairs can only have moved up, then the mean of those within its gate.
+    const double most = median(errors) / median_error;
+    double factor = most;
+    for (int k = 0; k < 3; ++k) {
+      const Indices inliers = below(errors, factor * options_.gate);
+      double sum = 0;
+      for (const std::size_t i : inliers) sum += errors[i];
+      const double freedom = 6 * static_cast<double>(inliers.size()) - parameters;
+      if (freedom <= 0) break;
+      factor = std::min(most, sum / freedom);
+    }
+    return factor * options_.gate;
+  }
+
+  void estimate() {
+    HandEyeValue value = candidates_.front().value;
+    if (!std::isfinite(candidates_.front().cost)) {
+      result_.status = FusionStatus::not_converged;
+      return;
+    }
+    HandEyeExcitation excitation = handEyeExcitation(value, pairs_, inliers_, world);
+    int open = openDirections(excitation, options_.trusted_excitation);
+    ConstrainedResult<typename Equation::Parameter> strict;
+    // Open directions are known at the estimate, and the estimate holds open directions: at most a few rounds.
+    for (int round = 0; round < 4; ++round) {
+      strict = strictHandEye<Equation>(value, pairs_, inliers_, excitation, open);
+      if (strict.end != ConstrainedEnd::converged) break;
+      value = Equation::value(strict.parameter);
+      double change = 1;
+      if (!options_.known_noise && strict.degrees_of_freedom > 0) {
+        change = strict.varianceFactor();
+        rescale(change);
+      }
+      excitation = handEyeExcitation(value, pairs_, inliers_, world);
+      const int now_open = openDirections(excitation, options_.trusted_excitation);
+      const bool same = now_open == open && std::abs(change - 1) < 1e-6;
+      open = now_open;
+      if (same) break;
+    }
+    report(value, strict, excitation, open);
+  }
+
+  template <class Strict>
+  void report(const HandEyeValue& value, const Strict& strict, const HandEyeExcitation& excitation, int open) {
+    HandEyeResult& r = result_;
+    r.X.mean = value.X, r.Y.mean = value.Y;
+    const bool converged = strict.end == ConstrainedEnd::converged;
+    // Corrections of thousands of standard deviations have no limit to converge to; the first estimate has their cost.
+    const double chi2 = converged ? strict.chi2 : candidates_.front().cost;
+    r.chi2 = chi2 * r.variance_factor;
+    r.degrees_of_freedom = 6 * static_cast<int>(inliers_.size()) - parameters + open;
+    if (options_.known_noise) {
+      r.p = chiSquaredTail(chi2, static_cast<std::size_t>(std::max(0, r.degrees_of_freedom)));
+    }
+    r.excitations = excitation.values;
+    const GripperMotion motion(pairs_, inliers_, world);
+    appendOpenDirections(r.directions, excitation, open, value, motion, world);
+    for (OpenDirection& d : r.directions) d.weak = d.excitation >= options_.least_excitation;
+
+    r.pairs.resize(pairs_.size());
+    errors_ = errorsAt(value);
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      PairFit& fit = r.pairs[order_[i]];
+      fit.error = handEyeError(value, pairs_[i].a.mean, pairs_[i].b.mean);
+      fit.chi2 = errors_[i];
+    }
+    for (const std::size_t i : inliers_) r.pairs[order_[i]].inlier = true;
+    for (std::size_t i = 0; i < r.pairs.size(); ++i) {
+      if (!r.pairs[i].inlier) r.outliers.push_back(i);
+    }
+
+    if (converged && !r.rotationIsOpen()) setCovariance(strict.covariance);
+    r.status = statusOf(strict, value, open);
+  }
+  void setCovariance(const SquareOf<typename Equation::Parameter>& covariance) {
+    if constexpr (world) {
+      result_.covariance = covariance;
+    } else {
+      result_.covariance << covariance, covariance, covariance, covariance;
+    }
+    result_.X.covariance = result_.covariance.topLeftCorner<6, 6>();
+    result_.Y.covariance = result_.covariance.bottomRightCorner<6, 6>();
+  }
+  template <class Strict>
+  FusionStatus statusOf(const Strict& strict, const HandEyeValue& value, int open) {
+    if (result_.p < options_.least_p && candidates_.front().converged) return FusionStatus::inconsistent;
+    if (strict.end != ConstrainedEnd::converged) return FusionStatus::not_converged;
+    if (open > 0) return FusionStatus::undetermined;
+    // A second minimum whose cost noise may have made larger, and which is another solution.
+    for (std::size_t k = 1; k < candidates_.size(); ++k) {
+      const HandEyeFit& other = candidates_[k];
+      const Vector6 off = (value.X.inverse() * other.value.X).log();
+      const Matrix6 V = result_.X.covariance;
+      if (other.converged && other.cost < candidates_.front().cost + 16 && mahalanobisSquared<double, 6>(off, V) > 50) {
+        result_.rival = other.value.X;
+        return FusionStatus::ambiguous;
+      }
+    }
+    return FusionStatus::ok;
+  }
+
+  HandEyeOptions options_;
+  std::vector<PosePair> pairs_;         // sorted, covariances rescaled
+  std::vector<std::size_t> order_;      // index in the input of each
+  Indices inliers_;                     // ascending, of the sorted pairs
+  std::vector<HandEyeFit> candidates_;  // the best first
+  std::vector<double> errors_;          // squared, at the best
+  HandEyeResult result_;
+};
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE HandEyeResult estimateRobotWorld(std::span<const PosePair> poses, const HandEyeOptions& options) {
+  return detail::HandEyeRun<detail::RobotWorldEquation>(poses, options).run();
+}
+
+LIESTAT_FUSION_INLINE HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options) {
+  return detail::HandEyeRun<detail::HandEyeEquation>(motions, options).run();
+}
+
+}  // namespace liestat

@@ -1,0 +1,281 @@
+// How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
+#pragma once
+
+#include <fusion/detail/median.hpp>
+#include <fusion/init/detail/second_motion.hpp>
+#include <fusion/init/closed_form.hpp>
+#include <fusion/init/consensus.hpp>
+#include <fusion/init/gyroscope_bias.hpp>
+#include <fusion/init/refinement.hpp>
+#include <fusion/init/robust_initialisation.hpp>
+#include <fusion/init/window_fusion.hpp>
+#include <fusion/visual_inertial_types.hpp>
+#include <stats/random.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// The run over one recording: all that stays the same from window to window.
+class RecordingRun {
+ public:
+  RecordingRun(const VisualInertialRecording& recording, const VisualInertialOptions& options,
+               VisualInertialResult& result)
+      : recording_(recording), options_(options), noise_(recording.noise) {
+    std::vector<double> sigmas;
+    by_image_.resize(times().size());
+    for (std::size_t i = 0; i < recording.observations.size(); ++i) {
+      const BearingMeasurement& seen = recording.observations[i];
+      if (seen.image >= by_image_.size() || seen.camera >= recording.cameras.size()) {
+        result.fault = {FaultKind::wrong_index, i};
+        return;
+      }
+      by_image_[seen.image].push_back(&seen);
+      sigmas.push_back(seen.sigma);
+      tracks_ = std::max(tracks_, seen.track + 1);
+    }
+    if (!sigmas.empty()) bearing_noise_ = median(std::move(sigmas));
+    result.bearing_noise = bearing_noise_;
+    for (const double time : times()) {
+      covered_.push_back(!recording.readings.empty() && time >= recording.readings.front().time &&
+                         time <= recording.readings.back().time);
+      result.images_outside += !covered_.back();
+    }
+  }
+
+  /// The images of all windows.
+  std::vector<std::vector<std::size_t>> windows() const {
+    std::vector<std::vector<std::size_t>> windows;
+    const double begin = options_.begin.value_or(times().front()), last = options_.end.value_or(times().back());
+    std::size_t previous = times().size();
+    for (std::size_t k = 0;; ++k) {
+      const double from = begin + static_cast<double>(k) * stride();
+      const auto at = std::lower_bound(times().begin(), times().end(), from - 1e-6);
+      if (at == times().end() || from + options_.window > last + 0.5 * options_.window) break;
+      auto first = static_cast<std::size_t>(at - times().begin());
+      while (first < times().size() && !covered_[first]) ++first;
+      if (first == times().size() || first == previous) continue;
+      previous = first;
+      std::vector<std::size_t> images = imagesFrom(first);
+      if (images.size() >= 2 && times()[images.back()] <= last + 1e-6) windows.push_back(std::move(images));
+    }
+    return windows;
+  }
+  double stride() const { return options_.stride > 0 ? options_.stride : options_.window; }
+
+  InitialisedWindow estimate(const std::vector<std::size_t>& images, const ImuBias<double>& start,
+                             std::size_t number) const {
+    InitialisedWindow w;
+    w.images = images;
+    w.begin = times()[images.front()];
+    w.end = times()[images.back()];
+    const std::optional<ImuBias<double>> known = options_.known_bias ? options_.known_bias(w.begin) : std::nullopt;
+    w.known_biases = known.has_value();
+    std::vector<double> image_times;
+    image_times.reserve(images.size());
+    for (const std::size_t j : images) image_times.push_back(times()[j]);
+    std::vector<FeatureTrack> tracks = chooseTracks(w);
+    w.measured = InertialWindow(recording_.readings, std::move(image_times), how(known.value_or(start)),
+                                std::move(tracks), recording_.cameras);
+    w.fault = w.measured.fault();
+    if (w.fault) {
+      if (w.fault.index < recording_.readings.size()) w.fault_time = recording_.readings[w.fault.index].time;
+      return w;
+    }
+    findMotion(w, number);
+    if (options_.refinement) w.refined = refined(w, 1);
+    return w;
+  }
+
+  /// A window refined with the n-th part of the information of the prior of the biases; empty: nothing to start from.
+  std::optional<RefinementResult> refined(const InitialisedWindow& w, std::size_t n) const {
+    const bool at_rest = w.closedForm().status == FusionStatus::stationary && !w.closedForm().solutions.empty();
+    if (!at_rest && !w.closedForm().hasMotion()) return std::nullopt;
+    InitialisationOptions options = optionsOf(w);
+    if (w.known_biases) options.prior = {w.measured.bias(), 1e-6, 1e-6};  // as good as exact
+    if (at_rest) {
+      if (n == 1 && w.found.rest) return w.found.rest;
+      return refineAtRest(w.measured.without(w.found.outliers), w.closedForm().solutions[0].gravity, w.measured.bias(),
+                          options);
+    }
+    const ClosedFormSolution& closed = w.closedForm().solutions[0];
+    if (!w.isRefined()) {
+      return refine(w.measured.without(w.found.outliers), closed, w.measured.bias(), withSharedPrior(options, n));
+    }
+    // Again, with another noise or prior: on from the first result.
+    const ClosedFormSolution start{
+        .velocity = w.refined->velocity(), .gravity = w.refined->gravity, .features = w.refined->features};
+    return refine(w.measured.without(w.found.outliers), start, w.refined->bias, withSharedPrior(options, n));
+  }
+
+  /// Disjoint windows that are ok, in stretches, each as one.
+  std::vector<FusedStretch> fuse(const std::vector<InitialisedWindow>& windows) const {
+    std::vector<FusedStretch> stretches =
+        stretchesOf(windows, [](const InitialisedWindow& w) { return w.ok() && w.refined; });
+    for (FusedStretch& stretch : stretches) fuse(windows, stretch);
+    return stretches;
+  }
+
+  /// The windows that take part, in stretches.
+  template <class TakesPart>
+  std::vector<FusedStretch> stretchesOf(const std::vector<InitialisedWindow>& windows,
+                                        const TakesPart& takes_part) const {
+    std::vector<FusedStretch> stretches;
+    double free_from = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < windows.size(); ++i) {
+      const InitialisedWindow& w = windows[i];
+      if (!takes_part(w) || w.begin < free_from) continue;
+      const bool begins = stretches.empty() || w.end > stretches.back().begin + options_.stretch * (1 + 1e-9) ||
+                          !hasReadings(stretches.back().end, w.begin);
+      if (begins) stretches.emplace_back().begin = w.begin;
+      stretches.back().windows.push_back(i);
+      stretches.back().end = free_from = w.end;
+    }
+    return stretches;
+  }
+
+  /// The run with readings of another noise, whose windows are to be integrated with it (InertialWindow::withNoise).
+  RecordingRun withNoise(const ImuNoise<double>& noise) const {
+    RecordingRun other = *this;
+    other.noise_ = noise;
+    return other;
+  }
+
+  /// A window's meeting with those before it.
+  struct Meeting {
+    std::size_t window;  ///< index in the result's windows
+    WindowFusion::Meeting outcome;
+  };
+  /// Fuses a stretch; returns its meetings.
+  std::vector<Meeting> fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
+    const std::size_t n = stretch.windows.size();
+    stretch.gravity =
+        options_.initialisation.gravity.value_or(windows[stretch.windows.front()].refined->gravity.norm());
+    WindowFusion fusion(stretch.gravity);
+    double end = 0;
+    std::vector<std::size_t> used;
+    std::vector<Meeting> meetings;
+    for (const std::size_t i : stretch.windows) {
+      const InitialisedWindow& w = windows[i];
+      const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
+      if (!estimate) continue;
+      const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
+        const auto between = motion(end, w.begin, bias);
+        return between.ok() ? between.motion : Preintegration<double>({.noise = noise_, .bias = bias});
+      });
+      if (meeting.status != Status::ok) continue;
+      if (meeting.degrees_of_freedom > 0) meetings.push_back({i, meeting});
+      used.push_back(i);
+      stretch.end = end = w.end;
+    }
+    stretch.windows = used;
+    stretch.has_state = fusion.hasState();
+    stretch.chi2 = fusion.chi2();
+    stretch.degrees_of_freedom = fusion.degrees_of_freedom();
+    stretch.p = fusion.p();
+    stretch.inflation = fusion.inflation();
+    stretch.state = fusion.state();
+    if (options_.inflate && !stretch.ok()) {
+      stretch.inflated = true;
+      stretch.state.covariance *= stretch.inflation;
+    }
+    return meetings;
+  }
+
+ private:
+  const std::vector<double>& times() const { return recording_.image_times; }
+  RecordingOptions<double> how(const ImuBias<double>& bias) const {
+    return {.preintegration = {.noise = noise_, .bias = bias}, .scheme = options_.scheme, .max_gap = options_.max_gap};
+  }
+  RecordingResult<double> motion(double from, double to, const ImuBias<double>& bias) const {
+    return preintegrate<double>(recording_.readings, from, to, how(bias));
+  }
+  bool hasReadings(double from, double to) const { return from >= to || motion(from, to, {}).ok(); }
+
+  /// The images of a window that begins at image `first`; empty where the recording ends before.
+  std::vector<std::size_t> imagesFrom(std::size_t first) const {
+    std::vector<std::size_t> images{first};
+    // Tolerates 5 % jitter in the images' times.
+    const double least = options_.image_rate > 0 ? 0.95 / options_.image_rate : 0;
+    const double end = times()[first] + options_.window, slack = 0.5 * std::max(least, 0.01);
+    for (std::size_t j = first + 1; j < times().size() && times()[j] <= end + slack; ++j) {
+      if (covered_[j] && times()[j] - times()[images.back()] >= least) images.push_back(j);
+    }
+    const bool whole = times()[images.back()] >= end - 1.05 * std::max(least, 0.06);
+    return whole ? images : std::vector<std::size_t>{};
+  }
+
+  std::vector<FeatureTrack> chooseTracks(InitialisedWindow& w) const {
+    std::vector<FeatureTrack> all(tracks_), chosen;
+    for (std::size_t j = 0; j < w.images.size(); ++j) {
+      for (const BearingMeasurement* seen : by_image_[w.images[j]]) {
+        const std::optional<double> time = seen->time ? std::optional(*seen->time - w.begin) : std::nullopt;
+        all[seen->track].push_back({j, seen->bearing, seen->sigma / bearing_noise_, seen->camera, time});
+      }
+    }
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].size() >= options_.min_observations) w.tracks.push_back(i);
+    }
+    std::stable_sort(w.tracks.begin(), w.tracks.end(),
+                     [&](std::size_t a, std::size_t b) { return all[a].size() > all[b].size(); });
+    if (options_.max_features > 0 && w.tracks.size() > options_.max_features) w.tracks.resize(options_.max_features);
+    std::sort(w.tracks.begin(), w.tracks.end());
+    for (const std::size_t i : w.tracks) chosen.push_back(std::move(all[i]));
+    return chosen;
+  }
+
+  InitialisationOptions optionsOf(const InitialisedWindow& w) const {
+    InitialisationOptions options = options_.initialisation;
+    options.bearing_noise = bearing_noise_;
+    options.closed_form.estimate_bias = !w.known_biases && options_.window >= 2;
+    return options;
+  }
+
+  void findMotion(InitialisedWindow& w, std::size_t number) const {
+    InitialisationOptions options = optionsOf(w);
+    options.consensus.seed = CounterRng(options.consensus.seed, number)();
+    RobustInitialisation& found = w.found;
+    found.gyroscope_bias = w.measured.bias().gyroscope;
+    if (w.known_biases && options_.consensus) {
+      ConsensusResult consensus = solveClosedFormRobustly(closedFormWindow(w.measured), options);
+      found.result = std::move(consensus.result);
+      found.inliers = std::move(consensus.inliers);
+      found.outliers = std::move(consensus.outliers);
+      found.hypotheses = consensus.hypotheses;
+      addSecondMotion(w.measured, w.measured.bias(), options, found);
+      return;
+    }
+    if (options_.consensus) {
+      found = initialiseRobustly(w.measured, options);
+    } else {
+      for (std::size_t i = 0; i < w.measured.features.size(); ++i) found.inliers.push_back(i);
+      if (w.known_biases) {
+        found.result = solveClosedForm(closedFormWindow(w.measured), options);
+        return;
+      }
+      GyroscopeBiasResult estimate = estimateGyroscopeBias(w.measured, options);
+      found.bias_status = estimate.status;
+      found.result = std::move(estimate.result);
+      if (estimate.status == FusionStatus::ok) found.gyroscope_bias = estimate.bias;
+    }
+    w.measured.integrate({found.gyroscope_bias, w.measured.bias().accelerometer});
+  }
+
+  const VisualInertialRecording& recording_;
+  const VisualInertialOptions& options_;
+  ImuNoise<double> noise_;
+  std::vector<std::vector<const BearingMeasurement*>> by_image_;
+  std::vector<bool> covered_;
+  std::size_t tracks_ = 0;
+  double bearing_noise_ = 0;
+};
+
+}  // namespace liestat::detail

@@ -1,0 +1,352 @@
+// Definitions of fusion/trajectories.hpp.
+#pragma once
+
+#include <fusion/trajectories/detail/pose_alignment.hpp>
+#include <fusion/trajectories.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace liestat {
+
+LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateByInterpolation(std::span<const double> reference_times,
+                                                                      std::span<const double> estimate_times,
+                                                                      double max_gap, double offset) {
+  std::vector<TimeMatch> matches;
+  std::size_t k = 0;  // the last stamp of the reference that is not later
+  for (std::size_t i = 0; i < estimate_times.size(); ++i) {
+    const double t = estimate_times[i] + offset;
+    while (k + 1 < reference_times.size() && reference_times[k + 1] <= t) ++k;
+    if (reference_times.empty() || !(reference_times[k] <= t)) continue;
+    if (reference_times[k] == t) {
+      matches.push_back({i, k, 0, 0});
+    } else if (k + 1 < reference_times.size()) {
+      const double gap = reference_times[k + 1] - reference_times[k];
+      if (gap <= max_gap) matches.push_back({i, k, (t - reference_times[k]) / gap, gap});
+    }
+  }
+  return matches;
+}
+
+LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateNearest(std::span<const double> reference_times,
+                                                              std::span<const double> estimate_times,
+                                                              double max_difference, double offset) {
+  std::vector<TimeMatch> matches;
+  const bool by_reference = estimate_times.size() > reference_times.size();
+  const std::span<const double> shorter = by_reference ? reference_times : estimate_times;
+  const std::span<const double> longer = by_reference ? estimate_times : reference_times;
+  const double shift = by_reference ? offset : -offset;  // added to the times of the longer list
+  for (std::size_t i = 0; i < shorter.size() && !longer.empty(); ++i) {
+    const double t = shorter[i];
+    auto at = std::lower_bound(longer.begin(), longer.end(), t, [&](double x, double y) { return x + shift < y; });
+    auto k = static_cast<std::size_t>(at - longer.begin());
+    const auto difference = [&](std::size_t j) { return std::abs(longer[j] + shift - t); };
+    if (k == longer.size() || (k > 0 && difference(k - 1) <= difference(k))) --k;
+    while (k > 0 && longer[k - 1] == longer[k]) --k;
+    if (!(difference(k) <= max_difference)) continue;
+    matches.push_back({by_reference ? k : i, by_reference ? i : k, 0, difference(k)});
+  }
+  return matches;
+}
+
+LIESTAT_FUSION_INLINE std::vector<MatchedPose> matchedPoses(std::span<const TimeMatch> matches,
+                                                            std::span<const Gaussian<SE3d>> reference,
+                                                            std::span<const Gaussian<SE3d>> estimate,
+                                                            PoseInterpolation interpolation) {
+  std::vector<MatchedPose> poses;
+  poses.reserve(matches.size());
+  for (const TimeMatch& m : matches) {
+    poses.push_back({reference[m.reference], estimate[m.estimate]});
+    if (m.fraction == 0) continue;
+    Gaussian<SE3d>& at = poses.back().reference;
+    const Gaussian<SE3d>& next = reference[m.reference + 1];
+    if (interpolation == PoseInterpolation::geodesic) {
+      at.mean = interpolate(at.mean, next.mean, m.fraction);
+    } else {
+      const Eigen::Vector3d t = (1 - m.fraction) * at.mean.translation() + m.fraction * next.mean.translation();
+      const SO3d R = at.mean.so3() * SO3d::exp(m.fraction * (at.mean.so3().inverse() * next.mean.so3()).log());
+      at.mean = SE3d(R, t);
+    }
+    at.covariance = (1 - m.fraction) * at.covariance + m.fraction * next.covariance;
+  }
+  return poses;
+}
+
+LIESTAT_FUSION_INLINE std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses) {
+  std::vector<Gaussian<SE3d>> exact;
+  exact.reserve(poses.size());
+  for (const SE3d& pose : poses) exact.push_back({pose, Eigen::Matrix<double, 6, 6>::Zero()});
+  return exact;
+}
+
+LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model,
+                                             std::size_t n_to_align) {
+  Alignment a;
+  a.model = model;
+  a.poses = model == AlignmentModel::none     ? 0
+            : model == AlignmentModel::origin ? 1
+            : n_to_align == 0                 ? poses.size()
+                                              : std::min(n_to_align, poses.size());
+  if (model == AlignmentModel::none) {
+    a.ok = true;
+    return a;
+  }
+  if (poses.empty()) {
+    a.fault = "no poses";
+    return a;
+  }
+  if (model == AlignmentModel::origin) {
+    a.transform = poses[0].reference.mean * poses[0].estimate.mean.inverse();
+    a.parameters = 6;
+    a.ok = true;
+    return a;
+  }
+  const auto n = static_cast<double>(a.poses);
+  Eigen::Vector3d x_mean = Eigen::Vector3d::Zero(), y_mean = Eigen::Vector3d::Zero();
+  for (const MatchedPose& p : poses.first(a.poses)) {
+    x_mean += p.estimate.mean.translation(), y_mean += p.reference.mean.translation();
+  }
+  x_mean /= n, y_mean /= n;
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+  double variance = 0;
+  for (const MatchedPose& p : poses.first(a.poses)) {
+    const Eigen::Vector3d x = p.estimate.mean.translation() - x_mean, y = p.reference.mean.translation() - y_mean;
+    moment += y * x.transpose();
+    variance += x.squaredNorm();
+  }
+  moment /= n, variance /= n;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  if (model == AlignmentModel::posyaw) {
+    const double c = moment(0, 0) + moment(1, 1), s = moment(1, 0) - moment(0, 1);
+    if (!(std::hypot(c, s) > 1e-12 * variance)) {
+      a.fault = "the positions do not determine the yaw";
+      return a;
+    }
+    R = SO3d::rotZ(std::atan2(s, c)).matrix();
+  } else {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    if (!(svd.singularValues()[1] > 1e-12 * svd.singularValues()[0])) {
+      a.fault = "the positions are collinear: they do not determine the rotation";
+      return a;
+    }
+    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+    if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs[2] = -1;
+    R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    if (model == AlignmentModel::sim3 || model == AlignmentModel::scale) {
+      a.scale = svd.singularValues().dot(signs) / variance;
+    }
+  }
+  if (model == AlignmentModel::scale) {
+    a.parameters = 1;
+    a.covariance.setConstant(detail::not_a_number);
+    a.ok = true;
+    return a;
+  }
+  a.transform = SE3d(R, Eigen::Vector3d(y_mean - a.scale * (R * x_mean)));
+  a.parameters = model == AlignmentModel::posyaw ? 4 : model == AlignmentModel::se3 ? 6 : 7;
+  a.ok = true;
+  a.covariance = detail::umeyamaCovariance(poses.first(a.poses), a);
+  return a;
+}
+
+LIESTAT_FUSION_INLINE Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model,
+                                              std::size_t n_to_align) {
+  return detail::weightedAlignment(poses, model, n_to_align);
+}
+
+LIESTAT_FUSION_INLINE Consistency evaluateConsistency(std::span<const MatchedPose> poses, const Alignment& alignment) {
+  return detail::consistencyOf(poses, alignment);
+}
+
+LIESTAT_FUSION_INLINE ErrorStatistics errorStatistics(std::span<const double> errors) {
+  ErrorStatistics s;
+  if (errors.empty()) return s;
+  const auto n = static_cast<double>(errors.size());
+  std::vector<double> sorted(errors.begin(), errors.end());
+  std::sort(sorted.begin(), sorted.end());
+  double sum = 0;
+  s.sse = 0;
+  for (const double e : errors) sum += e, s.sse += e * e;
+  s.mean = sum / n;
+  s.rmse = std::sqrt(s.sse / n);
+  double squares = 0;
+  for (const double e : errors) squares += (e - s.mean) * (e - s.mean);
+  s.std = std::sqrt(squares / n);
+  const std::size_t half = sorted.size() / 2;
+  s.median = sorted.size() % 2 == 1 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
+  s.min = sorted.front(), s.max = sorted.back();
+  return s;
+}
+
+namespace detail {
+
+inline double errorNumber(const SE3d& E, PoseRelation relation) {
+  constexpr double degrees = 180 / std::numbers::pi;
+  switch (relation) {
+    case PoseRelation::full:
+      return std::sqrt((E.rotationMatrix() - Eigen::Matrix3d::Identity()).squaredNorm() +
+                       E.translation().squaredNorm());
+    case PoseRelation::rot_part:
+      return (E.rotationMatrix() - Eigen::Matrix3d::Identity()).norm();
+    case PoseRelation::angle_deg:
+      return E.so3().log().norm() * degrees;
+    case PoseRelation::angle_rad:
+      return E.so3().log().norm();
+    default:
+      return E.translation().norm();
+  }
+}
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE std::vector<double> absoluteErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
+                                                         PoseRelation relation) {
+  std::vector<double> errors;
+  errors.reserve(poses.size());
+  for (const MatchedPose& p : poses) {
+    const SE3d estimate = alignment(p.estimate.mean);
+    switch (relation) {
+      case PoseRelation::trans_part:
+      case PoseRelation::point_distance:
+      case PoseRelation::point_distance_error_ratio:
+        errors.push_back((estimate.translation() - p.reference.mean.translation()).norm());
+        break;
+      default:
+        errors.push_back(detail::errorNumber(estimate.inverse() * p.reference.mean, relation));
+    }
+  }
+  return errors;
+}
+
+LIESTAT_FUSION_INLINE std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const MatchedPose> poses,
+                                                                                 const Alignment& alignment,
+                                                                                 const RelativeOptions& options) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  const std::size_t n = poses.size();
+  const auto pose = [&](std::size_t i) {
+    return options.pairs_from_reference ? poses[i].reference.mean : alignment(poses[i].estimate.mean);
+  };
+  const double tolerance = options.relative_tolerance * options.delta;
+  if (!(options.delta > 0) || n < 2) return pairs;
+  if (options.unit == DeltaUnit::frames) {
+    const auto delta = static_cast<std::size_t>(options.delta);
+    if (delta == 0) return pairs;
+    for (std::size_t i = 0; i + delta < n; i += options.all_pairs ? 1 : delta) pairs.emplace_back(i, i + delta);
+    return pairs;
+  }
+  std::vector<SE3d> poses_of_pairs;
+  poses_of_pairs.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) poses_of_pairs.push_back(pose(i));
+  if (options.unit == DeltaUnit::meters) {
+    std::vector<double> along(n, 0);
+    for (std::size_t i = 1; i < n; ++i) {
+      along[i] = along[i - 1] + (poses_of_pairs[i].translation() - poses_of_pairs[i - 1].translation()).norm();
+    }
+    if (options.all_pairs) {
+      for (std::size_t i = 0; i + 1 < n; ++i) {
+        const auto from = along.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+        auto at = std::lower_bound(from, along.end(), options.delta,
+                                   [&](double x, double delta) { return x - along[i] < delta; });
+        const auto off = [&](auto it) { return std::abs(*it - along[i] - options.delta); };
+        if (at == along.end() || (at != from && off(at - 1) <= off(at))) --at;
+        while (at != from && *(at - 1) == *at) --at;
+        if (off(at) <= tolerance) pairs.emplace_back(i, static_cast<std::size_t>(at - along.begin()));
+      }
+      return pairs;
+    }
+    // evo counts the first pose's own zero path, and starts at the first pose that reaches delta.
+    std::vector<std::size_t> ends;
+    double path = 0;
+    for (std::size_t i = 1; i < n; ++i) {
+      path += (poses_of_pairs[i].translation() - poses_of_pairs[i - 1].translation()).norm();
+      if (path >= options.delta) ends.push_back(i), path = 0;
+    }
+    for (std::size_t k = 1; k < ends.size(); ++k) pairs.emplace_back(ends[k - 1], ends[k]);
+    return pairs;
+  }
+  const double unit = options.unit == DeltaUnit::degrees ? std::numbers::pi / 180 : 1;
+  const double delta = options.delta * unit, slack = tolerance * unit;
+  const auto angle = [&](std::size_t i, std::size_t j) {
+    return (poses_of_pairs[i].so3().inverse() * poses_of_pairs[j].so3()).log().norm();
+  };
+  if (options.all_pairs) {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        const double a = angle(i, j);
+        if (delta - slack <= a && a <= delta + slack) pairs.emplace_back(i, j);
+      }
+    }
+    return pairs;
+  }
+  std::size_t start = 0;
+  double turned = 0;
+  for (std::size_t i = 1; i < n; ++i) {
+    turned += angle(i - 1, i);
+    if (turned >= delta) pairs.emplace_back(start, i), start = i, turned = 0;
+  }
+  return pairs;
+}
+
+LIESTAT_FUSION_INLINE std::vector<double> relativeErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
+                                                         std::vector<std::pair<std::size_t, std::size_t>>& pairs,
+                                                         PoseRelation relation) {
+  std::vector<double> errors;
+  std::vector<std::pair<std::size_t, std::size_t>> kept;
+  const bool lengths = relation == PoseRelation::point_distance || relation == PoseRelation::point_distance_error_ratio;
+  for (const auto& [i, j] : pairs) {
+    const SE3d &from = poses[i].reference.mean, &to = poses[j].reference.mean;
+    const SE3d est_from = alignment(poses[i].estimate.mean), est_to = alignment(poses[j].estimate.mean);
+    if (lengths) {
+      const double length = (from.translation() - to.translation()).norm();
+      const double error = std::abs(length - (est_from.translation() - est_to.translation()).norm());
+      if (relation == PoseRelation::point_distance) {
+        errors.push_back(error);
+      } else if (length != 0) {
+        errors.push_back(100 * error / length);
+      } else {
+        continue;
+      }
+    } else {
+      const SE3d E = (from.inverse() * to).inverse() * (est_from.inverse() * est_to);
+      errors.push_back(detail::errorNumber(E, relation));
+    }
+    kept.emplace_back(i, j);
+  }
+  pairs = std::move(kept);
+  return errors;
+}
+
+LIESTAT_FUSION_INLINE RelativeConsistency
+relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
+                    PairsModel model, double scale) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  RelativeConsistency result;
+  double sum = 0;
+  const auto scaled = [scale](const Gaussian<SE3d>& g) {
+    Gaussian<SE3d> s{SE3d(g.mean.so3(), Eigen::Vector3d(scale * g.mean.translation())), g.covariance};
+    s.covariance.topRows<3>() *= scale, s.covariance.leftCols<3>() *= scale;
+    return s;
+  };
+  for (const auto& [i, j] : pairs) {
+    const Gaussian<SE3d> from = scaled(poses[i].estimate), to = scaled(poses[j].estimate);
+    const SE3d relative = from.mean.inverse() * to.mean;
+    const SE3d reference = poses[i].reference.mean.inverse() * poses[j].reference.mean;
+    const Eigen::Matrix<double, 6, 1> eta = (relative.inverse() * reference).log();
+    const Matrix6 A = relative.inverse().Adj();
+    const Matrix6 carried = detail::congruence(A, from.covariance);
+    Matrix6 covariance =
+        model == PairsModel::independent ? Matrix6(to.covariance + carried) : Matrix6(to.covariance - carried);
+    covariance += poses[j].reference.covariance + detail::congruence(A, poses[i].reference.covariance);
+    const double squared = mahalanobisSquared<double, 6>(eta, covariance);
+    if (squared == squared) {
+      sum += squared, ++result.n;
+    } else {
+      ++result.indefinite;
+    }
+  }
+  if (result.n > 0) result.joint = detail::neesTest(sum, 6. * static_cast<double>(result.n));
+  return result;
+}
+
+}  // namespace liestat

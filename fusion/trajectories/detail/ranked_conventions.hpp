@@ -1,0 +1,256 @@
+// Hypotheses on the convention of a file, ranked by the likelihood of its errors; docs/theory/trajectories.md,
+// sections 6 and 7.
+#pragma once
+
+#include <fusion/convention_diagnosis.hpp>
+#include <fusion/trajectories.hpp>  // first: its definitions include the next
+#include <fusion/trajectories/detail/pose_alignment.hpp>
+#include <fusion/trajectories/detail/repaired_matrices.hpp>
+#include <stats/convention_charts.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+namespace liestat {
+
+LIESTAT_FUSION_INLINE std::vector<Convention> conventionHypotheses() {
+  std::vector<Convention> all;
+  for (const auto order : {CovarianceOrder::translation_rotation, CovarianceOrder::rotation_translation}) {
+    for (const auto perturbation :
+         {Perturbation::right, Perturbation::left, Perturbation::world_axes, Perturbation::world_body_axes,
+          Perturbation::roll_pitch_yaw, Perturbation::yaw_pitch_roll, Perturbation::transposed_axes}) {
+      for (const auto unit :
+           {RotationUnit::radian, RotationUnit::half_angle, RotationUnit::double_angle, RotationUnit::degree}) {
+        for (const auto content :
+             {CovarianceContent::covariance, CovarianceContent::information, CovarianceContent::sigmas}) {
+          Convention c;
+          c.order = order, c.perturbation = perturbation, c.unit = unit, c.content = content;
+          all.push_back(c);
+        }
+      }
+    }
+  }
+  return all;
+}
+
+namespace detail {
+
+/// Poses with usable matrices, their errors, and the matrices as covariances of each order and content.
+class DiagnosisData {
+ public:
+  DiagnosisData(std::span<const DiagnosedPose> given, bool may_use_charts) {
+    for (const DiagnosedPose& p : given) {
+      if (!blocksFinite(p.matrix) || !p.estimate.params().allFinite() || !p.truth.params().allFinite()) {
+        ++skipped;
+        continue;
+      }
+      poses.push_back(p);
+      blocks_only = blocks_only || crossUnknown(p.matrix);
+      errors.push_back((p.estimate.inverse() * p.truth).log());
+    }
+    double sum = 0;
+    for (const Vector6d& e : errors) sum += e.tail<3>().squaredNorm();
+    // First-order coordinates are within 1 % of a sigma below 0.03 rad; one rule for all hypotheses, so that they stay
+    // comparable.
+    charts =
+        may_use_charts && std::sqrt(sum / (3 * static_cast<double>(std::max<std::size_t>(1, errors.size())))) > 0.03;
+  }
+
+  std::size_t size() const { return poses.size(); }
+  /// The matrix of a pose as a covariance in the order translation, rotation of its own coordinates, of a hypothesis.
+  Matrix6d content(std::size_t i, const Convention& c, MatrixFault fault = MatrixFault::none) const {
+    const std::size_t row = fault == MatrixFault::previous_row ? std::min(i + 1, size() - 1)
+                            : fault == MatrixFault::next_row   ? (i > 0 ? i - 1 : 0)
+                                                               : i;
+    Matrix6d M = blocks_only ? withoutCross(poses[row].matrix) : poses[row].matrix;
+    if (c.order == CovarianceOrder::rotation_translation) M = halvesExchanged(M);
+    M = covarianceFromContent(c.content, M);
+    return fault == MatrixFault::none ? M : repaired(fault, M, poses[row].estimate);
+  }
+  /// The error in the coordinates of a hypothesis, order translation, rotation.
+  Vector6d coordinates(std::size_t i, const Convention& c, const Matrix6d& J) const {
+    return charts ? conventionLog(c, poses[i].estimate, poses[i].truth) : Vector6d(J * errors[i]);
+  }
+  bool decidable(const Convention& c) const {
+    return !blocks_only || (c.perturbation != Perturbation::left && c.content != CovarianceContent::information);
+  }
+
+  std::vector<DiagnosedPose> poses;
+  std::vector<Vector6d> errors;
+  std::size_t skipped = 0;
+  bool blocks_only = false, charts = false;
+};
+
+inline Convention translationFirst(Convention c) {
+  c.order = CovarianceOrder::translation_rotation;
+  return c;
+}
+
+/// Log-likelihood of the errors under hypotheses that share order and content, unaligned.
+inline void rankPlain(const DiagnosisData& data, std::span<HypothesisFit> fits) {
+  if (fits.empty()) return;
+  const std::size_t n = data.size();
+  std::vector<double> nees(fits.size(), 0), likelihood(fits.size(), 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Matrix6d C = data.content(i, fits[0].convention, fits[0].fault);
+    const Cholesky<double, 6> root(C);
+    if (!root.ok() || !C.allFinite()) {
+      for (HypothesisFit& f : fits) ++f.indefinite;
+      continue;
+    }
+    const double log_det = root.logDeterminant();
+    for (std::size_t h = 0; h < fits.size(); ++h) {
+      const Convention c = translationFirst(fits[h].convention);
+      const Matrix6d J = conventionJacobian(c, data.poses[i].estimate);
+      const double d2 = root.halfSolve<1>(data.coordinates(i, c, J)).squaredNorm();
+      nees[h] += d2;
+      likelihood[h] += -0.5 * d2 - 0.5 * log_det + conventionLogDeterminant(c, data.poses[i].estimate);
+    }
+  }
+  for (std::size_t h = 0; h < fits.size(); ++h) {
+    fits[h].nees_ratio = nees[h] / (6 * static_cast<double>(n));
+    fits[h].log_likelihood = fits[h].indefinite > 0 || std::isnan(likelihood[h]) ? -infinity : likelihood[h];
+  }
+}
+
+/// Σ_h of each pose in the library's convention.
+inline Matrix6d covarianceUnder(const DiagnosisData& data, std::size_t i, const HypothesisFit& h) {
+  const Matrix6d J = conventionJacobianInverse(translationFirst(h.convention), data.poses[i].estimate);
+  return congruence(J, data.content(i, h.convention, h.fault));
+}
+
+inline std::vector<MatchedPose> matchedUnder(const DiagnosisData& data, const HypothesisFit& h, std::size_t most) {
+  std::vector<MatchedPose> matched;
+  const std::size_t n = data.size(), used = std::min(n, most);
+  matched.reserve(used);
+  for (std::size_t k = 0; k < used; ++k) {
+    const std::size_t i = used == n ? k : k * n / used;
+    matched.push_back({{data.poses[i].truth, Matrix6d::Zero()}, {data.poses[i].estimate, covarianceUnder(data, i, h)}});
+  }
+  return matched;
+}
+
+/// The likelihood with the best alignment of a hypothesis, which its covariance allows for.
+inline void rankAligned(const DiagnosisData& data, HypothesisFit& h, const DiagnosisOptions& options) {
+  const std::vector<MatchedPose> matched = matchedUnder(data, h, options.most_aligned);
+  double log_det = 0;
+  for (const MatchedPose& p : matched) {
+    const Cholesky<double, 6> root(p.estimate.covariance);
+    if (!root.ok()) ++h.indefinite;
+    log_det += root.ok() ? root.logDeterminant() : 0;
+  }
+  h.log_likelihood = -infinity;
+  if (h.indefinite > 0) return;
+  const Alignment a = alignWeighted(matched, options.alignment);
+  if (!a.ok) return;
+  const std::array<bool, 7> is_free = freeParameters(a.model);
+  const AlignmentSums sums = alignmentSums(matched, a, centroid(matched, a), is_free);
+  h.nees_ratio = sums.cost / (6 * static_cast<double>(matched.size()) - a.parameters);
+  h.log_likelihood = -0.5 * sums.cost - 0.5 * log_det - 0.5 * Cholesky<double, 7>(sums.information).logDeterminant();
+}
+
+inline void rank(const DiagnosisData& data, std::vector<HypothesisFit>& fits, const DiagnosisOptions& options) {
+  std::erase_if(fits, [&](const HypothesisFit& f) { return !data.decidable(f.convention); });
+  if (options.alignment != AlignmentModel::none) {
+    for (HypothesisFit& f : fits) rankAligned(data, f, options);
+  } else {
+    const auto key = [](const HypothesisFit& f) {
+      return std::tuple(f.fault, f.convention.order, f.convention.content);
+    };
+    std::stable_sort(fits.begin(), fits.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
+    for (std::size_t begin = 0; begin < fits.size();) {
+      std::size_t end = begin;
+      while (end < fits.size() && key(fits[end]) == key(fits[begin])) ++end;
+      rankPlain(data, std::span(fits).subspan(begin, end - begin));
+      begin = end;
+    }
+  }
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const auto& a, const auto& b) { return a.log_likelihood > b.log_likelihood; });
+  const double best = fits.empty() ? 0 : fits.front().log_likelihood;
+  for (HypothesisFit& f : fits) f.log_likelihood = std::isinf(f.log_likelihood) ? -infinity : f.log_likelihood - best;
+}
+
+/// The tests of the errors under a hypothesis, aligned where asked for.
+inline WhitenedResidualTests testsUnder(const DiagnosisData& data, const HypothesisFit& h,
+                                        const DiagnosisOptions& options) {
+  if (options.alignment != AlignmentModel::none) {
+    const std::vector<MatchedPose> matched = matchedUnder(data, h, data.size());
+    return evaluateConsistency(matched, alignWeighted(matched, options.alignment)).tests;
+  }
+  std::vector<PoseResidual> residuals;
+  residuals.reserve(data.size());
+  const Convention c = translationFirst(h.convention);
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    // In the hypothesis' own coordinates, which are as normal as they can be.
+    const Matrix6d J = conventionJacobian(c, data.poses[i].estimate);
+    residuals.push_back({data.coordinates(i, c, J), data.content(i, h.convention, h.fault)});
+  }
+  return testWhitenedResiduals(residuals);
+}
+
+inline double leastEigenvalue(const Matrix6d& M) {
+  return Eigen::SelfAdjointEigenSolver<Matrix6d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+/// True if M + tolerance I is positive definite.
+inline bool semidefinite(Matrix6d M, const Vector6d& tolerance) {
+  M.diagonal() += tolerance;
+  return Cholesky<double, 6>(M).ok();
+}
+
+inline ScaleProfile profileScale(const DiagnosisData& data, const DiagnosisOptions& options) {
+  ScaleProfile profile;
+  struct Row {
+    Convention convention;
+    double likelihood, k_t, k_r;
+  };
+  std::vector<Row> rows;
+  for (const Convention& c : conventionHypotheses()) {
+    if (c.unit != RotationUnit::radian || !data.decidable(c)) continue;
+    const Convention own = translationFirst(c);
+    double q11 = 0, q12 = 0, q22 = 0, log_det = 0;
+    bool ok = true;
+    for (std::size_t i = 0; i < data.size() && ok; ++i) {
+      const Matrix6d C = data.content(i, c);
+      const Cholesky<double, 6> root(C);
+      if (!(ok = root.ok())) break;
+      const Vector6d x = data.coordinates(i, own, conventionJacobian(own, data.poses[i].estimate));
+      Vector6d a = x, b = x;
+      a.tail<3>().setZero(), b.head<3>().setZero();
+      const Vector6d za = root.halfSolve<1>(a), zb = root.halfSolve<1>(b);
+      q11 += za.squaredNorm(), q12 += za.dot(zb), q22 += zb.squaredNorm();
+      log_det += root.logDeterminant() - 2 * conventionLogDeterminant(own, data.poses[i].estimate);
+    }
+    if (!ok || !(q11 > 0) || !(q22 > 0)) continue;
+    const double n = static_cast<double>(data.size()), r = q12 / std::sqrt(q11 * q22), k = 3 * n / (1 + r);
+    const double k_t = k / q11, k_r = k / q22;
+    rows.push_back({c, 1.5 * n * (std::log(k_t) + std::log(k_r)) - 3 * n - 0.5 * log_det, k_t, k_r});
+  }
+  if (rows.empty()) return profile;
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.likelihood > b.likelihood; });
+  const double margin = std::log(static_cast<double>(rows.size()) / options.alpha) * (data.blocks_only ? 2 : 1);
+  for (const Row& r : rows) {
+    if (r.likelihood > rows[0].likelihood - margin) profile.accepted.push_back(r.convention);
+  }
+  profile.convention = rows[0].convention;
+  profile.translation = rows[0].k_t, profile.rotation = rows[0].k_r;
+  profile.relative_sigma = std::sqrt(2 / (3 * static_cast<double>(data.size())));
+  profile.identified = profile.accepted.size() == 1;
+  const Convention own = translationFirst(profile.convention);
+  std::vector<PoseResidual> residuals;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    Matrix6d C = data.content(i, profile.convention);
+    const double a = 1 / std::sqrt(profile.translation), b = 1 / std::sqrt(profile.rotation);
+    C.topRows<3>() *= a, C.leftCols<3>() *= a, C.bottomRows<3>() *= b, C.rightCols<3>() *= b;
+    residuals.push_back({data.coordinates(i, own, conventionJacobian(own, data.poses[i].estimate)), C});
+  }
+  profile.tests = testWhitenedResiduals(residuals);
+  return profile;
+}
+
+}  // namespace detail
+
+}  // namespace liestat

@@ -1,0 +1,80 @@
+// Members shared by the models of epipolar geometries.
+#pragma once
+
+#include <fusion/two_view/detail/two_view_estimate.hpp>
+#include <fusion/two_view/errors.hpp>
+#include <fusion/two_view/models.hpp>
+#include <lie/detail/small_products.hpp>
+#include <lie/essential.hpp>
+#include <stats/constrained_types.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// ũ'ᵀ F ũ = 0 and its derivatives by F's entries and by the match.
+struct EpipolarForm {
+  double value;
+  Eigen::Matrix<double, 1, 9> by_entries;
+  Eigen::Matrix<double, 1, 4> by_match;
+
+  EpipolarForm(const Eigen::Matrix3d& F, const Eigen::Vector4d& m) {
+    const Eigen::Vector3d u(m[0], m[1], 1), v(m[2], m[3], 1);
+    const Eigen::Vector3d Fu = F.col(0) * u[0] + F.col(1) * u[1] + F.col(2);
+    value = v.dot(Fu);
+    for (int k = 0; k < 3; ++k) by_entries.segment<3>(3 * k) = (u[k] * v).transpose();
+    for (int k = 0; k < 2; ++k) by_match[k] = v.dot(F.col(k)), by_match[2 + k] = Fu[k];
+  }
+};
+
+/// The equation of a pose.
+struct PoseEquation {
+  using Value = Eigen::Matrix<double, 1, 1>;
+  Value operator()(const Essentiald& q, const Eigen::Vector4d& m) const {
+    return Value(EpipolarForm(q.essentialMatrix(), m).value);
+  }
+  EquationDerivatives<1, 5, 4> linearize(const Essentiald& q, const Eigen::Vector4d& m) const {
+    const EpipolarForm form(q.essentialMatrix(), m);
+    return {Value(form.value), product(form.by_entries, q.essentialMatrixJacobian()), form.by_match};
+  }
+};
+
+/// The parts that models of epipolar geometries have in common.
+class EpipolarTypeModel : public TwoViewModel {
+ public:
+  EpipolarTypeModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
+  std::string name() const override { return card_.name; }
+  std::vector<std::string> parents() const override { return card_.parents; }
+  int freeParameters() const override { return card_.free_parameters; }
+  int equations() const override { return 1; }
+  int measurementDimension() const override { return 4; }
+  /// Matches of a homography H satisfy [e']× H for any epipole e': two freedoms.
+  int freedomBeyond(const TwoViewModel& specific) const override {
+    const int more = std::max(0, freeParameters() - specific.freeParameters());
+    return specific.equations() == 2 && freeParameters() > 2 ? 2 : more;
+  }
+  std::size_t sampleSize() const override { return card_.sample_size; }
+  void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
+    epipolarErrors(q.matrix, matches, images_.noise, squared);
+  }
+  /// The band about an epipolar line, which crosses the image in a length of about 1.3 times its height.
+  double chance(double threshold) const override {
+    const double variance = 0.5 * (std::pow(images_.noise.first, 2) + std::pow(images_.noise.second, 2));
+    const double height = std::min(images_.size.x(), images_.size.y());
+    return std::min(1.0, 2 * 1.3 * std::sqrt(2 * threshold * variance) / height);
+  }
+
+ protected:
+  TwoViewModelCard card_;
+  TwoViewImages images_;
+};
+
+}  // namespace liestat::detail

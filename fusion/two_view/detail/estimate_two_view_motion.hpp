@@ -1,0 +1,341 @@
+// The definitions of estimateTwoViewMotion() and estimateTwoViewMotions().
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <fusion/two_view/detail/two_view_estimate.hpp>
+#include <fusion/two_view/contradictions.hpp>
+#include <fusion/two_view/two_view.hpp>
+#include <stats/hierarchy.hpp>
+#include <stats/repeated_extraction.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat {
+namespace detail {
+
+/// How the pixels of an image become the coordinates of the models: u = (p - centre)/focal.
+struct TwoViewCoordinates {
+  std::optional<Camera> camera;
+  Eigen::Vector2d focal = Eigen::Vector2d::Ones(), centre = Eigen::Vector2d::Zero();
+
+  double focalLength() const { return std::sqrt(focal.x() * focal.y()); }
+  Eigen::Vector2d operator()(const Eigen::Vector2d& pixel) const {
+    if (!camera || camera->distortion == Distortion::none) return (pixel - centre).cwiseQuotient(focal);
+    const std::optional<Eigen::Vector3d> bearing = camera->bearing(pixel);
+    if (!bearing || !(bearing->z() > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return bearing->hnormalized();
+  }
+  /// K: pixels without distortion from the coordinates.
+  Eigen::Matrix3d pixels() const {
+    Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
+    K.diagonal().head<2>() = focal, K.topRightCorner<2, 1>() = centre;
+    return K;
+  }
+};
+
+inline TwoViewCoordinates coordinatesOf(const std::optional<Camera>& camera, const Eigen::Vector2d& size,
+                                        const Eigen::Vector2d& corner) {
+  if (camera) return {camera, {camera->fu, camera->fv}, {camera->cu, camera->cv}};
+  return {std::nullopt, Eigen::Vector2d::Constant(0.5 * size.norm()), corner + 0.5 * size};
+}
+
+/// The covariance of A M B/‖A M B‖, entries column after column.
+inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel>& estimate, const Eigen::Matrix3d& A,
+                                          const Eigen::Matrix3d& B) {
+  Eigen::MatrixXd covariance = estimate.covariance;
+  Eigen::Matrix3d M = estimate.parameter.matrix;
+  if (covariance.rows() == 5 || covariance.rows() == 6) {
+    // A pose, and with six log f: M ~ D [t]× R D, D = diag(1/f, 1/f, 1).
+    const bool with_focal_length = covariance.rows() == 6;
+    const double f = with_focal_length ? estimate.parameter.focal_length : 1;
+    const Eigen::Matrix3d D = Eigen::Vector3d(1 / f, 1 / f, 1).asDiagonal();
+    const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 0).asDiagonal();
+    const Eigen::Matrix<double, 9, 5> by_pose = estimate.parameter.pose.essentialMatrixJacobian();
+    M = D * estimate.parameter.pose.essentialMatrix() * D;
+    Eigen::MatrixXd J(9, covariance.rows());
+    for (int k = 0; k < 5; ++k) J.col(k) = entriesFrom(D * matrixFrom(Entries(by_pose.col(k))) * D);
+    if (with_focal_length) J.col(5) = entriesFrom(-(flat * M + M * flat));
+    covariance = covarianceThrough(J, covariance);
+  }
+  if (covariance.rows() != 9) return {};
+  M = A * M * B;
+  const Entries unit = entriesFrom(M / M.norm());
+  Eigen::MatrixXd J(9, 9);
+  for (int k = 0; k < 9; ++k) {
+    const Entries moved = entriesFrom(A * matrixFrom(Entries(Entries::Unit(k))) * B) / M.norm();
+    J.col(k) = moved - unit.dot(moved) * unit;
+  }
+  return covarianceThrough(J, covariance);
+}
+
+inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel>& search, std::size_t m,
+                             double sigma) {
+  const TwoViewModel& model = *search.models()[m];
+  const ModelState<TwoViewMotionModel>& state = search.state(m);
+  TwoViewModelRow row;
+  row.name = model.name(), row.parents = model.parents();
+  row.free_parameters = model.freeParameters(), row.equations = model.equations();
+  row.evaluated = state.progress == ModelState<TwoViewMotionModel>::Progress::evaluated;
+  row.draws = state.draws;
+  if (!state.hasEstimate()) return row;
+  row.status = state.estimate.status;
+  row.inliers = state.inliers.size();
+  row.relevance = state.relevance;
+  row.chi2 = state.fit.chi2, row.degrees_of_freedom = state.fit.degreesOfFreedom();
+  row.rms = sigma * std::sqrt(state.fit.normalised());
+  row.unsupported = state.unsupported;
+  row.rejection = state.rejection;
+  if (state.rejected_by) row.rejected_by = search.models()[*state.rejected_by]->name();
+  return row;
+}
+
+/// The least and the largest coordinate of all points along an axis. Those that lie ten times as far beyond the middle
+/// eight tenths as these are wide are in no image: one of them would take the centre and the scale of all others away.
+struct CoordinateRange {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+
+  CoordinateRange(std::span<const Eigen::Vector4d> matches, Eigen::Index axis) {
+    std::vector<double> all;
+    for (const Eigen::Vector4d& m : matches) {
+      if (m.allFinite()) all.push_back(m[axis]), all.push_back(m[2 + axis]);
+    }
+    if (all.empty()) return;
+    std::sort(all.begin(), all.end());
+    const double tenth = all[(all.size() - 1) / 10], last_tenth = all[all.size() - 1 - (all.size() - 1) / 10];
+    const double reach = last_tenth > tenth ? 10 * (last_tenth - tenth) : std::numeric_limits<double>::infinity();
+    low = *std::find_if(all.begin(), all.end(), [&](double x) { return x >= tenth - reach; });
+    high = *std::find_if(all.rbegin(), all.rend(), [&](double x) { return x <= last_tenth + reach; });
+  }
+};
+
+/// Matches as the models take them.
+struct TwoViewInput {
+  TwoViewImageFrame frame;
+  Status status = Status::ok;
+  std::string reason;                                ///< why there is nothing to estimate
+  bool first_differ = false, second_differ = false;  ///< the points of the first image, and of the second
+  TwoViewCoordinates first, second;
+  TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
+  TwoViewModels models;
+  std::vector<Eigen::Vector4d> normalised;
+  std::vector<std::size_t> used;            ///< places of those that take part
+  std::vector<std::size_t> first_of_equal;  ///< for each match the place of the first one that is equal to it
+
+  TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
+    frame.matches = matches.size(), frame.sigma = options.sigma;
+    frame.calibrated = options.first.has_value();
+    if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
+    // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
+    const Eigen::Vector4d* one = nullptr;
+    for (const Eigen::Vector4d& m : matches) {
+      if (!m.allFinite()) continue;
+      if (one == nullptr) one = &m;
+      first_differ = first_differ || m.head<2>() != one->head<2>();
+      second_differ = second_differ || m.tail<2>() != one->tail<2>();
+    }
+    Eigen::Vector2d& size = frame.image_size;
+    if (options.image_size) {
+      size = *options.image_size;
+    } else if (options.first && options.first->width > 0 && options.first->height > 0) {
+      size = {options.first->width, options.first->height};
+    } else if (one != nullptr) {
+      // One match alone, or several on a line, leave no area.
+      const CoordinateRange x(matches, 0), y(matches, 1);
+      size = Eigen::Vector2d(x.high - x.low, y.high - y.low).cwiseMax(options.sigma);
+      frame.size_from_matches = true;
+      frame.image_corner = {x.low, y.low};
+    }
+    first = coordinatesOf(options.first, size, frame.image_corner);
+    second = coordinatesOf(options.second ? options.second : options.first, size, frame.image_corner);
+    const TwoViewImages images{{options.sigma / first.focalLength(), options.sigma / second.focalLength()},
+                               size.cwiseQuotient(second.focal)};
+    const TwoViewModelOptions lattice{calibration, options.nodes, options.verticals};
+    models = options.planes_only ? homographyModels(images, lattice) : twoViewModels(images, lattice);
+    take(matches, options, images.noise, one != nullptr);
+  }
+  bool ok() const { return status == Status::ok; }
+  /// Why no answer is to be trusted, whatever it is; empty: nothing of that kind.
+  std::string fault() const {
+    if (!first_differ && !second_differ) return "all matches are the same one";
+    if (!first_differ || !second_differ) return "all points of one image are the same one";
+    return {};
+  }
+  /// The matches that take part.
+  std::vector<Eigen::Vector4d> usedMatches() const {
+    std::vector<Eigen::Vector4d> all;
+    for (const std::size_t i : used) all.push_back(normalised[i]);
+    return all;
+  }
+
+  /// The matches in the models' coordinates, or why not.
+  void take(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options, const MatchNoise& noise,
+            bool any_finite) {
+    if (!any_finite) return refuse(Status::too_few, "there is no finite match");
+    if (!(options.sigma > 0) || !std::isfinite(options.sigma) || !frame.image_size.allFinite() ||
+        !(frame.image_size.minCoeff() > 0)) {
+      return refuse(Status::not_applicable, "noise and size of the images must be finite and positive");
+    }
+    for (const std::optional<Camera>& camera : {options.first, options.second}) {
+      if (camera && !isPinhole(*camera)) {
+        return refuse(Status::not_applicable,
+                      "focal lengths of a camera must be finite and positive, its centre finite");
+      }
+    }
+    if (options.verticals && !(isDirection(options.verticals->first) && isDirection(options.verticals->second))) {
+      return refuse(Status::not_applicable, "verticals must be finite and not zero");
+    }
+    if (!(options.search.outlier_share > 0 && options.search.outlier_share < 1)) {
+      return refuse(Status::not_applicable, "the share of outliers beyond the threshold must be between 0 and 1");
+    }
+    for (const Eigen::Vector4d& m : matches) {
+      Eigen::Vector4d& u = normalised.emplace_back();
+      u << first(m.head<2>()), second(m.tail<2>());
+    }
+    used = independentMatches(normalised, noise, options.keep_contradictions);
+    first_of_equal = firstOfEqualMatches(normalised);
+    for (std::size_t i = 0; i < matches.size(); ++i) frame.repeated += first_of_equal[i] != i ? 1 : 0;
+    frame.contradicted = matches.size() - frame.repeated - used.size();
+    if (std::none_of(used.begin(), used.end(), [&](std::size_t i) { return normalised[i].allFinite(); })) {
+      const bool none = std::none_of(normalised.begin(), normalised.end(), [](const auto& u) { return u.allFinite(); });
+      refuse(none ? Status::too_few : Status::ill_defined,
+             none ? "the cameras see no match" : "all matches contradict each other");
+    }
+  }
+  void refuse(Status why, const char* in_words) { status = why, reason = in_words; }
+  static bool isPinhole(const Camera& camera) {
+    return camera.fu > 0 && camera.fv > 0 && std::isfinite(camera.fu) && std::isfinite(camera.fv) &&
+           std::isfinite(camera.cu) && std::isfinite(camera.cv);
+  }
+  static bool isDirection(const Eigen::Vector3d& v) { return v.allFinite() && !v.isZero(0); }
+
+  /// Fills the result with the motion of an estimate, using the matches that agree with it.
+  void describe(const TwoViewModel& model, const ModelEstimate<TwoViewMotionModel>& estimate,
+                std::span<const Eigen::Vector4d> agreeing, TwoViewMotionResult& result) const {
+    const Eigen::Matrix3d to_first = first.pixels().inverse(), K2 = second.pixels();
+    const Eigen::Matrix3d to_second = model.equations() == 2 ? K2 : Eigen::Matrix3d(K2.inverse().transpose());
+    const Eigen::Matrix3d in_pixels = to_second * estimate.parameter.matrix * to_first;
+    result.matrix = in_pixels / in_pixels.norm();
+    result.matrix_covariance = covarianceInPixels(estimate, to_second, to_first);
+    result.physical =
+        physicalParameters(model.name(), estimate, agreeing, calibration, {first.focalLength(), second.focalLength()});
+    if (estimate.covariance.rows() == 5) {
+      result.relative_pose = Gaussian<Essentiald>{estimate.parameter.pose, estimate.covariance};
+    }
+  }
+};
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<const Eigen::Vector4d> matches,
+                                                                  const TwoViewMotionOptions& options) {
+  const detail::TwoViewInput input(matches, options);
+  TwoViewMotionEstimate result;
+  static_cast<TwoViewImageFrame&>(result) = input.frame;
+  result.status = input.status, result.reason = input.reason;
+  result.errors.assign(matches.size(), std::numeric_limits<double>::quiet_NaN());
+  result.inlier.assign(matches.size(), false);
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.ok() ? options.search : HierarchyOptions{});
+  if (result.ok()) {
+    search.add(input.usedMatches());
+    while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
+    }
+  }
+  for (std::size_t m = 0; m < search.models().size(); ++m) {
+    result.lattice.push_back(detail::rowOf(search, m, options.sigma));
+  }
+  result.chosen = search.best();
+  if (!result.lattice.empty()) result.equations = result.chosenModel().equations;
+  if (!result.ok()) return result;
+
+  const ModelState<TwoViewMotionModel>& state = search.state(result.chosen);
+  const TwoViewModel& model = *search.models()[result.chosen];
+  if (!state.hasEstimate()) {
+    result.status = Status::not_converged, result.reason = "stopped before there was an estimate";
+    return result;
+  }
+  // Errors in the order of the matches; inliers are those of the threshold.
+  model.errors(state.estimate.parameter, input.normalised, result.errors);
+  std::vector<Eigen::Vector4d> agreeing;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    result.inlier[i] = result.errors[i] < state.threshold;
+    if (result.inlier[i]) agreeing.push_back(input.normalised[i]);
+  }
+  result.inliers = agreeing.size(), result.threshold = state.threshold;
+  input.describe(model, state.estimate, agreeing, result);
+
+  result.status = state.estimate.status;
+  if (search.progress() != HierarchyState::terminated) {
+    result.status = Status::not_converged, result.reason = "the search was stopped";
+  } else if (!result.ok()) {
+    result.reason = "the estimate of the chosen model did not converge";
+  } else if (!input.fault().empty()) {
+    result.status = Status::ill_defined, result.reason = input.fault();
+  } else if (state.unsupported) {
+    result.status = Status::ill_defined;
+    result.reason = "no model is supported: the inliers of the chosen one could be chance";
+  }
+  return result;
+}
+
+LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eigen::Vector4d> matches,
+                                                            const TwoViewMotionOptions& options, std::size_t most) {
+  const detail::TwoViewInput input(matches, options);
+  TwoViewMotions result;
+  static_cast<TwoViewImageFrame&>(result) = input.frame;
+  result.status = input.status, result.reason = input.reason;
+  if (!input.ok()) {
+    result.rest.resize(matches.size());
+    std::iota(result.rest.begin(), result.rest.end(), std::size_t{0});
+    return result;
+  }
+  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.usedMatches(),
+                                                                 {.hierarchy = options.search, .max_structures = most});
+  while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
+  }
+  std::vector<char> taken(matches.size(), 0);
+  for (const auto& found : search.structures()) {
+    const TwoViewModel& model = *input.models[found.model];
+    std::vector<Eigen::Vector4d> own;
+    std::vector<char> is_own(matches.size(), 0);
+    for (const std::size_t i : found.inliers) {
+      is_own[input.used[i]] = 1;
+      own.push_back(input.normalised[input.used[i]]);
+    }
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (is_own[input.first_of_equal[i]] != 0) places.push_back(i), taken[i] = 1;
+    }
+    std::vector<double> errors(own.size());
+    model.errors(found.estimate.parameter, own, errors);
+    const ModelFit fit{std::accumulate(errors.begin(), errors.end(), 0.0),
+                       own.size() * static_cast<std::size_t>(model.equations()), model.freeParameters()};
+    TwoViewStructure& structure = result.structures.emplace_back();
+    structure.model = found.name, structure.equations = model.equations();
+    structure.status = found.estimate.status, structure.inliers = std::move(places);
+    structure.rms = options.sigma * std::sqrt(fit.normalised());
+    input.describe(model, found.estimate, own, structure);
+  }
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    if (taken[i] == 0) result.rest.push_back(i);
+  }
+  if (!search.terminated()) {
+    result.status = Status::not_converged, result.reason = "the search was stopped";
+  } else if (!input.fault().empty()) {
+    result.status = Status::ill_defined, result.reason = input.fault();
+  }
+  return result;
+}
+
+}  // namespace liestat

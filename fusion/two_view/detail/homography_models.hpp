@@ -1,0 +1,139 @@
+// Motions that a homography tells: families, equation and models of fusion/two_view/models.hpp.
+#pragma once
+
+#include <fusion/detail/compiled.hpp>
+#include <fusion/two_view/detail/two_view_estimate.hpp>
+#include <fusion/two_view/detail/two_view_lattice.hpp>
+#include <fusion/two_view/errors.hpp>
+#include <fusion/two_view/homography_solvers.hpp>
+#include <fusion/two_view/image_motion_solvers.hpp>
+#include <fusion/two_view/models.hpp>
+#include <fusion/two_view/rotation_solvers.hpp>
+#include <stats/constrained.hpp>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <numbers>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace liestat::detail {
+
+/// (h₃·ũ) u' - (h₁·ũ, h₂·ũ) = 0.
+struct HomographyEquation {
+  Eigen::Vector2d operator()(const Entries& q, const Eigen::Vector4d& m) const {
+    const Eigen::Matrix3d H = matrixFrom(q);
+    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
+    return {w * m[2] - (H(0, 0) * m[0] + H(0, 1) * m[1] + H(0, 2)),
+            w * m[3] - (H(1, 0) * m[0] + H(1, 1) * m[1] + H(1, 2))};
+  }
+  EquationDerivatives<2, 9, 4> linearize(const Entries& q, const Eigen::Vector4d& m) const {
+    const Eigen::Matrix3d H = matrixFrom(q);
+    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
+    EquationDerivatives<2, 9, 4> result;
+    result.value = (*this)(q, m);
+    auto& J = result.by_parameter;
+    auto& D = result.by_measurement;
+    J.setZero(), D.setZero();
+    for (int k = 0; k < 2; ++k) {
+      const double u = m[2 + k];
+      J(k, entry(k, 0)) = -m[0], J(k, entry(k, 1)) = -m[1], J(k, entry(k, 2)) = -1;
+      J(k, entry(2, 0)) = u * m[0], J(k, entry(2, 1)) = u * m[1], J(k, entry(2, 2)) = u;
+      D(k, 0) = u * H(2, 0) - H(k, 0), D(k, 1) = u * H(2, 1) - H(k, 1), D(k, 2 + k) = w;
+    }
+    return result;
+  }
+};
+
+/// The parts that models of homographies have in common.
+class HomographyTypeModel : public TwoViewModel {
+ public:
+  HomographyTypeModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
+  std::string name() const override { return card_.name; }
+  std::vector<std::string> parents() const override { return card_.parents; }
+  int freeParameters() const override { return card_.free_parameters; }
+  int equations() const override { return 2; }
+  int measurementDimension() const override { return 4; }
+  std::size_t sampleSize() const override { return card_.sample_size; }
+  void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
+    homographyErrors(q.matrix, matches, images_.noise, squared);
+  }
+  /// The disc about the mapped point, of the whole image.
+  double chance(double threshold) const override {
+    const double variance = 0.5 * (std::pow(images_.noise.first, 2) + std::pow(images_.noise.second, 2));
+    return std::min(1.0, 2 * std::numbers::pi * threshold * variance / (images_.size.x() * images_.size.y()));
+  }
+
+ protected:
+  TwoViewModelCard card_;
+  TwoViewImages images_;
+};
+
+/// Nothing moves.
+class NoMotionModel : public HomographyTypeModel {
+ public:
+  using HomographyTypeModel::HomographyTypeModel;
+  void solve(std::span<const Measurement>, std::vector<Parameter>& solutions) const override {
+    solutions.emplace_back();
+  }
+  ModelEstimate<Parameter> estimate(const Parameter&, std::span<const Measurement> inliers,
+                                    const StopRequest&) const override {
+    ModelEstimate<Parameter> result;
+    result.status = Status::ok;
+    result.chi2 = 0, result.equation_error = 0;
+    for (const Measurement& m : inliers) result.chi2 += homographyError(result.parameter.matrix, m, images_.noise);
+    result.degrees_of_freedom = 2 * static_cast<int>(inliers.size());
+    result.measurements = inliers.size();
+    return result;
+  }
+};
+
+class HomographyModel : public HomographyTypeModel {
+ public:
+  HomographyModel(HomographyFamily family, TwoViewSolver solver, TwoViewModelCard card, const TwoViewImages& images)
+      : HomographyTypeModel(std::move(card), images), constraint_{family}, solver_(solver) {}
+  void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
+    solver_(sample, solutions);
+  }
+  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
+                                    const StopRequest& stop) const override {
+    const Entries q = entriesFrom(start.matrix);
+    return estimateTwoView<Entries, HomographyConstraint, HomographyEquation>(
+        q, constraint_, inliers, images_.noise, stop,
+        [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixFrom(found); });
+  }
+
+ private:
+  HomographyConstraint constraint_;
+  TwoViewSolver solver_;
+};
+
+LIESTAT_FUSION_INLINE TwoViewModels homographyModels(const TwoViewImages& images, const TwoViewModelOptions& options) {
+  using Family = HomographyFamily;
+  const TwoViewLattice lattice(options);
+  TwoViewModels models = {std::make_shared<NoMotionModel>(TwoViewModelCard{"none", {}, 0, 0}, images)};
+  const auto add = [&](Family family, TwoViewSolver solver, const char* name, int free_parameters,
+                       std::size_t sample_size) {
+    if (!lattice.has(name)) return;
+    models.push_back(std::make_shared<HomographyModel>(
+        family, solver, TwoViewModelCard{name, lattice.parents(name), free_parameters, sample_size}, images));
+  };
+  add(Family::retinal_translation, addSolutions<solveRetinalTranslation>, "retinal translation", 2, 1);
+  add(Family::zoom, addSolutions<solveZoom>, "zoom", 1, 1);
+  add(Family::free_zoom, addSolutions<solveFreeZoom>, "free zoom", 3, 2);
+  add(Family::retinal_displacement, addSolutions<solveRetinalDisplacement>, "retinal displacement", 3, 2);
+  add(Family::similarity, addSolutions<solveSimilarity>, "similarity", 4, 2);
+  add(Family::affine, addSolutions<solveAffine>, "affine", 6, 3);
+  add(Family::rotation, addSolutions<solveRotation>, "rotation", 3, 2);
+  add(Family::rotation_zoom, addSolutions<solveRotationZoom>, "rotation and zoom", 4, 2);
+  add(Family::homography, addSolutions<solveHomography>, "homography", 8, 4);
+  return models;
+}
+
+}  // namespace liestat::detail
