@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,6 +13,7 @@
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/detail/rotation_matrix.hpp>
+#include <lie/linear.hpp>
 #include <lie/units.hpp>
 
 namespace liestat {
@@ -202,17 +201,18 @@ class FeatureReader {
       for (int j = i; j < n; ++j) covariance(i, j) = covariance(j, i) = value(places_.covariance[next++]);
     }
     // The share of each variance that the components before it leave: the test does not depend on units.
-    const Eigen::LLT<FeatureCovariance> factor(covariance);
-    bool positive = factor.info() == Eigen::Success;
+    Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Identity();
+    whole.topLeftCorner(n, n) = covariance;
+    const Cholesky<double, 6> factor(whole);
+    bool positive = factor.ok();
     for (int i = 0; positive && i < n; ++i) {
-      const double pivot = factor.matrixLLT()(i, i);
-      positive = pivot * pivot > n * std::numeric_limits<double>::epsilon() * covariance(i, i);
+      positive = factor.pivot(i) > n * std::numeric_limits<double>::epsilon() * covariance(i, i);
     }
     if (positive) return covariance;
-    const Eigen::SelfAdjointEigenSolver<FeatureCovariance> solver(covariance, Eigen::EigenvaluesOnly);
+    const SymmetricEigen eigen(covariance);
     throw InputError(name_, line_,
                      fmt::format("the covariance is not positive definite (smallest eigenvalue {:.3g}, largest {:.3g})",
-                                 solver.eigenvalues()(0), solver.eigenvalues()(n - 1)),
+                                 eigen.values[0], eigen.values[n - 1]),
                      "positive eigenvalues");
   }
 

@@ -5,6 +5,7 @@
 //   if (root.ok()) const auto z = root.halfSolve<1>(error);  // whitened; z.squaredNorm() is the Mahalanobis distance
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/trig.hpp>
@@ -16,6 +17,8 @@ namespace liestat {
 using detail::Cholesky;
 /// A square root B of a symmetric matrix that may be singular, B Bᵀ = A, SemidefiniteRoot<S, N>.
 using detail::SemidefiniteRoot;
+/// The eigenvalues of a symmetric matrix, ascending, and its eigenvectors, SymmetricEigen(A): values, vectors.
+using detail::SymmetricEigen;
 /// The cross-product matrix [v] of a vector of three numbers: [v] w = v × w.
 using detail::skew;
 /// A B, without a type of expression for each pair of shapes.

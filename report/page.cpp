@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,6 +15,7 @@
 #include <report/plots.hpp>
 #include <report/json.hpp>
 #include <formats/output_file.hpp>
+#include <lie/linear.hpp>
 #include <formats/text.hpp>
 
 namespace liestat {
@@ -165,13 +165,11 @@ std::string lastLine(std::string text) {
 Series ellipse(std::string name, const Eigen::Vector2d& centre, const Eigen::Matrix2d& covariance, double chi2) {
   constexpr int steps = 96;
   Series series{.name = std::move(name), .style = Style::lines};
-  const Eigen::LLT<Eigen::Matrix2d> factor(covariance);
-  const bool valid = factor.info() == Eigen::Success;
-  const Eigen::Matrix2d axes = std::sqrt(chi2) * Eigen::Matrix2d(factor.matrixL());
+  // NaN, which draws nothing, where the covariance has no factor.
+  const Eigen::Matrix2d axes = std::sqrt(chi2) * Cholesky<double, 2>(covariance).lower();
   for (int i = 0; i <= steps; ++i) {
     const double angle = 2 * std::numbers::pi * i / steps;
-    Eigen::Vector2d point = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-    if (valid) point = centre + axes * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const Eigen::Vector2d point = centre + axes * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     series.x.push_back(point.x());
     series.y.push_back(point.y());
   }

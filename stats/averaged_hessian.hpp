@@ -8,6 +8,7 @@
 // kinks included (section 7.6): it needs log alone, and data near the cut locus count by their effect on the gradient.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/averaged_slope.hpp>
 #include <stats/detail/compact_part.hpp>
@@ -15,8 +16,6 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <cstddef>
@@ -45,7 +44,7 @@ auto regionFactor(const SquareOf<M>& covariance) {
   using Matrix = Eigen::Matrix<double, K, K>;
   Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
   region.diagonal().array() += min_region_sigma * min_region_sigma;
-  return Matrix(lowerFactor<K>(region));
+  return Cholesky<double, K>(region).lower();
 }
 
 /// True if the sums of a mean prove that findAveragedHessian does not average over `width` times a covariance's region.
@@ -127,12 +126,12 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
       return result;
     }
     const Matrix relative = factor.halfSolve(Matrix(factor.halfSolve(slope).transpose()));
-    result.change = 1 - Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[0];
+    result.change = 1 - detail::SymmetricEigen(relative).values[0];
     // A thinned sample gives the relative change, which is applied to the Hessian of all data.
     Matrix averaged = slope;
     if (stride > 1) {
       const Matrix all = mean.hessian.template block<K, K>(begin, begin).template cast<double>();
-      const Matrix half = lowerFactor<K>(all);
+      const Matrix half = Cholesky<double, K>(all).lower();
       averaged = half * relative * half.transpose();
     }
     result.hessian.template block<K, K>(begin, begin) = averaged.template cast<S>();

@@ -2,6 +2,7 @@
 // covariance is right. Needs Eigen alone.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/averaged_slope.hpp>
 #include <stats/detail/compact_part.hpp>
@@ -10,8 +11,6 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -107,7 +106,7 @@ CutLocusMass findCutLocusMass(const R& samples, const W& weights, const MeanResu
       } else {
         const Matrix half = factor_of_H.halfSolve(kinks);
         const Matrix relative = factor_of_H.halfSolve(Matrix(half.transpose()));
-        result.hessian_change = Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[N - 1];
+        result.hessian_change = detail::SymmetricEigen(relative).values[N - 1];
       }
     }
   }
@@ -134,7 +133,7 @@ double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
     const double half_determinant = 0.5 * (a * (d * f - n * n) - l * (l * f - n * m) + m * (l * n - d * m));
     return mean + 2 * size * cosineOfThird(std::clamp(half_determinant / (size2 * size), -1.0, 1.0));
   } else {
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>>(A, Eigen::EigenvaluesOnly).eigenvalues()[K - 1];
+    return SymmetricEigen(A).values[K - 1];
   }
 }
 

@@ -5,10 +5,10 @@
 //
 // Nothing here throws: arguments outside a function's domain, and NaN, give NaN.
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/laws.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <limits>
@@ -42,21 +42,20 @@ ConfidenceEllipsoid<typename Derived::PlainObject> ellipsoid(const Eigen::Matrix
   result.threshold = detail::not_a_number;
   if (!(threshold >= 0) || k == 0 || !covariance.derived().allFinite()) return result;
 
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(covariance);
-  if (eigen.info() != Eigen::Success) return result;
-  const Scalar largest = eigen.eigenvalues()[k - 1];
+  const detail::SymmetricEigen<Matrix> eigen(covariance);
+  const Scalar largest = eigen.values[k - 1];
   const Scalar rounding = Scalar(4 * k) * std::numeric_limits<Scalar>::epsilon() * largest;
-  if (!(largest >= 0) || eigen.eigenvalues()[0] < -rounding) return result;
+  if (!(largest >= 0) || eigen.values[0] < -rounding) return result;
 
   for (Eigen::Index i = 0; i < k; ++i) {
     using std::sqrt;
-    const Eigen::Index from = k - 1 - i;  // Eigen sorts in ascending order
-    const Scalar eigenvalue = eigen.eigenvalues()[from];
+    const Eigen::Index from = k - 1 - i;  // ascending order
+    const Scalar eigenvalue = eigen.values[from];
     result.semi_axes[i] = eigenvalue > 0 ? sqrt(eigenvalue * static_cast<Scalar>(threshold)) : Scalar(0);
     Eigen::Index at = 0;
-    eigen.eigenvectors().col(from).cwiseAbs().maxCoeff(&at);
-    const Scalar sign = eigen.eigenvectors()(at, from) < 0 ? Scalar(-1) : Scalar(1);
-    result.directions.col(i) = sign * eigen.eigenvectors().col(from);
+    eigen.vectors.col(from).cwiseAbs().maxCoeff(&at);
+    const Scalar sign = eigen.vectors(at, from) < 0 ? Scalar(-1) : Scalar(1);
+    result.directions.col(i) = sign * eigen.vectors.col(from);
   }
   result.threshold = threshold;
   result.valid = true;

@@ -12,6 +12,7 @@
 // the scatter, without a proof that there are no others.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/covariance.hpp>
 #include <stats/detail/averaged_slope.hpp>
 #include <stats/detail/compact_part.hpp>
@@ -24,8 +25,6 @@
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -71,12 +70,12 @@ std::vector<M> startsOfRivals(const R& samples, const MeanResult<M>& mean) {
   const Eigen::Matrix<double, K, K> scatter =
       mean.scatter.template block<K, K>(begin, begin).template cast<double>() / mean.sum_of_weights;
   if (!scatter.allFinite()) return starts;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, K, K>> axes(scatter);
+  const SymmetricEigen axes(scatter);
   for (int k = 0; k < K; ++k) {
-    const double length = std::min(2 * std::sqrt(std::max(0.0, axes.eigenvalues()[k])), pi);
+    const double length = std::min(2 * std::sqrt(std::max(0.0, axes.values[k])), pi);
     for (const double sign : {1.0, -1.0}) {
       TangentOf<M> v = TangentOf<M>::Zero();
-      v.template segment<K>(begin) = (sign * length * axes.eigenvectors().col(k)).template cast<ScalarOf<M>>();
+      v.template segment<K>(begin) = (sign * length * axes.vectors.col(k)).template cast<ScalarOf<M>>();
       starts.push_back(exp(mean.mean, v));
     }
   }

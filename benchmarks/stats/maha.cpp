@@ -7,6 +7,7 @@
 #include <lie/lie.hpp>
 #include <stats/maha.hpp>
 
+#include <Eigen/Cholesky>
 #include <benchmark/benchmark.h>
 
 #include <string>

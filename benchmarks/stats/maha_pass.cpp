@@ -6,6 +6,7 @@
 #include <lie/lie.hpp>
 #include <stats/maha.hpp>
 
+#include <Eigen/Cholesky>
 #include <cstdio>
 #include <vector>
 

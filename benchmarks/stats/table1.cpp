@@ -9,6 +9,7 @@
 #include <stats/maha.hpp>
 #include <stats/mean.hpp>
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <cstdio>
 #include <functional>

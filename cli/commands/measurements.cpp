@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include <lie/linear.hpp>
 #include <formats/input_error.hpp>
 
 namespace liestat::cli {
@@ -15,10 +16,10 @@ namespace {
 
 /// det(Σ)^(-1/k), for covariances whose size is known at run time only.
 double weightOf(const FeatureCovariance& covariance) {
-  const Eigen::LLT<FeatureCovariance> factor(covariance);
-  double sum = 0;
-  for (Eigen::Index i = 0; i < covariance.rows(); ++i) sum += std::log(factor.matrixLLT()(i, i));
-  return std::exp(-2 * sum / static_cast<double>(covariance.rows()));
+  const Eigen::Index n = covariance.rows();
+  Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Identity();
+  whole.topLeftCorner(n, n) = covariance;
+  return std::exp(-Cholesky<double, 6>(whole).logDeterminant() / static_cast<double>(n));
 }
 
 }  // namespace

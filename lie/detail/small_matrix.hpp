@@ -4,6 +4,7 @@
 // and cost a compiler seconds. Apart, so that users of a Cholesky factor do not compile them:
 //
 //   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to a maximum
+//   small_eigen.hpp        eigenvalues and eigenvectors of symmetric matrices
 //   small_reduced.hpp      square roots of semi-definite matrices: closest, and reduced to independent rows
 //   small_columns.hpp      3×3 blocks in vector registers
 //   small_products.hpp     products of more rows than that, and A C Aᵀ
@@ -87,6 +88,16 @@ class Cholesky {
       }
     }
     return X;
+  }
+  /// The j-th pivot: what the rows before j leave of A_jj.
+  S pivot(int j) const { return L_(j, j) * L_(j, j); }
+  /// L, zero above its diagonal.
+  Matrix lower() const {
+    Matrix L = L_;
+    for (int j = 1; j < N && ok_; ++j) {
+      for (int i = 0; i < j; ++i) L(i, j) = S(0);
+    }
+    return L;
   }
   /// log det A.
   S logDeterminant() const {

@@ -91,7 +91,7 @@ Eigen::Matrix<double, K, K> angularRegion(const Matrix& covariance, const List& 
     }
     region(a, a) += min_region_sigma * min_region_sigma;
   }
-  return lowerFactor<K>(region);
+  return Cholesky<double, K>(region).lower();
 }
 
 /// The concentration of the angles in features about one of them: by the metric where there is one, else by the parts of

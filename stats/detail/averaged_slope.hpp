@@ -82,21 +82,6 @@ class NormalNodes {
   double longest_ = 0;
 };
 
-/// The lower Cholesky factor, NaN where there is none.
-template <int K>
-Eigen::Matrix<double, K, K> lowerFactor(const Eigen::Matrix<double, K, K>& A) {
-  Eigen::Matrix<double, K, K> L = Eigen::Matrix<double, K, K>::Zero();
-  for (int j = 0; j < K; ++j) {
-    for (int i = j; i < K; ++i) {
-      double x = A(i, j);
-      for (int k = 0; k < j; ++k) x -= L(i, k) * L(j, k);
-      if (i == j && !(x > 0)) return Eigen::Matrix<double, K, K>::Constant(std::numeric_limits<double>::quiet_NaN());
-      L(i, j) = i == j ? std::sqrt(x) : x / L(j, j);
-    }
-  }
-  return L;
-}
-
 /// The average derivative (D×K) of a field of D components over displacements N(0, L Lᵀ) of K coordinates:
 /// E[field(v) vᵀ] (L Lᵀ)⁻¹ (Stein's identity), by regression on the nodes. It counts the jumps of the field.
 template <int D, int K, class Field>

@@ -2,11 +2,10 @@
 // stats/detail/settled_covariance.hpp does for a Fréchet mean.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/detail/angular_part.hpp>
 #include <stats/detail/settled_covariance.hpp>
 #include <stats/group_mean.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <cstddef>
 #include <ranges>
@@ -70,8 +69,7 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
       // How much flatter: the symmetric part relative to the equations at the mean.
       const Matrix relative = inverse<double, D>(at_mean) * jacobian;
       if (!relative.allFinite()) return settled;
-      settled.change =
-          1 - Eigen::SelfAdjointEigenSolver<Matrix>(0.5 * (relative + relative.transpose())).eigenvalues()[0];
+      settled.change = 1 - SymmetricEigen(Matrix(0.5 * (relative + relative.transpose()))).values[0];
       if (!(settled.change <= largest_change)) return settled;
       averaged.jacobian = jacobian.template cast<S>();
       const SquareOf<G> next = averaged.covarianceFromResiduals();

@@ -2,11 +2,10 @@
 // stats/detail/settled_covariance.hpp does for a Fréchet mean.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/detail/angular_part.hpp>
 #include <stats/detail/settled_covariance.hpp>
 #include <stats/detail/mahalanobis_mean.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <cstddef>
@@ -84,7 +83,7 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
       const Cholesky<double, D> factor(result.hessian.template cast<double>());
       const Matrix relative = factor.halfSolve(Matrix(factor.halfSolve(averaged).transpose()));
       if (!relative.allFinite()) return settled;
-      settled.change = 1 - Eigen::SelfAdjointEigenSolver<Matrix>(relative).eigenvalues()[0];
+      settled.change = 1 - SymmetricEigen(relative).values[0];
       if (!(settled.change <= largest_change)) return settled;
       const SquareOf<M> inverse = Cholesky<double, D>(averaged).inverse().template cast<S>();
       const SquareOf<M> next = likelihood ? inverse : SquareOf<M>(inverse * result.gauss_newton * inverse);

@@ -5,6 +5,7 @@
 #include <fusion/convention_diagnosis.hpp>
 #include <stats/convention_charts.hpp>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -4,6 +4,7 @@
 #include <experiments/trajectory_scene.hpp>
 #include <fusion/convention_diagnosis.hpp>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,7 @@
-// Singular values of small matrices (lie/detail/small_orthogonal.hpp): singular matrices, and columns of all sizes.
+// Singular values and eigenvalues of small matrices (lie/detail/small_orthogonal.hpp, small_eigen.hpp): singular matrices,
+// and columns of all sizes.
 
+#include <lie/detail/small_eigen.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 
@@ -100,6 +102,65 @@ TEST(SmallSvd, SmallValuesOfScaledColumnsAreAccurate) {
     const SmallSvd<6> svd(BasicSmallMatrix<6>::of<6, 6>(Eigen::Matrix<double, 6, 6>(Q * d.asDiagonal())));
     for (int k = 0; k < 6; ++k) EXPECT_NEAR(svd.value(k) / std::pow(10., -6 * k), 1, 1e-13) << k;
   }
+}
+
+/// A V = V diag(values) with V orthogonal and values ascending, within a bound relative to the largest value.
+template <class Matrix>
+SymmetricEigen<Matrix> checkedEigen(const Matrix& A, double bound) {
+  const SymmetricEigen<Matrix> eigen(A);
+  using Scalar = typename Matrix::Scalar;
+  const Matrix V = eigen.vectors, D = eigen.values.asDiagonal(), I = Matrix::Identity(A.rows(), A.cols());
+  EXPECT_LE((A * V - V * D).norm(), Scalar(bound) * A.norm()) << A;
+  EXPECT_LE((V.transpose() * V - I).norm(), Scalar(bound)) << A;
+  for (Eigen::Index k = 1; k < A.rows(); ++k) EXPECT_LE(eigen.values[k - 1], eigen.values[k]) << A;
+  return eigen;
+}
+
+TEST(SymmetricEigen, OfIndefiniteSingularAndRepeatedValues) {
+  std::mt19937_64 rng(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Matrix<double, 6, 6> B = random<6>(rng),
+                                      Q = Eigen::HouseholderQR<Eigen::Matrix<double, 6, 6>>(B).householderQ();
+    Eigen::Matrix<double, 6, 1> d;
+    d << -3, -3, 0, 0, 2, 2;
+    const Eigen::Matrix<double, 6, 6> A = Q * d.asDiagonal() * Q.transpose();
+    const auto eigen = checkedEigen(Eigen::Matrix<double, 6, 6>(0.5 * (A + A.transpose())), 60 * eps);
+    EXPECT_LE((eigen.values - d).norm(), 60 * eps * d.norm()) << A;
+    // Sizes known at run time, and the other precision.
+    checkedEigen(Eigen::MatrixXd(B + B.transpose()), 60 * eps);
+    checkedEigen(Eigen::MatrixXf((B + B.transpose()).cast<float>()), 60 * std::numeric_limits<float>::epsilon());
+  }
+  checkedEigen(Eigen::Matrix3d(Eigen::Matrix3d::Zero()), eps);
+  checkedEigen(Eigen::Matrix3d(Eigen::Matrix3d::Ones()), 8 * eps);
+  checkedEigen(Eigen::Matrix2d{{0, 1e-300}, {1e-300, 0}}, 8 * eps);
+  checkedEigen(Eigen::Matrix2d{{1, 1e-9}, {1e-9, 1}}, 8 * eps);
+}
+
+TEST(SymmetricEigen, SmallValuesOfScaledMatricesAreAccurate) {
+  // D C D with a well-conditioned C: each value to its own accuracy over 24 decades, as of its exact inverse.
+  std::mt19937_64 rng(4);
+  for (int trial = 0; trial < 100; ++trial) {
+    Eigen::Matrix3d C = Eigen::Matrix3d::Identity();
+    for (const auto& [i, j] : {std::pair(1, 0), std::pair(2, 0), std::pair(2, 1)}) {
+      C(i, j) = C(j, i) = std::uniform_real_distribution<double>(-0.3, 0.3)(rng);
+    }
+    const Eigen::Vector3d d(1, 1e-6, 1e-12);
+    const Eigen::Matrix3d A = d.asDiagonal() * C * d.asDiagonal();
+    // The largest value of the inverse, which has no cancellation, is the reciprocal of the smallest.
+    const Eigen::Matrix3d inverse = d.cwiseInverse().asDiagonal() * C.inverse() * d.cwiseInverse().asDiagonal();
+    const SymmetricEigen of(A), of_inverse(inverse);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(of.values[k] * of_inverse.values[2 - k], 1, 1e-13) << A;
+  }
+}
+
+TEST(SymmetricEigen, ReadsTheLowerTriangleAndReportsWhatHasNoValues) {
+  Eigen::Matrix3d A{{2, 9, 9}, {1, 3, 9}, {0.5, -1, 4}};
+  const Eigen::Matrix3d symmetric = A.selfadjointView<Eigen::Lower>();
+  EXPECT_EQ(SymmetricEigen(A).values, SymmetricEigen(symmetric).values);
+  A(1, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(SymmetricEigen(A).values.array().isNaN().all());
+  A(1, 0) = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(SymmetricEigen(A).values.array().isNaN().all());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <stats/convention_charts.hpp>
 #include <stats/convention_presets.hpp>
 
+#include <Eigen/Cholesky>
 #include <support/full_pose.hpp>
 
 #include <ceres/ceres.h>

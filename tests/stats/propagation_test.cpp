@@ -4,6 +4,7 @@
 #include <lie/lie.hpp>
 #include <stats/propagation.hpp>
 
+#include <Eigen/Cholesky>
 #include <support/propagated.hpp>
 
 #include <limits>

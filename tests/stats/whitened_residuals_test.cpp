@@ -3,6 +3,7 @@
 #include <stats/random.hpp>
 #include <stats/whitened_residuals.hpp>
 
+#include <Eigen/Cholesky>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <gtest/gtest.h>
 

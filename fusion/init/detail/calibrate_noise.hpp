@@ -1,6 +1,7 @@
 // The definition of fusion/noise_calibration.hpp.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <fusion/detail/compiled.hpp>
 #include <fusion/init/detail/visual_inertial_run.hpp>
 #include <fusion/noise_calibration.hpp>
@@ -9,7 +10,6 @@
 #include <stats/detail/tail_probabilities.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -162,8 +162,8 @@ class MeetingModel {
   };
   /// The symmetric matrix with its eigenvalues raised to a bound.
   static Matrix11 atLeast(double bound, const Matrix11& A) {
-    const Eigen::SelfAdjointEigenSolver<Matrix11> eigen(Matrix11(0.5 * (A + A.transpose())));
-    return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(bound).asDiagonal() * eigen.eigenvectors().transpose();
+    const SymmetricEigen eigen(Matrix11(0.5 * (A + A.transpose())));
+    return eigen.vectors * eigen.values.cwiseMax(bound).asDiagonal() * eigen.vectors.transpose();
   }
 
   LogFactors at_;

@@ -1,6 +1,7 @@
 // Definitions of fusion/convention_diagnosis.hpp; docs/theory/trajectories.md, sections 6 to 8.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <fusion/convention_diagnosis.hpp>
 #include <fusion/trajectories/detail/ranked_conventions.hpp>
 #include <stats/words.hpp>
@@ -365,8 +366,8 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
     if (!S.allFinite()) {
       d.verdict = DiagnosisVerdict::none;
     } else {
-      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(S, Eigen::EigenvaluesOnly);
-      if (eigen.eigenvalues()[0] < 1. / 3 || eigen.eigenvalues()[5] > 3) d.verdict = DiagnosisVerdict::none;
+      const detail::SymmetricEigen eigen(S);
+      if (eigen.values[0] < 1. / 3 || eigen.values[5] > 3) d.verdict = DiagnosisVerdict::none;
     }
   } else {
     noteFired(d.tests, d.notes);

@@ -1,6 +1,7 @@
 // Definitions of fusion/trajectories.hpp.
 #pragma once
 
+#include <lie/detail/small_orthogonal.hpp>
 #include <fusion/trajectories/detail/pose_alignment.hpp>
 #include <fusion/trajectories.hpp>
 
@@ -125,16 +126,17 @@ LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses,
     }
     R = SO3d::rotZ(std::atan2(s, c)).matrix();
   } else {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    if (!(svd.singularValues()[1] > 1e-12 * svd.singularValues()[0])) {
+    const detail::SmallSvd svd(detail::SmallMatrix::of<3, 3>(moment));
+    if (!(svd.value(1) > 1e-12 * svd.value(0))) {
       a.fault = "the positions are collinear: they do not determine the rotation";
       return a;
     }
+    const Eigen::Matrix3d Ut = svd.u.matrix3(0, 0), Vt = svd.v.matrix3(0, 0);
     Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-    if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs[2] = -1;
-    R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    if (Ut.determinant() * Vt.determinant() < 0) signs[2] = -1;
+    R = Ut.transpose() * signs.asDiagonal() * Vt;
     if (model == AlignmentModel::sim3 || model == AlignmentModel::scale) {
-      a.scale = svd.singularValues().dot(signs) / variance;
+      a.scale = (svd.value(0) + svd.value(1) + signs[2] * svd.value(2)) / variance;
     }
   }
   if (model == AlignmentModel::scale) {

@@ -5,12 +5,10 @@
 // translation and rotation could not be told apart in double precision.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <fusion/trajectories.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/trig.hpp>
-
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
 #include <algorithm>
 #include <array>
@@ -125,8 +123,8 @@ inline double scaledCondition(const Matrix7& information) {
     if (!(root > 0)) return infinity;
     scaled.row(i) /= root, scaled.col(i) /= root;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix7> eigen(scaled, Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues()[0] > 0 ? eigen.eigenvalues()[6] / eigen.eigenvalues()[0] : infinity;
+  const SymmetricEigen eigen(scaled);
+  return eigen.values[0] > 0 ? eigen.values[6] / eigen.values[0] : infinity;
 }
 
 /// A condition above which a direction is not determined in double precision.

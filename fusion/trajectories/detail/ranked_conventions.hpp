@@ -2,6 +2,7 @@
 // sections 6 and 7.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <fusion/convention_diagnosis.hpp>
 #include <fusion/trajectories.hpp>  // first: its definitions include the next
 #include <fusion/trajectories/detail/pose_alignment.hpp>
@@ -192,9 +193,7 @@ inline WhitenedResidualTests testsUnder(const DiagnosisData& data, const Hypothe
   return testWhitenedResiduals(residuals);
 }
 
-inline double leastEigenvalue(const Matrix6d& M) {
-  return Eigen::SelfAdjointEigenSolver<Matrix6d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
-}
+inline double leastEigenvalue(const Matrix6d& M) { return SymmetricEigen(M).values[0]; }
 /// True if M + tolerance I is positive definite.
 inline bool semidefinite(Matrix6d M, const Vector6d& tolerance) {
   M.diagonal() += tolerance;

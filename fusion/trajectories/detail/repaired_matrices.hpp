@@ -1,10 +1,9 @@
 // The matrices behind faulty ones: MatrixFault of fusion/convention_diagnosis_types.hpp, undone.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
 #include <lie/detail/small_products.hpp>
-
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 
@@ -100,9 +99,8 @@ inline Matrix6d repaired(MatrixFault fault, const Matrix6d& M, const SE3d& T) {
       }
       return C;
     case MatrixFault::matrix_squared: {
-      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(M);
-      return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
-             eigen.eigenvectors().transpose();
+      const SymmetricEigen eigen(M);
+      return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
     }
     case MatrixFault::inverse_diagonal:
       for (int i = 0; i < 6; ++i) {
