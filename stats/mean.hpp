@@ -7,6 +7,7 @@
 #include <lie/detail/always_inline.hpp>
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/any_executor.hpp>
 #include <stats/detail/mean_pass.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
@@ -217,7 +218,8 @@ template <Executor E, detail::AnyRange R>
 MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples,
                                               const MeanOptions<detail::SampleInSignature<R>>& options = {}) {
   if constexpr (detail::RequireMean<R>::ok) {
-    return detail::frechetMean<SampleOf<R>>(executor, detail::asSamples(samples), detail::UnitWeights{}, options);
+    return detail::frechetMean<SampleOf<R>>(detail::erased(executor), detail::asSamples(samples), detail::UnitWeights{},
+                                            options);
   } else {
     return {};
   }
@@ -241,7 +243,7 @@ MeanResult<detail::SampleInSignature<R>> mean(const E& executor, R&& samples, W&
     return detail::withRelativeWeights<M>(
         detail::asSamples(samples), detail::asWeights(weights),
         [&](const auto& features, const auto& numbers, const detail::KeptRows&) {
-          return detail::frechetMean<M>(executor, features, numbers, options);
+          return detail::frechetMean<M>(detail::erased(executor), features, numbers, options);
         },
         [] { return detail::without<MeanResult<M>>(Status::not_applicable); });
   } else {

@@ -178,7 +178,7 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
       MeanOptions<M> how;
       how.start = start;
       if (!part.features.empty()) {
-        const MeanResult<M> near = frechetMean<M>(executor, part.features, part.weights, how);
+        const MeanResult<M> near = frechetMean<M>(executor, asSamples(part.features), asWeights(part.weights), how);
         if (!converged(near.status) || isAmong(seen_by_part, near.mean)) continue;
         seen_by_part.push_back(near.mean);
         how.start = near.mean;

@@ -189,7 +189,7 @@ SplitValidation<M> validateMeanBySplitting(const E& executor, const std::vector<
     return detail::withRelativeWeights<M>(
         detail::asSamples(some), detail::asWeights(their_weights),
         [&](const auto& features, const auto& numbers, const detail::KeptRows& kept) {
-          const MeanResult<M> result = detail::frechetMean<M>(SerialExecutor{}, features, numbers, how);
+          const MeanResult<M> result = detail::frechetMean<M>(detail::erased(SerialExecutor{}), features, numbers, how);
           const SquareOf<M> covariance =
               known_noise.empty() ? covarianceFromResiduals(result)
                                   : detail::covarianceFromKnownNoise(features, numbers, result,

@@ -14,14 +14,10 @@
 #include <lie/so3.hpp>
 
 /// `instantiate` is template (a definition) or extern template.
-#define LIESTAT_INSTANTIATE_MEAN(instantiate, M)                                                             \
-  instantiate MeanResult<M> frechetMean<M>(const SerialExecutor&, const Samples<M>&, const UnitWeights&,     \
-                                           const MeanOptions<M>&);                                           \
-  instantiate MeanResult<M> frechetMean<M>(const SerialExecutor&, const Samples<M>&, const Samples<double>&, \
-                                           const MeanOptions<M>&);                                           \
-  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const UnitWeights&,        \
-                                           const MeanOptions<M>&);                                           \
-  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&,    \
+#define LIESTAT_INSTANTIATE_MEAN(instantiate, M)                                                          \
+  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const UnitWeights&,     \
+                                           const MeanOptions<M>&);                                        \
+  instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&, \
                                            const MeanOptions<M>&)
 
 /// `apply`, a macro of the two arguments above, for each feature whose mean is compiled.
