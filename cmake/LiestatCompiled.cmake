@@ -6,7 +6,7 @@
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
-#   formats        readers and writers of files ({fmt}, zlib, yaml-cpp, nlohmann/json)
+#   formats        readers and writers of files (Boost.Math, {fmt}, zlib, yaml-cpp, nlohmann/json)
 
 set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
@@ -19,7 +19,7 @@ set(LIESTAT_COMPILED_SOURCES_trajectories
     trajectories evaluate convention_diagnosis trajectory_conversion recording_windows)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
-set(LIESTAT_COMPILED_NEEDS_formats fmt json yaml zlib)
+set(LIESTAT_COMPILED_NEEDS_formats boost fmt json yaml zlib)
 # Parts that a part links.
 set(LIESTAT_COMPILED_USES_fusion estimation)
 

@@ -1,6 +1,7 @@
 // Whose covariance is it? One pose of a ROS message, read in three conventions that its author may have meant, given to
 // g2o and GTSAM, and what a wrong reading costs.
 #include <lie/linear.hpp>
+#include <lie/units.hpp>
 #include <stats/convention_charts.hpp>
 #include <stats/convention_layouts.hpp>
 #include <stats/convention_losses.hpp>
@@ -38,7 +39,7 @@ int main() {
     const Matrix6 information = covarianceAsContent(liestat::CovarianceContent::information, read.covariance);
     const double d2 = liestat::product(information, covariance).trace();
     const auto sd = [&](int i) { return std::sqrt(read.covariance(i, i)); };
-    std::printf("%-32s %9.3f m %9.3f m %6.2f deg %10.1f\n", reading, sd(0), sd(1), sd(5) * 57.29577951308232, d2);
+    std::printf("%-32s %9.3f m %9.3f m %6.2f deg %10.1f\n", reading, sd(0), sd(1), sd(5) / liestat::units::degree, d2);
     if (std::string_view(reading) == "ros-fixed") right_reading = d2;
     if (d2 > worst) worst = d2;
   }

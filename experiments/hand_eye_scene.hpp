@@ -18,6 +18,7 @@
 #include <lie/se3.hpp>
 #include <lie/units.hpp>
 #include <stats/random.hpp>
+#include <stats/words.hpp>
 
 #include <Eigen/Core>
 
@@ -30,6 +31,8 @@
 #include <vector>
 
 namespace liestat::experiments {
+
+using liestat::name;
 
 /// The motions of the gripper, with the dimension of what they leave open.
 enum class HandEyeMotion {
@@ -45,10 +48,9 @@ enum class HandEyeMotion {
 inline constexpr std::array all_hand_eye_motions = {
     HandEyeMotion::general, HandEyeMotion::about_point, HandEyeMotion::half_turns,       HandEyeMotion::parallel_axes,
     HandEyeMotion::planar,  HandEyeMotion::one_axis,    HandEyeMotion::pure_translation, HandEyeMotion::collinear};
-inline std::string name(HandEyeMotion motion) {
-  constexpr const char* names[] = {"general", "about_point", "half_turns",       "parallel_axes",
-                                   "planar",  "one_axis",    "pure_translation", "collinear"};
-  return names[static_cast<std::size_t>(motion)];
+constexpr auto words(HandEyeMotion) {
+  return std::array{"general", "about_point", "half_turns",       "parallel_axes",
+                    "planar",  "one_axis",    "pure_translation", "collinear"};
 }
 /// Dimension of what the motion leaves open.
 inline int openDimension(HandEyeMotion motion) {
@@ -63,10 +65,7 @@ enum class HandEyeNoise {
 };
 inline constexpr std::array all_hand_eye_noises = {HandEyeNoise::isotropic, HandEyeNoise::anisotropic,
                                                    HandEyeNoise::target};
-inline std::string name(HandEyeNoise noise) {
-  constexpr const char* names[] = {"isotropic", "anisotropic", "target"};
-  return names[static_cast<std::size_t>(noise)];
-}
+constexpr auto words(HandEyeNoise) { return std::array{"isotropic", "anisotropic", "target"}; }
 
 /// The kinds of wrong pairs; errors are in B.
 enum class HandEyeOutliers {
@@ -77,10 +76,7 @@ enum class HandEyeOutliers {
 };
 inline constexpr std::array all_hand_eye_outliers = {HandEyeOutliers::gross, HandEyeOutliers::mild,
                                                      HandEyeOutliers::flips, HandEyeOutliers::cluster};
-inline std::string name(HandEyeOutliers outliers) {
-  constexpr const char* names[] = {"gross", "mild", "flips", "cluster"};
-  return names[static_cast<std::size_t>(outliers)];
-}
+constexpr auto words(HandEyeOutliers) { return std::array{"gross", "mild", "flips", "cluster"}; }
 
 struct HandEyeSceneOptions {
   HandEyeMotion motion = HandEyeMotion::general;

@@ -1,4 +1,5 @@
 #include <experiments/hand_eye_validation.hpp>
+#include <lie/units.hpp>
 
 #include <fusion/hand_eye.hpp>
 #include <stats/propagation.hpp>
@@ -8,7 +9,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 namespace liestat::experiments {
@@ -20,7 +20,7 @@ using Vector6 = HandEyeScene::Vector6;
 using Matrix6 = HandEyeScene::Matrix6;
 
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-constexpr double degree = std::numbers::pi / 180;
+using units::degree;
 
 struct Outcome : TrialOutcome {
   double rotation2 = nothing, translation2 = nothing, chi2_per_dof = nothing, right = nothing, lost = nothing;
@@ -216,8 +216,8 @@ std::string noiseName(const HandEyeRow& row) {
 
 std::string label(const HandEyeRow& row) {
   std::string text = fmt::format("{} {} n = {}", name(row.formulation), noiseName(row), row.pairs);
-  if (row.motion != HandEyeMotion::general) text += " " + name(row.motion);
-  if (row.outliers) text += " " + name(*row.outliers);
+  if (row.motion != HandEyeMotion::general) text += std::string(" ") + name(row.motion);
+  if (row.outliers) text += std::string(" ") + name(*row.outliers);
   return row.fit ? text + ", fit" : text;
 }
 

@@ -1,4 +1,5 @@
 #include <experiments/motion_validation.hpp>
+#include <lie/units.hpp>
 
 #include <stats/quantile.hpp>
 #include <fusion/motion/motion_filter.hpp>
@@ -14,14 +15,13 @@
 #include <iterator>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <span>
 #include <utility>
 
 namespace liestat::experiments {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using units::degree;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// A run's error (degrees) and ξᵀ P⁻¹ ξ/2 at the frames, NaN where there is no covariance.

@@ -159,14 +159,14 @@ struct Trial {
 };
 
 template <class Model, class Rule>
-Search searched(const Model& model, const Rule& rule, double threshold, std::size_t most_draws, double confidence,
+Search searched(const Model& model, const Rule& rule, double threshold, std::size_t max_draws, double confidence,
                 double draw_factor, std::uint64_t seed, Thresholds& thresholds) {
   RobustSearch search(model, rule, {.inlier_threshold = threshold, .seed = seed});
   const auto done = [&] {
     const auto draws = static_cast<double>(search.draws());
     return search.draws() > 0 && draws >= draw_factor * static_cast<double>(search.neededDraws(confidence));
   };
-  while (!done() && search.draws() < most_draws) search.iterate();
+  while (!done() && search.draws() < max_draws) search.iterate();
   const auto found = search.refined();
   Search result;
   result.draws = search.draws();
@@ -197,13 +197,13 @@ template <class Model>
 Trial searchedByAll(const Model& model, const RobustValidation& validation, double share, std::size_t needed,
                     std::uint64_t seed) {
   const double threshold = chiSquaredQuantile(inlier_share, Model::equations);
-  const auto most_draws = 1000 + static_cast<std::size_t>(20 * validation.draw_factor * static_cast<double>(needed));
+  const auto max_draws = 1000 + static_cast<std::size_t>(20 * validation.draw_factor * static_cast<double>(needed));
   Trial trial;
   for (const RobustScore score : validation.scores) {
     Thresholds thresholds;
     const auto run = [&](const auto& rule) {
-      trial.searches.push_back(searched(model, rule, threshold, most_draws, validation.confidence,
-                                        validation.draw_factor, seed, thresholds));
+      trial.searches.push_back(
+          searched(model, rule, threshold, max_draws, validation.confidence, validation.draw_factor, seed, thresholds));
     };
     switch (score) {
       case RobustScore::relevance:

@@ -314,7 +314,10 @@ std::vector<Promise> checksOf(const TwoViewPairsResult& result) {
   }
   for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
     if (n[k] == 0) continue;
-    checks.push_back({name(pair_families[k]) + ": pairs that DEGENSAC's rule tells right", {}, {}, by_rule[k]});
+    checks.push_back({std::string(name(static_cast<PairFamily>(k))) + ": pairs that DEGENSAC's rule tells right",
+                      {},
+                      {},
+                      by_rule[k]});
   }
   if (n[0] > 0 && n[1] > 0) {
     add("both: pairs with the right choice", right[0] + right[1], std::ceil(2 * (n[0] + n[1]) / 3), true);

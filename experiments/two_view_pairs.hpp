@@ -1,10 +1,5 @@
 // Validation of the two-view hierarchy on real pairs of images whose truth is known in part: `liestat validate two-view
-// --pairs DIR`. Four kinds of pairs, by the folder that they are in:
-//
-//   homogr         a plane or a rotation; validation points, which satisfy a homography
-//   kusvod2        scenes in depth; validation points, which satisfy a fundamental matrix
-//   adelaide-rmf   several planes, each match labelled with its own
-//   evd            one plane seen from far apart, inliers labelled
+// --pairs DIR`. The kinds of pairs are in formats/two_view_pairs.hpp.
 //
 // One set of parameters for all: noise of σ px in both images, nothing known of the cameras, the hierarchy's
 // defaults but for ten hypotheses of a model that are refined.
@@ -12,6 +7,7 @@
 
 #include <experiments/cell_run.hpp>
 #include <experiments/judgement.hpp>
+#include <formats/two_view_pairs.hpp>
 #include <stats/hierarchy_types.hpp>
 
 #include <Eigen/Core>
@@ -22,28 +18,6 @@
 #include <vector>
 
 namespace liestat::experiments {
-
-/// Which of the four kinds a pair is.
-enum class PairFamily { homogr, kusvod2, adelaide, evd };
-/// The name of the folder.
-inline std::string name(PairFamily family) {
-  constexpr const char* names[] = {"homogr", "kusvod2", "adelaide-rmf", "evd"};
-  return names[static_cast<std::size_t>(family)];
-}
-inline constexpr PairFamily pair_families[] = {PairFamily::homogr, PairFamily::kusvod2, PairFamily::adelaide,
-                                               PairFamily::evd};
-
-/// A pair of images: matches (x, y, x', y') in px.
-struct TwoViewPair {
-  PairFamily family = PairFamily::homogr;
-  std::string name;
-  std::vector<Eigen::Vector4d> matches;  ///< tentative
-  /// Structure of each match, where the family has labels; 0 for a wrong match.
-  std::vector<std::size_t> labels;
-  std::vector<Eigen::Vector4d> validation;  ///< right matches that no estimate sees
-  /// A corner of both images, and width and height (px).
-  Eigen::Vector2d corner = Eigen::Vector2d::Zero(), size = Eigen::Vector2d::Ones();
-};
 
 struct TwoViewPairsValidation {
   double sigma = 1;           ///< px

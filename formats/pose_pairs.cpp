@@ -1,4 +1,5 @@
 #include <formats/pose_pairs.hpp>
+#include <fusion/nearest_in_time.hpp>
 
 #include <formats/input_error.hpp>
 #include <formats/text.hpp>
@@ -23,10 +24,11 @@ FeatureFile readPoses(const std::string& path, const ReadingOptions& options) {
 /// Times in ascending order, with the rows that they belong to.
 class TimeLine {
  public:
-  TimeLine(const FeatureFile& file, const std::string& name) : times_(file.times), rows_(file.size()) {
+  TimeLine(const FeatureFile& file, const std::string& name) : rows_(file.size()) {
     std::iota(rows_.begin(), rows_.end(), std::size_t{0});
     std::sort(rows_.begin(), rows_.end(),
-              [&](std::size_t i, std::size_t j) { return std::pair(times_[i], i) < std::pair(times_[j], j); });
+              [&](std::size_t i, std::size_t j) { return std::pair(file.times[i], i) < std::pair(file.times[j], j); });
+    for (const std::size_t row : rows_) times_.push_back(file.times[row]);
     for (std::size_t k = 1; k < rows_.size(); ++k) {
       if (time(k) == time(k - 1)) {
         throw InputError(name, file.lines[rows_[k]],
@@ -37,24 +39,17 @@ class TimeLine {
   }
 
   std::size_t size() const { return rows_.size(); }
-  double time(std::size_t k) const { return times_[rows_[k]]; }
+  double time(std::size_t k) const { return times_[k]; }
   std::size_t row(std::size_t k) const { return rows_[k]; }
   std::string interval() const { return fmt::format("{:.10g} to {:.10g} s", time(0), time(size() - 1)); }
   bool meets(const TimeLine& other, double tolerance) const {
     return time(0) <= other.time(other.size() - 1) + tolerance && other.time(0) <= time(size() - 1) + tolerance;
   }
-  /// The place of the nearest time; of two as near the earlier one.
-  std::size_t nearest(double t) const {
-    const auto after =
-        std::lower_bound(rows_.begin(), rows_.end(), t, [&](std::size_t i, double x) { return times_[i] < x; });
-    const auto k = static_cast<std::size_t>(after - rows_.begin());
-    if (k == 0) return 0;
-    if (k == size()) return k - 1;
-    return t - time(k - 1) <= time(k) - t ? k - 1 : k;
-  }
+  /// The place of the nearest time.
+  std::size_t nearest(double t) const { return nearestInTime(times_, t); }
 
  private:
-  const std::vector<double>& times_;
+  std::vector<double> times_;
   std::vector<std::size_t> rows_;
 };
 

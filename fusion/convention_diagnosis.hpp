@@ -18,10 +18,12 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/convention_diagnosis_types.hpp>
+#include <fusion/evaluate_types.hpp>
 
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace liestat {
@@ -40,8 +42,8 @@ struct DiagnosisOptions {
   double alpha = 1e-3;                              ///< probability of rejecting the truth
   AlignmentModel alignment = AlignmentModel::none;  ///< none, posyaw, se3 or sim3: the truth's world is another
   std::vector<Convention> hypotheses = {};          ///< empty: conventionHypotheses()
-  std::size_t most_aligned = 2000;  ///< poses, evenly spaced, from which hypotheses are ranked with an alignment
-  bool ordered = true;              ///< false: poses are of different runs, and neighbours mean nothing
+  std::size_t max_aligned = 2000;  ///< poses, evenly spaced, from which hypotheses are ranked with an alignment
+  bool ordered = true;             ///< false: poses are of different runs, and neighbours mean nothing
 };
 
 /// Finds the conventions that explain the errors. Fewer than ten usable poses are "undecidable".
@@ -56,8 +58,24 @@ LIESTAT_TRAJECTORIES_API std::vector<PlanRow> planDiagnosis(std::span<const Diag
 /// A run of a file: poses in order of time.
 struct DiagnosedRun {
   std::vector<DiagnosedPose> poses;
-  std::vector<double> times = {};  ///< s; empty: the numbers of the rows
+  std::vector<double> times = {};       ///< s; empty: the numbers of the rows
+  std::vector<std::string> notes = {};  ///< what is remarkable in its file, in sentences
 };
+
+/// A run and the truth at its times. If `status` is not ok, `reason` says why there is none.
+struct RunAgainstTruth {
+  EvaluationStatus status = EvaluationStatus::ok;
+  std::string reason = {};
+  DiagnosedRun run = {};
+
+  bool ok() const { return status == EvaluationStatus::ok; }
+};
+
+/// The poses of an estimate that have a partner in the truth, by the rules of evaluateTrajectory(). The covariances of
+/// the estimate are the matrices as the file has them. Notes: quaternions that look as if w came first, and how many
+/// poses have no partner.
+LIESTAT_TRAJECTORIES_API RunAgainstTruth runAgainstTruth(const PoseTrajectory& truth, const PoseTrajectory& estimate,
+                                                         const AssociationOptions& options = {});
 
 struct CovarianceDiagnosisOptions {
   DiagnosisMode mode = DiagnosisMode::diagnosis;

@@ -156,9 +156,10 @@ const char* name(DiagnosisMode mode);
 /// The diagnosis of a file of covariances.
 struct CovarianceDiagnosis {
   DiagnosisMode mode = DiagnosisMode::diagnosis;
-  std::string what = "poses";        ///< poses, edges, or "runs at 5 s"
-  std::vector<DiagnosedPose> poses;  ///< that were diagnosed: of several runs one each
-  std::vector<double> times;         ///< times of these poses, s; empty if they have none, or are of several runs
+  std::string what = "poses";           ///< poses, edges, or "runs at 5 s"
+  std::vector<std::string> file_notes;  ///< notes of the runs
+  std::vector<DiagnosedPose> poses;     ///< that were diagnosed: of several runs one each
+  std::vector<double> times;            ///< times of these poses, s; empty if they have none, or are of several runs
   AlignmentModel alignment = AlignmentModel::none;
   Convention assumed;  ///< in which the file would be read without a diagnosis, as far as the format allows
   MatrixStructure structure;
@@ -256,6 +257,11 @@ void describe(V& v, const PlanRow& row) {
 /// `chain`, the fields of the diagnosis, or `plan`: by the mode.
 template <class V>
 void describe(V& v, const CovarianceDiagnosis& d) {
+  const Verdict verdict = d.verdict();
+  v("file_notes", d.file_notes, "what is remarkable in the files");
+  v("sentence", verdict.text, "the verdict in a sentence");
+  v("decided", verdict.decided(),
+    "one convention, and the errors follow it; false: they do not; null: undecidable. True for a plan");
   v("mode", name(d.mode), "diagnosis, chain or plan")("what", d.what,
                                                       "the matrices belong to: poses, edges, or runs at a time");
   v("n", d.structure.n, "matrices")("structure", d.structure.words(), "the looks of the matrices");

@@ -5,6 +5,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/status.hpp>
 #include <lie/se3.hpp>
+#include <lie/units.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/shown.hpp>
 #include <stats/verdict.hpp>
@@ -38,9 +39,9 @@ struct HandEyeOptions {
   /// million times.
   int samples = 80;
   /// The excitation from which on a direction is estimated, and that below which noise alone explains it.
-  double trusted_excitation = 10, least_excitation = 3;
+  double trusted_excitation = 10, min_excitation = 3;
   /// The fit is `inconsistent` if the probability of exceeding its χ² is smaller.
-  double least_p = 1e-3;
+  double min_p = 1e-3;
   std::uint64_t seed = 1;  ///< seed of the fixed starts and samples
 };
 
@@ -48,7 +49,7 @@ struct HandEyeOptions {
 struct OpenDirection {
   /// Ratio of the information to that which the noise of the poses alone would produce; 1 is noise.
   double excitation = 0;
-  /// Above the least excitation: fixed like the others, but the motions contain some information on it.
+  /// Above `min_excitation`: fixed like the others, but the motions contain some information on it.
   bool weak = false;
   /// The twist (translation, rotation) in the gripper's frame along which X is open: Exp(s·twist) X. Its rotation has
   /// unit length if there is one, otherwise its translation.
@@ -194,12 +195,12 @@ struct LocalPoseSigmas : PoseSigmas {};
 template <class V>
 void describe(V& v, const PoseSigmas& x) {
   v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()), "", "m");
-  v("rotation_vector_deg", Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()), "", "deg");
+  v("rotation_vector_deg", Eigen::Vector3d(x.sigmas.tail<3>() / units::degree), "", "deg");
 }
 template <class V>
 void describe(V& v, const LocalPoseSigmas& x) {
   v("translation_m", Eigen::Vector3d(x.sigmas.head<3>()), "", "m");
-  v("rotation_deg", Eigen::Vector3d((180 / EIGEN_PI) * x.sigmas.tail<3>()), "", "deg");
+  v("rotation_deg", Eigen::Vector3d(x.sigmas.tail<3>() / units::degree), "", "deg");
 }
 
 template <class V>

@@ -32,8 +32,9 @@ struct ComparedWindow : InitialisedWindow {
   std::vector<double> image_times;         ///< s
   std::vector<std::uint64_t> track_names;  ///< numbers by which tracks are shown: the recording's, or a file's
   std::optional<InitialisationError> closed_form_error, refined_error;
-  std::optional<double> gyroscope_error;  ///< rad/s, of the best known bias
-  std::optional<double> nees;             ///< the refined V and G's, 5 degrees of freedom
+  std::optional<double> gyroscope_error;              ///< rad/s, of the best known bias
+  std::optional<double> nees;                         ///< the refined V and G's, 5 degrees of freedom
+  std::optional<double> velocity_nees, gravity_nees;  ///< of each by itself, 3 and 2 degrees of freedom
 
   bool hasSolution() const { return !closedForm().solutions.empty(); }
   /// The motion does not leave the scale open.
@@ -89,6 +90,16 @@ struct InitialisationSummary {
   std::size_t compared = 0, compared_not_ok = 0;  ///< windows whose errors these are
 };
 
+/// The errors of several estimates against the truth: the mean of their NEES.
+struct InitialisationTest {
+  std::size_t n = 0;  ///< estimates that claim to be right and that the truth covers
+  double nees = 0;    ///< mean
+  int expected = 0;   ///< degrees of freedom of each
+  /// Bound of the probability of a larger mean. Windows of a recording share its biases and their prior, so their errors
+  /// depend on each other, and the sum does not follow χ²: the bound holds for any dependence.
+  double p = 1;
+};
+
 /// A recording's windows and stretches.
 struct ComparedRecording {
   std::vector<ComparedWindow> windows;
@@ -99,8 +110,14 @@ struct ComparedRecording {
   std::size_t windows_left = 0;    ///< not estimated, because of an interrupt
 
   std::size_t okWindows() const;
-  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, and, where windows were fused, those
-  /// of a stretch agree.
+  /// NEES of velocity and gravity of the windows that are ok (5), and of the states of the stretches that are ok (11).
+  InitialisationTest windowTest() const;
+  InitialisationTest stretchTest() const;
+  /// Verdict on the covariances against the truth: no, if one of these tests has a p below `false_alarm`. The errors of the
+  /// truth are in no covariance: they must be small. None where no estimate that is ok is covered by the truth.
+  Verdict againstTruth(double false_alarm = 1e-5) const;
+  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, where windows were fused those of a
+  /// stretch agree, and with a truth the errors follow the covariances.
   Verdict verdict() const;
   /// Summary of all windows that claim a scale, not only of those that came out well.
   InitialisationSummary summary() const;
@@ -311,6 +328,7 @@ template <class V>
 void describe(V& v, const ComparedRecording& r) {
   const Verdict verdict = r.verdict();
   v("ok", verdict.isYes(), "the result is to be trusted")("in_words", verdict.text, "the verdict");
+  v("causes", verdict.causes, "with a truth: tests that speak against it, each with its likely cause");
   v("images_outside", r.images_outside, "that the readings do not cover");
   v("bearing_noise", r.bearing_noise, "standard deviation of the bearings", "rad");
   if (shown(v, r.windows_left > 0)) {

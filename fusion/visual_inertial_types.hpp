@@ -145,7 +145,7 @@ struct FusedStretch {
   Gaussian<InertialState> state;  ///< at the end
 
   /// True if there is a state with a covariance that the windows do not contradict: p ≥ 1e-3, or it was inflated.
-  bool ok() const { return has_state && (p >= least_p_of_fusion || inflated); }
+  bool ok() const { return has_state && (p >= min_p_of_fusion || inflated); }
 };
 
 struct VisualInertialResult {

@@ -108,7 +108,7 @@ struct Se23Math {
     const Vector3 rho = t.template head<3>(), phi = t.template segment<3>(3), nu = t.template tail<3>();
     return blocks(Rotation::leftJacobianInverse(phi), Pose::inverseCoupling(rho, phi), Pose::inverseCoupling(nu, phi));
   }
-  /// ∂(x·exp(d))/∂d and ∂log(x⁻¹y)/∂y at y = x, on parameters.
+  /// ∂(x·exp(d))/∂d at d = 0 (productJacobian) and ∂log(x⁻¹y)/∂y at y = x (quotientJacobian), by the parameters.
   static Eigen::Matrix<S, 10, 9> productJacobian(const Params& x) {
     Eigen::Matrix<S, 10, 9> J = Eigen::Matrix<S, 10, 9>::Zero();
     J.template block<4, 3>(0, 3) = Rotation::productJacobian(quaternion(x));
@@ -189,10 +189,10 @@ class SE23 : public SE23Base<SE23<Scalar_, Options_>> {
              Vector3(T.template block<3, 1>(0, 4))) {}
 };
 
-/// SE_2(3) is homogeneous under itself, not Metric.
+/// SE_2(3) acts on itself: Homogeneous, but not Metric, because no metric on it is bi-invariant.
 template <class S, int O>
 struct ManifoldTraits<SE23<S, O>> : GroupManifold<SE23<S, O>> {
-  /// log det of the left Jacobian: three times the rotation's.
+  /// log det of the left Jacobian, which has three diagonal blocks equal to that of the rotation: three times its value.
   static detail::VolumeElement<S, 9> logVolume(const Eigen::Matrix<S, 9, 1>& z) {
     const detail::VolumeElement<S, 3> rotation = detail::So3Math<S>::logVolume(z.template segment<3>(3));
     detail::VolumeElement<S, 9> v;

@@ -174,8 +174,20 @@ std::string pythonType(const FieldDescription& f, bool series) {
   return f.optional ? type + " | None" : type;
 }
 
-/// Classes of the results inside before that of the result. The attributes of a mean have the shape of the axes that are
-/// left, and dictionaries inside.
+/// The attributes of a mean are those of one mean, with dictionaries inside, or an array of the axes that are left. Features
+/// have the type of the argument, which the class does not know.
+std::string pythonTypeOfMean(const FieldDescription& f) {
+  if (f.name == "mean" || f.name == "rivals" || f.name == "near_ties") return "Any";
+  if (f.name == "unique") return "Uniqueness | _Several";
+  FieldDescription single = f;
+  single.optional = single.list = false;
+  std::string type = f.kind == Kind::result ? "dict[str, Any]" : pythonType(single, false);
+  if (f.list) type = "list[" + type + "]";
+  if (f.kind != Kind::array) type += " | _Several";
+  return f.optional ? type + " | None" : type;
+}
+
+/// Classes of the results inside before that of the result.
 void addClasses(std::string& text, const std::string& name, const Fields& fields, const Fields& series,
                 std::map<std::string, bool>& known) {
   if (std::exchange(known[name], true)) return;
@@ -195,7 +207,7 @@ void addClasses(std::string& text, const std::string& name, const Fields& fields
       for (const std::string& part : {f.meaning, f.unit}) {
         if (!part.empty()) comment += (comment.empty() ? "" : "; ") + part;
       }
-      std::string line = "    " + f.name + ": " + (mean ? "Any" : type);
+      std::string line = "    " + f.name + ": " + (mean ? pythonTypeOfMean(f) : type);
       const bool beside = line.size() + comment.size() < 116;
       if (!comment.empty()) line = beside ? line + "  # " + comment : "    # " + comment + "\n" + line;
       text += line + "\n";

@@ -98,7 +98,7 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
       return result;
     }
 
-    const std::size_t n = std::ranges::size(samples), stride = (n + most_averaged - 1) / most_averaged;
+    const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
     const TangentOf<M> metric = T::metricWeights();
     const auto sums = [&](const M& y, const auto& add) {
       const auto to_y = T::placement(y).inverse();

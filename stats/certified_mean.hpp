@@ -180,7 +180,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   result.cut_locus = findCutLocusNearby(samples, weights, result.mean, settled.first);
   // For very large samples near ties cost seconds, and here nothing depends on them.
   const bool scattered = isScattered(result.concentration);
-  if (scattered && result.mean.n > most_averaged) return without(Status::ill_defined, scattered_reason);
+  if (scattered && result.mean.n > max_averaged) return without(Status::ill_defined, scattered_reason);
   const SquareOf<M>& region = settled.settled ? settled.covariance : settled.first;
   if (known) {
     const auto noise = [&](std::size_t i) -> const SquareOf<M>& {

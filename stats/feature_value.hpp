@@ -6,13 +6,13 @@
 #include <lie/concepts.hpp>
 #include <lie/manifold.hpp>
 #include <lie/so3.hpp>
+#include <lie/units.hpp>
 #include <stats/shown.hpp>
 
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,7 +31,7 @@ struct PartUnit {
 
 /// Degrees for angles, else what is computed in.
 constexpr PartUnit unitOf(TangentPart part) {
-  if (isAngular(part)) return {"deg", "_deg", 180 / std::numbers::pi};
+  if (isAngular(part)) return {"deg", "_deg", 1 / units::degree};
   if (part == TangentPart::velocity) return {"m/s", "_m_per_s", 1};
   if (part == TangentPart::log_scale) return {"", "", 1};
   return {"m", "_m", 1};

@@ -18,7 +18,7 @@
 
 namespace liestat {
 
-/// A callback that an iteration calls between its steps; true ends the iteration.
+/// A callback that an iteration calls between its steps; if it returns true, the iteration ends.
 using StopRequest = std::function<bool()>;
 
 /// The parameter of a model estimated from measurements.
@@ -29,7 +29,7 @@ struct ModelEstimate {
   /// Information and covariance in the model's coordinates, which its documentation names; empty if not estimated.
   Eigen::MatrixXd information = {}, covariance = {};
   double chi2 = std::numeric_limits<double>::quiet_NaN();            ///< D² = 2 L² over the measurements
-  double equation_error = std::numeric_limits<double>::quiet_NaN();  ///< E²: squared error of the equations
+  double equation_error = std::numeric_limits<double>::quiet_NaN();  ///< E², the squared error of the equations
   int degrees_of_freedom = 0;
   std::size_t measurements = 0;  ///< number of measurements used
 
@@ -40,7 +40,8 @@ struct ModelEstimate {
 };
 
 /// A model of a hierarchy: its measurement equations, its free parameters and the models that it contains. All models
-/// of a hierarchy share one parameter type, of which each may use a part; they are called at run time, hence virtual.
+/// of a hierarchy share one parameter type, of which each may use a part. The functions are virtual because a hierarchy
+/// is a list of models of different types that is made at run time.
 template <class Measurement_, class Parameter_>
 class HierarchyModel {
  public:
@@ -56,8 +57,8 @@ class HierarchyModel {
   /// The equations of one measurement, where measurements are of several kinds.
   virtual int equationsOf(const Measurement&) const { return equations(); }
   virtual int measurementDimension() const = 0;  ///< coordinates of a measurement
-  /// f, the freedom left on measurements that obey a more specific model: the number of further equations that this one
-  /// meets whatever they are. At most the difference of the free parameters if both have as many equations.
+  /// f, the number of equations that this model can satisfy in addition, whatever they are, on measurements that obey a
+  /// more specific model. At most the difference of the free parameters if both have as many equations.
   virtual int freedomBeyond(const HierarchyModel& specific) const {
     return std::max(0, freeParameters() - specific.freeParameters());
   }
@@ -114,7 +115,7 @@ constexpr const char* name(Rejection rejection) {
   return rejection == Rejection::support ? "support" : rejection == Rejection::fit ? "fit" : "none";
 }
 
-/// The state of a model in the search.
+/// The state of one model during the search.
 template <class Parameter>
 struct ModelState {
   enum class Progress {

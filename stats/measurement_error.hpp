@@ -1,6 +1,6 @@
-// The error of a measurement under a given parameter: the size of the correction with which the measurement meets its
-// equations (Viéville, Lingrand and Gaspard 2000, (22) to (24), with derivatives by the measurement). Robust search
-// classifies inliers and outliers by it.
+// The error of a measurement under a given parameter: the size of the smallest correction after which the measurement
+// satisfies its equations (Viéville, Lingrand and Gaspard 2000, (22) to (24), with derivatives with respect to the
+// measurement). Robust search classifies inliers and outliers by this error.
 #pragma once
 
 #include <stats/constrained_types.hpp>
@@ -25,10 +25,10 @@ struct MeasurementError {
   double normalised() const { return equations > 0 ? squared / equations : 0; }
 };
 
-/// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which suffices for a search; strongly curved
-/// equations need two or three. A measurement without equations (zero gradients, or free in all of them) has the error
-/// zero. NaN for input that is not finite and for invalid noise; infinite if an equation is violated and all
-/// coordinates that it depends on are exact.
+/// The error of m under q. One step gives Sampson's error cᵀ (D V Dᵀ)⁻ c, which is accurate enough for a search; strongly
+/// curved equations need two or three steps. The error of a measurement without equations (zero gradients, or free in
+/// all of them) is zero. NaN for input that is not finite and for invalid noise; infinite if an equation is violated and
+/// all coordinates that it depends on are exact.
 template <Homogeneous Q, Homogeneous M, NoiseModel Noise, class Equation>
 MeasurementError<M> measurementError(const Q& q, const M& m, const Noise& noise, const Equation& equation,
                                      int steps = 1) {

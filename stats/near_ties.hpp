@@ -90,7 +90,7 @@ struct Part {
 
   template <class R, class W>
   Part(const R& samples, const W& all_weights) {
-    const std::size_t n = std::ranges::size(samples), stride = n > 20000 ? n / most_averaged : n + 1;
+    const std::size_t n = std::ranges::size(samples), stride = n > 20000 ? n / max_averaged : n + 1;
     for (std::size_t i = 0; stride <= n && i < n; i += stride) {
       features.push_back(M(samples[i]));
       weights.push_back(static_cast<double>(all_weights[i]));

@@ -162,11 +162,11 @@ const bool registered = [] {
 #endif
   for (const HandEyeNoise noise : experiments::all_hand_eye_noises) {
     for (const std::size_t pairs : {8, 20, 50}) {
-      addAll(experiments::name(noise) + "/" + std::to_string(pairs), {.noise = noise, .pairs = pairs});
+      addAll(std::string(name(noise)) + "/" + std::to_string(pairs), {.noise = noise, .pairs = pairs});
     }
   }
   for (const HandEyeMotion motion : {HandEyeMotion::half_turns, HandEyeMotion::planar}) {
-    addAll(experiments::name(motion) + "/20", {.motion = motion, .pairs = 20});
+    addAll(std::string(name(motion)) + "/20", {.motion = motion, .pairs = 20});
   }
   // Six pairs of twenty are wrong.
   addAll("outliers/20", {.pairs = 20, .outliers = 0.3});

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,15 +26,13 @@ constexpr const char* doctor_name = "liestat doctor";
 
 struct DoctorOptions {
   std::vector<std::string> files;
-  std::string json, report, align;
+  std::string json, report;
+  std::optional<AlignmentModel> align;
   TrajectoryInputOptions input;
   bool no_truth = false, plan = false, everything = false;
   std::optional<double> at;
   double alpha = 1e-3;
 };
-
-const std::map<std::string, AlignmentModel> doctor_alignments{
-    {"posyaw", AlignmentModel::posyaw}, {"se3", AlignmentModel::se3}, {"sim3", AlignmentModel::sim3}};
 
 Trajectory readWithCovariances(const std::string& path, const TrajectoryOptions& options) {
   Trajectory t = readTimedTrajectory(path, options);
@@ -46,26 +43,12 @@ Trajectory readWithCovariances(const std::string& path, const TrajectoryOptions&
   return t;
 }
 
-/// Poses of an estimate with the truth at their times.
-DiagnosedRun withTruth(const Trajectory& estimate, const Trajectory& truth, const DoctorOptions& o,
-                       std::vector<std::string>& notes) {
-  const Associated associated = associate(truth, estimate, o.input);
-  const std::vector<Gaussian<SE3d>> exact = exactPoses(truth.poses), poses = exactPoses(estimate.poses);
-  const std::vector<MatchedPose> matched =
-      matchedPoses(associated.matches, exact, poses, o.input.association.interpolation);
-  DiagnosedRun run;
-  for (std::size_t k = 0; k < matched.size(); ++k) {
-    const std::size_t row = associated.matches[k].estimate;
-    run.poses.push_back({matched[k].estimate.mean, estimate.covariances[row], matched[k].reference.mean});
-    if (estimate.hasTimes()) run.times.push_back(estimate.times[row]);
-  }
-  const std::string suspicion = suspectQuaternionOrder(matched, truth.name, estimate.name);
-  if (!suspicion.empty()) notes.push_back(suspicion);
-  if (matched.size() < estimate.size()) {
-    notes.push_back(fmt::format("{} of {} poses of {} have a partner in {}", matched.size(), estimate.size(),
-                                estimate.name, truth.name));
-  }
-  return run;
+/// The poses of a file with their matrices as they stand there, unless it is a truth.
+PoseTrajectory posesOf(const Trajectory& t, bool with_matrices) {
+  PoseTrajectory poses{
+      .times = t.times, .poses = exactPoses(t.poses), .has_covariances = with_matrices, .name = t.name};
+  for (std::size_t i = 0; with_matrices && i < t.size(); ++i) poses.poses[i].covariance = t.covariances[i];
+  return poses;
 }
 
 /// Edges of a graph and the relative poses of its vertices, or of those of another file.
@@ -97,7 +80,7 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   CovarianceDiagnosisOptions options;
   options.mode = o.plan ? DiagnosisMode::plan : o.no_truth ? DiagnosisMode::chain : DiagnosisMode::diagnosis;
   options.alpha = o.alpha, options.all_units = o.everything, options.at = o.at;
-  if (!o.align.empty()) options.alignment = doctor_alignments.at(o.align);
+  options.alignment = o.align.value_or(options.alignment);
   const bool has_truth = options.mode == DiagnosisMode::diagnosis;
   std::vector<std::string> estimates = o.files;
   std::string truth_path;
@@ -136,28 +119,29 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
     Trajectory truth;
     if (!truth_path.empty()) {
       truth = readTimedTrajectory(truth_path, o.input.reference);
-      cutTimes(truth, o.input);
       output.reference = truth.name;
     }
     for (const std::string& path : estimates) {
       const Trajectory estimate = readWithCovariances(path, o.input.estimate);
       output.files.push_back(estimate.name);
       options.order = estimate.fixed_order;
-      if (estimate.stated_convention) {
-        output.notes.push_back(fmt::format("{} states {}", estimate.covariance_source,
-                                           conventionName(*estimate.stated_convention, false)));
-      }
-      if (has_truth) {
-        runs.push_back(withTruth(estimate, truth, o, output.notes));
-        continue;
-      }
       DiagnosedRun run{{}, estimate.times};
-      for (std::size_t i = 0; i < estimate.size(); ++i) {
-        run.poses.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
+      if (has_truth) {
+        RunAgainstTruth found = runAgainstTruth(posesOf(truth, false), posesOf(estimate, true), o.input.association);
+        if (!found.ok()) refuse(found.status, found.reason, truth, estimate, o.input);
+        run = std::move(found.run);
+      } else {
+        for (std::size_t i = 0; i < estimate.size(); ++i) {
+          run.poses.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
+        }
+      }
+      if (estimate.stated_convention) {
+        run.notes.insert(run.notes.begin(), fmt::format("{} states {}", estimate.covariance_source,
+                                                        conventionName(*estimate.stated_convention, false)));
       }
       runs.push_back(std::move(run));
     }
-    if (runs.size() > 1 && !o.align.empty())
+    if (runs.size() > 1 && o.align)
       throw OptionError(doctor_name, "--align with several runs", "runs in the world of the truth");
   }
   output.result = diagnoseCovariances(runs, options);
@@ -189,8 +173,11 @@ void addDoctorCommand(const CommandList& program) {
           "or --plan the estimate alone")
       .required();
   o->input.declare(command);
-  command.option("--align", o->align, "The truth is in another world: align each hypothesis by its covariances")
-      .oneOf({"posyaw", "se3", "sim3"});
+  using Alignments = std::vector<std::pair<std::string, AlignmentModel>>;
+  command.choice(
+      "--align", o->align,
+      Alignments{{"posyaw", AlignmentModel::posyaw}, {"se3", AlignmentModel::se3}, {"sim3", AlignmentModel::sim3}},
+      "The truth is in another world: align each hypothesis by its covariances");
   const Option no_truth =
       command.flag("--no-truth", o->no_truth, "Dead reckoning without a truth: the covariance may only grow");
   command.flag("--plan", o->plan, "What the file can decide and with how many poses, before any error is seen")

@@ -1,5 +1,6 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/trajectory_input.hpp>
+#include <formats/evo_result.hpp>
 #include <formats/input_error.hpp>
 #include <formats/output_file.hpp>
 #include <formats/text.hpp>
@@ -45,62 +46,6 @@ struct EvaluateOptions {
     if (!motion_filter.empty()) how.motion_filter = {motion_filter[0], motion_filter[1]};
   }
 };
-
-const char* wordsOfRelation(PoseRelation relation) {
-  switch (relation) {
-    case PoseRelation::full:
-      return "full transformation";
-    case PoseRelation::trans_part:
-      return "translation part";
-    case PoseRelation::rot_part:
-      return "rotation part";
-    case PoseRelation::angle_deg:
-    case PoseRelation::angle_rad:
-      return "rotation angle";
-    case PoseRelation::point_distance:
-      return "point distance";
-    case PoseRelation::point_distance_error_ratio:
-      return "point distance error ratio";
-  }
-  return "";
-}
-
-/// evo's words after the title, or others where evo has no such alignment.
-std::string alignmentTitle(const EvaluateOptions& o) {
-  const AlignmentModel model = o.how.alignment;
-  std::string title = model == AlignmentModel::se3      ? "\n(with SE(3) Umeyama alignment)"
-                      : model == AlignmentModel::sim3   ? "\n(with Sim(3) Umeyama alignment)"
-                      : model == AlignmentModel::scale  ? "\n(scale corrected)"
-                      : model == AlignmentModel::origin ? ""
-                      : model == AlignmentModel::posyaw ? "\n(with position and yaw alignment)"
-                                                        : "\n(not aligned)";
-  if (o.how.n_to_align > 0 && model != AlignmentModel::none && model != AlignmentModel::origin) {
-    title += fmt::format(" (aligned poses: {})", o.how.n_to_align);
-  }
-  if (model == AlignmentModel::origin) title += "\n(with origin alignment)";
-  if (o.how.project_to_plane) title += fmt::format("\n(projected to {} plane)", name(*o.how.project_to_plane));
-  if (o.how.association.rule != AssociationRule::nearest) title += "\n(reference interpolated)";
-  return title;
-}
-/// A float as Python prints it, frames as integers.
-std::string deltaOf(const RelativeOptions& r) {
-  if (r.unit == DeltaUnit::frames) return fmt::format("{}", static_cast<long long>(r.delta));
-  const std::string text = fmt::format("{}", r.delta);
-  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
-}
-const char* deltaWord(DeltaUnit unit) {
-  switch (unit) {
-    case DeltaUnit::frames:
-      return "frames";
-    case DeltaUnit::degrees:
-      return "deg";
-    case DeltaUnit::radians:
-      return "rad";
-    case DeltaUnit::meters:
-      return "m";
-  }
-  return "";
-}
 
 std::string fileOf(const std::string& path) {
   return path == "-" ? sourceName(path) : printable(std::filesystem::path(path).filename().string(), 200);
@@ -149,17 +94,8 @@ EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& refere
   }
   EvaluatedEstimate e{
       .name = fileOf(path),
-      .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how),
-      .ape_title = {},
-      .rpe_title = {}};
+      .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how)};
   if (!e.evaluation.ok()) refuse(o, e.evaluation, reference, estimate);
-  // Titles name the unit in which the errors are first computed.
-  e.ape_title = fmt::format("APE w.r.t. {} ({}){}", wordsOfRelation(o.how.pose_relation), e.evaluation.ape_unit,
-                            alignmentTitle(o));
-  e.rpe_title =
-      fmt::format("RPE w.r.t. {} ({})\nfor delta = {} ({}) using {} pairs{}", wordsOfRelation(o.how.pose_relation),
-                  e.evaluation.rpe_unit, deltaOf(o.how.relative), deltaWord(o.how.relative.unit),
-                  o.how.relative.all_pairs ? "all" : "consecutive", alignmentTitle(o));
   return e;
 }
 
@@ -213,9 +149,12 @@ int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
   }
   applyConditions(o, output);
   publishResult(o.json, formatEvaluation(output), invocation.command_line, std::nullopt, output);
-  if (!o.save_results.empty())
-    writeOutput(o.save_results, evoResult(output, output.estimates[0], false, o.save_results));
-  if (!o.save_rpe.empty()) writeOutput(o.save_rpe, evoResult(output, output.estimates[0], true, o.save_rpe));
+  const EvaluatedEstimate& first = output.estimates[0];
+  const auto save = [&](const std::string& path, EvoErrors errors) {
+    if (path.empty()) return;
+    writeOutput(path, evoResult(first.evaluation, o.how, errors, {output.reference, first.name}, path));
+  };
+  save(o.save_results, EvoErrors::ape), save(o.save_rpe, EvoErrors::rpe);
   if (!o.report.empty()) writeEvaluationReport(o.report, invocation.command_line, output);
   if (!output.failed.empty()) return exit_validation_failed;
   for (const EvaluatedEstimate& e : output.estimates) {

@@ -23,9 +23,9 @@ namespace {
 constexpr const char* motion_name = "liestat motion";
 /// A quaternion of the command line is a unit quaternion within this.
 constexpr double unit_tolerance = 1e-3;
-constexpr std::size_t most_frames = 1000000;
+constexpr std::size_t max_frames = 1000000;
 /// Fewer observations than the filter asks for in one frame tell nothing of their unit.
-constexpr std::size_t least_observations_of_a_unit = 8;
+constexpr std::size_t min_observations_of_a_unit = 8;
 
 Calibration calibrationOf(const MotionInputOptions& options) {
   return options.calibration.empty() ? Calibration{} : readCalibration(options.calibration);
@@ -66,9 +66,9 @@ class TrackRays {
   MotionTracks take() {
     if (tracks_.frames.size() < 2) throw InputError(options_.tracks, 0, "there is one frame", "two frames or more");
     const std::size_t first = tracks_.frames.begin()->first, last = tracks_.frames.rbegin()->first;
-    if (last - first > most_frames) {
+    if (last - first > max_frames) {
       throw InputError(options_.tracks, 0, fmt::format("frames from {} to {}", first, last),
-                       fmt::format("at most {} of them", most_frames));
+                       fmt::format("at most {} of them", max_frames));
     }
     requireUnit();
     return std::move(tracks_);
@@ -77,7 +77,7 @@ class TrackRays {
  private:
   void requireUnit() {
     const std::size_t n = radii_.size() + tracks_.outside;
-    if (n < least_observations_of_a_unit) return;
+    if (n < min_observations_of_a_unit) return;
     if (radii_.empty()) {
       throw InputError(options_.tracks, 0, "no point lies where the camera sees",
                        "pixels of the camera that was given");

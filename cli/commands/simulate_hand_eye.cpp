@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,31 +22,21 @@ namespace {
 
 constexpr const char* command_name = "liestat simulate hand-eye";
 
+enum class FileFormat { csv, tum };
+constexpr auto words(FileFormat) { return std::array{"csv", "tum"}; }
+
 struct Options {
-  std::string output, format = "csv", motion = "general", noise = "isotropic", outlier_kind = "gross";
+  std::string output;
+  FileFormat format = FileFormat::csv;
   bool overwrite = false;
   std::uint64_t seed = 1;
   HandEyeSceneOptions scene;
 
   std::string path(const char* name) const {
-    return fmt::format("{}/{}.{}", output, name, format == "tum" ? "txt" : "csv");
+    return fmt::format("{}/{}.{}", output, name, format == FileFormat::tum ? "txt" : "csv");
   }
   std::string truth() const { return output + "/truth.json"; }
 };
-
-template <class Enum, class List>
-Enum byName(const List& all, const std::string& wanted) {
-  for (const Enum value : all) {
-    if (name(value) == wanted) return value;
-  }
-  throw OptionError(command_name, "there is no " + wanted);
-}
-template <class List>
-std::vector<std::string> namesOf(const List& all) {
-  std::vector<std::string> names;
-  for (const auto value : all) names.push_back(name(value));
-  return names;
-}
 
 /// Row i at the time i (s), with covariances unless the format has no place for them.
 std::string posesText(const HandEyeScene& scene, bool is_a, bool tum) {
@@ -91,15 +82,12 @@ JsonObject truthOf(const HandEyeScene& scene, const Options& options, const Invo
   return object.set("inlier", inlier);
 }
 
-int runCommand(Options options, const Invocation& invocation) {
-  HandEyeSceneOptions& scene_options = options.scene;
-  scene_options.motion = byName<HandEyeMotion>(all_hand_eye_motions, options.motion);
-  scene_options.noise = byName<HandEyeNoise>(all_hand_eye_noises, options.noise);
-  scene_options.outlier_kind = byName<HandEyeOutliers>(all_hand_eye_outliers, options.outlier_kind);
+int runCommand(const Options& options, const Invocation& invocation) {
+  const HandEyeSceneOptions& scene_options = options.scene;
   for (const double value : {scene_options.noise_factor, scene_options.outliers}) {
     if (!std::isfinite(value)) throw OptionError(command_name, "an option is not a finite number", "finite ones");
   }
-  const bool tum = options.format == "tum";
+  const bool tum = options.format == FileFormat::tum;
   if (!options.overwrite) {
     for (const std::string& path : {options.path("a"), options.path("b"), options.truth()}) {
       if (std::filesystem::exists(path)) throw InputError(path, 0, "the file is there", "another name, or --overwrite");
@@ -130,18 +118,15 @@ void addSimulateHandEyeCommand(const CommandList& simulate) {
       simulate.add("hand-eye", "Poses of a gripper and of the camera on it, including wrong ones, for hand-eye");
   command.option("--output", options->output, "Directory for a.csv, b.csv (a.txt, b.txt) and truth.json").required();
   command.flag("--overwrite", options->overwrite, "Replace files of these names");
-  command.option("--format", options->format, "csv with covariances (default), or tum without").oneOf({"csv", "tum"});
-  command.option("--motion", options->motion, "Default general; a list is in docs/program.md")
-      .oneOf(namesOf(all_hand_eye_motions));
-  command.option("--noise", options->noise, "isotropic (default), anisotropic or target")
-      .oneOf(namesOf(all_hand_eye_noises));
+  command.choice("--format", options->format, "csv with covariances (default), or tum without");
+  command.choice("--motion", options->scene.motion, "Default general; a list is in docs/program.md");
+  command.choice("--noise", options->scene.noise, "isotropic (default), anisotropic or target");
   command.option("--noise-factor", options->scene.noise_factor, "Multiplies the standard deviations (default 1)")
       .range(1e-6, 1e3);
   command.option("--pairs", options->scene.pairs, "Default 20").range(std::size_t{1}, std::size_t{100000});
   command.flag("--relative", options->scene.relative, "Independent motions, for AX = XB");
   command.option("--outliers", options->scene.outliers, "Share of wrong pairs (default 0)").range(0.0, 1.0);
-  command.option("--outlier-kind", options->outlier_kind, "gross (default), mild, flips or cluster")
-      .oneOf(namesOf(all_hand_eye_outliers));
+  command.choice("--outlier-kind", options->scene.outlier_kind, "gross (default), mild, flips or cluster");
   command.option("--seed", options->seed, "Seed; the same seed gives the same files (default 1)");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
 }

@@ -98,27 +98,4 @@ void refuse(EvaluationStatus status, const std::string& reason, const Trajectory
   }
 }
 
-Associated associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options) {
-  Associated a = associate({reference.times, reference.size(), reference.name},
-                           {estimate.times, estimate.size(), estimate.name}, options.association);
-  if (!a.ok()) refuse(a.status, a.reason, reference, estimate, options);
-  return a;
-}
-
-void cutTimes(Trajectory& reference, const TrajectoryInputOptions& options) {
-  const auto& [start, end] = std::pair(options.association.start, options.association.end);
-  if (!start && !end) return;
-  if (!reference.hasTimes()) refuse(EvaluationStatus::times_missing, {}, reference, reference, options);
-  const auto rows = rowsBetween(reference.times, start, end);
-  if (rows.empty()) refuse(EvaluationStatus::empty_interval, {}, reference, reference, options);
-  Trajectory cut = reference;
-  cut.time_texts.clear(), cut.times.clear(), cut.poses.clear(), cut.covariances.clear(), cut.lines.clear();
-  for (const std::size_t i : rows) {
-    cut.time_texts.push_back(reference.time_texts[i]), cut.times.push_back(reference.times[i]);
-    cut.poses.push_back(reference.poses[i]), cut.lines.push_back(reference.lines[i]);
-    if (reference.hasCovariances()) cut.covariances.push_back(reference.covariances[i]);
-  }
-  reference = std::move(cut);
-}
-
 }  // namespace liestat::cli

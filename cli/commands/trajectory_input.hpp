@@ -31,10 +31,4 @@ Trajectory readTimedTrajectory(const std::string& path, const TrajectoryOptions&
 [[noreturn]] void refuse(EvaluationStatus status, const std::string& reason, const Trajectory& reference,
                          const Trajectory& estimate, const TrajectoryInputOptions& options);
 
-/// The association of two trajectories. Throws InputError where times do not overlap or nothing matches.
-Associated associate(const Trajectory& reference, const Trajectory& estimate, const TrajectoryInputOptions& options);
-
-/// The reference between two times; the estimate keeps all of its poses. Throws InputError.
-void cutTimes(Trajectory& reference, const TrajectoryInputOptions& options);
-
 }  // namespace liestat::cli

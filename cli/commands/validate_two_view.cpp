@@ -1,7 +1,8 @@
 #include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
+#include <formats/two_view_pairs.hpp>
 #include <cli/show/validations.hpp>
-#include <experiments/two_view_pair_files.hpp>
+#include <experiments/two_view_pairs.hpp>
 #include <experiments/two_view_rules.hpp>
 #include <experiments/two_view_validation.hpp>
 

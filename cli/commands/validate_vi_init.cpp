@@ -9,6 +9,10 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace liestat::cli {
 using namespace experiments;
@@ -19,7 +23,7 @@ struct Options {
   std::vector<double> windows;
   double noise = 1;
   bool table1 = false;
-  std::string scene;
+  std::optional<int> figure;  ///< the scene with two solutions that is drawn
   RunOptions run;
 };
 
@@ -34,14 +38,14 @@ int runScene(const Options& options, const Invocation& invocation) {
   if (options.run.report.empty()) {
     throw OptionError("--scene", "draws into a directory and none is named", "--report DIR");
   }
-  const auto found = twoSolutions(options.scene == "fig1" ? 1 : 2, options.run.seed);
+  const auto found = twoSolutions(*options.figure, options.run.seed);
   if (found) return publish(options.run, invocation, viewOf(*found));
   printLines("no scene with two solutions that can be drawn among a thousand seeds\nFAILED\n");
   return exit_validation_failed;
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
-  if (!options.scene.empty()) return runScene(options, invocation);
+  if (options.figure) return runScene(options, invocation);
   if (options.table1) return runTable1(options, invocation);
   ViInitValidation validation;
   validation.checks = chosen(all_vi_init_checks, options.checks);
@@ -77,9 +81,8 @@ void addValidateViInitCommand(const CommandList& validate) {
   app.flag("--full", options->run.full, "4000 windows a row, 200 recordings; no time limit");
   const Option table1 = app.flag("--table1", options->table1, "The paper's table of cases, as it is recognised");
   const Option scene =
-      app.option("--scene", options->scene,
-                 "fig1, fig2: draws the paper's figure of two solutions into the directory of --report")
-          .oneOf({"fig1", "fig2"});
+      app.choice("--scene", options->figure, std::vector<std::pair<std::string, int>>{{"fig1", 1}, {"fig2", 2}},
+                 "fig1, fig2: draws the paper's figure of two solutions into the directory of --report");
   table1.excludes("--check").excludes("--window").excludes("--noise");
   scene.excludes(table1).excludes("--check").excludes("--window").excludes("--noise").excludes("--full");
   options->run.declare(app, "600, with --full 4000; recordings a twentieth, scenes of --table1: 100, 1000");

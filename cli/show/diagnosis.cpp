@@ -71,7 +71,7 @@ std::string formatDiagnosis(const DiagnosisOutput& output) {
                                                    : r.verdict().text + "\n" + acceptedInWords(r.accepted()) + "\n";
   text += fmt::format("{}: {} {}{}\n", joined(output.files, ", "), r.structure.n, r.what,
                       output.reference.empty() ? "" : ", truth " + output.reference);
-  for (const std::string& note : output.notes) text += note + "\n";
+  for (const std::string& note : r.file_notes) text += note + "\n";
   if (!r.diagnosis) {
     for (const std::string& line : r.structure.words()) text += line + "\n";
     if (r.chain) text += chainInWords(*r.chain);

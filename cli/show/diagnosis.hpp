@@ -12,13 +12,11 @@ namespace liestat::cli {
 struct DiagnosisOutput {
   std::vector<std::string> files;  ///< estimates, or the graph
   std::string reference;           ///< empty without truth
-  std::vector<std::string> notes;  ///< on the files
   CovarianceDiagnosis result;
 };
 template <class V>
 void describe(V& v, const DiagnosisOutput& output) {
   v("files", output.files)("reference", output.reference.empty() ? std::nullopt : std::optional(output.reference));
-  v("file_notes", output.notes);
   describe(v, output.result);
 }
 

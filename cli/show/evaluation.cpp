@@ -2,7 +2,6 @@
 
 #include <formats/input_error.hpp>
 #include <formats/output_file.hpp>
-#include <formats/result_zip.hpp>
 #include <formats/text.hpp>
 #include <report/page.hpp>
 #include <cli/show/pose_errors.hpp>
@@ -192,95 +191,6 @@ void writeEvaluationReport(const std::string& directory, const std::string& comm
     report.plot(neesPlot(e, k + 1));
   }
   printLines("\n" + report.write() + "\n");
-}
-
-// --- evo's result file --------------------------------------------------------------------------------------------------
-
-namespace {
-
-std::vector<double> distancesAlong(const std::vector<SE3d>& poses) {
-  std::vector<double> along(poses.size(), 0);
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    along[i] = along[i - 1] + (poses[i].translation() - poses[i - 1].translation()).norm();
-  }
-  return along;
-}
-
-/// Eight numbers a line, single blanks, no blank at the end and no blank last line: what evo reads.
-std::string tumText(const std::vector<double>& times, const std::vector<SE3d>& poses) {
-  std::string text;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Vector3d t = poses[i].translation();
-    const Eigen::Vector4d q = poses[i].so3().params();
-    text +=
-        fmt::format("{}{} {} {} {} {} {} {} {}", i > 0 ? "\n" : "", times[i], t[0], t[1], t[2], q[0], q[1], q[2], q[3]);
-  }
-  return text;
-}
-
-}  // namespace
-
-std::string evoResult(const EvaluationOutput& output, const EvaluatedEstimate& shown, bool relative,
-                      const std::string& path) {
-  const TrajectoryEvaluation& e = shown.evaluation;
-  const std::vector<double>& errors = relative ? e.rpe : e.ape;
-  std::vector<std::size_t> rows;
-  if (relative) {
-    rows.push_back(0);
-    for (const auto& [i, j] : e.pairs) rows.push_back(j);
-  } else {
-    for (std::size_t i = 0; i < e.matched.size(); ++i) rows.push_back(i);
-  }
-  std::vector<SE3d> reference, estimate;
-  std::vector<double> times, seconds;
-  for (const std::size_t i : rows) {
-    reference.push_back(e.matched[i].reference.mean);
-    estimate.push_back(e.alignment(e.matched[i].estimate.mean));
-    times.push_back(e.times[i]), seconds.push_back(e.times[i] - e.times[rows.front()]);
-  }
-  const std::vector<double> along_reference = distancesAlong(reference), along_estimate = distancesAlong(estimate);
-  // Values begin at the second pose of each pair, trajectories at the first pose.
-  const auto tail = [relative](const std::vector<double>& list) {
-    return npyArray(std::span(list).subspan(relative && !list.empty() ? 1 : 0));
-  };
-  JsonObject info;
-  // Two files of one name would be one trajectory.
-  const std::string est_name = shown.name == output.reference ? shown.name + "_estimate" : shown.name;
-  info.set("title", relative ? shown.rpe_title : shown.ape_title)
-      .set("ref_name", output.reference)
-      .set("est_name", est_name);
-  info.set("label", fmt::format("{} ({})", relative ? "RPE" : "APE", relative ? e.rpe_unit : e.ape_unit));
-  const JsonObject stats = JsonObject().fieldsOf(relative ? e.rpe_statistics : e.ape_statistics);
-  std::vector<ZipMember> members{{"info.json", info.str()}, {"stats.json", stats.str()}};
-  members.push_back({"error_array.npy", npyArray(errors)});
-  members.push_back({"seconds_from_start.npy", tail(seconds)});
-  members.push_back({"timestamps.npy", tail(times)});
-  members.push_back({"distances_from_start.npy", tail(along_reference)});
-  members.push_back({"distances.npy", tail(along_estimate)});
-  if (e.alignment.model != AlignmentModel::none) {
-    Eigen::Matrix<double, 4, 4, Eigen::RowMajor> sim3 = e.alignment.transform.matrix();
-    sim3.topLeftCorner<3, 3>() *= e.alignment.scale;
-    members.push_back({"alignment_transformation_sim3.npy", npyArray(std::span(sim3.data(), 16), 4)});
-  }
-  if (!relative && e.consistency.ok) {
-    std::vector<double> nees;
-    for (const PoseError& p : e.consistency.errors) nees.push_back(p.nees);
-    members.push_back({"nees.npy", npyArray(nees)});
-    std::string csv = "t";
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) csv += fmt::format(",cov_{}{}", i, j);
-    }
-    for (std::size_t k = 0; k < e.matched.size(); ++k) {
-      csv += fmt::format("\n{}", e.times[k]);
-      for (int i = 0; i < 6; ++i) {
-        for (int j = i; j < 6; ++j) csv += fmt::format(",{}", e.matched[k].estimate.covariance(i, j));
-      }
-    }
-    members.push_back({"covariances.csv", csv + "\n"});
-  }
-  members.push_back({output.reference + ".tum", tumText(times, reference)});
-  members.push_back({est_name + ".tum", tumText(times, estimate)});
-  return zipArchive(members, path);
 }
 
 }  // namespace liestat::cli

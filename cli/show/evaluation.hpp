@@ -12,7 +12,6 @@ namespace liestat::cli {
 struct EvaluatedEstimate {
   std::string name;  ///< name of the file
   TrajectoryEvaluation evaluation;
-  std::string ape_title, rpe_title;  ///< as evo writes them, where it could have computed the same
 };
 template <class V>
 void describe(V& v, const EvaluatedEstimate& e) {
@@ -40,9 +39,5 @@ void describe(V& v, const EvaluationOutput& output) {
 std::string formatEvaluation(const EvaluationOutput& output);
 void writeEvaluationReport(const std::string& directory, const std::string& command_line,
                            const EvaluationOutput& output);
-
-/// evo's result file: the archive of APE, or of RPE.
-std::string evoResult(const EvaluationOutput& output, const EvaluatedEstimate& e, bool relative,
-                      const std::string& path);
 
 }  // namespace liestat::cli

@@ -261,13 +261,13 @@ Plot excitationPlot(const HandEyeOutput& output) {
   double highest = o.trusted_excitation;
   for (int k = 0; k < 6; ++k) {
     const double value = output.result.excitations[k];
-    Series& series = value < o.least_excitation ? open : value < o.trusted_excitation ? weak : good;
+    Series& series = value < o.min_excitation ? open : value < o.trusted_excitation ? weak : good;
     series.add(k + 1, std::max(value, 1.02 * lowest)), series.width.push_back(0.6);
     if (std::isfinite(value)) highest = std::max(highest, value);
   }
   Panel panel{.x = {.label = "direction", .low = 0.4, .high = 6.6},
               .y = {.label = "excitation", .low = lowest, .high = 3 * highest, .logarithmic = true},
-              .references = {{ReferenceLine::Direction::horizontal, o.least_excitation},
+              .references = {{ReferenceLine::Direction::horizontal, o.min_excitation},
                              {ReferenceLine::Direction::horizontal, o.trusted_excitation}}};
   panel.add({open, weak, good});
   return {.name = "excitation",
@@ -275,7 +275,7 @@ Plot excitationPlot(const HandEyeOutput& output) {
               "Information of the motions over that which noise alone would make up, in the six "
               "directions of the unknown. Dotted: {:g}, below which a direction is open, and {:g}, from which "
               "on it is determined.",
-              o.least_excitation, o.trusted_excitation),
+              o.min_excitation, o.trusted_excitation),
           .panels = {panel}};
 }
 /// The planes of X's covariance in which no open direction lies.

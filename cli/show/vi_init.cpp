@@ -74,7 +74,7 @@ std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions) {
   double largest_p = 0, least = std::numeric_limits<double>::infinity(), largest = 0;
   for (const ComparedStretch& f : fusions) {
     with_state += f.has_state;
-    if (!f.has_state || f.p >= least_p_of_fusion) continue;
+    if (!f.has_state || f.p >= min_p_of_fusion) continue;
     ++contradict;
     inflated += f.inflated;
     largest_p = std::max(largest_p, f.p);
@@ -156,6 +156,9 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
       text += fmt::format("NEES of velocity and gravity: {:.3g} in the mean, 5 expected\n",
                           summary.nees / static_cast<double>(summary.with_nees));
     }
+    const Verdict errors = result.againstTruth();
+    if (!errors.isNone()) text += errors.text + "\n";
+    for (const std::string& cause : errors.causes) text += "  " + cause + "\n";
   }
   if (summary.degrees_of_freedom > 0) {
     text += fmt::format("chi2 per degree of freedom of the refinements: {:.3f}\n",

@@ -1,11 +1,14 @@
-// How the estimators of fusion/ are compiled. Their headers declare them; the definitions, in the folder detail/ of each
-// subject, are compiled once by the CMake targets liestat::fusion and liestat::trajectories, or by a project that compiles
-// fusion/compiled/*.cpp itself and defines LIESTAT_COMPILED_FUSION and LIESTAT_COMPILED_TRAJECTORIES for all of its units,
-// as the targets do. With LIESTAT_HEADER_ONLY defined for all units the headers include the definitions and nothing is
-// linked. Two views and hand-eye calibration use constrained estimation, liestat::estimation (stats/detail/compiled.hpp).
+// Macros for the compilation of the estimators of fusion/. Headers declare the estimators; their definitions are in the
+// folder detail/ of each subject. There are three ways to compile the definitions:
 //
-// A unit with neither may include the headers and use the types. A call of an estimator is an error at compile time that
-// names the target and the macro, rather than an undefined symbol.
+// - the CMake targets liestat::fusion and liestat::trajectories contain them;
+// - a project compiles fusion/compiled/*.cpp itself and defines LIESTAT_COMPILED_FUSION and
+//   LIESTAT_COMPILED_TRAJECTORIES in all of its units, as the targets do;
+// - LIESTAT_HEADER_ONLY is defined in all units: the headers include the definitions, and nothing is linked.
+//
+// A unit that does none of these may include the headers and use the types. A call of an estimator is then an error at
+// compile time that names the target and the macro, not an undefined symbol at link time. Two views and hand-eye
+// calibration use constrained estimation, liestat::estimation (stats/detail/compiled.hpp).
 #pragma once
 
 #include <stats/detail/compiled.hpp>

@@ -27,6 +27,13 @@ struct DampedOptions {
   double damping = 1e-4;       ///< initial damping
 };
 
+/// The factor by which a step that fails raises the damping, and one that succeeds lowers it.
+inline constexpr double damping_factor = 10;
+/// Below the first the steps are Gauss–Newton's; above the second they no longer change the parameters in double.
+inline constexpr double min_damping = 1e-10, max_damping = 1e10;
+/// Relative increase of the cost that rounding explains: the point is then at the minimum.
+inline constexpr double rounding_of_cost = 1e-9;
+
 /// The end of a minimisation.
 struct DampedSummary {
   double cost = std::numeric_limits<double>::infinity();
@@ -47,19 +54,18 @@ DampedSummary minimiseDamped(Problem& problem, const DampedOptions& options) {
     // The negation, so that NaN counts as no decrease.
     if (!(next < summary.cost)) {
       if (solved) problem.reject();
-      // An increase within rounding: the point is at the minimum.
-      if (next <= summary.cost + 1e-9 * (1 + summary.cost)) {
+      if (next <= summary.cost + rounding_of_cost * (1 + summary.cost)) {
         summary.status = FusionStatus::ok;
         return summary;
       }
-      damping *= 10;
-      if (damping > 1e10) return summary;
+      damping *= damping_factor;
+      if (damping > max_damping) return summary;
       continue;
     }
     const double decrease = summary.cost - next;
     problem.accept();
     summary.cost = problem.linearise();
-    damping = std::max(1e-10, 0.1 * damping);
+    damping = std::max(min_damping, damping / damping_factor);
     if (decrease < options.min_decrease && damping < 1) {
       summary.status = FusionStatus::ok;
       return summary;

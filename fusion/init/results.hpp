@@ -146,7 +146,7 @@ struct RefinementResult {
 /// Fused windows (window_fusion.hpp) that are as far apart with less than this probability contradict each other.
 inline constexpr double min_p_of_fusion = 1e-3;
 /// The former name of min_p_of_fusion.
-inline constexpr double least_p_of_fusion = min_p_of_fusion;
+[[deprecated("min_p_of_fusion")]] inline constexpr double least_p_of_fusion = min_p_of_fusion;
 
 /// Tracks that do not agree with the first motion but with another, and what they say. Indices are the window's.
 struct SecondMotion {

@@ -1,11 +1,11 @@
-// Linear least squares in three unknowns of known length: all local minima of |R x + r|² on |x| = radius. Gravity in a
+// Linear least squares for a vector of R³ of known length: all local minima of |R x + r|² on |x| = radius. Gravity in a
 // visual-inertial initialisation is such a vector.
 //
 // With R = U diag(s) Vᵀ, l = s² ascending and e = -s Uᵀr, the stationary points are V (l + λ)⁻¹ e with Σ e²/(l + λ)² =
 // radius². The global minimum is the only root λ ≥ -l₁; at most one other minimum exists, the root in (-l₂, -l₁)
 // nearest to -l₁ (J. M. Martínez, "Local minimizers of quadratic functions on Euclidean balls and spheres", SIAM J.
-// Optim. 4, 1994). The unknown is μ = l₁ + λ, with gaps l_k - l₁ = (s_k - s₁)(s_k + s₁), so that μ keeps all its digits
-// if a singular value is zero. Derivation: docs/theory/visual_inertial.md, section 3.2.
+// Optim. 4, 1994). The unknown is μ = l₁ + λ, with gaps l_k - l₁ = (s_k - s₁)(s_k + s₁), so that no digits of μ
+// cancel if a singular value is zero. Derivation: docs/theory/visual_inertial.md, section 3.2.
 #pragma once
 
 #include <lie/detail/small_orthogonal.hpp>
@@ -68,8 +68,8 @@ inline double globalRoot(const SecularPoint& secular, double radius) {
   return mu;
 }
 
-/// The root in (-gap₂, 0) nearest to 0, or 0 if there is none. |x|² is convex there, so that Newton's method started on
-/// the side of 0 never passes the root.
+/// The root in (-gap₂, 0) nearest to 0, or 0 if there is none. |x|² is convex there, so Newton's method does not overshoot
+/// the root if it starts between the root and 0.
 inline double localRoot(const SecularPoint& secular, double radius) {
   double mu = -std::abs(secular.e[0]) / radius;
   for (int i = 0; i < 400; ++i) {

@@ -123,7 +123,11 @@ class MotionFilter {
   std::size_t next_frame_ = 0, kept_frames_ = 0;
   bool in_charge_ = false;
   std::size_t hand_overs_ = 0, fall_backs_ = 0, waiting_ = 0;
-  double own_innovation_ = 0, other_innovation_ = 0;  ///< means over the last ten frames in charge
+  /// Frames over which innovations are averaged before the two filters are compared. The normalised innovation of one
+  /// frame of 30 points scatters by a quarter, too much for a factor of `fall_back`; the mean of ten by a tenth
+  /// (docs/theory/motion.md, section 8).
+  static constexpr std::size_t innovation_frames = 10;
+  double own_innovation_ = 0, other_innovation_ = 0;  ///< means over the last frames in charge
   std::size_t in_charge_for_ = 0;
 };
 

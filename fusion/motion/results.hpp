@@ -4,6 +4,7 @@
 
 #include <fusion/motion/plan.hpp>
 #include <fusion/motion/types.hpp>
+#include <lie/units.hpp>
 #include <stats/shown.hpp>
 #include <stats/verdict.hpp>
 
@@ -14,7 +15,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -171,7 +171,7 @@ void describe(V& v, const MotionFrame& x) {
   }
   if (shown(v, x.with_truth)) {
     const auto degrees = [](std::optional<double> angle) {
-      return angle ? std::optional<double>(180 / std::numbers::pi * *angle) : std::nullopt;
+      return angle ? std::optional<double>(*angle / units::degree) : std::nullopt;
     };
     v("direction_error_deg", degrees(x.direction_error), "with a truth; null: unknown, or hardly any motion", "deg");
     v("rotation_error_deg", degrees(x.rotation_error), "with a truth, per frame", "deg");
@@ -207,10 +207,10 @@ void describe(V& v, const MotionResult& x) {
   }
   v("frames", x.frames, "the motion of each");
   if (shown(v, x.with_truth)) {
-    const double degrees = 180 / std::numbers::pi;
-    v("median_direction_error_deg", degrees * x.medianError(&MotionFrame::direction_error), "with a truth", "deg");
-    v("median_rotation_error_deg", degrees * x.medianError(&MotionFrame::rotation_error), "with a truth, per frame",
+    v("median_direction_error_deg", x.medianError(&MotionFrame::direction_error) / units::degree, "with a truth",
       "deg");
+    v("median_rotation_error_deg", x.medianError(&MotionFrame::rotation_error) / units::degree,
+      "with a truth, per frame", "deg");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <fusion/motion/results.hpp>
 #include <fusion/motion/types.hpp>
 #include <lie/manifold.hpp>
+#include <lie/units.hpp>
 
 #include <Eigen/Core>
 
@@ -13,7 +14,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <vector>
@@ -66,14 +66,13 @@ class HemisphereChart {
   bool holds(const Eigen::Vector3d& direction) const { return direction.dot(centre_.unit_vector()) >= 0; }
   Eigen::Vector2d operator()(const Eigen::Vector3d& direction) const {
     const Eigen::Vector3d near = holds(direction) ? direction : Eigen::Vector3d(-direction);
-    return degrees * log(centre_, S2d(near));
+    return log(centre_, S2d(near)) / units::degree;
   }
   Eigen::Vector3d direction(const Eigen::Vector2d& coordinates) const {
-    return exp(centre_, Eigen::Vector2d(coordinates / degrees)).unit_vector();
+    return exp(centre_, Eigen::Vector2d(units::degree * coordinates)).unit_vector();
   }
 
  private:
-  static constexpr double degrees = 180 / std::numbers::pi;
   S2d centre_;
 };
 

@@ -171,9 +171,9 @@ struct MotionFilterOptions {
   double max_step = 0.5;  ///< rad per update
 
   // Sign of the direction.
-  bool positive_depth = true;      ///< false: V and -V are both accepted, and half of the starts end at the antipode
-  double evidence_decay = 0.95;    ///< per frame
-  double least_sign_evidence = 2;  ///< below it the sign is undecided
+  bool positive_depth = true;    ///< false: V and -V are both accepted, and half of the starts end at the antipode
+  double evidence_decay = 0.95;  ///< per frame
+  double min_sign_evidence = 2;  ///< below it the sign is undecided
 
   // Outliers.
   bool outliers = false;           ///< expect some: robust rotation per hypothesis, capped score, gates

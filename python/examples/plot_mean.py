@@ -11,13 +11,16 @@ import liestat
 def main() -> None:
     measured = liestat.sample(liestat.SO3.exp([1.0, 0.5, 0.2]), np.diag([0.3, 0.15, 0.1]) ** 2, 60, rng=3)
     result = liestat.mean(measured)
+    spread, covariance = result.dispersion, result.covariance
+    if spread is None or covariance is None:
+        sys.exit(f"no covariance: {result.reason}")
     points = result.mean.local(measured)
     region = result.confidence_region(0.95)
     angle = np.linspace(0, 2 * np.pi, 100)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     # The ellipses' shadows on the first two axes.
-    dispersion = np.linalg.cholesky(result.dispersion[:2, :2]) @ circle
-    of_mean = np.sqrt(region.threshold) * np.linalg.cholesky(result.covariance[:2, :2]) @ circle
+    dispersion = np.linalg.cholesky(spread[:2, :2]) @ circle
+    of_mean = np.sqrt(region.threshold) * np.linalg.cholesky(covariance[:2, :2]) @ circle
     print(f"{len(points)} rotations, 1-sigma dispersion reaches {np.abs(dispersion).max():.3f} rad")
     print(f"the mean is known to {np.abs(of_mean).max():.3f} rad with 95 %")
     try:

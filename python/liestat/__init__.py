@@ -39,6 +39,8 @@ from ._files import (
     read_stereo_camera,
     read_stereo_tracks,
     read_tracks,
+    read_two_view_pair,
+    read_two_view_pairs,
 )
 from ._gaussians import (
     CONVENTIONS,

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 __version__: str
 
 _Array = NDArray[np.float64]
+_Several = np.ndarray[Any, np.dtype[Any]]  # a value for each of several means
 _T = TypeVar("_T")
 _M = TypeVar("_M", bound="Manifold")
 _G = TypeVar("_G", bound="Group")
@@ -201,8 +202,8 @@ class Uniqueness(str):
 
 class MeanResult(_MeanSummary):
     law: Law
-    near_tie_z: Any
-    cost: Any
+    near_tie_z: _Array | _Several
+    cost: float | _Several
     shape: tuple[int, ...]
     def __init__(self, kind: Any, criterion: str, answers: Any, shape: tuple[int, ...]) -> None: ...
     def __getattr__(self, name: str) -> Any: ...
@@ -359,49 +360,54 @@ class Result:
 
 # fields of results, written by ./run generate
 class _MeanSummary:
-    feature: Any  # text; the type of the measurements
-    criterion: Any  # text; lsq, wlsq, maha or barycentre
-    covariance_at: Any  # text or null; frame of the measurements' covariances; null where it does not matter
-    likelihood: Any  # bool; whether the volume element is in the criterion
-    weighted: Any  # bool; whether weights were used
-    n: Any  # integer; measurements that count: those with a weight
+    feature: str | _Several  # text; the type of the measurements
+    criterion: str | _Several  # text; lsq, wlsq, maha or barycentre
+    # text or null; frame of the measurements' covariances; null where it does not matter
+    covariance_at: str | _Several | None
+    likelihood: bool | _Several  # bool; whether the volume element is in the criterion
+    weighted: bool | _Several  # bool; whether weights were used
+    n: int | _Several  # integer; measurements that count: those with a weight
     # text; ok, not_converged, ambiguous, ill_defined or too_few; not_applicable: a mean, but no covariance can be computed
-    status: Any
-    reason: Any  # text or null; in words, where status is not ok
-    converged: Any  # bool
-    iterations: Any  # integer
-    residual: Any  # number; norm of the last step
-    tolerance: Any  # number; of the norm of the last step
+    status: str | _Several
+    reason: str | _Several | None  # text or null; in words, where status is not ok
+    converged: bool | _Several  # bool
+    iterations: int | _Several  # integer
+    residual: float | _Several  # number; norm of the last step
+    tolerance: float | _Several  # number; of the norm of the last step
     mean: Any  # object; the parts that the feature has
-    covariance: Any  # n×n or null; of the mean, in its own axes; null where it is withheld
-    covariance_status: Any  # text; why there is no covariance; otherwise ok
-    covariance_order: Any  # text; coordinates of the covariance, with units
-    covariance_side: Any  # text; on which its errors are applied
-    covariance_frame: Any  # text; its axes
-    tangent_basis: Any  # 3×2 or null; directions: the axes of the two tangent coordinates, in columns
-    covariance_from: Any  # text or null; noise or residuals
-    covariance_law: Any  # text or null; of squared distances from the truth: chi2 or hotelling
+    covariance: _Array | None  # n×n or null; of the mean, in its own axes; null where it is withheld
+    covariance_status: str | _Several  # text; why there is no covariance; otherwise ok
+    covariance_order: str | _Several  # text; coordinates of the covariance, with units
+    covariance_side: str | _Several  # text; on which its errors are applied
+    covariance_frame: str | _Several  # text; its axes
+    tangent_basis: _Array | None  # 3×2 or null; directions: the axes of the two tangent coordinates, in columns
+    covariance_from: str | _Several | None  # text or null; noise or residuals
+    covariance_law: str | _Several | None  # text or null; of squared distances from the truth: chi2 or hotelling
     # by name or null; along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg
-    standard_deviations: Any
-    standard_deviations_world: Any  # by name or null; translation_m of frames along the axes of the world
-    dispersion: Any  # n×n or null; the measurements' covariance about the mean
-    dispersion_standard_deviations_world: Any  # by name or null; as standard_deviations_world
-    dispersion_standard_deviations: Any  # by name or null; as standard_deviations
-    farthest: Any  # list of objects; the farthest measurement in each part of the tangent vector
-    unique: Any  # text; unique, ambiguous or not_certified
-    proof: Any  # text; of uniqueness, in words
+    standard_deviations: dict[str, Any] | _Several | None
+    # by name or null; translation_m of frames along the axes of the world
+    standard_deviations_world: dict[str, Any] | _Several | None
+    dispersion: _Array | None  # n×n or null; the measurements' covariance about the mean
+    # by name or null; as standard_deviations_world
+    dispersion_standard_deviations_world: dict[str, Any] | _Several | None
+    dispersion_standard_deviations: dict[str, Any] | _Several | None  # by name or null; as standard_deviations
+    # list of objects; the farthest measurement in each part of the tangent vector
+    farthest: list[dict[str, Any]] | _Several
+    unique: Uniqueness | _Several  # text; unique, ambiguous or not_certified
+    proof: str | _Several  # text; of uniqueness, in words
     rivals: Any  # list of objects; other minimisers of equal cost
-    rivals_complete: Any  # bool; false: there are more, such as a circle, or the search ended early
-    r_star: Any  # number; radius in which the criterion is convex and has no other minimum; rad
-    cells: Any  # integer; of the global search; 0: it was not needed
+    rivals_complete: bool | _Several  # bool; false: there are more, such as a circle, or the search ended early
+    r_star: float | _Several  # number; radius in which the criterion is convex and has no other minimum; rad
+    cells: int | _Several  # integer; of the global search; 0: it was not needed
     near_ties: Any  # list of objects; other minima that the noise does not exclude, which make the status ambiguous
-    cut_locus_mass: Any  # number; fraction of the measurements near the cut locus of the mean
-    hessian_change: Any  # number; relative decrease of the Hessian averaged over the confidence region
-    fit: Any  # number or null; sum of the squared Mahalanobis distances, if the noise is known
-    fit_dof: Any  # number or null; its degrees of freedom
-    fit_p: Any  # number or null; probability of so large a sum
-    time_blocks: Any  # object or null; rows with times: whether their errors are independent; null without
-    notes: Any  # list of text; what is remarkable, in sentences
+    cut_locus_mass: float | _Several  # number; fraction of the measurements near the cut locus of the mean
+    hessian_change: float | _Several  # number; relative decrease of the Hessian averaged over the confidence region
+    fit: float | _Several | None  # number or null; sum of the squared Mahalanobis distances, if the noise is known
+    fit_dof: float | _Several | None  # number or null; its degrees of freedom
+    fit_p: float | _Several | None  # number or null; probability of so large a sum
+    # object or null; rows with times: whether their errors are independent; null without
+    time_blocks: dict[str, Any] | _Several | None
+    notes: list[str] | _Several  # list of text; what is remarkable, in sentences
 
 class _SplitSeries(Result):
     splits: int  # that were done
@@ -596,6 +602,10 @@ class _PlanRow(Result):
     equal: list[str]  # conventions that write the same matrices here
 
 class _CovarianceDiagnosis(Result):
+    file_notes: list[str]  # what is remarkable in the files
+    sentence: str  # the verdict in a sentence
+    # one convention, and the errors follow it; false: they do not; null: undecidable. True for a plan
+    decided: bool | None
     mode: str  # diagnosis, chain or plan
     what: str  # the matrices belong to: poses, edges, or runs at a time
     n: int  # matrices
@@ -791,6 +801,7 @@ class _InitialisationErrors(Result):
 class _ComparedRecording(Result):
     ok: bool  # the result is to be trusted
     in_words: str  # the verdict
+    causes: list[str]  # with a truth: tests that speak against it, each with its likely cause
     images_outside: int  # that the readings do not cover
     bearing_noise: float  # standard deviation of the bearings; rad
     interrupted: bool  # only then
@@ -1287,10 +1298,6 @@ def convert_trajectory(
     seed: int = 1,
     lines: Sequence[int] | _Array | None = None,
 ) -> _Conversion: ...
-class _Diagnosis(_CovarianceDiagnosis):
-    sentence: str
-    decided: bool | None
-
 def diagnose_conventions(
     estimate: SE3 | Sequence[SE3],
     matrices: ArrayLike | Sequence[ArrayLike],
@@ -1312,5 +1319,9 @@ def diagnose_conventions(
     max_gap: float | None = None,
     max_difference: float = 0.01,
     offset: float = 0.0,
-) -> _Diagnosis: ...
+    start: float | None = None,
+    end: float | None = None,
+) -> _CovarianceDiagnosis: ...
+def read_two_view_pair(path: Any, family: Literal["homogr", "kusvod2", "adelaide-rmf", "evd"]) -> Result: ...
+def read_two_view_pairs(directory: Any) -> list[Result]: ...
 def read_tracks(path: Any, image_times: Any = "", *, start_ns: int = 0) -> Result: ...

@@ -259,6 +259,8 @@ def diagnose_conventions(
     max_gap=None,
     max_difference=0.01,
     offset=0.0,
+    start=None,
+    end=None,
 ):
     """Which conventions explain the errors of poses under the matrices that a file gives for them.
 
@@ -294,13 +296,15 @@ def diagnose_conventions(
         Seconds between two stamps of the truth to interpolate between; five median steps.
     offset : float
         Seconds that are added to `times`.
+    start, end : float, optional
+        Seconds: the part of the truth that is used.
 
     Returns
     -------
     Result
-        The fields of ``liestat doctor --json`` (docs/program.md): those of the diagnosis, or `chain`, or
-        `plan`. The verdict in words is `sentence`; `decided` is True (one convention,
-        and the errors follow it), False (they do not) or None (undecidable).
+        The fields of ``liestat doctor --json`` (docs/program.md): `file_notes`, and those of the diagnosis, or
+        `chain`, or `plan`. The verdict in words is `sentence`; `decided` is True (one convention, and the errors
+        follow it), False (they do not) or None (undecidable).
     """
     caller = "diagnose_conventions"
     _choice(caller, "align", align, ("none", "posyaw", "se3", "sim3"))
@@ -322,32 +326,29 @@ def diagnose_conventions(
         raise ValueError(f"{caller}: expected an estimate, matrices and times for each run")
     if len(estimates) > 1 and (mode != "diagnosis" or align != "none" or edges):
         raise ValueError(f"{caller}: several runs: expected a truth, runs in its world, and no edges")
-    if truth_times is not None:
-        at_truth = _times(caller, "truth_times", truth_times, len(truth))
+    exact = at_truth = None
+    if mode == "diagnosis":
+        exact = _poses(caller, "truth", truth)
+        if truth_times is not None:
+            at_truth = _times(caller, "truth_times", truth_times, len(exact))
+        elif start is not None or end is not None:
+            raise ValueError(f"{caller}: start and end: expected truth_times")
     runs = []
     for run, table, run_times in zip(estimates, tables, stamps):
         params = _poses(caller, "estimate", run)
         table = _matrices(caller, table, len(params))
         run_times = None if run_times is None else _times(caller, "times", run_times, len(params))
-        exact = params
-        if mode == "diagnosis":
-            exact = _poses(caller, "truth", truth)
-            if truth_times is not None:
-                if run_times is None:
-                    raise ValueError(f"{caller}: truth_times without times")
-                slerp = interpolation == "slerp"
-                nearest = association == "nearest"
-                gap = None if max_gap is None else float(max_gap)
-                rows, exact = _core.match_truth(
-                    exact, at_truth, run_times, nearest, slerp, gap, float(max_difference), float(offset)
-                )
-                params, table, run_times = params[rows], table[rows], run_times[rows]
-            elif len(exact) != len(params):
-                raise ValueError(f"{caller}: {len(exact)} true poses of {len(params)}, expected one for each, or times")
-        runs.append((np.ascontiguousarray(params), np.ascontiguousarray(table), exact, run_times))
+        if at_truth is not None and run_times is None:
+            raise ValueError(f"{caller}: truth_times without times")
+        if exact is not None and at_truth is None and len(exact) != len(params):
+            raise ValueError(f"{caller}: {len(exact)} true poses of {len(params)}, expected one for each, or times")
+        runs.append((np.ascontiguousarray(params), np.ascontiguousarray(table), run_times))
+    how = {"association": association, "interpolation": interpolation, "max_gap": max_gap}
+    how |= {"max_difference": max_difference, "offset": offset, "start": start, "end": end}
     if edges and content is None:
         content = "information"
+    at = None if at is None else float(at)
     d = _core.diagnose_conventions(
-        runs, mode, align, float(alpha), None if at is None else float(at), bool(all_units), order, content, bool(edges)
+        runs, exact, at_truth, how, mode, align, float(alpha), at, bool(all_units), order, content, bool(edges)
     )
     return Result.of("diagnosis", d)

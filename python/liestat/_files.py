@@ -216,6 +216,38 @@ def read_matches(path):
     return _reader("read_matches")(os.fspath(path))
 
 
+def read_two_view_pair(path, family):
+    """Matches of a real pair of images, with labels or points that validate.
+
+    Parameters
+    ----------
+    path : str or path
+        CSV with x1, y1, x2, y2 (px) and, by the family, `validation`, `structure` or `inlier`.
+    family : {'homogr', 'kusvod2', 'adelaide-rmf', 'evd'}
+
+    Returns
+    -------
+    Result
+        `family`, `name`; `matches`, shape (n, 4), and `validation`, shape (k, 4): x1 y1 x2 y2; `labels` of the matches (0:
+        wrong; empty if the family has none), `corner` and `size` (px) of both images.
+    """
+    families = ("homogr", "kusvod2", "adelaide-rmf", "evd")
+    if family not in families:
+        raise ValueError(f"read_two_view_pair: family: expected one of {families}, got {family!r}")
+    return Result("pair of images", **_reader("read_two_view_pair")(os.fspath(path), family))
+
+
+def read_two_view_pairs(directory):
+    """All pairs of a directory, in its folders homogr, kusvod2, adelaide-rmf and evd (docs/formats.md).
+
+    Returns
+    -------
+    list of Result
+        As of `read_two_view_pair`; the image sizes are those of `manifest.csv` if it has them.
+    """
+    return [Result("pair of images", **pair) for pair in _reader("read_two_view_pairs")(os.fspath(directory))]
+
+
 def read_pose_pairs(path_a, path_b, *, by_row=False, tolerance=0.01, norm_tolerance=1e-3):
     """Poses of two files that belong together, for `hand_eye`.
 

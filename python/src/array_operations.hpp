@@ -25,17 +25,17 @@ struct Rows {
   std::ptrdiff_t step = 0;
 };
 
-inline constexpr std::size_t most_operands = 4;
+inline constexpr std::size_t max_operands = 4;
 
 /// Evaluates an operation on rows [0, n) and writes the results one after the other.
-using Kernel = void (*)(const std::array<Rows, most_operands>& operands, double* out, std::size_t n);
+using Kernel = void (*)(const std::array<Rows, max_operands>& operands, double* out, std::size_t n);
 
 /// An operation of a type: its operands with their names and columns, the columns of its result.
 struct ArrayOperation {
   std::string_view name;
   std::size_t operands = 0;
-  std::array<std::string_view, most_operands> names = {};
-  std::array<std::size_t, most_operands> columns = {};
+  std::array<std::string_view, max_operands> names = {};
+  std::array<std::size_t, max_operands> columns = {};
   std::size_t result = 0;
   Kernel kernel = nullptr;
 };
@@ -60,7 +60,7 @@ ArrayType nonOrientedFrameOperations();
 
 /// A loop over rows: f(a, …, out) on pointers to each row's first number.
 template <class F, std::size_t Result, std::size_t... I>
-void rowsOf(const std::array<Rows, most_operands>& operands, double* out, std::size_t n) {
+void rowsOf(const std::array<Rows, max_operands>& operands, double* out, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     F{}((operands[I].data + static_cast<std::ptrdiff_t>(i) * operands[I].step)..., out + i * Result);
   }
@@ -80,7 +80,7 @@ constexpr Kernel kernelOf(std::index_sequence<I...>) {
 /// An operation whose kernel is a loop over f, a lambda without captures: f(a, …, out) on pointers to numbers.
 template <std::size_t Result, std::size_t N, class F>
 ArrayOperation operation(std::string_view name, const Operand (&operands)[N], F) {
-  static_assert(N <= most_operands && std::is_empty_v<F>);
+  static_assert(N <= max_operands && std::is_empty_v<F>);
   ArrayOperation result{.name = name, .operands = N, .result = Result};
   for (std::size_t i = 0; i < N; ++i) {
     result.names[i] = operands[i].name;

@@ -59,8 +59,8 @@ struct BoundOperation {
     if (arguments.size() != operation.operands) {
       throw py::type_error(std::string(operation.name) + " takes " + std::to_string(operation.operands) + " arrays");
     }
-    std::array<Rows, most_operands> rows;
-    std::array<py::array_t<double>, most_operands> alive;
+    std::array<Rows, max_operands> rows;
+    std::array<py::array_t<double>, max_operands> alive;
     for (std::size_t i = 0; i < operation.operands; ++i) {
       if (!py::isinstance<py::array_t<double>>(arguments[i])) throw py::type_error("the arrays are of float64");
       alive[i] = py::reinterpret_borrow<py::array_t<double>>(arguments[i]);
@@ -92,7 +92,7 @@ struct BoundOperation {
           [&](std::size_t chunk) {
             const ChunkRange range = chunkRange(n, n_chunks, chunk);
             check(rows, range.begin, range.end);
-            std::array<Rows, most_operands> part = rows;
+            std::array<Rows, max_operands> part = rows;
             for (Rows& r : part) {
               if (r.data != nullptr) r.data += static_cast<std::ptrdiff_t>(range.begin) * r.step;
             }
@@ -105,7 +105,7 @@ struct BoundOperation {
   }
 
  private:
-  void check(const std::array<Rows, most_operands>& rows, std::size_t begin, std::size_t end) const {
+  void check(const std::array<Rows, max_operands>& rows, std::size_t begin, std::size_t end) const {
     for (std::size_t i = 0; i < operation.operands; ++i) {
       if (const auto row = firstNotFinite(rows[i], operation.columns[i], begin, end)) {
         NotFinite error;

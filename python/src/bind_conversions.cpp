@@ -56,32 +56,6 @@ py::dict convert(const DoubleArray& poses, const DoubleArray& matrices, const st
   return withVerdict(dictWithSeries(c), c.verdict());
 }
 
-/// Poses with a partner in the truth: their rows, and the truth at their times.
-py::tuple matchTruth(const DoubleArray& truth, const DoubleArray& truth_times, const DoubleArray& times, bool nearest,
-                     bool slerp, std::optional<double> max_gap, double max_difference, double offset) {
-  const std::vector<double> at = valuesOf(truth_times), wanted = valuesOf(times);
-  const AssociationOptions how{.rule = nearest ? AssociationRule::nearest : AssociationRule::interpolate,
-                               .interpolation = slerp ? PoseInterpolation::slerp : PoseInterpolation::geodesic,
-                               .max_gap = max_gap,
-                               .max_difference = max_difference,
-                               .offset = offset};
-  const Associated found = associate({at, at.size(), "the truth"}, {wanted, wanted.size(), "the estimate"}, how);
-  if (!found.ok()) throw std::invalid_argument("diagnose_conventions: " + found.reason);
-  const std::vector<TimeMatch>& matches = found.matches;
-  const std::vector<Gaussian<SE3d>> exact = exactPoses(posesOf(truth));
-  const std::vector<Gaussian<SE3d>> estimate(wanted.size());
-  const auto matched = matchedPoses(matches, exact, estimate, how.interpolation);
-  const auto n = static_cast<py::ssize_t>(matched.size());
-  py::array_t<py::ssize_t> rows(n);
-  DoubleArray poses({n, py::ssize_t{7}});
-  for (py::ssize_t i = 0; i < n; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    rows.mutable_data()[i] = static_cast<py::ssize_t>(matches[k].estimate);
-    storePoint(matched[k].reference.mean, poses.mutable_data() + 7 * i);
-  }
-  return py::make_tuple(rows, poses);
-}
-
 template <class Enum>
 Enum named(const std::string& word, std::initializer_list<Enum> values) {
   for (const Enum value : values) {
@@ -90,20 +64,51 @@ Enum named(const std::string& word, std::initializer_list<Enum> values) {
   throw std::invalid_argument("there is no '" + word + "'");
 }
 
-/// Runs are tuples (estimates, matrices, truth, times or None); without a truth it is the estimate.
-py::dict diagnose(
-    const std::vector<std::tuple<DoubleArray, DoubleArray, DoubleArray, std::optional<DoubleArray>>>& given,
-    const std::string& mode, const std::string& alignment, double alpha, std::optional<double> at, bool all_units,
-    const std::optional<std::string>& order, const std::optional<std::string>& content, bool edges) {
-  std::vector<DiagnosedRun> runs;
-  for (const auto& [estimates, matrices, truth, times] : given) {
-    const std::vector<SE3d> T = posesOf(estimates), exact = posesOf(truth);
-    const std::vector<Matrix6> M = matricesOf(matrices);
-    DiagnosedRun run;
-    for (std::size_t i = 0; i < T.size(); ++i) run.poses.push_back({T[i], M[i], exact[i]});
-    if (times) run.times = valuesOf(*times);
-    runs.push_back(std::move(run));
+PoseTrajectory trajectoryOf(const DoubleArray& poses, const std::optional<DoubleArray>& times) {
+  return {.times = times ? valuesOf(*times) : std::vector<double>(), .poses = exactPoses(posesOf(poses))};
+}
+
+/// A run of poses with their matrices, and times or None.
+using GivenRun = std::tuple<DoubleArray, DoubleArray, std::optional<DoubleArray>>;
+
+/// Without a truth a run has none, and with one that has no times row i belongs to row i.
+DiagnosedRun runOf(const GivenRun& given, const std::optional<PoseTrajectory>& truth, const AssociationOptions& how) {
+  const auto& [poses, matrices, times] = given;
+  PoseTrajectory estimate = trajectoryOf(poses, times);
+  const std::vector<Matrix6> all = matricesOf(matrices);
+  for (std::size_t i = 0; i < all.size(); ++i) estimate.poses[i].covariance = all[i];
+  if (!truth) {
+    DiagnosedRun run{{}, estimate.times};
+    for (const Gaussian<SE3d>& pose : estimate.poses) run.poses.push_back({pose.mean, pose.covariance, pose.mean});
+    return run;
   }
+  const std::vector<double> stamps = estimate.times;
+  if (truth->times.empty()) estimate.times.clear();
+  RunAgainstTruth found = runAgainstTruth(*truth, estimate, how);
+  if (!found.ok()) throw std::invalid_argument("diagnose_conventions: " + found.reason);
+  if (truth->times.empty()) found.run.times = stamps;
+  return found.run;
+}
+
+AssociationOptions associationOf(const py::dict& given) {
+  return {.rule = *liestat::named<AssociationRule>(given["association"].cast<std::string>()),
+          .interpolation = *liestat::named<PoseInterpolation>(given["interpolation"].cast<std::string>()),
+          .max_gap = given["max_gap"].cast<std::optional<double>>(),
+          .max_difference = given["max_difference"].cast<double>(),
+          .offset = given["offset"].cast<double>(),
+          .start = given["start"].cast<std::optional<double>>(),
+          .end = given["end"].cast<std::optional<double>>()};
+}
+
+py::dict diagnose(const std::vector<GivenRun>& given, const std::optional<DoubleArray>& true_poses,
+                  const std::optional<DoubleArray>& truth_times, const py::dict& association, const std::string& mode,
+                  const std::string& alignment, double alpha, std::optional<double> at, bool all_units,
+                  const std::optional<std::string>& order, const std::optional<std::string>& content, bool edges) {
+  std::optional<PoseTrajectory> truth;
+  if (true_poses) truth = trajectoryOf(*true_poses, truth_times);
+  const AssociationOptions how = associationOf(association);
+  std::vector<DiagnosedRun> runs;
+  for (const GivenRun& run : given) runs.push_back(runOf(run, truth, how));
   CovarianceDiagnosisOptions options;
   options.mode = named(mode, {DiagnosisMode::diagnosis, DiagnosisMode::chain, DiagnosisMode::plan});
   options.alignment =
@@ -116,14 +121,13 @@ py::dict diagnose(
     const py::gil_scoped_release released;
     return interruptible([=](const std::atomic<bool>&) { return diagnoseCovariances(runs, options); });
   }();
-  return withVerdict(dictOf(d), d.verdict());
+  return dictOf(d);
 }
 
 }  // namespace
 
 void bindConversions(py::module_& module) {
   module.def("convert_trajectory", &convert);
-  module.def("match_truth", &matchTruth);
   module.def("diagnose_conventions", &diagnose);
 }
 

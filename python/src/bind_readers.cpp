@@ -5,6 +5,7 @@
 #include <formats/input_error.hpp>
 #include <formats/pose_pairs.hpp>
 #include <formats/tracks.hpp>
+#include <formats/two_view_pairs.hpp>
 #include <python/src/array_operations.hpp>
 #include <python/src/described.hpp>
 
@@ -211,6 +212,24 @@ py::dict readPosePairFiles(const std::string& path_a, const std::string& path_b,
   return d;
 }
 
+py::dict dictOfPair(const TwoViewPair& pair) {
+  const auto row = [](const Eigen::Vector4d& match, double* out) { Eigen::Map<Eigen::Vector4d>{out} = match; };
+  py::dict d;
+  d["family"] = name(pair.family), d["name"] = text(pair.name);
+  d["matches"] = rowsOf(pair.matches, 4, row), d["validation"] = rowsOf(pair.validation, 4, row);
+  d["labels"] = integers(std::vector<std::int64_t>(pair.labels.begin(), pair.labels.end()));
+  d["corner"] = DictView::of(pair.corner), d["size"] = DictView::of(pair.size);
+  return d;
+}
+py::dict readTwoViewPairFile(const std::string& path, const std::string& family) {
+  return dictOfPair(released([&] { return readTwoViewPair(path, *named<PairFamily>(family)); }));
+}
+py::list readTwoViewPairFiles(const std::string& directory) {
+  py::list all;
+  for (const TwoViewPair& pair : released([&] { return readTwoViewPairs(directory); })) all.append(dictOfPair(pair));
+  return all;
+}
+
 }  // namespace
 
 void bindReaders(py::module_& module) {
@@ -227,6 +246,8 @@ void bindReaders(py::module_& module) {
   module.def("read_landmarks", [](const std::string& path) { return arrayOfPoints(readLandmarks(path)); });
   module.def("read_matches", [](const std::string& path) { return arrayOfPoints(readMatches(path)); });
   module.def("read_pose_pairs", &readPosePairFiles);
+  module.def("read_two_view_pair", &readTwoViewPairFile);
+  module.def("read_two_view_pairs", &readTwoViewPairFiles);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

@@ -116,7 +116,7 @@ ArrayView<const double> viewOf(const Rows& rows, std::size_t n) {
 /// One of these kernels as an entry of a table; Result numbers come of operands of A and B numbers, B zero where there
 /// is one operand. Matrices by rows.
 template <auto function, std::size_t Result, std::size_t A, std::size_t B = 0>
-void arrayKernel(const std::array<Rows, most_operands>& operands, double* out, std::size_t n) {
+void arrayKernel(const std::array<Rows, max_operands>& operands, double* out, std::size_t n) {
   const ArrayView<double> result = ArrayView<double>(out, n, Result, 1, Result).byRows();
   if constexpr (B == 0) {
     function(viewOf<A>(operands[0], n), result);

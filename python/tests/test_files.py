@@ -120,6 +120,23 @@ class Files(unittest.TestCase):
         pairs = liestat.read_pose_pairs(first, second, by_row=True)
         self.assertEqual((len(pairs.a), pairs.times), (4, None))
 
+    def test_labelled_pairs_of_images(self):
+        folder = self.path.with_name("evd")
+        folder.mkdir()
+        rows = [[1, 2, 3, 4, 1], [5, 6, 7, 8, 0]]
+        path = self.write("x1,y1,x2,y2,inlier", rows).rename(folder / "a.csv")
+        pair = liestat.read_two_view_pair(path, "evd")
+        np.testing.assert_array_equal(pair.matches, np.array(rows)[:, :4])
+        self.assertEqual((pair.family, pair.name, pair.labels.tolist(), len(pair.validation)), ("evd", "a", [1, 0], 0))
+        self.assertEqual((pair.corner.tolist(), pair.size.tolist()), ([1, 2], [6, 6]))
+        self.path.with_name("manifest.csv").write_text("family,pair,note\nevd,a,imsize=480x640\n")
+        (only,) = liestat.read_two_view_pairs(self.path.parent)
+        self.assertEqual((only.name, only.corner.tolist(), only.size.tolist()), ("a", [0, 0], [640, 480]))
+        with self.assertRaisesRegex(ValueError, "no column 'structure'"):
+            liestat.read_two_view_pair(path, "adelaide-rmf")
+        with self.assertRaisesRegex(ValueError, "expected one of"):
+            liestat.read_two_view_pair(path, "other")
+
     def test_messages(self):
         path = self.write("qx,qy,qz,qw", [[0, 0, 0, 1], [0, 0, 0, 2]])
         with self.assertRaisesRegex(ValueError, r"file\.csv:3: "):

@@ -1,6 +1,7 @@
 """`liestat vi-init` and `liestat.vi_init` on the same files."""
 
 import os
+import subprocess
 import tempfile
 import unittest
 
@@ -95,6 +96,29 @@ class ViInitParity(parity.ParityTest):
         result = self.run_both("--gravity", 5, codes=(3,), gravity=5.0)
         self.assertFalse(result.ok)
         self.assertTrue(result.in_words.startswith("Not to be trusted"), result.in_words)
+
+    def test_errors_that_the_covariances_do_not_explain(self):
+        # The velocity of the truth is 0.5 m/s off: each window by itself fits its measurements.
+        wrong = os.path.join(self.directory.name, "wrong.csv")
+        with open(self.truth_file, encoding="utf-8") as file, open(wrong, "w", encoding="utf-8") as output:
+            for line in file:
+                cells = line.strip().split(",")
+                if not line.startswith("#"):
+                    cells[8:11] = [repr(float(cell) + 0.5) for cell in cells[8:11]]
+                output.write(",".join(cells) + "\n")
+        imu_start = liestat.read_imu(self.arguments[2]).start_ns
+        truth = parity.truth_of(wrong, imu_start)
+        result = self.run_both("--truth", wrong, codes=(3,), truth=truth)
+        self.assertFalse(result.ok)
+        self.assertIn("INCONSISTENT with the truth", result.in_words)
+        self.assertTrue(any(cause.startswith("velocity of windows") for cause in result.causes), result.causes)
+        said = subprocess.run(
+            [parity.PROGRAM, *self.arguments, "--truth", wrong], capture_output=True, text=True
+        ).stdout
+        for sentence in (result.in_words.partition(", but ")[2].removesuffix("."), *result.causes):
+            self.assertIn(sentence, said)
+        right = self.run_both("--truth", self.truth_file, truth=self.truth)
+        self.assertEqual(right.causes, [])
 
     def test_former_names(self):
         result = self.run_both()

@@ -20,7 +20,7 @@ namespace liestat::detail {
 /// No region is taken to be narrower, rad, or there would be too few data in it to estimate a density from.
 inline constexpr double min_region_sigma = 0.05;
 /// More data are represented by every m-th of them.
-inline constexpr std::size_t most_averaged = 4096;
+inline constexpr std::size_t max_averaged = 4096;
 
 /// The coordinates over which a Hessian is averaged: the compact ones, or all of a manifold of which nothing is known.
 template <Metric M>

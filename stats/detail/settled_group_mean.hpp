@@ -29,7 +29,7 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
   SettledGroupMean<G> settled{mean.covarianceFromResiduals(), 0, true};
   if constexpr (K > 0) {
     using Matrix = Eigen::Matrix<double, D, D>;
-    const std::size_t n = std::ranges::size(samples), stride = (n + most_averaged - 1) / most_averaged;
+    const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
     const double width = averagingWidth(n);
     const double clearance = angleToCutLocus(samples, mean.mean);
     const Matrix at_mean = mean.jacobian.template cast<double>();

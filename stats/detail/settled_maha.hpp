@@ -34,7 +34,7 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
   if constexpr (K > 0) {
     using Derivative = Eigen::Matrix<double, D, K>;
     using Matrix = Eigen::Matrix<double, D, D>;
-    const std::size_t n = std::ranges::size(samples), stride = (n + most_averaged - 1) / most_averaged;
+    const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
     std::vector<Gaussian<M>> some;
     std::vector<M> features;
     features.reserve(n);

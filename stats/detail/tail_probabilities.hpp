@@ -2,6 +2,7 @@
 // by Boost).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -54,6 +55,24 @@ inline double chiSquaredTail(double x, std::size_t n) {
     tail += std::exp(power * std::log(half) - half - log_factorial);
   }
   return tail;
+}
+
+/// A bound of the probability that the mean of n numbers exceeds x which each follow χ²ₖ, however they depend on each other.
+/// The mean is then below χ²ₖ in convex order, so that P(mean > x) ≤ E(χ²ₖ - a)₊ / (x - a) for every a < x; the least of
+/// these bounds is about e times P(χ²ₖ > x). Exact for n = 1; 1 for n = 0, NaN for NaN.
+inline double dependentMeanTail(double x, std::size_t k, std::size_t n) {
+  if (n < 2) return n == 0 ? 1 : chiSquaredTail(x, k);
+  const auto dof = static_cast<double>(k);
+  // a is best where x - a is the mean excess over a, which is close to 2 far out.
+  double best = 1, excess = 2;
+  for (int pass = 0; pass < 4 && x > dof + excess; ++pass) {
+    const double a = x - excess, above = chiSquaredTail(a, k);
+    const double expected = dof * chiSquaredTail(a, k + 2) - a * above;
+    best = std::min(best, expected / excess);
+    if (!(above > 0 && expected > 0)) break;
+    excess = expected / above;
+  }
+  return std::isnan(x) ? x : best;
 }
 
 }  // namespace liestat::detail

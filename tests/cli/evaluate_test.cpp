@@ -10,7 +10,10 @@
 #include <string>
 #include <vector>
 
+#include <formats/evo_result.hpp>
 #include <formats/result_zip.hpp>
+#include <formats/trajectory.hpp>
+#include <fusion/evaluate.hpp>
 #include <cli/program_output.hpp>
 #include <support/temporary_directory.hpp>
 #include <support/trajectory_files.hpp>
@@ -158,6 +161,14 @@ TEST(EvaluateCommand, ResultFileIsThatOfEvo) {
   EXPECT_EQ(Json::parse(member(relative, "info.json"))["title"],
             "RPE w.r.t. translation part (m)\nfor delta = 1 (frames) using consecutive pairs\n(with SE(3) Umeyama "
             "alignment)");
+  // From C++: the same bytes.
+  const Trajectory truth = readTrajectory(files.reference), estimate = readTrajectory(files.estimate);
+  const EvaluationOptions how{.association = {.rule = AssociationRule::nearest}, .alignment = AlignmentModel::se3};
+  const TrajectoryEvaluation evaluated = evaluateTrajectory(
+      {.times = truth.times, .poses = exactPoses(truth.poses)},
+      {.times = estimate.times, .poses = gaussiansOf(estimate, "right"), .has_covariances = true}, how);
+  EXPECT_EQ(evoResult(evaluated, how, EvoErrors::ape, {"gt.tum", "est.tum"}), contentOf(path));
+  EXPECT_EQ(evoResult(evaluated, how, EvoErrors::rpe, {"gt.tum", "est.tum"}), contentOf(rpe));
   // Python's own reader, where there is one.
   const ProgramResult python = runProgram({"python3", "-c",
                                            "import sys, zipfile, json\n"

@@ -1,7 +1,7 @@
 // `liestat validate two-view --pairs`: the reader, the comparison with labels, and what the hierarchy makes of the real
 // pairs, as far as LIESTAT_DATA names their directory.
 
-#include <experiments/two_view_pair_files.hpp>
+#include <formats/two_view_pairs.hpp>
 #include <cli/show/validations.hpp>
 #include <experiments/plane_scene.hpp>
 #include <fusion/two_view/contradictions.hpp>

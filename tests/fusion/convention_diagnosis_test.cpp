@@ -3,6 +3,7 @@
 
 #include <experiments/trajectory_scene.hpp>
 #include <fusion/convention_diagnosis.hpp>
+#include <fusion/trajectories.hpp>
 #include <stats/convention_charts.hpp>
 
 #include <Eigen/Cholesky>
@@ -401,6 +402,36 @@ TEST(CovarianceDiagnosis, FormatsAndEdgesLeaveFewerHypotheses) {
   EXPECT_EQ(d.assumed, convention(P::right, U::radian, CovarianceContent::information, rt));
   EXPECT_EQ(d.what, "edges");
   EXPECT_EQ(d.alignment, AlignmentModel::none) << "edges have no world";
+}
+
+TEST(CovarianceDiagnosis, PosesMeetTheTruthAtTheirTimes) {
+  CounterRng rng(26);
+  const TrajectoryScene scene = experiments::independentScene({.n = 60}, rng);
+  const PoseTrajectory estimate{.times = scene.times, .poses = scene.estimate, .has_covariances = true, .name = "a"};
+  PoseTrajectory truth{.times = scene.times, .poses = exactPoses(scene.truth), .name = "b"};
+  const RunAgainstTruth all = runAgainstTruth(truth, estimate);
+  ASSERT_TRUE(all.ok()) << all.reason;
+  ASSERT_EQ(all.run.poses.size(), 60U);
+  EXPECT_EQ(all.run.poses[7].truth.params(), scene.truth[7].params());
+  EXPECT_EQ(all.run.poses[7].matrix, scene.estimate[7].covariance);
+  EXPECT_EQ(all.run.times, scene.times);
+  EXPECT_TRUE(all.run.notes.empty());
+  // A part of the truth; quaternions of the truth with w first.
+  for (Gaussian<SE3d>& pose : truth.poses) {
+    const Eigen::Vector4d q = pose.mean.so3().params();
+    pose.mean = SE3d(SO3d(Eigen::Quaterniond(q[2], q[3], q[0], q[1])), Eigen::Vector3d(pose.mean.translation()));
+  }
+  const RunAgainstTruth part = runAgainstTruth(truth, estimate, {.start = scene.times[10], .end = scene.times[40]});
+  ASSERT_EQ(part.run.poses.size(), 31U);
+  EXPECT_EQ(part.run.times.front(), scene.times[10]);
+  ASSERT_EQ(part.run.notes.size(), 2U);
+  EXPECT_NE(part.run.notes[0].find("quaternions of b look as if w came first"), std::string::npos);
+  EXPECT_EQ(part.run.notes[1], "31 of 60 poses of a have a partner in b");
+  EXPECT_EQ(diagnosed(part.run).file_notes, part.run.notes);
+  EXPECT_EQ(runAgainstTruth(truth, estimate, {.start = 1e6}).status, EvaluationStatus::empty_interval);
+  truth.times.clear();
+  EXPECT_EQ(runAgainstTruth(truth, estimate, {.start = 0}).status, EvaluationStatus::times_missing);
+  EXPECT_EQ(runAgainstTruth(truth, estimate).status, EvaluationStatus::times_missing);
 }
 
 TEST(CovarianceDiagnosis, SeveralRunsGiveOneResidualEach) {

@@ -2,6 +2,7 @@
 // absolute and relative errors beside an independent computation, bad input.
 
 #include <experiments/trajectory_scene.hpp>
+#include <fusion/nearest_in_time.hpp>
 #include <fusion/trajectories.hpp>
 
 #include <Eigen/Cholesky>
@@ -121,6 +122,17 @@ TEST(Trajectories, AssociationAsEvo) {
       EXPECT_EQ(matches[k].estimate, expected[k].second) << trial;
     }
   }
+}
+
+TEST(Trajectories, TheNearestTimeIsTheEarlierOfTwo) {
+  const std::vector<double> times{0, 1, 1, 2, 4};
+  EXPECT_EQ(nearestInTime(times, -5), 0U);
+  EXPECT_EQ(nearestInTime(times, 1.2), 1U) << "the first of equal ones";
+  EXPECT_EQ(nearestInTime(times, 3), 3U) << "the earlier of two as near";
+  EXPECT_EQ(nearestInTime(times, 3.1), 4U);
+  EXPECT_EQ(nearestInTime(times, 9), 4U);
+  EXPECT_EQ(nearestInTime(times, 11.9, 10), 3U) << "shifted";
+  EXPECT_EQ(nearestInTime({}, 1), 0U);
 }
 
 TEST(Trajectories, ExactPosesAreAlignedExactly) {

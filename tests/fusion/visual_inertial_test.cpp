@@ -3,6 +3,7 @@
 #include <fusion/init/closed_form.hpp>
 #include <fusion/visual_inertial.hpp>
 #include <fusion/visual_inertial_truth.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 #include <stats/quantile.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
@@ -209,6 +210,70 @@ TEST(VisualInertialVerdict, OneWindowIsOkAndNoStretchContradictsAll) {
   EXPECT_EQ(text(Verdict::Answer::no), "Interrupted: 2 of 5 windows.");
 }
 
+/// Windows that are ok and a stretch of them, with these NEES.
+ComparedRecording withNees(std::size_t n, double window, double stretch) {
+  ComparedRecording r;
+  r.windows.assign(n, okWindow());
+  for (std::size_t i = 0; i < n; ++i) {
+    r.windows[i].begin = static_cast<double>(i);
+    r.windows[i].nees = window, r.windows[i].velocity_nees = window - 2, r.windows[i].gravity_nees = 2;
+  }
+  r.stretches.resize(1);
+  r.stretches[0].has_state = true, r.stretches[0].nees = stretch;
+  return r;
+}
+
+TEST(VisualInertialVerdict, ErrorsAgainstTheTruthAreJudged) {
+  const ComparedRecording fine = withNees(20, 6, 14);
+  EXPECT_TRUE(fine.againstTruth().isYes()) << fine.againstTruth().text;
+  EXPECT_TRUE(fine.verdict().isYes());
+  EXPECT_EQ(fine.windowTest().n, 20U);
+  EXPECT_DOUBLE_EQ(fine.windowTest().nees, 6);
+  // Windows share their biases: a mean of 25 may be the misfortune of a single draw, one of 60 is none.
+  EXPECT_TRUE(withNees(20, 25, 14).againstTruth().isYes());
+  const ComparedRecording off = withNees(20, 60, 14);
+  const Verdict errors = off.againstTruth();
+  EXPECT_TRUE(errors.isNo()) << errors.text;
+  EXPECT_EQ(errors.text.find("INCONSISTENT with the truth: 20 windows: NEES 60 in the mean, 5 expected (p "), 0U);
+  ASSERT_EQ(errors.causes.size(), 1U) << "gravity and the stretch are fine, and the windows are not a few";
+  EXPECT_EQ(errors.causes[0].find("velocity of windows: NEES 58 in the mean, 3 expected"), 0U) << errors.causes[0];
+  EXPECT_TRUE(off.verdict().isNo());
+  EXPECT_EQ(off.verdict().text, "Not to be trusted: 20 of 20 windows are ok, but " + errors.text + ".");
+  EXPECT_EQ(off.verdict().causes, errors.causes);
+  const Verdict stretch = withNees(20, 5, 90).againstTruth();
+  EXPECT_TRUE(stretch.isNo());
+  ASSERT_EQ(stretch.causes.size(), 1U);
+  EXPECT_EQ(stretch.causes[0].find("states of stretches: NEES 90, 11 expected"), 0U) << stretch.causes[0];
+  // One window of twenty.
+  ComparedRecording one = withNees(20, 5, 14);
+  one.windows[3].nees = 4000;
+  ASSERT_TRUE(one.againstTruth().isNo());
+  EXPECT_EQ(one.againstTruth().causes.back().find("1 of 20 windows alone, the first from 3 s"), 0U);
+  // A window that is not ok claims nothing; without a truth there is no verdict on errors.
+  one.windows[3].found.result.consistent = false;
+  EXPECT_TRUE(one.againstTruth().isYes());
+  ComparedRecording unknown = fine;
+  for (ComparedWindow& w : unknown.windows) w.nees.reset();
+  unknown.stretches[0].nees.reset();
+  EXPECT_TRUE(unknown.againstTruth().isNone());
+  EXPECT_TRUE(unknown.verdict().isYes());
+}
+
+TEST(VisualInertialVerdict, MeansOfDependentNumbersHaveABound) {
+  // The bound is the tail itself for one number. For more it holds for equal ones, whose mean has that tail, and is not
+  // above e times it by more than a fifth.
+  for (const std::size_t k : {2U, 5U, 11U}) {
+    for (const double x : {8., 15., 30., 60.}) {
+      const double tail = detail::chiSquaredTail(x, k);
+      EXPECT_EQ(detail::dependentMeanTail(x, k, 1), tail);
+      EXPECT_GE(detail::dependentMeanTail(x, k, 9), tail);
+      if (x >= 2 * static_cast<double>(k)) EXPECT_LE(detail::dependentMeanTail(x, k, 9), 1.2 * std::exp(1.) * tail);
+    }
+  }
+  EXPECT_EQ(detail::dependentMeanTail(3, 5, 0), 1);
+  EXPECT_TRUE(std::isnan(detail::dependentMeanTail(std::numeric_limits<double>::quiet_NaN(), 5, 4)));
+}
+
 TEST(VisualInertialVerdict, ErrorsAreThoseOfWindowsThatClaimAScale) {
   ComparedRecording r;
   r.windows = {okWindow(), okWindow(), okWindow()};
@@ -260,6 +325,8 @@ TEST(VisualInertialTruth, TheErrorOfAnExactEstimateIsZero) {
   EXPECT_NEAR(off.windows[0].refined_error->speed, 2, 1e-12);
   EXPECT_NEAR(off.windows[0].refined_error->scale, 1, 1e-12);
   EXPECT_NEAR(off.windows[0].nees.value_or(0), 4, 1e-12);
+  EXPECT_NEAR(off.windows[0].velocity_nees.value_or(0), 4, 1e-12);
+  EXPECT_NEAR(off.windows[0].gravity_nees.value_or(-1), 0, 1e-12);
   // Without a truth at all images there is nothing to compare.
   EXPECT_FALSE(compareWithTruth(found, times, std::span(truth).first(1), 9.81).windows[0].nees.has_value());
 }

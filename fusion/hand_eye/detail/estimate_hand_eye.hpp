@@ -65,8 +65,8 @@ class HandEyeRun {
 
   Fault fault() const {
     const HandEyeOptions& o = options_;
-    if (!(o.gate > 0 && o.samples >= 0 && o.least_excitation > 0 && o.trusted_excitation >= o.least_excitation &&
-          o.least_p >= 0)) {
+    if (!(o.gate > 0 && o.samples >= 0 && o.min_excitation > 0 && o.trusted_excitation >= o.min_excitation &&
+          o.min_p >= 0)) {
       return FaultKind::bad_option;
     }
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
@@ -284,7 +284,7 @@ class HandEyeRun {
     r.excitations = excitation.values;
     const GripperMotion motion(pairs_, inliers_, world);
     appendOpenDirections(r.directions, excitation, open, value, motion, world);
-    for (OpenDirection& d : r.directions) d.weak = d.excitation >= options_.least_excitation;
+    for (OpenDirection& d : r.directions) d.weak = d.excitation >= options_.min_excitation;
 
     r.pairs.resize(pairs_.size());
     errors_ = errorsAt(value);
@@ -312,7 +312,7 @@ class HandEyeRun {
   }
   template <class Strict>
   FusionStatus statusOf(const Strict& strict, const HandEyeValue& value, int open) {
-    if (result_.p < options_.least_p && candidates_.front().converged) return FusionStatus::inconsistent;
+    if (result_.p < options_.min_p && candidates_.front().converged) return FusionStatus::inconsistent;
     if (strict.end != ConstrainedEnd::converged) return FusionStatus::not_converged;
     if (open > 0) return FusionStatus::undetermined;
     // A second minimum whose cost noise may have made larger, and which is another solution.

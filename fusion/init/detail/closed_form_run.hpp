@@ -48,6 +48,16 @@ class ClosedFormRun {
   /// Distance, in standard deviations of the tilt, up to which the two solutions of a lost direction are one double root:
   /// the tilt is predicted to first order, which near a double root is short of what noise moves it by.
   static constexpr double double_root_sigmas = 5;
+  /// Angle (rad) within which two minimisers of exact data are one double root, where a line touches the sphere. They
+  /// depend on the data by a square root there: a relative error of 1e-10 by rounding moves them by as much.
+  static constexpr double exact_double_root_angle = 1e-5;
+  /// A lost direction involves gravity if it moves G T²/2 by more than this fraction of V T. Measured
+  /// (docs/closed_form.md): below 0.06 in 98 % of the windows of constant velocity, above 0.19 otherwise.
+  static constexpr double gravity_part = 0.1;
+  /// Distance from a plane, in standard deviations, up to which directions count as coplanar.
+  static constexpr double coplanar_sigmas = 3;
+  /// Fraction of noise above which a second direction counts as lost besides the first; being the second, it is smaller.
+  static constexpr double second_lost_share = 0.5 * lost_share;
   using Status = FusionStatus;
 
   void solveExactly(const RankDiagnosis& ranks) {
@@ -190,8 +200,7 @@ class ClosedFormRun {
     if (candidates_.empty()) return;
     if (status == Status::mirror_gravity && !hasRival(candidates_)) status = Status::ok;
     if (status != Status::ambiguous) return;
-    // A line that touches the sphere: the two are one to the root of rounding.
-    if (candidates_.size() < 2 || gravityAngle(candidates_[0], candidates_[1]) < 1e-5) {
+    if (candidates_.size() < 2 || gravityAngle(candidates_[0], candidates_[1]) < exact_double_root_angle) {
       status = Status::double_root;
     } else if (!hasRival(candidates_) || candidates_[1].negative > 0) {
       status = Status::ok;
@@ -210,7 +219,7 @@ class ClosedFormRun {
     // Plain least squares never quite fit, and that says nothing on the case.
     const bool misfit = options_.closed_form.remove_noise_bias && !isConsistent();
     // A bias may make up for what gravity gains.
-    const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > 0.1 * weak.velocity().norm();
+    const bool moves_gravity = (weak.gravity() - weak.bias()).norm() > gravity_part * weak.velocity().norm();
     const Eigen::Vector3d G = candidates_[0].y.gravity(), along = weak.gravity().normalized();
     // Where the lost direction leaves the sphere of gravity again: the other solution.
     const Eigen::Vector3d other = G - 2 * G.dot(along) * along;
@@ -220,11 +229,12 @@ class ClosedFormRun {
       candidates_.pop_back();
     }
     const bool rival = hasRival(candidates_) && isInFront(candidates_[1], table_);
-    if (coplanarityMatters(result_.images_used, table_.features()) && outOfPlane(table_.rays) < 3 * solver_.sigma()) {
+    if (coplanarityMatters(result_.images_used, table_.features()) &&
+        outOfPlane(table_.rays) < coplanar_sigmas * solver_.sigma()) {
       return Status::coplanar;
     }
     if (lost && !moves_gravity) return Status::scale_unobservable;
-    if (lost && (share.shares[1] > 0.5 * lost_share || !options_.gravity || misfit)) {
+    if (lost && (share.shares[1] > second_lost_share || !options_.gravity || misfit)) {
       return Status::gravity_undetermined;
     }
     if (rival && solver_.bias() && isMirror(candidates_)) return Status::mirror_gravity;

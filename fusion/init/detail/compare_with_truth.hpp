@@ -14,11 +14,21 @@ inline double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// The NEES of V and G, G on its sphere.
-inline double neesOf(const RefinementResult& refined, const Eigen::Vector3d& V, const Eigen::Vector3d& G) {
+/// The NEES of V and G, and of each by itself; G on its sphere.
+inline void setNees(ComparedWindow& w, const Eigen::Vector3d& V, const Eigen::Vector3d& G) {
+  const RefinementResult& refined = *w.refined;
   Eigen::Matrix<double, 6, 1> error;
   error << refined.velocity() - V, refined.gravity - G;
-  return neesOnSphere<5>(error, refined.covariance.atFirst(), refined.gravity);
+  const Eigen::Matrix<double, 6, 6> covariance = refined.covariance.atFirst().template topLeftCorner<6, 6>();
+  w.nees = neesOnSphere<5>(error, covariance, refined.gravity);
+  w.velocity_nees = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
+                                                  Eigen::Matrix3d(covariance.topLeftCorner<3, 3>()));
+  Eigen::Matrix<double, 2, 3> across;
+  across.row(0) = refined.gravity.unitOrthogonal();
+  across.row(1) = refined.gravity.normalized().cross(across.row(0).transpose());
+  w.gravity_nees = mahalanobisSquared<double, 2>(
+      Eigen::Vector2d(across * error.tail<3>()),
+      Eigen::Matrix2d(across * covariance.bottomRightCorner<3, 3>() * across.transpose()));
 }
 
 inline void compare(ComparedWindow& w, std::span<const GroundTruth> all, std::optional<double> gravity) {
@@ -49,7 +59,7 @@ inline void compare(ComparedWindow& w, std::span<const GroundTruth> all, std::op
   w.gyroscope_error = (w.bias().gyroscope - truth[0].bias.gyroscope).norm();
   if (!w.isRefined()) return;
   w.refined_error = errorOf(w.refined->velocity(), w.refined->gravity, w.refined->states);
-  if (gravity && w.closedForm().status != FusionStatus::stationary) w.nees = neesOf(*w.refined, V, G);
+  if (gravity && w.closedForm().status != FusionStatus::stationary) setNees(w, V, G);
 }
 
 /// The fields that say what was found.

@@ -1,15 +1,20 @@
 #pragma once
 
 #include <fusion/visual_inertial_truth_types.hpp>
+#include <lie/units.hpp>
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/words.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace liestat {
 
 LIESTAT_FUSION_INLINE void InitialisationErrors::add(const InitialisationError& e) {
-  constexpr double degrees = 180 / static_cast<double>(EIGEN_PI);
-  speed.push_back(e.speed), gravity.push_back(degrees * e.gravity), scale.push_back(100 * std::abs(e.scale));
+  speed.push_back(e.speed), gravity.push_back(e.gravity / units::degree), scale.push_back(100 * std::abs(e.scale));
 }
 
 LIESTAT_FUSION_INLINE std::size_t ComparedRecording::okWindows() const {
@@ -29,7 +34,87 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
       std::none_of(stretches.begin(), stretches.end(), [](const ComparedStretch& f) { return f.ok(); })) {
     return Verdict::no("Not to be trusted: the windows contradict each other in every stretch.");
   }
-  return Verdict::yes(std::to_string(ok) + " of " + n + " windows are ok.");
+  const std::string text = std::to_string(ok) + " of " + n + " windows are ok";
+  const Verdict errors = againstTruth();
+  if (errors.isNo()) return Verdict::no("Not to be trusted: " + text + ", but " + errors.text + ".", errors.causes);
+  return Verdict::yes(text + ".");
+}
+
+namespace detail {
+
+/// The mean of these NEES with a part, where it is known.
+template <class List, class Part>
+InitialisationTest testOf(const List& list, int dof, const Part& part) {
+  InitialisationTest test{.expected = dof};
+  for (const auto& x : list) {
+    if (const std::optional<double> nees = part(x); x.ok() && nees) test.nees += *nees, ++test.n;
+  }
+  if (test.n > 0) test.nees /= static_cast<double>(test.n);
+  test.p = dependentMeanTail(test.nees, static_cast<std::size_t>(dof), test.n);
+  return test;
+}
+
+inline std::string inWords(const InitialisationTest& t) {
+  return "NEES " + significant(t.nees, 3) + (t.n == 1 ? ", " : " in the mean, ") + std::to_string(t.expected) +
+         " expected";
+}
+
+inline std::string countOf(std::size_t n, const std::string& things) {
+  return std::to_string(n) + " " + things + (n == 1 ? "" : things == "stretch" ? "es" : "s");
+}
+
+/// The parts whose errors are beyond their covariances, each with what is likely to be off.
+inline std::vector<std::string> causesOfErrors(const ComparedRecording& r, double false_alarm) {
+  std::vector<std::string> causes;
+  const auto add = [&](const char* part, const InitialisationTest& test, const char* cause) {
+    if (test.p < false_alarm) causes.push_back(part + inWords(test) + ": " + cause);
+  };
+  add("velocity of windows: ", testOf(r.windows, 3, [](const ComparedWindow& w) { return w.velocity_nees; }),
+      "the sensor's noise in motion, the camera's calibration or clock, or the truth's velocity");
+  add("gravity of windows: ", testOf(r.windows, 2, [](const ComparedWindow& w) { return w.gravity_nees; }),
+      "the accelerometer's bias and its prior, or the truth's orientation");
+  add("states of stretches: ", r.stretchTest(),
+      "the sensor's noise in motion, the biases' walks, or the truth's biases");
+  // A few windows that are far off: an error of the recording there, not of the noise.
+  std::size_t far = 0;
+  const std::size_t n = r.windowTest().n;
+  const ComparedWindow* first = nullptr;
+  for (const ComparedWindow& w : r.windows) {
+    if (w.ok() && w.nees && chiSquaredTail(*w.nees, 5) < false_alarm && far++ == 0) first = &w;
+  }
+  if (far > 0 && 10 * far <= n) {
+    causes.push_back(std::to_string(far) + " of " + std::to_string(n) + " windows alone, the first from " +
+                     significant(first->begin, 9) + " s: readings, tracks or truth may be wrong there");
+  }
+  return causes;
+}
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE InitialisationTest ComparedRecording::windowTest() const {
+  return detail::testOf(windows, 5, [](const ComparedWindow& w) { return w.nees; });
+}
+LIESTAT_FUSION_INLINE InitialisationTest ComparedRecording::stretchTest() const {
+  return detail::testOf(stretches, 11, [](const ComparedStretch& f) { return f.nees; });
+}
+
+LIESTAT_FUSION_INLINE Verdict ComparedRecording::againstTruth(double false_alarm) const {
+  const InitialisationTest of_windows = windowTest(), of_stretches = stretchTest();
+  if (of_windows.n + of_stretches.n == 0) {
+    return Verdict::none("no verdict: no window that is ok is covered by the truth");
+  }
+  const bool windows_fit = !(of_windows.p < false_alarm), stretches_fit = !(of_stretches.p < false_alarm);
+  std::string text;
+  for (const auto& [test, thing] : {std::pair(&of_windows, "window"), std::pair(&of_stretches, "stretch")}) {
+    if (test->n == 0) continue;
+    text += (text.empty() ? "" : "; ") + detail::countOf(test->n, thing) + ": " + detail::inWords(*test) + " (p " +
+            significant(test->p, 2) + ")";
+  }
+  if (!std::isfinite(of_windows.nees + of_stretches.nees)) {
+    return Verdict::none("no verdict: a covariance is singular, or an error not finite");
+  }
+  if (windows_fit && stretches_fit) return Verdict::yes("consistent with the truth: " + text);
+  return Verdict::no("INCONSISTENT with the truth: " + text, detail::causesOfErrors(*this, false_alarm));
 }
 
 LIESTAT_FUSION_INLINE InitialisationSummary ComparedRecording::summary() const {

@@ -164,11 +164,12 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
     const MotionEstimate& other =
         gyroscope != nullptr ? essential_.update(pairs, *gyroscope) : essential_.update(pairs);
     if (other.cost > 0 && own.cost > 0 && !other.flags.standstill && !other.flags.too_few) {
-      const auto n = static_cast<double>(std::min<std::size_t>(++in_charge_for_, 10));
+      const auto n = static_cast<double>(std::min(++in_charge_for_, innovation_frames));
       own_innovation_ += (own.innovation - own_innovation_) / n;
       other_innovation_ += (other.innovation - other_innovation_) / n;
     }
-    const bool changes = in_charge_for_ >= 10 && other_innovation_ > hand_over_.fall_back * own_innovation_;
+    const bool changes =
+        in_charge_for_ >= innovation_frames && other_innovation_ > hand_over_.fall_back * own_innovation_;
     const bool loses = other.flags.degenerate && !own.flags.degenerate;
     if (!other.flags.lost && !own.flags.lost && !changes && !loses) return other;
     fallBack();

@@ -8,6 +8,7 @@
 #include <fusion/motion/study.hpp>
 #include <fusion/motion/subspace_filter.hpp>
 #include <fusion/motion/track_pairs.hpp>
+#include <lie/units.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -123,7 +124,7 @@ inline ResidualMap residualMap(const DirectionResidual& residual, const Hemisphe
   for (const Eigen::Vector2d& at : minima) {
     const Eigen::Vector3d V = chart.direction(at);
     const bool is_known = std::any_of(known.begin(), known.end(), [&](const Eigen::Vector3d& other) {
-      return std::abs(other.dot(V)) > std::cos(2 * grid_step * std::numbers::pi / 180);
+      return std::abs(other.dot(V)) > std::cos(2 * grid_step * units::degree);
     });
     if (is_known) continue;
     known.push_back(V), map.others.push_back(at);

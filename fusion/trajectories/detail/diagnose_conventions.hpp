@@ -3,6 +3,8 @@
 
 #include <lie/detail/small_eigen.hpp>
 #include <fusion/convention_diagnosis.hpp>
+#include <fusion/evaluate.hpp>
+#include <fusion/nearest_in_time.hpp>
 #include <fusion/trajectories/detail/ranked_conventions.hpp>
 #include <stats/words.hpp>
 
@@ -442,6 +444,43 @@ LIESTAT_FUSION_INLINE std::vector<PlanRow> planDiagnosis(std::span<const Diagnos
   return rows;
 }
 
+LIESTAT_FUSION_INLINE RunAgainstTruth runAgainstTruth(const PoseTrajectory& truth, const PoseTrajectory& estimate,
+                                                      const AssociationOptions& options) {
+  RunAgainstTruth r;
+  const std::string truth_name = truth.name.empty() ? "the truth" : truth.name;
+  const std::string estimate_name = estimate.name.empty() ? "the estimate" : estimate.name;
+  std::vector<double> times = truth.times;
+  std::vector<Gaussian<SE3d>> poses = truth.poses;
+  if (options.start || options.end) {
+    const std::vector<std::size_t> rows = rowsBetween(truth.times, options.start, options.end);
+    if (rows.empty()) {
+      r.status = truth.times.empty() ? EvaluationStatus::times_missing : EvaluationStatus::empty_interval;
+      r.reason = truth.times.empty() ? truth_name + " has no times, and a part of it is asked for"
+                                     : "no pose of " + truth_name + " is between the given times";
+      return r;
+    }
+    times.clear(), poses.clear();
+    for (const std::size_t i : rows) times.push_back(truth.times[i]), poses.push_back(truth.poses[i]);
+  }
+  const Associated associated =
+      associate({times, poses.size(), truth_name}, {estimate.times, estimate.poses.size(), estimate_name}, options);
+  r.status = associated.status, r.reason = associated.reason;
+  if (!r.ok()) return r;
+  const std::vector<MatchedPose> matched =
+      matchedPoses(associated.matches, poses, estimate.poses, options.interpolation);
+  for (std::size_t k = 0; k < matched.size(); ++k) {
+    r.run.poses.push_back({matched[k].estimate.mean, matched[k].estimate.covariance, matched[k].reference.mean});
+    if (!estimate.times.empty()) r.run.times.push_back(estimate.times[associated.matches[k].estimate]);
+  }
+  const std::string suspicion = suspectQuaternionOrder(matched, truth_name, estimate_name);
+  if (!suspicion.empty()) r.run.notes.push_back(suspicion);
+  if (matched.size() < estimate.poses.size()) {
+    r.run.notes.push_back(std::to_string(matched.size()) + " of " + std::to_string(estimate.poses.size()) +
+                          " poses of " + estimate_name + " have a partner in " + truth_name);
+  }
+  return r;
+}
+
 LIESTAT_FUSION_INLINE CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
                                                               const CovarianceDiagnosisOptions& options) {
   CovarianceDiagnosis d;
@@ -449,23 +488,22 @@ LIESTAT_FUSION_INLINE CovarianceDiagnosis diagnoseCovariances(std::span<const Di
   d.assumed.order = options.order.value_or(d.assumed.order);
   d.assumed.content = options.content.value_or(d.assumed.content);
   if (options.edges) d.what = "edges";
+  for (const DiagnosedRun& run : runs) d.file_notes.insert(d.file_notes.end(), run.notes.begin(), run.notes.end());
   if (runs.size() == 1) {
     d.poses = runs[0].poses, d.times = runs[0].times;
   } else if (!runs.empty()) {
-    const auto timeOf = [](const DiagnosedRun& run, std::size_t i) {
-      return run.times.empty() ? static_cast<double>(i) : run.times[i];
+    const auto timesOf = [](const DiagnosedRun& run) {
+      std::vector<double> times = run.times;
+      for (std::size_t i = times.size(); i < run.poses.size(); ++i) times.push_back(static_cast<double>(i));
+      return times;
     };
     double last = detail::infinity;
     for (const DiagnosedRun& run : runs) {
-      if (!run.poses.empty()) last = std::min(last, timeOf(run, run.poses.size() - 1));
+      if (!run.poses.empty()) last = std::min(last, timesOf(run).back());
     }
     const double at = options.at.value_or(last);
     for (const DiagnosedRun& run : runs) {
-      std::size_t nearest = 0;
-      for (std::size_t i = 1; i < run.poses.size(); ++i) {
-        if (std::abs(timeOf(run, i) - at) < std::abs(timeOf(run, nearest) - at)) nearest = i;
-      }
-      if (!run.poses.empty()) d.poses.push_back(run.poses[nearest]);
+      if (!run.poses.empty()) d.poses.push_back(run.poses[nearestInTime(timesOf(run), at)]);
     }
     d.what = "runs at " + significant(at, 10) + " s";
   }

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <lie/detail/small_orthogonal.hpp>
+#include <fusion/nearest_in_time.hpp>
 #include <fusion/trajectories/detail/pose_alignment.hpp>
 #include <fusion/trajectories.hpp>
+#include <lie/units.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace liestat {
 
@@ -39,14 +40,10 @@ LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateNearest(std::span<const do
   const std::span<const double> longer = by_reference ? estimate_times : reference_times;
   const double shift = by_reference ? offset : -offset;  // added to the times of the longer list
   for (std::size_t i = 0; i < shorter.size() && !longer.empty(); ++i) {
-    const double t = shorter[i];
-    auto at = std::lower_bound(longer.begin(), longer.end(), t, [&](double x, double y) { return x + shift < y; });
-    auto k = static_cast<std::size_t>(at - longer.begin());
-    const auto difference = [&](std::size_t j) { return std::abs(longer[j] + shift - t); };
-    if (k == longer.size() || (k > 0 && difference(k - 1) <= difference(k))) --k;
-    while (k > 0 && longer[k - 1] == longer[k]) --k;
-    if (!(difference(k) <= max_difference)) continue;
-    matches.push_back({by_reference ? k : i, by_reference ? i : k, 0, difference(k)});
+    const std::size_t k = nearestInTime(longer, shorter[i], shift);
+    const double difference = std::abs(longer[k] + shift - shorter[i]);
+    if (!(difference <= max_difference)) continue;
+    matches.push_back({by_reference ? k : i, by_reference ? i : k, 0, difference});
   }
   return matches;
 }
@@ -184,7 +181,6 @@ LIESTAT_FUSION_INLINE ErrorStatistics errorStatistics(std::span<const double> er
 namespace detail {
 
 inline double errorNumber(const SE3d& E, PoseRelation relation) {
-  constexpr double degrees = 180 / std::numbers::pi;
   switch (relation) {
     case PoseRelation::full:
       return std::sqrt((E.rotationMatrix() - Eigen::Matrix3d::Identity()).squaredNorm() +
@@ -192,7 +188,7 @@ inline double errorNumber(const SE3d& E, PoseRelation relation) {
     case PoseRelation::rot_part:
       return (E.rotationMatrix() - Eigen::Matrix3d::Identity()).norm();
     case PoseRelation::angle_deg:
-      return E.so3().log().norm() * degrees;
+      return E.so3().log().norm() / units::degree;
     case PoseRelation::angle_rad:
       return E.so3().log().norm();
     default:
@@ -267,7 +263,7 @@ LIESTAT_FUSION_INLINE std::vector<std::pair<std::size_t, std::size_t>> posePairs
     for (std::size_t k = 1; k < ends.size(); ++k) pairs.emplace_back(ends[k - 1], ends[k]);
     return pairs;
   }
-  const double unit = options.unit == DeltaUnit::degrees ? std::numbers::pi / 180 : 1;
+  const double unit = options.unit == DeltaUnit::degrees ? units::degree : 1;
   const double delta = options.delta * unit, slack = tolerance * unit;
   const auto angle = [&](std::size_t i, std::size_t j) {
     return (poses_of_pairs[i].so3().inverse() * poses_of_pairs[j].so3()).log().norm();

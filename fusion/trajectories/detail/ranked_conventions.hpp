@@ -136,7 +136,7 @@ inline std::vector<MatchedPose> matchedUnder(const DiagnosisData& data, const Hy
 
 /// The likelihood with the best alignment of a hypothesis, which its covariance allows for.
 inline void rankAligned(const DiagnosisData& data, HypothesisFit& h, const DiagnosisOptions& options) {
-  const std::vector<MatchedPose> matched = matchedUnder(data, h, options.most_aligned);
+  const std::vector<MatchedPose> matched = matchedUnder(data, h, options.max_aligned);
   double log_det = 0;
   for (const MatchedPose& p : matched) {
     const Cholesky<double, 6> root(p.estimate.covariance);

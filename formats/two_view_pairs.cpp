@@ -1,4 +1,8 @@
-#include <experiments/two_view_pair_files.hpp>
+#include <formats/two_view_pairs.hpp>
+
+#include <formats/input_error.hpp>
+#include <formats/numeric_table.hpp>
+#include <formats/text.hpp>
 
 #include <fmt/format.h>
 
@@ -11,19 +15,10 @@
 #include <system_error>
 #include <utility>
 
-#include <formats/input_error.hpp>
-#include <formats/numeric_table.hpp>
-#include <formats/text.hpp>
-
-namespace liestat::experiments {
-
-using experiments::PairFamily;
-using experiments::TwoViewPair;
-
+namespace liestat {
 namespace {
 
-namespace fs = std::filesystem;
-using Sizes = std::map<std::pair<std::string, std::string>, Eigen::Vector2d>;  // by folder and name
+using ImageSizes = std::map<std::pair<std::string, std::string>, Eigen::Vector2d>;  // by folder and name
 
 const char* labelColumn(PairFamily family) {
   return family == PairFamily::adelaide ? "structure" : family == PairFamily::evd ? "inlier" : "validation";
@@ -47,9 +42,9 @@ std::optional<Eigen::Vector2d> sizeIn(std::string_view note, const std::string& 
   return Eigen::Vector2d(width, height);
 }
 
-Sizes readSizes(const fs::path& path) {
-  Sizes sizes;
-  if (!fs::exists(path)) return sizes;
+ImageSizes readImageSizes(const std::filesystem::path& path) {
+  ImageSizes sizes;
+  if (!std::filesystem::exists(path)) return sizes;
   const TextFile file = loadText(path.string());
   requireText(file.text, file.name);
   LineReader reader(file.text);
@@ -84,7 +79,7 @@ TwoViewPair readTwoViewPair(const std::string& path, PairFamily family) {
   const NumericTable table = readTable(path, {"x1", "y1", "x2", "y2", label});
   TwoViewPair pair;
   pair.family = family;
-  pair.name = fs::path(path).stem().string();
+  pair.name = std::filesystem::path(path).stem().string();
   Eigen::Vector2d high;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const Eigen::Vector4d m(table(row, 0), table(row, 1), table(row, 2), table(row, 3));
@@ -112,23 +107,24 @@ TwoViewPair readTwoViewPair(const std::string& path, PairFamily family) {
 }
 
 std::vector<TwoViewPair> readTwoViewPairs(const std::string& directory) {
-  const fs::path root(directory);
+  const std::filesystem::path root(directory);
   std::error_code error;
-  if (!fs::is_directory(root, error)) throw InputError(sourceName(directory), 0, "this is no directory");
-  const Sizes sizes = readSizes(root / "manifest.csv");
+  if (!std::filesystem::is_directory(root, error)) throw InputError(sourceName(directory), 0, "this is no directory");
+  const ImageSizes sizes = readImageSizes(root / "manifest.csv");
   std::vector<TwoViewPair> pairs;
-  for (const PairFamily family : experiments::pair_families) {
-    const fs::path folder = root / experiments::name(family);
-    if (!fs::is_directory(folder, error)) continue;
+  for (std::size_t k = 0; k < words(PairFamily{}).size(); ++k) {
+    const auto family = static_cast<PairFamily>(k);
+    const std::filesystem::path folder = root / name(family);
+    if (!std::filesystem::is_directory(folder, error)) continue;
     std::vector<std::string> files;
-    for (const auto& entry : fs::directory_iterator(folder)) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       const std::string stem = entry.path().stem().string();
       if (entry.path().extension() == ".csv" && !stem.ends_with("_model")) files.push_back(entry.path().string());
     }
     std::sort(files.begin(), files.end());
     for (const std::string& file : files) {
       pairs.push_back(readTwoViewPair(file, family));
-      const auto size = sizes.find({experiments::name(family), pairs.back().name});
+      const auto size = sizes.find({name(family), pairs.back().name});
       if (size == sizes.end()) continue;
       pairs.back().corner.setZero();
       pairs.back().size = size->second;
@@ -141,4 +137,4 @@ std::vector<TwoViewPair> readTwoViewPairs(const std::string& directory) {
   return pairs;
 }
 
-}  // namespace liestat::experiments
+}  // namespace liestat
