@@ -2,7 +2,7 @@
 # that adds its directory, or one that finds the installed package. A unit that links one reads declarations only.
 #
 #   means          Fréchet, Mahalanobis and certified means of the common features in double
-#   estimation     the core of constrained estimation
+#   estimation     the cores of constrained estimation and of the implicit filter
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
 #                  (Boost.Math, Random123)
@@ -11,7 +11,7 @@
 set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
 set(LIESTAT_COMPILED_SOURCES_means mean maha certified_mean certified_maha certified_group_mean)
-set(LIESTAT_COMPILED_SOURCES_estimation constrained)
+set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
     robust_two_view two_view hand_eye motion)
@@ -79,8 +79,11 @@ function(liestat_compiled part root library)
     endforeach()
   endif()
   if(part STREQUAL "estimation")
-    # Loops whose lengths are run-time numbers, which g++ turns into vector instructions at -O3 alone.
+    # Loops whose lengths are run-time numbers, which g++ turns into vector instructions at -O3 alone. Those of the filter
+    # are of a few steps, which it slows down.
     set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release,RelWithDebInfo>:-O3>)
+    set_source_files_properties(${root}/stats/compiled/implicit_ekf.cpp
+                                PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release,RelWithDebInfo>:-O2>)
   endif()
   add_library(liestat::${part} ALIAS ${target})
   if(part STREQUAL "formats")

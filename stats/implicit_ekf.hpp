@@ -20,94 +20,36 @@
 // the frame at the new estimate by the derivative of exp. With `max_iterations` above one the equations are linearised
 // again at the new state and the corrected measurement, until the most probable state is reached.
 //
-// Everything is of fixed size, nothing is allocated, nothing throws; an update that fails leaves the state as it was.
+// Nothing throws, and nothing is allocated but where a measurement has free directions; an update that fails leaves the
+// state as it was. The updates are compiled once (stats/detail/compiled.hpp); what is here tells them state, noise and
+// equations.
 //
 // Sources: S. Soatto and P. Perona, "Robust and efficient recovery of rigid motion from subspace constraints", 1994,
 // section 3 (the sign of the step corrected); R. Steffen and C. Beder, "Recursive estimation with implicit constraints",
 // DAGM 2007 (iteration). docs/implicit_ekf.md has the mathematics.
 #pragma once
 
-#include <lie/rn.hpp>
-#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
-#include <lie/detail/small_reduced.hpp>
+#include <lie/manifold.hpp>
 #include <lie/rn.hpp>
 #include <stats/constrained_types.hpp>
-#include <stats/detail/measurement_block.hpp>
+#include <stats/detail/filter_core.hpp>
+#include <stats/detail/number_rows.hpp>
 #include <stats/gaussian.hpp>
+#include <stats/implicit_ekf_types.hpp>
 #include <stats/measurement_noise.hpp>
 
 #include <Eigen/Core>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <type_traits>
 #include <utility>
 
 namespace liestat {
-
-/// How an update or a prediction ended. Only `ok` and `not_converged` change the state.
-enum class FilterStatus {
-  ok,             ///< the state is updated
-  gated,          ///< the innovation is too large for its covariance; for several measurements: all of them are
-  not_converged,  ///< the iterations did not settle: the state is that of the first, a plain extended Kalman update
-  not_finite,     ///< a number is not finite
-  singular        ///< equations that say nothing, contradict each other, or a covariance that this form has to invert
-};
-
-/// The name used in files and messages.
-constexpr const char* name(FilterStatus status) {
-  switch (status) {
-    case FilterStatus::ok:
-      return "ok";
-    case FilterStatus::gated:
-      return "gated";
-    case FilterStatus::not_converged:
-      return "not_converged";
-    case FilterStatus::not_finite:
-      return "not_finite";
-    case FilterStatus::singular:
-      return "singular";
-  }
-  return "unknown";
-}
-
-struct ImplicitEkfOptions {
-  /// Linearisations per update. One: the extended Kalman filter. More: until the most probable state is reached.
-  int max_iterations = 1;
-  /// Iterations end when no coordinate changes by more than this, in standard deviations of the prior.
-  double tolerance = 1e-8;
-  /// Redundant equations that differ from what the others say by more than this, in standard deviations, are a
-  /// contradiction: status singular. Dense form.
-  double max_inconsistency = 3;
-};
-
-/// The result of an update. NIS is the normalised innovation squared at the prior, hᵀ S⁻¹ h: it follows χ² with
-/// `degrees_of_freedom`, the rank of S, where state and noise are what they are said to be.
-template <Homogeneous X>
-struct FilterUpdate {
-  FilterStatus status = FilterStatus::ok;
-  TangentOf<X> step = TangentOf<X>::Zero();  ///< in the frame at the prior's mean; what was or would have been applied
-  double nis = 0;                            ///< NIS of all measurements that passed their gates; dense form: of any
-  int degrees_of_freedom = 0;
-  int iterations = 0;
-  std::size_t measurements = 0;  ///< measurements used
-  std::size_t gated = 0;         ///< measurements left out by their gates
-
-  bool ok() const { return status == FilterStatus::ok; }
-};
-
-/// An update in dense form, P equations.
-template <Homogeneous X, int P>
-struct DenseFilterUpdate : FilterUpdate<X> {
-  Eigen::Matrix<double, P, 1> innovation = Eigen::Matrix<double, P, 1>::Zero();  ///< h at the prior
-  /// S at the prior; singular where equations are redundant.
-  Eigen::Matrix<double, P, P> innovation_covariance = Eigen::Matrix<double, P, P>::Zero();
-  double inconsistency = 0;  ///< largest contradiction of redundant equations, in standard deviations; 0 without any
-};
-
 namespace detail {
 
 /// Derivative of exp(x, v) with respect to v, local frame at exp(x, v); exact.
@@ -128,51 +70,91 @@ constexpr int equation_count =
                                      .linearize(std::declval<const X&>(), std::declval<const M&>())
                                      .value)>::RowsAtCompileTime;
 
-/// How many of P equations are independent: all of them, unless they say how many.
-template <class Equation, int P>
-constexpr int independentEquations() {
-  if constexpr (requires { Equation::rank; }) {
-    static_assert(Equation::rank > 0 && Equation::rank <= P, "between one and the number of equations");
-    return Equation::rank;
-  } else {
-    return P;
-  }
-}
-
-/// The equations at exp(x, v) and exp(y, w), with derivatives by v and w. At zero nothing is moved, not even by rounding.
-template <class Equation, Homogeneous X, Homogeneous M>
-auto linearizedEquations(const Equation& equation, const X& x, const TangentOf<X>& v, const M& y,
-                         const TangentOf<M>& w) {
-  constexpr int P = equation_count<Equation, X, M>, N = ManifoldTraits<X>::DoF, K = ManifoldTraits<M>::DoF;
-  static_assert(P != Eigen::Dynamic, "equations return a vector of fixed size");
-  const bool state_moved = !v.isZero(0), measurement_moved = !w.isZero(0);
-  EquationDerivatives<P, N, K> J = equation.linearize(state_moved ? exp(x, v) : x, measurement_moved ? exp(y, w) : y);
-  if (state_moved) J.by_parameter = product(J.by_parameter, expJacobian(x, v));
-  if (measurement_moved) J.by_measurement = product(J.by_measurement, expJacobian(y, w));
-  return J;
-}
-
-/// The largest change of a coordinate in standard deviations of P; along exact directions there is none.
-template <int N>
-double changeInDeviations(const Eigen::Matrix<double, N, 1>& change, const Eigen::Matrix<double, N, N>& P) {
-  double largest = 0;
-  for (int i = 0; i < N; ++i) {
-    if (P(i, i) > 0) largest = std::max(largest, std::abs(change[i]) / std::sqrt(P(i, i)));
-  }
-  return largest;
-}
-
-/// The Gaussian whose tangent coordinates at x have the mean v and the given covariance, in its own frame.
-template <Homogeneous X>
-Gaussian<X> movedGaussian(const X& x, const TangentOf<X>& v, const SquareOf<X>& covariance) {
-  const SquareOf<X> moved = congruence(expJacobian(x, v), covariance);
-  return {exp(x, v), 0.5 * (moved + moved.transpose())};
-}
-
 template <Homogeneous X>
 bool isFinite(const Gaussian<X>& g) {
   return g.covariance.allFinite() && log(ManifoldTraits<X>::origin(), g.mean).allFinite();
 }
+
+/// A state before an update, and where the update has moved it.
+template <Homogeneous X>
+struct MovingState {
+  static constexpr int N = ManifoldTraits<X>::DoF;
+  const Gaussian<X>& before;
+  X moved = before.mean;
+
+  FilterState record() { return {N, is_vector<X>, before.covariance.data(), this, &move}; }
+
+ private:
+  static void move(void* front, const double* step, double* by_step) {
+    auto& state = *static_cast<MovingState*>(front);
+    state.moved = movedBy(state.before.mean, step);
+    if constexpr (!is_vector<X>) {
+      toRows<N, N>(expJacobian(state.before.mean, fromRows<N, 1>(step)), by_step);
+    }
+  }
+};
+
+/// A measurement with its noise and equations as the core reads them, and memory for its update.
+template <Homogeneous X, Homogeneous M, NoiseModel Noise, class Equation>
+class FilterFront {
+ public:
+  static constexpr int N = ManifoldTraits<X>::DoF, K = ManifoldTraits<M>::DoF, P = equation_count<Equation, X, M>;
+  static_assert(P != Eigen::Dynamic, "equations return a vector of fixed size");
+  static_assert(Noise::dimension == K, "the noise has as many coordinates as the measurement");
+
+  FilterFront(const MovingState<X>& state, const M& y, const Noise& noise, const Equation& equation)
+      : state_(state), y_(y), equation_(equation), valid_noise_(noise.valid()) {
+    NoiseNumbers<Noise>::covariance(noise, covariance_.data());
+    if constexpr (HasFreeDirections<Noise>) {
+      free_ = noise.freeDimension();
+      if (free_ > 0) toRows<K, K>(noise.freeBasis(), free_basis_.data());
+    }
+  }
+  FilterMeasurement record() const {
+    return {P,
+            equationRank<Equation, P>(),
+            K,
+            is_vector<M>,
+            valid_noise_,
+            NoiseNumbers<Noise>::form,
+            covariance_.data(),
+            free_,
+            free_basis_.data(),
+            this,
+            &linearize};
+  }
+  /// No noise at all.
+  bool isExact() const {
+    return std::all_of(covariance_.begin(), covariance_.end(), [](double x) { return x == 0; });
+  }
+  FilterMemory memory() { return {numbers_, rows_}; }
+
+ private:
+  static void linearize(const void* front, bool moved, const double* step, double* values, double* by_state,
+                        double* by_measurement, double* by_step) {
+    const FilterFront& f = *static_cast<const FilterFront*>(front);
+    const X& x = moved ? f.state_.moved : f.state_.before.mean;
+    const EquationDerivatives<P, N, K> J =
+        step ? f.equation_.linearize(x, movedBy(f.y_, step)) : f.equation_.linearize(x, f.y_);
+    toValues<P>(J.value, values);
+    toRows<P, N>(J.by_parameter, by_state);
+    toRows<P, K>(J.by_measurement, by_measurement);
+    if constexpr (!is_vector<M>) {
+      if (step)
+        toRows<K, K>(expJacobian(f.y_, TangentOf<M>(fromRows<K, 1>(step).template cast<ScalarOf<M>>())), by_step);
+    }
+  }
+
+  const MovingState<X>& state_;
+  const M& y_;
+  const Equation& equation_;
+  bool valid_noise_;
+  int free_ = 0;
+  std::array<double, NoiseNumbers<Noise>::count> covariance_;
+  std::array<double, HasFreeDirections<Noise> ? std::size_t{K} * K : 1> free_basis_;
+  double numbers_[filterNumbers(N, P, K)];
+  int rows_[static_cast<std::size_t>(P)];
+};
 
 }  // namespace detail
 
@@ -185,100 +167,23 @@ class InformationSums {
   /// One measurement y with its noise and equations. Where its own squared distance, rᵀ (C P Cᵀ + D R Dᵀ)⁻¹ r at the
   /// prior, exceeds `gate` (a χ² threshold for its equations), it is left out and counted.
   template <Homogeneous M, NoiseModel Noise, class Equation>
-  void add(const M& y, const Noise& noise, const Equation& equation,
-           double gate = std::numeric_limits<double>::infinity()) {
-    static_assert(Noise::dimension == ManifoldTraits<M>::DoF, "the noise has as many coordinates as the measurement");
-    using Block = detail::MeasurementBlock<detail::equation_count<Equation, X, M>, N, ManifoldTraits<M>::DoF>;
-    if (!noise.valid()) {
-      fail(FilterStatus::singular);
-      return;
-    }
-    Block block;
-    typename Block::Correction w = Block::Correction::Zero();
-    const bool first = pass_ == 0;
-    if (first || std::isfinite(gate)) {
-      if (!build(block, y, noise, equation, TangentOf<X>::Zero(), w)) return;
-      if (std::isfinite(gate) && !(distance(block) <= gate)) {
-        gated_ += first;
-        return;
-      }
-    }
-    if (!first) {
-      // The correction that the state at hand asks for: the equations hold at (state, exp(y, w)).
-      for (int i = 0; i < 10; ++i) {
-        if (!build(block, y, noise, equation, v_, w)) return;
-        const typename Block::Correction next = block.correction(Step::Zero());
-        const double change = (next - w).norm(), size = next.norm();
-        w = next;
-        if (!(change > 1e-10 * size)) break;
-      }
-      if (!build(block, y, noise, equation, v_, w)) return;
-    }
-    const typename Block::Values r = block.r + detail::product(block.C, v_);
-    A_ += detail::product(block.C.transpose(), block.C);
-    b_ += detail::product(block.C.transpose(), r);
-    squared_ += block.r.squaredNorm();
-    equations_ += block.root.rank();
-    ++measurements_;
+  LIESTAT_ESTIMATION_API void add(const M& y, const Noise& noise, const Equation& equation,
+                                  double gate = std::numeric_limits<double>::infinity()) {
+    detail::FilterFront<X, M, Noise, Equation> front(state_, y, noise, equation);
+    detail::addToSums(sums_, front.record(), gate, front.memory());
   }
 
  private:
   template <Homogeneous>
   friend class ImplicitEkf;
-  using Step = Eigen::Matrix<double, N, 1>;
-  using Square = Eigen::Matrix<double, N, N>;
+  explicit InformationSums(const Gaussian<X>& prior) : state_{prior}, sums_{state_.record(), step_, by_step_, A_, b_} {}
+  InformationSums(const InformationSums&) = delete;
+  InformationSums& operator=(const InformationSums&) = delete;
 
-  explicit InformationSums(const Gaussian<X>& prior) : prior_(&prior) {}
-  void begin(int pass, const Step& v) {
-    pass_ = pass, v_ = v;
-    A_.setZero(), b_.setZero();
-    squared_ = 0, equations_ = 0, measurements_ = 0;
-  }
-  void fail(FilterStatus status) {
-    if (status_ == FilterStatus::ok) status_ = status;
-  }
-
-  template <class Block, Homogeneous M, class Noise, class Equation>
-  bool build(Block& block, const M& y, const Noise& noise, const Equation& equation, const Step& v,
-             const typename Block::Correction& w) {
-    constexpr int P = Block::Values::RowsAtCompileTime, rank = detail::independentEquations<Equation, P>();
-    const auto J = detail::linearizedEquations(equation, prior_->mean, v, y, w);
-    block.build(noise, J.value, J.by_parameter, J.by_measurement, w, rank);
-    if (!block.finite || !block.C.allFinite() || !block.D.allFinite()) {
-      fail(FilterStatus::not_finite);
-      return false;
-    }
-    // An exact constraint of the state has no finite information: a row without noise that is not made of others.
-    if (block.free.dimension == 0 && block.root.rank() < rank) {
-      const auto S = detail::product(J.by_measurement, noise.template spread<P>(J.by_measurement));
-      const Eigen::Matrix<double, P, P> X_rows = block.root.template halfSolve<P>(S);
-      const Eigen::Matrix<double, P, N> left = J.by_parameter - detail::product(X_rows.transpose(), block.C);
-      for (int i = 0; i < P; ++i) {
-        bool kept = false;
-        for (int k = 0; k < block.root.rank(); ++k) kept = kept || block.root.row(k) == i;
-        if (kept || !(left.row(i).norm() > 1e-6 * J.by_parameter.row(i).norm())) continue;
-        fail(FilterStatus::singular);
-        return false;
-      }
-    }
-    return true;
-  }
-  /// r̂ᵀ (I + Ĉ P Ĉᵀ)⁻¹ r̂ of whitened equations; those that are left out are zero.
-  template <class Block>
-  double distance(const Block& block) const {
-    constexpr int P = Block::Values::RowsAtCompileTime;
-    Eigen::Matrix<double, P, P> S = detail::congruence(block.C, prior_->covariance);
-    S.diagonal().array() += 1;
-    return detail::Cholesky<double, P>(S).template halfSolve<1>(block.r).squaredNorm();
-  }
-
-  const Gaussian<X>* prior_;
-  Step v_ = Step::Zero(), b_ = Step::Zero();
-  Square A_ = Square::Zero();
-  double squared_ = 0;
-  int pass_ = 0, equations_ = 0;
-  std::size_t measurements_ = 0, gated_ = 0;
-  FilterStatus status_ = FilterStatus::ok;
+  detail::MovingState<X> state_;
+  double step_[static_cast<std::size_t>(N)], b_[static_cast<std::size_t>(N)];
+  double by_step_[static_cast<std::size_t>(N * N)], A_[static_cast<std::size_t>(N * N)];
+  detail::FilterSums sums_;
 };
 
 /// The filter: a state with its covariance, predictions and updates. See the header comment.
@@ -313,77 +218,20 @@ class ImplicitEkf {
   /// covariance, where that is singular its independent rows: the noise may be zero (an exact constraint of the state), the
   /// covariance of the state singular. `gate`: the NIS beyond which the state is left as it was.
   template <Homogeneous M, NoiseModel Noise, class Equation>
-  auto update(const M& y, const Noise& noise, const Equation& equation,
-              double gate = std::numeric_limits<double>::infinity()) {
-    constexpr int P = detail::equation_count<Equation, X, M>, K = ManifoldTraits<M>::DoF;
-    constexpr int independent = detail::independentEquations<Equation, P>();
-    static_assert(Noise::dimension == K, "the noise has as many coordinates as the measurement");
+  LIESTAT_ESTIMATION_API auto update(const M& y, const Noise& noise, const Equation& equation,
+                                     double gate = std::numeric_limits<double>::infinity()) {
     static_assert(!detail::HasFreeDirections<Noise>, "free directions of a measurement need updateAll()");
-    using Values = Eigen::Matrix<double, P, 1>;
-    DenseFilterUpdate<X, P> result;
-    const SquareOf<X>& prior = state_.covariance;
-    const auto ended = [&](FilterStatus status) {
-      result.status = status;
-      return result;
-    };
-    if (!noise.valid() && !noise.covariance().isZero(0)) return ended(FilterStatus::singular);
-
-    TangentOf<X> v = TangentOf<X>::Zero();
-    TangentOf<M> w = TangentOf<M>::Zero();
-    Gaussian<X> posterior = state_;
-    const int passes = std::max(1, options_.max_iterations);
-    result.status = passes > 1 ? FilterStatus::not_converged : FilterStatus::ok;
-    while (result.iterations < passes) {
-      const bool first = result.iterations == 0;
-      const auto J = detail::linearizedEquations(equation, state_.mean, v, y, w);
-      const Values r = J.value - detail::product(J.by_parameter, v) - detail::product(J.by_measurement, w);
-      const Eigen::Matrix<double, N, P> PC = detail::productTransposed(prior, J.by_parameter);
-      const Eigen::Matrix<double, K, P> RD = noise.template spread<P>(J.by_measurement);
-      const Eigen::Matrix<double, P, P> S = detail::product(J.by_parameter, PC) + detail::product(J.by_measurement, RD);
-      if (!r.allFinite() || !S.allFinite() || !PC.allFinite()) {
-        if (first) return ended(FilterStatus::not_finite);
-        break;
-      }
-      const detail::ReducedRoot<double, P> root(S, detail::Pivoting::largest, independent);
-      const Values whitened = root.template halfSolve<1>(r);
-      if (first) {
-        result.innovation = r;
-        result.innovation_covariance = S;
-        result.nis = whitened.squaredNorm();
-        result.degrees_of_freedom = root.rank();
-        if (root.rank() < independent) result.inconsistency = inconsistency(root, S, r, whitened);
-        if (root.rank() == 0 || !(result.inconsistency <= options_.max_inconsistency)) {
-          return ended(FilterStatus::singular);
-        }
-      } else if (root.rank() == 0) {
-        break;
-      }
-      const Values multipliers = root.halfSolveTransposed(whitened);
-      const TangentOf<X> next = -detail::product(PC, multipliers);
-      const double change = detail::changeInDeviations<N>(next - v, prior);
-      v = next, w = -detail::product(RD, multipliers);
-      ++result.iterations;
-      if (first) {
-        result.step = v;
-        if (!(result.nis <= gate)) {
-          result.gated = 1;
-          return ended(FilterStatus::gated);
-        }
-      }
-      const bool settled = !first && change <= options_.tolerance;
-      if (first || settled) {
-        const Gaussian<X> found = detail::movedGaussian(state_.mean, v, josephForm(J, root, PC, noise));
-        if (!detail::isFinite(found)) return ended(FilterStatus::not_finite);
-        posterior = found;
-        result.step = v;
-      }
-      if (settled) {
-        result.status = FilterStatus::ok;
-        break;
-      }
-    }
-    result.measurements = 1;
-    state_ = posterior;
+    detail::MovingState<X> moving{state_};
+    detail::FilterFront<X, M, Noise, Equation> front(moving, y, noise, equation);
+    detail::FilterMeasurement measurement = front.record();
+    measurement.valid_noise = measurement.valid_noise || front.isExact();
+    DenseFilterUpdate<X, front.P> result;
+    SquareOf<X> covariance;
+    const detail::FilterRows rows{result.step.data(), covariance.data(), result.innovation.data(),
+                                  result.innovation_covariance.data()};
+    const auto found = detail::updateDense(moving.record(), measurement, options_, gate, rows, front.memory());
+    result.inconsistency = found.inconsistency;
+    take(found, {moving.moved, covariance}, result);
     return result;
   }
 
@@ -391,94 +239,40 @@ class ImplicitEkf {
   /// called: once, or for each iteration. The covariance of the state must be regular, and so must the noise of the
   /// equations (no exact constraint of the state).
   template <class Visit>
-  FilterUpdate<X> updateAll(Visit&& visit) {
+  LIESTAT_ESTIMATION_API FilterUpdate<X> updateAll(Visit&& visit) {
     FilterUpdate<X> result;
-    const auto ended = [&](FilterStatus status) {
-      result.status = status;
+    if (!detail::isFinite(state_)) {
+      result.status = FilterStatus::not_finite;
       return result;
-    };
-    if (!detail::isFinite(state_)) return ended(FilterStatus::not_finite);
-    const detail::Cholesky<double, N> prior(state_.covariance);
-    if (!prior.ok()) return ended(FilterStatus::singular);
-    const SquareOf<X> prior_information = prior.inverse();
-
-    InformationSums<X> sums(state_);
-    Gaussian<X> posterior = state_;
-    TangentOf<X> v = TangentOf<X>::Zero();
-    const int passes = std::max(1, options_.max_iterations);
-    result.status = passes > 1 ? FilterStatus::not_converged : FilterStatus::ok;
-    while (result.iterations < passes) {
-      const bool first = result.iterations == 0;
-      sums.begin(result.iterations, v);
-      visit(sums);
-      if (first) {
-        if (sums.status_ != FilterStatus::ok) return ended(sums.status_);
-        result.measurements = sums.measurements_, result.gated = sums.gated_;
-        result.degrees_of_freedom = sums.equations_;
-        if (result.measurements == 0) return ended(result.gated > 0 ? FilterStatus::gated : FilterStatus::ok);
-      }
-      const detail::Cholesky<double, N> information(prior_information + sums.A_);
-      if (sums.status_ != FilterStatus::ok || !information.ok()) {
-        if (first) return ended(sums.A_.allFinite() ? FilterStatus::singular : FilterStatus::not_finite);
-        break;
-      }
-      const TangentOf<X> next = information.template solve<1>(sums.b_);
-      const double change = detail::changeInDeviations<N>(next - v, state_.covariance);
-      v = next;
-      ++result.iterations;
-      const bool settled = !first && change <= options_.tolerance;
-      if (first || settled) {
-        const Gaussian<X> found = detail::movedGaussian(state_.mean, v, information.inverse());
-        if (!detail::isFinite(found)) return ended(FilterStatus::not_finite);
-        posterior = found;
-        result.step = v;
-      }
-      // Woodbury's identity: hᵀ (C P Cᵀ + R)⁻¹ h = hᵀ R⁻¹ h - bᵀ (P⁻¹ + A)⁻¹ b.
-      if (first) result.nis = std::max(0.0, sums.squared_ - sums.b_.dot(v));
-      if (settled) {
-        result.status = FilterStatus::ok;
-        break;
-      }
     }
-    state_ = posterior;
+    InformationSums<X> sums(state_);
+    SquareOf<X> covariance;
+    double numbers[detail::filterNumbers(N, 0, 0)];
+    struct Visitor {
+      InformationSums<X>* sums;
+      std::remove_reference_t<Visit>* visit;
+    } visitor{&sums, std::addressof(visit)};
+    const auto found = detail::updateSums(
+        sums.sums_, options_, {result.step.data(), covariance.data()}, {numbers, nullptr},
+        [](void* front) { (*static_cast<Visitor*>(front)->visit)(*static_cast<Visitor*>(front)->sums); }, &visitor);
+    take(found, {sums.state_.moved, covariance}, result);
     return result;
   }
 
  private:
-  /// How far the rows that were left out are from what those that were kept say of them.
-  template <int P>
-  static double inconsistency(const detail::ReducedRoot<double, P>& root, const Eigen::Matrix<double, P, P>& S,
-                              const Eigen::Matrix<double, P, 1>& r, const Eigen::Matrix<double, P, 1>& whitened) {
-    const Eigen::Matrix<double, P, P> rows = root.template halfSolve<P>(S);
-    double largest = 0;
-    for (int i = 0; i < P; ++i) {
-      bool kept = false;
-      for (int k = 0; k < root.rank(); ++k) kept = kept || root.row(k) == i;
-      if (kept) continue;
-      double left = r[i], scale = 0;
-      for (int k = 0; k < root.rank(); ++k) {
-        left -= rows(k, i) * whitened[k];
-        scale += std::abs(rows(k, i) * whitened[k]);
-      }
-      // Rounding alone is no contradiction, however small the deviation.
-      if (!(std::abs(left) > 1e-10 * (std::abs(r[i]) + scale))) continue;
-      largest = std::max(largest, std::abs(left) / std::sqrt(S(i, i)));
+  /// Takes over what the core has found.
+  void take(const detail::FilterOutcome& found, const Gaussian<X>& posterior, FilterUpdate<X>& result) {
+    result.status = found.status;
+    result.nis = found.nis;
+    result.degrees_of_freedom = found.degrees_of_freedom;
+    result.iterations = found.iterations;
+    result.measurements = found.measurements, result.gated = found.gated;
+    if (!found.moved) return;
+    if (detail::isFinite(posterior)) {
+      state_ = posterior;
+    } else {
+      result.status = FilterStatus::not_finite;
     }
-    return largest;
-  }
-
-  /// (I - L C) P (I - L C)ᵀ + L D R Dᵀ Lᵀ in coordinates at the prior.
-  template <int P, int K, class Noise>
-  SquareOf<X> josephForm(const EquationDerivatives<P, N, K>& J, const detail::ReducedRoot<double, P>& root,
-                         const Eigen::Matrix<double, N, P>& PC, const Noise& noise) const {
-    const Eigen::Matrix<double, P, N> half = root.template halfSolve<N>(PC.transpose());
-    Eigen::Matrix<double, N, P> gain;
-    for (int i = 0; i < N; ++i) gain.row(i) = root.halfSolveTransposed(half.col(i)).transpose();
-    const SquareOf<X> left = SquareOf<X>::Identity() - detail::product(gain, J.by_parameter);
-    const Eigen::Matrix<double, N, K> by_noise = detail::product(gain, J.by_measurement);
-    const SquareOf<X> covariance =
-        detail::congruence(left, state_.covariance) + detail::product(by_noise, noise.template spread<N>(by_noise));
-    return 0.5 * (covariance + covariance.transpose());
   }
 
   Gaussian<X> state_;

@@ -227,6 +227,9 @@ concept NoiseModel = requires(const T& noise, const Eigen::Matrix<double, T::dim
 
 namespace detail {
 
+/// How the numbers of a noise are given: a variance, variances of the coordinates, or a matrix.
+enum class NoiseForm { isotropic, diagonal, full };
+
 /// A model whose information may be singular.
 template <class T>
 concept HasFreeDirections = NoiseModel<T> && requires(const T& noise) {

@@ -4,9 +4,8 @@
 // it through a table.
 #pragma once
 
+#include <stats/detail/measurement_rows.hpp>
 #include <stats/detail/tangent_system.hpp>
-
-#include <lie/detail/small_orthogonal.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -20,15 +19,15 @@ namespace liestat::detail {
 // ------------------------------------------------------------------------------------------------------------ noises
 
 inline std::size_t NoiseTable::stride() const {
-  return number(form == Form::isotropic ? 1 : form == Form::diagonal ? dimension : dimension * dimension);
+  return number(form == NoiseForm::isotropic ? 1 : form == NoiseForm::diagonal ? dimension : dimension * dimension);
 }
 inline double NoiseTable::squaredNorm(std::size_t i, const double* e) const {
   const double* Q = information.data() + index(i) * stride();
   double sum = 0;
   switch (form) {
-    case Form::isotropic:
+    case NoiseForm::isotropic:
       return dot(e, e, dimension) * Q[0];
-    case Form::diagonal:
+    case NoiseForm::diagonal:
       for (int k = 0; k < dimension; ++k) sum += e[k] * e[k] * Q[k];
       return sum;
     default:
@@ -36,19 +35,21 @@ inline double NoiseTable::squaredNorm(std::size_t i, const double* e) const {
       return sum;
   }
 }
-inline void NoiseTable::spread(std::size_t i, const double* D, int rows, double* result) const {
-  const double* V = covariance.data() + index(i) * stride();
-  for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
-    for (int k = 0; k < dimension; ++k) {
-      result[k] = form == Form::full ? dot(V + k * dimension, D, dimension) : V[form == Form::isotropic ? 0 : k] * D[k];
-    }
+inline NoiseRows NoiseTable::rows(std::size_t i) const {
+  NoiseRows noise{form, dimension, covariance.data() + index(i) * stride()};
+  if (can_be_free) {
+    noise.free = null_dimension[index(i)];
+    noise.free_basis = null_basis.data() + index(i) * number(dimension * dimension);
   }
+  return noise;
 }
 inline void NoiseTable::matrix(const Numbers& list, std::size_t i, double* result) const {
   const double* values = list.data() + index(i) * stride();
   for (int k = 0; k < dimension; ++k) {
     for (int l = 0; l < dimension; ++l, ++result) {
-      *result = form == Form::full ? values[k * dimension + l] : k != l ? 0 : values[form == Form::isotropic ? 0 : k];
+      *result = form == NoiseForm::full ? values[k * dimension + l]
+                : k != l                ? 0
+                                        : values[form == NoiseForm::isotropic ? 0 : k];
     }
   }
 }
@@ -56,78 +57,9 @@ inline double NoiseTable::typicalDeviation(std::size_t i) const {
   const double* V = covariance.data() + index(i) * stride();
   double trace = 0;
   for (int k = 0; k < dimension; ++k) {
-    trace += V[form == Form::full ? k * (dimension + 1) : form == Form::diagonal ? k : 0];
+    trace += V[form == NoiseForm::full ? k * (dimension + 1) : form == NoiseForm::diagonal ? k : 0];
   }
   return std::sqrt(trace / dimension);
-}
-
-// ----------------------------------------------------------------------------------------------------- small factors
-
-/// The reduced root of a symmetric P×P matrix S, which is used up (ReducedRoot of lie/detail/small_reduced.hpp, with
-/// Pivoting::largest). Row k of `kept` holds the k-th row of L that is kept, 1/L_kk in place of L_kk; `order` says which
-/// that is. `half` holds P² numbers.
-inline int reducedRoot(double* S, int P, int max_rank, double* kept, int* order, double* half) {
-  const double least = 10 * P * std::numeric_limits<double>::epsilon();
-  const auto isLeft = [&](int k, int rank) { return std::find(order, order + rank, k) == order + rank; };
-  double* original = half + P * P;
-  for (int k = 0; k < P; ++k) original[k] = S[k * P + k];
-  int rank = 0;
-  while (rank < max_rank) {
-    int best = -1;
-    double largest = 0;
-    for (int k = 0; k < P; ++k) {
-      const double pivot = S[k * P + k];
-      // Written so that NaN is left out.
-      if (!isLeft(k, rank) || !(pivot > least * original[k]) || !(pivot > largest)) continue;
-      best = k, largest = pivot;
-    }
-    if (best < 0) break;
-    const double inverse = 1 / std::sqrt(largest);
-    std::copy(half + best * P, half + best * P + rank, kept + rank * P);
-    kept[rank * P + rank] = inverse;
-    order[rank] = best;
-    for (int i = 0; i < P; ++i) {
-      if (isLeft(i, rank + 1)) half[i * P + rank] = S[i * P + best] * inverse;
-    }
-    for (int i = 0; i < P; ++i) {
-      if (!isLeft(i, rank + 1)) continue;
-      for (int j = 0; j < P; ++j) S[i * P + j] -= half[i * P + rank] * half[j * P + rank];
-    }
-    ++rank;
-  }
-  return rank;
-}
-
-/// Cholesky's factor of a symmetric n×n matrix in its lower triangle; false where that is not positive definite.
-inline bool choleskyFactor(double* A, int n) {
-  for (int j = 0; j < n; ++j) {
-    const double pivot = A[j * n + j] - dot(A + j * n, A + j * n, j);
-    if (!(pivot > 0)) return false;
-    A[j * n + j] = std::sqrt(pivot);
-    for (int i = j + 1; i < n; ++i) A[i * n + j] = (A[i * n + j] - dot(A + i * n, A + j * n, j)) / A[j * n + j];
-  }
-  return true;
-}
-/// A⁻¹ B in the place of B, n×m, from the factor.
-inline void choleskySolve(const double* L, int n, double* B, int m) {
-  const auto divide = [&](int i) {
-    for (int c = 0; c < m; ++c) B[i * m + c] /= L[i * n + i];
-  };
-  for (int i = 0; i < n; ++i) {
-    for (int k = 0; k < i; ++k) addScaled(B + i * m, -L[i * n + k], B + k * m, m);
-    divide(i);
-  }
-  for (int i = n - 1; i >= 0; --i) {
-    for (int k = i + 1; k < n; ++k) addScaled(B + i * m, -L[k * n + i], B + k * m, m);
-    divide(i);
-  }
-}
-/// C = A B, A n×m and B m×k.
-inline void multiply(const double* A, const double* B, int n, int m, int k, double* C) {
-  std::fill(C, C + n * k, 0.);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < m; ++j) addScaled(C + i * k, A[i * m + j], B + j * k, k);
-  }
 }
 
 // ------------------------------------------------------------------------------------------------------ the channel
@@ -183,22 +115,8 @@ inline int ConstrainedChannel::freeOf(std::size_t i) const {
   return record_.noise.can_be_free ? record_.noise.null_dimension[record_.noise.index(i)] : 0;
 }
 
-/// L⁻¹ B of the rows that are kept, in the first of P rows; the others are zero.
 inline void ConstrainedChannel::halfSolve(std::size_t i, const double* B, int cols, double* X) const {
-  const double* root = block(root_, i, P * P);
-  const int *order = order_.data() + i * number(P), rank = ranks_[i];
-  for (int k = 0; k < rank; ++k, root += P) {
-    const double *row = B + order[k] * cols, inverse = root[k];
-    double* x = X + k * cols;
-    if (k == 0) {
-      for (int c = 0; c < cols; ++c) x[c] = row[c] * inverse;
-      continue;
-    }
-    std::copy(row, row + cols, x);
-    for (int l = 0; l < k; ++l) addScaled(x, -root[l], X + l * cols, cols);
-    for (int c = 0; c < cols; ++c) x[c] *= inverse;
-  }
-  std::fill(X + rank * cols, X + P * cols, 0.);
+  detail::halfSolve(block(root_, i, P * P), order_.data() + i * number(P), ranks_[i], P, B, cols, X);
 }
 /// Values of the equations in units of the noise.
 inline void ConstrainedChannel::whitened(std::size_t i, const double* values, double* result) const {
@@ -214,67 +132,29 @@ inline int ConstrainedChannel::selected(std::size_t i) const {
   return rows;
 }
 
-inline void ConstrainedChannel::eliminateFree(std::size_t i) {
-  const int free = freeOf(i), size = std::max(P, K);
-  const double *D = block(free_D_, i, P * K),
-               *basis = record_.noise.null_basis.data() + record_.noise.index(i) * number(K * K);
-  // Singular vectors of the transpose of D N_i N_iᵀ's part N_i, filled up to a square; the zeros that fill it up are
-  // never mixed with the rest.
-  BasicSmallMatrix<Eigen::Dynamic> transposed(size, size);
-  for (int f = 0; f < free; ++f) {
-    for (int j = 0; j < P; ++j) {
-      for (int k = 0; k < K; ++k) transposed(f, j) += D[j * K + k] * basis[k * K + f];
-    }
-  }
-  const SmallSvd svd(transposed);
-  double *selection = block(selection_, i, P * P), *recovery = block(recovery_, i, K * P);
-  std::fill(selection, selection + P * P, 0.);
-  std::fill(recovery, recovery + K * P, 0.);
-  int row = 0;
-  for (int k = 0; k < size; ++k) {
-    const double* v = svd.v.row(k);
-    if (svd.value(k) > 1e-12 * svd.value(0)) {
-      for (int a = 0; a < K; ++a) {
-        const double along = dot(basis + a * K, svd.u.row(k), free) / svd.value(k);
-        addScaled(recovery + a * P, along, v, P);
-      }
-    } else if (dot(v, v, P) >= 0.5) {
-      std::copy(v, v + P, selection + P * row++);
-    }
-  }
-}
-
 /// The block of a measurement from its derivatives. False if something is not finite.
 inline bool ConstrainedChannel::build(std::size_t i, const double* values, const double* by_parameter,
                                       const double* by_measurement) {
-  double *observed = scratch_.data(), *S = observed + P, *spread = S + P * P, *work = spread + P * K;
-  const double* at = block(at_, i, K);
-  for (int p = 0; p < P; ++p) observed[p] = dot(by_measurement + p * K, at, K) - values[p];
-  const bool finite = allFinite(observed, number(P)) && allFinite(by_parameter, number(P * N));
-  if (freeOf(i) > 0) {
-    double *C = block(free_C_, i, P * N), *D = block(free_D_, i, P * K), *r = block(free_r_, i, P);
-    std::copy(by_parameter, by_parameter + P * N, C);
-    std::copy(by_measurement, by_measurement + P * K, D);
-    std::copy(observed, observed + P, r);
-    eliminateFree(i);
-    const double* selection = block(selection_, i, P * P);
-    double *selected_C = work + 2 * P * P, *selected_D = selected_C + P * N, *selected_values = selected_D + P * K;
-    multiply(selection, C, P, P, N, selected_C);
-    multiply(selection, D, P, P, K, selected_D);
-    multiply(selection, values, P, P, 1, selected_values);
-    multiply(selection, r, P, P, 1, observed);
-    by_parameter = selected_C, by_measurement = selected_D, values = selected_values;
-  }
-  record_.noise.spread(i, by_measurement, P, spread);
-  for (int p = 0; p < P; ++p) {
-    for (int q = 0; q < P; ++q) S[p * P + q] = dot(by_measurement + p * K, spread + q * K, K);
-  }
-  ranks_[i] = reducedRoot(S, P, record_.functions->rank, block(root_, i, P * P), order_.data() + i * number(P), work);
-  halfSolve(i, by_parameter, N, block(C_, i, P * N));
-  halfSolve(i, by_measurement, K, block(D_, i, P * K));
-  halfSolve(i, observed, 1, block(r_, i, P));
-  halfSolve(i, values, 1, block(value_, i, P));
-  halfSolve(i, spread, K, block(G_, i, P * K));
+  const bool free = record_.noise.can_be_free;
+  const auto where = [&](Numbers& list, int size) { return free ? block(list, i, size) : nullptr; };
+  MeasurementRows rows{N,
+                       P,
+                       K,
+                       block(C_, i, P * N),
+                       block(D_, i, P * K),
+                       block(r_, i, P),
+                       block(value_, i, P),
+                       block(G_, i, P * K),
+                       block(root_, i, P * P),
+                       order_.data() + i * number(P),
+                       where(selection_, P * P),
+                       where(recovery_, K * P),
+                       where(free_C_, P * N),
+                       where(free_D_, P * K),
+                       where(free_r_, P)};
+  const bool finite = rows.whiten(record_.noise.rows(i), record_.functions->rank, block(at_, i, K), values,
+                                  by_parameter, by_measurement, scratch_.data());
+  ranks_[i] = rows.rank;
   return finite;
 }
 
@@ -301,14 +181,9 @@ inline bool ConstrainedChannel::linearize(const void* q, Rows& A, Numbers& b) {
 /// The multipliers of the equations as they were given; with the sign of ½ ‖ε‖² + λᵀ c.
 inline void ConstrainedChannel::lagrange(std::size_t i, double* lambda) const {
   double *y = scratch_.data(), *x = y + P;
-  const double *given = block(multipliers_, i, P), *root = block(root_, i, P * P);
-  std::copy(given, given + P, y);
-  std::fill(x, x + P, 0.);
-  for (int k = ranks_[i] - 1; k >= 0; --k) {
-    const double value = -y[k] * root[k * P + k];
-    x[order_[i * number(P) + number(k)]] = value;
-    for (int l = 0; l < k; ++l) y[l] += root[k * P + l] * value;
-  }
+  const double* given = block(multipliers_, i, P);
+  for (int k = 0; k < P; ++k) y[k] = -given[k];
+  halfSolveTransposed(block(root_, i, P * P), order_.data() + i * number(P), ranks_[i], P, y, 1, x);
   if (freeOf(i) == 0) {
     std::copy(x, x + P, lambda);
     return;

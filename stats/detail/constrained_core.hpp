@@ -7,6 +7,7 @@
 
 #include <stats/constrained_types.hpp>
 #include <stats/detail/compiled.hpp>
+#include <stats/measurement_noise.hpp>
 
 #include <cstddef>
 #include <limits>
@@ -66,9 +67,11 @@ struct ChannelFunctions {
                    double* values);
 };
 
+struct NoiseRows;
+
 /// The noises of a channel, one or one for each measurement: a variance, variances, or matrices.
 struct NoiseTable {
-  enum class Form { isotropic, diagonal, full } form = Form::isotropic;
+  NoiseForm form = NoiseForm::isotropic;
   int dimension = 0;
   bool one = true;                       ///< one for all measurements
   Numbers covariance, information;       ///< of each noise 1, K or K² numbers
@@ -80,8 +83,7 @@ struct NoiseTable {
   std::size_t stride() const;
   /// eᵀ Q e.
   double squaredNorm(std::size_t i, const double* e) const;
-  /// D V, D of `rows` rows.
-  void spread(std::size_t i, const double* D, int rows, double* result) const;
+  NoiseRows rows(std::size_t i) const;
   /// V or Q as a matrix.
   void matrix(const Numbers& list, std::size_t i, double* result) const;
   /// A standard deviation of the coordinates.
@@ -229,7 +231,6 @@ class ConstrainedChannel {
   const double* block(const Numbers& list, std::size_t i, int size) const;
   int freeOf(std::size_t i) const;
   bool build(std::size_t i, const double* values, const double* by_parameter, const double* by_measurement);
-  void eliminateFree(std::size_t i);
   int selected(std::size_t i) const;
   void halfSolve(std::size_t i, const double* B, int cols, double* X) const;
   void whitened(std::size_t i, const double* values, double* result) const;

@@ -9,6 +9,7 @@
 #include <lie/detail/small_products.hpp>
 #include <stats/constrained_types.hpp>
 #include <stats/detail/constrained_core.hpp>
+#include <stats/detail/number_rows.hpp>
 #include <stats/measurement_noise.hpp>
 
 #include <Eigen/Core>
@@ -25,10 +26,6 @@ namespace liestat {
 struct NoConstraint {};
 
 namespace detail {
-
-/// Fixed-size vectors: exp and log are sums and differences.
-template <class M>
-constexpr bool is_vector = std::is_base_of_v<Eigen::MatrixBase<M>, M>;
 
 /// The derivative of log(y, x) by x alone, errorVector(y, x).by_feature.
 template <Homogeneous M>
@@ -52,68 +49,6 @@ Eigen::Matrix<double, P, ManifoldTraits<M>::DoF> inCoordinatesAt(
     const SquareOf<M> to_step = inverse<ScalarOf<M>, ManifoldTraits<M>::DoF>(logJacobian(x, y));
     return product(J, to_step.template cast<double>());
   }
-}
-
-/// How many equations are independent: all of them, unless they say how many.
-template <class Equation, int P>
-constexpr int equationRank() {
-  if constexpr (requires { Equation::rank; }) {
-    static_assert(Equation::rank > 0 && Equation::rank <= P, "between one and the number of equations");
-    return Equation::rank;
-  } else {
-    return P;
-  }
-}
-
-/// A matrix as rows of numbers, and back.
-template <int Rows_, int Cols, class Matrix>
-void toRows(const Matrix& m, double* rows) {
-  for (int i = 0; i < Rows_; ++i) {
-    for (int j = 0; j < Cols; ++j) *rows++ = static_cast<double>(m(i, j));
-  }
-}
-template <int Rows_, int Cols>
-Eigen::Matrix<double, Rows_, Cols> fromRows(const double* rows) {
-  Eigen::Matrix<double, Rows_, Cols> m;
-  for (int i = 0; i < Rows_; ++i) {
-    for (int j = 0; j < Cols; ++j) m(i, j) = *rows++;
-  }
-  return m;
-}
-/// Values of equations: a vector, or a number.
-template <int P, class Values>
-void toValues(const Values& values, double* rows) {
-  if constexpr (std::is_arithmetic_v<Values>) {
-    *rows = static_cast<double>(values);
-  } else {
-    for (int k = 0; k < P; ++k) rows[k] = static_cast<double>(values[k]);
-  }
-}
-/// exp(x, step).
-template <Homogeneous M>
-M movedBy(const M& x, const double* step) {
-  TangentOf<M> v;
-  for (int k = 0; k < ManifoldTraits<M>::DoF; ++k) v[k] = static_cast<ScalarOf<M>>(step[k]);
-  if constexpr (is_vector<M>) {
-    for (int k = 0; k < ManifoldTraits<M>::DoF; ++k) v[k] += x[k];
-    return v;
-  } else {
-    return exp(x, v);
-  }
-}
-/// The coordinates of x as seen from the origin.
-template <Homogeneous M>
-void toCoordinates(const M& x, double* rows) {
-  if constexpr (is_vector<M>) {
-    toRows<ManifoldTraits<M>::DoF, 1>(x, rows);
-  } else {
-    toRows<ManifoldTraits<M>::DoF, 1>(log(ManifoldTraits<M>::origin(), x), rows);
-  }
-}
-inline bool areFinite(const double* values, int n) {
-  bool finite = true;
-  for (int k = 0; k < n; ++k) finite = finite && std::isfinite(values[k]);
-  return finite;
 }
 
 /// The functions of a channel for a parameter Q.
@@ -156,34 +91,22 @@ struct ChannelFront {
       P, equationRank<typename Channel::Equation, P>(), K, is_vector<M>, &linearize, &evaluate};
 };
 
-/// The noises of a channel.
-template <int K>
-void addNoise(NoiseTable& table, const IsotropicNoise<K>& noise) {
-  table.covariance.push_back(noise.variance());
-  table.information.push_back(1 / noise.variance());
-}
-template <int K>
-void addNoise(NoiseTable& table, const DiagonalNoise<K>& noise) {
-  table.form = NoiseTable::Form::diagonal;
-  for (int k = 0; k < K; ++k) {
-    table.covariance.push_back(noise.variances()[k]);
-    table.information.push_back(1 / noise.variances()[k]);
-  }
-}
+/// Adds a noise to those of a channel.
 template <NoiseModel Noise>
 void addNoise(NoiseTable& table, const Noise& noise) {
   constexpr int K = Noise::dimension;
-  table.form = NoiseTable::Form::full;
-  const auto add = [](Numbers& list, const Eigen::Matrix<double, K, K>& m) {
-    list.resize(list.size() + K * K);
-    toRows<K, K>(m, list.data() + list.size() - K * K);
+  using N = NoiseNumbers<Noise>;
+  const auto grown = [](Numbers& list, std::size_t n) {
+    list.resize(list.size() + n);
+    return list.data() + list.size() - n;
   };
-  add(table.covariance, noise.covariance());
-  add(table.information, noise.information());
+  table.form = N::form;
+  N::covariance(noise, grown(table.covariance, N::count));
+  N::information(noise, grown(table.information, N::count));
   if constexpr (HasFreeDirections<Noise>) {
     table.can_be_free = true;
     table.null_dimension.push_back(noise.freeDimension());
-    add(table.null_basis, noise.freeBasis());
+    toRows<K, K>(noise.freeBasis(), grown(table.null_basis, std::size_t{K} * K));
   }
 }
 
@@ -297,23 +220,24 @@ class ConstrainedProblem {
       if (by_parameter) toRows<N, N>(logJacobian(p.prior_, p.at(point)), by_parameter);
     }
   }
-  static constexpr ParameterFunctions describe() { ParameterFunctions f{N, P, is_vector<Q>, requires {Constraint::G; }
-  , &move, &point, &coordinates, nullptr, nullptr, nullptr, &priorError
+  static constexpr bool is_linear = requires { Constraint::G; };
+  static constexpr ParameterFunctions describe() {
+    ParameterFunctions f{N,       P,       is_vector<Q>, is_linear,  &move, &point, &coordinates,
+                         nullptr, nullptr, nullptr,      &priorError};
+    if constexpr (!is_vector<Q>) f.transport = &transport;
+    if constexpr (constrained) f.constraint = &constraint, f.linearizeConstraint = &linearizeConstraint;
+    return f;
+  }
+
+  std::array<Q, 3> points_;
+  Constraint constraint_;
+  Q prior_ = ManifoldTraits<Q>::origin();
+  int prior_rank_ = 0;
+  bool valid_ = true;
+
+ public:
+  static constexpr ParameterFunctions functions = describe();
 };
-if constexpr (!is_vector<Q>) f.transport = &transport;
-if constexpr (constrained) f.constraint = &constraint, f.linearizeConstraint = &linearizeConstraint;
-return f;
-}  // namespace detail
-
-std::array<Q, 3> points_;
-Constraint constraint_;
-Q prior_ = ManifoldTraits<Q>::origin();
-int prior_rank_ = 0;
-bool valid_ = true;
-
-public:
-static constexpr ParameterFunctions functions = describe();
-};  // namespace liestat
 
 }  // namespace detail
 }  // namespace liestat

@@ -4,6 +4,7 @@
 
 #include <lie/detail/small_orthogonal.hpp>
 #include <stats/detail/constrained_core.hpp>
+#include <stats/detail/row_factors.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -12,26 +13,12 @@
 
 namespace liestat::detail {
 
-/// Row vectors of n numbers.
-inline double dot(const double* a, const double* b, int n) {
-  double sum = 0;
-  for (int i = 0; i < n; ++i) sum += a[i] * b[i];
-  return sum;
-}
-inline void addScaled(double* sum, double factor, const double* a, int n) {
-  for (int i = 0; i < n; ++i) sum[i] += factor * a[i];
-}
-inline double norm(const double* a, int n) { return std::sqrt(dot(a, a, n)); }
 inline double norm(const Numbers& a) { return norm(a.data(), static_cast<int>(a.size())); }
 inline double dot(const Numbers& a, const Numbers& b) { return dot(a.data(), b.data(), static_cast<int>(a.size())); }
-inline bool allFinite(const double* a, std::size_t n) {
-  return std::all_of(a, a + n, [](double x) { return std::isfinite(x); });
-}
 inline bool allFinite(const Numbers& a) { return allFinite(a.data(), a.size()); }
 inline bool allFinite(const Rows& A) {
   return allFinite(A.data(), static_cast<std::size_t>(A.rows()) * static_cast<std::size_t>(A.cols()));
 }
-inline std::size_t number(int n) { return static_cast<std::size_t>(n); }
 inline void multiply(const Rows& A, const Numbers& x, Numbers& result) {
   for (int i = 0; i < A.rows(); ++i) result[number(i)] = dot(A[i], x.data(), A.cols());
 }

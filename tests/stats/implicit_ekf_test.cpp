@@ -6,6 +6,7 @@
 #include <stats/implicit_ekf.hpp>
 #include <stats/random.hpp>
 #include <stats/sampling.hpp>
+#include <support/implicit_ekf_reference.hpp>
 #include <support/turned_s2.hpp>
 
 #include <gtest/gtest.h>
@@ -199,6 +200,101 @@ TEST(ImplicitEkf, MovesByAModelWithAnUncertainInput) {
   const Mat<6> before = by_hand.state().covariance;
   EXPECT_EQ(by_hand.predict(broken, Q), FilterStatus::not_finite);
   EXPECT_EQ(by_hand.state().covariance, before);
+}
+
+// --- Sizes at run time against fixed ones -------------------------------------------------------------------------
+
+template <class A, class B>
+void expectSame(const A& a, const B& b) {
+  ASSERT_EQ(a.status, b.status);
+  EXPECT_LE((a.step - b.step).norm(), 1e-12 * (1 + b.step.norm()));
+  EXPECT_NEAR(a.nis, b.nis, 1e-12 * (1 + b.nis));
+  EXPECT_EQ(a.degrees_of_freedom, b.degrees_of_freedom);
+  EXPECT_EQ(a.iterations, b.iterations);
+  EXPECT_EQ(a.measurements, b.measurements);
+  EXPECT_EQ(a.gated, b.gated);
+}
+
+/// Both forms, plain and iterated, with a gate and without: the reference finds the same.
+template <class X, class M, class Noise, class EquationOf>
+void expectReference(const Gaussian<X>& start, const std::vector<M>& measured, const Noise& noise,
+                     const EquationOf& equation_of, double gate) {
+  for (const int iterations : {1, 8}) {
+    const ImplicitEkfOptions options{.max_iterations = iterations};
+    ImplicitEkf<X> filter(start, options);
+    liestat_test::ReferenceEkf<X> reference(start, options);
+    const auto compare = [&] {
+      EXPECT_LE(log(reference.state().mean, filter.state().mean).norm(), 1e-12);
+      EXPECT_LE((filter.state().covariance - reference.state().covariance).norm(),
+                1e-12 * reference.state().covariance.norm());
+      // Each update from the same state, or differences grow.
+      reference.reset(filter.state());
+    };
+    if constexpr (!detail::HasFreeDirections<Noise>) {
+      for (std::size_t i = 0; i < measured.size(); ++i) {
+        const auto a = filter.update(measured[i], noise, equation_of(i), gate);
+        const auto b = reference.update(measured[i], noise, equation_of(i), gate);
+        expectSame(a, b);
+        EXPECT_LE((a.innovation - b.innovation).norm(), 1e-12 * (1 + b.innovation.norm()));
+        EXPECT_LE((a.innovation_covariance - b.innovation_covariance).norm(), 1e-12 * b.innovation_covariance.norm());
+        EXPECT_NEAR(a.inconsistency, b.inconsistency, 1e-10 * (1 + b.inconsistency));
+        compare();
+      }
+      filter.reset(start), reference.reset(start);
+    }
+    const auto add = [&](auto& sums) {
+      for (std::size_t i = 0; i < measured.size(); ++i) sums.add(measured[i], noise, equation_of(i), gate);
+    };
+    expectSame(filter.updateAll(add), reference.updateAll(add));
+    compare();
+  }
+}
+
+TEST(ImplicitEkf, SizesAtRunTimeGiveWhatFixedSizesGive) {
+  CounterRng rng(30);
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto with = [](const auto& equation) { return [=](std::size_t) { return equation; }; };
+  // Vectors: a larger state than any that the loops know by size; a singular covariance of the noise; redundant equations;
+  // a free direction.
+  Mat<8> F;
+  for (int i = 0; i < 8; ++i) F.col(i) = rng.normalVector<8>();
+  const Gaussian<Vec<8>> wide{rng.normalVector<8>(), randomCovariance<8>(rng, 0.5)};
+  const Mat<7, 8> H7 = F.topRows<7>();
+  expectReference(wide, std::vector<Vec<7>>{rng.normalVector<7>(), rng.normalVector<7>()},
+                  CovarianceNoise<7>(randomCovariance<7>(rng, 0.4)), with(observes<7, 8>(H7)), infinity);
+  const Mat<2, 8> H2 = F.topRows<2>();
+  expectReference(wide, std::vector<Vec<2>>{rng.normalVector<2>()},
+                  InformationNoise<2>(Eigen::Vector2d(4, 0).asDiagonal()), with(observes<2, 8>(H2)), infinity);
+  Mat<3, 2> twice;
+  twice << 1, 0, 0, 1, 1, 1;
+  expectReference(wide, std::vector<Vec<2>>{rng.normalVector<2>(), rng.normalVector<2>()}, DiagonalNoise<2>({0.3, 0.5}),
+                  with(Linear<3, 8, 2>{twice * H2, twice}), infinity);
+  expectReference(Gaussian<Vec<2>>{Vec<2>(1, 0.6), Mat<2>(0.04 * Mat<2>::Identity())},
+                  std::vector<Vec<1>>{Vec<1>(1.2), Vec<1>(1.3)}, IsotropicNoise<1>(0.05), with(autoDiff(HasRange{})),
+                  infinity);
+
+  // Manifolds: of the state, and of both; a gate that leaves some out.
+  const Gaussian<SO3d> turn{SO3d::exp(rng.normalVector<3>()), randomCovariance<3>(rng, 0.1)};
+  std::vector<Vec<6>> pairs(8);
+  for (Vec<6>& pair : pairs) {
+    const Eigen::Vector3d a = rng.unitVector<3>();
+    pair << a, turn.mean * a;
+    pair += 0.05 * rng.normalVector<6>();
+  }
+  expectReference(turn, pairs, IsotropicNoise<6>(0.05), with(autoDiff(Rotates<1>{})), 5.);
+  const Gaussian<S2d> direction{S2d(rng.unitVector<3>()), randomCovariance<2>(rng, 0.1)};
+  std::vector<S2d> seen;
+  for (int i = 0; i < 5; ++i) seen.push_back(exp(direction.mean, TangentOf<S2d>(0.1 * rng.normalVector<2>())));
+  expectReference(direction, seen, DiagonalNoise<2>({0.05, 0.08}), with(autoDiff(SameDirection{})), infinity);
+  const Gaussian<SE3d> pose{sampleInCube<SE3d>(rng, 1), randomCovariance<6>(rng, 0.05)};
+  std::vector<Vec<3>> landmarks, in_body;
+  for (int i = 0; i < 6; ++i) {
+    landmarks.push_back(rng.normalVector<3>());
+    in_body.push_back(pose.mean.inverse() * landmarks.back() + 0.05 * rng.normalVector<3>());
+  }
+  expectReference(
+      pose, in_body, CovarianceNoise<3>(randomCovariance<3>(rng, 0.05)),
+      [&](std::size_t i) { return autoDiff(SeesLandmark{landmarks[i]}); }, infinity);
 }
 
 // --- Two forms ----------------------------------------------------------------------------------------------------

@@ -1,0 +1,6 @@
+// The implicit filter, compiled once.
+#ifndef LIESTAT_COMPILED_ESTIMATION
+#define LIESTAT_COMPILED_ESTIMATION
+#endif
+
+#include <stats/detail/filter_update.hpp>
