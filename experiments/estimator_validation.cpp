@@ -6,7 +6,6 @@
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/models.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -64,49 +63,37 @@ std::vector<Plan> plansOf(Experiment experiment) {
   const ValidationTolerance open_direction{.index = 0.04, .ks = 0.02, .failure_fraction = 0.001, .tail = 0.003};
   const int pairs = static_cast<int>(few_pairs), more_pairs = static_cast<int>(many_pairs);
   const int matches = static_cast<int>(match_count);
+  const auto plan = [&](double sigma, double cost, std::vector<RowPlan> rows) {
+    return Plan{experiment, sigma, cost, std::move(rows)};
+  };
   switch (experiment) {
     case Experiment::conic:
-      return {{experiment,
-               0.005,
-               1,
-               {{Quantity::criterion, 25, criterion, 25}, {Quantity::parameter, 5, first_order, 5, 0.95}}},
-              // Curvature counts: shown beside the prototype's figures, not judged.
-              {experiment, 0.02, 1.5, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.12, 0.94}}},
-              {experiment, 0.05, 2, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.28, 0.93}}}};
+      return {
+          plan(0.005, 1, {{Quantity::criterion, 25, criterion, 25}, {Quantity::parameter, 5, first_order, 5, 0.95}}),
+          // Curvature counts: shown beside the prototype's figures, not judged.
+          plan(0.02, 1.5, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.12, 0.94}}),
+          plan(0.05, 2, {{Quantity::criterion, 25, {}}, {Quantity::parameter, 5, {}, 5.28, 0.93}})};
     case Experiment::corrected_points:
-      return {{experiment,
-               0.005,
-               0.5,
-               {{Quantity::criterion, 7, criterion},
-                {Quantity::correction, 1, first_order},
-                {Quantity::corrected_point, 2, first_order}}}};
+      return {plan(0.005, 0.5,
+                   {{Quantity::criterion, 7, criterion},
+                    {Quantity::correction, 1, first_order},
+                    {Quantity::corrected_point, 2, first_order}})};
     case Experiment::rotation_numbers:
     case Experiment::rotation:
-      return {{experiment,
-               pair_sigma_before,
-               1,
-               {{Quantity::criterion, 3 * pairs - 3, criterion, 12}, {Quantity::parameter, 3, first_order, 3}}}};
+      return {plan(pair_sigma_before, 1,
+                   {{Quantity::criterion, 3 * pairs - 3, criterion, 12}, {Quantity::parameter, 3, first_order, 3}})};
     case Experiment::prior_numbers:
       // All nine coordinates of the prior are data, six of them against the constraints.
-      return {{experiment,
-               pair_sigma_before,
-               2,
-               {{Quantity::criterion, 6 + 3 * more_pairs, criterion, 66}, {Quantity::parameter, 3, first_order, 3}}}};
+      return {
+          plan(pair_sigma_before, 2,
+               {{Quantity::criterion, 6 + 3 * more_pairs, criterion, 66}, {Quantity::parameter, 3, first_order, 3}})};
     case Experiment::prior:
-      return {{experiment,
-               pair_sigma_before,
-               1,
-               {{Quantity::criterion, 3 * more_pairs, criterion}, {Quantity::parameter, 3, first_order, 3}}}};
+      return {plan(pair_sigma_before, 1,
+                   {{Quantity::criterion, 3 * more_pairs, criterion}, {Quantity::parameter, 3, first_order, 3}})};
     case Experiment::homography:
-      return {{experiment,
-               0.5,
-               4,
-               {{Quantity::criterion, 2 * matches - 8, criterion}, {Quantity::parameter, 8, first_order}}}};
+      return {plan(0.5, 4, {{Quantity::criterion, 2 * matches - 8, criterion}, {Quantity::parameter, 8, first_order}})};
     case Experiment::fundamental:
-      return {{experiment,
-               0.5,
-               4,
-               {{Quantity::criterion, matches - 7, criterion}, {Quantity::parameter, 7, open_direction}}}};
+      return {plan(0.5, 4, {{Quantity::criterion, matches - 7, criterion}, {Quantity::parameter, 7, open_direction}})};
   }
   return {};
 }

@@ -5,7 +5,6 @@
 #include <stats/validation_report.hpp>
 
 #include <array>
-#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>

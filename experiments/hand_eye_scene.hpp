@@ -27,6 +27,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,7 @@ class HandEyeScene {
     addOutliers(wrong);
   }
 
+  const HandEyeSceneOptions& options() const { return options_; }
   /// That of the X which the motion can't tell from the true one that is nearest to an estimate, where what is open are
   /// translations: the truth moved along them.
   SE3d nearestTruth(const SE3d& estimate) const {
@@ -279,5 +281,25 @@ class HandEyeScene {
   HandEyeSceneOptions options_;
   CounterRng draw_;
 };
+
+/// A pose of the truth.
+struct TruePose {
+  SE3d pose;
+};
+template <class V>
+void describe(V& v, const TruePose& x) {
+  v("translation", Eigen::Vector3d(x.pose.translation()), "", "m");
+  v("quaternion_xyzw", Eigen::Vector4d(x.pose.so3().params()));
+  v("rotation_vector", Eigen::Vector3d(x.pose.so3().log()), "", "rad");
+}
+/// The truth of a scene.
+template <class V>
+void describe(V& v, const HandEyeScene& scene) {
+  const HandEyeSceneOptions& o = scene.options();
+  v("problem", o.relative ? "AX = XB" : "AX = YB")("motion", name(o.motion))("noise", name(o.noise));
+  v("noise_factor", o.noise_factor)("pairs", o.pairs)("outlier_kind", name(o.outlier_kind));
+  v("open_dimension", openDimension(o.motion), "of what the motion leaves open")("X", TruePose{scene.X});
+  v("Y", o.relative ? std::nullopt : std::optional(TruePose{scene.Y}))("inlier", scene.inlier);
+}
 
 }  // namespace liestat::experiments

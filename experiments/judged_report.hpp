@@ -5,7 +5,6 @@
 #include <stats/validation_report.hpp>
 
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <optional>
 #include <utility>

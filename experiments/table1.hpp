@@ -5,7 +5,6 @@
 #include <fusion/init/closed_form_types.hpp>
 
 #include <array>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>

@@ -24,6 +24,7 @@
 #include <lie/so3.hpp>
 #include <lie/units.hpp>
 #include <stats/random.hpp>
+#include <stats/shown.hpp>
 
 #include <Eigen/Core>
 
@@ -31,7 +32,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <string>
 #include <vector>
 
 namespace liestat::experiments {
@@ -93,6 +94,12 @@ inline const char* nameOf(TwoViewMotion motion) {
                                    "upright",
                                    "shared focal length"};
   return names[static_cast<std::size_t>(motion)];
+}
+/// The name of a motion in options and JSON fields.
+inline std::string name(TwoViewMotion motion) {
+  std::string text = nameOf(motion);
+  for (char& c : text) c = c == ' ' ? '_' : c;
+  return text;
 }
 /// True if a motion is described by a fundamental matrix, not by a homography.
 inline bool isEpipolar(TwoViewMotion motion) {
@@ -338,5 +345,19 @@ class TwoViewScene {
     return true;
   }
 };
+
+/// The truth of a scene.
+template <class V>
+void describe(V& v, const TwoViewScene& scene) {
+  const TwoViewSceneOptions& o = scene.options;
+  v("motion", name(o.motion))("sigma", o.sigma, "", "px");
+  v("intrinsics", std::vector<double>{o.focal_length, o.focal_length, 0.5 * o.width, 0.5 * o.height}, "", "px");
+  v("focal_scale", scene.focal_scale)("focal_ratio", scene.focal_ratio);
+  v("rotation_vector", Eigen::Vector3d(SO3d::fitToSO3(scene.R).log()), "", "rad")("translation", scene.t, "", "m");
+  const bool epipolar = isEpipolar(o.motion), plane = o.motion == TwoViewMotion::homography;
+  if (shown(v, epipolar)) v("fundamental_normalised", scene.F);
+  if (shown(v, !epipolar)) v("homography_normalised", scene.H);
+  if (shown(v, plane)) v("plane_normal", scene.plane_normal)("plane_distance", scene.plane_distance, "", "m");
+}
 
 }  // namespace liestat::experiments

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace liestat::experiments {
@@ -56,12 +55,6 @@ bool reaches(double right, double trials, double share) {
 }
 
 }  // namespace
-
-std::string name(TwoViewMotion motion) {
-  std::string text = nameOf(motion);
-  std::replace(text.begin(), text.end(), ' ', '_');
-  return text;
-}
 
 double TwoViewValidationResult::average() const {
   double sum = 0, count = 0;

@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace liestat::experiments {
@@ -23,9 +22,6 @@ struct TwoViewValidation {
   double outliers = 0.2;  ///< share of the matches
   double sigma = 0.5;     ///< px
 };
-
-/// The name of a motion in options and JSON fields.
-std::string name(TwoViewMotion motion);
 
 /// Which model was chosen how often, by the number of its motion.
 struct TwoViewChoice {

@@ -41,6 +41,11 @@ struct FeatureFile {
 
   std::size_t size() const { return lines.size(); }
 };
+template <class V>
+void describe(V& v, const FeatureFile& file) {
+  v("format", file.format, "that was read")("n_normalised", file.n_normalised, "rows that were off their norm");
+  v("largest_norm_error", file.largest_norm_error, "of these rows");
+}
 
 /// The unit of rotation vectors. Unsaid: radians, and one longer than a turn is an error, for degrees look like that.
 enum class AngleUnit { unsaid, radians, degrees };

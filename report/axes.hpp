@@ -1,7 +1,6 @@
 // The range of an axis of a plot and the marks on it.
 #pragma once
 
-#include <cstddef>
 #include <string>
 #include <vector>
 

@@ -13,9 +13,7 @@
 #pragma once
 
 #include <algorithm>
-#include <concepts>
 #include <limits>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>

@@ -167,11 +167,11 @@ JsonObject jsonEnvelope(std::string_view command_line, std::optional<std::uint64
 }
 
 std::string commandLine(int argc, const char* const* argv) {
+  return commandLine(std::vector<std::string>(argv, argv + argc));
+}
+std::string commandLine(const std::vector<std::string>& words) {
   std::string line;
-  for (int i = 0; i < argc; ++i) {
-    if (i > 0) line += ' ';
-    line += shellWord(argv[i]);
-  }
+  for (const std::string& word : words) line += (line.empty() ? "" : " ") + shellWord(word);
   return line;
 }
 

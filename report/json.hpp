@@ -110,6 +110,7 @@ JsonObject jsonEnvelope(std::string_view command_line, std::optional<std::uint64
 
 /// The command line as one could type it again in a shell.
 std::string commandLine(int argc, const char* const* argv);
+std::string commandLine(const std::vector<std::string>& words);
 
 /// Writes the object to a file, as writeOutput does. Throws InputError.
 void writeJson(const std::string& path, const JsonObject& object);

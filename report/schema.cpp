@@ -18,7 +18,6 @@
 #include <stats/mean_summary.hpp>
 #include <stats/split_validation_types.hpp>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>

@@ -41,14 +41,14 @@ std::string padded(const std::string& text, std::size_t width, bool right) {
 }
 
 /// One column as it is printed: cells of the same width.
-struct Column {
+struct PrintedColumn {
   bool numeric = false;
   std::size_t width = 0;
   std::vector<std::string> cells;  // the header first
 };
 
-Column makeColumn(const std::string& header, std::vector<std::string> cells) {
-  Column column;
+PrintedColumn makeColumn(const std::string& header, std::vector<std::string> cells) {
+  PrintedColumn column;
   const bool any = std::any_of(cells.begin(), cells.end(), isNumber);
   column.numeric = any && std::all_of(cells.begin(), cells.end(),
                                       [](const std::string& cell) { return isNumber(cell) || isGap(cell); });
@@ -70,9 +70,9 @@ Column makeColumn(const std::string& header, std::vector<std::string> cells) {
   return column;
 }
 
-void appendLine(std::string& text, const std::vector<const Column*>& columns, std::size_t row) {
+void appendLine(std::string& text, const std::vector<const PrintedColumn*>& columns, std::size_t row) {
   std::string line;
-  for (const Column* column : columns) {
+  for (const PrintedColumn* column : columns) {
     if (!line.empty()) line.append(gap, ' ');
     line += padded(shortened(column->cells[row], column->width), column->width, column->numeric);
   }
@@ -84,6 +84,10 @@ void appendLine(std::string& text, const std::vector<const Column*>& columns, st
 
 std::string number(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "n/a";
+}
+
+std::string cell(double value, Digits digits) {
+  return digits.decimals ? fmt::format("{:.{}f}", value, digits.count) : number(value, digits.count);
 }
 
 std::size_t displayWidth(std::string_view text) {
@@ -99,7 +103,7 @@ void Table::row(std::vector<std::string> cells) {
 }
 
 std::string Table::str(std::size_t width) const {
-  std::vector<Column> columns;
+  std::vector<PrintedColumn> columns;
   std::size_t total = 0;
   for (std::size_t i = 0; i < headers_.size(); ++i) {
     std::vector<std::string> cells;
@@ -109,8 +113,8 @@ std::string Table::str(std::size_t width) const {
   }
   // Texts give way first, the longest ones most.
   while (total > width) {
-    Column* longest = nullptr;
-    for (Column& column : columns) {
+    PrintedColumn* longest = nullptr;
+    for (PrintedColumn& column : columns) {
       if (!column.numeric && column.width > shortest_text && (longest == nullptr || column.width > longest->width))
         longest = &column;
     }
@@ -122,7 +126,7 @@ std::string Table::str(std::size_t width) const {
   std::string text;
   std::size_t next = 0;
   while (next < columns.size()) {
-    std::vector<const Column*> block;
+    std::vector<const PrintedColumn*> block;
     std::size_t used = 0;
     if (next > 0) {
       block.push_back(&columns[0]);
@@ -138,7 +142,7 @@ std::string Table::str(std::size_t width) const {
     }
     appendLine(text, block, 0);
     std::string rule;
-    for (const Column* column : block) {
+    for (const PrintedColumn* column : block) {
       if (!rule.empty()) rule.append(gap, ' ');
       rule.append(column->width, '-');
     }

@@ -16,7 +16,6 @@
 #include <cstddef>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -160,8 +159,7 @@ HandEyeOutput calibrate(Options options) {
 
 int runCommand(const Options& options, const Invocation& invocation) {
   const HandEyeOutput output = calibrate(options);
-  publishResult(options.json, formatHandEye(output), invocation.command_line, output.options.seed,
-                [&](JsonObject& object) { setHandEye(object, output); });
+  publishResult(options.json, formatHandEye(output), invocation.command_line, output.options.seed, output);
   if (!options.report.empty()) writeHandEyeReport(options.report, invocation.command_line, output);
   return output.result.verdict().isNo() ? exit_not_trusted : exit_fine;
 }

@@ -46,8 +46,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   }
   publishResult(options.json, formatMean(options.input.file, measurements, analysis), invocation.command_line,
                 std::nullopt, [&](JsonObject& object) {
-                  if (interrupted) object.set("interrupted", true);
-                  setMeanFields(object, options.input.file, measurements, analysis);
+                  if (interrupted) object("interrupted", true);
+                  object("file", options.input.file).fieldsOf(measurements.file).fieldsOf<MeanSummary>(analysis);
                 });
   if (!options.report.empty()) {
     writeMeanReport(options.report, invocation.command_line, options.input.file, measurements, analysis);

@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace liestat::cli {

@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -64,24 +63,6 @@ std::string posesText(const HandEyeScene& scene, bool is_a, bool tum) {
   return text;
 }
 
-JsonObject poseObject(const SE3d& pose) {
-  JsonObject o;
-  return o.set("translation", Eigen::Vector3d(pose.translation()))
-      .set("quaternion_xyzw", Eigen::Vector4d(pose.so3().params()))
-      .set("rotation_vector", Eigen::Vector3d(pose.so3().log()));
-}
-JsonObject truthOf(const HandEyeScene& scene, const Options& options, const Invocation& invocation) {
-  const HandEyeSceneOptions& o = options.scene;
-  JsonObject object = jsonEnvelope(invocation.command_line, options.seed);
-  object.set("problem", o.relative ? "AX = XB" : "AX = YB").set("motion", name(o.motion)).set("noise", name(o.noise));
-  object.set("noise_factor", o.noise_factor).set("pairs", o.pairs).set("outlier_kind", name(o.outlier_kind));
-  object.set("open_dimension", openDimension(o.motion)).set("X", poseObject(scene.X));
-  object.set("Y", o.relative ? std::nullopt : std::optional(poseObject(scene.Y)));
-  std::vector<double> inlier;
-  for (const bool right : scene.inlier) inlier.push_back(right ? 1 : 0);
-  return object.set("inlier", inlier);
-}
-
 int runCommand(const Options& options, const Invocation& invocation) {
   const HandEyeSceneOptions& scene_options = options.scene;
   for (const double value : {scene_options.noise_factor, scene_options.outliers}) {
@@ -97,16 +78,14 @@ int runCommand(const Options& options, const Invocation& invocation) {
   createDirectory(options.output);
   writeOutput(options.path("a"), posesText(scene, true, tum));
   writeOutput(options.path("b"), posesText(scene, false, tum));
-  writeJson(options.truth(), truthOf(scene, options, invocation));
+  writeJson(options.truth(), jsonEnvelope(invocation.command_line, options.seed).fieldsOf(scene));
   std::vector<std::string> words = {"liestat", "hand-eye", options.path("a"), options.path("b")};
   if (scene_options.relative) words.emplace_back("--relative");
-  std::vector<const char*> pointers;
-  for (const std::string& word : words) pointers.push_back(word.c_str());
   std::size_t wrong = 0;
   for (const bool right : scene.inlier) wrong += right ? 0 : 1;
   printLines(fmt::format("{} pairs of {}, {} of them wrong, motion '{}'\n\n{}\n", scene.pairs.size(),
                          scene_options.relative ? "motions" : "poses", wrong, name(scene_options.motion),
-                         commandLine(static_cast<int>(pointers.size()), pointers.data())));
+                         commandLine(words)));
   return exit_fine;
 }
 

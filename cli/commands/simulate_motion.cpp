@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -96,9 +95,7 @@ std::string commandOf(const Options& options, bool inertial) {
   if (scene.outliers > 0) words.emplace_back("--outliers");
   if (scene.sigma > 0) add("--sigma", fmt::format("{:g}", scene.sigma));
   add("--truth", options.path("truth.csv")), add("--min-motion", "0");
-  std::vector<const char*> pointers;
-  for (const std::string& word : words) pointers.push_back(word.c_str());
-  return commandLine(static_cast<int>(pointers.size()), pointers.data());
+  return commandLine(words);
 }
 
 int runCommand(Options options) {

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -40,24 +39,6 @@ std::string matchesCsv(const TwoViewScene& scene) {
   return text;
 }
 
-JsonObject truthOf(const TwoViewScene& scene, const Invocation& invocation, std::uint64_t seed) {
-  const TwoViewSceneOptions& o = scene.options;
-  JsonObject object = jsonEnvelope(invocation.command_line, seed);
-  object.set("motion", name(o.motion)).set("sigma", o.sigma);
-  object.set("intrinsics", std::vector<double>{o.focal_length, o.focal_length, 0.5 * o.width, 0.5 * o.height});
-  object.set("focal_scale", scene.focal_scale).set("focal_ratio", scene.focal_ratio);
-  object.set("rotation_vector", Eigen::Vector3d(SO3d::fitToSO3(scene.R).log())).set("translation", scene.t);
-  if (isEpipolar(o.motion)) {
-    object.set("fundamental_normalised", scene.F);
-  } else {
-    object.set("homography_normalised", scene.H);
-  }
-  if (o.motion == TwoViewMotion::homography) {
-    object.set("plane_normal", scene.plane_normal).set("plane_distance", scene.plane_distance);
-  }
-  return object;
-}
-
 void requireFree(const std::string& path) {
   if (path.empty() || path == "-" || !std::filesystem::exists(path)) return;
   throw InputError(path, 0, "the file is there", "another name, or --overwrite");
@@ -84,26 +65,19 @@ int runCommand(Options options, const Invocation& invocation) {
         "larger images or a shorter focal length");
   }
   writeOutput(options.output, matchesCsv(scene));
-  if (!options.truth.empty()) writeJson(options.truth, truthOf(scene, invocation, options.seed));
+  if (!options.truth.empty()) {
+    writeJson(options.truth, jsonEnvelope(invocation.command_line, options.seed).fieldsOf(scene));
+  }
   if (options.output != "-" && options.truth != "-") {
-    const auto n = [](double x) { return fmt::format("{:g}", x); };
     const double f = scene_options.focal_length, w = scene_options.width, h = scene_options.height;
-    const std::vector<std::string> words = {"liestat",
-                                            "two-view",
-                                            options.output,
-                                            "--intrinsics",
-                                            fmt::format("{:g},{:g},{:g},{:g}", f, f, 0.5 * w, 0.5 * h),
-                                            "--image-size",
-                                            fmt::format("{:g},{:g}", w, h),
-                                            "--sigma",
-                                            n(scene_options.sigma > 0 ? scene_options.sigma : 1)};
-    std::vector<const char*> pointers;
-    for (const std::string& word : words) pointers.push_back(word.c_str());
+    const std::string intrinsics = fmt::format("{:g},{:g},{:g},{:g}", f, f, 0.5 * w, 0.5 * h);
+    const std::string next = commandLine({"liestat", "two-view", options.output, "--intrinsics", intrinsics,
+                                          "--image-size", fmt::format("{:g},{:g}", w, h), "--sigma",
+                                          fmt::format("{:g}", scene_options.sigma > 0 ? scene_options.sigma : 1)});
     std::size_t good = 0;
     for (const bool inlier : scene.inlier) good += inlier ? 1 : 0;
     printLines(fmt::format("{} matches, {} of them wrong, of the motion '{}'\n\n{}\n", scene.pixels.size(),
-                           scene.pixels.size() - good, nameOf(scene_options.motion),
-                           commandLine(static_cast<int>(pointers.size()), pointers.data())));
+                           scene.pixels.size() - good, nameOf(scene_options.motion), next));
   }
   return exit_fine;
 }

@@ -5,10 +5,7 @@
 #include <formats/trajectory.hpp>
 #include <fusion/evaluate.hpp>
 
-#include <cstddef>
-#include <optional>
 #include <string>
-#include <vector>
 
 namespace liestat::cli {
 

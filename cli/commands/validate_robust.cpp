@@ -1,48 +1,93 @@
-#include <cli/commands/commands.hpp>
 #include <cli/commands/validation_command.hpp>
-#include <cli/show/validations.hpp>
 #include <experiments/robust_validation.hpp>
+#include <report/table.hpp>
 
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
 #include <memory>
 #include <string>
-#include <vector>
 
 namespace liestat::cli {
 using namespace experiments;
 namespace {
 
-struct Options {
-  RobustValidation validation;
-  std::vector<std::string> structures, scores;
-  std::vector<double> outliers;
-  RunOptions run;
-};
+std::string percent(double share) { return std::isnan(share) ? "" : fmt::format("{:.1f}", 100 * share); }
 
-int runCommand(const Options& options, const Invocation& invocation) {
-  RobustValidation validation = options.validation;
-  validation.structures = chosen(all_robust_structures, options.structures);
-  validation.scores = chosen(all_robust_scores, options.scores);
-  if (!options.outliers.empty()) validation.outliers = options.outliers;
-  validation.run = options.run.size(100, 2000);
-  const auto result =
-      runTrials("validate robust", [&](const auto& progress) { return validateRobust(validation, progress); });
-  return publish(options.run, invocation, viewOf(result));
+/// The names of the scores, for narrow columns.
+const char* shortName(RobustScore score) {
+  constexpr const char* names[] = {"relevance", "truncated", "count", "quantile"};
+  return names[static_cast<std::size_t>(score)];
+}
+
+// In per cent: share of outliers, trials that found the structure, inliers and outliers among the estimate's inliers,
+// coverage of the 95 % region.
+const Columns<RobustRow> search_columns{
+    {"out %", [](const RobustRow& row) { return fmt::format("{:g}", 100 * row.outliers); }},
+    {"score", [](const RobustRow& row) { return shortName(row.score); }},
+    {"found", [](const RobustRow& r) { return percent(static_cast<double>(r.found) / static_cast<double>(r.trials)); }},
+    {"draws", &RobustRow::draws, fixed(0)},
+    {"needed", &RobustRow::needed},
+    {"right %", [](const RobustRow& row) { return percent(row.right); }},
+    {"wrong %", [](const RobustRow& row) { return percent(row.wrong); }},
+    {"index", Judged::index, 3},
+    {"95 %", [](const RobustRow& row) { return percent(row.report.coverage[2].observed); }},
+    {"verdict", [](const RobustRow& row) { return verdictCell(row.answer()); }}};
+
+const Columns<ThresholdRow> threshold_columns{
+    {"outliers %", [](const ThresholdRow& row) { return fmt::format("{:g}", 100 * row.outliers); }},
+    {"histogram %", [](const ThresholdRow& row) { return percent(row.histogram_found); }},
+    {"mean", &ThresholdRow::histogram_mean, 3},
+    {"sd", &ThresholdRow::histogram_sd, 2},
+    {"moments %", [](const ThresholdRow& row) { return percent(row.moments_found); }},
+    {"median", &ThresholdRow::moments_median, 3},
+    {"one in ten below", &ThresholdRow::moments_tenth, 3}};
+
+ValidationTable searchTable(const RobustValidationResult& result, RobustStructure structure) {
+  const auto rows = selected(result.rows, [&](const RobustRow& row) { return row.structure == structure; });
+  ValidationTable table{.table = tablesOf(search_columns, rows)};
+  if (rows.empty()) return table;
+  const RobustRow& last = rows.back();
+  table.title = fmt::format("{}: index {} expected, distances over {:.3f} (cut errors)",
+                            structure == RobustStructure::conic ? "Conic, samples of 5" : "Homography, samples of 4",
+                            last.report.dof, last.cut_factor);
+  table.plots = {histogramPlot(
+      "distances_" + name(structure), rows,
+      [](const RobustRow& row) { return fmt::format("{:g} %, {}", 100 * row.outliers, name(row.score)); },
+      "Squared distances of the truth with the density that they should have.")};
+  return table;
+}
+
+ValidationView viewOf(const RobustValidationResult& result) {
+  ValidationView view{
+      .title = "Robust search: is the structure found, and is the covariance of what is found true?",
+      .introduction =
+          "Each trial draws measurements of a structure among outliers and searches until, with the confidence that "
+          "was asked for, one of the draws was of inliers alone. The structure counts as found where nine tenths of "
+          "its measurements are inliers of the refined estimate. Of these trials the squared Mahalanobis distance of "
+          "the truth follows a chi-square law if the covariance is true.",
+      .judgement = judgementOf(result),
+      .fields = [&result](JsonObject& object) { object.fieldsOf(result); }};
+  for (const RobustStructure structure : all_robust_structures) view.tables.push_back(searchTable(result, structure));
+  view.tables.push_back({.title = "Thresholds found in the errors (% of the trials), in standard deviations",
+                         .table = tablesOf(threshold_columns, result.thresholds),
+                         .page_caption = "Of the conic. The moments of normal errors give 4.42."});
+  return view;
 }
 
 }  // namespace
 
 void addValidateRobustCommand(const CommandList& validate) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ValidationOptions<RobustValidation>>();
   const Command app = validate.add(
       "robust", "Robust search among outliers: is the structure found, and is the covariance of what is found true?");
-  app.option("--structure", options->structures, "conic, homography: a comma list (default: both)")
-      .list()
-      .oneOf(names(all_robust_structures));
-  app.option("--score", options->scores,
-             "relevance, truncated_cost, inlier_count, trimmed_quantile: a comma list (default: all)")
-      .list()
-      .oneOf(names(all_robust_scores));
-  app.option("--outliers", options->outliers, "Shares of wrong measurements, a comma list (default 0,0.3,0.5,0.7)")
+  declareNames(app, "--structure", options->names, all_robust_structures,
+               "conic, homography: a comma list (default: both)");
+  declareNames(app, "--score", options->more_names, all_robust_scores,
+               "relevance, truncated_cost, inlier_count, trimmed_quantile: a comma list (default: all)");
+  app.option("--outliers", options->validation.outliers,
+             "Shares of wrong measurements, a comma list (default 0,0.3,0.5,0.7)")
       .list()
       .range(0.0, 0.9);
   app.option("--measurements", options->validation.measurements, "Measurements of a trial (default 100)")
@@ -57,7 +102,14 @@ void addValidateRobustCommand(const CommandList& validate) {
       .range(0.01, 100.0);
   app.flag("--full", options->run.full, "2000 trials a row");
   options->run.declare(app, "100, with --full 2000");
-  app.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });
+  const auto compute = [](const auto& given, const RunProgress& progress) {
+    RobustValidation validation = given.validation;
+    validation.structures = chosen(all_robust_structures, given.names);
+    validation.scores = chosen(all_robust_scores, given.more_names);
+    validation.run = given.run.size(100, 2000);
+    return validateRobust(validation, progress);
+  };
+  runValidation(app, options, "validate robust", compute, viewOf);
 }
 
 }  // namespace liestat::cli

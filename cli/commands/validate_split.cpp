@@ -14,7 +14,6 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <memory>

@@ -10,7 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -80,5 +80,28 @@ int exitCode(bool passed);
 
 /// Shows a view on the terminal, in the JSON file and as the page that were asked for; returns the exit code.
 int publish(const RunOptions& options, const Invocation& invocation, const ValidationView& view);
+
+/// The options of a validation whose trials one function runs.
+template <class Validation>
+struct ValidationOptions {
+  Validation validation;
+  std::vector<std::string> names, more_names;  ///< of the experiments or methods that are wanted; none: all
+  RunOptions run;
+};
+/// Declares the option of a comma list of such names.
+template <class List>
+void declareNames(const Command& command, const std::string& option, std::vector<std::string>& wanted, const List& all,
+                  const std::string& description) {
+  command.option(option, wanted, description).list().oneOf(names(all));
+}
+/// The work of such a command: runs compute(options, progress) with a bar and publishes its view.
+template <class Options, class Compute, class View>
+void runValidation(const Command& command, const std::shared_ptr<Options>& options, const std::string& label,
+                   const Compute& compute, const View& viewOf) {
+  command.run([=](const Invocation& invocation) {
+    const auto result = runTrials(label, [&](const auto& progress) { return compute(*options, progress); });
+    return publish(options->run, invocation, viewOf(result));
+  });
+}
 
 }  // namespace liestat::cli

@@ -15,7 +15,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -158,7 +157,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   result.noise = noise;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
   publishResult(options.json, viInitTable(recording, result), invocation.command_line,
-                how.initialisation.consensus.seed, [&](JsonObject& object) { setViInit(object, recording, result); });
+                how.initialisation.consensus.seed,
+                [&](JsonObject& object) { object.fieldsOf(recording).fieldsOf(result); });
   if (!options.report.empty()) writeViInitReport(options.report, invocation.command_line, recording, result);
   if (result.windows_left > 0) return exit_interrupted;
   return result.verdict().isNo() ? exit_not_trusted : exit_fine;

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <string>
 #include <span>
-#include <utility>
 
 namespace liestat::cli {
 void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured, std::int64_t start_ns,

@@ -21,6 +21,12 @@ struct ViRecording {
   ImuNoise<double> noise;
   std::vector<GroundTruth> truth;  ///< empty: not known
 };
+template <class V>
+void describe(V& v, const ViRecording& r) {
+  v("readings", r.imu.samples.size())("start_ns", r.imu.start_ns, "the time of the first reading", "ns");
+  v("images", r.tracks.times.size())("tracks", r.tracks.track_ids.size())("camera_pose_assumed", r.pose_assumed);
+  v("tracks_seen_once", r.tracks.seen_once);
+}
 
 /// The result that the command shows.
 struct ViInitResult : ComparedRecording {
@@ -28,6 +34,11 @@ struct ViInitResult : ComparedRecording {
   std::optional<NoiseCalibration> noise;  ///< where it was asked for
   std::size_t observations_outside = 0;   ///< pixels that the lens' model can't explain
 };
+template <class V>
+void describe(V& v, const ViInitResult& r) {
+  v("observations_outside", r.observations_outside, "pixels without a direction")("noise_calibration", r.noise);
+  describe(v, static_cast<const ComparedRecording&>(r));
+}
 
 /// Throws an InputError in the command's name for the fault of a recording as a whole.
 void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured, std::int64_t start_ns,

@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -114,9 +113,8 @@ Plot trajectoryPlot(const EvaluationOutput& output) {
   Plot plot{.name = "trajectories", .caption = "Reference and aligned estimates, from above and from the side, m."};
   for (const auto& [i, j] : {std::pair(0, 1), std::pair(0, 2)}) {
     constexpr std::array axes{"x, m", "y, m", "z, m"};
-    Panel panel{.x = {.label = axes[static_cast<std::size_t>(i)]},
-                .y = {.label = axes[static_cast<std::size_t>(j)]},
-                .equal_aspect = true};
+    Panel panel{{}, {axes[static_cast<std::size_t>(i)]}, {axes[static_cast<std::size_t>(j)]}};
+    panel.equal_aspect = true;
     Series reference{.name = "reference"};
     for (const MatchedPose& p : output.setting().matched) {
       reference.add(p.reference.mean.translation()[i], p.reference.mean.translation()[j]);

@@ -147,9 +147,8 @@ std::string rivalInWords(const HandEyeResult& r) {
   if (!r.rival) return "";
   const Eigen::Vector3d t = r.rival->translation(), v = degrees * r.rival->so3().log();
   return fmt::format(
-      "X may as well be: translation ({:.4g}, {:.4g}, {:.4g}) m, rotation vector ({:.4g}, {:.4g}, "
-      "{:.4g}) deg\n",
-      t[0], t[1], t[2], v[0], v[1], v[2]);
+      "X may as well be: translation ({:.4g}, {:.4g}, {:.4g}) m, rotation vector ({:.4g}, {:.4g}, {:.4g}) deg\n", t[0],
+      t[1], t[2], v[0], v[1], v[2]);
 }
 
 /// A pose of one of the files, or its inverse.
@@ -207,20 +206,6 @@ std::string rest(const HandEyeOutput& output) {
   return fitInWords(output) + directionsInWords(output) + rivalInWords(output.result) + outliersInWords(output);
 }
 
-// --- JSON -----------------------------------------------------------------------------------------------------------
-
-const char* nameOf(CovarianceReading reading) {
-  constexpr const char* names[] = {"right", "left", "rotation_first", "world_axes"};
-  return names[static_cast<std::size_t>(reading)];
-}
-JsonObject toJson(const HandEyeFile& file) {
-  JsonObject o;
-  o("file", file.path)("rows", file.rows)("unmatched", file.unmatched)("inverted", file.inverted);
-  const bool columns = file.noise == PoseNoise::columns;
-  o("noise", columns ? "columns" : file.noise == PoseNoise::option ? "option" : "assumed");
-  return o("sigma", columns ? std::nullopt : std::optional(LocalPoseSigmas{{file.sigma}}));
-}
-
 // --- Page -----------------------------------------------------------------------------------------------------------
 
 constexpr std::size_t inlier_colour = 0, outlier_colour = 1;
@@ -272,9 +257,8 @@ Plot excitationPlot(const HandEyeOutput& output) {
   panel.add({open, weak, good});
   return {.name = "excitation",
           .caption = fmt::format(
-              "Information of the motions over that which noise alone would make up, in the six "
-              "directions of the unknown. Dotted: {:g}, below which a direction is open, and {:g}, from which "
-              "on it is determined.",
+              "Information of the motions over that which noise alone would make up, in the six directions of the "
+              "unknown. Dotted: {:g}, below which a direction is open, and {:g}, from which on it is determined.",
               o.min_excitation, o.trusted_excitation),
           .panels = {panel}};
 }
@@ -318,27 +302,16 @@ std::string formatHandEye(const HandEyeOutput& output) {
   return text + summary(output) + rest(output);
 }
 
-void setHandEye(JsonObject& object, const HandEyeOutput& output) {
-  object.fieldsOf(output.result);
-  const auto by_time = [&](double value) { return output.by_time ? std::optional(value) : std::nullopt; };
-  std::vector<JsonObject> hints, pairs;
-  if (const auto& hint = output.hint) {
-    const std::string text = hintInWords(output);
-    const std::size_t begin = text.find(": ") + 2;
-    JsonObject& o = hints.emplace_back()("text", text.substr(begin, text.size() - 1 - begin));
-    o("covariance_a", nameOf(hint->reading.a.covariance))("covariance_b", nameOf(hint->reading.b.covariance));
-    o("one_file_inverted", hint->reading.b.inverted != output.b.inverted);
-    o("chi2_per_degree", hint->chi2_per_degree)("p", hint->p)("agrees", hint->agrees);
-  }
-  object("hints", hints)("notes", output.notes)("A", toJson(output.a))("B", toJson(output.b));
-  object("association", output.by_time ? "time" : "row")("tolerance", by_time(output.tolerance));
-  object("largest_gap", by_time(output.largest_gap));
-  for (std::size_t i = 0; i < output.result.pairs.size(); ++i) {
-    const PoseRows& rows = output.rows[i];
-    JsonObject& o = pairs.emplace_back()("row_a", rows.a + 1)("row_b", rows.b + 1);
-    o("line_a", rows.line_a)("line_b", rows.line_b)("time", rows.time).fieldsOf(output.result.pairs[i]);
-  }
-  object("pairs", pairs);
+std::vector<WordedHint> HandEyeOutput::hints() const {
+  if (!hint) return {};
+  const std::string text = hintInWords(*this);
+  const std::size_t begin = text.find(": ") + 2;
+  return {{*hint, text.substr(begin, text.size() - 1 - begin), hint->reading.b.inverted != b.inverted}};
+}
+std::vector<HandEyePair> HandEyeOutput::pairs() const {
+  std::vector<HandEyePair> list;
+  for (std::size_t i = 0; i < result.pairs.size(); ++i) list.push_back({rows[i], result.pairs[i]});
+  return list;
 }
 
 void writeHandEyeReport(const std::string& directory, const std::string& command_line, const HandEyeOutput& output) {

@@ -2,21 +2,14 @@
 
 #include <report/table.hpp>
 
-#include <report/json.hpp>
 #include <cli/commands/mean_analysis.hpp>
 
-#include <optional>
 #include <string>
-#include <vector>
 
 namespace liestat::cli {
 
 /// The result for the terminal.
 std::string formatMean(const std::string& source, const Measurements& measurements, const MeanAnalysis& analysis);
-
-/// The fields of the JSON file, added to an envelope.
-void setMeanFields(JsonObject& object, const std::string& source, const Measurements& measurements,
-                   const MeanAnalysis& analysis);
 
 /// A feature on one line, for lists of rivals and of halves.
 std::string oneLine(const FeatureValue& value);

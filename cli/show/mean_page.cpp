@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -74,10 +72,8 @@ struct ChartPanel {
 };
 
 Panel panelOf(const ChartPanel& chart, Plane plane) {
-  Panel panel{.title = chart.title,
-              .x = {.label = chart.label(plane.a)},
-              .y = {.label = chart.label(plane.b)},
-              .equal_aspect = true};
+  Panel panel{chart.title, {chart.label(plane.a)}, {chart.label(plane.b)}};
+  panel.equal_aspect = true;
   Eigen::Vector2d size = Eigen::Vector2d::Constant(chart.frontier);  // half of what is seen
   if (chart.frontier > 0) {
     panel.x.low = panel.y.low = -1.05 * chart.frontier;

@@ -134,9 +134,8 @@ Plot estimatesPlot(const MotionResult& result) {
       .name = "estimates",
       .caption =
           "Direction of motion and rotation over one frame, of the points in the camera's axes (x right, y down, z "
-          "forward), with bands of two standard deviations (figures 2 to 4). The direction is that of the "
-          "velocity, and of the translation from one frame to the next where the essential filter is in "
-          "charge." +
+          "forward), with bands of two standard deviations (figures 2 to 4). The direction is that of the velocity, "
+          "and of the translation from one frame to the next where the essential filter is in charge." +
           thinned(result)};
   Panel directions{.title = "direction", .x = {.label = "frame"}, .y = {.label = "component"}};
   direction.drawOn(directions);
@@ -175,15 +174,11 @@ Plot errorsPlot(const MotionResult& result) {
                 "the covariances: the direction's two tangent coordinates, the rotation's axes of the first "
                 "frame. The scales are those of the frames that may be used." +
                 thinned(result)};
-  Panel directions{.title = "error of the direction",
-                   .x = {.label = "frame"},
-                   .y = {.label = "tangent coordinate, deg"},
-                   .references = {{.at = 0}}};
+  Panel directions{"error of the direction", {"frame"}, {"tangent coordinate, deg"}};
+  directions.references = {{.at = 0}};
   direction.drawOn(directions, 2);
-  Panel rotations{.title = "error of the rotation",
-                  .x = {.label = "frame"},
-                  .y = {.label = "deg per frame"},
-                  .references = {{.at = 0}}};
+  Panel rotations{"error of the rotation", {"frame"}, {"deg per frame"}};
+  rotations.references = {{.at = 0}};
   rotation.drawOn(rotations);
   plot.panels = {directions, rotations};
   return plot;
@@ -246,10 +241,8 @@ Plot residualPlot(const MotionFrameStudy& at, const FlowMaps& maps) {
           "the minima by the curvature of one frame, that of the estimate by all frames.",
           at.frame)};
   const Axis colour = colourAxis({&maps[0].map.grid, &maps[1].map.grid, &maps[2].map.grid});
-  Panel near{.title = "near the estimate",
-             .x = {.label = "first tangent coordinate, deg"},
-             .y = {.label = "second tangent coordinate, deg"},
-             .equal_aspect = true};
+  Panel near{"near the estimate", {"first tangent coordinate, deg"}, {"second tangent coordinate, deg"}};
+  near.equal_aspect = true;
   double reach = 1;
   for (std::size_t k = 0; k < maps.size(); ++k) {
     const FlowMap& of = maps[k];
@@ -327,12 +320,11 @@ Plot convergencePlot(const MotionFrameStudy& at, const MotionWindowRuns& runs, c
   Plot plot{
       .name = "convergence",
       .caption = fmt::format(
-          "The way of the filter over {} frames, on the residual of frame {} (figures 7 and 8): of the start that "
-          "wins among many, and from the farthest start that arrives, with the sign of the depths held and "
-          "released, on the side from which the latter goes to the rubbery state; until the depths turn the direction "
-          "round the two are the same. Left the hemisphere about the estimate, right that about its antipode with the "
-          "same residual, each direction at the coordinates of its "
-          "antipode on the left.",
+          "The way of the filter over {} frames, on the residual of frame {} (figures 7 and 8): of the start that wins "
+          "among many, and from the farthest start that arrives, with the sign of the depths held and released, on the "
+          "side from which the latter goes to the rubbery state; until the depths turn the direction round the two are "
+          "the same. Left the hemisphere about the estimate, right that about its antipode with the same residual, "
+          "each direction at the coordinates of its antipode on the left.",
           runs.released.frames.size(), at.frame)};
   const HemisphereChart chart(at.velocity.mean.unit_vector());
   const Axis colour = colourAxis({&map.grid});
@@ -357,8 +349,7 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 double beforeFirst(const MotionTrace& trace) { return static_cast<double>(trace.frames.front()) - 1; }
 
 Panel tracePanel(std::string title, const MotionTrace& trace, const Eigen::Vector3d& reference) {
-  Panel panel{
-      .title = std::move(title), .x = {.label = "frame"}, .y = {.label = "component", .low = -1.05, .high = 1.05}};
+  Panel panel{std::move(title), {"frame"}, {.label = "component", .low = -1.05, .high = 1.05}};
   for (std::size_t k = 0; k < 3; ++k) {
     Series line = seriesOf(axis_names[k], Style::lines, axis_inks[k]);
     line.add(beforeFirst(trace), trace.start[static_cast<Eigen::Index>(k)]);
@@ -384,12 +375,9 @@ Plot signPlot(std::string name, std::string caption, const MotionTrace& held, co
   Plot plot{.name = std::move(name), .caption = std::move(caption)};
   plot.panels.push_back(tracePanel("sign of the depths held", held, reference));
   plot.panels.push_back(tracePanel("sign released", released, reference));
-  Panel angles{
-      .title = "angle from the estimate", .x = {.label = "frame"}, .y = {.label = "deg", .low = -5, .high = 185}};
-  Panel evidence{.title = "evidence for positive depths",
-                 .x = {.label = "frame"},
-                 .y = {.label = "standard deviations"},
-                 .references = {{.at = 0}}};
+  Panel angles{"angle from the estimate", {"frame"}, {.label = "deg", .low = -5, .high = 185}};
+  Panel evidence{"evidence for positive depths", {"frame"}, {"standard deviations"}};
+  evidence.references = {{.at = 0}};
   for (const bool free : {false, true}) {
     const MotionTrace& trace = free ? released : held;
     Series angle = seriesOf(free ? "released" : "held", Style::linespoints, free ? second_ink : estimate_ink);
@@ -435,12 +423,11 @@ Plot contourPlot(const MotionFrameStudy& at, const ResidualMap& subspace, const 
     const ResidualMap& map = second ? essential : subspace;
     Axis colour = colourAxis({&map.grid});
     colour.high = std::nullopt;
-    Panel panel{.title = second ? "essential filter, rotation of the estimate" : "subspace filter",
-                .x = tangentAxis(0),
-                .y = tangentAxis(1),
-                .colour = colour,
-                .series = {contours("residual", gridOf(map), contourLevels(map.grid))},
-                .equal_aspect = true};
+    Panel panel{second ? "essential filter, rotation of the estimate" : "subspace filter", tangentAxis(0),
+                tangentAxis(1)};
+    panel.colour = colour;
+    panel.series = {contours("residual", gridOf(map), contourLevels(map.grid))};
+    panel.equal_aspect = true;
     panel.add({othersOf(map), star("minimum", map.minimum, second_ink),
                star("estimate", Eigen::Vector2d::Zero(), estimate_ink)});
     plot.panels.push_back(panel);
@@ -450,10 +437,9 @@ Plot contourPlot(const MotionFrameStudy& at, const ResidualMap& subspace, const 
 
 /// Depth over one coordinate: the last positions with two standard deviations, and where they come from.
 Panel structurePanel(std::string title, const MotionInterpretation& seen, int coordinate) {
-  Panel panel{.title = std::move(title),
-              .x = {.label = coordinate == 0 ? "to the right, translations of one frame"
-                                             : "downwards, translations of one frame"},
-              .y = {.label = "depth, translations of one frame"}};
+  Panel panel{std::move(title),
+              {coordinate == 0 ? "to the right, translations of one frame" : "downwards, translations of one frame"},
+              {"depth, translations of one frame"}};
   Series ways = seriesOf("last frames", Style::lines, 5),
          points = seriesOf("last position", Style::errorbars, estimate_ink);
   std::vector<double> depths;
@@ -511,10 +497,8 @@ Plot distancesPlot(const MotionWindowRuns& runs) {
   std::vector<double> changes;
   for (const bool rubbery : {false, true}) {
     const MotionInterpretation& seen = rubbery ? runs.rubbery : runs.rigid;
-    Panel panel{.title = rubbery ? "rubbery" : "rigid",
-                .x = {.label = "frame"},
-                .y = {.label = "change of the distance, %"},
-                .references = {{.at = 0}}};
+    Panel panel{rubbery ? "rubbery" : "rigid", {"frame"}, {"change of the distance, %"}};
+    panel.references = {{.at = 0}};
     Series lines = seriesOf("distances", Style::lines, rubbery ? second_ink : estimate_ink);
     for (std::size_t i = 1; i < seen.points.front().size(); i += 2) {
       const auto length = [&](std::size_t k) {
@@ -545,9 +529,8 @@ std::string rigidityVerdict(const RigidityComparison& c) {
         c.steadier, c.distances, c.p_value);
   }
   return fmt::format(
-      "Flag: UNDECIDED. {} of {} separate distances vary less in the interpretation of the estimate, which "
-      "by chance has a probability of {:.2g} (Wilcoxon's signed-rank test; 0.01 decides, which takes seven "
-      "distances).",
+      "Flag: UNDECIDED. {} of {} separate distances vary less in the interpretation of the estimate, which by chance "
+      "has a probability of {:.2g} (Wilcoxon's signed-rank test; 0.01 decides, which takes seven distances).",
       c.steadier, c.distances, c.p_value);
 }
 
@@ -597,8 +580,7 @@ void reportFrame(Report& report, const MotionFrameStudy& at) {
   report.plot(convergencePlot(at, runs, at.midpoint));
   report.plot(signPlot("sign",
                        "The subspace filter from the farthest start that arrives, with the sign of the depths held and "
-                       "released (figures 9 and "
-                       "10); dashed the estimate of the last frame.",
+                       "released (figures 9 and 10); dashed the estimate of the last frame.",
                        runs.held, runs.released, V));
   report.plot(
       signPlot("essential",

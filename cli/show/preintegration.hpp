@@ -3,7 +3,6 @@
 
 #include <formats/imu.hpp>
 #include <fusion/imu/recording_windows_types.hpp>
-#include <report/table.hpp>
 
 #include <string>
 #include <vector>
@@ -28,11 +27,5 @@ struct PreintegratedReadings {
 /// The page with its plots.
 void writePreintegrationReport(const std::string& directory, const std::string& command_line,
                                const RecordingWindows& result, const PreintegratedReadings& readings);
-
-/// The lines of formatPreintegration() below the table: where readings fail, and the errors against the truth.
-std::string preintegrationRemarks(const RecordingWindows& result);
-
-/// Its table.
-TableRows preintegrationTable(const RecordingWindows& result);
 
 }  // namespace liestat::cli

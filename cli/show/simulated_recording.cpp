@@ -44,15 +44,9 @@ std::string formatSimulatedRecording(const SimulatedRecording& recording, const 
 }
 
 std::string nextCommand(const std::string& directory) {
-  const std::vector<std::string> words = {"liestat",       "vi-init",
-                                          "--imu",         directory + "/imu.csv",
-                                          "--tracks",      directory + "/tracks.csv",
-                                          "--image-times", directory + "/images.csv",
-                                          "--calibration", directory + "/calibration.yaml",
-                                          "--truth",       directory + "/truth.csv"};
-  std::vector<const char*> pointers;
-  for (const std::string& word : words) pointers.push_back(word.c_str());
-  return commandLine(static_cast<int>(pointers.size()), pointers.data());
+  return commandLine({"liestat", "vi-init", "--imu", directory + "/imu.csv", "--tracks", directory + "/tracks.csv",
+                      "--image-times", directory + "/images.csv", "--calibration", directory + "/calibration.yaml",
+                      "--truth", directory + "/truth.csv"});
 }
 
 }  // namespace liestat::cli

@@ -12,10 +12,6 @@
 #include <string>
 #include <vector>
 
-namespace liestat {
-class Report;
-}
-
 namespace liestat::cli {
 
 /// The measurements of one file.
@@ -73,9 +69,5 @@ std::string formatSplit(const LandmarkSplits& split);
 /// The page with its plots.
 void writeSplitReport(const std::string& directory, const std::string& command_line, const FileSplit& split);
 void writeSplitReport(const std::string& directory, const std::string& command_line, const LandmarkSplits& split);
-
-/// Parts of these views: the last lines, the verdict among them, and the plots.
-std::string splitVerdict(const SplitOutcome& outcome);
-void plotSplits(Report& report, const SplitOutcome& outcome);
 
 }  // namespace liestat::cli

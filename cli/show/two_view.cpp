@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,29 +34,21 @@ std::string rejectionOf(const TwoViewMotionEstimate& estimate, std::size_t m) {
   return row.unsupported && row.rejection == Rejection::none ? verdict + ", could be chance" : verdict;
 }
 
-TableRows latticeRows(const TwoViewMotionEstimate& estimate) {
-  TableRows table{{"model", "free", "draws", "inliers", "relevance", "rms px", "rejected by"}};
-  for (std::size_t m = 0; m < estimate.lattice.size(); ++m) {
-    const TwoViewModelRow& row = estimate.lattice[m];
-    const bool found = row.hasEstimate();
-    table.rows.push_back(
-        {row.name, fmt::format("{}", row.free_parameters), row.draws > 0 ? fmt::format("{}", row.draws) : "",
-         found ? fmt::format("{}", row.inliers) : "", found ? fmt::format("{:.3f}", row.relevance) : "",
-         found ? number(row.rms, 3) : "", rejectionOf(estimate, m)});
-  }
-  return table;
-}
-/// The same for the terminal, which is narrower.
-std::string latticeTable(const TwoViewMotionEstimate& estimate) {
-  constexpr std::size_t draws = 2, relevance = 4;
-  const auto narrow = [](std::vector<std::string> cells) {
-    cells.erase(cells.begin() + relevance), cells.erase(cells.begin() + draws);
-    return cells;
-  };
-  TableRows table = latticeRows(estimate);
-  table.headers = narrow(table.headers);
-  for (auto& row : table.rows) row = narrow(row);
-  return Table(table).str();
+TableRows latticeRows(const TwoViewMotionEstimate& estimate, ShownOn view) {
+  using Row = TwoViewModelRow;
+  const auto given = [](bool there, const auto& value) { return there ? std::optional(value) : std::nullopt; };
+  return tableOf<Row>(
+      {{"model", &Row::name},
+       {"free", &Row::free_parameters},
+       {"draws", [&](const Row& row) { return given(row.draws > 0, row.draws); }, ShownOn::page},
+       {"inliers", [&](const Row& row) { return given(row.hasEstimate(), row.inliers); }},
+       {"relevance", [&](const Row& row) { return given(row.hasEstimate(), row.relevance); }, fixed(3), ShownOn::page},
+       {"rms px", [&](const Row& row) { return given(row.hasEstimate(), row.rms); }, 3},
+       {"rejected by",
+        [&](const Row& row) {
+          return rejectionOf(estimate, static_cast<std::size_t>(&row - estimate.lattice.data()));
+        }}},
+      estimate.lattice, view);
 }
 
 /// A table and the line above it.
@@ -166,8 +158,7 @@ Plot latticePlot(const TwoViewMotionEstimate& estimate) {
     const double middle = (row.equations == 2 ? -0.75 : 0.95) + (row.free_parameters % 2 == 0 ? -0.2 : 0.2);
     at[row.name] = {middle + 1.25 * k, row.free_parameters};
   }
-  Panel panel{.x = {.low = -1.9, .high = 1.9, .numbers = false},
-              .y = {.label = "free parameters", .low = -0.6, .high = 8.9}};
+  Panel panel{{}, {.low = -1.9, .high = 1.9, .numbers = false}, {.label = "free parameters", .low = -0.6, .high = 8.9}};
   Series edges{.style = Style::lines, .colour = 6, .dashed = true};
   for (const TwoViewModelRow& row : estimate.lattice) {
     for (const std::string& parent : row.parents) {
@@ -206,10 +197,9 @@ Plot errorPlot(const TwoViewMotionOutput& output) {
   std::vector<double> errors;
   const double limit = std::sqrt(output.estimate.threshold) * output.estimate.sigma;
   for (const double e : output.estimate.errors) errors.push_back(output.estimate.sigma * std::sqrt(e));
-  Panel panel{.x = {.label = "error, px"},
-              .y = {.label = "matches"},
-              .series = {histogram("", errors, 0, 4 * limit, 40, false)},
-              .references = {{ReferenceLine::Direction::vertical, limit}}};
+  Panel panel{{}, {"error, px"}, {"matches"}};
+  panel.series = {histogram("", errors, 0, 4 * limit, 40, false)};
+  panel.references = {{ReferenceLine::Direction::vertical, limit}};
   return {.name = "errors",
           .caption =
               "Distances of the matches from the chosen model (in four dimensions, of both images). The dotted "
@@ -226,7 +216,7 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   if (e.physical.empty() && e.matrix_covariance.rows() == 9 && e.chosenModel().name == "fundamental") {
     text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
   }
-  return text + "\n" + latticeTable(e);
+  return text + "\n" + Table(latticeRows(e, ShownOn::terminal)).str();
 }
 
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
@@ -244,7 +234,7 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   if (e.threshold > 0) report.plot(errorPlot(output));
   report.section("Models");
   report.plot(latticePlot(e));
-  report.table(latticeRows(e),
+  report.table(latticeRows(e, ShownOn::page),
                "The chosen model is the most specific one that no model which contains it rejects: by more support "
                "among matches that the specific one is far from, or by a better fit to the common inliers.");
   printLines("\n" + report.write() + "\n");
@@ -253,12 +243,12 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
 namespace {
 
 TableRows structureRows(const TwoViewMotions& motions) {
-  TableRows table{{"motion", "model", "matches", "rms px"}};
-  for (std::size_t k = 0; k < motions.structures.size(); ++k) {
-    const TwoViewStructure& s = motions.structures[k];
-    table.rows.push_back({fmt::format("{}", k + 1), s.model, fmt::format("{}", s.inliers.size()), number(s.rms, 3)});
-  }
-  return table;
+  const std::vector<TwoViewStructure>& all = motions.structures;
+  return tableOf<TwoViewStructure>({{"motion", [&](const TwoViewStructure& s) { return &s - all.data() + 1; }},
+                                    {"model", &TwoViewStructure::model},
+                                    {"matches", [](const TwoViewStructure& s) { return s.inliers.size(); }},
+                                    {"rms px", &TwoViewStructure::rms, 3}},
+                                   all);
 }
 std::string endOf(const TwoViewMotionsOutput& output) {
   std::string text = fmt::format("{} matches belong to none\n", output.motions.rest.size());

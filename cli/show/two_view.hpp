@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 
-#include <cstdint>
 #include <string>
 #include <vector>
 

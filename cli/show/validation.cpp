@@ -1,7 +1,5 @@
 #include <cli/show/validation.hpp>
 
-#include <report/table.hpp>
-
 #include <sstream>
 
 namespace liestat::cli {
@@ -22,16 +20,14 @@ std::optional<Verdict> shownVerdict(const ValidationView& view) {
 std::string ValidationView::text() const {
   std::string text = head;
   for (const ValidationTable& part : tables) {
-    if (part.rows.empty()) continue;
-    Table table(part.headers);
-    for (const auto& row : part.rows) table.row(row);
+    if (part.table.terminal.rows.empty()) continue;
     if (!part.title.empty()) {
       text += "\n" + part.title + "\n";
     } else if (!text.empty() && !text.ends_with("\n\n")) {
       text += "\n";
     }
     if (!part.caption.empty()) text += part.caption + "\n";
-    text += table.str(part.width) + part.below;
+    text += Table(part.table.terminal).str(part.width) + part.below;
   }
   text += legend;
   if (!judgement && !trials_of_run.incomplete()) return text;
@@ -59,10 +55,11 @@ void ValidationView::writePage(const std::string& directory, const std::string& 
   for (std::string text; std::getline(paragraphs, text);) report.paragraph(text);
   report.code(command_line);
   for (const ValidationTable& part : tables) {
-    if (page || part.rows.empty()) continue;
+    if (page || part.table.page.rows.empty()) continue;
     const std::string heading = part.page_title.value_or(part.title);
     if (!heading.empty()) report.section(heading);
-    report.table(part.headers, part.rows, part.page_caption.value_or(part.caption));
+    for (const Plot& plot : part.above) report.plot(plot);
+    report.table(part.table.page, part.page_caption.value_or(part.caption));
     for (const Plot& plot : part.plots) report.plot(plot);
   }
   if (page) page(report);
@@ -75,9 +72,7 @@ std::string verdictCell(const std::optional<bool>& passed) {
 }
 
 Panel histogramPanel(const JudgedReport& row, const std::string& title) {
-  Panel panel{.title = title,
-              .x = {.label = "squared Mahalanobis distance", .low = 0.0},
-              .y = {.label = "density", .low = 0.0}};
+  Panel panel{title, {.label = "squared Mahalanobis distance", .low = 0.0}, {.label = "density", .low = 0.0}};
   Series boxes{.name = "trials", .style = Style::boxes}, density{.name = row.report.law.name(), .style = Style::lines};
   for (const HistogramBin& bin : row.histogram) {
     for (Series* series : {&boxes, &density}) series->x.push_back(0.5 * (bin.lower + bin.upper));

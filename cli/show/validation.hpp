@@ -4,12 +4,14 @@
 
 #include <report/json.hpp>
 #include <report/page.hpp>
+#include <report/table.hpp>
 #include <experiments/judged_report.hpp>
 
 #include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -17,10 +19,10 @@ namespace liestat::cli {
 /// A table of a validation. On the terminal title and caption stand above it; the page has a section of that title.
 struct ValidationTable {
   std::string title = {}, caption = {};
-  std::vector<std::string> headers = {};
-  std::vector<std::vector<std::string>> rows = {};  ///< none: the table is not shown
-  std::vector<Plot> plots = {};                     ///< on the page, below the table
-  std::string below = {};                           ///< on the terminal, a line below the table
+  BothTables table = {};         ///< without rows: the table is not shown
+  std::vector<Plot> above = {};  ///< on the page, above the table
+  std::vector<Plot> plots = {};  ///< on the page, below the table
+  std::string below = {};        ///< on the terminal, a line below the table
   /// On the page, in place of title and caption.
   std::optional<std::string> page_title = {}, page_caption = {};
   std::size_t width = 80;  ///< columns on the terminal
@@ -48,7 +50,40 @@ struct ValidationView {
 /// A cell of a table: pass, FAIL, or empty where nothing was judged.
 std::string verdictCell(const std::optional<bool>& passed);
 
+/// Values of a row that is a judged report, for columns.
+struct Judged {
+  using Row = experiments::JudgedReport;
+  static std::size_t trials(const Row& row) { return row.report.trials; }
+  static int dof(const Row& row) { return row.report.dof; }
+  static double index(const Row& row) { return row.report.index; }
+  static double indexError(const Row& row) { return row.report.index_se; }
+  static double expected(const Row& row) { return row.report.law.mean(); }
+  static double kolmogorov(const Row& row) { return row.report.ks_p_value; }
+  /// Per cent of the truths inside the 95 % region.
+  static double covered(const Row& row) { return 100 * row.report.coverage[2].observed; }
+  static std::string verdict(const Row& row) { return verdictCell(row.passed); }
+};
+
+/// The rows for which keep(row) holds.
+template <class Row, class Keep>
+std::vector<std::reference_wrapper<const Row>> selected(const std::vector<Row>& rows, const Keep& keep) {
+  std::vector<std::reference_wrapper<const Row>> list;
+  for (const Row& row : rows) {
+    if (keep(row)) list.emplace_back(row);
+  }
+  return list;
+}
+
 /// Histogram of the squared distances with the density that they should have.
 Panel histogramPanel(const experiments::JudgedReport& row, const std::string& title);
+
+/// The histograms of some rows; titleOf(row) names each.
+template <class List, class Title>
+Plot histogramPlot(std::string name, const List& rows, const Title& titleOf,
+                   std::string caption = "Distances of the trials with the density that they should have.") {
+  Plot plot{.name = std::move(name), .caption = std::move(caption), .columns = 4};
+  for (const auto& row : rows) plot.panels.push_back(histogramPanel(row, titleOf(row)));
+  return plot;
+}
 
 }  // namespace liestat::cli

@@ -2,16 +2,12 @@
 
 #include <string>
 
-#include <report/json.hpp>
 #include <cli/commands/vi_init_result.hpp>
 
 namespace liestat::cli {
 
 /// A line a window, what stretches of them say together, and a summary; for the terminal.
 std::string viInitTable(const ViRecording& recording, const ViInitResult& result);
-
-/// All of it as fields of an object.
-void setViInit(JsonObject& object, const ViRecording& recording, const ViInitResult& result);
 
 /// A page with the trajectory, gravity, scale and biases over the windows, and the two solutions where there are two.
 void writeViInitReport(const std::string& directory, const std::string& command_line, const ViRecording& recording,

@@ -32,10 +32,8 @@ SO3d levelling(const Eigen::Vector3d& gravity) {
 /// Windows as curves: at the truth's pose of their first image where that is known, else levelled, from the origin.
 Panel trajectoryPanel(const ViRecording& recording, const ViInitResult& result, int horizontal, int vertical) {
   const char* labels[] = {"x, m", "y, m", "z (upwards), m"};
-  Panel panel{.title = vertical == 2 ? "from the side" : "from above",
-              .x = {.label = labels[horizontal]},
-              .y = {.label = labels[vertical]},
-              .equal_aspect = true};
+  Panel panel{vertical == 2 ? "from the side" : "from above", {labels[horizontal]}, {labels[vertical]}};
+  panel.equal_aspect = true;
   Series truth = line("truth", truth_colour, true), found = line("windows", estimate_colour);
   Series starts = dots("their first images", second_colour);
   if (!result.windows.empty()) {
@@ -124,10 +122,8 @@ Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
 }
 
 Panel scalePanel(const ViInitResult& result) {
-  Panel panel{.title = "scale of the trajectory against the truth",
-              .x = {.label = "s"},
-              .y = {.label = "%"},
-              .references = {{.at = 0}}};
+  Panel panel{"scale of the trajectory against the truth", {"s"}, {"%"}};
+  panel.references = {{.at = 0}};
   Series closed = dots("closed form", second_colour), refined = dots("refined", estimate_colour);
   for (const ComparedWindow& w : result.windows) {
     if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {

@@ -54,33 +54,26 @@ std::string errors(const ViInitRow* row) { return row == nullptr ? "" : both(row
 bool isOfRefinement(Check check) { return check == Check::consistency || check == Check::walk; }
 bool hasDistances(Check check) { return isOfRefinement(check) || check == Check::closed_form; }
 
-Table distancesTable(const std::vector<Group>& list) {
-  const Check check = list.front().first().check;
+/// A column of what one quantity of a window is.
+Column<Group> columnOf(const char* heading, std::string (*cell)(const ViInitRow*), Quantity quantity) {
+  return {heading, [=](const Group& g) { return cell(g.of(quantity)); }};
+}
+std::string verdictOf(const Group& g) { return verdictCell(g.passed()); }
+std::string estimatorOf(const Group& g) { return name(g.first().estimator); }
+
+Columns<Group> distanceColumns(Check check) {
   const bool refined = isOfRefinement(check), walks = check == Check::walk;
-  std::vector<std::string> headers{"T, n, N"};
-  if (refined) {
-    if (!walks) headers.push_back("V (3)");
-    headers.insert(headers.end(), {"V,G (5)", "all (11)", "last (9)"});
-    if (walks) headers.push_back("last, G, biases (17)");
-  } else {
-    headers.insert(headers.end(), {"V,G (5)", "with bias (8)"});
-  }
-  headers.insert(headers.end(), {"χ²/dof", "95 %", "lost", "verdict"});
-  Table table(headers);
-  for (const Group& g : list) {
-    std::vector<std::string> cells{windowOf(g)};
-    if (refined && !walks) cells.push_back(index(g.of(Quantity::nees_v)));
-    cells.push_back(index(g.of(Quantity::nees_v_g)));
-    cells.push_back(index(g.of(Quantity::nees_all)));
-    if (refined) cells.push_back(index(g.of(Quantity::nees_last_state)));
-    if (walks) cells.push_back(index(g.of(Quantity::nees_at_last)));
-    cells.push_back(ratio(g.of(Quantity::chi2_per_dof)));
-    cells.push_back(covered(g.of(Quantity::nees_v_g)));
-    cells.push_back(fmt::format("{}", g.of(Quantity::nees_v_g)->failures));
-    cells.push_back(verdictCell(g.passed()));
-    table.row(cells);
-  }
-  return table;
+  Columns<Group> columns{{"T, n, N", windowOf}};
+  if (refined && !walks) columns.push_back(columnOf("V (3)", index, Quantity::nees_v));
+  columns.push_back(columnOf("V,G (5)", index, Quantity::nees_v_g));
+  columns.push_back(columnOf(refined ? "all (11)" : "with bias (8)", index, Quantity::nees_all));
+  if (refined) columns.push_back(columnOf("last (9)", index, Quantity::nees_last_state));
+  if (walks) columns.push_back(columnOf("last, G, biases (17)", index, Quantity::nees_at_last));
+  columns.push_back(columnOf("χ²/dof", ratio, Quantity::chi2_per_dof));
+  columns.push_back(columnOf("95 %", covered, Quantity::nees_v_g));
+  columns.push_back({"lost", [](const Group& g) { return g.of(Quantity::nees_v_g)->failures; }});
+  columns.push_back({"verdict", verdictOf});
+  return columns;
 }
 
 /// The errors of a refinement stand below its distances.
@@ -112,27 +105,22 @@ Table errorsTable(const std::vector<Group>& list) {
   return table;
 }
 
-/// Table of the check at rest: windows that were told right, and the covariance.
-Table restTable(const std::vector<Group>& list) {
-  Table table({"", "T, n, N", "told right", "moves", "gravity, biases (8)", "95 %", "verdict"});
-  for (const Group& g : list) {
-    const ViInitRow* nees = g.of(Quantity::nees_at_rest);
-    table.row({name(g.first().estimator), windowOf(g), ratio(g.of(Quantity::told)), ratio(g.of(Quantity::moving)),
-               index(nees), covered(nees), verdictCell(g.passed())});
-  }
-  return table;
-}
-
+/// The check at rest: windows that were told right, and the covariance.
+const Columns<Group> rest_columns{{"", estimatorOf},
+                                  {"T, n, N", windowOf},
+                                  columnOf("told right", ratio, Quantity::told),
+                                  columnOf("moves", ratio, Quantity::moving),
+                                  columnOf("gravity, biases (8)", index, Quantity::nees_at_rest),
+                                  columnOf("95 %", covered, Quantity::nees_at_rest),
+                                  {"verdict", verdictOf}};
 /// How often intervals held the factors.
-Table noiseTable(const std::vector<Group>& list) {
-  Table table({"factors g, a", "T, n, N", "recordings", "gyroscope's", "accelerometer's", "of both", "verdict"});
-  for (const Group& g : list) {
-    table.row({inWords(g.first().estimator), windowOf(g), fmt::format("{}", g.first().trials),
-               ratio(g.of(Quantity::gyroscope_interval)), ratio(g.of(Quantity::accelerometer_interval)),
-               ratio(g.of(Quantity::common_interval)), verdictCell(g.passed())});
-  }
-  return table;
-}
+const Columns<Group> noise_columns{{"factors g, a", [](const Group& g) { return inWords(g.first().estimator); }},
+                                   {"T, n, N", windowOf},
+                                   {"recordings", [](const Group& g) { return g.first().trials; }},
+                                   columnOf("gyroscope's", ratio, Quantity::gyroscope_interval),
+                                   columnOf("accelerometer's", ratio, Quantity::accelerometer_interval),
+                                   columnOf("of both", ratio, Quantity::common_interval),
+                                   {"verdict", verdictOf}};
 
 std::string viInitTables(const std::vector<ViInitRow>& rows) {
   std::string text;
@@ -143,11 +131,11 @@ std::string viInitTables(const std::vector<ViInitRow>& rows) {
       text = fmt::format("{} windows a row, of T seconds, n images and N features\n\n", list.front().first().trials);
     }
     text += fmt::format("{}\n\n", subjectOf(check));
-    if (hasDistances(check)) text += distancesTable(list).str() + "\n";
+    if (hasDistances(check)) text += Table(tableOf(distanceColumns(check), list)).str() + "\n";
     if (check == Check::rest) {
-      text += restTable(list).str() + "\n";
+      text += Table(tableOf(rest_columns, list)).str() + "\n";
     } else if (check == Check::noise) {
-      text += noiseTable(list).str() + "\n";
+      text += Table(tableOf(noise_columns, list)).str() + "\n";
     } else if (check != Check::closed_form && check != Check::walk) {
       text += errorsTable(list).str() + "\n";
     }

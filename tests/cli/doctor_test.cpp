@@ -17,7 +17,6 @@ namespace liestat::cli {
 namespace {
 
 using Json = nlohmann::json;
-using Words = std::vector<std::string>;
 using experiments::TrajectoryScene;
 
 Json json(Words words, int exit_code) {
@@ -48,9 +47,7 @@ struct Files {
     estimate = directory.write("est.txt", tumWithCovariance(scene.times, scene.estimate, c));
   }
   Words words(Words more = {}) const {
-    Words all{"doctor", estimate, truth, "--format", "tum", "--cov-layout", "full36"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+    return Words{"doctor", estimate, truth, "--format", "tum", "--cov-layout", "full36"} + more;
   }
 };
 

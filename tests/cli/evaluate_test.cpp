@@ -22,7 +22,6 @@ namespace liestat::cli {
 namespace {
 
 using Json = nlohmann::json;
-using Words = std::vector<std::string>;
 
 /// A scene in files: the reference at twice the rate, the estimate in another world, covariances in a side file.
 struct Files {
@@ -45,9 +44,7 @@ struct Files {
     directory.write("est.tum.cov", covarianceFileOf(scene.times, scene.estimate, {}));
   }
   Json json(Words options, int exit_code = 0) const {
-    Words words{"evaluate", reference, estimate, "--json", "-"};
-    words.insert(words.end(), options.begin(), options.end());
-    const ProgramOutput out = run(words);
+    const ProgramOutput out = run(Words{"evaluate", reference, estimate, "--json", "-"} + options);
     EXPECT_EQ(out.exit_code, exit_code) << out.error << out.output;
     return out.output.empty() ? Json() : Json::parse(out.output);
   }

@@ -3,10 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -20,7 +17,6 @@ namespace liestat::cli {
 namespace {
 
 using Json = nlohmann::json;
-using Words = std::vector<std::string>;
 
 /// A simulated calibration: the files of poses and the truth.
 struct Scene {
@@ -38,11 +34,7 @@ struct Scene {
     EXPECT_TRUE(contains(made.output, "liestat hand-eye " + a + " " + b)) << made.output;
     truth = Json::parse(contentOf(directory / "scene/truth.json"));
   }
-  ProgramOutput calibrated(const Words& options) const {
-    Words words{"hand-eye", a, b};
-    words.insert(words.end(), options.begin(), options.end());
-    return run(words);
-  }
+  ProgramOutput calibrated(const Words& options) const { return run(Words{"hand-eye", a, b} + options); }
   Json json(int exit_code, Words options = {}) const {
     options.insert(options.end(), {"--json", "-"});
     const ProgramOutput out = calibrated(options);
@@ -412,9 +404,7 @@ TEST(HandEyeCommand, badInputIsNamed) {
   const std::string header = "t,tx,ty,tz,rx,ry,rz\n";
   const std::string fine = header + "0,0,0,0,0,0,0\n1,1,0,0,1,0,0\n2,0,1,0,0,1,0\n3,0,1,1,0,1,1\n";
   const auto error = [&](const std::string& a, const std::string& b, const Words& more = {}) {
-    Words words{"hand-eye", directory.write("a.csv", a), directory.write("b.csv", b)};
-    words.insert(words.end(), more.begin(), more.end());
-    const ProgramOutput out = run(words);
+    const ProgramOutput out = run(Words{"hand-eye", directory.write("a.csv", a), directory.write("b.csv", b)} + more);
     EXPECT_EQ(out.exit_code, 2) << a << b;
     EXPECT_EQ(std::count(out.error.begin(), out.error.end(), '\n'), 1) << out.error;
     return out.error;

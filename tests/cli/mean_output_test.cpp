@@ -3,6 +3,7 @@
 #include <cli/commands/measurements.hpp>
 #include <formats/features.hpp>
 #include <cli/show/mean.hpp>
+#include <report/json.hpp>
 
 #include <gtest/gtest.h>
 
@@ -26,9 +27,7 @@ struct Analysed {
   }
   std::string text() const { return formatMean("f.csv", measurements, analysis); }
   nlohmann::json json() const {
-    JsonObject object;
-    setMeanFields(object, "f.csv", measurements, analysis);
-    return nlohmann::json::parse(object.str());
+    return nlohmann::json::parse(JsonObject().fieldsOf(measurements.file).fieldsOf<MeanSummary>(analysis).str());
   }
   /// The numbers of a row of the table.
   std::vector<double> row(const std::string& name) const {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
@@ -23,6 +22,7 @@
 #include <vector>
 
 #include <report/run_program.hpp>
+#include <cli/words.hpp>
 #include <support/temporary_directory.hpp>
 #include <experiments/motion_scene.hpp>
 
@@ -31,28 +31,19 @@ namespace {
 
 using Json = nlohmann::json;
 
-ProgramResult run(std::vector<std::string> words) {
+ProgramResult run(Words words) {
   words.insert(words.begin(), {"sh", "-c", "\"$0\" \"$@\" > /dev/null", LIESTAT_PROGRAM, "motion"});
   return runProgram(words, ".");
 }
 
-Json runOnKitti(const std::string& directory, const std::string& sequence, const std::vector<std::string>& more) {
+Json runOnKitti(const std::string& directory, const std::string& sequence, const Words& more) {
   const TemporaryDirectory out;
   const std::string stem = directory + "/tracks/kitti_2011_09_26_" + sequence;
-  std::vector<std::string> words{stem + "_tracks.csv",
-                                 "--intrinsics",
-                                 "721.5377,721.5377,609.5593,172.854",
-                                 "--truth",
-                                 stem + "_poses.csv",
-                                 "--process-noise",
-                                 "1e-4",
-                                 "--outliers",
-                                 "--filter",
-                                 "subspace",
-                                 "--json",
-                                 out / "out.json"};
-  words.insert(words.end(), more.begin(), more.end());
-  const ProgramResult result = run(words);
+  const ProgramResult result =
+      run(wordsOf(fmt::format("{0}_tracks.csv --intrinsics 721.5377,721.5377,609.5593,172.854 --truth {0}_poses.csv "
+                              "--process-noise 1e-4 --outliers --filter subspace --json {1}",
+                              stem, out / "out.json")) +
+          more);
   EXPECT_EQ(result.status, 0) << result.errors;
   return Json::parse(contentOf(out / "out.json"));
 }
@@ -81,26 +72,12 @@ TEST(MotionCommand, realGyroscopeWithFewTracks) {
   if (directory == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
   const TemporaryDirectory out;
   const std::string stem = std::string(directory) + "/tracks/starry_night";
-  const ProgramResult result = run({stem + "_tracks.csv",
-                                    "--intrinsics",
-                                    "484.49985,484.49985,321.68048,247.48145",
-                                    "--truth",
-                                    stem + "_poses.csv",
-                                    "--min-motion",
-                                    "0.01",
-                                    "--rates",
-                                    stem + "_poses.csv",
-                                    "--rates-rotation=0.50420466,-0.49921739,-0.49953699,-0.49701353",
-                                    "--rates-sigma",
-                                    "0.1",
-                                    "--sigma",
-                                    "1.5",
-                                    "--process-noise",
-                                    "1e-2",
-                                    "--frames-apart",
-                                    "10",
-                                    "--json",
-                                    out / "out.json"});
+  const ProgramResult result = run(wordsOf(
+      fmt::format("{0}_tracks.csv --intrinsics 484.49985,484.49985,321.68048,247.48145 --truth {0}_poses.csv "
+                  "--min-motion 0.01 --rates {0}_poses.csv "
+                  "--rates-rotation=0.50420466,-0.49921739,-0.49953699,-0.49701353 --rates-sigma 0.1 --sigma 1.5 "
+                  "--process-noise 1e-2 --frames-apart 10 --json {1}",
+                  stem, out / "out.json")));
   ASSERT_EQ(result.status, 0) << result.errors;
   const Json json = Json::parse(contentOf(out / "out.json"));
   EXPECT_GT(json["frames_usable"].get<int>(), 800);
@@ -128,7 +105,7 @@ TEST(MotionCommand, realTracksInTwoPasses) {
 /// A simulated recording in a directory of its own.
 class Simulated {
  public:
-  explicit Simulated(std::vector<std::string> options) {
+  explicit Simulated(Words options) {
     options.insert(options.begin(), {"sh", "-c", "\"$0\" \"$@\" > /dev/null", LIESTAT_PROGRAM, "simulate", "motion",
                                      "--output", directory_.path().string()});
     const ProgramResult result = runProgram(options, ".");
@@ -138,31 +115,20 @@ class Simulated {
   std::string content(const std::string& name) const { return contentOf(directory_ / name); }
   void write(const std::string& name, const std::string& text) const { directory_.write(name, text); }
 
-  ProgramResult motion(const std::vector<std::string>& more) const {
-    std::vector<std::string> words{*this / "tracks.csv",
-                                   "--calibration",
-                                   *this / "calibration.yaml",
-                                   "--truth",
-                                   *this / "truth.csv",
-                                   "--min-motion",
-                                   "0",
-                                   "--json",
-                                   *this / "out.json"};
-    words.insert(words.end(), more.begin(), more.end());
-    return run(words);
+  ProgramResult motion(const Words& more) const {
+    return run(wordsOf(fmt::format("{0}/tracks.csv --calibration {0}/calibration.yaml --truth {0}/truth.csv "
+                                   "--min-motion 0 --json {0}/out.json",
+                                   directory_.path().string())) +
+               more);
   }
-  Json json(const std::vector<std::string>& more) const {
+  Json json(const Words& more) const {
     const ProgramResult result = motion(more);
     EXPECT_EQ(result.status, 0) << result.errors;
     return Json::parse(content("out.json"));
   }
-  std::vector<std::string> imu(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"--imu", *this / "imu.csv"});
-    return more;
-  }
-  std::vector<std::string> rates(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"--rates", *this / "rates.csv", "--rates-axes", "vehicle"});
-    return more;
+  Words imu(const Words& more = {}) const { return Words{"--imu", *this / "imu.csv"} + more; }
+  Words rates(const Words& more = {}) const {
+    return Words{"--rates", *this / "rates.csv", "--rates-axes", "vehicle"} + more;
   }
 
  private:
@@ -172,7 +138,7 @@ class Simulated {
 double directionError(const Json& json) { return json["median_direction_error_deg"].get<double>(); }
 double rotationError(const Json& json) { return json["median_rotation_error_deg"].get<double>(); }
 std::vector<double> numbers(const Json& list) { return list.get<std::vector<double>>(); }
-std::vector<std::string> flags(const Json& frame) { return frame["flags"].get<std::vector<std::string>>(); }
+Words flags(const Json& frame) { return frame["flags"].get<Words>(); }
 bool hasFlag(const Json& frame, const std::string& flag) {
   const auto all = flags(frame);
   return std::find(all.begin(), all.end(), flag) != all.end();
@@ -182,13 +148,13 @@ bool hasFlag(const Json& frame, const std::string& flag) {
 TEST(SimulateMotion, ExactFilesGiveTheExactMotion) {
   for (const std::string scene : {"orbit", "general", "plane", "narrow", "turning"}) {
     const Simulated files({"--scene", scene, "--sigma", "0", "--gyroscope-sigma", "1e-5", "--frames", "40"});
-    const std::vector<std::string> noise{"--sigma", "0.01", "--filter", "subspace"};
+    const Words noise{"--sigma", "0.01", "--filter", "subspace"};
     // The direction of the translation turns with the rotation, which the filter takes for noise.
     const double bound = scene == "turning" ? 1.5 : 0.01;
     const Json inertial = files.json(files.imu(noise));
     EXPECT_LT(directionError(inertial), bound) << scene;
     EXPECT_LT(rotationError(inertial), scene == "turning" ? 0.01 : 0.001) << scene;
-    std::vector<std::string> more = noise;
+    Words more = noise;
     more.insert(more.end(), {"--rates-sigma", "0.02"});
     const Json rates = files.json(files.rates(more));
     EXPECT_LT(directionError(rates), bound) << scene;
@@ -201,7 +167,7 @@ TEST(SimulateMotion, ExactFilesGiveTheExactMotion) {
 // Errors of docs/motion.md (orbit, 1 px): 0.28° by frame 20 and 0.25° later with 0.1° per frame, 0.2 to 0.4° without.
 TEST(SimulateMotion, ErrorsHaveTheExpectedSize) {
   const Simulated files({"--seed", "4"});
-  const std::vector<std::string> noise{"--sigma", "1"};
+  const Words noise{"--sigma", "1"};
   const Json images = files.json(noise), inertial = files.json(files.imu(noise)),
              rates = files.json(files.rates(noise));
   for (const Json* json : {&images, &inertial, &rates}) {
@@ -255,10 +221,8 @@ TEST(SimulateMotion, FilesAreTheSameForASeedAndNotReplaced) {
     EXPECT_EQ(a.content(name), b.content(name)) << name;
     EXPECT_EQ(a.content(name) == c.content(name), name == "calibration.yaml") << name;
   }
-  const auto again = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{LIESTAT_PROGRAM, "simulate", "motion", "--output", a / ""};
-    words.insert(words.end(), more.begin(), more.end());
-    return runProgram(words, ".");
+  const auto again = [&](const Words& more) {
+    return runProgram(Words{LIESTAT_PROGRAM, "simulate", "motion", "--output", a / ""} + more, ".");
   };
   EXPECT_EQ(again({}).status, 2);
   EXPECT_NE(again({}).errors.find("tracks.csv: the file is there"), std::string::npos);
@@ -271,7 +235,7 @@ TEST(SimulateMotion, FilesAreTheSameForASeedAndNotReplaced) {
 TEST(MotionCommand, BiasOfTheGyroscopeIsFound) {
   const std::vector<double> bias{0.02, -0.03, 0.01};
   const Simulated files({"--seed", "3", "--frames", "120", "--gyroscope-bias", "0.02,-0.03,0.01"});
-  const std::vector<std::string> noise{"--sigma", "1"};
+  const Words noise{"--sigma", "1"};
   const Json ignored = files.json(files.imu(noise));
   const Json given = files.json(files.imu({"--sigma", "1", "--gyroscope-bias", "0.02,-0.03,0.01"}));
   EXPECT_GT(directionError(ignored), 2 * directionError(given));
@@ -339,18 +303,14 @@ std::string turnedRates(const std::string& text, const SO3d& R) {
 
 TEST(MotionCommand, AxesOfTheRates) {
   const Simulated files({"--scene", "general", "--sigma", "0", "--gyroscope-sigma", "1e-5", "--frames", "30"});
-  const std::vector<std::string> noise{"--sigma", "0.01", "--rates-sigma", "0.02"};
+  const Words noise{"--sigma", "0.01", "--rates-sigma", "0.02"};
   // A camera that looks down by 10°, and is turned by 5° about its own axis, 3° to the left: the vehicle's rates are
   // those of the sensor turned by the tilt, yaw · pitch · roll.
   const double d = std::numbers::pi / 180;
   const SO3d tilt = SO3d::exp(Eigen::Vector3d(0, 0, 3 * d)) * SO3d::exp(Eigen::Vector3d(0, 10 * d, 0)) *
                     SO3d::exp(Eigen::Vector3d(5 * d, 0, 0));
   files.write("tilted.csv", turnedRates(files.content("rates.csv"), tilt));
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"--rates", files / "tilted.csv"});
-    more.insert(more.end(), noise.begin(), noise.end());
-    return more;
-  };
+  const auto with = [&](const Words& more) { return Words{"--rates", files / "tilted.csv"} + more + noise; };
   EXPECT_LT(rotationError(files.json(with({"--rates-axes", "vehicle", "--camera-tilt", "5,10,3"}))), 0.001);
   EXPECT_GT(rotationError(files.json(with({"--rates-axes", "vehicle"}))), 0.01);
   Eigen::Matrix3d camera_R_ahead;
@@ -402,7 +362,7 @@ TEST(MotionCommand, ReadingsWithAGap) {
   std::string tracks = files.content("tracks.csv");
   tracks.replace(tracks.find("t_s"), 3, "old");
   files.write("untimed.csv", tracks);
-  const auto errors = [&](std::vector<std::string> words) {
+  const auto errors = [&](Words words) {
     words.insert(words.begin(), files / "untimed.csv");
     const ProgramResult result = run(words);
     EXPECT_EQ(result.status, 2);
@@ -442,14 +402,12 @@ TEST(MotionCommand, SecondPassStartsFromTheEndOfTheFirst) {
 
 TEST(MotionCommand, badInputIsNamed) {
   const TemporaryDirectory directory;
-  const auto error = [&](const std::string& content, const std::vector<std::string>& more) {
-    std::vector<std::string> words{directory.write("t.csv", content)};
-    words.insert(words.end(), more.begin(), more.end());
-    const ProgramResult result = run(words);
+  const auto error = [&](const std::string& content, const Words& more) {
+    const ProgramResult result = run(Words{directory.write("t.csv", content)} + more);
     EXPECT_EQ(result.status, 2) << content;
     return result.errors;
   };
-  const std::vector<std::string> camera{"--intrinsics", "500,500,256,256"};
+  const Words camera{"--intrinsics", "500,500,256,256"};
   const std::string fine = "frame,track,u,v\n0,0,1,2\n1,0,2,2\n";
   EXPECT_NE(error(fine, {}).find("--intrinsics"), std::string::npos);
   EXPECT_NE(error("frame,track,u\n0,0,1\n", camera).find("columns u and v"), std::string::npos);
@@ -497,11 +455,10 @@ TEST(MotionCommand, UnitsOfTheIntrinsics) {
 
 TEST(MotionCommand, IdenticalFramesAndTracksThatVanish) {
   const TemporaryDirectory directory;
-  const auto json = [&](const std::string& content, int status, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> words{directory.write("t.csv", content), "--intrinsics", "500,500,256,256", "--json",
-                                   directory / "out.json"};
-    words.insert(words.end(), more.begin(), more.end());
-    const ProgramResult result = run(words);
+  const auto json = [&](const std::string& content, int status, const Words& more = {}) {
+    const ProgramResult result = run(
+        Words{directory.write("t.csv", content), "--intrinsics", "500,500,256,256", "--json", directory / "out.json"} +
+        more);
     EXPECT_EQ(result.status, status) << result.errors;
     return Json::parse(contentOf(directory / "out.json"));
   };
@@ -608,10 +565,8 @@ struct SimulatedTracks {
     }
     tracks = directory.write("tracks.csv", rows), poses = directory.write("poses.csv", motion);
   }
-  std::vector<std::string> words(const std::vector<std::string>& more) const {
-    std::vector<std::string> all{tracks, "--intrinsics", "500,500,256,256", "--truth", poses};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+  Words words(const Words& more) const {
+    return Words{tracks, "--intrinsics", "500,500,256,256", "--truth", poses} + more;
   }
 };
 
@@ -625,7 +580,7 @@ Rows rowsOf(const std::string& csv) {
   Rows rows;
   while (std::getline(lines, line)) {
     if (line.empty()) continue;
-    std::vector<std::string> cells{""};
+    Words cells{""};
     bool quoted = false;
     for (const char c : line) {
       if (c == '"') {
@@ -666,8 +621,8 @@ TEST(MotionCommand, ReportShowsTheFiguresWithTheirData) {
   std::set<std::string> linked;
   for (std::sregex_iterator at(html.begin(), html.end(), link), end; at != end; ++at) linked.insert((*at)[1]);
   const bool drawn = runProgram({"gnuplot", "--version"}, ".").found;
-  const std::vector<std::string> plots{"estimates", "errors",    "residual",  "contours", "convergence",
-                                       "sign",      "essential", "structure", "distances"};
+  const Words plots{"estimates", "errors",    "residual",  "contours", "convergence",
+                    "sign",      "essential", "structure", "distances"};
   EXPECT_EQ(linked.size(), plots.size() * (drawn ? 3 : 1));
   for (const std::string& file : linked) EXPECT_TRUE(std::filesystem::exists(page + "/" + file)) << file;
   EXPECT_EQ(html.find("could not draw"), std::string::npos);

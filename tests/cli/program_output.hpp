@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <cli/words.hpp>
 #include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 
@@ -22,7 +23,5 @@ inline ProgramOutput run(const std::vector<std::string>& words) {
   const ProgramResult result = runProgram(command, ".");
   return {result.status, contentOf(directory / "out"), result.errors};
 }
-
-inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace liestat::cli

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <report/run_program.hpp>
+#include <cli/words.hpp>
 #include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
@@ -46,7 +47,7 @@ struct ProgramRun {
 
 class Program : public ::testing::Test {
  protected:
-  ProgramRun run(std::vector<std::string> arguments) const {
+  ProgramRun run(Words arguments) const {
     arguments.insert(arguments.begin(), LIESTAT_PROGRAM);
     const ProgramResult result = runProgram(arguments, directory_.path().string());
     EXPECT_TRUE(result.found) << result.errors;
@@ -57,15 +58,13 @@ class Program : public ::testing::Test {
   }
 
   /// `liestat mean` of a text, with JSON.
-  ProgramRun mean(const std::string& text, const std::vector<std::string>& options = {}) const {
+  ProgramRun mean(const std::string& text, const Words& options = {}) const {
     directory_.write("f.csv", text);
-    std::vector<std::string> arguments{"mean", "f.csv", "--json", "out.json"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return run(arguments);
+    return run(Words{"mean", "f.csv", "--json", "out.json"} + options);
   }
 
   /// The message of a run that must end with exit code 2 and one line.
-  std::string refusal(const std::string& text, const std::vector<std::string>& options = {}) const {
+  std::string refusal(const std::string& text, const Words& options = {}) const {
     const ProgramRun r = mean(text, options);
     EXPECT_EQ(r.status, 2) << text;
     EXPECT_TRUE(r.json.is_null()) << "nothing is written";
@@ -120,28 +119,28 @@ TEST_F(Program, HelpAndVersion) {
 }
 
 TEST_F(Program, BadUsageIsOneLineAndTwo) {
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
-                                                    {"mean"},
-                                                    {"no_such_command"},
-                                                    {"validate"},
-                                                    {"mean", "f.csv", "--feature", "line"},
-                                                    {"mean", "f.csv", "--threads", "-1"},
-                                                    {"mean", "f.csv", "--norm-tolerance", "much"},
-                                                    {"mean", "f.csv", "--norm-tolerance", "nan"},
-                                                    {"mean", "f.csv", "--budget", "-1"},
-                                                    {"validate", "means", "--seed", "-1"},
-                                                    {"validate", "means", "--spread", "1,-nan"},
-                                                    {"vi-init", "--imu", "i", "--tracks", "t", "--max-gap", "nan"},
-                                                    {"simulate", "vi", "--output", "d", "--box", "1,nan,1"},
-                                                    {"motion"},
-                                                    {"motion", "t.csv", "--sigma", "-1"},
-                                                    {"motion", "t.csv", "--passes", "0"},
-                                                    {"motion", "t.csv", "--imu", "i", "--rates", "r"},
-                                                    {"motion", "t.csv", "--gyroscope-bias", "1,inf,0"},
-                                                    {"simulate", "motion"},
-                                                    {"simulate", "motion", "--output", "d", "--frames", "1"},
-                                                    {"validate", "split"},
-                                                    {"validate", "split", "f.csv", "--blocks", "3"}}) {
+  for (const Words& arguments : {Words{},
+                                 {"mean"},
+                                 {"no_such_command"},
+                                 {"validate"},
+                                 {"mean", "f.csv", "--feature", "line"},
+                                 {"mean", "f.csv", "--threads", "-1"},
+                                 {"mean", "f.csv", "--norm-tolerance", "much"},
+                                 {"mean", "f.csv", "--norm-tolerance", "nan"},
+                                 {"mean", "f.csv", "--budget", "-1"},
+                                 {"validate", "means", "--seed", "-1"},
+                                 {"validate", "means", "--spread", "1,-nan"},
+                                 {"vi-init", "--imu", "i", "--tracks", "t", "--max-gap", "nan"},
+                                 {"simulate", "vi", "--output", "d", "--box", "1,nan,1"},
+                                 {"motion"},
+                                 {"motion", "t.csv", "--sigma", "-1"},
+                                 {"motion", "t.csv", "--passes", "0"},
+                                 {"motion", "t.csv", "--imu", "i", "--rates", "r"},
+                                 {"motion", "t.csv", "--gyroscope-bias", "1,inf,0"},
+                                 {"simulate", "motion"},
+                                 {"simulate", "motion", "--output", "d", "--frames", "1"},
+                                 {"validate", "split"},
+                                 {"validate", "split", "f.csv", "--blocks", "3"}}) {
     const ProgramRun r = run(arguments);
     EXPECT_EQ(r.status, 2) << ::testing::PrintToString(arguments);
     EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
@@ -149,7 +148,7 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
 }
 
 TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
-  const auto complaint = [this](const std::vector<std::string>& arguments) {
+  const auto complaint = [this](const Words& arguments) {
     const ProgramRun r = run(arguments);
     EXPECT_EQ(r.status, 2) << ::testing::PrintToString(arguments);
     return r.errors;
@@ -373,10 +372,10 @@ TEST_F(Program, AMillionRotations) {
 TEST_F(Program, EveryFeatureFillsItsFields) {
   struct Case {
     std::string text, feature;
-    std::vector<std::string> fields;
+    Words fields;
     std::size_t dof;
   };
-  const std::vector<std::string> pose{"quaternion_xyzw", "rotation_vector", "translation"};
+  const Words pose{"quaternion_xyzw", "rotation_vector", "translation"};
   const std::vector<Case> cases{
       {rotations(30, 0.2), "rotation", {"quaternion_xyzw", "rotation_vector"}, 3},
       {frames(30), "frame", pose, 6},
@@ -390,27 +389,10 @@ TEST_F(Program, EveryFeatureFillsItsFields) {
     const ProgramRun r = mean(c.text, {"--feature", c.feature});
     SCOPED_TRACE(c.feature);
     ASSERT_EQ(r.status, 0) << r.errors;
-    for (const char* field : {"schema_version",
-                              "program",
-                              "version",
-                              "command_line",
-                              "n",
-                              "mean",
-                              "covariance",
-                              "iterations",
-                              "converged",
-                              "status",
-                              "unique",
-                              "rivals",
-                              "covariance_order",
-                              "covariance_side",
-                              "covariance_frame",
-                              "standard_deviations",
-                              "dispersion",
-                              "r_star",
-                              "cells",
-                              "n_normalised",
-                              "covariance_status"}) {
+    for (const std::string& field :
+         wordsOf("schema_version program version command_line n mean covariance iterations converged status unique "
+                 "rivals covariance_order covariance_side covariance_frame standard_deviations dispersion r_star cells "
+                 "n_normalised covariance_status")) {
       EXPECT_TRUE(r.json.contains(field)) << field;
     }
     EXPECT_EQ(r.json["feature"], c.feature);

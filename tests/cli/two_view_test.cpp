@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -18,27 +17,19 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::string simulate(const TemporaryDirectory& directory, const std::string& motion,
-                     const std::vector<std::string>& more = {}) {
-  std::vector<std::string> words{"simulate", "two-view", "--output", directory / (motion + ".csv"), "--motion", motion};
-  words.insert(words.end(), more.begin(), more.end());
-  const ProgramOutput made = run(words);
+std::string simulate(const TemporaryDirectory& directory, const std::string& motion, const Words& more = {}) {
+  const ProgramOutput made =
+      run(Words{"simulate", "two-view", "--output", directory / (motion + ".csv"), "--motion", motion} + more);
   EXPECT_EQ(made.exit_code, 0) << made.error;
   return directory / (motion + ".csv");
 }
-const std::vector<std::string> known_camera = {"--intrinsics", "600,600,320,240", "--image-size",
-                                               "640,480",      "--sigma",         "0.5"};
-std::vector<std::string> asked(const std::string& file, std::vector<std::string> more = known_camera) {
-  more.insert(more.begin(), {"two-view", file});
-  return more;
-}
+const Words known_camera = {"--intrinsics", "600,600,320,240", "--image-size", "640,480", "--sigma", "0.5"};
+Words asked(const std::string& file, const Words& more = known_camera) { return Words{"two-view", file} + more; }
 
 TEST(TwoViewCommand, answersWhatWasSimulated) {
   const TemporaryDirectory directory;
   const std::string file = simulate(directory, "essential", {"--truth", directory / "truth.json", "--seed", "3"});
-  std::vector<std::string> words = asked(file);
-  words.insert(words.end(), {"--json", directory / "out.json"});
-  const ProgramOutput out = run(words);
+  const ProgramOutput out = run(asked(file) + Words{"--json", directory / "out.json"});
   ASSERT_EQ(out.exit_code, 0) << out.error;
   EXPECT_NE(out.output.find("essential: "), std::string::npos) << out.output;
   std::istringstream lines(out.output);
@@ -82,7 +73,7 @@ TEST(TwoViewCommand, withoutIntrinsicsAndSizeItSaysSo) {
 
 TEST(TwoViewCommand, thePageHasMatchesErrorsAndLattice) {
   const TemporaryDirectory directory;
-  std::vector<std::string> words = asked(simulate(directory, "homography"));
+  Words words = asked(simulate(directory, "homography"));
   words.insert(words.end(), {"--report", directory / "page"});
   const ProgramOutput out = run(words);
   ASSERT_EQ(out.exit_code, 0) << out.error;
@@ -100,7 +91,7 @@ TEST(TwoViewCommand, severalMotionsAreListed) {
   std::string both = contentOf(simulate(directory, "homography", {"--outliers", "0"}));
   const std::string second = contentOf(simulate(directory, "zoom", {"--outliers", "0", "--matches", "60"}));
   both += second.substr(second.find('\n') + 1);
-  std::vector<std::string> words = asked(directory.write("both.csv", both));
+  Words words = asked(directory.write("both.csv", both));
   words.insert(words.end(), {"--motions", "5", "--json", directory / "out.json", "--report", directory / "page"});
   const ProgramOutput out = run(words);
   ASSERT_EQ(out.exit_code, 0) << out.error << out.output;
@@ -139,8 +130,8 @@ TEST(TwoViewCommand, repeatedAndContradictingMatchesAreCounted) {
   text += text.substr(text.find('\n') + 1);  // each match twice
   for (int i = 0; i < 20; ++i) text += "100,100," + std::to_string(20 * i) + ",50,0\n";
   const std::string file = directory.write("twice.csv", text);
-  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--motions", "3"}}) {
-    std::vector<std::string> words = asked(file, more);
+  for (const Words& more : {Words{}, {"--motions", "3"}}) {
+    Words words = asked(file, more);
     words.insert(words.end(), {"--json", directory / "out.json"});
     const ProgramOutput out = run(words);
     ASSERT_EQ(out.exit_code, 0) << out.error << out.output;
@@ -154,7 +145,7 @@ TEST(TwoViewCommand, repeatedAndContradictingMatchesAreCounted) {
 
 TEST(TwoViewCommand, badInputIsNamed) {
   const TemporaryDirectory directory;
-  const auto error = [&](const std::string& content, const std::vector<std::string>& more = {}) {
+  const auto error = [&](const std::string& content, const Words& more = {}) {
     const ProgramOutput out = run(asked(directory.write("m.csv", content), more));
     EXPECT_EQ(out.exit_code, 2) << content;
     return out.error;

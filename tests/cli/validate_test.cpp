@@ -27,7 +27,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -35,6 +34,7 @@
 #include <vector>
 
 #include <report/run_program.hpp>
+#include <cli/words.hpp>
 #include <support/temporary_directory.hpp>
 
 namespace liestat::cli {
@@ -42,14 +42,6 @@ using namespace experiments;
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Words = std::vector<std::string>;
-
-Words wordsOf(const std::string& text) {
-  std::istringstream stream(text);
-  Words words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
 
 /// The names of the fields of a described type, without those of nested ones.
 template <class T>
@@ -143,12 +135,9 @@ struct ValidationRun {
   Json json;
 
   explicit ValidationRun(const std::string& command, const Words& before = {}) {
-    Words words{"sh", "-c", "\"$@\" > out.txt", "sh"};
-    words.insert(words.end(), before.begin(), before.end());
-    words.insert(words.end(), {LIESTAT_PROGRAM, "validate"});
-    for (const std::string& word : wordsOf(command)) words.push_back(word);
-    words.insert(words.end(), {"--json", "out.json", "--report", "page"});
-    result = runProgram(words, directory.path().string());
+    const Words shell{"sh", "-c", "\"$@\" > out.txt", "sh"}, program{LIESTAT_PROGRAM, "validate"};
+    result = runProgram(shell + before + program + wordsOf(command + " --json out.json --report page"),
+                        directory.path().string());
     text = contentOf(directory / "out.txt");
     if (!std::filesystem::exists(directory.path() / "out.json")) return;
     json = Json::parse(contentOf(directory / "out.json"));
@@ -250,9 +239,8 @@ TEST(Validate, AnInterruptLeavesWhatWasComputed) {
 TEST(Validate, RefusesWhatItDoesNotKnow) {
   for (const Subject& subject : subjects()) {
     for (const std::string& options : subject.refused) {
-      Words words{LIESTAT_PROGRAM, "validate", wordsOf(subject.command)[0]};
-      for (const std::string& word : wordsOf(options)) words.push_back(word);
-      const ProgramResult result = runProgram(words, ".");
+      const Words words{LIESTAT_PROGRAM, "validate", wordsOf(subject.command)[0]};
+      const ProgramResult result = runProgram(words + wordsOf(options), ".");
       EXPECT_EQ(result.status, 2) << subject.command << ": " << options;
       EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
     }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <cli/words.hpp>
 #include <report/run_program.hpp>
 #include <support/temporary_directory.hpp>
 
@@ -24,28 +25,24 @@ struct Outcome {
   Json json;
 };
 
-Outcome run(const TemporaryDirectory& directory, const std::vector<std::string>& options) {
-  std::vector<std::string> arguments{LIESTAT_PROGRAM};
-  arguments.insert(arguments.end(), options.begin(), options.end());
-  const ProgramResult result = runProgram(arguments, directory.path().string());
+Outcome run(const TemporaryDirectory& directory, const Words& options) {
+  const ProgramResult result = runProgram(Words{LIESTAT_PROGRAM} + options, directory.path().string());
   EXPECT_TRUE(result.found) << result.errors;
   return {result.status, result.errors, nullptr};
 }
 
-void simulate(const TemporaryDirectory& directory, std::vector<std::string> options) {
-  options.insert(options.begin(), {"simulate", "vi", "--output", "r"});
-  const Outcome outcome = run(directory, options);
+void simulate(const TemporaryDirectory& directory, Words options) {
+  const Outcome outcome = run(directory, Words{"simulate", "vi", "--output", "r"} + options);
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
 }
 
 /// On the files of simulate.
-Outcome initialise(const TemporaryDirectory& directory, const std::vector<std::string>& more = {}) {
-  std::vector<std::string> options{
-      "vi-init",      "--imu",         "r/imu.csv",          "--tracks", "r/tracks.csv", "--image-times",
-      "r/images.csv", "--calibration", "r/calibration.yaml", "--json",   "out.json"};
-  options.insert(options.end(), more.begin(), more.end());
+Outcome initialise(const TemporaryDirectory& directory, const Words& more = {}) {
   std::filesystem::remove(directory / "out.json");
-  Outcome outcome = run(directory, options);
+  const Words files = wordsOf(
+      "vi-init --imu r/imu.csv --tracks r/tracks.csv --image-times r/images.csv --calibration r/calibration.yaml "
+      "--json out.json");
+  Outcome outcome = run(directory, files + more);
   if (std::filesystem::exists(directory / "out.json")) outcome.json = Json::parse(contentOf(directory / "out.json"));
   return outcome;
 }
@@ -154,7 +151,7 @@ TEST(ViInit, SlidesItsWindows) {
 TEST(ViInit, WhatCannotBeUsedIsSaid) {
   const TemporaryDirectory directory;
   simulate(directory, {"--end", "5"});
-  const auto message = [&](const std::vector<std::string>& more) {
+  const auto message = [&](const Words& more) {
     const Outcome outcome = initialise(directory, more);
     EXPECT_EQ(outcome.status, 2) << outcome.errors;
     EXPECT_TRUE(outcome.json.is_null());
@@ -169,13 +166,11 @@ TEST(ViInit, WhatCannotBeUsedIsSaid) {
   directory.write("later.csv", "frame,t_s\n0,1000\n1,1000.1\n2,1000.2\n");
   directory.write("few.csv", "frame,track,u,v\n0,1,300,200\n1,1,301,200\n2,1,302,200\n2,2,302,210\n");
   directory.write("i.csv", "t,wx,wy,wz,ax,ay,az\n0,0,0,0,0,0,9.8\n1,0,0,0,0,0,9.8\n2,0,0,0,0,0,9.8\n");
-  const auto on = [&](const std::vector<std::string>& options) {
-    std::vector<std::string> all{"vi-init", "--imu", "i.csv", "--tracks", "few.csv"};
-    all.insert(all.end(), options.begin(), options.end());
-    return run(directory, all);
+  const auto on = [&](const Words& options) {
+    return run(directory, Words{"vi-init", "--imu", "i.csv", "--tracks", "few.csv"} + options);
   };
-  const std::vector<std::string> camera{"--intrinsics", "450,450,320,240", "--noise", "1e-4,1e-3"};
-  auto with = [&](std::vector<std::string> options) {
+  const Words camera{"--intrinsics", "450,450,320,240", "--noise", "1e-4,1e-3"};
+  auto with = [&](Words options) {
     options.insert(options.end(), camera.begin(), camera.end());
     return on(options);
   };

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -74,6 +75,26 @@ Plot everyStyle() {
   const Panel empty{.title = "Empty",
                     .series = {Series{.name = "nothing", .x = {nan}, .y = {1}}, Series{.name = "none"}}};
   return {.name = "every style", .caption = "One of each.", .panels = {left, middle, right, empty}};
+}
+
+TEST(Columns, DescribeTheTerminalAndThePage) {
+  struct Row {
+    std::string word;
+    double x;
+    std::optional<int> n;
+    double twice() const { return 2 * x; }
+  };
+  const Columns<Row> columns{{"word", &Row::word},
+                             {"x", &Row::x, 2},
+                             {"twice", &Row::twice, fixed(1), ShownOn::page},
+                             {"n", &Row::n, ShownOn::terminal},
+                             {"sign", [](const Row& row) { return row.x < 0 ? "-" : ""; }}};
+  const BothTables tables = tablesOf(columns, std::vector<Row>{{"a", -1.234, {}}, {"b", nan, 3}});
+  using Cells = std::vector<std::string>;
+  EXPECT_EQ(tables.terminal.headers, (Cells{"word", "x", "n", "sign"}));
+  EXPECT_EQ(tables.terminal.rows, (std::vector<Cells>{{"a", "-1.2", "", "-"}, {"b", "n/a", "3", ""}}));
+  EXPECT_EQ(tables.page.headers, (Cells{"word", "x", "twice", "sign"}));
+  EXPECT_EQ(tables.page.rows, (std::vector<Cells>{{"a", "-1.2", "-2.5", "-"}, {"b", "n/a", "nan", ""}}));
 }
 
 TEST(Report, PageHoldsTextTablesAndPlots) {
