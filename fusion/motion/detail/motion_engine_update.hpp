@@ -1,0 +1,219 @@
+// MotionEngine: what a frame says of one hypothesis: robust weights, sums, the step.
+#pragma once
+
+#include <fusion/motion/detail/motion_engine.hpp>
+#include <lie/manifold.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace liestat::detail {
+
+/// Weights of a forward difference, which depend on the depth and the rotation.
+LIESTAT_FUSION_INLINE void MotionEngine::weighForward(const Eigen::Vector3d& V, Evaluation& e) {
+  const Eigen::Vector3d Omega = rotationSums<double>(rows_).solve(e.prior);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const double rho = flowResidual(points_[i], rows_[i], Omega).rho;
+    const double variance = forwardVariance(points_[i], rows_[i], rho, V, Omega);
+    if (variance > 0) rows_[i].weight = 1 / variance;
+  }
+}
+
+/// Sets the weights of outliers to zero: first a robust rotation, by reweighting (Huber 1981, then Geman and McClure),
+/// then a threshold, or a gate where the direction is known well enough to predict the error.
+LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate& c, Evaluation& e) {
+  const std::size_t n = points_.size();
+  RotationPrior<double> prior = e.prior;
+  if (keepsTheBias(state_)) prior.information = e.marginal;
+  if (keepsTheRotation(state_)) {
+    // Knowledge of the increment in the state, besides the gyroscope.
+    const Eigen::Matrix3d own = Cholesky<double, 3>(Eigen::Matrix3d(c.wide.gain.bottomRightCorner<3, 3>())).inverse();
+    const Eigen::Vector3d pull = prior.information * prior.mean;
+    prior.information += own;
+    prior.mean = Cholesky<double, 3>(prior.information).solve<1>(pull);
+  }
+  for (std::size_t i = 0; i < n; ++i) weights_[i] = rows_[i].weight;
+  const auto squared = [&](std::size_t i, const Eigen::Vector3d& Omega) {
+    const FlowRow<double>& row = rows_[i];
+    const double error = row.q - (row.h0 * Omega[0] + row.h1 * Omega[1] + row.h2 * Omega[2]);
+    return weights_[i] * error * error;
+  };
+  Eigen::Vector3d Omega = rotationSums<double>(rows_).solve(prior);
+  // With a gyroscope the rotation cannot give way: far from the truth all errors are large, and the smaller ones among
+  // them still show where to go. Errors then count in units of their median, 0.455 for χ² of one degree of freedom. (A
+  // free rotation fits the inliers at any direction, and this would only let outliers in.)
+  double scale = 1;
+  const auto rescale = [&] {
+    if (!frame_.has_gyroscope) return;
+    for (std::size_t i = 0; i < n; ++i) squared_[i] = squared(i, Omega);
+    const auto middle = squared_.begin() + static_cast<std::ptrdiff_t>(n / 2);
+    std::nth_element(squared_.begin(), middle, squared_.end());
+    scale = std::max(1.0, *middle / 0.455);
+  };
+  for (int pass = 0; pass < 12; ++pass) {
+    if (pass % 3 == 0) rescale();
+    for (std::size_t i = 0; i < n; ++i) {
+      const double z2 = squared(i, Omega) / scale, f = 1 / (1 + z2 / 9);
+      rows_[i].weight = weights_[i] * (pass < 6 ? 1 / std::max(1.0, std::sqrt(z2)) : f * f);
+    }
+    Omega = rotationSums<double>(rows_).solve(prior);
+  }
+  rescale();
+  const Eigen::Matrix2d known =
+      state_ == MotionState::direction ? c.narrow.reported : Eigen::Matrix2d(c.wide.reported.topLeftCorner<2, 2>());
+  const bool gate = candidates_.size() == 1 && updates_ >= options_.first_pruning && known.trace() < 0.01;
+  const double limit = options_.outlier_threshold * options_.outlier_threshold * scale;
+  for (std::size_t i = 0; i < n; ++i) rows_[i].weight = squared(i, Omega) <= limit ? weights_[i] : 0;
+  if (gate) {
+    // e² ≤ gate² (variance + G P Gᵀ + hᵀ M⁻¹ h), with M without the pair itself.
+    const FlowRotationSums<double> sums = rotationSums<double>(rows_);
+    const Cholesky<double, 3> ML(Eigen::Matrix3d(sums.M + prior.information));
+    const bool turns = keepsTheRotation(state_);
+    if (!turns) Omega = sums.solve(prior);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d h(rows_[i].h0, rows_[i].h1, rows_[i].h2);
+      const double variance = 1 / weights_[i], leverage = rows_[i].weight * h.dot(ML.solve<1>(h));
+      const FlowResidual<double> r = flowResidual(points_[i], rows_[i], turns ? Eigen::Vector3d::Zero().eval() : Omega);
+      const Eigen::RowVector2d G = -r.along * flowTurn(points_[i], rows_[i], e.basis);
+      double predicted = variance, error = r.e;
+      if (turns) {
+        Eigen::Matrix<double, 1, 5> g;
+        g << G, -h.transpose();
+        predicted += g.dot(g * c.wide.reported);
+      } else {
+        const double rest = std::max(1e-9, 1 - leverage);
+        error /= rest;
+        predicted += G.dot(G * known) + (rows_[i].weight > 0 ? leverage / rest * variance : h.dot(ML.solve<1>(h)));
+      }
+      rows_[i].weight = error * error <= options_.gate * options_.gate * predicted ? weights_[i] : 0;
+    }
+  }
+  if (keepsTheRotation(state_)) {
+    Omega.setZero();
+  } else {
+    Omega = rotationSums<double>(rows_).solve(prior);
+  }
+  e.capped_cost = 0, e.inliers = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    e.capped_cost += std::min(squared(i, Omega), 9.0);
+    e.inliers += rows_[i].weight > 0 ? 1U : 0U;
+  }
+}
+
+LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, Evaluation& e) {
+  const Eigen::Vector3d V = c.direction.unit_vector();
+  e.basis = ManifoldTraits<S2d>::placement(c.direction).matrix().leftCols<2>();
+  e.prior.information = e.marginal = frame_.information;
+  e.prior.mean.setZero();
+  e.base = SO3d();
+  int passes = 1;
+  const Eigen::Vector3d gyroscope = frame_.gyroscope - c.bias;
+  if (keepsTheRotation(state_)) {
+    e.base = c.rotation;
+    if (frame_.has_gyroscope) e.prior.mean = (SO3d::exp(gyroscope) * c.rotation.inverse()).log();
+  } else if (options_.flow == Flow::discrete) {
+    e.base = frame_.has_gyroscope ? SO3d::exp(gyroscope) : c.rotation;
+    if (!frame_.has_gyroscope) passes = updates_ == 0 ? 4 : 2;
+  } else if (frame_.has_gyroscope) {
+    e.prior.mean = gyroscope;
+  }
+  if (keepsTheBias(state_) && frame_.has_gyroscope) {
+    const Eigen::Matrix3d covariance = Cholesky<double, 3>(frame_.information).inverse();
+    e.marginal = Cholesky<double, 3>(Eigen::Matrix3d(covariance + c.biasCovariance(state_))).inverse();
+  }
+  for (int pass = 0; pass < passes; ++pass) {
+    if (turnedPerCandidate()) flowsAfter(e.base);
+    flowRows<double>(points_, V, rows_);
+    if (options_.flow == Flow::forward) weighForward(V, e);
+    e.inliers = points_.size();
+    if (options_.outliers) rejectOutliers(c, e);
+    const FlowRotationSums<double> sums = rotationSums<double>(rows_);
+    if (keepsTheRotation(state_)) {
+      e.Omega.setZero();
+    } else {
+      e.Omega = sums.solve({e.prior.mean, e.marginal});
+    }
+    if (!e.Omega.allFinite()) return false;
+    if (pass + 1 < passes) {
+      e.base = SO3d::exp(e.Omega) * e.base;
+      continue;
+    }
+    e.sums = subspaceSums<double>(points_, rows_, e.basis, e.Omega, sums.M);
+  }
+  return e.inliers >= std::min<std::size_t>(leastPairs(), 5) && std::isfinite(e.sums.cost);
+}
+
+/// Moves a hypothesis by what its frame says; false, and unchanged, where that is not finite.
+template <int D>
+bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, const Evaluation& e,
+                        const FrameInformation<double, D>& frame) {
+  FilterCovariance<double, D> next = P;
+  const FilterStep<double, D> s = updateCovariance(next, frame, options_.max_step, options_.second_derivatives);
+  if (!s.step.allFinite() || !next.reported.allFinite()) return false;
+  boundDirection(next);
+  const S2d moved = exp(c.direction, Eigen::Vector2d(s.step.template head<2>()));
+  const Eigen::Matrix2d T = frameTransport(c.direction, moved);
+  turnDirection<D>(next.gain, T), turnDirection<D>(next.reported, T);
+  P = next;
+  c.direction = moved;
+  const int equations = static_cast<int>(e.inliers) - (keepsTheRotation(state_) || frame_.has_gyroscope ? 0 : 3);
+  c.innovation = (frame.start - s.reduction) / std::max(equations, 1);
+  c.cost = frame.cost;
+  c.inliers = e.inliers;
+  const double cost = options_.outliers ? e.capped_cost : frame.cost;
+  c.score += cost;
+  c.costs[updates_ % DirectionCandidate::remembered] = cost;
+
+  const Cholesky<double, 3> ML(Eigen::Matrix3d(e.sums.M + e.marginal));
+  const Eigen::Vector3d lever = e.sums.depth_lever / e.sums.depth_weight;
+  c.depth = e.sums.meanInverseDepth();
+  if constexpr (D > 2) {
+    if (keepsTheRotation(state_)) {
+      const Eigen::Vector3d turn = s.step.template segment<3>(2);
+      c.rotation = SO3d::exp(turn) * c.rotation;
+      c.Omega = c.rotation.log();
+      c.rotation_covariance = P.reported.template block<3, 3>(2, 2);
+      c.depth -= lever.dot(turn);
+      c.depth_variance = 1 / e.sums.depth_weight + lever.dot(P.gain.template block<3, 3>(2, 2) * lever);
+      if constexpr (D == 8) {
+        c.bias += s.step.template tail<3>();
+        c.copyFromWhole();
+      }
+      return true;
+    }
+  }
+  c.depth_variance = e.sums.meanInverseDepthVariance(ML);
+  // The rotation at the new direction, to first order: δ = -ML⁻¹ (bo + Hox ξ + pull of the bias).
+  const Eigen::Vector2d xi = s.step.template head<2>();
+  Eigen::Vector3d right = e.sums.Hox * xi;
+  if constexpr (D == 5) {
+    const Eigen::Vector3d bias = s.step.template tail<3>();
+    c.bias += bias;
+  }
+  const Eigen::Vector3d delta = -ML.solve<1>(right);
+  const Eigen::Matrix<double, 3, 2> K = ML.solve<2>(e.sums.Hox);
+  c.rotation_covariance = ML.inverse() + K * Eigen::Matrix2d(P.reported.template topLeftCorner<2, 2>()) * K.transpose();
+  c.Omega = e.Omega + delta;
+  c.rotation = SO3d::exp(c.Omega) * e.base;
+  return true;
+}
+
+LIESTAT_FUSION_INLINE bool MotionEngine::advance(DirectionCandidate& c) {
+  Evaluation e;
+  if (!evaluate(c, e)) return false;
+  bool moved = false;
+  if (state_ == MotionState::direction) {
+    moved = step<2>(c, c.narrow, e, eliminateRotation(e.sums, e.Omega, e.prior));
+  } else if (state_ == MotionState::rotation) {
+    moved = step<5>(c, c.wide, e, keepRotation(e.sums, e.Omega, e.prior));
+  } else if (state_ == MotionState::rotation_and_bias) {
+    const Eigen::Matrix3d turn = SO3d::leftJacobian(Eigen::Vector3d(frame_.gyroscope - c.bias));
+    moved = step<8>(c, c.whole, e, keepRotationAndBias(e.sums, e.Omega, e.prior, turn, e.marginal));
+  } else {
+    moved = step<5>(c, c.wide, e, eliminateRotationWithBias(e.sums, e.Omega, e.prior, e.marginal));
+  }
+  if (moved) weighSign(c);
+  return moved;
+}
+
+}  // namespace liestat::detail
