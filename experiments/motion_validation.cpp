@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <memory>
@@ -374,7 +375,7 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
     row.method = method, row.scene = scene, row.promise = promiseOf(method, scene);
     cells.push_back(row);
   };
-  constexpr MotionWorld orbit = MotionWorld::orbit, general = MotionWorld::general;
+  using enum MotionWorld;
   const auto scene = [](MotionWorld world, double sigma) {
     MotionSceneOptions options;
     options.world = world, options.sigma = sigma;
@@ -391,25 +392,26 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
   };
   MotionSceneOptions fast = scene(orbit, 8);
   fast.rotation = 10;
-
-  for (const MotionWorld world : {orbit, general}) {
-    for (const double sigma : {1., 4., 8.}) add(M::subspace, scene(world, sigma));
-  }
-  add(M::subspace, fast);
-  for (const MotionWorld world : {orbit, general}) {
-    for (const double sigma : {1., 4.}) add(M::subspace, wrong(scene(world, sigma)));
-  }
-  for (const MotionWorld world : {MotionWorld::plane, MotionWorld::narrow, MotionWorld::turning}) {
-    for (const double sigma : {1., 4.}) add(M::subspace, scene(world, sigma));
-  }
-  for (const M method : {M::single_start, M::forward, M::discrete}) {
-    for (const MotionWorld world : {orbit, general}) {
-      for (const double sigma : {1., 4., 8.}) add(method, scene(world, sigma));
+  // Methods, and of each the worlds with the noises.
+  const auto over = [&](std::initializer_list<M> of, std::initializer_list<MotionWorld> worlds,
+                        std::initializer_list<double> sigmas, const auto& make) {
+    for (const M method : of) {
+      for (const MotionWorld world : worlds) {
+        for (const double sigma : sigmas) add(method, make(world, sigma));
+      }
     }
-  }
-  for (const double sigma : {1., 8.}) add(M::gauss_newton, scene(orbit, sigma));
+  };
+  const auto usual = [&](MotionWorld world, double sigma) { return inertial(world, sigma); };
+  const auto biased = [&](MotionWorld world, double sigma) { return inertial(world, sigma, 0.1, 0.115); };
+
+  over({M::subspace}, {orbit, general}, {1, 4, 8}, scene);
+  add(M::subspace, fast);
+  over({M::subspace}, {orbit, general}, {1, 4}, [&](auto world, double sigma) { return wrong(scene(world, sigma)); });
+  over({M::subspace}, {plane, narrow, turning}, {1, 4}, scene);
+  over({M::single_start, M::forward, M::discrete}, {orbit, general}, {1, 4, 8}, scene);
+  over({M::gauss_newton}, {orbit}, {1, 8}, scene);
   add(M::gauss_newton, fast);
-  for (const MotionWorld world : {orbit, general}) add(M::released, scene(world, 1));
+  over({M::released}, {orbit, general}, {1}, scene);
   for (const double sigma : {12., 16.}) {
     for (const double rotation : {5., 10.}) {
       MotionSceneOptions options = scene(orbit, sigma);
@@ -417,14 +419,10 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
       add(M::near_start, options);
     }
   }
-  for (const MotionWorld world : {orbit, general}) add(M::search, scene(world, 4));
-  for (const M method : {M::essential, M::essential_near, M::composition, M::intervals}) {
-    for (const MotionWorld world : {orbit, general}) {
-      for (const double sigma : {1., 4., 8.}) add(method, scene(world, sigma));
-    }
-  }
-  for (const M method : {M::essential, M::composition}) add(method, scene(MotionWorld::turning, 1));
-  for (const MotionWorld world : {orbit, general}) add(M::intervals, scene(world, 10));
+  over({M::search}, {orbit, general}, {4}, scene);
+  over({M::essential, M::essential_near, M::composition, M::intervals}, {orbit, general}, {1, 4, 8}, scene);
+  over({M::essential, M::composition}, {turning}, {1}, scene);
+  over({M::intervals}, {orbit, general}, {10}, scene);
   for (const MotionWorld world : {orbit, general}) {
     for (const double sigma : {1., 4., 8.}) {
       for (const double gyroscope : {0.02, 0.1, 0.5}) add(M::gyroscope, inertial(world, sigma, gyroscope));
@@ -438,19 +436,11 @@ std::vector<MotionRow> motionCells(const std::vector<MotionMethod>& methods) {
       add(M::gyroscope, options);
     }
   }
-  for (const MotionWorld world : {MotionWorld::plane, MotionWorld::narrow, MotionWorld::turning}) {
-    for (const double sigma : {1., 4.}) add(M::gyroscope, inertial(world, sigma));
-  }
-  add(M::gyroscope, inertial(orbit, 1, 0.1, 0.115));  // a bias that is not modelled
-  for (const MotionWorld world : {orbit, general}) {
-    for (const double sigma : {1., 4., 8.}) add(M::gyroscope_bias, inertial(world, sigma, 0.1, 0.115));
-  }
-  for (const MotionWorld world : {orbit, general}) {
-    for (const double sigma : {1., 4., 8.}) add(M::essential_bias, inertial(world, sigma, 0.1, 0.115));
-  }
-  for (const MotionWorld world : {orbit, general}) {
-    for (const double sigma : {1., 4.}) add(M::gyroscope_robust, wrong(inertial(world, sigma)));
-  }
+  over({M::gyroscope}, {plane, narrow, turning}, {1, 4}, usual);
+  add(M::gyroscope, biased(orbit, 1));  // a bias that is not modelled
+  over({M::gyroscope_bias, M::essential_bias}, {orbit, general}, {1, 4, 8}, biased);
+  over({M::gyroscope_robust}, {orbit, general}, {1, 4},
+       [&](auto world, double sigma) { return wrong(usual(world, sigma)); });
   return cells;
 }
 

@@ -22,7 +22,7 @@ struct Table1Entry {
   const char* paper;  ///< the paper's number of solutions
   /// Names of the cases of experiments/closed_form_cases.hpp that stand for it, each with the letters of the
   /// corrections that concern it.
-  std::vector<std::pair<const char*, const char*>> exact, noisy;
+  std::vector<std::pair<std::string, std::string>> exact, noisy;
 };
 const std::vector<Table1Entry>& table1Entries();
 

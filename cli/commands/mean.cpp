@@ -1,9 +1,12 @@
 #include <formats/input_error.hpp>
 #include <report/publish.hpp>
 #include <cli/commands/commands.hpp>
+#include <cli/commands/split.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
 #include <experiments/interruption.hpp>
+#include <stats/mean_notes.hpp>
+#include <stats/time_blocks.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -57,6 +60,24 @@ int runCommand(const Options& options, const Invocation& invocation) {
 }
 
 }  // namespace
+
+MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options) {
+  MeanAnalysis analysis = estimateMean(measurements, options);
+  analysis.notes = measurements.notes;
+  addMeanNotes(analysis, measurements.size());
+  return analysis;
+}
+
+void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, const AnalysisOptions& options) {
+  if (measurements.file.times.empty() || !analysis.hasCovariance()) return;
+  const auto by_blocks = [&](const SplitOptions& split) {
+    return splitMeasurements(measurements, {split, options.threads}).by_blocks;
+  };
+  setTimeBlocks(analysis,
+                compareTimeBlocks(measurements.size(), degreesOfFreedom(measurements.feature), measurements.known_noise,
+                                  by_blocks),
+                options.inflate);
+}
 
 void addMeanCommand(const CommandList& app) {
   auto options = std::make_shared<Options>();

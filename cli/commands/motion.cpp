@@ -5,7 +5,6 @@
 #include <formats/tracks.hpp>
 #include <report/json.hpp>
 #include <cli/show/motion.hpp>
-#include <cli/show/motion_report.hpp>
 #include <fusion/motion/sequence.hpp>
 #include <fusion/motion/study.hpp>
 

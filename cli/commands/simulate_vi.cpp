@@ -5,15 +5,18 @@
 #include <formats/output_file.hpp>
 #include <experiments/recording_files.hpp>
 #include <formats/text.hpp>
-#include <cli/show/simulated_recording.hpp>
+#include <report/json.hpp>
 #include <experiments/simulate_vi.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace liestat::cli {
 using namespace experiments;
@@ -132,6 +135,40 @@ void checkFinite(const Options& options) {
   if (!finite) throw OptionError(command_name, "an option is not a finite number", "finite ones");
 }
 
+/// The recording and the files it was written to, in lines for the terminal. `as_recorded`: the readings are not simulated.
+std::string describeRecording(const SimulatedRecording& recording, const ViSceneOptions& scene, bool as_recorded,
+                              const std::string& directory) {
+  std::string text;
+  const auto print = [&text](const std::string& line) { text += line + "\n"; };
+  const auto listed = [](const Eigen::Vector3d& v) {
+    return fmt::format("{:.4g}, {:.4g}, {:.4g}", v.x(), v.y(), v.z());
+  };
+  const double duration = recording.imu.back().time - recording.imu.front().time;
+  print(fmt::format("{:.4g} s: {} readings {}, {} images at {:g} Hz", duration, recording.imu.size(),
+                    as_recorded ? "as recorded" : "simulated", recording.image_times.size(), scene.image_rate));
+  std::vector<std::size_t> lengths;
+  std::size_t outliers = 0;
+  for (const SimulatedTrack& track : recording.tracks) {
+    if (track.images > 0) lengths.push_back(track.images);
+    outliers += track.outlier ? 1 : 0;
+  }
+  std::sort(lengths.begin(), lengths.end());
+  print(fmt::format("{} landmarks on a box of {:.4g} x {:.4g} x {:.4g} m", scene.landmarks, recording.box.x(),
+                    recording.box.y(), recording.box.z()));
+  print(fmt::format(
+      "{} tracks of {} images in the median, {:.3g} an image, {} that drift", lengths.size(),
+      lengths.empty() ? 0 : lengths[lengths.size() / 2],
+      static_cast<double>(recording.observations.size()) / static_cast<double>(recording.image_times.size()),
+      outliers));
+  const ImuBias<double>& bias = recording.truth.front().bias;
+  print(
+      fmt::format("biases at the beginning {} rad/s and {} m/s^2", listed(bias.gyroscope), listed(bias.accelerometer)));
+  print("\n" + commandLine({"liestat", "vi-init", "--imu", directory + "/imu.csv", "--tracks",
+                            directory + "/tracks.csv", "--image-times", directory + "/images.csv", "--calibration",
+                            directory + "/calibration.yaml", "--truth", directory + "/truth.csv"}));
+  return text;
+}
+
 int runCommand(Options options) {
   checkFinite(options);
   options.scene.box = given(options.box);
@@ -145,7 +182,7 @@ int runCommand(Options options) {
   try {
     const SimulatedRecording recording = simulate(options, sensors);
     writeRecording(recording, options.output);
-    printLines(formatSimulatedRecording(recording, options.scene, !options.imu.empty(), options.output));
+    printLines(describeRecording(recording, options.scene, !options.imu.empty(), options.output));
   } catch (const ImpossibleMotion& complaint) {
     throw OptionError(command_name, complaint.found(), complaint.expected());
   }

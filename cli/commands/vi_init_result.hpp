@@ -40,8 +40,4 @@ void describe(V& v, const ViInitResult& r) {
   describe(v, static_cast<const ComparedRecording&>(r));
 }
 
-/// Throws an InputError in the command's name for the fault of a recording as a whole.
-void refuseFault(const VisualInertialResult& found, const VisualInertialRecording& measured, std::int64_t start_ns,
-                 const VisualInertialOptions& how, const char* command);
-
 }  // namespace liestat::cli

@@ -1,13 +1,17 @@
 #include <cli/show/mean.hpp>
 
+#include <formats/text.hpp>
+#include <report/table.hpp>
+#include <cli/show/units.hpp>
+#include <report/page.hpp>
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include <formats/text.hpp>
-#include <report/table.hpp>
-#include <cli/show/units.hpp>
+#include <limits>
+#include <numbers>
+#include <span>
 
 namespace liestat::cli {
 namespace {
@@ -108,17 +112,6 @@ std::string oneLine(const FeatureValue& value) {
   return text;
 }
 
-std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis) {
-  if (analysis.covariance.size() == 0) {
-    return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
-  }
-  const int k = degreesOfFreedom(measurements.feature);
-  const std::string law = analysis.fromResiduals() ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
-                                                   : fmt::format("chi-square with {} degrees of freedom", k);
-  return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
-                     analysis.fromResiduals() ? "the residuals" : "the measurements' own covariances", law);
-}
-
 std::string measurementsInWords(const std::string& source, const Measurements& measurements) {
   const FeatureInfo& feature = info(measurements.feature);
   std::string text = fmt::format("{}: {} {} ({})", sourceName(source), measurements.size(),
@@ -131,6 +124,18 @@ std::string measurementsInWords(const std::string& source, const Measurements& m
 }
 
 namespace {
+
+/// The origin of the covariance and how it is to be read, or the reason why there is none.
+std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis) {
+  if (analysis.covariance.size() == 0) {
+    return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
+  }
+  const int k = degreesOfFreedom(measurements.feature);
+  const std::string law = analysis.fromResiduals() ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
+                                                   : fmt::format("chi-square with {} degrees of freedom", k);
+  return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
+                     analysis.fromResiduals() ? "the residuals" : "the measurements' own covariances", law);
+}
 
 /// As many decimals as the standard deviation of the rotation leaves, nine at least.
 int quaternionDecimals(Feature feature, const MeanAnalysis& analysis) {
@@ -181,6 +186,250 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   for (const std::string& note : analysis.notes) text += "note         " + note + "\n";
   if (!analysis.trusted()) text += "\n" + analysis.verdict().text + "\n";
   return text;
+}
+
+namespace {
+
+// The palette's colours by what they stand for.
+constexpr std::size_t mean_colour = 1, measurement_colour = 0, barycentre_colour = 2, rival_colour = 3,
+                      frontier_colour = 6;
+constexpr double ellipsoid_chi2 = 6, dispersion_chi2 = 5;
+
+constexpr double gap = std::numeric_limits<double>::quiet_NaN();
+
+/// Two coordinates of a chart.
+struct Plane {
+  int a = 0, b = 1;
+
+  Eigen::Vector2d of(const Eigen::VectorXd& v) const { return {v[a], v[b]}; }
+  Eigen::Matrix2d of(const Eigen::MatrixXd& m) const {
+    Eigen::Matrix2d block;
+    block << m(a, a), m(a, b), m(b, a), m(b, b);
+    return block;
+  }
+};
+
+Series scatter(std::string name, Style style, std::size_t colour, const Eigen::MatrixXd& data, Plane plane) {
+  Series series{.name = std::move(name), .style = style, .colour = colour};
+  for (Eigen::Index i = 0; i < data.cols(); ++i) {
+    series.add(data(plane.a, i), data(plane.b, i));
+  }
+  return series;
+}
+
+/// An upright or a diagonal cross, which shows on top of a cloud of discs; half as wide and high as the size.
+Series cross(std::string name, const Eigen::Vector2d& at, const Eigen::Vector2d& size, bool diagonal,
+             std::size_t colour) {
+  const Eigen::Vector2d s = diagonal ? Eigen::Vector2d(size / std::numbers::sqrt2) : size;
+  const Eigen::Vector2d u(s.x(), diagonal ? s.y() : 0), v(diagonal ? s.x() : 0, diagonal ? -s.y() : s.y());
+  return {.name = std::move(name),
+          .style = Style::lines,
+          .x = {at.x() - u.x(), at.x() + u.x(), gap, at.x() - v.x(), at.x() + v.x()},
+          .y = {at.y() - u.y(), at.y() + u.y(), gap, at.y() - v.y(), at.y() + v.y()},
+          .colour = colour};
+}
+
+Series coloured(Series series, std::size_t colour, bool dashed = false) {
+  series.colour = colour;
+  series.dashed = dashed;
+  return series;
+}
+
+/// One chart: measurements, mean and barycentre with their uncertainty, the dispersion.
+struct ChartPanel {
+  std::string title = {};
+  std::vector<std::string> labels;
+  const Eigen::MatrixXd& data;
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd mean_covariance, dispersion;
+  Eigen::VectorXd barycentre = {};
+  Eigen::MatrixXd barycentre_covariance = {};
+  double frontier = 0;          ///< radius, 0 for none
+  Eigen::MatrixXd rivals = {};  ///< columns; empty: the mean has none
+
+  const std::string& label(int i) const { return labels[static_cast<std::size_t>(i)]; }
+};
+
+Panel panelOf(const ChartPanel& chart, Plane plane) {
+  Panel panel{chart.title, {chart.label(plane.a)}, {chart.label(plane.b)}};
+  panel.equal_aspect = true;
+  Eigen::Vector2d size = Eigen::Vector2d::Constant(chart.frontier);  // half of what is seen
+  if (chart.frontier > 0) {
+    panel.x.low = panel.y.low = -1.05 * chart.frontier;
+    panel.x.high = panel.y.high = 1.05 * chart.frontier;
+    panel.series.push_back(
+        coloured(ellipse("", Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), chart.frontier * chart.frontier),
+                 frontier_colour));
+  } else {
+    // The data and the dispersion's ellipse fit; a square, unless the cloud is so flat that nothing would be seen.
+    Eigen::Vector2d low(chart.data.row(plane.a).minCoeff(), chart.data.row(plane.b).minCoeff());
+    Eigen::Vector2d high(chart.data.row(plane.a).maxCoeff(), chart.data.row(plane.b).maxCoeff());
+    const Eigen::Vector2d reach = (dispersion_chi2 * plane.of(chart.dispersion).diagonal()).cwiseSqrt();
+    low = low.cwiseMin(plane.of(chart.mean) - reach);
+    high = high.cwiseMax(plane.of(chart.mean) + reach);
+    for (Eigen::Index i = 0; i < chart.rivals.cols(); ++i) {
+      const Eigen::Vector2d rival = plane.of(Eigen::VectorXd(chart.rivals.col(i)));
+      low = low.cwiseMin(rival), high = high.cwiseMax(rival);
+    }
+    const Eigen::Vector2d middle = 0.5 * (low + high);
+    Eigen::Vector2d half = 0.525 * (high - low);
+    panel.equal_aspect = half.maxCoeff() < 4 * half.minCoeff();
+    if (panel.equal_aspect) half.setConstant(half.maxCoeff());
+    size = half;
+    if (half.minCoeff() > 0) {
+      panel.x.low = middle.x() - half.x(), panel.x.high = middle.x() + half.x();
+      panel.y.low = middle.y() - half.y(), panel.y.high = middle.y() + half.y();
+    }
+  }
+  panel.series.push_back(scatter("measurements", Style::points, measurement_colour, chart.data, plane));
+  if (chart.dispersion.size() > 0) {
+    panel.series.push_back(coloured(
+        ellipse("dispersion", plane.of(chart.mean), plane.of(chart.dispersion), dispersion_chi2), mean_colour, true));
+  }
+  if (chart.barycentre.size() > 0) {
+    if (chart.barycentre_covariance.size() > 0) {
+      panel.series.push_back(
+          coloured(ellipse("", plane.of(chart.barycentre), plane.of(chart.barycentre_covariance), ellipsoid_chi2),
+                   barycentre_colour));
+    }
+    panel.series.push_back(
+        cross("chart barycentre", plane.of(chart.barycentre), 0.035 * size, true, barycentre_colour));
+  }
+  if (chart.mean_covariance.size() > 0) {
+    panel.series.push_back(
+        coloured(ellipse("", plane.of(chart.mean), plane.of(chart.mean_covariance), ellipsoid_chi2), mean_colour));
+  }
+  if (chart.rivals.cols() > 0) {
+    panel.series.push_back(scatter("rivals of the mean", Style::stars, rival_colour, chart.rivals, plane));
+  }
+  panel.series.push_back(cross("mean", plane.of(chart.mean), 0.035 * size, false, mean_colour));
+  return panel;
+}
+
+Eigen::MatrixXd blockOf(const Eigen::MatrixXd& m, const TangentBlock& part) {
+  if (m.size() == 0) return {};
+  return m.block(part.begin, part.begin, part.size, part.size);
+}
+
+/// The largest distance of a rotation or direction from the origin, rad.
+double largestAngle(Feature feature) {
+  return feature == Feature::non_oriented_frame ? 2 * std::numbers::pi / 3 : std::numbers::pi;
+}
+
+/// The rows of the rivals' coordinates, if there are rivals.
+Eigen::MatrixXd rivalsOf(const Eigen::MatrixXd& rivals, const TangentBlock& part) {
+  if (rivals.cols() == 0) return {};
+  return rivals.middleRows(part.begin, part.size);
+}
+
+/// True if a cloud is large enough to be drawn with its space's frontier; a small one would become a dot.
+bool fillsItsSpace(const Eigen::MatrixXd& centred, const Eigen::MatrixXd& principal) {
+  const Eigen::VectorXd first = principal.col(0);
+  // In the principal chart even a small cloud may lie on both sides of the frontier.
+  return centred.colwise().norm().maxCoeff() > 0.8 || (principal.colwise() - first).colwise().norm().maxCoeff() > 3;
+}
+
+/// Figure 2 of Pennec 1998.
+void plotAngles(Report& report, const Measurements& measurements, const MeanAnalysis& analysis,
+                const TangentBlock& part) {
+  const ChartScatter& charts = *analysis.charts;
+  const Eigen::MatrixXd principal = charts.principal.middleRows(part.begin, part.size);
+  const Eigen::MatrixXd centred = charts.centred.middleRows(part.begin, part.size);
+  const bool direction = part.size == 2;
+  const std::vector<std::string> labels =
+      direction ? std::vector<std::string>{"first coordinate (rad)", "second coordinate (rad)"}
+                : std::vector<std::string>{"r_x (rad)", "r_y (rad)", "r_z (rad)"};
+  const Eigen::MatrixXd rivals_principal = rivalsOf(analysis.rivals_principal, part);
+  const Eigen::MatrixXd rivals_centred = rivalsOf(analysis.rivals_centred, part);
+  const bool far_rival = rivals_centred.cols() > 0 && rivals_centred.colwise().norm().maxCoeff() > 0.8;
+  const double frontier = far_rival || fillsItsSpace(centred, principal) ? largestAngle(measurements.feature) : 0;
+  ChartPanel left{.title = "Principal chart",
+                  .labels = labels,
+                  .data = principal,
+                  .mean = charts.mean.segment(part.begin, part.size),
+                  .mean_covariance = blockOf(charts.mean_covariance, part),
+                  .dispersion = blockOf(charts.dispersion, part),
+                  .barycentre = charts.barycentre.segment(part.begin, part.size),
+                  .barycentre_covariance = blockOf(charts.barycentre_covariance, part),
+                  .frontier = frontier,
+                  .rivals = rivals_principal};
+  ChartPanel right{.title = "Exponential chart about the mean",
+                   .labels = labels,
+                   .data = centred,
+                   .mean = Eigen::VectorXd::Zero(part.size),
+                   .mean_covariance = blockOf(analysis.covariance, part),
+                   .dispersion = blockOf(analysis.dispersion, part),
+                   .barycentre = charts.barycentre_centred.segment(part.begin, part.size),
+                   .barycentre_covariance = blockOf(charts.barycentre_covariance_centred, part),
+                   .frontier = frontier,
+                   .rivals = rivals_centred};
+  const std::string what = direction ? "directions" : "rotation vectors";
+  std::string caption = fmt::format(
+      "The {}{}: left about the origin, right about the mean. Crosses: the mean, and the plain mean of the coordinates "
+      "of the left chart, with their covariance ellipsoids at chi-square {:g}; dashed, the dispersion at {:g}.",
+      what, direction ? "" : " seen along the third axis", ellipsoid_chi2, dispersion_chi2);
+  if (rivals_centred.cols() > 0) {
+    caption += " Stars: other features that the measurements do not exclude, so that the mean is one of several.";
+  }
+  if (frontier > 0) caption += fmt::format(" The circle is where the charts end, at {:.4g} rad.", frontier);
+  report.plot({.name = "mean", .caption = caption, .panels = {panelOf(left, {0, 1}), panelOf(right, {0, 1})}});
+  if (!direction) {
+    report.plot({.name = "mean_other_coordinates",
+                 .caption = "The other coordinates in the chart about the mean.",
+                 .panels = {panelOf(right, {0, 2}), panelOf(right, {1, 2})}});
+  }
+}
+
+/// Points, or the translations of frames, in the coordinates of the file.
+void plotPositions(Report& report, const MeanAnalysis& analysis, const TangentBlock& part) {
+  const ChartScatter& charts = *analysis.charts;
+  const Eigen::MatrixXd data = charts.principal.middleRows(part.begin, part.size);
+  const ChartPanel chart{.labels = {"x (m)", "y (m)", "z (m)"},
+                         .data = data,
+                         .mean = charts.mean.segment(part.begin, part.size),
+                         .mean_covariance = blockOf(charts.mean_covariance, part),
+                         .dispersion = blockOf(charts.dispersion, part),
+                         .rivals = rivalsOf(analysis.rivals_principal, part)};
+  report.plot({.name = std::string(name(part.part)) + "s",
+               .caption = fmt::format("The {}s in the file's coordinates with their mean, its covariance ellipsoid at "
+                                      "chi-square {:g} and, dashed, the dispersion at {:g}.",
+                                      name(part.part), ellipsoid_chi2, dispersion_chi2),
+               .panels = {panelOf(chart, {0, 1}), panelOf(chart, {0, 2})}});
+}
+
+}  // namespace
+
+void writeMeanReport(const std::string& directory, const std::string& command_line, const std::string& source,
+                     const Measurements& measurements, const MeanAnalysis& analysis) {
+  Report report(directory, "Mean of the measurements in " + source);
+  report.verdict(analysis.verdict());
+  report.paragraph(measurementsInWords(source, measurements) + ".");
+  report.code(command_line);
+  const std::span<const TangentBlock> parts = info(measurements.feature).tangent;
+  if (analysis.charts) {
+    for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
+      if (isAngular(part->part)) {
+        plotAngles(report, measurements, analysis, *part);
+      } else {
+        plotPositions(report, analysis, *part);
+      }
+    }
+  }
+  report.section("Numbers");
+  report.table(meanRows(measurements, analysis));
+  report.section("All that the program said");
+  report.code(formatMean(source, measurements, analysis));
+  if (analysis.covariance.size() > 0) {
+    report.section("Covariance");
+    std::vector<std::vector<std::string>> matrix;
+    for (Eigen::Index i = 0; i < analysis.covariance.rows(); ++i) {
+      std::vector<std::string> row;
+      for (Eigen::Index j = 0; j < analysis.covariance.cols(); ++j) row.push_back(number(analysis.covariance(i, j), 6));
+      matrix.push_back(std::move(row));
+    }
+    report.table(std::vector<std::string>(matrix.size(), ""), matrix, covarianceInWords(measurements, analysis));
+  }
+  report.write();
 }
 
 }  // namespace liestat::cli

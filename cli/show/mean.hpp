@@ -18,9 +18,6 @@ std::string oneLine(const FeatureValue& value);
 /// deviation leaves, and below it standard deviations and dispersion, for translations along both kinds of axes.
 TableRows meanRows(const Measurements& measurements, const MeanAnalysis& analysis);
 
-/// The origin of the covariance and how it is to be read, or the reason why there is none.
-std::string covarianceInWords(const Measurements& measurements, const MeanAnalysis& analysis);
-
 /// The data and what the reader changed in them: "50 rotations …".
 std::string measurementsInWords(const std::string& source, const Measurements& measurements);
 

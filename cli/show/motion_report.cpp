@@ -1,4 +1,4 @@
-#include <cli/show/motion_report.hpp>
+#include <cli/show/motion.hpp>
 
 #include <report/page.hpp>
 #include <report/table.hpp>

@@ -51,20 +51,14 @@ std::string table1Text(const std::vector<Table1Row>& rows) {
   const auto& entries = table1Entries();
   for (std::size_t e = 0; e < entries.size(); ++e) {
     for (const bool noisy : {false, true}) {
-      Table table(noisy ? std::vector<std::string>{"with noise", "solutions", "recognised as", ""}
-                        : std::vector<std::string>{"exact", "null", "solutions", "recognised as", ""});
-      bool any = false;
-      for (const Table1Row& row : rows) {
-        if (row.entry != e || row.noisy != noisy) continue;
-        any = true;
-        if (noisy) {
-          table.row({label(row), solutions(row), statuses(row), verdict(row)});
-        } else {
-          table.row({label(row), null(row), solutions(row), statuses(row), verdict(row)});
-        }
-      }
+      const auto own = selected(rows, [&](const Table1Row& row) { return row.entry == e && row.noisy == noisy; });
+      Columns<Table1Row> columns{{noisy ? "with noise" : "exact", label},
+                                 {"solutions", solutions},
+                                 {"recognised as", statuses},
+                                 {"", verdict}};
+      if (!noisy) columns.insert(columns.begin() + 1, {"null", null});
       if (!noisy) text += fmt::format("\n{}\n", heading(entries[e]));
-      if (any) text += table.str(110);
+      if (!own.empty()) text += Table(tableOf(columns, own)).str(110);
     }
   }
   text += "\n";
@@ -79,16 +73,17 @@ void drawPage(Report& report, const std::vector<Table1Row>& rows) {
   const auto& entries = table1Entries();
   for (std::size_t e = 0; e < entries.size(); ++e) {
     report.section(heading(entries[e]));
-    std::vector<std::vector<std::string>> table;
-    for (const Table1Row& row : rows) {
-      if (row.entry != e) continue;
-      table.push_back({row.name, row.noisy ? "noise" : "exact", fmt::format("{}", row.images),
-                       fmt::format("{}", row.features), entries[e].paper, null(row), solutions(row), statuses(row),
-                       row.corrections, *row.passed ? "pass" : "FAIL"});
-    }
-    report.table(
-        {"case", "data", "n", "N", "paper", "null", "solutions: scenes", "recognised as", "corrections", "verdict"},
-        table);
+    const Columns<Table1Row> columns{{"case", &Table1Row::name},
+                                     {"data", [](const Table1Row& row) { return row.noisy ? "noise" : "exact"; }},
+                                     {"n", &Table1Row::images},
+                                     {"N", &Table1Row::features},
+                                     {"paper", [&](const Table1Row&) { return entries[e].paper; }},
+                                     {"null", null},
+                                     {"solutions: scenes", solutions},
+                                     {"recognised as", statuses},
+                                     {"corrections", &Table1Row::corrections},
+                                     {"verdict", [](const Table1Row& row) { return verdictCell(row.passed); }}};
+    report.table(tableOf(columns, selected(rows, [&](const Table1Row& row) { return row.entry == e; })));
   }
   report.section("Corrections");
   std::vector<std::vector<std::string>> list;

@@ -1,8 +1,10 @@
-#include <report/table.hpp>
-#include <cli/show/units.hpp>
 #include <cli/show/vi_init.hpp>
 
+#include <report/table.hpp>
+#include <cli/show/units.hpp>
 #include <stats/quantile.hpp>
+#include <lie/s2.hpp>
+#include <report/page.hpp>
 
 #include <fmt/format.h>
 
@@ -10,6 +12,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -194,6 +197,270 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
         "to have the same axes and origin\n";
   }
   return text;
+}
+
+namespace {
+
+constexpr double gap = std::numeric_limits<double>::quiet_NaN();
+// The palette's colours by what they stand for.
+constexpr std::size_t estimate_colour = 0, second_colour = 1, fused_colour = 2, truth_colour = 6;
+
+Series bars(std::string name, std::size_t colour) { return seriesOf(std::move(name), Style::errorbars, colour); }
+Series dots(std::string name, std::size_t colour) { return seriesOf(std::move(name), Style::points, colour); }
+Series line(std::string name, std::size_t colour, bool dashed = false) {
+  return seriesOf(std::move(name), Style::lines, colour, dashed);
+}
+
+/// The rotation that makes gravity point along -z, heading left as it is.
+SO3d levelling(const Eigen::Vector3d& gravity) {
+  return ManifoldTraits<S2d>::placement(S2d(Eigen::Vector3d(-gravity))).inverse();
+}
+
+/// Windows as curves: at the truth's pose of their first image where that is known, else levelled, from the origin.
+Panel trajectoryPanel(const ViRecording& recording, const ViInitResult& result, int horizontal, int vertical) {
+  const char* labels[] = {"x, m", "y, m", "z (upwards), m"};
+  Panel panel{vertical == 2 ? "from the side" : "from above", {labels[horizontal]}, {labels[vertical]}};
+  panel.equal_aspect = true;
+  Series truth = line("truth", truth_colour, true), found = line("windows", estimate_colour);
+  Series starts = dots("their first images", second_colour);
+  if (!result.windows.empty()) {
+    for (const GroundTruth& g : recording.truth) {
+      if (g.time < result.windows.front().begin || g.time > result.windows.back().end) continue;
+      truth.add(g.state.translation()[horizontal], g.state.translation()[vertical]);
+    }
+  }
+  for (const ComparedWindow& w : result.windows) {
+    if (!w.ok()) continue;
+    SO3d world_R_body;
+    Eigen::Vector3d start = Eigen::Vector3d::Zero();
+    if (const auto at = truthAt(recording.truth, w.begin)) {
+      world_R_body = at->state.so3();
+      start = at->state.translation();
+    } else if (recording.truth.empty()) {
+      world_R_body = levelling(w.best().gravity);
+    } else {
+      continue;
+    }
+    for (const SE23d& x : w.states()) {
+      const Eigen::Vector3d p = start + world_R_body * Eigen::Vector3d(x.translation());
+      found.add(p[horizontal], p[vertical]);
+    }
+    found.add(gap, gap);
+    starts.add(start[horizontal], start[vertical]);
+  }
+  panel.add({truth, found});
+  if (!recording.truth.empty()) panel.add({starts});
+  return panel;
+}
+
+/// The truth, ten times a second over the windows.
+template <class Value>
+Series truthLine(const ViRecording& recording, const ViInitResult& result, const Value& value) {
+  Series series = line("truth", truth_colour);
+  if (recording.truth.empty() || result.windows.empty()) return series;
+  const double end = result.windows.back().end;
+  double previous = 0;
+  for (double t = result.windows.front().begin; t <= end;
+       t += std::max(0.1, (end - result.windows.front().begin) / 2000)) {
+    const auto at = truthAt(recording.truth, t);
+    if (!at) continue;
+    const double y = value(*at);
+    // An angle that goes round is no stroke across the picture.
+    const bool round = !series.x.empty() && std::abs(y - previous) > 180;
+    series.add(t, round ? gap : y);
+    previous = y;
+  }
+  return series;
+}
+
+/// Roll or pitch at the first image of each window.
+Panel anglePanel(const ViRecording& recording, const ViInitResult& result, bool roll) {
+  const auto angle = [roll](const Eigen::Vector3d& gravity) {
+    ClosedFormSolution motion;
+    motion.gravity = gravity;
+    return degrees * (roll ? motion.roll() : motion.pitch());
+  };
+  Panel panel{.title = roll ? "roll" : "pitch", .x = {.label = "s"}, .y = {.label = "deg"}};
+  Series found = dots("windows", estimate_colour);
+  for (const ComparedWindow& w : result.windows) {
+    if (w.closedForm().solutions.empty()) continue;
+    found.add(w.begin, angle(w.best().gravity));
+  }
+  const Series truth = truthLine(recording, result, [&](const GroundTruth& g) {
+    return angle(SO3d(g.state.so3()).inverse() * Eigen::Vector3d(0, 0, -1));
+  });
+  panel.add({truth, found});
+  return panel;
+}
+
+/// The length of V at the first image of each window: the scale.
+Panel speedPanel(const ViRecording& recording, const ViInitResult& result) {
+  Panel panel{.title = "speed", .x = {.label = "s"}, .y = {.label = "m/s", .low = 0}};
+  Series found = bars("windows, two standard deviations", estimate_colour);
+  const Series truth = truthLine(recording, result, [](const GroundTruth& g) { return g.state.velocity().norm(); });
+  for (const ComparedWindow& w : result.windows) {
+    if (!w.isRefined()) continue;
+    const Eigen::Vector3d V = w.refined->velocity(), u = V.normalized();
+    found.addBar(w.begin, V.norm(),
+                 2 * std::sqrt(u.dot(w.refined->covariance.of<InitialCovariance::first_velocity>() * u)));
+  }
+  panel.add({truth, found});
+  return panel;
+}
+
+Panel scalePanel(const ViInitResult& result) {
+  Panel panel{"scale of the trajectory against the truth", {"s"}, {"%"}};
+  panel.references = {{.at = 0}};
+  Series closed = dots("closed form", second_colour), refined = dots("refined", estimate_colour);
+  for (const ComparedWindow& w : result.windows) {
+    if (w.closed_form_error && w.closedForm().status == FusionStatus::ok) {
+      closed.add(w.begin, 100 * w.closed_form_error->scale);
+    }
+    if (w.refined_error) refined.add(w.begin, 100 * w.refined_error->scale);
+  }
+  panel.series = {closed, refined};
+  return panel;
+}
+
+Panel gravityErrorPanel(const ViInitResult& result) {
+  Panel panel{.title = "gravity against the truth", .x = {.label = "s"}, .y = {.label = "deg", .low = 0}};
+  Series refined = dots("windows", estimate_colour), fused = dots("fused", fused_colour);
+  for (const ComparedWindow& w : result.windows) {
+    if (w.error()) refined.add(w.begin, degrees * w.error()->gravity);
+  }
+  for (const ComparedStretch& f : result.stretches) {
+    if (f.gravity_error) fused.add(f.end, degrees * *f.gravity_error);
+  }
+  panel.series = {refined, fused};
+  return panel;
+}
+
+Panel biasPanel(const ViRecording& recording, const ViInitResult& result, bool gyroscope, int axis) {
+  const char* axes[] = {"x", "y", "z"};
+  Panel panel{.title = fmt::format("{}'s bias, {}", gyroscope ? "gyroscope" : "accelerometer", axes[axis]),
+              .x = {.label = "s"},
+              .y = {.label = gyroscope ? "rad/s" : "m/s²"}};
+  Series found = bars("windows", estimate_colour), fused = bars("fused", fused_colour);
+  const auto of = [&](const ImuBias<double>& b) { return (gyroscope ? b.gyroscope : b.accelerometer)[axis]; };
+  const Series truth = truthLine(recording, result, [&](const GroundTruth& g) { return of(g.bias); });
+  for (const ComparedWindow& w : result.windows) {
+    if (!w.isRefined()) continue;
+    const int i = (gyroscope ? InitialCovariance::gyroscope_bias : InitialCovariance::accelerometer_bias) + axis;
+    found.addBar(w.begin, of(w.refined->bias), 2 * std::sqrt(w.refined->covariance.joint(i, i)));
+  }
+  for (const ComparedStretch& f : result.stretches) {
+    if (!f.has_state) continue;
+    fused.addBar(f.end, (gyroscope ? f.gyroscope_bias : f.accelerometer_bias)[axis],
+                 2 * (gyroscope ? f.gyroscope_sigma : f.accelerometer_sigma));
+  }
+  panel.add({truth, found, fused});
+  return panel;
+}
+
+/// Both solutions of a window as the body at the first image sees them, trajectory and features.
+Panel solutionsPanel(const ComparedWindow& w) {
+  const ClosedFormResult& closed = w.closedForm();
+  const double more = closed.solutions[1].cost - closed.solutions[0].cost;
+  Panel panel{.title = fmt::format("{:.1f} s: {}, chi2 {:.3g} more", w.begin, name(closed.status), more),
+              .x = {.label = "body's x, m"},
+              .y = {.label = "body's y, m"},
+              .equal_aspect = true};
+  const std::vector<BiasedImage> images = biasedImages(w.measured.motions(), w.measured.bias());
+  double reach = 0.1;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const ClosedFormSolution& s = closed.solutions[k];
+    const std::size_t colour = k == 0 ? estimate_colour : second_colour;
+    Series body = line(fmt::format("solution {}", k + 1), colour);
+    Series features{.style = Style::points, .colour = colour};
+    const auto add = [&reach](Series& series, const Eigen::Vector3d& p) {
+      series.add(p.x(), p.y());
+      reach = std::max({reach, std::abs(p.x()), std::abs(p.y())});
+    };
+    for (const BiasedImage& b : images) {
+      const double t = b.image.time;
+      add(body, t * s.velocity + (0.5 * t * t) * s.gravity + b.image.displacement +
+                    b.image.displacement_by_bias * s.accelerometer_bias);
+    }
+    for (const Eigen::Vector3d& P : s.features) {
+      if (P.allFinite()) add(features, P);
+    }
+    panel.series.push_back(features);
+    panel.series.push_back(body);
+  }
+  panel.x.low = panel.y.low = -1.05 * reach;
+  panel.x.high = panel.y.high = 1.05 * reach;
+  return panel;
+}
+
+/// The windows of which two solutions are left come first; of the others those whose second is the nearest.
+void addSolutions(Report& report, const ViInitResult& result) {
+  constexpr std::size_t most = 4;
+  std::vector<const ComparedWindow*> windows;
+  std::size_t left = 0;
+  for (const ComparedWindow& w : result.windows) {
+    if (w.closedForm().solutions.size() < 2) continue;
+    windows.push_back(&w);
+    left += w.closedForm().status != FusionStatus::ok;
+  }
+  report.section("Two solutions");
+  if (windows.empty()) {
+    report.paragraph("No window has a second solution.");
+    return;
+  }
+  const auto rank = [](const ComparedWindow* w) {
+    const auto& s = w->closedForm().solutions;
+    return std::pair(w->closedForm().status == FusionStatus::ok, s[1].cost - s[0].cost);
+  };
+  std::stable_sort(windows.begin(), windows.end(),
+                   [&](const ComparedWindow* a, const ComparedWindow* b) { return rank(a) < rank(b); });
+  const std::size_t all = windows.size();
+  windows.resize(std::min(all, most));
+  std::vector<Panel> panels;
+  for (const ComparedWindow* w : windows) panels.push_back(solutionsPanel(*w));
+  report.plot(
+      {.name = "two_solutions",
+       .caption = fmt::format("Lines: the body; points: features. {} of {} windows have a second minimum, in {} "
+                              "of them the data leave both; else its chi2 is too large.",
+                              all, result.windows.size(), left),
+       .panels = panels,
+       .columns = 2});
+}
+
+}  // namespace
+
+void writeViInitReport(const std::string& directory, const std::string& command_line, const ViRecording& recording,
+                       const ViInitResult& result) {
+  const bool with_truth = !recording.truth.empty();
+  Report report(directory, "Visual-inertial initialisation");
+  report.verdict(result.verdict());
+  report.code(command_line);
+  report.code(viInitTable(recording, result));
+  report.section("Trajectory");
+  report.plot({.name = "trajectory",
+               .caption = with_truth
+                              ? "Each window from the truth's pose at its first image on: what departs from the "
+                                "truth is the window's own."
+                              : "Each window from its first image on, levelled by its gravity; headings are free.",
+               .panels = {trajectoryPanel(recording, result, 0, 1), trajectoryPanel(recording, result, 0, 2)}});
+  report.section("Gravity and scale");
+  std::vector<Panel> panels = {anglePanel(recording, result, true), anglePanel(recording, result, false),
+                               speedPanel(recording, result)};
+  if (with_truth) {
+    panels.push_back(gravityErrorPanel(result));
+    panels.push_back(scalePanel(result));
+  }
+  report.plot({.name = "gravity_and_scale",
+               .caption = "At the first image of each window; fused values at the end of their stretch.",
+               .panels = panels});
+  report.section("Biases");
+  panels.clear();
+  for (const bool gyroscope : {true, false}) {
+    for (int axis = 0; axis < 3; ++axis) panels.push_back(biasPanel(recording, result, gyroscope, axis));
+  }
+  report.plot(
+      {.name = "biases", .caption = "With two standard deviations on either side.", .panels = panels, .columns = 3});
+  addSolutions(report, result);
+  report.write();
 }
 
 }  // namespace liestat::cli

@@ -5,7 +5,6 @@
 #include <formats/tracks.hpp>
 #include <formats/imu.hpp>
 #include <experiments/recording_files.hpp>
-#include <cli/show/simulated_recording.hpp>
 #include <experiments/simulate_vi.hpp>
 
 #include <fusion/imu/preintegrate.hpp>
@@ -282,9 +281,12 @@ TEST(SimulateVi, TheProgramWritesTheSameBytesForTheSameSeed) {
   };
   const ProgramResult first = run({"--output", "a"});
   ASSERT_EQ(first.status, 0) << first.errors;
-  EXPECT_EQ(nextCommand("a dir"),
-            "liestat vi-init --imu 'a dir/imu.csv' --tracks 'a dir/tracks.csv' --image-times 'a dir/images.csv' "
-            "--calibration 'a dir/calibration.yaml' --truth 'a dir/truth.csv'");
+  const std::string shell = "\"$0\" simulate vi --end 3 --output 'a dir' > out.txt";
+  ASSERT_EQ(runProgram({"sh", "-c", shell, LIESTAT_PROGRAM}, directory.path().string()).status, 0);
+  EXPECT_TRUE(contentOf(directory / "out.txt")
+                  .ends_with("\n\nliestat vi-init --imu 'a dir/imu.csv' --tracks 'a dir/tracks.csv' --image-times "
+                             "'a dir/images.csv' --calibration 'a dir/calibration.yaml' --truth 'a dir/truth.csv'\n"))
+      << contentOf(directory / "out.txt");
   ASSERT_EQ(run({"--output", "b", "--seed", "1"}).status, 0);
   ASSERT_EQ(run({"--output", "c", "--seed", "2"}).status, 0);
   for (const std::string& name : file_names) {

@@ -21,13 +21,11 @@ TEST(Table1, hasEveryCaseOnce) {
   for (const Table1Correction& c : table1Corrections()) letters.insert(c.letter);
   std::set<char> used;
   for (const Table1Entry& entry : table1Entries()) {
-    for (const auto& [case_name, corrections] : entry.exact) {
-      exact.insert(case_name);
-      for (const char letter : std::string(corrections)) used.insert(letter);
-    }
-    for (const auto& [case_name, corrections] : entry.noisy) {
-      noisy.insert(case_name);
-      for (const char letter : std::string(corrections)) used.insert(letter);
+    for (const bool with_noise : {false, true}) {
+      for (const auto& [case_name, corrections] : with_noise ? entry.noisy : entry.exact) {
+        (with_noise ? noisy : exact).insert(case_name);
+        used.insert(corrections.begin(), corrections.end());
+      }
     }
   }
   EXPECT_EQ(used, letters);
