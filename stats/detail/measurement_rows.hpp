@@ -53,9 +53,9 @@ struct MeasurementRows {
     for (int p = 0; p < P; ++p) observed[p] = dot(by_measurement + p * K, at, K) - values[p];
     const bool finite = allFinite(observed, number(P)) && allFinite(by_parameter, number(P * N));
     if (noise.free > 0) {
-      std::copy(by_parameter, by_parameter + P * N, free_C);
-      std::copy(by_measurement, by_measurement + P * K, free_D);
-      std::copy(observed, observed + P, free_r);
+      copyRow(by_parameter, P * N, free_C);
+      copyRow(by_measurement, P * K, free_D);
+      copyRow(observed, P, free_r);
       eliminateFree(noise);
       double *selected_C = work + 2 * P * P, *selected_D = selected_C + P * N, *selected_values = selected_D + P * K;
       multiply(selection, free_C, P, P, N, selected_C);
@@ -65,7 +65,9 @@ struct MeasurementRows {
       by_parameter = selected_C, by_measurement = selected_D, values = selected_values;
     }
     noise.spread(by_measurement, P, spread);
-    multiplyTransposed(by_measurement, spread, P, K, P, S, work);
+    for (int p = 0; p < P; ++p) {
+      for (int q = 0; q < P; ++q) S[p * P + q] = dot(by_measurement + p * K, spread + q * K, K);
+    }
     rank = reducedRoot(S, P, max_rank, root, order, work);
     solve(by_parameter, N, C);
     solve(observed, 1, r);
@@ -74,7 +76,7 @@ struct MeasurementRows {
     if (G) solve(spread, K, G);
     return finite;
   }
-  static constexpr int scratchSize(int N, int P, int K) { return P * (3 * P + 3 * K + N + 2); }
+  static constexpr int scratchSize(int N, int P, int K) { return P * (3 * P + 2 * K + N + 2); }
   /// L⁻¹ B.
   void solve(const double* B, int cols, double* X) const { halfSolve(root, order, rank, P, B, cols, X); }
 
@@ -102,7 +104,7 @@ struct MeasurementRows {
           addScaled(recovery + a * P, along, v, P);
         }
       } else if (dot(v, v, P) >= 0.5) {
-        std::copy(v, v + P, selection + P * row++);
+        copyRow(v, P, selection + P * row++);
       }
     }
   }
