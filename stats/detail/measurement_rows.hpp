@@ -21,13 +21,19 @@ struct NoiseRows {
   const double* free_basis = nullptr;
 
   /// D V, D of `rows` rows.
-  void spread(const double* D, int rows, double* result) const {
+  void spread(const double* __restrict D, int rows, double* __restrict result) const {
     const double* V = covariance;
-    for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
-      for (int k = 0; k < dimension; ++k) {
-        result[k] = form == NoiseForm::full ? dot(V + k * dimension, D, dimension)
-                                            : V[form == NoiseForm::isotropic ? 0 : k] * D[k];
-      }
+    switch (form) {
+      case NoiseForm::isotropic:
+        for (int i = 0; i < rows * dimension; ++i) result[i] = V[0] * D[i];
+        return;
+      case NoiseForm::diagonal:
+        for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
+          for (int k = 0; k < dimension; ++k) result[k] = V[k] * D[k];
+        }
+        return;
+      default:
+        return multiply(D, V, rows, dimension, dimension, result);
     }
   }
 };
