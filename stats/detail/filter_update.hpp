@@ -35,7 +35,7 @@ inline bool moveState(const FilterState& state, const double* step, double* by_s
 inline void setDerivative(const FilterState& state, const double* by_step, bool moved, double* J) {
   const int N = state.dimension;
   if (moved && !state.is_vector) {
-    std::copy(by_step, by_step + N * N, J);
+    copyRow(by_step, N * N, J);
     return;
   }
   std::fill(J, J + N * N, 0.);
@@ -44,7 +44,7 @@ inline void setDerivative(const FilterState& state, const double* by_step, bool 
 /// M × J in the place of M, n×m.
 inline void multiplyInPlace(double* M, const double* J, int n, int m, double* scratch) {
   multiply(M, J, n, m, m, scratch);
-  std::copy(scratch, scratch + n * m, M);
+  copyRow(scratch, n * m, M);
 }
 
 /// Equations at exp(x, v) and exp(y, w), with derivatives by v and w: values, P×N and P×K.
@@ -136,18 +136,19 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateDense(const FilterState& state, co
     for (int p = 0; p < P; ++p) r[p] = at.h[p] - dot(at.C + p * N, v, N) - dot(at.D + p * K, w, K);
     multiply(at.C, prior, P, N, N, CP);
     noise.spread(at.D, P, RD);
-    multiplyTransposed(at.C, CP, P, N, P, S, work);
-    multiplyTransposed<true>(at.D, RD, P, K, P, S, work);
-    if (!allFinite(r, number(P)) || !allFinite(S, number(P * P)) || !allFinite(CP, number(P * N))) {
+    for (int p = 0; p < P; ++p) {
+      for (int q = 0; q < P; ++q) S[p * P + q] = dot(at.C + p * N, CP + q * N, N) + dot(at.D + p * K, RD + q * K, K);
+    }
+    if (!allFinite(r, number(P)) || !allFinite(S, number(P * P))) {
       if (first) return ended(FilterStatus::not_finite);
       break;
     }
-    std::copy(S, S + P * P, work);
+    copyRow(S, P * P, work);
     const int rank = reducedRoot(work, P, y.rank, root, order, work + P * P);
     halfSolve(root, order, rank, P, r, 1, whitened);
     if (first) {
-      std::copy(r, r + P, rows.innovation);
-      std::copy(S, S + P * P, rows.innovation_covariance);
+      copyRow(r, P, rows.innovation);
+      copyRow(S, P * P, rows.innovation_covariance);
       outcome.nis = dot(whitened, whitened, P);
       outcome.degrees_of_freedom = rank;
       if (rank < y.rank) outcome.inconsistency = inconsistency(root, order, rank, S, r, whitened, P, work);
@@ -156,16 +157,17 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateDense(const FilterState& state, co
       break;
     }
     halfSolveTransposed(root, order, rank, P, whitened, 1, multipliers);
-    std::fill(next, next + N, 0.), std::fill(w, w + K, 0.);
-    for (int p = 0; p < P; ++p) {
-      addScaled(next, -multipliers[p], CP + p * N, N);
-      addScaled(w, -multipliers[p], RD + p * K, K);
+    std::fill(next, next + N, 0.);
+    for (int p = 0; p < P; ++p) addScaled(next, -multipliers[p], CP + p * N, N);
+    if (passes > 1) {
+      std::fill(w, w + K, 0.);
+      for (int p = 0; p < P; ++p) addScaled(w, -multipliers[p], RD + p * K, K);
     }
     const double change = first ? 0 : changeInDeviations(next, v, prior, N);
-    std::copy(next, next + N, v);
+    copyRow(next, N, v);
     ++outcome.iterations;
     if (first) {
-      std::copy(v, v + N, rows.step);
+      copyRow(v, N, rows.step);
       if (!(outcome.nis <= gate)) {
         outcome.gated = 1;
         return ended(FilterStatus::gated);
@@ -173,18 +175,19 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateDense(const FilterState& state, co
     }
     const bool settled = !first && change <= options.tolerance;
     if (first || settled) {
-      // Joseph's form in the frame at the new state, to which J leads: (J - J L C) P (J - J L C)ᵀ + (J L D) R (J L D)ᵀ. Rows
-      // of `gain` are those of (J L)ᵀ; the sign of its part of the noise does not matter.
+      // Joseph's form in the frame at the new state, to which J leads: (J - J L C) P (J - J L C)ᵀ + (J L D) R (J L D)ᵀ. Of
+      // the gain J L the sign does not matter in the second term.
       moved = moveState(state, v, by_v);
+      setDerivative(state, by_v, moved, left);
       halfSolve(root, order, rank, P, CP, N, work);
       halfSolveTransposed(root, order, rank, P, work, N, gain);
-      setDerivative(state, by_v, moved, left);
-      if (moved && !state.is_vector) {
-        transpose(left, N, N, work);
-        multiplyInPlace(gain, work, P, N, work + N * N);
+      for (int p = 0; p < P; ++p) {
+        for (int i = 0; i < N; ++i) minus_gain[i * P + p] = -gain[p * N + i];
       }
-      transpose(gain, P, N, minus_gain);
-      for (int i = 0; i < N * P; ++i) minus_gain[i] = -minus_gain[i];
+      if (moved && !state.is_vector) {
+        multiply(left, minus_gain, N, N, P, work);
+        copyRow(work, N * P, minus_gain);
+      }
       multiplyBy<true>(minus_gain, at.C, N, P, N, left);
       multiply(minus_gain, at.D, N, P, K, by_noise);
       multiply(left, prior, N, N, N, work);
@@ -192,7 +195,7 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateDense(const FilterState& state, co
       noise.spread(by_noise, N, work);
       multiplyTransposed<true>(work, by_noise, N, K, N, rows.covariance, work + N * K);
       mirror(rows.covariance, N);
-      std::copy(v, v + N, rows.step);
+      copyRow(v, N, rows.step);
       outcome.moved = true;
     }
     if (settled) {
@@ -292,7 +295,7 @@ struct FilterBlock {
     size = norm(next, K);
     for (int k = 0; k < K; ++k) open[k] = next[k] - w[k];
     change = norm(open, K);
-    std::copy(next, next + K, w);
+    copyRow(next, K, w);
   }
 };
 
@@ -354,7 +357,7 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateSums(FilterSums& sums, const Impli
     outcome.status = status, outcome.moved = false;
     return outcome;
   };
-  std::copy(prior, prior + N * N, information);
+  copyRow(prior, N * N, information);
   if (!allFinite(prior, number(N * N))) return ended(FilterStatus::not_finite);
   if (!invert(information, N, prior_information)) return ended(FilterStatus::singular);
 
@@ -379,10 +382,10 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateSums(FilterSums& sums, const Impli
       if (first) return ended(allFinite(sums.A, number(N * N)) ? FilterStatus::singular : FilterStatus::not_finite);
       break;
     }
-    std::copy(sums.b, sums.b + N, next);
+    copyRow(sums.b, N, next);
     choleskySolve(information, N, next, 1);
     const double change = first ? 0 : changeInDeviations(next, sums.step, prior, N);
-    std::copy(next, next + N, sums.step);
+    copyRow(next, N, sums.step);
     ++outcome.iterations;
     const bool settled = !first && change <= options.tolerance;
     if (first || settled) {
@@ -393,9 +396,9 @@ LIESTAT_ESTIMATION_INLINE FilterOutcome updateSums(FilterSums& sums, const Impli
       choleskyHalfSolve(information, N, rows.covariance, N);
       transpose(rows.covariance, N, N, half);
       multiply(half, rows.covariance, N, N, N, information);
-      std::copy(information, information + N * N, rows.covariance);
+      copyRow(information, N * N, rows.covariance);
       mirror(rows.covariance, N);
-      std::copy(next, next + N, rows.step);
+      copyRow(next, N, rows.step);
       outcome.moved = true;
     }
     // Woodbury's identity: hᵀ (C P Cᵀ + R)⁻¹ h = hᵀ R⁻¹ h - bᵀ (P⁻¹ + A)⁻¹ b.

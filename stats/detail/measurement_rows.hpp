@@ -21,13 +21,19 @@ struct NoiseRows {
   const double* free_basis = nullptr;
 
   /// D V, D of `rows` rows.
-  void spread(const double* D, int rows, double* result) const {
+  void spread(const double* __restrict D, int rows, double* __restrict result) const {
     const double* V = covariance;
-    for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
-      for (int k = 0; k < dimension; ++k) {
-        result[k] = form == NoiseForm::full ? dot(V + k * dimension, D, dimension)
-                                            : V[form == NoiseForm::isotropic ? 0 : k] * D[k];
-      }
+    switch (form) {
+      case NoiseForm::isotropic:
+        for (int i = 0; i < rows * dimension; ++i) result[i] = V[0] * D[i];
+        return;
+      case NoiseForm::diagonal:
+        for (int p = 0; p < rows; ++p, D += dimension, result += dimension) {
+          for (int k = 0; k < dimension; ++k) result[k] = V[k] * D[k];
+        }
+        return;
+      default:
+        return multiply(D, V, rows, dimension, dimension, result);
     }
   }
 };
@@ -53,9 +59,9 @@ struct MeasurementRows {
     for (int p = 0; p < P; ++p) observed[p] = dot(by_measurement + p * K, at, K) - values[p];
     const bool finite = allFinite(observed, number(P)) && allFinite(by_parameter, number(P * N));
     if (noise.free > 0) {
-      std::copy(by_parameter, by_parameter + P * N, free_C);
-      std::copy(by_measurement, by_measurement + P * K, free_D);
-      std::copy(observed, observed + P, free_r);
+      copyRow(by_parameter, P * N, free_C);
+      copyRow(by_measurement, P * K, free_D);
+      copyRow(observed, P, free_r);
       eliminateFree(noise);
       double *selected_C = work + 2 * P * P, *selected_D = selected_C + P * N, *selected_values = selected_D + P * K;
       multiply(selection, free_C, P, P, N, selected_C);
@@ -65,7 +71,9 @@ struct MeasurementRows {
       by_parameter = selected_C, by_measurement = selected_D, values = selected_values;
     }
     noise.spread(by_measurement, P, spread);
-    multiplyTransposed(by_measurement, spread, P, K, P, S, work);
+    for (int p = 0; p < P; ++p) {
+      for (int q = 0; q < P; ++q) S[p * P + q] = dot(by_measurement + p * K, spread + q * K, K);
+    }
     rank = reducedRoot(S, P, max_rank, root, order, work);
     solve(by_parameter, N, C);
     solve(observed, 1, r);
@@ -74,7 +82,7 @@ struct MeasurementRows {
     if (G) solve(spread, K, G);
     return finite;
   }
-  static constexpr int scratchSize(int N, int P, int K) { return P * (3 * P + 3 * K + N + 2); }
+  static constexpr int scratchSize(int N, int P, int K) { return P * (3 * P + 2 * K + N + 2); }
   /// L⁻¹ B.
   void solve(const double* B, int cols, double* X) const { halfSolve(root, order, rank, P, B, cols, X); }
 
@@ -102,7 +110,7 @@ struct MeasurementRows {
           addScaled(recovery + a * P, along, v, P);
         }
       } else if (dot(v, v, P) >= 0.5) {
-        std::copy(v, v + P, selection + P * row++);
+        copyRow(v, P, selection + P * row++);
       }
     }
   }

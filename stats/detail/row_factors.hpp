@@ -17,6 +17,9 @@ inline double dot(const double* a, const double* b, int n) {
 inline void addScaled(double* __restrict sum, double factor, const double* __restrict a, int n) {
   for (int i = 0; i < n; ++i) sum[i] += factor * a[i];
 }
+inline void copyRow(const double* __restrict a, int n, double* __restrict to) {
+  for (int i = 0; i < n; ++i) to[i] = a[i];
+}
 inline double norm(const double* a, int n) { return std::sqrt(dot(a, a, n)); }
 inline bool allFinite(const double* a, std::size_t n) {
   double zero = 0;  // NaN where one of them is not finite
@@ -100,7 +103,7 @@ inline int reducedRoot(double* S, int P, int max_rank, double* kept, int* order,
     }
     if (best < 0) break;
     const double inverse = 1 / std::sqrt(largest);
-    std::copy(half + best * P, half + best * P + rank, kept + rank * P);
+    copyRow(half + best * P, rank, kept + rank * P);
     kept[rank * P + rank] = inverse;
     order[rank] = best, bound[best] = kept_row;
     if (++rank == max_rank) break;
@@ -120,7 +123,7 @@ inline void halfSolve(const double* kept, const int* order, int rank, int P, con
       for (int c = 0; c < cols; ++c) x[c] = row[c] * inverse;
       continue;
     }
-    std::copy(row, row + cols, x);
+    copyRow(row, cols, x);
     for (int l = 0; l < k; ++l) addScaled(x, -kept[l], X + l * cols, cols);
     for (int c = 0; c < cols; ++c) x[c] *= inverse;
   }
