@@ -102,5 +102,5 @@ LIESTAT_TRAJECTORIES_API ConventionReading readInConvention(std::span<const Diag
 }  // namespace liestat
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <fusion/trajectories/detail/diagnose_conventions.hpp>
+#include <fusion/trajectories/detail/diagnose_runs.hpp>
 #endif

@@ -3,5 +3,5 @@
 #define LIESTAT_COMPILED_TRAJECTORIES
 #endif
 
-#include <fusion/trajectories/detail/diagnose_conventions.hpp>
+#include <fusion/trajectories/detail/diagnose_runs.hpp>
 #include <fusion/trajectories/detail/diagnosis_words.hpp>
