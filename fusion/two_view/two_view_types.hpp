@@ -92,6 +92,10 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
+  /// The fundamental matrix is known, but not the focal lengths: the optical axes meet, or noise decides.
+  bool focalLengthsOpen() const {
+    return physical.empty() && matrix_covariance.rows() == 9 && !lattice.empty() && chosenModel().name == "fundamental";
+  }
   /// Verdict on the estimate: to be trusted if the status is ok, else not.
   Verdict verdict() const;
 };

@@ -263,7 +263,7 @@ TEST(HandEye, InvariantUnderFramesUnitsAndExchange) {
 TEST(HandEye, DirectionsThatMotionsLeaveOpen) {
   for (const bool motions : {false, true}) {
     for (const HandEyeMotion motion : experiments::all_hand_eye_motions) {
-      const std::string what = experiments::name(motion) + (motions ? " AX = XB" : " AX = YB");
+      const std::string what = std::string(name(motion)) + (motions ? " AX = XB" : " AX = YB");
       for (std::uint64_t trial = 0; trial < 5; ++trial) {
         const HandEyeScene scene({.motion = motion, .pairs = 12, .relative = motions}, 6, trial);
         const HandEyeResult r = motions ? estimateHandEye(scene.pairs) : estimateRobotWorld(scene.pairs);

@@ -119,6 +119,7 @@ TEST_P(EachMotion, parametersLieWhereTheirCovarianceSays) {
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < scene.inlier.size(); ++i) wrong += scene.inlier[i] != found.inlier[i];
     EXPECT_LE(wrong, 12U);
+    EXPECT_EQ(found.focalLengthsOpen(), motion == TwoViewMotion::fundamental && found.physical.empty());
     if (motion == TwoViewMotion::none) {
       EXPECT_TRUE(found.physical.empty());
       ++counted;
