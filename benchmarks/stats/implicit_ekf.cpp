@@ -93,9 +93,8 @@ int print() {
   for (int j = 0; j < 4; ++j) H.col(j) = random.normal<2>();
   std::vector<Eigen::Vector2d> points;
   for (int i = 0; i < 50; ++i) points.push_back(random.normal<2>(0.1));
-  rows(
-      "R4, R2, 2 equations", Gaussian<Eigen::Vector4d>{Eigen::Vector4d::Zero(), random.covariance<4>(0.1)}, points,
-      [&](std::size_t) { return Observes{H}; });
+  rows("R4, R2, 2 equations", Gaussian<Eigen::Vector4d>{Eigen::Vector4d::Zero(), random.covariance<4>(0.1)}, points,
+       [&](std::size_t) { return Observes{H}; });
 
   const SO3d R = random.feature<SO3d>();
   std::vector<Eigen::Matrix<double, 6, 1>> pairs(50);
@@ -104,10 +103,8 @@ int print() {
     pair << a, R * a;
     pair += random.normal<6>(sigma);
   }
-  rows(
-      "SO3, R6, 3 equations",
-      Gaussian<SO3d>{exp(R, random.normal<3>(0.05)), 0.0025 * Eigen::Matrix3d::Identity()}, pairs,
-      [](std::size_t) { return Rotates{}; });
+  rows("SO3, R6, 3 equations", Gaussian<SO3d>{exp(R, random.normal<3>(0.05)), 0.0025 * Eigen::Matrix3d::Identity()},
+       pairs, [](std::size_t) { return Rotates{}; });
 
   const SE3d world_T_body = random.feature<SE3d>();
   std::vector<Eigen::Vector3d> seen, landmarks;

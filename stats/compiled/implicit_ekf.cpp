@@ -3,4 +3,5 @@
 #define LIESTAT_COMPILED_ESTIMATION
 #endif
 
-#include <stats/detail/filter_update.hpp>
+#include <stats/detail/filter_dense.hpp>
+#include <stats/detail/filter_sums.hpp>

@@ -1,7 +1,8 @@
-// How constrained estimation is compiled. Its headers hold templates over parameter, measurements and equations; the core
-// behind them, which is none, is compiled once by the CMake target liestat::estimation, or by a project that compiles
-// the sources of that target itself and defines LIESTAT_COMPILED_ESTIMATION for all of its units, as the target does. With
-// LIESTAT_HEADER_ONLY defined for all units the headers include the core and nothing is linked.
+// How constrained estimation and the implicit filter are compiled. Their headers hold templates over parameter,
+// measurements and equations; the cores behind them, which are none, are compiled once by the CMake target
+// liestat::estimation, or by a project that compiles the sources of that target itself and defines
+// LIESTAT_COMPILED_ESTIMATION for all of its units, as the target does. With LIESTAT_HEADER_ONLY defined for all units the
+// headers include the cores and nothing is linked.
 //
 // A unit with neither may include the headers and use the types. A call of an estimator is an error at compile time that
 // names the target and the macro, rather than an undefined symbol.

@@ -2,7 +2,8 @@
 // on an exact penalty function, the result. Definitions of stats/detail/constrained_core.hpp.
 #pragma once
 
-#include <stats/detail/constrained_channel.hpp>
+#include <stats/detail/constrained_curvature.hpp>
+#include <stats/detail/constrained_steps.hpp>
 #include <stats/detail/tangent_system.hpp>
 
 #include <algorithm>
@@ -111,60 +112,6 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearize(void* problem) {
     }
   }
   system_.compute(A_, basis_.freeBasis(), N - basis_.rank());
-}
-
-/// The same with the curvature of all equations under the multipliers of the last step.
-LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearizeCurved(void* problem) {
-  Rows A(N, N);
-  Numbers b(number(N));
-  if (hasPrior()) {
-    Numbers row(number(N));
-    for (int i = 0; i < N; ++i) {
-      const double* Q = settings_.prior_information.data() + i * N;
-      std::fill(row.begin(), row.end(), 0.);
-      for (int k = 0; k < N; ++k) addScaled(row.data(), Q[k], prior_J_[k], N);
-      for (int j = 0; j < N; ++j) addScaled(A[j], prior_J_[i][j], row.data(), N);
-      b[number(i)] = -prior_slope_[number(i)];
-    }
-  }
-  const double h = differenceStep(problem);
-  for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b);
-  if (P > 0) addConstraintCurvature(problem, h, A);
-  if (!allFinite(A) || !allFinite(b)) return;
-  curved_A_ = A, curved_b_ = b;
-  curved_system_.compute(A, basis_.freeBasis(), N - basis_.rank(), true);
-}
-LIESTAT_ESTIMATION_INLINE double ConstrainedCore::differenceStep(const void* problem) const {
-  if (!parameter_.is_vector) return curvature_step;
-  Numbers q(number(N));
-  parameter_.coordinates(problem, q.data());
-  return curvature_step * differenceScale(q.data(), N);
-}
-LIESTAT_ESTIMATION_INLINE void ConstrainedCore::addConstraintCurvature(void* problem, double h, Rows& A) {
-  Rows H(N, N), C(P, N), transport(N, N);
-  Numbers shift(number(N)), values(number(P)), gradient(number(N)), moved(number(N));
-  for (int k = 0; k < N; ++k) {
-    for (const double sign : {1., -1.}) {
-      std::fill(shift.begin(), shift.end(), 0.);
-      shift[number(k)] = sign * h;
-      parameter_.move(problem, ParameterPoint::current, ParameterPoint::shifted, shift.data());
-      parameter_.linearizeConstraint(problem, ParameterPoint::shifted, values.data(), C.data());
-      std::fill(gradient.begin(), gradient.end(), 0.);
-      for (int p = 0; p < P; ++p) {
-        addScaled(gradient.data(), sign * constraint_multipliers_[number(p)] / (2 * h), C[p], N);
-      }
-      if (!parameter_.is_vector) {
-        parameter_.transport(problem, transport.data());
-        moved = gradient;
-        std::fill(gradient.begin(), gradient.end(), 0.);
-        for (int j = 0; j < N; ++j) addScaled(gradient.data(), moved[number(j)], transport[j], N);
-      }
-      addScaled(H[k], 1, gradient.data(), N);
-    }
-  }
-  for (int i = 0; i < N; ++i) {
-    for (int j = 0; j < N; ++j) A[i][j] += 0.5 * (H[i][j] + H[j][i]);
-  }
 }
 
 LIESTAT_ESTIMATION_INLINE ConstrainedCore::Merit ConstrainedCore::meritOf(const ChannelMerit& sum, double prior_cost,

@@ -81,5 +81,6 @@ LIESTAT_ESTIMATION_API FilterOutcome updateSums(FilterSums& sums, const Implicit
 }  // namespace liestat::detail
 
 #ifdef LIESTAT_HEADER_ONLY
-#include <stats/detail/filter_update.hpp>
+#include <stats/detail/filter_dense.hpp>
+#include <stats/detail/filter_sums.hpp>
 #endif

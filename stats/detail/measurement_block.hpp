@@ -1,6 +1,6 @@
 // One measurement of fixed size, P equations, N parameters, K coordinates: its equations linearised, its own correction
-// eliminated (Viéville, Lingrand and Gaspard 2000, appendix A, corrected). The errors of single measurements and the implicit
-// filter use it; constrained estimates do the same with sizes at run time (stats/detail/constrained_core.hpp).
+// eliminated (Viéville, Lingrand and Gaspard 2000, appendix A, corrected). The errors of single measurements use it;
+// constrained estimates and the implicit filter do the same with sizes at run time (stats/detail/measurement_rows.hpp).
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
@@ -74,10 +74,6 @@ struct MeasurementBlock {
   Values multipliers(const Step& step) const { return r - product(C, step); }
   /// ε for a step of the parameter.
   Correction correction(const Step& step) const { return recovered(product(G, multipliers(step)), free.r, step); }
-  /// The change of ε that takes the equations, whose values are `values` elsewhere, to zero to first order.
-  Correction correctionOf(const Values& values, const Step& step) const {
-    return recovered(product(G, Values(-whitened(values) - product(C, step))), -values, step);
-  }
   /// Values of the equations in units of the noise.
   Values whitened(const Values& values) const {
     return root.template halfSolve<1>(free.dimension > 0 ? Values(product(free.selection, values)) : values);

@@ -1,0 +1,202 @@
+// The curvature of equations and constraints in a constrained estimate (docs/theory/constrained.md, section 5): second
+// derivatives under the multipliers of the last step, by differences of the first. Definitions of
+// stats/detail/constrained_core.hpp.
+#pragma once
+
+#include <stats/detail/constrained_channel.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace liestat::detail {
+
+/// Step of the differences by which curvatures are found, for coordinates of size one.
+inline constexpr double curvature_step = 6e-6;
+
+/// The largest coordinate's size, or one where all are zero.
+inline double differenceScale(const double* x, int n) {
+  double size = 0;
+  for (int k = 0; k < n; ++k) size = std::max(size, std::abs(x[k]));
+  return size > 0 ? size : 1;
+}
+
+/// The multipliers of the equations as they were given; with the sign of ½ ‖ε‖² + λᵀ c.
+inline void ConstrainedChannel::lagrange(std::size_t i, double* lambda) const {
+  double *y = scratch_.data(), *x = y + P;
+  const double* given = block(multipliers_, i, P);
+  for (int k = 0; k < P; ++k) y[k] = -given[k];
+  halfSolveTransposed(block(root_, i, P * P), order_.data() + i * number(P), ranks_[i], P, y, 1, x);
+  if (freeOf(i) == 0) {
+    std::copy(x, x + P, lambda);
+    return;
+  }
+  const double* selection = block(selection_, i, P * P);
+  std::fill(lambda, lambda + P, 0.);
+  for (int k = 0; k < P; ++k) addScaled(lambda, x[k], selection + k * P, P);
+}
+
+inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parameter, void* problem,
+                                                double parameter_step, Rows& A, Numbers& b) {
+  const int size = N + K;
+  base_.resize(n_ * number(K)), slope_.resize(n_ * number(K * N)), curved_.assign(n_, 0);
+  // Second derivatives of λᵀ c with respect to parameter and measurement, by central differences of the first.
+  Numbers H(channel_batch * number(size * size)), lambda(channel_batch * number(P)), shift(number(N)),
+      at(channel_batch * number(K)), steps(channel_batch, curvature_step), gradient(number(N)), moved(number(N));
+  Rows transport(N, N);
+  for (std::size_t first = 0; first < n_; first += channel_batch) {
+    const std::size_t count = std::min(channel_batch, n_ - first);
+    for (std::size_t i = 0; i < count; ++i) {
+      lagrange(first + i, block(lambda, i, P));
+      if (!record_.functions->is_vector) continue;
+      steps[i] = curvature_step * differenceScale(block(record_.coordinates, first + i, K), K);
+    }
+    std::fill(H.begin(), H.end(), 0.);
+    for (int column = 0; column < size; ++column) {
+      for (const double sign : {1., -1.}) {
+        std::copy_n(block(at_, first, K), count * number(K), at.data());
+        std::fill(shift.begin(), shift.end(), 0.);
+        if (column < N) {
+          shift[number(column)] = sign * parameter_step;
+        } else {
+          for (std::size_t i = 0; i < count; ++i) at[i * number(K) + number(column - N)] += sign * steps[i];
+        }
+        parameter.move(problem, ParameterPoint::current, ParameterPoint::shifted, shift.data());
+        if (!parameter.is_vector) parameter.transport(problem, transport.data());
+        record_.functions->linearize(record_.channel, parameter.point(problem, ParameterPoint::shifted), first, count,
+                                     at.data(), raw_values_.data(), raw_C_.data(), raw_D_.data());
+        for (std::size_t i = 0; i < count; ++i) {
+          const double *l = block(lambda, i, P), *C = block(raw_C_, i, P * N), *D = block(raw_D_, i, P * K);
+          double* h = block(H, i, size * size) + column * size;
+          const double factor = sign / (2 * (column < N ? parameter_step : steps[i]));
+          std::fill(gradient.begin(), gradient.end(), 0.);
+          for (int p = 0; p < P; ++p) addScaled(gradient.data(), factor * l[p], C + p * N, N);
+          if (!parameter.is_vector) {
+            moved = gradient;
+            std::fill(gradient.begin(), gradient.end(), 0.);
+            for (int k = 0; k < N; ++k) addScaled(gradient.data(), moved[number(k)], transport[k], N);
+          }
+          addScaled(h, 1, gradient.data(), N);
+          for (int p = 0; p < P; ++p) addScaled(h + N, factor * l[p], D + p * K, K);
+        }
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) addCurved(first + i, block(H, i, size * size), A, b);
+  }
+}
+
+/// With W = Q + Σ λ_k ∂²c_k/∂m², H_qm = Σ λ_k ∂²c_k/∂q∂m, the criterion gains ½ δᵀ A δ − bᵀ δ. H is made symmetric.
+inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Numbers& b) {
+  const int size = N + K, cols = N + 1;
+  for (int k = 0; k < size; ++k) {
+    for (int l = 0; l < k; ++l) H[k * size + l] = H[l * size + k] = 0.5 * (H[k * size + l] + H[l * size + k]);
+  }
+  const double *C = block(C_, i, P * N), *D = block(D_, i, P * K), *r = block(r_, i, P), *value = block(value_, i, P);
+  const auto addPlain = [&] {
+    for (int k = 0; k < ranks_[i]; ++k) {
+      addScaled(b.data(), r[k], C + k * N, N);
+      for (int j = 0; j < N; ++j) addScaled(A[j], C[k * N + j], C + k * N, N);
+    }
+  };
+  if (freeOf(i) > 0) return addPlain();
+  const double* at = block(at_, i, K);
+  double *Q = scratch_.data(), *W = Q + K * K, *first = W + K * K, *response = first + K * cols, *S = response + K * P,
+         *lambda = S + P * P;
+  record_.noise.matrix(record_.noise.information, i, Q);
+  for (int k = 0; k < K; ++k) {
+    for (int l = 0; l < K; ++l) W[k * K + l] = Q[k * K + l] + H[(N + k) * size + N + l];
+  }
+  if (!choleskyFactor(W, K)) return addPlain();
+  // Δε = W⁻¹ (first - D̂ᵀ λ), D̂ Δε = second; columns: δ, and 1.
+  for (int k = 0; k < K; ++k) {
+    for (int j = 0; j < N; ++j) first[k * cols + j] = -H[(N + k) * size + j];
+    first[k * cols + N] = -dot(Q + k * K, at, K);
+    for (int p = 0; p < P; ++p) response[k * P + p] = D[p * K + k];
+  }
+  choleskySolve(W, K, first, cols);
+  choleskySolve(W, K, response, P);
+  multiply(D, response, P, K, P, S);
+  for (int k = ranks_[i]; k < P; ++k) S[k * P + k] = 1;  // equations that were left out
+  if (!choleskyFactor(S, P)) return addPlain();
+  multiply(D, first, P, K, cols, lambda);
+  for (int p = 0; p < P; ++p) {
+    addScaled(lambda + p * cols, 1, C + p * N, N);
+    lambda[p * cols + N] += value[p];
+  }
+  choleskySolve(S, P, lambda, cols);
+  for (int k = 0; k < K; ++k) {
+    for (int p = 0; p < P; ++p) addScaled(first + k * cols, -response[k * P + p], lambda + p * cols, cols);
+  }
+  // H_qq δ + H_qm Δε + Ĉᵀ λ = A δ - b.
+  for (int j = 0; j < N; ++j) {
+    const auto add = [&](double factor, const double* row) {
+      addScaled(A[j], factor, row, N);
+      b[number(j)] -= factor * row[N];
+    };
+    addScaled(A[j], 1, H + j * size, N);
+    for (int k = 0; k < K; ++k) add(H[j * size + N + k], first + k * cols);
+    for (int p = 0; p < P; ++p) add(C[p * N + j], lambda + p * cols);
+  }
+  double *slope = block(slope_, i, K * N), *base = block(base_, i, K);
+  for (int k = 0; k < K; ++k) {
+    std::copy_n(first + k * cols, N, slope + k * N);
+    base[k] = at[k] + first[k * cols + N];
+  }
+  curved_[i] = 1;
+}
+
+/// linearize() with the curvature of all equations under the multipliers of the last step.
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearizeCurved(void* problem) {
+  Rows A(N, N);
+  Numbers b(number(N));
+  if (hasPrior()) {
+    Numbers row(number(N));
+    for (int i = 0; i < N; ++i) {
+      const double* Q = settings_.prior_information.data() + i * N;
+      std::fill(row.begin(), row.end(), 0.);
+      for (int k = 0; k < N; ++k) addScaled(row.data(), Q[k], prior_J_[k], N);
+      for (int j = 0; j < N; ++j) addScaled(A[j], prior_J_[i][j], row.data(), N);
+      b[number(i)] = -prior_slope_[number(i)];
+    }
+  }
+  const double h = differenceStep(problem);
+  for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b);
+  if (P > 0) addConstraintCurvature(problem, h, A);
+  if (!allFinite(A) || !allFinite(b)) return;
+  curved_A_ = A, curved_b_ = b;
+  curved_system_.compute(A, basis_.freeBasis(), N - basis_.rank(), true);
+}
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::differenceStep(const void* problem) const {
+  if (!parameter_.is_vector) return curvature_step;
+  Numbers q(number(N));
+  parameter_.coordinates(problem, q.data());
+  return curvature_step * differenceScale(q.data(), N);
+}
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::addConstraintCurvature(void* problem, double h, Rows& A) {
+  Rows H(N, N), C(P, N), transport(N, N);
+  Numbers shift(number(N)), values(number(P)), gradient(number(N)), moved(number(N));
+  for (int k = 0; k < N; ++k) {
+    for (const double sign : {1., -1.}) {
+      std::fill(shift.begin(), shift.end(), 0.);
+      shift[number(k)] = sign * h;
+      parameter_.move(problem, ParameterPoint::current, ParameterPoint::shifted, shift.data());
+      parameter_.linearizeConstraint(problem, ParameterPoint::shifted, values.data(), C.data());
+      std::fill(gradient.begin(), gradient.end(), 0.);
+      for (int p = 0; p < P; ++p) {
+        addScaled(gradient.data(), sign * constraint_multipliers_[number(p)] / (2 * h), C[p], N);
+      }
+      if (!parameter_.is_vector) {
+        parameter_.transport(problem, transport.data());
+        moved = gradient;
+        std::fill(gradient.begin(), gradient.end(), 0.);
+        for (int j = 0; j < N; ++j) addScaled(gradient.data(), moved[number(j)], transport[j], N);
+      }
+      addScaled(H[k], 1, gradient.data(), N);
+    }
+  }
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) A[i][j] += 0.5 * (H[i][j] + H[j][i]);
+  }
+}
+
+}  // namespace liestat::detail
