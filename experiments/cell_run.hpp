@@ -20,7 +20,7 @@ using RunProgress = std::function<void(std::uint64_t done, std::uint64_t all)>;
 
 /// The size of a run. Trial number i draws the same numbers whatever the number of trials and of threads.
 struct RunSize {
-  std::size_t trials = 0;  ///< of a cell
+  std::size_t trials = 0;  ///< each cell's number
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0: as many as the machine has
 };

@@ -33,7 +33,7 @@ void describe(V& v, const Promise& p) {
 struct Judgement {
   std::vector<Promise> promises;
   std::string where = {};                ///< the rows that are judged: "in the promised domain"
-  double false_alarm = run_false_alarm;  ///< of all promises together; 0: they are bounds, not tests
+  double false_alarm = run_false_alarm;  ///< all promises together; 0: they are bounds, not tests
 
   std::size_t judged() const;
   std::size_t failed() const;

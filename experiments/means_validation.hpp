@@ -61,7 +61,7 @@ void describe(V& v, const MeansRow& row) {
 
 struct MeansValidationResult {
   std::vector<MeansRow> rows;        ///< in the order of the lists
-  std::vector<VerdictRow> verdicts;  ///< of certifiedMean
+  std::vector<VerdictRow> verdicts;  ///< certifiedMean's
 };
 template <class V>
 void describe(V& v, const MeansValidationResult& result) {

@@ -121,7 +121,7 @@ std::vector<std::string> writeTrajectory(const std::string& path, const Trajecto
 /// A trajectory as text.
 struct TrajectoryText {
   std::string text;
-  std::string side_file;            ///< of covariances, for formats without a place for them; empty if there are none
+  std::string side_file;            ///< covariances, for formats without a place for them; empty if there are none
   std::size_t n_rounded_times = 0;  ///< times with digits below the format's unit, which were cut off
   std::size_t n_lost_cross = 0;     ///< covariances whose cross block the format or layout has no place for
   std::size_t n_marked = 0;         ///< components written with the variance that means "not measured"

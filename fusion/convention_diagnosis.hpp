@@ -59,7 +59,7 @@ LIESTAT_TRAJECTORIES_API std::vector<PlanRow> planDiagnosis(std::span<const Diag
 struct DiagnosedRun {
   std::vector<DiagnosedPose> poses;
   std::vector<double> times = {};       ///< s; empty: the numbers of the rows
-  std::vector<std::string> notes = {};  ///< what is remarkable in its file, in sentences
+  std::vector<std::string> notes = {};  ///< remarks on its file, in sentences
 };
 
 /// A run and the truth at its times. If `status` is not ok, `reason` says why there is none.

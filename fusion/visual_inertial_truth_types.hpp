@@ -34,7 +34,7 @@ struct ComparedWindow : InitialisedWindow {
   std::optional<InitialisationError> closed_form_error, refined_error;
   std::optional<double> gyroscope_error;              ///< rad/s, of the best known bias
   std::optional<double> nees;                         ///< the refined V and G's, 5 degrees of freedom
-  std::optional<double> velocity_nees, gravity_nees;  ///< of each by itself, 3 and 2 degrees of freedom
+  std::optional<double> velocity_nees, gravity_nees;  ///< each by itself, 3 and 2 degrees of freedom
 
   bool hasSolution() const { return !closedForm().solutions.empty(); }
   /// The motion does not leave the scale open.

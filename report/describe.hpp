@@ -42,7 +42,7 @@ struct FieldDescription {
   std::string name, meaning, unit;
   Kind kind = Kind::number;
   bool list = false, optional = false;
-  int rows = 0, columns = 0;  ///< of an array: 0 if any number, a vector has one column
+  int rows = 0, columns = 0;  ///< an array's sizes: 0 if any number, a vector has one column
   std::string result = {};    ///< name of the type of a result, its fields are:
   std::vector<FieldDescription> fields = {};
 };

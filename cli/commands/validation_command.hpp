@@ -85,7 +85,7 @@ int publish(const RunOptions& options, const Invocation& invocation, const Valid
 template <class Validation>
 struct ValidationOptions {
   Validation validation;
-  std::vector<std::string> names, more_names;  ///< of the experiments or methods that are wanted; none: all
+  std::vector<std::string> names, more_names;  ///< experiments or methods that are wanted; none: all
   RunOptions run;
 };
 /// Declares the option of a comma list of such names.

@@ -30,14 +30,14 @@ struct ValidationTable {
 
 /// A validation as it is shown. The page may refer to the rows of which the view was made.
 struct ValidationView {
-  std::string title, introduction;                       ///< of the page; a line of the latter is a paragraph
+  std::string title, introduction;                       ///< the page's; a line of the latter is a paragraph
   std::optional<experiments::Judgement> judgement = {};  ///< none: nothing is promised
   std::function<void(JsonObject&)> fields = {};          ///< adds those of JSON to the verdict
   std::string head = {};                                 ///< lines on the terminal above the tables
   std::vector<ValidationTable> tables = {};
   std::string legend = {};                 ///< lines on the terminal below the tables
   std::function<void(Report&)> page = {};  ///< draws the page, in place of the tables
-  std::optional<Verdict> verdict = {};     ///< of the page, where nothing is promised
+  std::optional<Verdict> verdict = {};     ///< the page's, where nothing is promised
 
   /// The lines for the terminal, the verdict last.
   std::string text() const;

@@ -74,7 +74,7 @@ struct NoiseTable {
   NoiseForm form = NoiseForm::isotropic;
   int dimension = 0;
   bool one = true;                       ///< one for all measurements
-  Numbers covariance, information;       ///< of each noise 1, K or K² numbers
+  Numbers covariance, information;       ///< each noise's, 1, K or K² numbers
   bool can_be_free = false;              ///< the information may be singular
   std::vector<int> null_dimension = {};  ///< where it can be: of each noise,
   Numbers null_basis = {};               ///< with a basis in the first columns of K×K
@@ -95,7 +95,7 @@ struct ChannelRecord {
   const void* channel = nullptr;
   std::size_t size = 0;
   NoiseTable noise = {};
-  Numbers coordinates = {};  ///< of vectors that were observed
+  Numbers coordinates = {};  ///< those of vectors that were observed
   Numbers start = {};        ///< corrections with which the iteration starts
 };
 

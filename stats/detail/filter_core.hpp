@@ -43,7 +43,7 @@ constexpr std::size_t filterNumbers(int N, int P, int K) {
   return static_cast<std::size_t>(P * (5 * P + 6 * N + 8 * K + 5) + N * (5 * N + 3 * K + 2) + K * (K + 1));
 }
 
-/// What an update has found, the members of FilterUpdate and DenseFilterUpdate that depend on no type.
+/// The findings of an update: the members of FilterUpdate and DenseFilterUpdate that depend on no type.
 struct FilterOutcome {
   FilterStatus status = FilterStatus::ok;
   bool moved = false;  ///< there is a new state: the step and its covariance are set

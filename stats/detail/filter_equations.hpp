@@ -1,4 +1,4 @@
-// What both forms of the implicit filter's update share: memory, the state that is moved, the equations linearised.
+// The parts that both forms of the implicit filter's update share: memory, the state that is moved, the equations linearised.
 #pragma once
 
 #include <stats/detail/filter_core.hpp>

@@ -87,7 +87,7 @@ void multiplyTransposed(const double* A, const double* B, int n, int m, int k, d
 /// that is. `half` holds P² numbers.
 inline int reducedRoot(double* S, int P, int max_rank, double* kept, int* order, double* half) {
   const double least = 10 * P * std::numeric_limits<double>::epsilon();
-  // What a pivot must exceed; infinite in rows that are kept.
+  // The bound that a pivot must exceed; infinite in rows that are kept.
   constexpr double kept_row = std::numeric_limits<double>::infinity();
   double* bound = half + P * P;
   for (int k = 0; k < P; ++k) bound[k] = least * S[k * P + k];

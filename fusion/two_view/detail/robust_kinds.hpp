@@ -1,5 +1,5 @@
-// What a robust estimate needs of a kind of matrix (homography, fundamental, essential): its solver, the coordinates of
-// its entries, the step by sums over matches, and the model that a search takes.
+// The kinds of matrices that are estimated robustly (homography, fundamental, essential): solver, coordinates of the
+// entries, the step by sums over matches, and the model that a search takes.
 #pragma once
 
 #include <fusion/two_view/detail/match_columns.hpp>
