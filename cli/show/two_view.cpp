@@ -213,13 +213,8 @@ std::string formatTwoViewMotion(const TwoViewMotionOutput& output) {
   const TwoViewMotionEstimate& e = output.estimate;
   std::string text = summary(output.file, output.estimate) + "\n" + answer(output);
   for (const HeadedTable& t : parameterTables(e)) text += "\n" + t.heading + Table(t.table).str();
-  if (e.focalLengthsOpen())
-    text +=
-        "the focal lengths are not determined: the optical axes meet, or noise decides
-        ";
-        return text +
-        "
-        " + Table(latticeRows(e, ShownOn::terminal)).str();
+  if (e.focalLengthsOpen()) text += "the focal lengths are not determined: the optical axes meet, or noise decides\n";
+  return text + "\n" + Table(latticeRows(e, ShownOn::terminal)).str();
 }
 
 void writeTwoViewMotionReport(const std::string& directory, const std::string& command_line,
