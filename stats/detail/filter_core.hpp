@@ -40,7 +40,8 @@ struct FilterMemory {
   int* rows;
 };
 constexpr std::size_t filterNumbers(int N, int P, int K) {
-  return static_cast<std::size_t>(P * (5 * P + 6 * N + 8 * K + 5) + N * (5 * N + 3 * K + 2) + K * (K + 1));
+  const auto n = static_cast<std::size_t>(N), p = static_cast<std::size_t>(P), k = static_cast<std::size_t>(K);
+  return p * (5 * p + 6 * n + 8 * k + 5) + n * (5 * n + 3 * k + 2) + k * (k + 1);
 }
 
 /// The findings of an update: the members of FilterUpdate and DenseFilterUpdate that depend on no type.
