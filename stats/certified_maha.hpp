@@ -36,6 +36,8 @@ struct CertifiedMahaOptions {
   double tie_tolerance = 1e-9;       ///< minima are rivals if their costs c differ by less than this times 1 + |c|
   double distinct = 1e-4;            ///< and they are this far apart, rad and m
   NearTieOptions near_ties = {};     ///< the criterion by which higher minima are rivals; costs are log-likelihoods
+  double refutation_level = liestat::refutation_level;  ///< a less probable fit refutes the covariances; 0: none does
+  bool scale_noise = false;  ///< multiply the covariance by Birge's factor max(1, χ²/ν), if the noise is not refuted
   /// The covariance is withheld if a Hessian averaged over its region is lower than that at the mean by more than this
   /// fraction: that of MAHA, or of the least-squares mean.
   double largest_hessian_change = liestat::largest_hessian_change;
@@ -53,8 +55,7 @@ struct CertifiedMaha {
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
-  double fit = 0;      ///< Σ μ_i² at the mean, χ² with `fit_dof` degrees of freedom if the covariances are right
-  double fit_dof = 0;  ///< k (n - 1)
+  NoiseFit fit;  ///< Σ μ_i² at the mean, of k (n - 1) degrees of freedom
   Status status = Status::too_few;
   const char* reason = "";  ///< why there is no estimate, in words
 };
@@ -74,34 +75,23 @@ constexpr bool isFlat() {
   }
 }
 
-}  // namespace detail
-
-/// Squared Mahalanobis distance of a measurement from a mean; `at` is the frame of its covariance.
-template <Homogeneous M>
-ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
-  const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
-  return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
-}
-
-namespace detail {
-
 /// Sets the near ties: the minima of other starts that are higher by less than the noise explains, outside the
 /// confidence region of the mean.
 template <Homogeneous M>
 void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& others, const SquareOf<M>& region,
-                 const CertifiedMahaOptions<M>& options) {
+                 double distinct, const NearTieOptions& options) {
   const MahaResult<M>& best = result.maha;
   for (const MahaResult<M>& other : others) {
     const double ratio = static_cast<double>(other.cost - best.cost);
-    if (other.status != Status::ok || !(ratio < options.near_ties.log_likelihood_ratio)) continue;
+    if (other.status != Status::ok || !(ratio < options.log_likelihood_ratio)) continue;
     const TangentOf<M> error = log(best.mean, other.mean);
     const double squared = static_cast<double>(mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(error, region));
-    if (chiSquaredTail(squared, std::size_t{ManifoldTraits<M>::DoF}) > options.near_ties.region) continue;
+    if (chiSquaredTail(squared, std::size_t{ManifoldTraits<M>::DoF}) > options.region) continue;
     const bool known = std::any_of(result.near_ties.begin(), result.near_ties.end(), [&](const NearTie<M>& tie) {
-      return static_cast<double>(log(tie.feature, other.mean).norm()) < options.distinct;
+      return static_cast<double>(log(tie.feature, other.mean).norm()) < distinct;
     });
     // The ratio is half the square of z standard deviations.
-    if (!known && static_cast<double>(error.norm()) >= options.distinct) {
+    if (!known && static_cast<double>(error.norm()) >= distinct) {
       result.near_ties.push_back({other.mean, std::sqrt(2 * std::max(0.0, ratio)), ratio});
     }
   }
@@ -140,6 +130,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     how.uniqueness = options.uniqueness;
     how.largest_hessian_change = options.largest_hessian_change;
     how.known_noise = std::move(noise);  // the twin preserves the rotation, and with it the noise that is tested
+    how.refutation_level = 0;            // the fit that counts is that of this criterion, below
     // These are the types that certifiedMean uses, so that both share their instantiations.
     const Samples<Twin> twins(metricTwins<M>(features));
     const Samples<double> numbers(std::move(weights));
@@ -201,21 +192,25 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   } else {
     result.uniqueness.proof = "the best minimum from several starts; there is no certificate for maha";
   }
-  for (const Gaussian<M>& g : samples) result.fit += static_cast<double>(mahalanobisSquared(g, best.mean, at));
-  result.fit_dof = ManifoldTraits<M>::DoF * (static_cast<double>(n) - 1);
+  result.fit = fitOfMaha<M>(samples, best.mean, at);
 
   if (best.status == Status::not_converged) return without(best.status, not_converged_reason);
   if (best.status == Status::ill_defined) return without(best.status, hessian_reason);
   if (best.status != Status::ok) return without(best.status, "this criterion has no answer for these measurements");
+  if (result.fit.refuted(options.refutation_level)) return without(Status::inconsistent, refuted_reason);
   if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
   const SettledMaha<M> settled =
       settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change);
   result.hessian_change = settled.change;
-  setNearTies(result, results, settled.covariance, options);
+  // Noise that is larger than stated lowers the likelihood ratio as it raises χ².
+  NearTieOptions near_ties = options.near_ties;
+  near_ties.log_likelihood_ratio *= result.fit.factor();
+  setNearTies(result, results, settled.covariance, options.distinct, near_ties);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   result.estimate = Gaussian<M>{best.mean, settled.covariance};
+  if (options.scale_noise) result.estimate->covariance *= ScalarOf<M>(result.fit.factor());
   result.status = Status::ok;
   return result;
 }
@@ -223,7 +218,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
 }  // namespace detail
 
 /// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance if that can be trusted:
-/// status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if several
+/// status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if the measurements
+/// scatter more than their covariances say (inconsistent; `fit` says by how much), if several
 /// minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is singular or,
 /// averaged over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined). The
 /// statuses of maha() occur as well. The result has the same bits on any executor.

@@ -14,6 +14,7 @@
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
 #include <stats/near_ties.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/status.hpp>
 #include <stats/uniqueness.hpp>
 
@@ -36,6 +37,11 @@ struct CertifiedMeanOptions {
   /// the mean along the geodesic, which has an effect only if the isotropy group is not trivial, as for directions), or
   /// a single one for all features, in the frame of the mean. Empty: the covariance is computed from the residuals.
   std::vector<SquareOf<M>> known_noise = {};
+  RefutedNoise refuted_noise = RefutedNoise::withheld;  ///< what becomes of known noise that the measurements refute
+  double refutation_level =
+      liestat::refutation_level;  ///< known noise is refuted by a less probable fit; 0: not tested
+  /// Multiply a covariance from known noise by Birge's factor max(1, χ²/ν), if it is not refuted.
+  bool scale_noise = false;
   /// The covariance is withheld if the Hessian averaged over its region is lower than that at the mean by more than
   /// this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
@@ -53,6 +59,8 @@ struct CertifiedMean {
   /// The relative decrease of the Hessian averaged over the confidence region (averagedHessian) from that at the mean;
   /// the covariance is that of the averaged one.
   double hessian_change = 0;
+  NoiseFit fit = {};        ///< of the measurements to their known noise; nothing where none was stated
+  bool from_noise = false;  ///< the covariance follows from the known noise
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
   std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
@@ -65,6 +73,8 @@ namespace detail {
 inline constexpr std::size_t scattered_budget_part = 50;
 
 inline constexpr const char* not_converged_reason = "the iteration for the mean did not converge";
+inline constexpr const char* refuted_reason =
+    "the measurements scatter more than the covariances that are stated for them";
 inline constexpr const char* rival_reason = "another feature explains the data as well";
 inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
 inline constexpr const char* hessian_reason = "the Hessian of the criterion is not positive definite at the mean";
@@ -136,7 +146,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   };
   result.mean = first;
   if (result.mean.n == 0) return without(Status::too_few, "there are no features");
-  const bool known = !options.known_noise.empty();
+  bool known = !options.known_noise.empty();
   // If the noise is known and both noise and scatter are small, the test for the existence of a mean is skipped.
   const auto isScattered = [&](const Concentration& concentration) {
     const bool modest =
@@ -160,6 +170,15 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     search(1);
   }
   if (!converged(result.mean.status)) return without(Status::not_converged, not_converged_reason);
+  result.from_noise = known;
+  if (known && options.refutation_level > 0) {
+    result.fit = fitToNoise<M>(executor, samples, options.known_noise, result.mean.mean);
+    const bool refuted = result.fit.refuted(options.refutation_level);
+    if (refuted && options.refuted_noise == RefutedNoise::withheld) {
+      return without(Status::inconsistent, refuted_reason);
+    }
+    known = result.from_noise = !refuted;
+  }
   if (result.uniqueness.unique == Uniqueness::ambiguous) return without(Status::ambiguous, rival_reason);
 
   // The region is that of the residuals, regardless of the stated noise; that of the known noise if there are too few
@@ -186,8 +205,11 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     const auto noise = [&](std::size_t i) -> const SquareOf<M>& {
       return options.known_noise[options.known_noise.size() == 1 ? 0 : i];
     };
+    // Noise that is larger than stated lowers the likelihood ratio as it raises χ².
+    NearTieOptions near_ties = options.near_ties;
+    near_ties.log_likelihood_ratio *= result.fit.factor();
     result.near_ties =
-        findNearTies<M>(executor, samples, weights, result.mean, region, have_residuals, noise, options.near_ties);
+        findNearTies<M>(executor, samples, weights, result.mean, region, have_residuals, noise, near_ties);
   } else {
     result.near_ties =
         findNearTies<M>(executor, samples, weights, result.mean, region, true, NoNoise{}, options.near_ties);
@@ -202,6 +224,7 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
     covariance = known_covariance(averaged);
     if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
   }
+  if (known && options.scale_noise) covariance *= ScalarOf<M>(result.fit.factor());
   result.estimate = Gaussian<M>{result.mean.mean, covariance};
   result.status = Status::ok;
   return result;
@@ -224,8 +247,8 @@ CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const
 }  // namespace detail
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, if that can
-/// be trusted: status ok. The covariance is withheld, with the reason in words, if another feature explains the
-/// measurements as well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or
+/// be trusted: status ok. The covariance is withheld, with the reason in words, if the measurements refute the noise that
+/// is stated for them (inconsistent; `fit` says by how much), if another feature explains the measurements as well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or
 /// the criterion is flat within the confidence region (ill_defined), if there are no more features than dimensions and
 /// the noise is not known (too_few), or if the weights are invalid (not_applicable). A mean that is merely not
 /// certified to be unique keeps its covariance. The result has the same bits on any executor.

@@ -18,6 +18,7 @@
 #include <stats/gaussian.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/mean.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/start.hpp>
 #include <stats/status.hpp>
 
@@ -89,35 +90,85 @@ MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& opti
   }
 }
 
+/// Squared Mahalanobis distance of a measurement from a mean; `at` is the frame of its covariance.
+template <Homogeneous M>
+ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
+  const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
+  return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
+}
+
+/// What testedFuse() returns.
+template <Homogeneous M>
+struct FuseResult {
+  /// The mean with its covariance. NaN where there is no trustworthy one; where the fit refutes it (inconsistent) it is
+  /// still that of the stated covariances, which fit.factor() widens.
+  Gaussian<M> estimate;
+  /// ok, inconsistent; ill_defined where the features are as scattered as uniform ones or the criterion is flat where
+  /// the truth may be; else the status of maha().
+  Status status = Status::too_few;
+  NoiseFit fit;
+};
+
 namespace detail {
 
+/// The χ² of measurements about their Mahalanobis mean.
 template <Homogeneous M, class R>
-Gaussian<M> fused(const R& samples, CovarianceAt at) {
+NoiseFit fitOfMaha(const R& samples, const M& mean, CovarianceAt at) {
+  double chi2 = 0;
+  for (const Gaussian<M>& g : samples) chi2 += static_cast<double>(mahalanobisSquared(g, mean, at));
+  return NoiseFit::of(chi2, ManifoldTraits<M>::DoF * (static_cast<double>(std::ranges::size(samples)) - 1));
+}
+
+template <Homogeneous M, class R>
+FuseResult<M> fused(const R& samples, CovarianceAt at) {
   const SerialExecutor serial;
   const AnyExecutor executor(serial);
-  const MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, {});
-  Gaussian<M> estimate = result.estimate();
-  if (result.status != Status::ok) return estimate;
-  const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, result, largest_hessian_change);
-  const bool trusted = settled.settled && showAMean<M>(samples, result.mean);
-  estimate.covariance =
-      trusted ? settled.covariance : SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
-  return estimate;
+  const MahaResult<M> found = mahalanobisMean<M>(executor, samples, at, {});
+  FuseResult<M> result{found.estimate(), found.status, {}};
+  if (found.status != Status::ok) return result;
+  result.fit = fitOfMaha<M>(samples, found.mean, at);
+  const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, found, largest_hessian_change);
+  if (settled.settled && showAMean<M>(samples, found.mean)) {
+    result.estimate.covariance = settled.covariance;
+    if (result.fit.refuted()) result.status = Status::inconsistent;
+  } else {
+    result.estimate.covariance.setConstant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+    result.status = Status::ill_defined;
+  }
+  return result;
 }
 
 }  // namespace detail
 
 /// A range of Gaussians to one: the mean of maha() with its covariance, the Hessian averaged over the confidence region
-/// as certifiedMaha (stats/certified_maha.hpp) does. The covariance is NaN if there is no trustworthy estimate:
-/// directions or rotations as scattered as uniform ones, a criterion that is flat where the truth may be. Other minima
-/// are not looked for.
+/// as certifiedMaha (stats/certified_maha.hpp) does, and the test of their fit. Other minima are not looked for.
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
-Gaussian<M> fuse(R&& samples, CovarianceAt at) {
+FuseResult<M> testedFuse(R&& samples, CovarianceAt at) {
   if constexpr (detail::RequireGaussians<R>::ok) {
     return detail::fused<M>(detail::asValues<Gaussian<M>>(samples), at);
   } else {
     return {};
   }
+}
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+FuseResult<M> testedFuse(R&& samples) {
+  if constexpr (detail::RequireGaussians<R, false>::ok) {
+    return testedFuse(samples, CovarianceAt::measured);
+  } else {
+    return {};
+  }
+}
+
+/// The estimate of testedFuse() alone. The covariance is NaN unless its status is ok: where the Gaussians lie farther
+/// apart than their covariances say, directions or rotations are as scattered as uniform ones, or the criterion is flat
+/// where the truth may be.
+template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
+Gaussian<M> fuse(R&& samples, CovarianceAt at) {
+  FuseResult<M> result = testedFuse(samples, at);
+  if (result.status == Status::inconsistent) {
+    result.estimate.covariance.setConstant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  }
+  return result.estimate;
 }
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 Gaussian<M> fuse(R&& samples) {

@@ -1,22 +1,20 @@
-// Notes on a mean, in sentences, and the p-value of its fit (needs Boost.Math).
+// Notes on a mean, in sentences. Needs Eigen alone.
 #pragma once
 
 #include <stats/covariance.hpp>
-#include <stats/laws.hpp>
 #include <stats/mean_summary.hpp>
 #include <stats/words.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <string>
+#include <utility>
 
 namespace liestat {
 
-/// Below this p measurements are said to scatter more than their covariances say.
-inline constexpr double poor_fit = 1e-3;
-
-/// Sets the p-value of the fit and adds the notes to the mean of so many measurements: which of them do not count, that
-/// all are equal, that their covariance is singular, that they scatter more than their covariances say.
+/// Adds the notes to the mean of so many measurements: which of them do not count, that all are equal, that their
+/// covariance is singular, that they scatter more than their covariances say.
 inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
   if (const std::size_t without = measurements - std::min(mean.n, measurements); without > 0) {
     mean.notes.push_back(std::to_string(without) + (without == 1 ? " measurement has" : " measurements have") +
@@ -37,13 +35,17 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.emplace_back(
         "the measurements do not vary in every direction: the covariance from the residuals is singular");
   }
-  if (mean.fit_dof > 0) {
-    mean.fit_p = chiSquaredSurvival(mean.fit, mean.fit_dof);
-    if (mean.fit_p < poor_fit) {
-      mean.notes.push_back(
-          "the measurements scatter more than their covariances say: " + significant(mean.fit / mean.fit_dof, 4) +
-          " times the expected squared distance (p = " + significant(mean.fit_p, 2) + ")");
-    }
+  if (mean.fit.p < doubtful_fit) {
+    std::string note = "the measurements scatter more than their covariances say: " +
+                       significant(mean.fit.chi2 / mean.fit.degrees_of_freedom, 4) +
+                       " times the expected squared distance (p = " + significant(mean.fit.p, 2) + ")";
+    const std::string factor = significant(std::sqrt(mean.fit.factor()), 3);
+    note += mean.fromResiduals() ? "; the covariance is that of the residuals"
+            : mean.noise_scaled  ? "; the covariance is multiplied by that (Birge's factor)"
+            : mean.status == Status::inconsistent
+                ? "; if all are too small by one factor, their deviations are " + factor + " times as large"
+                : "; Birge's factor would make the deviations " + factor + " times as large";
+    mean.notes.push_back(std::move(note));
   }
 }
 

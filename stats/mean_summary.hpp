@@ -5,6 +5,7 @@
 #include <lie/concepts.hpp>
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/time_blocks_types.hpp>
@@ -111,10 +112,8 @@ struct MeanSummary {
   /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
   double hessian_change = 0;
 
-  /// Sum of the measurements' squared Mahalanobis distances, where their noise is known, and what is expected.
-  double fit = 0;
-  double fit_dof = 0;  ///< 0: there is none
-  double fit_p = 1;    ///< probability of so large a sum
+  NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
+  bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
   std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
   std::vector<std::string> notes = {};         ///< remarks, in sentences
@@ -122,8 +121,8 @@ struct MeanSummary {
   bool hasCovariance() const { return covariance.size() > 0; }
   /// A covariance from the residuals.
   bool fromResiduals() const { return hasCovariance() && !known_noise; }
-  /// There is a mean that may be used, with or without a covariance.
-  bool trusted() const { return status == Status::ok || status == Status::not_applicable; }
+  /// There is a mean that may be used, with or without a covariance. Weights that are none leave no mean.
+  bool trusted() const { return status == Status::ok || (status == Status::not_applicable && converged); }
 
   /// "unique: branch and bound, 232 cells" and so on.
   std::string uniquenessInWords() const {
@@ -143,7 +142,7 @@ struct MeanSummary {
 template <class V>
 void describe(V& v, const MeanSummary& m) {
   const auto where = [](bool there, auto value) { return there ? std::optional(std::move(value)) : std::nullopt; };
-  const bool has = m.hasCovariance(), fits = m.fit_dof > 0;
+  const bool has = m.hasCovariance(), fits = m.fit.tested();
   v("feature", m.feature, "the type of the measurements");
   v("criterion", name(m.criterion), "lsq, wlsq, maha or barycentre");
   v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
@@ -151,7 +150,9 @@ void describe(V& v, const MeanSummary& m) {
   v("likelihood", m.likelihood, "whether the volume element is in the criterion");
   v("weighted", m.weighted, "whether weights were used")("n", m.n, "measurements that count: those with a weight");
   v("status", name(m.status),
-    "ok, not_converged, ambiguous, ill_defined or too_few; not_applicable: a mean, but no covariance can be computed");
+    "ok, not_converged, ambiguous, ill_defined, inconsistent or too_few; not_applicable: a mean, but no covariance can "
+    "be "
+    "computed");
   v("reason", where(m.status != Status::ok, m.reason), "in words, where status is not ok");
   v("converged", m.converged)("iterations", m.iterations)("residual", m.residual, "norm of the last step");
   v("tolerance", m.tolerance, "of the norm of the last step")("mean", m.mean, "the parts that the feature has");
@@ -181,9 +182,11 @@ void describe(V& v, const MeanSummary& m) {
   v("near_ties", m.near_ties, "other minima that the noise does not exclude, which make the status ambiguous");
   v("cut_locus_mass", m.cut_locus_mass, "fraction of the measurements near the cut locus of the mean");
   v("hessian_change", m.hessian_change, "relative decrease of the Hessian averaged over the confidence region");
-  v("fit", where(fits, m.fit), "sum of the squared Mahalanobis distances, if the noise is known");
-  v("fit_dof", where(fits, m.fit_dof), "its degrees of freedom");
-  v("fit_p", where(fits, m.fit_p), "probability of so large a sum");
+  v("fit", where(fits, m.fit.chi2), "χ² of the measurements under the noise that is stated for them; null: not tested");
+  v("fit_dof", where(fits, m.fit.degrees_of_freedom), "its degrees of freedom");
+  v("fit_p", where(fits, m.fit.p), "probability of so large a χ²; below 0.001 the stated noise is refuted");
+  v("fit_factor", where(fits, m.fit.factor()), "Birge's factor max(1, χ²/ν) of the stated covariances");
+  v("noise_scaled", m.noise_scaled, "whether the covariance is multiplied by it");
   v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
   v("notes", m.notes, "what is remarkable, in sentences");
 }

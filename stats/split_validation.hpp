@@ -129,7 +129,8 @@ template <Homogeneous M, Executor E, class Estimate>
   result.p_value = law.survival(result.squared_distance);
   // Each half's covariance lives in its own frame.
   const std::vector<Gaussian<M>> both{result.first.result.estimate, result.second.result.estimate};
-  result.merged = {n, {fuse(both, CovarianceAt::measured), false}};
+  // Their distance has a test of its own, under the law of these covariances.
+  result.merged = {n, {testedFuse(both, CovarianceAt::measured).estimate, false}};
   result.merged.result.valid = result.merged.result.estimate.covariance.allFinite();
 
   std::vector<std::vector<char>> deals;

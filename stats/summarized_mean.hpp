@@ -35,6 +35,9 @@ struct MeanInput {
   std::vector<SquareOf<M>> covariances = {};
   CovarianceAt covariance_at = CovarianceAt::measured;  ///< frame of the covariances, for maha
   bool likelihood = false;                              ///< maha: with the volume element
+  /// What becomes of covariances that the measurements refute; for lsq, wlsq and barycentre.
+  RefutedNoise refuted_noise = RefutedNoise::withheld;
+  bool scale_noise = false;  ///< Birge's factor, where they are not refuted
 
   bool weighted() const {
     return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
@@ -102,10 +105,12 @@ void setCertified(MeanSummary& mean, const Iteration& iteration, const Certified
   for (const auto& tie : result.near_ties) mean.near_ties.push_back({featureValue(tie.feature), tie.z});
   mean.cut_locus_mass = result.cut_locus.mass;
   mean.hessian_change = result.hessian_change;
+  mean.fit = result.fit;
   if (result.estimate) mean.covariance = result.estimate->covariance.template cast<double>();
 }
 
-/// An estimate without certificates: the iteration, and its covariance where the features show a mean at all.
+/// An estimate without certificates: the iteration, and its covariance where the features show a mean at all and, with
+/// `mean.fit` set, do not refute their noise.
 template <Homogeneous M, class Iteration>
 void setUncertified(MeanSummary& mean, const Iteration& iteration, const SquareOf<M>& covariance, bool concentrated) {
   setIteration(mean, iteration);
@@ -113,6 +118,7 @@ void setUncertified(MeanSummary& mean, const Iteration& iteration, const SquareO
   if (iteration.n == 0) return setStatus(mean, Status::too_few, "there are no features");
   if (!converged(iteration.status)) return setStatus(mean, iteration.status, not_converged_reason);
   if (few) return setStatus(mean, Status::too_few, too_few_reason);
+  if (mean.known_noise && mean.fit.refuted()) return setStatus(mean, Status::inconsistent, refuted_reason);
   if (!concentrated) return setStatus(mean, Status::ill_defined, scattered_reason);
   if (!covariance.allFinite()) return setStatus(mean, Status::ill_defined, hessian_reason);
   setStatus(mean, Status::ok, "");
@@ -138,13 +144,20 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
     CertifiedMeanOptions<M> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
+    how.refuted_noise = input.refuted_noise;
+    how.scale_noise = input.scale_noise;
     const CertifiedMean<M> result = ones ? certifiedMean(executor, input.features, how)
                                          : certifiedMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
+    mean.known_noise = result.from_noise;
     return setDispersion(mean, input, result.mean.mean);
   }
   const MeanResult<M> result =
       ones ? liestat::mean(executor, input.features) : liestat::mean(executor, input.features, input.weights);
+  if (mean.known_noise && converged(result.status)) {
+    mean.fit = fitToNoise<M>(executor, asSamples(input.features), input.covariances, result.mean);
+    if (input.refuted_noise == RefutedNoise::residuals) mean.known_noise = !mean.fit.refuted();
+  }
   const SquareOf<M> covariance = !mean.known_noise ? covarianceFromResiduals(result)
                                  : ones            ? covarianceFromNoise(result, input.covariances)
                                                    : covarianceFromNoise(result, input.weights, input.covariances);
@@ -158,15 +171,21 @@ template <LieGroup G, Executor E>
 void setBarycentre(MeanSummary& mean, const E& executor, const MeanInput<G>& input, const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
   if (options.certificates) {
-    CertifiedGroupMeanOptions how;
+    CertifiedGroupMeanOptions<G> how;
     how.uniqueness = options.uniqueness;
+    how.known_noise = input.covariances;
+    how.refuted_noise = input.refuted_noise;
+    how.scale_noise = input.scale_noise;
     const CertifiedGroupMean<G> result = ones ? certifiedGroupMean(executor, input.features, how)
                                               : certifiedGroupMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
+    mean.known_noise = result.from_noise;
     return setDispersion(mean, input, result.mean.mean);
   }
   const GroupMeanResult<G> result =
       ones ? groupMean(executor, input.features) : groupMean(executor, input.features, input.weights);
+  // A covariance from noise is certified, or there is none.
+  mean.known_noise = false;
   setUncertified<G>(mean, result, result.covarianceFromResiduals(), result.concentration.concentrated);
   setDispersion(mean, input, result.mean);
 }
@@ -181,15 +200,15 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
     how.maha.likelihood = input.likelihood;
     how.uniqueness = options.uniqueness;
     how.uniqueness.budget = std::min(options.uniqueness.budget, most);
+    how.scale_noise = input.scale_noise;
     const CertifiedMaha<M> result = certifiedMaha(executor, samples, input.covariance_at, how);
-    mean.fit = result.fit;
-    mean.fit_dof = result.fit_dof;
     setCertified(mean, result.maha, result);
     return setDispersion(mean, input, result.maha.mean);
   }
   MahaOptions<M> how;
   how.likelihood = input.likelihood;
   const MahaResult<M> result = maha(executor, samples, input.covariance_at, how);
+  if (converged(result.status)) mean.fit = fitOfMaha<M>(samples, result.mean, input.covariance_at);
   setUncertified<M>(mean, result, result.covariance, showAMean<M>(samples, result.mean));
   setDispersion(mean, input, result.mean);
 }
@@ -218,6 +237,8 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   } else {
     detail::setBarycentre(mean, any, input, options);
   }
+  mean.noise_scaled = input.scale_noise && mean.known_noise && mean.hasCovariance() && mean.fit.tested();
+  if (mean.noise_scaled && !options.certificates) mean.covariance *= mean.fit.factor();
   if constexpr (std::is_same_v<M, S2<ScalarOf<M>>>) {
     const M y = featureOf<M>(mean.mean);
     mean.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>().template cast<double>();

@@ -27,6 +27,17 @@ struct Options {
 int runCommand(const Options& options, const Invocation& invocation) {
   const Measurements measurements = options.input.read("liestat mean");
   AnalysisOptions how = options.analysis;
+  const bool residuals = how.refuted_noise == RefutedNoise::residuals;
+  if ((how.birge || residuals) && !measurements.known_noise) {
+    throw OptionError(
+        "liestat mean",
+        how.birge ? "--birge without the measurements' noise" : "--refuted residuals without the measurements' noise",
+        "covariances in the file (columns cov_00 ...) that the mean uses");
+  }
+  if (residuals && measurements.criterion == Criterion::maha) {
+    throw OptionError("liestat mean", "--refuted residuals with maha, whose weights are the refuted covariances",
+                      "--criterion lsq or wlsq");
+  }
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
   Progress progress("searching for other means", 1000);
@@ -88,6 +99,11 @@ void addMeanCommand(const CommandList& app) {
       .option("--budget", options->analysis.budget,
               "Looks of branch and bound at measurements or bins of them, some 30 ns each (default 100000000)")
       .range(std::size_t{1}, std::size_t{1000000000000});
+  command.choice("--refuted", options->analysis.refuted_noise,
+                 {{"withheld", RefutedNoise::withheld}, {"residuals", RefutedNoise::residuals}},
+                 "The covariance where the scatter refutes the file's: withheld (default) or from the residuals");
+  command.flag("--birge", options->analysis.birge,
+               "Multiply the covariance by Birge's factor where the measurements scatter more than the file's say");
   command.flag("--inflate", options->analysis.inflate,
                "Multiply the covariance by the factor by which blocks of time disagree");
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);

@@ -41,8 +41,10 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   how.uniqueness.stop = options.stop;
   how.uniqueness.branch_and_bound = options.certify;
   how.uniqueness.budget = options.budget;
-  MeanAnalysis analysis{
-      summarizedMean(experiments::ProgramExecutor{options.threads}, meanInput(measurements, features), how)};
+  MeanInput<M> input = meanInput(measurements, features);
+  input.refuted_noise = options.refuted_noise;
+  input.scale_noise = options.birge;
+  MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];
   if (options.charts) setCharts<ChartOf<M>>(measurements, analysis);

@@ -26,6 +26,8 @@ struct AnalysisOptions {
   bool charts = false;                              ///< for a report
   std::function<void(double)> progress = {};        ///< is told which part of that budget is spent
   std::function<bool()> stop = {};                  ///< ends that search once it says true
+  RefutedNoise refuted_noise = RefutedNoise::withheld;  ///< what becomes of the file's covariances once refuted
+  bool birge = false;                                   ///< multiply the covariance by fit_factor
   bool inflate = false;                             ///< multiply the covariance by the factor of compareBlocks()
 };
 

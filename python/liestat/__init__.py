@@ -45,6 +45,7 @@ from ._files import (
 from ._gaussians import (
     CONVENTIONS,
     CounterRng,
+    FuseResult,
     Gaussian,
     ValidationReport,
     convert_covariance,
@@ -53,6 +54,7 @@ from ._gaussians import (
     random_directions,
     random_rotations,
     sample,
+    tested_fuse,
     validate,
 )
 from ._motion import motion

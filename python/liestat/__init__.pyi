@@ -1,6 +1,6 @@
 """Statistics on Lie groups and homogeneous manifolds over NumPy arrays."""
 
-from typing import Any, Callable, ClassVar, Iterable, Iterator, Literal, Self, Sequence, TypeVar, overload
+from typing import Any, Callable, ClassVar, Iterable, Iterator, Literal, NamedTuple, Self, Sequence, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -277,6 +277,8 @@ def mean(
     covariance_at: _CovarianceAt = None,
     likelihood: bool = False,
     times: ArrayLike | None = None,
+    refuted: Literal["withheld", "residuals"] = "withheld",
+    birge: bool = False,
     inflate: bool = False,
     budget: int | None = None,
     threads: int = 0,
@@ -318,6 +320,21 @@ def fuse(
     *,
     covariance_at: _CovarianceAt = None,
 ) -> Gaussian: ...
+class FuseResult(NamedTuple):
+    estimate: Gaussian
+    status: Any
+    fit: Any
+    fit_dof: int
+    fit_p: Any
+    fit_factor: Any
+
+def tested_fuse(
+    x: Manifold | Gaussian,
+    covariances: ArrayLike | None = None,
+    axis: _Axis = None,
+    *,
+    covariance_at: _CovarianceAt = None,
+) -> FuseResult: ...
 def convert_covariance(
     x: Manifold,
     covariance: ArrayLike,

@@ -3,6 +3,7 @@
 import math
 import numbers
 import warnings
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -310,6 +311,38 @@ def random_directions(size=None, rng=None):
     return S2.from_vector(_normals(rng, (*shape, 3), "random_directions"))
 
 
+def _fused(caller, x, covariances, axis, covariance_at):
+    """The type, shape of the results, their parameters and covariances, statuses, χ², degrees of freedom and p."""
+    if isinstance(x, Gaussian):
+        if covariances is not None:
+            raise TypeError(f"{caller}: a Gaussian has its covariances already")
+        x, covariances = x.mean, x.covariance
+    x = require_manifold(x, caller)
+    if covariances is None:
+        raise TypeError(f"{caller}: covariances are missing")
+    if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
+        raise ValueError(
+            f"{caller}: covariance_at: say 'measured' (covariances in the axes of each measurement) or 'estimated'"
+        )
+    kind = type(x)
+    if x.ndim == 0:
+        x = x.reshape(1)
+    axes = _axes(axis, x.ndim, caller)
+    k = (kind.dof, kind.dof)
+    c = np.broadcast_to(_covariances(covariances, f"{caller}: covariances", kind, x.shape), (*x.shape, *k))
+    features, lead = _grouped(require_finite(x.params, f"{caller}: x"), axes, x.ndim)
+    if features.shape[1] == 0:
+        raise ValueError(f"{caller}: x, shape {x.shape}: there are no features")
+    c = _grouped(c, axes, x.ndim)[0]
+    mean, covariance, statuses, chi2, p = _core.fuse(
+        kind._core_name,
+        np.ascontiguousarray(features),
+        np.ascontiguousarray(c),
+        covariance_at != "estimated",
+    )
+    return kind, lead, mean, covariance, np.array(statuses), chi2, kind.dof * (features.shape[1] - 1), p
+
+
 def fuse(x, covariances=None, axis=None, *, covariance_at=None):
     """Independent estimates of one feature, fused: the mean of least Mahalanobis distances with its covariance.
 
@@ -332,44 +365,54 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
     Warns
     -----
     UserWarning
-        Where the covariance is withheld (NaN): directions or rotations as scattered as uniform ones, or a criterion
-        that is flat where the truth may be.
+        Where the covariance is withheld (NaN): estimates that lie farther apart than their covariances say (`tested_fuse`
+        has the test), directions or rotations as scattered as uniform ones, or a criterion that is flat where the truth
+        may be.
     """
-    if isinstance(x, Gaussian):
-        if covariances is not None:
-            raise TypeError("fuse: a Gaussian has its covariances already")
-        x, covariances = x.mean, x.covariance
-    x = require_manifold(x, "fuse")
-    if covariances is None:
-        raise TypeError("fuse: covariances are missing")
-    if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
-        raise ValueError(
-            "fuse: covariance_at: say 'measured' (covariances in the axes of each measurement) or 'estimated'"
-        )
-    kind = type(x)
-    if x.ndim == 0:
-        x = x.reshape(1)
-    axes = _axes(axis, x.ndim, "fuse")
-    k = (kind.dof, kind.dof)
-    c = np.broadcast_to(_covariances(covariances, "fuse: covariances", kind, x.shape), (*x.shape, *k))
-    features, lead = _grouped(require_finite(x.params, "fuse: x"), axes, x.ndim)
-    if features.shape[1] == 0:
-        raise ValueError(f"fuse: x, shape {x.shape}: there are no features")
-    c = _grouped(c, axes, x.ndim)[0]
-    mean, covariance = _core.fuse(
-        kind._core_name,
-        np.ascontiguousarray(features),
-        np.ascontiguousarray(c),
-        covariance_at != "estimated",
-    )
+    kind, lead, mean, covariance, status, _, _, _ = _fused("fuse", x, covariances, axis, covariance_at)
+    refuted = status == "inconsistent"
+    covariance[refuted] = np.nan
     bad = int(np.count_nonzero(~np.isfinite(covariance).all(axis=(1, 2))))
     if bad:
-        warnings.warn(
-            f"liestat.fuse: no covariance of {bad} of {len(mean)} results: the measurements do not determine it",
-            UserWarning,
-            stacklevel=2,
-        )
-    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, *k))
+        n_refuted = int(np.count_nonzero(refuted))
+        why = "the measurements do not determine it"
+        if n_refuted:
+            why = "they lie farther apart than their covariances say"
+            if n_refuted < bad:
+                why += f" ({n_refuted}), or do not determine it ({bad - n_refuted})"
+        warnings.warn(f"liestat.fuse: no covariance of {bad} of {len(mean)} results: {why}", UserWarning, stacklevel=2)
+    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, kind.dof, kind.dof))
+
+
+class FuseResult(NamedTuple):
+    """What `tested_fuse` returns; arrays of the shape of the results, numbers for a single one."""
+
+    #: The means with their covariances, those of the stated covariances also where the fit refutes them.
+    estimate: Gaussian
+    #: 'ok', 'inconsistent', 'ill_defined', ...
+    status: Any
+    #: χ² of the estimates under their covariances.
+    fit: Any
+    #: Its degrees of freedom; 0 for a single estimate, which nothing tests.
+    fit_dof: int
+    #: Probability of so large a χ²; below 0.001 the covariances are refuted.
+    fit_p: Any
+    #: Birge's factor max(1, χ²/ν), by which the covariances are too small if all are so by the same factor.
+    fit_factor: Any
+
+
+def tested_fuse(x, covariances=None, axis=None, *, covariance_at=None):
+    """The same as `fuse`, with the test of the covariances by the scatter of the estimates, and without a warning.
+
+    Returns
+    -------
+    FuseResult
+    """
+    kind, lead, mean, covariance, status, chi2, dof, p = _fused("tested_fuse", x, covariances, axis, covariance_at)
+    factor = np.maximum(1, chi2 / dof) if dof > 0 else np.ones_like(chi2)
+    shaped = [array.reshape(lead)[()] for array in (status, chi2, p, factor)]
+    estimate = Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, kind.dof, kind.dof))
+    return FuseResult(estimate, str(shaped[0]) if lead == () else shaped[0], shaped[1], dof, shaped[2], shaped[3])
 
 
 def _tangent_of(value):

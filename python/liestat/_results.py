@@ -194,8 +194,9 @@ class MeanResult:
     covariance_from, covariance_law : str or None
         'noise' or 'residuals', and with it 'chi2' or 'hotelling'.
     status : str
-        'ok', 'ambiguous', 'ill_defined', 'too_few', 'not_converged', or 'not_applicable': there is a mean, but no
-        covariance of it can be computed.
+        'ok', 'ambiguous', 'ill_defined', 'inconsistent' (the features scatter more than the covariances that are stated
+        for them), 'too_few', 'not_converged', or 'not_applicable': there is a mean, but no covariance of it can be
+        computed.
     reason : str or None
         Why there is no covariance, in words; None if there is one.
     unique : Uniqueness

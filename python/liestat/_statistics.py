@@ -73,6 +73,8 @@ def mean(
     covariance_at=None,
     likelihood=False,
     times=None,
+    refuted="withheld",
+    birge=False,
     inflate=False,
     budget=None,
     threads=0,
@@ -107,6 +109,12 @@ def mean(
         Of the features, in whatever unit; broadcast to ``x.shape``. Halves of the features made of blocks of time then
         tell whether the errors of successive features are independent, as the covariance supposes (`time_blocks` of the
         result, with a note where they are not).
+    refuted : {'withheld', 'residuals'}
+        What becomes of the covariance where the features scatter more than `covariances` say (`fit_p` below 0.001): it
+        is withheld, with status 'inconsistent', or it is computed from the residuals. Not for 'maha', whose weights are
+        the refuted covariances.
+    birge : bool
+        Multiply a covariance from `covariances` that are not refuted by ``fit_factor``, max(1, χ²/ν).
     inflate : bool
         Multiply the covariance by the factor by which blocks of time disagree, where it is above one.
     budget : int, optional
@@ -138,8 +146,22 @@ def mean(
     )
     if inflate and times is None:
         raise ValueError("mean: inflate needs times")
+    if refuted not in ("withheld", "residuals"):
+        raise ValueError(f"mean: refuted: expected 'withheld' or 'residuals', got {refuted!r}")
+    if (birge or refuted == "residuals") and covariances is None:
+        raise ValueError(f"mean: {'birge' if birge else 'refuted'} needs covariances")
+    if refuted == "residuals" and criterion == "maha":
+        raise ValueError("mean: refuted='residuals': the weights of 'maha' are the refuted covariances; criterion 'lsq'")
     answers = [
-        _core.mean(**group, certify=bool(certify), inflate=bool(inflate), budget=int(budget or 0), threads=int(threads))
+        _core.mean(
+            **group,
+            residuals_if_refuted=refuted == "residuals",
+            birge=bool(birge),
+            certify=bool(certify),
+            inflate=bool(inflate),
+            budget=int(budget or 0),
+            threads=int(threads),
+        )
         for group in groups
     ]
     if inflate and any(a["time_blocks"] is None for a in answers):

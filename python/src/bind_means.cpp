@@ -67,11 +67,13 @@ MeanRequest requestOf(const std::string& criterion, const DoubleArray& features,
 
 py::dict mean(const std::string& type, const std::string& criterion, const DoubleArray& features,
               const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
-              bool covariances_at_measurement, bool likelihood, bool certify, bool inflate, std::size_t budget,
-              int threads) {
+              bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge, bool certify,
+              bool inflate, std::size_t budget, int threads) {
   const MeanType& means = typeOf(type);
   MeanRequest request =
       requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
+  request.refuted_noise = residuals_if_refuted ? RefutedNoise::residuals : RefutedNoise::withheld;
+  request.birge = birge;
   request.certify = certify;
   request.budget = budget;
   MeanSummary answer;
@@ -119,13 +121,15 @@ py::dict split(const std::string& type, const std::string& criterion, const Doub
   return d;
 }
 
-/// Fuses groups of n features: features (g, n, p), covariances (g, n, k, k). Returns means (g, p), covariances (g, k, k).
+/// Fuses groups of n features: features (g, n, p), covariances (g, n, k, k). Returns means (g, p), covariances (g, k, k),
+/// the names of statuses, χ² and its p (g each).
 py::tuple fuse(const std::string& type, const DoubleArray& features, const DoubleArray& covariances,
                bool covariances_at_measurement) {
   const MeanType& means = typeOf(type);
   const py::ssize_t groups = features.shape(0), p = features.shape(2), k = covariances.shape(3);
   DoubleArray mean({groups, p});
   DoubleArray covariance({groups, k, k});
+  std::vector<TestedFuse> tests(static_cast<std::size_t>(groups));
   const auto of_group = [&](const DoubleArray& array, py::ssize_t i) {
     const std::span<const double> all = numbers(array);
     const std::size_t size = all.size() / static_cast<std::size_t>(groups);
@@ -141,11 +145,18 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
       request.features = of_group(features, i);
       request.covariances = of_group(covariances, i);
       request.covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated;
-      means.fuse(request, mean_out + i * p, covariance_out + i * k * k);
+      tests[static_cast<std::size_t>(i)] = means.fuse(request, mean_out + i * p, covariance_out + i * k * k);
       signals.look();
     }
   }
-  return py::make_tuple(mean, covariance);
+  py::list statuses;
+  std::vector<double> chi2, p_values;
+  for (const TestedFuse& test : tests) {
+    statuses.append(name(test.status));
+    chi2.push_back(test.fit.chi2);
+    p_values.push_back(test.fit.p);
+  }
+  return py::make_tuple(mean, covariance, statuses, arrayOf(chi2, {groups}), arrayOf(p_values, {groups}));
 }
 
 }  // namespace
@@ -153,7 +164,8 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
 void bindMeans(py::module_& module) {
   using namespace py::literals;
   module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
-             "covariances_at_measurement"_a, "likelihood"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
+             "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a, "certify"_a,
+             "inflate"_a, "budget"_a, "threads"_a);
   py::list fields;
   for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
   module.attr("mean_fields") = fields;

@@ -42,7 +42,9 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
                      .features = features.list(),
                      .weights = request.weights,
                      .covariance_at = request.covariance_at,
-                     .likelihood = request.likelihood};
+                     .likelihood = request.likelihood,
+                     .refuted_noise = request.refuted_noise,
+                     .scale_noise = request.birge};
   for (std::size_t i = 0; i + k * k <= request.covariances.size(); i += k * k) {
     input.covariances.push_back(square<ManifoldTraits<M>::DoF>(request.covariances.data() + i));
   }
@@ -60,11 +62,12 @@ MeanSummary meanOf(const MeanRequest& request, SignalWatch& signals) {
 }
 
 template <class M>
-void fuseFeatures(const MeanRequest& request, double* mean, double* covariance) {
+TestedFuse fuseFeatures(const MeanRequest& request, double* mean, double* covariance) {
   const Features<M> features(request.features);
-  const Gaussian<M> result = fuse(inputOf(request, features).gaussians(), request.covariance_at);
-  storePoint(result.mean, mean);
-  store(result.covariance, covariance);
+  const FuseResult<M> result = testedFuse(inputOf(request, features).gaussians(), request.covariance_at);
+  storePoint(result.estimate.mean, mean);
+  store(result.estimate.covariance, covariance);
+  return {result.status, result.fit};
 }
 
 template <class M>

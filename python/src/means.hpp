@@ -24,6 +24,8 @@ struct MeanRequest {
   std::span<const double> times;        ///< one for each feature, or empty
   CovarianceAt covariance_at = CovarianceAt::measured;
   bool likelihood = false;
+  RefutedNoise refuted_noise = RefutedNoise::withheld;
+  bool birge = false;  ///< multiply by Birge's factor
   bool certify = true;
   std::size_t budget = 0;  ///< limit of the search; 0: the library's
   int threads = 0;
@@ -33,9 +35,12 @@ struct MeanRequest {
 using MeanFunction = MeanSummary (*)(const MeanRequest&, SignalWatch&);
 /// splitMean() of a type.
 using SplitFunction = SplitSummary (*)(const MeanRequest&, SignalWatch&, const SplitOptions&);
-/// fuse() of features with covariances: writes the mean's parameters and its covariance, NaN where it is not to be
-/// trusted.
-using FuseFunction = void (*)(const MeanRequest&, double* mean, double* covariance);
+/// testedFuse() of features with covariances: writes the mean's parameters and its covariance.
+struct TestedFuse {
+  Status status = Status::too_few;
+  NoiseFit fit;
+};
+using FuseFunction = TestedFuse (*)(const MeanRequest&, double* mean, double* covariance);
 
 /// A type whose means are compiled in.
 struct MeanType {

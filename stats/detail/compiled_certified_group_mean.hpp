@@ -8,7 +8,7 @@
 
 #define LIESTAT_INSTANTIATE_CERTIFIED_GROUP_MEAN(instantiate, G) \
   instantiate CertifiedGroupMean<G> findCertifiedGroupMean<G>(   \
-      const AnyExecutor&, const Samples<G>&, const Samples<double>&, const CertifiedGroupMeanOptions&)
+      const AnyExecutor&, const Samples<G>&, const Samples<double>&, const CertifiedGroupMeanOptions<G>&)
 
 namespace liestat::detail {
 

@@ -7,7 +7,7 @@
 #define LIESTAT_INSTANTIATE_MAHA(instantiate, M)                                                              \
   instantiate MahaResult<M> mahalanobisMean<M>(const AnyExecutor&, const Samples<Gaussian<M>>&, CovarianceAt, \
                                                const MahaOptions<M>&);                                        \
-  instantiate Gaussian<M> fused<M>(const Samples<Gaussian<M>>&, CovarianceAt)
+  instantiate FuseResult<M> fused<M>(const Samples<Gaussian<M>>&, CovarianceAt)
 
 namespace liestat::detail {
 

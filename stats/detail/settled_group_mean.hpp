@@ -14,19 +14,25 @@ namespace liestat::detail {
 
 template <LieGroup G>
 struct SettledGroupMean {
-  SquareOf<G> covariance;
-  double change = 0;  ///< relative change of the equations' derivative
+  SquareOf<G> first;       ///< from the equations at the mean
+  SquareOf<G> covariance;  ///< from the averaged ones
+  SquareOf<G> jacobian;    ///< the averaged equations' derivative
+  double change = 0;       ///< its relative change
   bool settled = false;
 };
 
-template <LieGroup G, class R, class W>
+/// `covariance_of` a barycentre with its jacobian.
+template <LieGroup G, class R, class W, class Covariance>
 SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const GroupMeanResult<G>& mean,
-                                    double largest_change) {
+                                    double largest_change, const Covariance& covariance_of) {
   using S = ScalarOf<G>;
   constexpr int D = G::DoF;
   constexpr auto angular = angularCoordinates<G>();
   constexpr int K = angular.count;
-  SettledGroupMean<G> settled{mean.covarianceFromResiduals(), 0, true};
+  SettledGroupMean<G> settled{covariance_of(mean), {}, mean.jacobian, 0, true};
+  settled.covariance = settled.first;
+  // A single element is its own mean, with the covariance that it came with.
+  if (mean.n == 1) return settled;
   if constexpr (K > 0) {
     using Matrix = Eigen::Matrix<double, D, D>;
     const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
@@ -71,8 +77,8 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
       if (!relative.allFinite()) return settled;
       settled.change = 1 - SymmetricEigen(Matrix(0.5 * (relative + relative.transpose()))).values[0];
       if (!(settled.change <= largest_change)) return settled;
-      averaged.jacobian = jacobian.template cast<S>();
-      const SquareOf<G> next = averaged.covarianceFromResiduals();
+      averaged.jacobian = settled.jacobian = jacobian.template cast<S>();
+      const SquareOf<G> next = covariance_of(averaged);
       if (!next.allFinite()) return settled;
       const double step = static_cast<double>((next - settled.covariance).norm());
       const double size = static_cast<double>(settled.covariance.norm());

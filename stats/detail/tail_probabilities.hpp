@@ -41,20 +41,30 @@ inline double hotellingTail(double t2, int k, double n) {
   return incompleteBeta(0.5 * (n - k), 0.5 * k, 1 / (1 + t2 / (n - 1)));
 }
 
-/// P(χ²ₙ > x) for x that is not too far out for a number (then 0); 1 for n = 0, NaN for NaN.
+/// P(χ²ₙ > x), of relative precision some 1e-14 √n also where it is tiny; 1 for n = 0, NaN for NaN.
 inline double chiSquaredTail(double x, std::size_t n) {
   if (n == 0 || x <= 0) return 1;
-  // Q(x, n + 2) = Q(x, n) + (x/2)^(n/2) exp(-x/2) / Γ(n/2 + 1).
-  const double half = 0.5 * x;
-  const bool odd = n % 2 == 1;
-  double tail = odd ? std::erfc(std::sqrt(half)) : std::exp(-half);
-  double log_factorial = odd ? std::lgamma(1.5) : 0;  // log Γ(k/2 + 1)
-  for (std::size_t k = odd ? 1 : 2; k < n; k += 2) {
-    const double power = 0.5 * static_cast<double>(k);
-    if (k > 2) log_factorial += std::log(power);
-    tail += std::exp(power * std::log(half) - half - log_factorial);
+  if (std::isnan(x)) return x;
+  if (std::isinf(x)) return 0;
+  const double a = 0.5 * static_cast<double>(n), half = 0.5 * x;
+  const double front = std::exp(a * std::log(half) - half - std::lgamma(a));
+  constexpr double eps = std::numeric_limits<double>::epsilon();
+  constexpr int most = 1'000'000;  // terms; some √a are needed where a series is slow
+  if (half < a + 1) {
+    double term = 1 / a, sum = term;
+    for (int m = 1; m < most && term > eps * sum; ++m) term *= half / (a + m), sum += term;
+    return std::max(0.0, 1 - front * sum);
   }
-  return tail;
+  // Lentz's continued fraction of the upper incomplete gamma function.
+  double b = half + 1 - a, c = 1e300, d = 1 / b, fraction = d;
+  for (int m = 1; m < most; ++m) {
+    const double an = -m * (m - a);
+    b += 2;
+    d = 1 / (an * d + b), c = b + an / c;
+    fraction *= c * d;
+    if (std::abs(c * d - 1) < eps) break;
+  }
+  return front * fraction;
 }
 
 /// A bound of the probability that the mean of n numbers exceeds x which each follow χ²ₖ, however they depend on each other.

@@ -68,7 +68,7 @@ TEST(ScatteredFeatures, barycentresOfPoses) {
       CounterRng rng(17, t);
       std::vector<SE3d> samples;
       for (int i = 0; i < 30; ++i) samples.push_back(pose(law, rng));
-      CertifiedGroupMeanOptions options;
+      CertifiedGroupMeanOptions<SE3d> options;
       options.uniqueness.budget = 200'000;
       const auto result = certifiedGroupMean(samples, options);
       const bool inside =
