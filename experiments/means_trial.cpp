@@ -157,8 +157,11 @@ void mahalanobisMeans(const MeansExperiment& experiment, const Scene<M>& scene, 
   constexpr bool measured_only = ManifoldTraits<M>::Group::DoF != ManifoldTraits<M>::DoF;
   const CovarianceAt at = measured_only ? CovarianceAt::measured : experiment.covariance_at;
   const auto from = [&](const M& start) {
-    const MahaOptions<M> options{
-        .method = experiment.maha_method, .tolerance = 1e-10, .start = start, .likelihood = experiment.maha_likelihood};
+    const MahaOptions<M> options{.method = experiment.maha_method,
+                                 .tolerance = 1e-10,
+                                 .start = start,
+                                 .likelihood = experiment.maha_likelihood,
+                                 .refutation_level = 0};
     return corrected ? maha(scene.attached, at, options) : printed::maha(scene.attached, options);
   };
   MahaResult<M> best = from(scene.measurements.front());

@@ -6,6 +6,7 @@
 #include <fusion/status.hpp>
 #include <lie/se3.hpp>
 #include <lie/units.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/shown.hpp>
 #include <stats/verdict.hpp>
@@ -41,7 +42,7 @@ struct HandEyeOptions {
   /// The excitation from which on a direction is estimated, and that below which noise alone explains it.
   double trusted_excitation = 10, min_excitation = 3;
   /// The fit is `inconsistent` if the probability of exceeding its χ² is smaller.
-  double min_p = 1e-3;
+  double min_p = refutation_level;
   std::uint64_t seed = 1;  ///< seed of the fixed starts and samples
 };
 

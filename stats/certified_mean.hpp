@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stats/detail/any_executor.hpp>
+#include <stats/detail/fit_to_noise.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/concentration.hpp>

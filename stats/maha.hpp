@@ -63,7 +63,37 @@ struct RequireGaussians {
 
 }  // namespace detail
 
-/// Mahalanobis mean of a range of Gaussian<M>. Status ill_defined if a covariance is not positive definite, too_few for
+/// Squared Mahalanobis distance of a measurement from a mean; `at` is the frame of its covariance.
+template <Homogeneous M>
+ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
+  const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
+  return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
+}
+
+namespace detail {
+
+/// The χ² of measurements about their Mahalanobis mean.
+template <Homogeneous M, class R>
+NoiseFit fitOfMaha(const R& samples, const M& mean, CovarianceAt at) {
+  double chi2 = 0;
+  for (const Gaussian<M>& g : samples) chi2 += static_cast<double>(mahalanobisSquared(g, mean, at));
+  return NoiseFit::of(chi2, ManifoldTraits<M>::DoF * (static_cast<double>(std::ranges::size(samples)) - 1));
+}
+
+/// A Mahalanobis mean with the test of its covariances.
+template <Homogeneous M, Executor E, class R>
+MahaResult<M> testedMaha(const E& executor, const R& samples, CovarianceAt at, const MahaOptions<M>& options) {
+  MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, options);
+  if (result.status != Status::ok) return result;
+  result.fit = fitOfMaha<M>(samples, result.mean, at);
+  if (result.fit.refuted(options.refutation_level)) result.status = Status::inconsistent;
+  return result;
+}
+
+}  // namespace detail
+
+/// Mahalanobis mean of a range of Gaussian<M>. Status inconsistent, with the covariance that the refuted ones give, if the
+/// measurements scatter more than they say; ill_defined if a covariance is not positive definite, too_few for
 /// an empty range, not_converged if the data are not finite, not_applicable for CovarianceAt::estimated with an
 /// anisotropic covariance on a manifold without a continuous placement (directions) and for likelihood where a user's
 /// manifold has no logVolume.
@@ -71,7 +101,7 @@ template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R
 MahaResult<M> maha(const E& executor, R&& samples, CovarianceAt at,
                    const MahaOptions<std::type_identity_t<M>>& options = {}) {
   if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::mahalanobisMean<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
+    return detail::testedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
   } else {
     return {};
   }
@@ -90,13 +120,6 @@ MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& opti
   }
 }
 
-/// Squared Mahalanobis distance of a measurement from a mean; `at` is the frame of its covariance.
-template <Homogeneous M>
-ScalarOf<M> mahalanobisSquared(const Gaussian<M>& measurement, const M& mean, CovarianceAt at) {
-  const TangentOf<M> z = at == CovarianceAt::measured ? log(measurement.mean, mean) : log(mean, measurement.mean);
-  return mahalanobisSquared<ScalarOf<M>, ManifoldTraits<M>::DoF>(z, measurement.covariance);
-}
-
 /// What testedFuse() returns.
 template <Homogeneous M>
 struct FuseResult {
@@ -111,26 +134,16 @@ struct FuseResult {
 
 namespace detail {
 
-/// The χ² of measurements about their Mahalanobis mean.
-template <Homogeneous M, class R>
-NoiseFit fitOfMaha(const R& samples, const M& mean, CovarianceAt at) {
-  double chi2 = 0;
-  for (const Gaussian<M>& g : samples) chi2 += static_cast<double>(mahalanobisSquared(g, mean, at));
-  return NoiseFit::of(chi2, ManifoldTraits<M>::DoF * (static_cast<double>(std::ranges::size(samples)) - 1));
-}
-
 template <Homogeneous M, class R>
 FuseResult<M> fused(const R& samples, CovarianceAt at) {
   const SerialExecutor serial;
   const AnyExecutor executor(serial);
-  const MahaResult<M> found = mahalanobisMean<M>(executor, samples, at, {});
-  FuseResult<M> result{found.estimate(), found.status, {}};
-  if (found.status != Status::ok) return result;
-  result.fit = fitOfMaha<M>(samples, found.mean, at);
+  const MahaResult<M> found = testedMaha<M>(executor, samples, at, {});
+  FuseResult<M> result{found.estimate(), found.status, found.fit};
+  if (!converged(found.status) || found.status == Status::ill_defined) return result;
   const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, found, largest_hessian_change);
   if (settled.settled && showAMean<M>(samples, found.mean)) {
     result.estimate.covariance = settled.covariance;
-    if (result.fit.refuted()) result.status = Status::inconsistent;
   } else {
     result.estimate.covariance.setConstant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
     result.status = Status::ill_defined;

@@ -4,6 +4,7 @@
 #include <lie/manifold.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/gaussian.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/status.hpp>
 
 #include <cmath>
@@ -33,6 +34,7 @@ struct MahaOptions {
   std::optional<M> start = {};
   /// Adds the log-determinant of the volume element: the maximum likelihood of noise that is Gaussian in the chart.
   bool likelihood = false;
+  double refutation_level = liestat::refutation_level;  ///< a less probable fit refutes the covariances; 0: none does
 };
 
 /// The result of maha(). Matrices are in the local frame at the mean.
@@ -49,6 +51,7 @@ struct MahaResult {
   SquareOf<M> gauss_newton = SquareOf<M>::Zero();  ///< Σ Jᵀ S⁻¹ J
   /// H⁻¹ H_GN H⁻¹, or H⁻¹ with likelihood (docs/theory/means.md, section 4.3); NaN where H is not positive definite.
   SquareOf<M> covariance = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  NoiseFit fit;  ///< Σ μ_i², of k (n - 1) degrees of freedom, where the iteration converged
 
   /// Mean and covariance together.
   Gaussian<M> estimate() const { return {mean, covariance}; }

@@ -208,7 +208,7 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
   MahaOptions<M> how;
   how.likelihood = input.likelihood;
   const MahaResult<M> result = maha(executor, samples, input.covariance_at, how);
-  if (converged(result.status)) mean.fit = fitOfMaha<M>(samples, result.mean, input.covariance_at);
+  mean.fit = result.fit;
   setUncertified<M>(mean, result, result.covariance, showAMean<M>(samples, result.mean));
   setDispersion(mean, input, result.mean);
 }

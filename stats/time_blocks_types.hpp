@@ -1,6 +1,7 @@
 // The result of stats/time_blocks.hpp. (Needs the standard library alone.)
 #pragma once
 
+#include <stats/noise_fit.hpp>
 #include <stats/verdict.hpp>
 #include <stats/words.hpp>
 
@@ -13,7 +14,7 @@
 namespace liestat {
 
 /// Below this p the errors of successive rows are called dependent.
-inline constexpr double dependent_rows = 1e-3;
+inline constexpr double dependent_rows = refutation_level;
 
 /// Measurements with times: whether halves made of blocks of time agree as well as the covariance of their mean says.
 struct TimeBlocks {

@@ -18,6 +18,7 @@
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/laws.hpp>
 #include <stats/words.hpp>
 
@@ -42,7 +43,7 @@ struct PoseResidual {
 };
 
 /// The level below which a test fires by default. Any of the seven fires falsely in less than one case in a hundred.
-inline constexpr double residual_test_level = 1e-3;
+inline constexpr double residual_test_level = refutation_level;
 
 /// The outcome of one test. NaN where it does not apply (too few residuals, or a covariance that is not positive definite).
 struct ResidualTest {

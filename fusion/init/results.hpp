@@ -2,6 +2,7 @@
 // compiler more than the rest of the library. The closed form's results are in closed_form_types.hpp.
 #pragma once
 
+#include <stats/noise_fit.hpp>
 #include <fusion/imu/readings.hpp>
 #include <fusion/init/closed_form_types.hpp>
 #include <fusion/status.hpp>
@@ -144,7 +145,7 @@ struct RefinementResult {
 // initialiseRobustly(), in robust_initialisation.hpp
 
 /// Fused windows (window_fusion.hpp) that are as far apart with less than this probability contradict each other.
-inline constexpr double min_p_of_fusion = 1e-3;
+inline constexpr double min_p_of_fusion = refutation_level;
 /// The former name of min_p_of_fusion.
 [[deprecated("min_p_of_fusion")]] inline constexpr double least_p_of_fusion = min_p_of_fusion;
 

@@ -223,9 +223,12 @@ class MeanResult:
     cut_locus_mass, hessian_change : float
         Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the
         confidence region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
-    fit, fit_dof, fit_p : float or None
-        Sum of squared Mahalanobis distances for 'maha', χ² with `fit_dof` degrees of freedom if the covariances are
-        right, and the probability of so large a sum; None (NaN in an array) for the other criteria.
+    fit, fit_dof, fit_p, fit_factor : float or None
+        χ² of the features under the covariances that are stated for them, its degrees of freedom, the probability of so
+        large a χ² (below 0.001 the covariances are refuted) and Birge's factor max(1, χ²/ν); None (NaN in an array)
+        where nothing was tested.
+    noise_scaled : bool
+        The covariance is multiplied by Birge's factor.
     time_blocks : dict or None
         With `times`: the factor by which the covariance is too small since the errors of successive features depend on
         each other, `factor`, with its 95 % interval, `p`, and whether it was `applied`.
@@ -283,7 +286,7 @@ class MeanResult:
         if name in ("covariance", "dispersion"):
             nan = np.full((k, k), np.nan)
             return _array([nan if m is None else m for m in parts], (*shape, k, k))
-        if name in ("fit", "fit_dof", "fit_p"):
+        if name in ("fit", "fit_dof", "fit_p", "fit_factor"):
             return _array([np.nan if v is None else v for v in parts], shape)
         if name != "unique" and parts and all(isinstance(v, (bool, int, float, str)) for v in parts):
             return np.array(parts).reshape(shape)

@@ -139,6 +139,16 @@ class Fusion(unittest.TestCase):
         with self.assertWarnsRegex(UserWarning, "no covariance of 1 of 1"):
             fused = liestat.fuse(opposite, 2 * np.eye(3))
         self.assertTrue(np.isnan(fused.covariance).all())
+        far = SO3.exp([[0, 0, 0], [0, 0, 1], [0, 1, 0]])
+        with self.assertWarnsRegex(UserWarning, "farther apart than their covariances say"):
+            fused = liestat.fuse(far, 1e-4 * np.eye(3))
+        self.assertTrue(np.isnan(fused.covariance).all())
+        tested = liestat.tested_fuse(far, 1e-4 * np.eye(3))
+        self.assertEqual((tested.status, tested.fit_dof), ("inconsistent", 6))
+        self.assertLess(tested.fit_p, 1e-3)
+        self.assertAlmostEqual(tested.fit_factor, tested.fit / 6)
+        self.assertTrue(tested.estimate.mean.allclose(fused.mean, 1e-12))
+        self.assertTrue(np.isfinite(tested.estimate.covariance).all())
         with self.assertRaisesRegex(ValueError, "covariance_at"):
             liestat.fuse(Frame3.identity(3), np.eye(6))
         with self.assertRaisesRegex(ValueError, "no features"):

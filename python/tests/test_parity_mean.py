@@ -123,6 +123,26 @@ class MeanParity(ParityTest):
         json, result = self.assert_equal_means(path, use=["covariances"])
         self.assertIn("scatter more than their covariances say", result.notes[-1])
         self.assertLess(json["fit_p"], 1e-3)
+        self.assertEqual((json["status"], json["covariance"]), ("inconsistent", None))
+        json, _ = self.assert_equal_means(
+            path, ("--criterion", "lsq", "--refuted", "residuals"), use=["covariances"], criterion="lsq",
+            refuted="residuals",
+        )
+        self.assertEqual((json["status"], json["covariance_from"]), ("ok", "residuals"))
+        with self.assertRaisesRegex(ValueError, "refuted"):
+            liestat.mean(liestat.R3(rows[:, :3]), covariances=0.01 * np.eye(3), criterion="maha", refuted="residuals")
+
+    def test_birges_factor(self):
+        """Covariances that say half of the variance of few measurements: doubtful, not refuted."""
+        rows = np.column_stack([[[0, 0, 0], [2, 0, 0], [0, 2.2, 0]], np.tile([0.5, 0, 0, 0.5, 0, 0.5], (3, 1))])
+        path = self.table("x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22", rows)
+        plain, _ = self.assert_equal_means(path, use=["covariances"])
+        scaled, _ = self.assert_equal_means(path, ("--birge",), use=["covariances"], birge=True)
+        self.assertEqual((plain["status"], plain["noise_scaled"], scaled["noise_scaled"]), ("ok", False, True))
+        self.assertIn("Birge's factor", plain["notes"][-1])
+        np.testing.assert_allclose(
+            np.array(scaled["covariance"]), plain["fit_factor"] * np.array(plain["covariance"]), rtol=1e-12
+        )
 
     def test_ambiguous(self):
         path = self.written("rx,ry,rz\n0,0,1.5707963267948966\n0,0,-1.5707963267948966\n")

@@ -96,7 +96,7 @@ NamedNumbers frontDoors(const E& executor) {
   numbers.addCertified("certifiedGroupMean", certifiedGroupMean(executor, poses, weights));
   const auto certified = certifiedMaha(executor, measured, CovarianceAt::measured);
   numbers.addCertified("certifiedMaha", certified);
-  numbers.add("certifiedMaha.fit", certified.fit);
+  numbers.add("certifiedMaha.fit", certified.fit.chi2);
   return numbers.list();
 }
 

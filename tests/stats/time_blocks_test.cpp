@@ -163,8 +163,8 @@ TEST(MeanNotes, SayWhatIsRemarkable) {
   // Covariances that say a quarter of the variance: four times the expected distance, p below poor_fit.
   EXPECT_TRUE(says(noted(points, {}, {50, 0.25 * SquareOf<Point>::Identity()}), "scatter more than their covariances"));
   const MeanSummary right = noted(points, {}, {50, SquareOf<Point>::Identity()});
-  EXPECT_FALSE(says(right, "scatter more")) << right.fit << " of " << right.fit_dof;
-  EXPECT_EQ(right.fit_dof, 147);
+  EXPECT_FALSE(says(right, "scatter more")) << right.fit.chi2 << " of " << right.fit.degrees_of_freedom;
+  EXPECT_EQ(right.fit.degrees_of_freedom, 147);
 }
 
 TEST(SplitOutcome, VerdictHasThreeAnswers) {

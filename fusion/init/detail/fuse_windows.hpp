@@ -119,7 +119,7 @@ LIESTAT_FUSION_INLINE WindowFusion::Meeting WindowFusion::meet(const WindowState
   Meeting meeting;
   const std::array<Gaussian<InertialState>, 2> both{carried(state_, since, gravity_), window.first};
   const MahaResult<InertialState> mean =
-      maha(both, CovarianceAt::measured, {.tolerance = 1e-7, .start = window.first.mean});
+      maha(both, CovarianceAt::measured, {.tolerance = 1e-7, .start = window.first.mean, .refutation_level = 0});
   meeting.status = mean.status;
   if (mean.status != Status::ok) return meeting;
   meeting.chi2 = 2 * mean.cost;
