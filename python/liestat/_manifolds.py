@@ -516,12 +516,14 @@ class SO3(_Metric, Group, core="SO3"):
         ----------
         matrix : array_like, shape (..., 3, 3)
         fit : bool
-            Take any matrix, and the rotation nearest to it in the Frobenius norm. Otherwise a matrix that is not a
-            rotation to 1e-6 is an error.
+            Take any matrix that has one nearest rotation in the Frobenius norm, and that one. Zeros, a matrix of rank one
+            and a reflection have many. Otherwise a matrix that is not a rotation to 1e-6 is an error.
         """
         name = "SO3.from_matrix: matrix"
         m = require_finite(as_numbers(matrix, name, (3, 3)), name)
-        if not fit:
+        if fit:
+            _require_one_nearest(m, name)
+        else:
             _require_rotations(m, name)
         operation = cls._operations["fit_matrix" if fit else "from_matrix"]
         return cls._of(operate(operation, "SO3.from_matrix", [("matrix", m, (3, 3))], (4,)))
@@ -560,21 +562,37 @@ class SO3(_Metric, Group, core="SO3"):
 
     @classmethod
     def from_euler(cls, seq, angles, *, degrees=False):
-        """From three Euler angles.
+        """From one to three Euler angles.
 
         Parameters
         ----------
         seq : str
-            Three axes: capitals are intrinsic, lower case extrinsic, as in SciPy.
-        angles : array_like, shape (..., 3)
-            rad, or degrees.
+            One to three axes: capitals are intrinsic, lower case extrinsic, as in SciPy.
+        angles : array_like, shape (..., 3), (..., 2), or for one axis any shape
+            rad, or degrees. For one axis a last dimension of one beside others is dropped, as by SciPy.
         """
+        if isinstance(seq, str) and len(seq) in (1, 2) and (seq.isupper() or seq.islower()):
+            return cls._from_few_angles(seq, angles, degrees)
         axes, reverse = cls._axes(seq)
         a = as_numbers(angles, "SO3.from_euler: angles", (3,))
         a = np.deg2rad(a) if degrees else a
         a = a[..., ::-1] if reverse else a
         operands = [("angles", a, (3,)), ("axes", axes, ())]
         return cls._of(operate(cls._operations["from_euler"], "SO3.from_euler", operands, (4,)))
+
+    @classmethod
+    def _from_few_angles(cls, seq, angles, degrees):
+        axes = seq.lower()
+        if not set(axes) <= set("xyz") or len(set(axes)) != len(axes):
+            raise ValueError(f"seq: {seq!r} repeats an axis or names another one than x, y, z")
+        a = as_numbers(angles, "SO3.from_euler: angles", () if len(axes) == 1 else (2,))
+        a = np.deg2rad(a) if degrees else a
+        if len(axes) == 1 and not (a.ndim > 1 and a.shape[-1] == 1):
+            a = a[..., None]
+        turns = [cls.exp(a[..., i, None] * np.eye(3)["xyz".index(axis)]) for i, axis in enumerate(axes)]
+        if len(turns) == 1:
+            return turns[0]
+        return turns[0] * turns[1] if seq.isupper() else turns[1] * turns[0]
 
     def as_euler(self, seq, *, degrees=False):
         """Euler angles; the first and the last in [-pi, pi]. At gimbal lock both have the same absolute value.
@@ -614,6 +632,19 @@ def _require_rotations(m, name):
             f"{name}, shape {m.shape}: not a rotation matrix"
             + (f" at index {where}" if where else "")
             + " (SO3.from_matrix(m, fit=True) gives the nearest one)"
+        )
+
+
+def _require_one_nearest(m, name):
+    """Raises where the rotation nearest to a matrix is not unique: σ₂ + σ₃ sign(det) is zero."""
+    s = np.linalg.svd(m, compute_uv=False)
+    bad = ~(s[..., 1] + s[..., 2] * np.sign(np.linalg.det(m)) > 1e-12 * s[..., 0])
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(bad)[0]) if bad.shape else ()
+        raise ValueError(
+            f"{name}, shape {m.shape}: many rotations are as near"
+            + (f" at index {where}" if where else "")
+            + ": zeros, a matrix of rank one or a reflection has no nearest one"
         )
 
 

@@ -51,6 +51,13 @@ class AgainstSciPy(unittest.TestCase):
                     SO3.from_euler(sequence, self.x.as_euler(sequence)).as_matrix(), self.x.as_matrix(), atol=4e-15
                 )
         degrees = self.x.as_euler("ZYX", degrees=True)
+        for sequence in ("z", "X", "xy", "ZX"):
+            angles = self.v[:, 0] if len(sequence) == 1 else self.v[:, :2]
+            np.testing.assert_allclose(
+                SO3.from_euler(sequence, angles).as_matrix(), Rotation.from_euler(sequence, angles).as_matrix(), atol=4e-15
+            )
+        self.assertEqual(SO3.from_euler("z", 0.3).shape, ())
+        self.assertEqual(SO3.from_euler("z", [[0.3], [0.2]]).shape, (2,))
         back = SO3.from_euler("ZYX", degrees, degrees=True)
         np.testing.assert_allclose(back.as_matrix(), self.x.as_matrix(), atol=1e-14)
 
@@ -67,6 +74,11 @@ class AgainstSciPy(unittest.TestCase):
         self.assertTrue(SO3.from_matrix(m).allclose(self.x, 1e-14))
         scaled = 3 * m + 1e-3
         self.assertTrue(SO3.from_matrix(scaled, fit=True).allclose(self.x, 2e-3))
+        for matrix in (np.zeros((3, 3)), np.outer([1, 2, 3], [3, 1, 2]), np.diag([1.0, 1, -1]), -np.eye(3)):
+            with self.assertRaisesRegex(ValueError, "many rotations are as near"):
+                SO3.from_matrix(matrix, fit=True)
+        flat = SO3.from_matrix(self.x.as_matrix() * [1, 1, 0], fit=True)
+        self.assertTrue(flat.allclose(self.x, 1e-9))
         message = r"SO3.from_matrix: matrix, shape \(200, 3, 3\): not a rotation.*\(0,\)"
         with self.assertRaisesRegex(ValueError, message):
             SO3.from_matrix(scaled)
