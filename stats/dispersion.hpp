@@ -6,6 +6,7 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
+#include <stats/row_order.hpp>
 
 #include <cmath>
 #include <cstddef>
@@ -28,9 +29,28 @@ template <Homogeneous M>
 struct Dispersion {
   SquareOf<M> covariance = SquareOf<M>::Zero();  ///< Σ p_i z_i z_iᵀ / Σ p_i, z_i = log(y, x_i)
   std::vector<FarthestFeature> farthest = {};    ///< one for each of the type's tangent_parts, none if it says none
+  RowOrder order = {};                           ///< of the features as they came
 };
 
 namespace detail {
+
+/// Whitens the features' tangent vectors by the scatter of some thousand of them.
+template <Homogeneous M, class R>
+Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF> scatterOfSome(const R& samples,
+                                                            const typename ManifoldTraits<M>::Group& to_y) {
+  using T = ManifoldTraits<M>;
+  using S = ScalarOf<M>;
+  constexpr std::size_t some = 1000;
+  const std::size_t n = std::ranges::size(samples), stride = (n + some - 1) / some;
+  SquareOf<M> sum = SquareOf<M>::Zero();
+  for (std::size_t i = 0; i < n; i += stride) {
+    const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
+    sum += z * z.transpose();
+  }
+  // Directions without any scatter must not divide by zero.
+  const S least = S(16) * std::numeric_limits<S>::epsilon() * sum.trace();
+  return Cholesky<S, T::DoF>(sum + least * SquareOf<M>::Identity());
+}
 
 template <Homogeneous M, class R, class W>
 Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
@@ -45,9 +65,23 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   S weight(0);
   // Two features are equally far from their midpoint: rounding is not to choose.
   const double tie = 64 * static_cast<double>(std::numeric_limits<S>::epsilon());
-  for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {
+  const std::size_t n = std::ranges::size(samples);
+  const bool ordered = n >= RowOrder::min_rows;
+  const Cholesky<S, T::DoF> whitening =
+      ordered ? scatterOfSome<M>(samples, to_y) : Cholesky<S, T::DoF>(SquareOf<M>::Identity());
+  TangentOf<M> before = TangentOf<M>::Zero();
+  double lag = 0, squared_lags = 0, squares_of_rows = 0;
+  for (std::size_t i = 0; i < n; ++i) {
     const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
     const S p = S(weights[i]);
+    if (ordered) {
+      using std::sqrt;
+      const TangentOf<M> u = whitening.halfSolve(TangentOf<M>(sqrt(p) * z));
+      const double product = static_cast<double>(u.dot(before));
+      lag += product, squared_lags += product * product;
+      squares_of_rows += static_cast<double>(u.squaredNorm());
+      before = u;
+    }
     result.covariance += p * z * z.transpose();
     weight += p;
     for (FarthestFeature& f : result.farthest) {
@@ -60,6 +94,11 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
     }
   }
   result.covariance /= weight;
+  if (ordered && squared_lags > 0) {
+    // Errors about their own mean are correlated by -1/n.
+    lag += squares_of_rows / static_cast<double>(n);
+    result.order = {lag / squares_of_rows, lag / std::sqrt(squared_lags)};
+  }
   return result;
 }
 

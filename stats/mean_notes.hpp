@@ -35,6 +35,13 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.emplace_back(
         "the measurements do not vary in every direction: the covariance from the residuals is singular");
   }
+  if (mean.order.dependent() && mean.hasCovariance()) {
+    mean.notes.push_back("successive measurements err alike (correlation " + significant(mean.order.correlation, 2) +
+                         ", " + significant(mean.order.z, 2) +
+                         " standard deviations): the covariance supposes independent errors; if these fade from row to "
+                         "row it is about " +
+                         significant(mean.order.varianceFactor(), 2) + " times too small");
+  }
   if (mean.fit.p < doubtful_fit) {
     std::string note = "the measurements scatter more than their covariances say: " +
                        significant(mean.fit.chi2 / mean.fit.degrees_of_freedom, 4) +

@@ -6,6 +6,7 @@
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/noise_fit.hpp>
+#include <stats/row_order.hpp>
 #include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/time_blocks_types.hpp>
@@ -115,6 +116,7 @@ struct MeanSummary {
   NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
+  RowOrder order = {};                         ///< correlation of successive measurements
   std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
   std::vector<std::string> notes = {};         ///< remarks, in sentences
 
@@ -154,6 +156,8 @@ void describe(V& v, const MeanSummary& m) {
     "be "
     "computed");
   v("reason", where(m.status != Status::ok, m.reason), "in words, where status is not ok");
+  v("verdict", m.verdict().text, "a sentence: the mean with its certificate, or why it is not to be trusted");
+  v("trusted", m.trusted(), "the verdict: whether the mean may be used; unique says no more than its certificate");
   v("converged", m.converged)("iterations", m.iterations)("residual", m.residual, "norm of the last step");
   v("tolerance", m.tolerance, "of the norm of the last step")("mean", m.mean, "the parts that the feature has");
   v("covariance", where(has, m.covariance), "of the mean, in its own axes; null where it is withheld");
@@ -187,6 +191,8 @@ void describe(V& v, const MeanSummary& m) {
   v("fit_p", where(fits, m.fit.p), "probability of so large a χ²; below 0.001 the stated noise is refuted");
   v("fit_factor", where(fits, m.fit.factor()), "Birge's factor max(1, χ²/ν) of the stated covariances");
   v("noise_scaled", m.noise_scaled, "whether the covariance is multiplied by it");
+  v("lag_correlation", where(m.order.tested(), m.order.correlation), "of successive measurements' errors");
+  v("lag_z", where(m.order.tested(), m.order.z), "the same in standard deviations; above 2.45 a note says so");
   v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
   v("notes", m.notes, "what is remarkable, in sentences");
 }

@@ -131,6 +131,7 @@ void setDispersion(MeanSummary& mean, const MeanInput<M>& input, const M& y) {
   const Dispersion<M> dispersion =
       input.weights.empty() ? dispersionAbout(input.features, y) : dispersionAbout(input.features, input.weights, y);
   mean.dispersion = dispersion.covariance.template cast<double>();
+  mean.order = dispersion.order;
   for (const FarthestFeature& f : dispersion.farthest) {
     mean.farthest.push_back({f.block.part, f.distance, f.index});
   }

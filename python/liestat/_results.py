@@ -199,8 +199,11 @@ class MeanResult:
         computed.
     reason : str or None
         Why there is no covariance, in words; None if there is one.
+    verdict, trusted : str, bool
+        The verdict on the mean in a sentence, and as a word: what `status` and `unique` say together.
     unique : Uniqueness
-        The word 'unique', 'ambiguous' or 'not_certified'; true if it is 'unique'. An array of words for several means.
+        The certificate of the criterion's minimum, 'unique', 'ambiguous' or 'not_certified'; true if it is 'unique'. A
+        unique minimum may be a near tie, which `trusted` says. An array of words for several means.
     proof : str
         The certificate in words.
     rivals : the type of the features, shape (m,)

@@ -2,12 +2,17 @@
 #include <lie/rn.hpp>
 #include <lie/s2.hpp>
 #include <lie/so2.hpp>
+#include <lie/so3.hpp>
 #include <stats/concentration.hpp>
 #include <stats/covariance.hpp>
 #include <stats/dispersion.hpp>
+#include <stats/mean.hpp>
+#include <stats/random.hpp>
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <list>
 #include <vector>
@@ -131,6 +136,66 @@ TEST(Concentration, ofTwoAnglesByHand) {
   EXPECT_DOUBLE_EQ(about(0.9, {5, 5, 5, 5}).limit, detail::circleLaw().limit(4));
   EXPECT_DOUBLE_EQ(about(0.9, {5, 5, 5, 0}).limit, detail::circleLaw().limit(3));
   EXPECT_DOUBLE_EQ(about(0.9, {4, 2, 1, 1}).limit, detail::circleLaw().limit(64.0 / 22));
+}
+
+/// The fraction of samples of n rows that are called dependent; errors of a first-order autoregression.
+template <class M>
+double flagged(double rho, int n, int trials, bool heavy_tails = false) {
+  constexpr int k = ManifoldTraits<M>::DoF;
+  int dependent = 0;
+  for (int t = 0; t < trials; ++t) {
+    CounterRng rng(3, static_cast<std::uint64_t>(t));
+    TangentOf<M> e = rng.template normalVector<k>();
+    std::vector<M> rows;
+    for (int i = 0; i < n; ++i) {
+      TangentOf<M> w = rng.template normalVector<k>();
+      if (heavy_tails) w *= std::exp(rng.normal());
+      e = rho * e + std::sqrt(1 - rho * rho) * w;
+      rows.push_back(exp(ManifoldTraits<M>::origin(), TangentOf<M>(0.2 * e)));
+    }
+    dependent += dispersionAbout(rows, mean(rows).mean).order.dependent();
+  }
+  return static_cast<double>(dependent) / trials;
+}
+
+TEST(RowOrder, seesAutoregressions) {
+  constexpr int trials = 500;
+  const double margin = 4 * std::sqrt(0.99 * 0.01 / trials);
+  EXPECT_GE(flagged<SO2d>(0.5, 120, trials), 0.99 - margin);
+  EXPECT_GE(flagged<S2d>(0.5, 60, trials), 0.99 - margin);
+  EXPECT_GE(flagged<SO3d>(0.5, 50, trials), 0.99 - margin);
+  EXPECT_GE(flagged<SO2d>(0.9, 50, trials), 0.99 - margin);
+  EXPECT_GE(flagged<Frame3d>(0.9, 50, trials), 0.99 - margin);
+}
+
+TEST(RowOrder, independentRowsAreNotFlagged) {
+  constexpr int trials = 1000;
+  const double most = 0.01 + 4 * std::sqrt(0.99 * 0.01 / trials);
+  for (const bool heavy_tails : {false, true}) {
+    for (const int n : {25, 100}) {
+      EXPECT_LE(flagged<SO2d>(0, n, trials, heavy_tails), most) << n;
+      EXPECT_LE(flagged<SO3d>(0, n, trials, heavy_tails), most) << n;
+      EXPECT_LE(flagged<Frame3d>(0, n, trials, heavy_tails), most) << n;
+    }
+  }
+}
+
+TEST(RowOrder, saysTheCorrelation) {
+  CounterRng rng(7, 0);
+  std::vector<Eigen::Vector3d> rows;
+  Eigen::Vector3d e(0, 0, 0);
+  for (int i = 0; i < 20000; ++i) {
+    e = 0.6 * e + 0.8 * rng.normalVector<3>();
+    // Units that differ by factors of hundreds are whitened away.
+    rows.push_back({e.x(), 100 * e.y(), 0.01 * e.z()});
+  }
+  const RowOrder order = dispersionAbout(rows, mean(rows).mean).order;
+  EXPECT_NEAR(order.correlation, 0.6, 4 * 0.8 / std::sqrt(3 * 20000.0));
+  EXPECT_NEAR(order.varianceFactor(), 4, 0.15);
+  EXPECT_FALSE(dispersionAbout(std::vector<Eigen::Vector3d>(24, {1, 2, 3}), Eigen::Vector3d(0, 0, 0)).order.tested());
+  // All rows at the mean: there is nothing to compare.
+  EXPECT_FALSE(
+      dispersionAbout(std::vector<Eigen::Vector3d>(30, {1, 2, 3}), Eigen::Vector3d(1, 2, 3)).order.dependent());
 }
 
 }  // namespace

@@ -75,8 +75,8 @@ struct Scene {
 };
 
 template <class M>
-void addAll(std::vector<std::pair<std::string, Counts>>& all, const std::string& feature, int n, double sd, double understated, int trials,
-            std::uint64_t seed) {
+void addAll(std::vector<std::pair<std::string, Counts>>& all, const std::string& feature, int n, double sd,
+            double understated, int trials, std::uint64_t seed) {
   Counts lsq, wlsq, maha, fused;
   for (int t = 0; t < trials; ++t) {
     CounterRng rng(seed, static_cast<std::uint64_t>(t));
