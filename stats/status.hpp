@@ -9,13 +9,15 @@ enum class Status {
   not_converged,  ///< the iteration ended elsewhere: the budget ran out, or the data are not finite
   ambiguous,      ///< another feature explains the data as well
   ill_defined,    ///< the criterion has no smooth minimum; a covariance would be wrong and is withheld
+  inconsistent,   ///< the measurements refute the noise that is stated for them; a covariance from it is withheld
   too_few,        ///< fewer measurements than the estimate needs
   not_applicable  ///< the question has no answer for these data
 };
 
 /// True if an iteration that ended with this status found a minimum, whatever else there is to say about it.
 constexpr bool converged(Status status) {
-  return status == Status::ok || status == Status::ambiguous || status == Status::ill_defined;
+  return status == Status::ok || status == Status::ambiguous || status == Status::ill_defined ||
+         status == Status::inconsistent;
 }
 
 /// The name used in files and messages.
@@ -29,6 +31,8 @@ constexpr const char* name(Status status) {
       return "ambiguous";
     case Status::ill_defined:
       return "ill_defined";
+    case Status::inconsistent:
+      return "inconsistent";
     case Status::too_few:
       return "too_few";
     case Status::not_applicable:
