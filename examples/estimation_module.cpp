@@ -99,7 +99,9 @@ class LaneModel : public HierarchyModel<Measurement, Lane> {
     const auto [points, edgels] = byChannel(inliers);
     const auto on_points = measurements(points, point_noise, PointOnLane{camera_});
     const auto on_edgels = measurements(edgels, edgel_noise, EdgelOnLane{camera_});
-    ConstrainedEstimator estimator(start, zero_, ConstrainedOptions<Lane>{}, on_points, on_edgels);
+    // The hierarchy compares models by their χ²: one that does not fit is an answer, too.
+    ConstrainedEstimator estimator(start, zero_, ConstrainedOptions<Lane>{.noise = StatedNoise::trusted}, on_points,
+                                   on_edgels);
     while (estimator.iterate()) {
       if (stop && stop()) estimator.stop();
     }

@@ -106,7 +106,8 @@ ConicChannel conicChannel(const ConicScene& scene, double sigma) {
 }
 ConicEstimator estimatedConic(const ConicChannel& channel) {
   // Points without a conic through them do not come up; the estimator says what becomes of a start of zero.
-  ConicEstimator estimator(linearConic(channel.measurements).value_or(Conic::Zero()), UnitConic{}, {}, channel);
+  ConicEstimator estimator(linearConic(channel.measurements).value_or(Conic::Zero()), UnitConic{},
+                           {.noise = StatedNoise::trusted}, channel);
   while (estimator.iterate()) {
   }
   return estimator;
@@ -146,7 +147,7 @@ Outcomes rotationTrial(Experiment experiment, double noise_factor, CounterRng& r
   const double prior_sigma = noise_factor / std::sqrt(prior_information);
   if (numbers) {
     const RotationNumbers truth = rotationNumbers(scene.truth.matrix());
-    ConstrainedOptions<RotationNumbers> options;
+    ConstrainedOptions<RotationNumbers> options{.noise = StatedNoise::trusted};
     if (with_prior) {
       options.prior = ParameterPrior<RotationNumbers>{truth + prior_sigma * rng.normalVector<9>(),
                                                       prior_information * Eigen::Matrix<double, 9, 9>::Identity()};
@@ -156,7 +157,7 @@ Outcomes rotationTrial(Experiment experiment, double noise_factor, CounterRng& r
     return {outcome(r.ok() && r.free_parameters == 3, r.chi2, r.iterations),
             outcome(r.ok(), squaredDistance(truth - r.parameter, r.covariance, 3), r.iterations)};
   }
-  ConstrainedOptions<SO3d> options;
+  ConstrainedOptions<SO3d> options{.noise = StatedNoise::trusted};
   if (with_prior) {
     const Eigen::Vector3d error = prior_sigma * rng.normalVector<3>();
     options.prior = ParameterPrior<SO3d>{exp(scene.truth, error), prior_information * Eigen::Matrix3d::Identity()};

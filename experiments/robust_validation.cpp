@@ -77,7 +77,7 @@ struct ConicModel {
   }
   ConstrainedResult<Conic> estimate(const Conic& q, std::span<const std::size_t> inliers) const {
     const ConicChannel channel{selected(scene.points, inliers), {IsotropicNoise<2>(conic_sigma)}, {OnConic{}}, {}};
-    ConicEstimator estimator(q, UnitConic{}, {}, channel);
+    ConicEstimator estimator(q, UnitConic{}, {.noise = StatedNoise::trusted}, channel);
     while (estimator.iterate()) {
     }
     return estimator.result();

@@ -211,6 +211,10 @@ class ConstrainedEstimator {
     result_.uninformative = found.uninformative;
     result_.unobservable = found.unobservable;
     result_.unobservable_basis = detail::fromRows<N, N>(found.unobservable_basis.data());
+    result_.determined_covariance = detail::fromRows<N, N>(found.determined_covariance.data());
+    result_.fit_p = found.fit_p;
+    result_.active_bounds = found.active_bounds;
+    result_.minimum_checked = found.minimum_checked;
   }
 
   Problem problem_;

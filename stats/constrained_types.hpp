@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -20,6 +21,8 @@ enum class ConstrainedEnd {
   capped,         ///< no iterations left
   stalled,        ///< no step along the direction that was found improves estimate or equations
   stopped,        ///< asked to
+  saddle,         ///< a stationary point that is no minimum, and no way down from it was found
+  inconsistent,   ///< converged, but χ² refutes the stated noise: no covariance follows from it
   unobservable,   ///< converged, but the measurements leave directions of the parameter open
   contradictory,  ///< constraints that cannot be met together, or not from here, or an equation of exact coordinates
   too_few,        ///< no equation is left
@@ -39,6 +42,10 @@ constexpr const char* name(ConstrainedEnd end) {
       return "stalled";
     case ConstrainedEnd::stopped:
       return "stopped";
+    case ConstrainedEnd::saddle:
+      return "saddle";
+    case ConstrainedEnd::inconsistent:
+      return "inconsistent";
     case ConstrainedEnd::unobservable:
       return "unobservable";
     case ConstrainedEnd::contradictory:
@@ -56,6 +63,8 @@ constexpr Status statusOf(ConstrainedEnd end) {
   switch (end) {
     case ConstrainedEnd::converged:
       return Status::ok;
+    case ConstrainedEnd::inconsistent:
+      return Status::inconsistent;
     case ConstrainedEnd::unobservable:
     case ConstrainedEnd::contradictory:
       return Status::ill_defined;
@@ -92,6 +101,16 @@ struct ParameterPrior {
   SquareOf<Q> information = SquareOf<Q>::Zero();
 };
 
+/// What becomes of the noise that was stated, which the χ² of an estimate tests.
+enum class StatedNoise {
+  tested,  ///< where χ² refutes it at min_constrained_fit_p the estimate is `inconsistent`, without a covariance
+  scaled,  ///< covariances are multiplied by max(1, χ²/r), after R. Birge (1932)
+  trusted  ///< nothing: whoever called looks at χ² himself
+};
+
+/// The probability below which χ² refutes the stated noise: a thousandth of estimates from right noise are lost.
+inline constexpr double min_constrained_fit_p = 1e-3;
+
 template <Homogeneous Q>
 struct ConstrainedOptions {
   std::optional<ParameterPrior<Q>> prior = {};
@@ -101,6 +120,11 @@ struct ConstrainedOptions {
   /// The curvature of the equations joins the Hessian after three steps of slow convergence, which are those of large
   /// residuals. `false`: Gauss–Newton steps alone, as in the report.
   bool curvature = true;
+  /// Second derivatives, by differences of the first, are looked at where the iteration converged: whether it is a
+  /// minimum, which bounds are active. It costs about two linearisations for each coordinate of parameter and
+  /// measurement. Without it, or without `curvature`, neither is known.
+  bool second_order = true;
+  StatedNoise noise = StatedNoise::tested;
 };
 
 /// A constrained estimate. All distances and covariances are in local frames, in the tangent order of Q.
@@ -111,12 +135,15 @@ struct ConstrainedResult {
   /// Information on the parameter, (6) of the report: before the constraints.
   SquareOf<Q> information = SquareOf<Q>::Zero();
   /// Z (Zᵀ A Z)⁻¹ Zᵀ, A the information and Z a basis of what the constraints leave free: of that rank. First order.
-  /// NaN where something is unobservable.
+  /// NaN in rows and columns of coordinates that are open, and everywhere where the stated noise is refuted. Active
+  /// bounds do not make it smaller: the true parameter may be inside of them.
   SquareOf<Q> covariance = SquareOf<Q>::Constant(std::numeric_limits<double>::quiet_NaN());
   /// D² of section 3.7: 2 L², the squared distance from the measurements and the prior to what was estimated. It follows
   /// χ² with `degrees_of_freedom`.
   double chi2 = std::numeric_limits<double>::quiet_NaN();
   int degrees_of_freedom = 0;
+  /// The probability of a larger χ² where the stated noise is right; NaN without degrees of freedom: untested.
+  double fit_p = std::numeric_limits<double>::quiet_NaN();
   /// E² of (13) and (17): the squared distance from what was estimated to the equations linearised there.
   double equation_error = std::numeric_limits<double>::quiet_NaN();
   int free_parameters = 0;                          ///< dimension of what the constraints leave free
@@ -130,12 +157,24 @@ struct ConstrainedResult {
   /// A basis of the directions that neither measurements nor constraints determine, in the first `unobservable` columns.
   int unobservable = 0;
   SquareOf<Q> unobservable_basis = SquareOf<Q>::Zero();
+  /// The covariance of the error's part across these directions, whatever its part along them; NaN as `covariance` is
+  /// where the stated noise is refuted. Without open directions it is `covariance`.
+  SquareOf<Q> determined_covariance = covariance;
+  /// Inequalities that hold with equality: directions, such as a slack variable, that second derivatives alone determine.
+  int active_bounds = 0;
+  bool minimum_checked = false;  ///< that the end is a minimum was seen in its second derivatives
 
   Status status() const { return statusOf(end); }
   bool ok() const { return end == ConstrainedEnd::converged; }
   /// The variance factor 2 L² / r, by which covariances are multiplied where the scale of the noise is not known.
   double varianceFactor() const {
     return degrees_of_freedom > 0 ? chi2 / degrees_of_freedom : std::numeric_limits<double>::quiet_NaN();
+  }
+  /// √(2 L² / r), by which the stated standard deviations are too small if the model is right.
+  double noiseFactor() const { return std::sqrt(varianceFactor()); }
+  /// What χ² says of the stated noise, in a word.
+  const char* fit() const {
+    return std::isnan(fit_p) ? "untested" : fit_p < min_constrained_fit_p ? "inconsistent" : "consistent";
   }
 };
 

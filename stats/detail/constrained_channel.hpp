@@ -53,6 +53,14 @@ inline void NoiseTable::matrix(const Numbers& list, std::size_t i, double* resul
     }
   }
 }
+inline bool NoiseTable::movingDirections(std::size_t i, const double* Q, double* projection, double* work) const {
+  if (form != NoiseForm::full || can_be_free) return false;
+  matrix(covariance, i, work);
+  multiply(work, Q, dimension, dimension, dimension, projection);
+  double trace = 0;
+  for (int k = 0; k < dimension; ++k) trace += projection[k * (dimension + 1)];
+  return trace < dimension - 0.5;
+}
 inline double NoiseTable::typicalDeviation(std::size_t i) const {
   const double* V = covariance.data() + index(i) * stride();
   double trace = 0;

@@ -86,6 +86,8 @@ struct NoiseTable {
   NoiseRows rows(std::size_t i) const;
   /// V or Q as a matrix.
   void matrix(const Numbers& list, std::size_t i, double* result) const;
+  /// The projection V Q on the directions that are not exact; false where none is, and nothing to project.
+  bool movingDirections(std::size_t i, const double* Q, double* projection, double* work) const;
   /// A standard deviation of the coordinates.
   double typicalDeviation(std::size_t i) const;
 };
@@ -102,7 +104,8 @@ struct ChannelRecord {
 struct ConstrainedSettings {
   int max_iterations = 100;
   double tolerance = 1e-9;
-  bool curvature = true;
+  bool curvature = true, second_order = true;
+  StatedNoise noise = StatedNoise::tested;
   Numbers prior_information = {};  ///< empty without a prior
   int prior_rank = 0;
 };
@@ -110,12 +113,12 @@ struct ConstrainedSettings {
 /// The members of ConstrainedResult that depend on no type.
 struct ConstrainedOutcome {
   ConstrainedEnd end = ConstrainedEnd::running;
-  double chi2 = std::numeric_limits<double>::quiet_NaN(), equation_error = chi2;
+  double chi2 = std::numeric_limits<double>::quiet_NaN(), equation_error = chi2, fit_p = chi2;
   int degrees_of_freedom = 0, free_parameters = 0, equations = 0, dropped_equations = 0, constraints = 0,
-      dropped_constraints = 0, iterations = 0, unobservable = 0;
+      dropped_constraints = 0, iterations = 0, unobservable = 0, active_bounds = 0;
   std::size_t uninformative = 0;
-  bool used_curvature = false;
-  Rows information = {}, covariance = {}, unobservable_basis = {};
+  bool used_curvature = false, minimum_checked = false;
+  Rows information = {}, covariance = {}, unobservable_basis = {}, determined_covariance = {};
 };
 
 /// The null space and solution of linear equations C δ = d in N unknowns. Singular values of C with unit rows that are
@@ -159,10 +162,12 @@ class TangentSystem {
 
   /// δ, from its part that the constraints fix.
   void solve(const Numbers& b, Numbers& step) const;
-  /// The number of directions that A leaves open, and an orthonormal basis of them in the first columns.
+  /// The number of directions that A leaves open, and an orthonormal basis of them, rows.
   int nullDimension() const { return null_dimension_; }
   Rows nullBasis() const;
-  /// Z (Zᵀ A Z)⁻¹ Zᵀ; NaN where a direction is open.
+  /// Rows d_k with d_kᵀ A d_l = δ_kl: a basis of the directions that A determines, one standard deviation long.
+  Rows determinedBasis() const;
+  /// Z (Zᵀ A Z)⁻¹ Zᵀ over these directions.
   Rows covariance() const;
 
  private:
@@ -192,9 +197,10 @@ class ConstrainedChannel {
   /// Linearises at q and at the corrections; adds to the upper triangle of A, and to b. False if something is not
   /// finite.
   bool linearize(const void* q, Rows& A, Numbers& b);
-  /// The same with the curvature of the equations, after linearize() and with the multipliers of the last step; adds to
-  /// all of A.
+  /// The same with the curvature of the equations, after linearize(); adds to all of A.
   void linearizeCurved(const ParameterFunctions& parameter, void* problem, double step, Rows& A, Numbers& b);
+  /// Measurements whose correction is no minimum for the parameter, in linearizeCurved().
+  std::size_t misplaced() const { return misplaced_; }
   /// Corrections for a step; returns the largest multiplier in units of the noise.
   double step(const Numbers& delta, bool curved);
   /// ‖Δε‖² of the step, in units of the noise, and ε·Q Δε.
@@ -254,6 +260,7 @@ class ConstrainedChannel {
   // The same with the curvature of the equations: the correction is base + slope δ.
   Numbers base_, slope_;
   std::vector<char> curved_;
+  std::size_t misplaced_ = 0;
   Numbers raw_values_, raw_C_, raw_D_, difference_steps_;
   mutable Numbers scratch_;
 };
@@ -279,8 +286,8 @@ class ConstrainedCore {
   bool hasPrior() const { return !settings_.prior_information.empty(); }
   const void* point(const void* problem, ParameterPoint which) const { return parameter_.point(problem, which); }
   void linearize(void* problem);
-  void linearizeCurved(void* problem);
-  void addConstraintCurvature(void* problem, double h, Rows& A);
+  bool linearizeCurved(void* problem);
+  std::vector<Rows> constraintCurvatures(void* problem, double h);
   double differenceStep(const void* problem) const;
   Merit meritOf(const ChannelMerit& sum, double prior_cost, const Numbers& constraints) const;
   Merit meritAt(const void* problem, ParameterPoint which, const ChannelMerit& sum);
@@ -290,7 +297,12 @@ class ConstrainedCore {
   double rounding(const void* problem) const;
   bool step(void* problem, bool curved);
   bool search(void* problem, const Merit& here, double slope, double length, double parameter_step, bool met);
+  bool restore(void* problem, const Merit& here);
   bool accept(void* problem);
+  bool settle(void* problem);
+  bool leaveSaddle(void* problem, const Numbers& direction, double curvature);
+  void setCovariance();
+  bool isRefuted();
   bool finish(void* problem, ConstrainedEnd end);
   double equationError(void* problem);
 
@@ -307,7 +319,10 @@ class ConstrainedCore {
   Numbers constraint_values_, trial_values_, constraint_multipliers_;
   bool have_basis_ = false, finite_ = true, cut_ = false;  // cut: the last step was
   double prior_cost_ = 0, penalty_ = 0, constraint_penalty_ = 0, last_length_ = 0, free_step_ = 0;
-  int slow_steps_ = 0;
+  int slow_steps_ = 0, left_saddles_ = 0, restorations_ = 0;
+  /// Second derivatives at the end: the null directions of A that they determine, rows, those that stay open, and the
+  /// directions in which the parameter moves off active bounds.
+  Rows bound_, open_, off_bounds_;
 };
 
 }  // namespace liestat::detail

@@ -1,5 +1,5 @@
 // The curvature of equations and constraints in a constrained estimate (docs/theory/constrained.md, section 5): second
-// derivatives under the multipliers of the last step, by differences of the first. Definitions of
+// derivatives under the multipliers, by differences of the first. Definitions of
 // stats/detail/constrained_core.hpp.
 #pragma once
 
@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <vector>
 
 namespace liestat::detail {
 
@@ -40,6 +42,10 @@ inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parame
                                                 double parameter_step, Rows& A, Numbers& b) {
   const int size = N + K;
   base_.resize(n_ * number(K)), slope_.resize(n_ * number(K * N)), curved_.assign(n_, 0);
+  misplaced_ = 0;
+  // Those where the parameter stays. Those of the last step are in an order of equations that may be another one now: of
+  // equal pivots rounding takes the first.
+  multipliers_ = r_;
   // Second derivatives of λᵀ c with respect to parameter and measurement, by central differences of the first.
   Numbers H(channel_batch * number(size * size)), lambda(channel_batch * number(P)), shift(number(N)),
       at(channel_batch * number(K)), steps(channel_batch, curvature_step), gradient(number(N)), moved(number(N));
@@ -101,17 +107,51 @@ inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Num
   if (freeOf(i) > 0) return addPlain();
   const double* at = block(at_, i, K);
   double *Q = scratch_.data(), *W = Q + K * K, *first = W + K * K, *response = first + K * cols, *S = response + K * P,
-         *lambda = S + P * P;
+         *lambda = S + P * P, *moving = lambda + P * cols, *work = moving + K * K;
   record_.noise.matrix(record_.noise.information, i, Q);
+  const bool partly_exact = record_.noise.movingDirections(i, Q, moving, work);
+  double largest = 0, smallest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < K; ++k) {
-    for (int l = 0; l < K; ++l) W[k * K + l] = Q[k * K + l] + H[(N + k) * size + N + l];
+    if (Q[k * K + k] > 0) smallest = std::min(smallest, Q[k * K + k]);
+    for (int l = 0; l < K; ++l) largest = std::max(largest, std::abs(H[(N + k) * size + N + l]));
   }
-  if (!choleskyFactor(W, K)) return addPlain();
+  // A multiple of D̂ᵀ D̂ changes nothing where the equations hold, and leaves W its curvature along them alone.
+  double along_equations = 0;
+  const auto factorised = [&] {
+    for (int k = 0; k < K; ++k) {
+      for (int l = 0; l < K; ++l) W[k * K + l] = Q[k * K + l] + H[(N + k) * size + N + l];
+    }
+    for (int p = 0; p < ranks_[i]; ++p) {
+      for (int k = 0; k < K; ++k) addScaled(W + k * K, along_equations * D[p * K + k], D + p * K, K);
+    }
+    if (partly_exact) {
+      multiply(moving, W, K, K, K, work);
+      multiply(work, moving, K, K, K, W);
+      for (int k = 0; k < K; ++k) {
+        addScaled(W + k * K, -1, moving + k * K, K);
+        W[k * K + k] += 1;
+      }
+    }
+    return choleskyFactor(W, K);
+  };
+  if (!factorised()) {
+    along_equations = 100 * (1 + largest / smallest);
+    if (!factorised()) {
+      ++misplaced_;
+      return addPlain();
+    }
+  }
   // Δε = W⁻¹ (first - D̂ᵀ λ), D̂ Δε = second; columns: δ, and 1.
   for (int k = 0; k < K; ++k) {
     for (int j = 0; j < N; ++j) first[k * cols + j] = -H[(N + k) * size + j];
     first[k * cols + N] = -dot(Q + k * K, at, K);
     for (int p = 0; p < P; ++p) response[k * P + p] = D[p * K + k];
+  }
+  if (partly_exact) {
+    std::copy_n(first, K * cols, work);
+    multiply(moving, work, K, K, cols, first);
+    std::copy_n(response, K * P, work);
+    multiply(moving, work, K, K, P, response);
   }
   choleskySolve(W, K, first, cols);
   choleskySolve(W, K, response, P);
@@ -126,6 +166,10 @@ inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Num
   choleskySolve(S, P, lambda, cols);
   for (int k = 0; k < K; ++k) {
     for (int p = 0; p < P; ++p) addScaled(first + k * cols, -response[k * P + p], lambda + p * cols, cols);
+  }
+  for (int p = 0; p < P; ++p) {
+    addScaled(lambda + p * cols, -along_equations, C + p * N, N);
+    lambda[p * cols + N] -= along_equations * value[p];
   }
   // H_qq δ + H_qm Δε + Ĉᵀ λ = A δ - b.
   for (int j = 0; j < N; ++j) {
@@ -145,8 +189,9 @@ inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Num
   curved_[i] = 1;
 }
 
-/// linearize() with the curvature of all equations under the multipliers of the last step.
-LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearizeCurved(void* problem) {
+/// linearize() with the curvature of all equations and constraints under their multipliers.
+/// False if something is not finite.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::linearizeCurved(void* problem) {
   Rows A(N, N);
   Numbers b(number(N));
   if (hasPrior()) {
@@ -161,10 +206,16 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedCore::linearizeCurved(void* problem) {
   }
   const double h = differenceStep(problem);
   for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b);
-  if (P > 0) addConstraintCurvature(problem, h, A);
-  if (!allFinite(A) || !allFinite(b)) return;
+  if (P > 0) {
+    const std::vector<Rows> curvatures = constraintCurvatures(problem, h);
+    for (int p = 0; p < P; ++p) {
+      for (int i = 0; i < N; ++i) addScaled(A[i], constraint_multipliers_[number(p)], curvatures[number(p)][i], N);
+    }
+  }
+  if (!allFinite(A) || !allFinite(b)) return false;
   curved_A_ = A, curved_b_ = b;
   curved_system_.compute(A, basis_.freeBasis(), N - basis_.rank(), true);
+  return true;
 }
 LIESTAT_ESTIMATION_INLINE double ConstrainedCore::differenceStep(const void* problem) const {
   if (!parameter_.is_vector) return curvature_step;
@@ -172,31 +223,33 @@ LIESTAT_ESTIMATION_INLINE double ConstrainedCore::differenceStep(const void* pro
   parameter_.coordinates(problem, q.data());
   return curvature_step * differenceScale(q.data(), N);
 }
-LIESTAT_ESTIMATION_INLINE void ConstrainedCore::addConstraintCurvature(void* problem, double h, Rows& A) {
-  Rows H(N, N), C(P, N), transport(N, N);
-  Numbers shift(number(N)), values(number(P)), gradient(number(N)), moved(number(N));
+/// The second derivatives of each constraint, in coordinates at the current parameter.
+LIESTAT_ESTIMATION_INLINE std::vector<Rows> ConstrainedCore::constraintCurvatures(void* problem, double h) {
+  std::vector<Rows> H(number(P), Rows(N, N));
+  Rows C(P, N), transport(N, N);
+  Numbers shift(number(N)), values(number(P));
   for (int k = 0; k < N; ++k) {
     for (const double sign : {1., -1.}) {
       std::fill(shift.begin(), shift.end(), 0.);
       shift[number(k)] = sign * h;
       parameter_.move(problem, ParameterPoint::current, ParameterPoint::shifted, shift.data());
       parameter_.linearizeConstraint(problem, ParameterPoint::shifted, values.data(), C.data());
-      std::fill(gradient.begin(), gradient.end(), 0.);
+      if (!parameter_.is_vector) parameter_.transport(problem, transport.data());
       for (int p = 0; p < P; ++p) {
-        addScaled(gradient.data(), sign * constraint_multipliers_[number(p)] / (2 * h), C[p], N);
+        const double factor = sign / (2 * h);
+        if (parameter_.is_vector) addScaled(H[number(p)][k], factor, C[p], N);
+        for (int j = 0; j < N && !parameter_.is_vector; ++j) {
+          addScaled(H[number(p)][k], factor * C[p][j], transport[j], N);
+        }
       }
-      if (!parameter_.is_vector) {
-        parameter_.transport(problem, transport.data());
-        moved = gradient;
-        std::fill(gradient.begin(), gradient.end(), 0.);
-        for (int j = 0; j < N; ++j) addScaled(gradient.data(), moved[number(j)], transport[j], N);
-      }
-      addScaled(H[k], 1, gradient.data(), N);
     }
   }
-  for (int i = 0; i < N; ++i) {
-    for (int j = 0; j < N; ++j) A[i][j] += 0.5 * (H[i][j] + H[j][i]);
+  for (Rows& one : H) {
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < i; ++j) one[i][j] = one[j][i] = 0.5 * (one[i][j] + one[j][i]);
+    }
   }
+  return H;
 }
 
 }  // namespace liestat::detail

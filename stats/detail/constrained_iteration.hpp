@@ -2,8 +2,10 @@
 // on an exact penalty function, the result. Definitions of stats/detail/constrained_core.hpp.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/detail/constrained_curvature.hpp>
 #include <stats/detail/constrained_steps.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 #include <stats/detail/tangent_system.hpp>
 
 #include <algorithm>
@@ -42,6 +44,7 @@ LIESTAT_ESTIMATION_INLINE ConstrainedCore::ConstrainedCore(const ParameterFuncti
   result_.information = result_.unobservable_basis = Rows(N, N);
   result_.covariance = Rows(N, N);
   std::fill_n(result_.covariance.data(), N * N, std::numeric_limits<double>::quiet_NaN());
+  result_.determined_covariance = result_.covariance;
   if (!valid) result_.end = ConstrainedEnd::bad_input;
   channels_.reserve(channels.size());
   for (ChannelRecord& channel : channels) {
@@ -194,7 +197,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::step(void* problem, bool curved)
       parameter_step <= 1e-6) {
     parameter_.move(problem, ParameterPoint::current, ParameterPoint::current, delta_.data());
     for (ConstrainedChannel& channel : channels_) channel.acceptFull();
-    return finish(problem, ConstrainedEnd::converged);
+    return settle(problem);
   }
   const double ratio = last_length_ > 0 ? length / last_length_ : 0;
   // Linear convergence: the curvature joins, and stays.
@@ -241,12 +244,180 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::search(void* problem, const Meri
     }
   }
   const bool close = length <= 1e-6 && parameter_step <= 1e-7 && met;
-  return finish(problem, close ? ConstrainedEnd::converged : ConstrainedEnd::stalled);
+  if (!met && restore(problem, here)) return true;
+  return close ? settle(problem) : finish(problem, ConstrainedEnd::stalled);
+}
+/// Where nothing along the direction improves anything and constraints do not hold: a step to the constraints alone. The
+/// linearised constraint c - λ² = 0 near λ = 0 has its multiplier at zero, and at that price the iteration would stay off
+/// it; it is raised to what c costs without λ.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::restore(void* problem, const Merit& here) {
+  constexpr int most = 8;
+  if (restorations_++ >= most) return false;
+  basis_.shortest(constraint_values_, -1, delta_);
+  multiply(A_, delta_, gradient_);
+  for (int i = 0; i < N; ++i) gradient_[number(i)] -= b_[number(i)];
+  constraint_penalty_ = std::max(constraint_penalty_, 2 * basis_.fixedLength(gradient_));
+  parameter_.move(problem, ParameterPoint::current, ParameterPoint::trial, delta_.data());
+  ChannelMerit sum;
+  for (ConstrainedChannel& channel : channels_) {
+    channel.step(delta_, false);
+    channel.tryStep(point(problem, ParameterPoint::trial), 1, sum);
+  }
+  if (!(meritAt(problem, ParameterPoint::trial, sum).constraint < 0.5 * here.constraint)) return false;
+  last_length_ = 0;
+  return accept(problem);
 }
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::accept(void* problem) {
   parameter_.move(problem, ParameterPoint::trial, ParameterPoint::current, nullptr);
   for (ConstrainedChannel& channel : channels_) channel.accept();
   return true;
+}
+
+/// The end at a stationary point, if it is a minimum: the Hessian of the Lagrangian on the tangent space, in units of one
+/// standard deviation along the directions that A determines. Along a direction of negative curvature the iteration goes
+/// on. Where A leaves directions open, second derivatives may determine them, as that of c - λ² does at λ = 0.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
+  // Curvature that differences of first derivatives can tell from none, in units of A or of all curvature.
+  constexpr double certain = 1e-4, resolved = 1e-6, rounding = 1e-13;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
+  if (!settings_.curvature || !settings_.second_order) return finish(problem, ConstrainedEnd::converged);
+  linearize(problem);
+  if (!finite_ || !allFinite(A_) || !linearizeCurved(problem)) return finish(problem, ConstrainedEnd::converged);
+  std::size_t misplaced = 0;
+  for (const ConstrainedChannel& channel : channels_) misplaced += channel.misplaced();
+  if (misplaced > 0) return finish(problem, ConstrainedEnd::saddle);
+
+  const Rows determined = system_.determinedBasis(), null = system_.nullBasis();
+  const int k = determined.rows(), m = null.rows();
+  const auto product = [&](const double* a, const double* b) {
+    double sum = 0;
+    for (int i = 0; i < N; ++i) sum += a[i] * dot(curved_A_[i], b, N);
+    return sum;
+  };
+  Matrix H(k, k), cross(m, k), rest(m, m);
+  for (int i = 0; i < k; ++i) {
+    for (int j = 0; j < k; ++j) H(i, j) = product(determined[i], determined[j]);
+    for (int j = 0; j < m; ++j) cross(j, i) = product(null[j], determined[i]);
+  }
+  const SymmetricEigen<Matrix> eigen(H);
+  Numbers direction(number(N));
+  const auto combine = [&](const Rows& basis, const double* factors) {
+    std::fill(direction.begin(), direction.end(), 0.);
+    for (int i = 0; i < basis.rows(); ++i) addScaled(direction.data(), factors[i], basis[i], N);
+    return direction;
+  };
+  if (k > 0 && eigen.values[0] < -certain) {
+    return leaveSaddle(problem, combine(determined, eigen.vectors.data()), eigen.values[0]);
+  }
+  double least = 0;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) {
+      least = std::max({least, resolved * std::abs(curved_A_[i][j] - A_[i][j]), rounding * std::abs(A_[i][j])});
+    }
+  }
+  for (int a = 0; a < m; ++a) {
+    for (int b = 0; b < m; ++b) {
+      rest(a, b) = product(null[a], null[b]);
+      for (int l = 0; l < k; ++l) {
+        double left = 0, right = 0;
+        for (int i = 0; i < k; ++i)
+          left += cross(a, i) * eigen.vectors(i, l), right += cross(b, i) * eigen.vectors(i, l);
+        rest(a, b) -= left * right / std::max(eigen.values[l], certain);
+      }
+    }
+  }
+  const SymmetricEigen<Matrix> along_null(rest);
+  if (m > 0 && along_null.values[0] < -least) {
+    return leaveSaddle(problem, combine(null, along_null.vectors.data()), along_null.values[0]);
+  }
+  int bounds = 0;
+  for (int a = 0; a < m; ++a) bounds += along_null.values[a] > least;
+  bound_ = Rows(bounds, N), open_ = Rows(m - bounds, N);
+  for (int a = 0, b = 0, o = 0; a < m; ++a) {
+    const Numbers& v = combine(null, along_null.vectors.col(a).data());
+    std::copy(v.begin(), v.end(), along_null.values[a] > least ? bound_[b++] : open_[o++]);
+  }
+  result_.minimum_checked = true;
+  // Along v_i and v_j the parameter moves by -C₀⁺ (v_iᵀ ∇²c v_j) to second order, to one side.
+  if (bounds > 0 && P > 0) {
+    const std::vector<Rows> curvatures = constraintCurvatures(problem, differenceStep(problem));
+    off_bounds_ = Rows(bounds * (bounds + 1) / 2, N);
+    Numbers values(number(P)), half(number(N));
+    for (int a = 0, row = 0; a < bounds; ++a) {
+      for (int b = 0; b <= a; ++b, ++row) {
+        for (int p = 0; p < P; ++p) {
+          std::copy_n(bound_[b], N, half.data());
+          double sum = 0;
+          for (int i = 0; i < N; ++i) sum += bound_[a][i] * dot(curvatures[number(p)][i], half.data(), N);
+          values[number(p)] = sum;
+        }
+        basis_.shortest(values, -1, direction);
+        std::copy(direction.begin(), direction.end(), off_bounds_[row]);
+      }
+    }
+  }
+  return finish(problem, ConstrainedEnd::converged);
+}
+/// A step from a stationary point along a direction of negative curvature; not again and again.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const Numbers& direction, double curvature) {
+  constexpr int most = 8;
+  if (left_saddles_++ >= most) return finish(problem, ConstrainedEnd::saddle);
+  // A third of the parameter's size at first, which the search halves.
+  const double length = parameterSize(problem) / (3 * norm(direction));
+  for (int i = 0; i < N; ++i) delta_[number(i)] = length * direction[number(i)];
+  ChannelMerit sum;
+  for (ConstrainedChannel& channel : channels_) {
+    channel.step(delta_, true);
+    channel.addMerit(sum);
+  }
+  last_length_ = 0, slow_steps_ = 0;
+  const Merit here = meritOf(sum, prior_cost_, constraint_values_);
+  const bool found = search(problem, here, 0.5 * curvature * length * length, length, 1, false);
+  if (!found && result_.end == ConstrainedEnd::stalled) result_.end = ConstrainedEnd::saddle;
+  return found;
+}
+
+/// The covariance of what is determined. Active bounds do not count as equations: an estimate that a convex set cuts off
+/// is no farther from a true parameter in that set, in units of A, than one that is not cut off.
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::setCovariance() {
+  Rows C = system_.covariance();
+  if (open_.rows() + bound_.rows() > 0) {
+    Rows basis(N, N);
+    int rows = 0;
+    const auto add = [&](const double* v) {
+      double* next = basis[rows];
+      std::copy_n(v, N, next);
+      const double before = norm(next, N);
+      for (int pass = 0; pass < 2; ++pass) {
+        for (const Rows* list : {&open_, &bound_, &basis}) {
+          const int count = list == &basis ? rows : list->rows();
+          for (int i = 0; i < count; ++i) addScaled(next, -dot((*list)[i], next, N), (*list)[i], N);
+        }
+      }
+      const double after = norm(next, N);
+      if (!(after > 1e-8 * before) || rows == N) return;
+      for (int i = 0; i < N; ++i) next[i] /= after;
+      ++rows;
+    };
+    const Rows& free = basis_.freeBasis();
+    for (int i = 0; i < N - basis_.rank() && rows < N; ++i) add(free[i]);
+    for (int i = 0; i < off_bounds_.rows() && rows < N; ++i) add(off_bounds_[i]);
+    TangentSystem system(N);
+    system.compute(A_, basis, rows);
+    C = system.covariance();
+  }
+  if (settings_.noise == StatedNoise::scaled && result_.degrees_of_freedom > 0) {
+    const double factor = std::max(1.0, result_.chi2 / result_.degrees_of_freedom);
+    for (int i = 0; i < N * N; ++i) C.data()[i] *= factor;
+  }
+  result_.determined_covariance = result_.covariance = C;
+  for (int i = 0; i < N; ++i) {
+    double open = 0;
+    for (int k = 0; k < open_.rows(); ++k) open = std::max(open, std::abs(open_[k][i]));
+    if (!(open > 1e-7)) continue;
+    for (int j = 0; j < N; ++j)
+      result_.covariance[i][j] = result_.covariance[j][i] = std::numeric_limits<double>::quiet_NaN();
+  }
 }
 
 /// Fills in the result; always false.
@@ -269,23 +440,37 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::finish(void* problem, Constraine
   result_.dropped_constraints = P - result_.constraints;
   result_.free_parameters = N - result_.constraints;
   result_.information = A_;
-  result_.covariance = system_.covariance();
-  result_.unobservable = system_.nullDimension();
-  result_.unobservable_basis = system_.nullBasis();
+  if (!result_.minimum_checked) open_ = system_.nullBasis();
+  result_.unobservable = open_.rows();
+  result_.active_bounds = bound_.rows();
+  for (int k = 0; k < open_.rows(); ++k) {
+    for (int i = 0; i < N; ++i) result_.unobservable_basis[i][k] = open_[k][i];
+  }
   result_.chi2 = sum.cost + prior_cost_;
   result_.equation_error = equationError(problem);
   result_.degrees_of_freedom =
-      result_.constraints + result_.equations + settings_.prior_rank - N + result_.unobservable;
+      result_.constraints + result_.equations + settings_.prior_rank - N + system_.nullDimension();
+  setCovariance();
   if (end != ConstrainedEnd::converged && end != ConstrainedEnd::stalled) return false;
   if (basis_.largest(constraint_values_) > 1e-7 * parameterSize(problem) ||
       (end == ConstrainedEnd::converged && unmet > 0)) {
     result_.end = ConstrainedEnd::contradictory;
   } else if (end == ConstrainedEnd::converged && result_.equations == 0 && !hasPrior() && result_.unobservable > 0) {
     result_.end = ConstrainedEnd::too_few;
+  } else if (end == ConstrainedEnd::converged && isRefuted()) {
+    result_.end = ConstrainedEnd::inconsistent;
+    std::fill_n(result_.covariance.data(), N * N, std::numeric_limits<double>::quiet_NaN());
+    result_.determined_covariance = result_.covariance;
   } else if (end == ConstrainedEnd::converged && result_.unobservable > 0) {
     result_.end = ConstrainedEnd::unobservable;
   }
   return false;
+}
+/// Whether χ² refutes the stated noise; fit_p is set.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::isRefuted() {
+  if (result_.degrees_of_freedom <= 0) return false;
+  result_.fit_p = chiSquaredTail(result_.chi2, number(result_.degrees_of_freedom));
+  return settings_.noise == StatedNoise::tested && result_.fit_p < min_constrained_fit_p;
 }
 /// E²: the squared length of the second-order correction at the end.
 LIESTAT_ESTIMATION_INLINE double ConstrainedCore::equationError(void* problem) {

@@ -168,7 +168,8 @@ class ConstrainedProblem {
   }
   bool valid() const { return valid_; }
   ConstrainedSettings settings(const ConstrainedOptions<Q>& options) const {
-    ConstrainedSettings settings{options.max_iterations, options.tolerance, options.curvature};
+    ConstrainedSettings settings{options.max_iterations, options.tolerance, options.curvature, options.second_order,
+                                 options.noise};
     settings.prior_rank = prior_rank_;
     if (prior_rank_ > 0) {
       settings.prior_information.resize(N * N);

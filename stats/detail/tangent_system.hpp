@@ -134,7 +134,7 @@ inline void TangentSystem::solve(const Numbers& b, Numbers& step) const {
 }
 inline Rows TangentSystem::nullBasis() const {
   const int n = A_.rows();
-  Rows found(n, n), basis(n, n);
+  Rows found(null_dimension_, n);
   const auto normalise = [n](double* v) {
     const double length = norm(v, n);
     for (int i = 0; i < n && length > 0; ++i) v[i] /= length;
@@ -147,8 +147,15 @@ inline Rows TangentSystem::nullBasis() const {
     normalise(v);
     for (int j = 0; j < next; ++j) addScaled(v, -dot(found[j], v, n), found[j], n);
     normalise(v);
-    for (int i = 0; i < n; ++i) basis[i][next] = v[i];
     ++next;
+  }
+  return found;
+}
+inline Rows TangentSystem::determinedBasis() const {
+  const int n = A_.rows();
+  Rows basis(free_ - null_dimension_, n);
+  for (int k = 0, next = 0; k < free_; ++k) {
+    if (values_[number(k)] > 0) addScaled(basis[next++], 1 / std::sqrt(values_[number(k)]), axes_[k], n);
   }
   return basis;
 }
@@ -157,9 +164,9 @@ inline Rows TangentSystem::covariance() const {
   Rows sum(n, n);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
-      if (null_dimension_ > 0) sum[i][j] = std::numeric_limits<double>::quiet_NaN();
-      for (int k = 0; k < free_ && null_dimension_ == 0; ++k)
-        sum[i][j] += axes_[k][i] * axes_[k][j] / values_[number(k)];
+      for (int k = 0; k < free_; ++k) {
+        if (values_[number(k)] > 0) sum[i][j] += axes_[k][i] * axes_[k][j] / values_[number(k)];
+      }
     }
   }
   return sum;

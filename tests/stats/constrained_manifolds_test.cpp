@@ -35,8 +35,8 @@ TEST(ConstrainedManifolds, MeansWithCovariancesAreASpecialCase) {
     measured.push_back(
         {SO3d::exp(0.3 * rng.normalVector<3>()), half * half.transpose() + 0.003 * Eigen::Matrix3d::Identity()});
   }
-  const auto estimate =
-      constrainedEstimate(SO3d(), measurements(measured, autoDiff(Same{})), NoConstraint{}, {.tolerance = 1e-11});
+  const auto estimate = constrainedEstimate(SO3d(), measurements(measured, autoDiff(Same{})), NoConstraint{},
+                                            {.tolerance = 1e-11, .noise = StatedNoise::trusted});
   ASSERT_TRUE(estimate.ok()) << name(estimate.end);
   const auto mean = maha(measured, CovarianceAt::measured);
   ASSERT_EQ(mean.status, Status::ok);
@@ -97,7 +97,8 @@ TEST(ConstrainedManifolds, DirectionsGiveARotationWithItsCovariance) {
                          exp(b, Eigen::Vector2d(sigma * rng.normalVector<2>())));
     }
     const SO3d start = exp(truth, Eigen::Vector3d(0.2, -0.1, 0.1));
-    const auto r = constrainedEstimate(start, measurements(pairs, IsotropicNoise<4>(sigma), autoDiff(Turns{})));
+    const auto r = constrainedEstimate(start, measurements(pairs, IsotropicNoise<4>(sigma), autoDiff(Turns{})),
+                                       NoConstraint{}, {.second_order = t < 20, .noise = StatedNoise::trusted});
     ASSERT_TRUE(r.ok()) << t << " " << name(r.end);
     EXPECT_EQ(r.equations, 2 * n);
     EXPECT_EQ(r.dropped_equations, 0);

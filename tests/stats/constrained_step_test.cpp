@@ -111,7 +111,8 @@ TEST(ConstrainedStep, AgreesWithTheDenseReference) {
     for (std::uint64_t seed = 0; seed < 20; ++seed) {
       const Problem problem(seed);
       const Eigen::Matrix<double, N, N> Q_0 = scale * Eigen::Matrix<double, N, N>::Identity();
-      const auto found = problem.solved({.prior = ParameterPrior<Parameter>{problem.prior, Q_0}});
+      const auto found =
+          problem.solved({.prior = ParameterPrior<Parameter>{problem.prior, Q_0}, .noise = StatedNoise::trusted});
       const Eigen::VectorXd expected = problem.reference(problem.prior, Q_0);
       ASSERT_EQ(found.result.end, ConstrainedEnd::converged) << name(found.result.end);
       EXPECT_LE((found.x - expected).norm(), 1e-9 * expected.norm()) << scale << ", seed " << seed;
@@ -127,7 +128,7 @@ TEST(ConstrainedStep, AgreesWithTheDenseReference) {
 TEST(ConstrainedStep, EliminatesFreeDirectionsExactly) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Problem problem(seed, 3);
-    const auto found = problem.solved({});
+    const auto found = problem.solved({.noise = StatedNoise::trusted});
     ASSERT_TRUE(found.result.ok()) << name(found.result.end);
     const Eigen::VectorXd expected = problem.reference(problem.start, Eigen::Matrix<double, N, N>::Zero());
     EXPECT_LE((found.x - expected).norm(), 1e-11 * expected.norm()) << seed;

@@ -2,6 +2,7 @@
 
 #include <support/constrained_models.hpp>
 #include <support/sanitized.hpp>
+#include <lie/detail/small_eigen.hpp>
 #include <stats/measurement_error.hpp>
 
 #include <gtest/gtest.h>
@@ -25,7 +26,7 @@ const auto unit_length = autoDiff(UnitLength{});
 
 template <class Q, class Channel, class Constraint>
 auto run(const Q& start, const Channel& channel, const Constraint& constraint,
-         const ConstrainedOptions<Q>& options = {}) {
+         const ConstrainedOptions<Q>& options = {.noise = StatedNoise::trusted}) {
   ConstrainedEstimator estimator(start, constraint, options, channel);
   while (estimator.iterate()) {
   }
@@ -54,8 +55,10 @@ TEST(Constrained, AConicIsAsUncertainAsItSays) {
     double chi2 = 0, squares = 0, inside = 0, steps = 0;
     for (int t = 0; t < trials; ++t) {
       const Ellipse ellipse(30, sigma, static_cast<std::uint64_t>(t));
-      const auto r = constrainedEstimate(ellipse.truth,
-                                         measurements(ellipse.points, IsotropicNoise<2>(sigma), on_conic), unit_length);
+      // One of a thousand χ² is that large.
+      const auto r =
+          constrainedEstimate(ellipse.truth, measurements(ellipse.points, IsotropicNoise<2>(sigma), on_conic),
+                              unit_length, {.noise = StatedNoise::trusted});
       ASSERT_TRUE(r.ok()) << t << ": " << name(r.end);
       EXPECT_EQ(r.degrees_of_freedom, 25);
       EXPECT_EQ(r.free_parameters, 5);
@@ -108,7 +111,7 @@ TEST(Constrained, APriorAddsItsRankToTheDegreesOfFreedom) {
   for (int t = 0; t < trials; ++t) {
     const RotatedPairs data(20, static_cast<std::uint64_t>(t));
     CounterRng rng(77, static_cast<std::uint64_t>(t));
-    ConstrainedOptions<Vector9d> options;
+    ConstrainedOptions<Vector9d> options{.noise = StatedNoise::trusted};
     // A prior in the nine numbers, whose part off the rotations is data too: six equations and three tangent ones.
     options.prior = ParameterPrior<Vector9d>{elements(data.truth) + 0.01 * rng.normalVector<9>(),
                                              1e4 * Eigen::Matrix<double, 9, 9>::Identity()};
@@ -181,7 +184,8 @@ TEST(MeasurementError, IsTheDistanceToTheModelInUnitsOfTheNoise) {
 TEST(Constrained, CurvatureConvergesWhereResidualsAreLarge) {
   for (const double radius : {0.1, 0.5, 0.9, 1.5, 3.0, 10.0}) {
     for (const double angle : {0.5, 2.5}) {
-      ConstrainedOptions<Eigen::Vector2d> options{.max_iterations = 500, .tolerance = 1e-10};
+      ConstrainedOptions<Eigen::Vector2d> options{
+          .max_iterations = 500, .tolerance = 1e-10, .noise = StatedNoise::trusted};
       options.prior = ParameterPrior<Eigen::Vector2d>{{radius, 0}, Eigen::Matrix2d::Identity()};
       const Eigen::Vector2d start(std::cos(angle), std::sin(angle));
       const auto curved = constrainedEstimate(start, std::tuple<>(), unit_length, options);
@@ -299,6 +303,70 @@ TEST(Constrained, CanBeStoppedAndGoesStepByStep) {
   EXPECT_EQ(capped.status(), Status::not_converged);
 }
 
+// A rotation that is turned by exactly 180° about one of these axes is a stationary point of its criterion.
+TEST(Constrained, ASaddleIsNoMinimum) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const RotatedPairs data(6, seed);
+    const auto channel = measurements(data.pairs, DiagonalNoise<6>(data.sigmas), autoDiff(Rotates{}));
+    const ConstrainedOptions<SO3d> trusted{.noise = StatedNoise::trusted};
+    const auto best = constrainedEstimate(data.truth, channel, NoConstraint{}, trusted);
+    ASSERT_TRUE(best.ok() && best.minimum_checked);
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    for (const Vector6d& pair : data.pairs) H += pair.tail<3>() * pair.head<3>().transpose();
+    const detail::SymmetricEigen<Eigen::Matrix3d> axes(
+        Eigen::Matrix3d(best.parameter.matrix().transpose() * H + H.transpose() * best.parameter.matrix()));
+    const Eigen::Vector3d half_turn = 3.14159265358979323846 * axes.vectors.col(static_cast<int>(seed % 3));
+    const SO3d start = exp(best.parameter, half_turn);
+    // Where the pairs have the same noise on both sides, or one for all, it is exactly one of the stationary points.
+    const auto plain =
+        constrainedEstimate(start, channel, NoConstraint{}, {.second_order = false, .noise = StatedNoise::trusted});
+    const auto found = constrainedEstimate(start, channel, NoConstraint{}, trusted);
+    ASSERT_TRUE(found.ok() && found.minimum_checked) << seed << " " << name(found.end);
+    EXPECT_LE(distance(found.parameter, best.parameter), 1e-6) << seed;
+    EXPECT_FALSE(plain.minimum_checked);
+    if (distance(plain.parameter, best.parameter) > 1) {
+      EXPECT_GT(plain.chi2, 1000) << "the saddle";
+      EXPECT_EQ(constrainedEstimate(start, channel, NoConstraint{}, {.second_order = false}).end,
+                ConstrainedEnd::inconsistent);
+    }
+  }
+}
+
+// Noise is a hypothesis: half the true deviation is refuted, none of it is lost where it is right.
+TEST(Constrained, StatedNoiseIsTested) {
+  const int trials = trialsOf(1000);
+  int refuted = 0, alarms = 0;
+  for (int t = 0; t < trials; ++t) {
+    const Ellipse ellipse(30, 0.01, static_cast<std::uint64_t>(t) + 5001);
+    const auto estimate = [&](double stated, StatedNoise noise) {
+      return constrainedEstimate(ellipse.truth, measurements(ellipse.points, IsotropicNoise<2>(stated), on_conic),
+                                 unit_length, {.noise = noise});
+    };
+    const auto right = estimate(0.01, StatedNoise::tested), wrong = estimate(0.005, StatedNoise::tested);
+    alarms += right.end == ConstrainedEnd::inconsistent;
+    refuted += wrong.end == ConstrainedEnd::inconsistent;
+    EXPECT_EQ(right.ok(), right.fit_p >= min_constrained_fit_p);
+    if (t > 0 || wrong.ok()) continue;
+    EXPECT_EQ(wrong.status(), Status::inconsistent);
+    EXPECT_STREQ(wrong.fit(), "inconsistent");
+    EXPECT_FALSE(wrong.covariance.array().isFinite().any()) << "withheld";
+    EXPECT_NEAR(wrong.noiseFactor(), std::sqrt(wrong.chi2 / 25), 1e-12);
+    const auto scaled = estimate(0.005, StatedNoise::scaled), trusted = estimate(0.005, StatedNoise::trusted);
+    ASSERT_TRUE(scaled.ok() && trusted.ok());
+    EXPECT_LE((scaled.covariance - scaled.varianceFactor() * trusted.covariance).norm(),
+              1e-12 * scaled.covariance.norm());
+  }
+  // Binomial, p = 1e-3, four standard errors. The power: P(χ²₂₅ > 52.6/4) = 0.974.
+  EXPECT_LE(alarms, 1e-3 * trials + 4 * std::sqrt(1e-3 * trials));
+  EXPECT_NEAR(refuted, 0.974 * trials, 4 * std::sqrt(0.026 * trials));
+  // Five points on a conic test nothing.
+  const Ellipse five(5, 0.01, 3);
+  const auto r =
+      constrainedEstimate(five.truth, measurements(five.points, IsotropicNoise<2>(0.01), on_conic), unit_length);
+  EXPECT_EQ(r.degrees_of_freedom, 0);
+  EXPECT_STREQ(r.fit(), "untested");
+}
+
 // ---------------------------------------------------------------------------------------------------------- bad data
 
 TEST(Constrained, OpenDirectionsAreNamed) {
@@ -412,9 +480,10 @@ TEST(Constrained, ExactCoordinatesThatDoNotFitAreSaid) {
 }
 
 TEST(Constrained, EveryEndHasAName) {
-  for (const ConstrainedEnd e : {ConstrainedEnd::running, ConstrainedEnd::converged, ConstrainedEnd::capped,
-                                 ConstrainedEnd::stalled, ConstrainedEnd::stopped, ConstrainedEnd::unobservable,
-                                 ConstrainedEnd::contradictory, ConstrainedEnd::too_few, ConstrainedEnd::bad_input}) {
+  for (const ConstrainedEnd e :
+       {ConstrainedEnd::running, ConstrainedEnd::converged, ConstrainedEnd::capped, ConstrainedEnd::stalled,
+        ConstrainedEnd::stopped, ConstrainedEnd::saddle, ConstrainedEnd::inconsistent, ConstrainedEnd::unobservable,
+        ConstrainedEnd::contradictory, ConstrainedEnd::too_few, ConstrainedEnd::bad_input}) {
     EXPECT_NE(std::string(name(e)), "unknown");
     EXPECT_EQ(statusOf(e) == Status::ok, e == ConstrainedEnd::converged);
   }

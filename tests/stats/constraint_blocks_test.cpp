@@ -67,13 +67,73 @@ TEST(ConstraintBlocks, NearestPointOfAHalfPlane) {
   }
 }
 
-TEST(ConstraintBlocks, ASlackThatStartsAtZeroIsReported) {
-  // At λ = 0 the inequality is an equation: its gradient by λ vanishes, and the estimate stays on the border though the
-  // measurement is inside.
+TEST(ConstraintBlocks, ASlackThatStartsAtZeroLeavesIt) {
+  // At λ = 0 the inequality is an equation: its gradient by λ vanishes, and the border is a saddle where the measurement is
+  // inside.
   const auto result = nearest<3, 2>(Vector<3>(1, 5, 0), Vector<2>(3, 5), atLeastZero(right_of_one, 2));
-  EXPECT_NEAR(result.parameter[0], 1, 1e-6);
-  EXPECT_NE(result.end, ConstrainedEnd::converged);
-  EXPECT_EQ(result.unobservable, 1) << "λ";
+  EXPECT_TRUE(result.ok()) << name(result.end);
+  EXPECT_NEAR(result.parameter[0], 3, 1e-6);
+  EXPECT_EQ(result.active_bounds, 0);
+  // Without second derivatives it is reported.
+  const std::vector<Vector<2>> one{{3, 5}};
+  const auto unseen =
+      constrainedEstimate(Vector<3>(1, 5, 0), measurements(one, IsotropicNoise<2>(1), autoDiff(Measured<3, 2>{})),
+                          autoDiff(atLeastZero(right_of_one, 2)), {.second_order = false});
+  EXPECT_EQ(unseen.end, ConstrainedEnd::unobservable);
+  EXPECT_FALSE(unseen.minimum_checked);
+  EXPECT_EQ(unseen.unobservable, 1) << "λ";
+  // What is determined has its covariance.
+  EXPECT_NEAR(unseen.covariance(1, 1), 1, 1e-9);
+  EXPECT_TRUE(std::isnan(unseen.covariance(2, 2)) && std::isnan(unseen.covariance(2, 1)));
+}
+
+/// y = q₀ + q₁ x at x = m₀, which is exact.
+struct OnSlope {
+  template <class S>
+  Eigen::Matrix<S, 1, 1> operator()(const Eigen::Matrix<S, 3, 1>& q, const Eigen::Matrix<S, 2, 1>& m) const {
+    return Eigen::Matrix<S, 1, 1>(m[1] - q[0] - q[1] * m[0]);
+  }
+};
+
+// A slope that is at least zero, by a slack variable: half of the estimates stand on the bound where it is zero. They are
+// the least-squares answers under the bound, and the region without it holds on either side.
+TEST(ConstraintBlocks, ASlopeThatIsAtLeastZero) {
+  const int trials = 300, n = 10;
+  const double sigma = 0.1, sd = sigma / std::sqrt(n * 1.2222 / 3);
+  for (const double truth : {0.0, 0.5 * sd}) {
+    int active = 0, inside = 0;
+    for (int t = 0; t < trials; ++t) {
+      CounterRng rng(991, static_cast<std::uint64_t>(t));
+      std::vector<Vector<2>> points;
+      double y = 0, xx = 0, xy = 0;
+      for (int i = 0; i < n; ++i) {
+        const double x = -1 + 2 * i / 9.0, value = 1 + truth * x + sigma * rng.normal();
+        points.emplace_back(x, value);
+        y += value / n, xx += x * x, xy += x * value;
+      }
+      const double slope = xy / xx;
+      const Eigen::Matrix2d noise = Eigen::Vector2d(0, sigma * sigma).asDiagonal();
+      const auto r = constrainedEstimate(Vector<3>(y, std::max(slope, 0.), slackForAtLeastZero(slope)),
+                                         measurements(points, CovarianceNoise<2>(noise), autoDiff(OnSlope{})),
+                                         autoDiff(atLeastZero([](const auto& q) { return q[1]; }, 2)),
+                                         {.noise = StatedNoise::trusted});
+      ASSERT_TRUE(r.ok()) << t << " " << name(r.end);
+      EXPECT_NEAR(r.parameter[0], y, 1e-7) << t;
+      EXPECT_NEAR(r.parameter[1], std::max(slope, 0.), 1e-7) << t;
+      EXPECT_TRUE(r.covariance.allFinite() && r.minimum_checked);
+      EXPECT_EQ(r.active_bounds, slope < 0) << t << " " << slope;
+      active += r.active_bounds;
+      // Of both numbers, as without a bound.
+      EXPECT_NEAR(r.covariance(1, 1), sd * sd, 1e-3 * sd * sd) << t;
+      EXPECT_NEAR(r.covariance(0, 0), sigma * sigma / n, 1e-6 * sigma * sigma) << t;
+      const double squared = std::pow((r.parameter[1] - truth) / sd, 2) + n * std::pow((r.parameter[0] - 1) / sigma, 2);
+      inside += squared < 5.9915;
+    }
+    if (truth == 0) {
+      EXPECT_NEAR(active, trials / 2., 4 * std::sqrt(trials / 4.));
+    }
+    EXPECT_GE(inside, 0.95 * trials - 4 * std::sqrt(0.0475 * trials)) << truth;
+  }
 }
 
 TEST(ConstraintBlocks, NearestPointOfTwoLines) {

@@ -160,6 +160,8 @@ ConstrainedResult<typename Equation::Parameter> strictHandEye(const HandEyeValue
   // It starts within a fraction of a standard deviation of the end.
   ConstrainedOptions<typename Equation::Parameter> options;
   options.max_iterations = 30;
+  options.second_order = false;
+  options.noise = StatedNoise::trusted;  // the calibration has a verdict of its own
   return constrainedEstimate(Equation::parameter(start), channel, held, options);
 }
 

@@ -36,8 +36,9 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   const Noise sigma(Eigen::Vector4d(noise.first, noise.first, noise.second, noise.second));
   ConstrainedOptions<Q> options;
   options.max_iterations = 20;
-  options.tolerance = 1e-4;   // standard deviations
-  options.curvature = false;  // residuals are small
+  options.tolerance = 1e-4;              // standard deviations
+  options.curvature = false;             // residuals are small
+  options.noise = StatedNoise::trusted;  // models are compared by their χ²
   Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
   ConstrainedResult<Q> found;
   for (int pass = 0; pass < 4; ++pass) {
