@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/status.hpp>
 
 #include <Eigen/Core>
@@ -109,7 +110,7 @@ enum class StatedNoise {
 };
 
 /// The probability below which χ² refutes the stated noise: a thousandth of estimates from right noise are lost.
-inline constexpr double min_constrained_fit_p = 1e-3;
+inline constexpr double min_constrained_fit_p = refutation_level;
 
 template <Homogeneous Q>
 struct ConstrainedOptions {
