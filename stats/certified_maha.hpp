@@ -21,6 +21,7 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -53,6 +54,8 @@ struct CertifiedMaha {
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
+  /// A factor of its covariance, as in MahaResult; NaN unless status is ok.
+  SquareOf<M> factor = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
   double fit = 0;      ///< Σ μ_i² at the mean, χ² with `fit_dof` degrees of freedom if the covariances are right
   double fit_dof = 0;  ///< k (n - 1)
   Status status = Status::too_few;
@@ -111,7 +114,7 @@ void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& oth
 
 template <Homogeneous M, Executor E, class R>
 CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, CovarianceAt at,
-                                   const CertifiedMahaOptions<M>& options) {
+                                   const CertifiedMahaOptions<M>& options, std::span<const SquareOf<M>> factors) {
   CertifiedMaha<M> result;
   const auto without = [&](Status status, const char* reason) {
     result.status = status;
@@ -168,7 +171,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   for (const std::optional<M>& start : starts) {
     MahaOptions<M> how = options.maha;
     how.start = start;
-    results.push_back(mahalanobisMean<M>(executor, samples, at, how));
+    results.push_back(mahalanobisMean<M>(executor, samples, at, how, factors));
   }
   result.starts = results.size();
   const auto better = [](const MahaResult<M>& a, const MahaResult<M>& b) {
@@ -209,20 +212,21 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (best.status != Status::ok) return without(best.status, "this criterion has no answer for these measurements");
   if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
   const SettledMaha<M> settled =
-      settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change);
+      settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change, factors);
   result.hessian_change = settled.change;
   setNearTies(result, results, settled.covariance, options);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   result.estimate = Gaussian<M>{best.mean, settled.covariance};
+  result.factor = settled.factor;
   result.status = Status::ok;
   return result;
 }
 
 }  // namespace detail
 
-/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance if that can be trusted:
+/// The Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M> from several starts, with its covariance if that can be trusted:
 /// status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if several
 /// minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is singular or,
 /// averaged over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined). The
@@ -230,8 +234,12 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
                                const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
-  if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::findCertifiedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
+  if constexpr (detail::RequireGaussians<R>::ok && detail::RequireGaussians<R>::factored) {
+    const detail::FactoredSamples<M> both(samples);
+    return detail::findCertifiedMaha<M>(detail::erased(executor), both.gaussians, at, options, both.factors);
+  } else if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::findCertifiedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options,
+                                        {});
   } else {
     return {};
   }

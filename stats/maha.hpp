@@ -23,6 +23,7 @@
 
 #include <concepts>
 #include <limits>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -41,6 +42,10 @@ template <class M>
 struct FeatureOfGaussian<Gaussian<M>> {
   using type = M;
 };
+template <class M>
+struct FeatureOfGaussian<FactoredGaussian<M>> {
+  using type = M;
+};
 template <AnyRange R>
 using FeatureInSignature = typename FeatureOfGaussian<ElementOf<R>>::type;
 
@@ -49,28 +54,55 @@ using FeatureInSignature = typename FeatureOfGaussian<ElementOf<R>>::type;
 template <AnyRange R, bool ModelGiven = true>
 struct RequireGaussians {
   using M = FeatureInSignature<R>;
-  static constexpr bool gaussians = std::same_as<ElementOf<R>, Gaussian<M>>;
+  static constexpr bool factored = std::same_as<ElementOf<R>, FactoredGaussian<M>>;
+  static constexpr bool gaussians = std::same_as<ElementOf<R>, Gaussian<M>> || factored;
   static constexpr bool one_model = requires { requires ManifoldTraits<M>::covariance_models_coincide; };
   static constexpr bool ok = MultiPass<R> && gaussians && (ModelGiven || one_model);
   static_assert(MultiPass<R>, "liestat: the data can be gone through only once; copy them into a std::vector first.");
-  static_assert(gaussians, "liestat: maha and fuse take a range of liestat::Gaussian, features with their covariance.");
+  static_assert(gaussians,
+                "liestat: maha and fuse take a range of liestat::Gaussian, features with their covariance, or of "
+                "liestat::FactoredGaussian.");
   static_assert(ModelGiven || one_model,
                 "liestat: on this manifold the frame of the covariances matters: say CovarianceAt::measured (a "
                 "sensor's, in the frame of the measurement) or CovarianceAt::estimated (an object's, in the frame of "
                 "the estimate).");
 };
 
+/// Features with the factors of their covariances, as the estimators take them.
+template <Homogeneous M>
+struct FactoredSamples {
+  std::vector<SquareOf<M>> factors;
+  Samples<Gaussian<M>> gaussians;
+
+  template <class R>
+  explicit FactoredSamples(const R& samples) : gaussians(listOf(samples)) {
+    for (const FactoredGaussian<M>& x : samples) factors.push_back(x.factor);
+  }
+
+ private:
+  template <class R>
+  static std::vector<Gaussian<M>> listOf(const R& samples) {
+    std::vector<Gaussian<M>> list;
+    for (const FactoredGaussian<M>& x : samples) list.push_back(x.gaussian());
+    return list;
+  }
+};
+
 }  // namespace detail
 
-/// Mahalanobis mean of a range of Gaussian<M>. Status ill_defined if a covariance is not positive definite, too_few for
+/// Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M>. Status ill_defined if a covariance is not positive definite, too_few for
 /// an empty range, not_converged if the data are not finite, not_applicable for CovarianceAt::estimated with an
 /// anisotropic covariance on a manifold without a continuous placement (directions) and for likelihood where a user's
 /// manifold has no logVolume.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 MahaResult<M> maha(const E& executor, R&& samples, CovarianceAt at,
                    const MahaOptions<std::type_identity_t<M>>& options = {}) {
-  if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::mahalanobisMean<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
+  if constexpr (detail::RequireGaussians<R>::ok && detail::RequireGaussians<R>::factored) {
+    const detail::FactoredSamples<M> both(samples);
+    return detail::mahalanobisMean<M>(detail::erased(executor), both.gaussians, at, options, both.factors);
+  } else if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::mahalanobisMean<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options,
+                                      {});
   } else {
     return {};
   }
@@ -91,36 +123,52 @@ MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& opti
 
 namespace detail {
 
+/// A fused estimate with its covariance and the factor of that.
+template <Homogeneous M>
+struct Fused {
+  Gaussian<M> gaussian;
+  SquareOf<M> factor;
+};
+
 template <Homogeneous M, class R>
-Gaussian<M> fused(const R& samples, CovarianceAt at) {
+Fused<M> fused(const R& samples, CovarianceAt at, std::span<const SquareOf<M>> factors) {
   const SerialExecutor serial;
   const AnyExecutor executor(serial);
-  const MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, {});
-  Gaussian<M> estimate = result.estimate();
-  if (result.status != Status::ok) return estimate;
-  const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, result, largest_hessian_change);
+  const MahaResult<M> result = mahalanobisMean<M>(executor, samples, at, {}, factors);
+  Fused<M> fused{result.estimate(), result.factor};
+  if (result.status != Status::ok) return fused;
+  const SettledMaha<M> settled = settleMaha<M>(executor, samples, at, false, result, largest_hessian_change, factors);
   const bool trusted = settled.settled && showAMean<M>(samples, result.mean);
-  estimate.covariance =
-      trusted ? settled.covariance : SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
-  return estimate;
+  const SquareOf<M> none = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  fused.gaussian.covariance = trusted ? settled.covariance : none;
+  fused.factor = trusted ? settled.factor : none;
+  return fused;
 }
+
+/// What fuse() gives back of a range: a Gaussian of Gaussians, a factored one of factored ones.
+template <AnyRange R, class M>
+using FusedOf = std::conditional_t<RequireGaussians<R>::factored, FactoredGaussian<M>, Gaussian<M>>;
 
 }  // namespace detail
 
 /// A range of Gaussians to one: the mean of maha() with its covariance, the Hessian averaged over the confidence region
 /// as certifiedMaha (stats/certified_maha.hpp) does. The covariance is NaN if there is no trustworthy estimate:
 /// directions or rotations as scattered as uniform ones, a criterion that is flat where the truth may be. Other minima
-/// are not looked for.
+/// are not looked for. Factored Gaussians give a factored one.
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
-Gaussian<M> fuse(R&& samples, CovarianceAt at) {
-  if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::fused<M>(detail::asValues<Gaussian<M>>(samples), at);
+detail::FusedOf<R, M> fuse(R&& samples, CovarianceAt at) {
+  if constexpr (detail::RequireGaussians<R>::ok && detail::RequireGaussians<R>::factored) {
+    const detail::FactoredSamples<M> both(samples);
+    const detail::Fused<M> result = detail::fused<M>(both.gaussians, at, both.factors);
+    return {result.gaussian.mean, result.factor};
+  } else if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::fused<M>(detail::asValues<Gaussian<M>>(samples), at, {}).gaussian;
   } else {
     return {};
   }
 }
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
-Gaussian<M> fuse(R&& samples) {
+detail::FusedOf<R, M> fuse(R&& samples) {
   if constexpr (detail::RequireGaussians<R, false>::ok) {
     return fuse(samples, CovarianceAt::measured);
   } else {
