@@ -21,6 +21,7 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,8 @@ struct CertifiedMaha {
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
+  /// A factor of its covariance, as in MahaResult; NaN unless status is ok.
+  SquareOf<M> factor = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
   NoiseFit fit;  ///< Σ μ_i² at the mean, of k (n - 1) degrees of freedom
   Status status = Status::too_few;
   const char* reason = "";  ///< why there is no estimate, in words
@@ -101,7 +104,7 @@ void setNearTies(CertifiedMaha<M>& result, const std::vector<MahaResult<M>>& oth
 
 template <Homogeneous M, Executor E, class R>
 CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, CovarianceAt at,
-                                   const CertifiedMahaOptions<M>& options) {
+                                   const CertifiedMahaOptions<M>& options, std::span<const SquareOf<M>> factors) {
   CertifiedMaha<M> result;
   const auto without = [&](Status status, const char* reason) {
     result.status = status;
@@ -159,7 +162,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   for (const std::optional<M>& start : starts) {
     MahaOptions<M> how = options.maha;
     how.start = start;
-    results.push_back(mahalanobisMean<M>(executor, samples, at, how));
+    results.push_back(mahalanobisMean<M>(executor, samples, at, how, factors));
   }
   result.starts = results.size();
   const auto better = [](const MahaResult<M>& a, const MahaResult<M>& b) {
@@ -192,7 +195,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   } else {
     result.uniqueness.proof = "the best minimum from several starts; there is no certificate for maha";
   }
-  result.fit = fitOfMaha<M>(samples, best.mean, at);
+  result.fit = fitOfMaha<M>(samples, best, at, options.maha.likelihood);
 
   if (best.status == Status::not_converged) return without(best.status, not_converged_reason);
   if (best.status == Status::ill_defined) return without(best.status, hessian_reason);
@@ -200,7 +203,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (result.fit.refuted(options.refutation_level)) return without(Status::inconsistent, refuted_reason);
   if (minima.size() > 1) return without(Status::ambiguous, rival_reason);
   const SettledMaha<M> settled =
-      settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change);
+      settleMaha(executor, samples, at, options.maha.likelihood, best, options.largest_hessian_change, factors);
   result.hessian_change = settled.change;
   // Noise that is larger than stated lowers the likelihood ratio as it raises χ².
   NearTieOptions near_ties = options.near_ties;
@@ -210,24 +213,32 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   result.estimate = Gaussian<M>{best.mean, settled.covariance};
-  if (options.scale_noise) result.estimate->covariance *= ScalarOf<M>(result.fit.factor());
+  result.factor = settled.factor;
+  if (options.scale_noise) {
+    result.estimate->covariance *= ScalarOf<M>(result.fit.factor());
+    result.factor *= ScalarOf<M>(std::sqrt(result.fit.factor()));
+  }
   result.status = Status::ok;
   return result;
 }
 
 }  // namespace detail
 
-/// The Mahalanobis mean of a range of Gaussian<M> from several starts, with its covariance if that can be trusted:
-/// status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if the measurements
-/// scatter more than their covariances say (inconsistent; `fit` says by how much), if several
+/// The Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M> from several starts, with its covariance if that
+/// can be trusted: status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if
+/// the measurements scatter more than their covariances say (inconsistent; `fit` says by how much), if several
 /// minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is singular or,
 /// averaged over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined). The
 /// statuses of maha() occur as well. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
                                const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {
-  if constexpr (detail::RequireGaussians<R>::ok) {
-    return detail::findCertifiedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options);
+  if constexpr (detail::RequireGaussians<R>::ok && detail::RequireGaussians<R>::factored) {
+    const detail::FactoredSamples<M> both(samples);
+    return detail::findCertifiedMaha<M>(detail::erased(executor), both.gaussians, at, options, both.factors);
+  } else if constexpr (detail::RequireGaussians<R>::ok) {
+    return detail::findCertifiedMaha<M>(detail::erased(executor), detail::asValues<Gaussian<M>>(samples), at, options,
+                                        {});
   } else {
     return {};
   }

@@ -49,7 +49,12 @@ struct MahaResult {
   ScalarOf<M> cost = 0;                            ///< ½ Σ μ_i², with the volume terms if likelihood was asked for
   SquareOf<M> hessian = SquareOf<M>::Zero();       ///< exact Hessian of the cost
   SquareOf<M> gauss_newton = SquareOf<M>::Zero();  ///< Σ Jᵀ S⁻¹ J
-  /// H⁻¹ H_GN H⁻¹, or H⁻¹ with likelihood (docs/theory/means.md, section 4.3); NaN where H is not positive definite.
+  /// A with A Aᵀ = H_GN⁻¹, and Aᵀ H A: what the matrices above lose where standard deviations differ by thousands.
+  SquareOf<M> axes = SquareOf<M>::Identity(), relative_hessian = SquareOf<M>::Identity();
+  /// A factor F of the covariance F Fᵀ, which has the small variances to more digits than the matrix can hold.
+  SquareOf<M> factor = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
+  /// H⁻¹ H_GN H⁻¹, or H⁻¹ with likelihood (docs/theory/means.md, section 4.3), symmetric and with a Cholesky factor;
+  /// NaN where H is not positive definite.
   SquareOf<M> covariance = SquareOf<M>::Constant(std::numeric_limits<ScalarOf<M>>::quiet_NaN());
   NoiseFit fit;  ///< Σ μ_i², of k (n - 1) degrees of freedom, where the iteration converged
 

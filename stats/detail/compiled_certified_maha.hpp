@@ -7,7 +7,7 @@
 
 #define LIESTAT_INSTANTIATE_CERTIFIED_MAHA(instantiate, M)                                                         \
   instantiate CertifiedMaha<M> findCertifiedMaha<M>(const AnyExecutor&, const Samples<Gaussian<M>>&, CovarianceAt, \
-                                                    const CertifiedMahaOptions<M>&)
+                                                    const CertifiedMahaOptions<M>&, std::span<const SquareOf<M>>)
 
 namespace liestat::detail {
 

@@ -6,8 +6,8 @@
 
 #define LIESTAT_INSTANTIATE_MAHA(instantiate, M)                                                              \
   instantiate MahaResult<M> mahalanobisMean<M>(const AnyExecutor&, const Samples<Gaussian<M>>&, CovarianceAt, \
-                                               const MahaOptions<M>&);                                        \
-  instantiate FuseResult<M> fused<M>(const Samples<Gaussian<M>>&, CovarianceAt)
+                                               const MahaOptions<M>&, std::span<const SquareOf<M>>);          \
+  instantiate FuseResult<M> fused<M>(const Samples<Gaussian<M>>&, CovarianceAt, std::span<const SquareOf<M>>)
 
 namespace liestat::detail {
 

@@ -10,25 +10,27 @@
 #include <cmath>
 #include <cstddef>
 #include <ranges>
+#include <span>
 #include <vector>
 
 namespace liestat::detail {
 
 template <Homogeneous M>
 struct SettledMaha {
-  SquareOf<M> covariance;
+  SquareOf<M> covariance, factor;
   double change = 0;  ///< relative change of the Hessian
   bool settled = false;
 };
 
 template <Homogeneous M, Executor E, class R>
 SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, bool likelihood,
-                          const MahaResult<M>& result, double largest_change) {
+                          const MahaResult<M>& result, double largest_change,
+                          std::span<const SquareOf<M>> factors = {}) {
   using S = ScalarOf<M>;
   constexpr int D = ManifoldTraits<M>::DoF;
   constexpr auto angular = angularCoordinates<M>();
   constexpr int K = angular.count;
-  SettledMaha<M> settled{result.covariance, 0, true};
+  SettledMaha<M> settled{result.covariance, result.factor, 0, true};
   // A single measurement is its own mean, with the covariance that it came with.
   if (std::ranges::size(samples) == 1) return settled;
   if constexpr (K > 0) {
@@ -36,13 +38,15 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
     using Matrix = Eigen::Matrix<double, D, D>;
     const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
     std::vector<Gaussian<M>> some;
+    std::vector<SquareOf<M>> some_factors;
     std::vector<M> features;
     features.reserve(n);
     for (std::size_t i = 0; i < n; ++i) {
       if (i % stride == 0) some.push_back(samples[i]);
+      if (i % stride == 0 && !factors.empty()) some_factors.push_back(factors[i]);
       features.push_back(Gaussian<M>(samples[i]).mean);
     }
-    MahaProblem<M, std::vector<Gaussian<M>>> problem{some, at, likelihood};
+    MahaProblem<M, std::vector<Gaussian<M>>> problem{some, at, likelihood, some_factors};
     for (const Gaussian<M>& g : some) problem.append(g.mean, Cholesky<S, D>(g.covariance));
     const double scale = static_cast<double>(n) / static_cast<double>(some.size());
     const double clearance = angleToCutLocus(features, result.mean);
@@ -80,13 +84,18 @@ SettledMaha<M> settleMaha(const E& executor, const R& samples, CovarianceAt at, 
         }
       }
       averaged = 0.5 * (averaged + averaged.transpose()).eval();
-      const Cholesky<double, D> factor(result.hessian.template cast<double>());
+      // In the axes of the result, in which small variances keep their digits.
+      const Matrix axes = result.axes.template cast<double>(),
+                   hessian = result.relative_hessian.template cast<double>();
+      const Matrix change = averaged - result.hessian.template cast<double>();
+      averaged = symmetricPart(Matrix(hessian + axes.transpose() * change * axes));
+      const Cholesky<double, D> factor(hessian);
       const Matrix relative = factor.halfSolve(Matrix(factor.halfSolve(averaged).transpose()));
       if (!relative.allFinite()) return settled;
       settled.change = 1 - SymmetricEigen(relative).values[0];
       if (!(settled.change <= largest_change)) return settled;
-      const SquareOf<M> inverse = Cholesky<double, D>(averaged).inverse().template cast<S>();
-      const SquareOf<M> next = likelihood ? inverse : SquareOf<M>(inverse * result.gauss_newton * inverse);
+      settled.factor = covarianceFactor<double, D>(axes, averaged, likelihood).template cast<S>();
+      const SquareOf<M> next = squareOfFactor<S, D>(settled.factor);
       if (!next.allFinite()) return settled;
       const double step = static_cast<double>((next - settled.covariance).norm());
       const double size = static_cast<double>(settled.covariance.norm());

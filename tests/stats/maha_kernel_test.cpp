@@ -108,7 +108,7 @@ TYPED_TEST(MahaKernelSums, quaternions_far_from_unit_go_the_general_way) {
   for (int c = 0; c < 4; ++c) data[12].mean.data()[c] *= 1.001;
   const auto p = this->problem(data, true);
   EXPECT_FALSE(p.by_kernels);
-  EXPECT_EQ(p.information.size(), data.size());
+  EXPECT_EQ(p.whitening.size(), data.size());
 }
 
 TEST(MahaCovariance, of_two_rotations_by_hand) {

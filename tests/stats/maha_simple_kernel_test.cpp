@@ -177,7 +177,7 @@ TEST(MahaKernelRefusals, vectors_far_from_unit_go_the_general_way) {
   detail::MahaProblem<S2d, std::vector<Gaussian<S2d>>> problem{data, CovarianceAt::measured, false};
   for (const auto& g : data) problem.append(g.mean, detail::Cholesky<double, 2>(g.covariance));
   EXPECT_FALSE(problem.by_kernels);
-  EXPECT_EQ(problem.information.size(), data.size());
+  EXPECT_EQ(problem.whitening.size(), data.size());
 }
 
 }  // namespace
