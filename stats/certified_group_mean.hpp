@@ -14,6 +14,7 @@
 #include <stats/detail/weights.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/detail/metric_twin.hpp>
+#include <stats/detail/residual_scatter.hpp>
 #include <stats/detail/settled_group_mean.hpp>
 #include <stats/group_mean.hpp>
 #include <stats/noise_fit.hpp>
@@ -33,8 +34,9 @@ struct CertifiedGroupMeanOptions {
   std::vector<SquareOf<G>> known_noise = {};
   RefutedNoise refuted_noise = RefutedNoise::withheld;  ///< what becomes of known noise that the elements refute
   double refutation_level =
-      liestat::refutation_level;  ///< known noise is refuted by a less probable fit; 0: not tested
-  bool scale_noise = false;       ///< multiply by Birge's factor max(1, χ²/ν), if the noise is not refuted
+      liestat::refutation_level;                ///< known noise is refuted by a less probable fit; 0: not tested
+  ResidualNoise noise = ResidualNoise::scaled;  ///< what the weights mean to a covariance from residuals
+  bool scale_noise = false;  ///< multiply by Birge's factor max(1, χ²/ν), if the noise is not refuted
   /// The covariance is withheld if the Hessian of the twin's mean, or without a twin the equations of the barycentre,
   /// averaged over the confidence region, are flatter than those at the mean by more than this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
@@ -50,6 +52,7 @@ struct CertifiedGroupMean {
   double hessian_change = 0;          ///< how much flatter the barycentre's equations are across the confidence region
   NoiseFit fit;                       ///< of the elements to their known noise; nothing where none was stated
   bool from_noise = false;            ///< the covariance follows from the known noise
+  double law_n = 0;                   ///< as CertifiedMean's
   /// The barycentre with its covariance, from residuals or from known noise; none unless status is ok.
   std::optional<Gaussian<G>> estimate;
   Status status = Status::too_few;
@@ -131,7 +134,17 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
     }
     return congruence(inverse<ScalarOf<G>, G::DoF>(mean.jacobian), sum);
   };
-  const auto from_residuals = [](const GroupMeanResult<G>& mean) { return mean.covarianceFromResiduals(); };
+  ResidualScatter<G> residuals;
+  if (have_residuals) {
+    residuals = residualScatter<G>(samples, weights, result.mean, options.noise);
+    if (residuals.reason != nullptr && !known) return without(Status::too_few, residuals.reason);
+    if (residuals.reason != nullptr)
+      residuals = residualScatter<G>(samples, weights, result.mean, ResidualNoise::scaled);
+    if (!known) result.law_n = residuals.n;
+  }
+  const auto from_residuals = [&](const GroupMeanResult<G>& mean) {
+    return congruence(inverse<ScalarOf<G>, G::DoF>(mean.jacobian), residuals.scatter);
+  };
   const double largest_change = options.largest_hessian_change;
   const SettledGroupMean<G> settled =
       have_residuals ? settleGroupMean(samples, weights, result.mean, largest_change, from_residuals)

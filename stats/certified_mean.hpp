@@ -9,6 +9,7 @@
 #include <stats/concentration.hpp>
 #include <stats/covariance.hpp>
 #include <stats/cut_locus.hpp>
+#include <stats/detail/residual_scatter.hpp>
 #include <stats/detail/settled_covariance.hpp>
 #include <stats/detail/sum_certificates.hpp>
 #include <stats/executor.hpp>
@@ -33,7 +34,7 @@ template <Metric M>
 struct CertifiedMeanOptions {
   MeanOptions<M> mean = {};
   UniquenessOptions uniqueness = {};
-  ResidualNoise noise = ResidualNoise::scaled;  ///< noise model for a covariance from residuals
+  ResidualNoise noise = ResidualNoise::scaled;  ///< what the weights mean to a covariance from residuals
   /// Covariances of the features' errors if they are known: one for each feature, in its frame (it is transported to
   /// the mean along the geodesic, which has an effect only if the isotropy group is not trivial, as for directions), or
   /// a single one for all features, in the frame of the mean. Empty: the covariance is computed from the residuals.
@@ -62,6 +63,8 @@ struct CertifiedMean {
   double hessian_change = 0;
   NoiseFit fit = {};        ///< of the measurements to their known noise; nothing where none was stated
   bool from_noise = false;  ///< the covariance follows from the known noise
+  /// Covariance from residuals: the number of measurements for Hotelling's law, n but for weights that are no precisions.
+  double law_n = 0;
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
   std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
@@ -108,6 +111,7 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
                                      CertifiedMean<M>& result) {
   const MeanResult<M>& mean = result.mean;
   if (Factored<M> || !converged(mean.status) || !options.known_noise.empty()) return false;
+  if (options.noise != ResidualNoise::scaled) return false;
   if (mean.n <= static_cast<std::size_t>(ManifoldTraits<M>::DoF)) return false;
   if (!std::isfinite(static_cast<double>(mean.cost)) || !(options.largest_hessian_change >= 0)) return false;
   if (!concentrationBySums(mean, weights, result.concentration) || !result.concentration.concentrated) return false;
@@ -129,6 +133,7 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
       !isFarFromCutLocusBySums<M>(mean, covariance, result.cut_locus)) {
     return false;
   }
+  result.law_n = static_cast<double>(mean.n);
   result.status = Status::ok;
   return true;
 }
@@ -190,7 +195,15 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   const auto known_covariance = [&](const MeanResult<M>& mean) {
     return covarianceFromKnownNoise(samples, weights, mean, options.known_noise);
   };
-  const auto from_residuals = [&](const MeanResult<M>& mean) { return covarianceFromResiduals(mean, options.noise); };
+  ResidualScatter<M> residuals;
+  if (have_residuals) {
+    residuals = residualScatter<M>(samples, weights, result.mean, options.noise);
+    if (residuals.reason != nullptr && !known) return without(Status::too_few, residuals.reason);
+    if (residuals.reason != nullptr)
+      residuals = residualScatter<M>(samples, weights, result.mean, ResidualNoise::scaled);
+    if (!known) result.law_n = residuals.n;
+  }
+  const auto from_residuals = [&](const MeanResult<M>& mean) { return sandwich(mean, residuals.scatter); };
   const SettledCovariance<M> settled =
       have_residuals
           ? settleCovariance(samples, weights, result.mean, options.largest_hessian_change, from_residuals)

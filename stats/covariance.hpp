@@ -10,16 +10,11 @@
 #include <lie/detail/small_products.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
+#include <stats/residual_noise.hpp>
 
 #include <cmath>
 
 namespace liestat {
-
-/// Assumption of a covariance from residuals about the weights.
-enum class ResidualNoise {
-  scaled,  ///< Cov(z_i) = Σ/p_i with one unknown Σ: exact small-sample law (Hotelling)
-  any      ///< any independent noise: consistent for many data only
-};
 
 namespace detail {
 
@@ -78,7 +73,8 @@ SquareOf<M> covarianceFromCommonNoise(const MeanResult<M>& result, const SquareO
 }
 
 /// Covariance of the mean when the noise is unknown, from the residuals. Squared distances follow Hotelling's law
-/// (stats/inference.hpp), not χ². Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
+/// (stats/inference.hpp), not χ²; with ResidualNoise::any the sums of the mean know too little of the weights for a law,
+/// which certifiedMean has. Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
 /// measurement.
 template <Metric M>
 LIESTAT_NO_INLINE SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result,
@@ -86,6 +82,10 @@ LIESTAT_NO_INLINE SquareOf<M> covarianceFromResiduals(const MeanResult<M>& resul
   using S = ScalarOf<M>;
   const S n = S(result.n);
   if (result.n < 2) return SquareOf<M>::Constant(std::numeric_limits<S>::quiet_NaN());
+  if (noise == ResidualNoise::frequency) {
+    const S sum = S(result.sum_of_weights);
+    return detail::sandwich(result, SquareOf<M>(result.scatter * (sum / (sum - S(1)))));
+  }
   if (noise == ResidualNoise::any) {
     return detail::sandwich(result, SquareOf<M>(result.squared_weight_scatter * (n / (n - S(1)))));
   }

@@ -71,6 +71,8 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
       ordered ? scatterOfSome<M>(samples, to_y) : Cholesky<S, T::DoF>(SquareOf<M>::Identity());
   TangentOf<M> before = TangentOf<M>::Zero();
   double lag = 0, squared_lags = 0, squares_of_rows = 0;
+  // Σ of a = log p, of q = p |z|² and their products, for the correlation of both.
+  double a1 = 0, a2 = 0, q2 = 0, aq = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
     const S p = S(weights[i]);
@@ -79,8 +81,13 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
       const TangentOf<M> u = whitening.halfSolve(TangentOf<M>(sqrt(p) * z));
       const double product = static_cast<double>(u.dot(before));
       lag += product, squared_lags += product * product;
-      squares_of_rows += static_cast<double>(u.squaredNorm());
+      const double q = static_cast<double>(u.squaredNorm());
+      squares_of_rows += q;
       before = u;
+      if constexpr (!std::is_same_v<W, UnitWeights>) {
+        const double a = std::log(static_cast<double>(p));
+        a1 += a, a2 += a * a, q2 += q * q, aq += a * q;
+      }
     }
     result.covariance += p * z * z.transpose();
     weight += p;
@@ -97,7 +104,14 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   if (ordered && squared_lags > 0) {
     // Errors about their own mean are correlated by -1/n.
     lag += squares_of_rows / static_cast<double>(n);
-    result.order = {lag / squares_of_rows, lag / std::sqrt(squared_lags)};
+    result.order.correlation = lag / squares_of_rows;
+    result.order.z = lag / std::sqrt(squared_lags);
+    const double count = static_cast<double>(n), spread = a2 - a1 * a1 / count;
+    if (spread > 1e-6 * count) {
+      const double covariance = aq - a1 * squares_of_rows / count;
+      const double of_squares = q2 - squares_of_rows * squares_of_rows / count;
+      result.order.weight_z = std::sqrt(count) * covariance / std::sqrt(spread * of_squares);
+    }
   }
   return result;
 }

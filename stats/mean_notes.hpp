@@ -35,6 +35,12 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.emplace_back(
         "the measurements do not vary in every direction: the covariance from the residuals is singular");
   }
+  if (mean.order.weightsAreNoPrecisions() && mean.weighted && mean.fromResiduals() &&
+      mean.weights_are == ResidualNoise::precision) {
+    mean.notes.push_back("p r^2 depends on the weights p (" + significant(mean.order.weight_z, 2) +
+                         " standard deviations): they are no inverse variances, and the covariance supposes that they "
+                         "are; importance has a covariance without that");
+  }
   if (mean.order.dependent() && mean.hasCovariance()) {
     mean.notes.push_back("successive measurements err alike (correlation " + significant(mean.order.correlation, 2) +
                          ", " + significant(mean.order.z, 2) +

@@ -6,6 +6,7 @@
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/noise_fit.hpp>
+#include <stats/residual_noise.hpp>
 #include <stats/row_order.hpp>
 #include <stats/shown.hpp>
 #include <stats/status.hpp>
@@ -84,6 +85,7 @@ struct MeanSummary {
   /// The frame of the measurements' covariances; nothing where it does not matter, or none are used.
   std::optional<CovarianceAt> covariance_at = {};
   bool likelihood = false, weighted = false;
+  ResidualNoise weights_are = ResidualNoise::precision;
   bool known_noise = false;  ///< the covariance follows from that of the measurements (χ²), not from residuals
 
   FeatureValue mean;
@@ -97,6 +99,8 @@ struct MeanSummary {
   double tolerance = 0, cost = 0;
 
   Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
+  double law_n =
+      0;  ///< number of measurements for Hotelling's law: n, fewer in effect for weights that are no precisions
   Status covariance_status = Status::ok;
   Eigen::MatrixXd dispersion;                                     ///< the measurements' covariance about the mean
   std::vector<FarthestMeasurement> farthest = {};                 ///< one for each part of the tangent vector
@@ -150,6 +154,8 @@ void describe(V& v, const MeanSummary& m) {
   v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
     "frame of the measurements' covariances; null where it does not matter");
   v("likelihood", m.likelihood, "whether the volume element is in the criterion");
+  v("weights_are", where(m.weighted, std::string(name(m.weights_are))),
+    "precision, importance or frequency: what the weights mean to a covariance from residuals");
   v("weighted", m.weighted, "whether weights were used")("n", m.n, "measurements that count: those with a weight");
   v("status", name(m.status),
     "ok, not_converged, ambiguous, ill_defined, inconsistent or too_few; not_applicable: a mean, but no covariance can "
@@ -169,6 +175,8 @@ void describe(V& v, const MeanSummary& m) {
   v("covariance_from", where(has, std::string(m.known_noise ? "noise" : "residuals")), "noise or residuals");
   v("covariance_law", where(has, std::string(m.known_noise ? "chi2" : "hotelling")),
     "of squared distances from the truth: chi2 or hotelling");
+  v("covariance_law_n", where(m.fromResiduals(), m.law_n),
+    "measurements for Hotelling's law: n, fewer in effect where weights are no precisions");
   v("standard_deviations", partDeviations(m.parts, m.covariance),
     "along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg");
   v("standard_deviations_world", worldDeviations(m.parts, m.mean, m.covariance),
@@ -192,6 +200,8 @@ void describe(V& v, const MeanSummary& m) {
   v("fit_factor", where(fits, m.fit.factor()), "Birge's factor max(1, χ²/ν) of the stated covariances");
   v("noise_scaled", m.noise_scaled, "whether the covariance is multiplied by it");
   v("lag_correlation", where(m.order.tested(), m.order.correlation), "of successive measurements' errors");
+  v("weight_z", where(m.order.weightsTested(), m.order.weight_z),
+    "correlation of log weights with p·r², in standard deviations; beyond 3.3 the weights are no inverse variances");
   v("lag_z", where(m.order.tested(), m.order.z), "the same in standard deviations; above 2.45 a note says so");
   v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
   v("notes", m.notes, "what is remarkable, in sentences");

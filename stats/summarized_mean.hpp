@@ -37,7 +37,8 @@ struct MeanInput {
   bool likelihood = false;                              ///< maha: with the volume element
   /// What becomes of covariances that the measurements refute; for lsq, wlsq and barycentre.
   RefutedNoise refuted_noise = RefutedNoise::withheld;
-  bool scale_noise = false;  ///< Birge's factor, where they are not refuted
+  ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
+  bool scale_noise = false;                              ///< Birge's factor, where they are not refuted
 
   bool weighted() const {
     return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
@@ -72,6 +73,7 @@ namespace detail {
 template <class Iteration>
 void setIteration(MeanSummary& mean, const Iteration& iteration) {
   mean.n = iteration.n;
+  mean.law_n = static_cast<double>(iteration.n);
   mean.mean = featureValue(iteration.mean);
   mean.converged = converged(iteration.status);
   mean.iterations = iteration.iterations;
@@ -141,16 +143,19 @@ template <Metric M, Executor E>
 void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
                      const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
-  if (options.certificates) {
+  // Without certificates there is a law for precisions alone.
+  if (options.certificates || input.weights_are != ResidualNoise::precision) {
     CertifiedMeanOptions<M> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
     how.refuted_noise = input.refuted_noise;
+    how.noise = input.weights_are;
     how.scale_noise = input.scale_noise;
     const CertifiedMean<M> result = ones ? certifiedMean(executor, input.features, how)
                                          : certifiedMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
     mean.known_noise = result.from_noise;
+    if (!result.from_noise && result.law_n > 0) mean.law_n = result.law_n;
     return setDispersion(mean, input, result.mean.mean);
   }
   const MeanResult<M> result =
@@ -171,16 +176,18 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
 template <LieGroup G, Executor E>
 void setBarycentre(MeanSummary& mean, const E& executor, const MeanInput<G>& input, const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
-  if (options.certificates) {
+  if (options.certificates || input.weights_are != ResidualNoise::precision) {
     CertifiedGroupMeanOptions<G> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
     how.refuted_noise = input.refuted_noise;
+    how.noise = input.weights_are;
     how.scale_noise = input.scale_noise;
     const CertifiedGroupMean<G> result = ones ? certifiedGroupMean(executor, input.features, how)
                                               : certifiedGroupMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
     mean.known_noise = result.from_noise;
+    if (!result.from_noise && result.law_n > 0) mean.law_n = result.law_n;
     return setDispersion(mean, input, result.mean.mean);
   }
   const GroupMeanResult<G> result =
@@ -229,6 +236,7 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   mean.criterion = input.criterion;
   mean.likelihood = input.likelihood;
   mean.weighted = input.weighted();
+  mean.weights_are = input.weights_are;
   mean.known_noise = !input.covariances.empty();
   if (mean.known_noise && covarianceFrameMatters<M>()) mean.covariance_at = input.covariance_at;
   if (input.criterion == Criterion::maha) {

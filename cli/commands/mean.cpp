@@ -99,6 +99,11 @@ void addMeanCommand(const CommandList& app) {
       .option("--budget", options->analysis.budget,
               "Looks of branch and bound at measurements or bins of them, some 30 ns each (default 100000000)")
       .range(std::size_t{1}, std::size_t{1000000000000});
+  command.choice("--weights-are", options->analysis.weights_are,
+                 {{"precision", ResidualNoise::precision},
+                  {"importance", ResidualNoise::importance},
+                  {"frequency", ResidualNoise::frequency}},
+                 "Meaning of the weights: precision (inverse variances, default), importance or frequency (counts)");
   command.choice("--refuted", options->analysis.refuted_noise,
                  {{"withheld", RefutedNoise::withheld}, {"residuals", RefutedNoise::residuals}},
                  "The covariance where the scatter refutes the file's: withheld (default) or from the residuals");

@@ -44,6 +44,7 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   MeanInput<M> input = meanInput(measurements, features);
   input.refuted_noise = options.refuted_noise;
   input.scale_noise = options.birge;
+  input.weights_are = options.weights_are;
   MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];

@@ -20,15 +20,16 @@ struct MeanAnalysis : MeanSummary {
 
 /// Options of analyseMean().
 struct AnalysisOptions {
-  bool certify = true;                              ///< branch and bound where the cheap certificates fail
-  std::size_t budget = UniquenessOptions{}.budget;  ///< limit of the search's looks at measurements or bins of them
-  int threads = 0;                                  ///< 0: all
-  bool charts = false;                              ///< for a report
-  std::function<void(double)> progress = {};        ///< is told which part of that budget is spent
-  std::function<bool()> stop = {};                  ///< ends that search once it says true
+  bool certify = true;                                  ///< branch and bound where the cheap certificates fail
+  std::size_t budget = UniquenessOptions{}.budget;      ///< limit of the search's looks at measurements or bins of them
+  int threads = 0;                                      ///< 0: all
+  bool charts = false;                                  ///< for a report
+  std::function<void(double)> progress = {};            ///< is told which part of that budget is spent
+  std::function<bool()> stop = {};                      ///< ends that search once it says true
   RefutedNoise refuted_noise = RefutedNoise::withheld;  ///< what becomes of the file's covariances once refuted
-  bool birge = false;                                   ///< multiply the covariance by fit_factor
-  bool inflate = false;                             ///< multiply the covariance by the factor of compareBlocks()
+  ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
+  bool birge = false;                                    ///< multiply the covariance by fit_factor
+  bool inflate = false;                                  ///< multiply the covariance by the factor of compareBlocks()
 };
 
 /// Mean, covariance, dispersion and uniqueness of the measurements, with notes. The same bits for any number of threads.

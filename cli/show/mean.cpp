@@ -131,8 +131,9 @@ std::string covarianceInWords(const Measurements& measurements, const MeanAnalys
     return analysis.status == Status::not_applicable ? "none: " + analysis.reason : "withdrawn";
   }
   const int k = degreesOfFreedom(measurements.feature);
-  const std::string law = analysis.fromResiduals() ? fmt::format("Hotelling's law with k = {}, n = {}", k, analysis.n)
-                                                   : fmt::format("chi-square with {} degrees of freedom", k);
+  const std::string law = analysis.fromResiduals()
+                              ? fmt::format("Hotelling's law with k = {}, n = {}", k, significant(analysis.law_n, 4))
+                              : fmt::format("chi-square with {} degrees of freedom", k);
   return fmt::format("from {}, in the local frame of the mean; squared distances follow {}",
                      analysis.fromResiduals() ? "the residuals" : "the measurements' own covariances", law);
 }

@@ -279,6 +279,7 @@ def mean(
     times: ArrayLike | None = None,
     refuted: Literal["withheld", "residuals"] = "withheld",
     birge: bool = False,
+    weights_are: Literal["precision", "importance", "frequency"] = "precision",
     inflate: bool = False,
     budget: int | None = None,
     threads: int = 0,

@@ -75,6 +75,7 @@ def mean(
     times=None,
     refuted="withheld",
     birge=False,
+    weights_are="precision",
     inflate=False,
     budget=None,
     threads=0,
@@ -115,6 +116,10 @@ def mean(
         the refuted covariances.
     birge : bool
         Multiply a covariance from `covariances` that are not refuted by ``fit_factor``, max(1, χ²/ν).
+    weights_are : {'precision', 'importance', 'frequency'}
+        What `weights` mean to a covariance from the residuals: inverse variances; anything else, whatever the noise (by
+        the jackknife, with the degrees of freedom that the weights leave, `covariance_law_n`; less than eight features
+        of equal weight in effect have no covariance); or counts of features that were measured several times.
     inflate : bool
         Multiply the covariance by the factor by which blocks of time disagree, where it is above one.
     budget : int, optional
@@ -146,6 +151,10 @@ def mean(
     )
     if inflate and times is None:
         raise ValueError("mean: inflate needs times")
+    if weights_are not in ("precision", "importance", "frequency"):
+        raise ValueError(
+            f"mean: weights_are: expected 'precision', 'importance' or 'frequency', got {weights_are!r}"
+        )
     if refuted not in ("withheld", "residuals"):
         raise ValueError(f"mean: refuted: expected 'withheld' or 'residuals', got {refuted!r}")
     if (birge or refuted == "residuals") and covariances is None:
@@ -157,6 +166,7 @@ def mean(
             **group,
             residuals_if_refuted=refuted == "residuals",
             birge=bool(birge),
+            weights_are=weights_are,
             certify=bool(certify),
             inflate=bool(inflate),
             budget=int(budget or 0),

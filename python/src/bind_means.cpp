@@ -39,7 +39,7 @@ py::dict answerOf(const MeanSummary& mean) {
   values["near_ties"] = rows(mean.near_ties, [](const NearRival& x) -> const FeatureValue& { return x.feature; });
   values["near_tie_z"] = arrayOf(z, {static_cast<py::ssize_t>(z.size())});
   values["cost"] = mean.cost;
-  values["law_samples"] = mean.known_noise ? std::size_t{0} : mean.n;
+  values["law_samples"] = mean.known_noise ? std::size_t{0} : static_cast<std::size_t>(mean.law_n);
   py::dict d = dictOf(mean);
   d["_values"] = values;
   return d;
@@ -67,13 +67,16 @@ MeanRequest requestOf(const std::string& criterion, const DoubleArray& features,
 
 py::dict mean(const std::string& type, const std::string& criterion, const DoubleArray& features,
               const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
-              bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge, bool certify,
-              bool inflate, std::size_t budget, int threads) {
+              bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge,
+              const std::string& weights_are, bool certify, bool inflate, std::size_t budget, int threads) {
   const MeanType& means = typeOf(type);
   MeanRequest request =
       requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
   request.refuted_noise = residuals_if_refuted ? RefutedNoise::residuals : RefutedNoise::withheld;
   request.birge = birge;
+  for (const ResidualNoise meaning : {ResidualNoise::importance, ResidualNoise::frequency}) {
+    if (weights_are == name(meaning)) request.weights_are = meaning;
+  }
   request.certify = certify;
   request.budget = budget;
   MeanSummary answer;
@@ -164,8 +167,8 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
 void bindMeans(py::module_& module) {
   using namespace py::literals;
   module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
-             "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a, "certify"_a,
-             "inflate"_a, "budget"_a, "threads"_a);
+             "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a, "weights_are"_a,
+             "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
   py::list fields;
   for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
   module.attr("mean_fields") = fields;

@@ -44,6 +44,7 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
                      .covariance_at = request.covariance_at,
                      .likelihood = request.likelihood,
                      .refuted_noise = request.refuted_noise,
+                     .weights_are = request.weights_are,
                      .scale_noise = request.birge};
   for (std::size_t i = 0; i + k * k <= request.covariances.size(); i += k * k) {
     input.covariances.push_back(square<ManifoldTraits<M>::DoF>(request.covariances.data() + i));

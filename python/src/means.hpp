@@ -26,6 +26,7 @@ struct MeanRequest {
   bool likelihood = false;
   RefutedNoise refuted_noise = RefutedNoise::withheld;
   bool birge = false;  ///< multiply by Birge's factor
+  ResidualNoise weights_are = ResidualNoise::precision;
   bool certify = true;
   std::size_t budget = 0;  ///< limit of the search; 0: the library's
   int threads = 0;
