@@ -215,6 +215,8 @@ class ConstrainedEstimator {
     result_.fit_p = found.fit_p;
     result_.active_bounds = found.active_bounds;
     result_.minimum_checked = found.minimum_checked;
+    result_.relative_curvature = found.relative_curvature;
+    result_.widening = found.widening;
   }
 
   Problem problem_;

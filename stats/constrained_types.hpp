@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -24,6 +25,7 @@ enum class ConstrainedEnd {
   stopped,        ///< asked to
   saddle,         ///< a stationary point that is no minimum, and no way down from it was found
   inconsistent,   ///< converged, but χ² refutes the stated noise: no covariance follows from it
+  curved,         ///< converged, but the model is curved on the scale of the noise: first order gives no covariance
   unobservable,   ///< converged, but the measurements leave directions of the parameter open
   contradictory,  ///< constraints that cannot be met together, or not from here, or an equation of exact coordinates
   too_few,        ///< no equation is left
@@ -47,6 +49,8 @@ constexpr const char* name(ConstrainedEnd end) {
       return "saddle";
     case ConstrainedEnd::inconsistent:
       return "inconsistent";
+    case ConstrainedEnd::curved:
+      return "curved";
     case ConstrainedEnd::unobservable:
       return "unobservable";
     case ConstrainedEnd::contradictory:
@@ -66,6 +70,7 @@ constexpr Status statusOf(ConstrainedEnd end) {
       return Status::ok;
     case ConstrainedEnd::inconsistent:
       return Status::inconsistent;
+    case ConstrainedEnd::curved:
     case ConstrainedEnd::unobservable:
     case ConstrainedEnd::contradictory:
       return Status::ill_defined;
@@ -122,10 +127,40 @@ struct ConstrainedOptions {
   /// residuals. `false`: Gauss–Newton steps alone, as in the report.
   bool curvature = true;
   /// Second derivatives, by differences of the first, are looked at where the iteration converged: whether it is a
-  /// minimum, which bounds are active. It costs about two linearisations for each coordinate of parameter and
+  /// minimum, which bounds are active, how curved the model is. It costs about two linearisations for each coordinate of parameter and
   /// measurement. Without it, or without `curvature`, neither is known.
   bool second_order = true;
   StatedNoise noise = StatedNoise::tested;
+};
+
+/// How far the model is from its linearisation at the estimate, on the scale of the noise. The first two are root mean
+/// squares over all directions of second derivatives times the radius of the 95 % region, the relative curvatures of
+/// D. Bates and D. Watts, "Relative curvature measures of nonlinearity", 1980. NaN: untested.
+struct RelativeCurvature {
+  double intrinsic = std::numeric_limits<double>::quiet_NaN();  ///< across the model, whatever its parameters
+  double parameter = intrinsic;                                 ///< along it: of the coordinates
+  /// The part of the information, along the parameter where it is largest, that is noise of the corrected measurements
+  /// along the model. It looks like information and is none: a line whose points spread by their noise alone has 1.
+  double noise_share = intrinsic;
+  double bias = intrinsic;  ///< second-order bias of the estimate, in standard deviations
+
+  bool tested() const { return !std::isnan(parameter); }
+  /// Of noise that is larger by a factor than stated.
+  RelativeCurvature at(double scale) const {
+    return {scale * intrinsic, scale * parameter, scale * scale * noise_share, scale * bias};
+  }
+  /// Regions of first order were seen to hold below these bounds, in all kinds of docs/constrained.md.
+  bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.4; }
+  /// Widened regions were seen to fail beyond these.
+  bool large() const { return parameter > 0.5 || intrinsic > 0.35 || noise_share > 0.4 || bias > 0.4; }
+  /// The factor of a covariance whose region holds between the two. The edge of the region is off by no more than the
+  /// relative curvatures of its radius; what is noise of the information is none, and its own noise is as large.
+  double widening() const {
+    if (!tested() || small()) return 1;
+    const double radius = (1 + parameter + intrinsic) / (1 - std::min(noise_share, 0.9));
+    return radius * radius;
+  }
+  const char* word() const { return !tested() ? "untested" : small() ? "small" : large() ? "large" : "widened"; }
 };
 
 /// A constrained estimate. All distances and covariances are in local frames, in the tangent order of Q.
@@ -136,7 +171,7 @@ struct ConstrainedResult {
   /// Information on the parameter, (6) of the report: before the constraints.
   SquareOf<Q> information = SquareOf<Q>::Zero();
   /// Z (Zᵀ A Z)⁻¹ Zᵀ, A the information and Z a basis of what the constraints leave free: of that rank. First order.
-  /// NaN in rows and columns of coordinates that are open, and everywhere where the stated noise is refuted. Active
+  /// NaN in rows and columns of coordinates that are open, and everywhere of `inconsistent` and `curved` ends. Active
   /// bounds do not make it smaller: the true parameter may be inside of them.
   SquareOf<Q> covariance = SquareOf<Q>::Constant(std::numeric_limits<double>::quiet_NaN());
   /// D² of section 3.7: 2 L², the squared distance from the measurements and the prior to what was estimated. It follows
@@ -159,10 +194,14 @@ struct ConstrainedResult {
   int unobservable = 0;
   SquareOf<Q> unobservable_basis = SquareOf<Q>::Zero();
   /// The covariance of the error's part across these directions, whatever its part along them; NaN as `covariance` is
-  /// where the stated noise is refuted. Without open directions it is `covariance`.
+  /// where it is withheld. Without open directions it is `covariance`.
   SquareOf<Q> determined_covariance = covariance;
   /// Inequalities that hold with equality: directions, such as a slack variable, that second derivatives alone determine.
   int active_bounds = 0;
+  /// Where it is large the estimate is `curved`, without a covariance; where it is not small the covariance is multiplied
+  /// by `widening`.
+  RelativeCurvature relative_curvature = {};
+  double widening = 1;
   bool minimum_checked = false;  ///< that the end is a minimum was seen in its second derivatives
 
   Status status() const { return statusOf(end); }

@@ -126,4 +126,62 @@ inline MomentScale scaleFromMoments(std::span<const double> errors, const Moment
   return found;
 }
 
+/// √T of scaleFromMoments() for normal inliers, in standard deviations.
+inline constexpr double moment_scale_of_normal_errors = 4.42;
+
+/// What the errors of all measurements under an estimate say of the noise in whose units they are. Of right noise one
+/// inlier in a hundred lies between the threshold and twice that distance, and outliers are as dense there as beyond; noise
+/// that is larger than stated moves inliers there.
+struct NoiseCheck {
+  /// √T of scaleFromMoments() over what it is where the stated noise is right: by which the true standard deviation is
+  /// larger. NaN without a root, or with several equations a measurement.
+  double scale = std::numeric_limits<double>::quiet_NaN();
+  std::size_t beyond = 0;                                      ///< errors between the threshold and twice that distance
+  double expected = std::numeric_limits<double>::quiet_NaN();  ///< of them where the stated noise is right
+  double p = std::numeric_limits<double>::quiet_NaN();         ///< probability of so many, or more
+
+  /// A thousandth of searches with right noise are refuted by their number; of 100 errors, half of them outliers, 99 of
+  /// 100 scales are below 1.5.
+  static constexpr double level = 1e-3, max_scale = 1.6;
+  bool tested() const { return !std::isnan(p); }
+  bool refuted() const { return p < level || scale > max_scale; }
+  const char* word() const { return !tested() ? "untested" : refuted() ? "larger than stated" : "as stated"; }
+};
+
+/// The check for an inlier threshold χ²_{0.99} of the equations of one measurement. Untested without errors below it.
+inline NoiseCheck checkNoise(std::span<const double> errors, double threshold, int equations = 1) {
+  NoiseCheck check;
+  std::size_t inside = 0, outside = 0;
+  for (const double e : errors) {
+    inside += e < threshold;
+    check.beyond += e >= threshold && e < 4 * threshold;
+    outside += e >= 4 * threshold && e < 36 * threshold;
+  }
+  if (inside == 0 || !(threshold > 0)) return check;
+  // Outliers of constant density in the space of the equations: their numbers are as volumes of shells.
+  const double ratio = (std::pow(2, equations) - 1) / (std::pow(6, equations) - std::pow(2, equations));
+  const double of_inliers = 0.01 / 0.99 * static_cast<double>(inside), shells = static_cast<double>(outside) + 1;
+  check.expected = of_inliers + ratio * static_cast<double>(outside);
+  // Inliers by Poisson's law; outliers by what a number of them elsewhere predicts, the negative binomial law.
+  std::vector<double> background(check.beyond);
+  double fewer = 0, here = std::pow(1 + ratio, -shells);
+  for (std::size_t k = 0; k < check.beyond; ++k) {
+    background[k] = here;
+    here *= (shells + static_cast<double>(k)) / static_cast<double>(k + 1) * ratio / (1 + ratio);
+  }
+  double poisson = std::exp(-of_inliers);
+  for (std::size_t k = 0; k < check.beyond; ++k) {
+    double rest = 0;
+    for (std::size_t j = 0; j + k < check.beyond; ++j) rest += background[j];
+    fewer += poisson * rest;
+    poisson *= of_inliers / static_cast<double>(k + 1);
+  }
+  check.p = std::max(0.0, 1 - fewer);
+  if (equations == 1) {
+    const MomentScale found = scaleFromMoments(errors);
+    if (found.ok()) check.scale = std::sqrt(found.T) / moment_scale_of_normal_errors;
+  }
+  return check;
+}
+
 }  // namespace liestat

@@ -11,6 +11,7 @@
 
 #include <stats/random.hpp>
 #include <stats/robust.hpp>
+#include <stats/status.hpp>
 
 #include <algorithm>
 #include <array>
@@ -84,6 +85,13 @@ struct RobustEstimate {
   std::vector<std::size_t> inliers;  ///< ascending
   std::size_t draw = 0;              ///< in which it was found
   bool refined = false;              ///< estimated from the inliers of what the draw gave
+  /// The stated noise under the parameter; refined() tests it. Where it is larger than stated the inliers are too few, and
+  /// a covariance from them is too small.
+  NoiseCheck noise = {};
+
+  Status status() const {
+    return !parameter ? Status::not_converged : noise.refuted() ? Status::inconsistent : Status::ok;
+  }
 };
 
 /// The search for one model, a hypothesis at a time. It keeps a reference to the model, whose measurements must not
@@ -163,12 +171,21 @@ class RobustSearch {
       listInliers(errors, result.inliers);
       before = after;
     }
+    model_->errors(*result.parameter, errors);
+    result.noise = checkNoise(errors, options_.inlier_threshold, equations);
     return result;
   }
 
  private:
   static constexpr bool rejects = ModelOfSome<Model> && BoundedRule<Rule>;
   static constexpr std::size_t block = 16;
+  static constexpr int equations = [] {
+    if constexpr (requires { Model::equations; }) {
+      return static_cast<int>(Model::equations);
+    } else {
+      return 1;
+    }
+  }();
 
   /// Distinct measurements, each set with the same probability (Floyd's algorithm).
   void drawSample(CounterRng& rng) {

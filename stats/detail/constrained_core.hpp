@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace liestat::detail {
@@ -118,6 +119,8 @@ struct ConstrainedOutcome {
       dropped_constraints = 0, iterations = 0, unobservable = 0, active_bounds = 0;
   std::size_t uninformative = 0;
   bool used_curvature = false, minimum_checked = false;
+  RelativeCurvature relative_curvature = {};
+  double widening = 1;
   Rows information = {}, covariance = {}, unobservable_basis = {}, determined_covariance = {};
 };
 
@@ -176,6 +179,24 @@ class TangentSystem {
   int free_ = 0, null_dimension_ = 0;
 };
 
+/// Second derivatives of the equations along directions d_a of the parameter, one standard deviation long, in units of the
+/// noise: sums over the measurements (docs/theory/constrained.md, section 6).
+struct CurvatureSums {
+  CurvatureSums(Rows directions_, Rows bends_)
+      : directions(std::move(directions_)),
+        bends(std::move(bends_)),
+        tangent(directions.rows() * directions.rows(), directions.rows()),
+        spread(directions.rows(), directions.rows()),
+        bias(static_cast<std::size_t>(directions.rows())) {}
+
+  Rows directions, bends;  ///< d_a; the constraints' second-order steps w_ab for b ≤ a, one after the other
+  Rows tangent;            ///< row ab, column c: Σ a_ab·v_c, what of the curvature lies along the model
+  Rows spread;             ///< the part of the information that is noise of the corrected measurements along the model
+  Numbers bias;            ///< -½ Σ v·tr a, the second-order bias
+  double total = 0;        ///< Σ 2 ‖a‖² + ‖tr a‖², tangent and normal
+  bool known = true;       ///< false where a measurement has free directions
+};
+
 /// Criterion and equations at some point.
 struct ChannelMerit {
   double cost = 0;       ///< Σ ‖ε‖²_Q
@@ -198,7 +219,8 @@ class ConstrainedChannel {
   /// finite.
   bool linearize(const void* q, Rows& A, Numbers& b);
   /// The same with the curvature of the equations, after linearize(); adds to all of A.
-  void linearizeCurved(const ParameterFunctions& parameter, void* problem, double step, Rows& A, Numbers& b);
+  void linearizeCurved(const ParameterFunctions& parameter, void* problem, double step, Rows& A, Numbers& b,
+                       CurvatureSums* sums = nullptr);
   /// Measurements whose correction is no minimum for the parameter, in linearizeCurved().
   std::size_t misplaced() const { return misplaced_; }
   /// Corrections for a step; returns the largest multiplier in units of the noise.
@@ -246,6 +268,7 @@ class ConstrainedChannel {
   void evaluate(const void* q, ChannelMerit& sum);
   void lagrange(std::size_t i, double* lambda) const;
   void addCurved(std::size_t i, double* H, Rows& A, Numbers& b);
+  void addCurvature(std::size_t i, const double* second, CurvatureSums& sums) const;
 
   ChannelRecord record_;
   int N, P, K;
@@ -286,7 +309,9 @@ class ConstrainedCore {
   bool hasPrior() const { return !settings_.prior_information.empty(); }
   const void* point(const void* problem, ParameterPoint which) const { return parameter_.point(problem, which); }
   void linearize(void* problem);
-  bool linearizeCurved(void* problem);
+  bool linearizeCurved(void* problem, CurvatureSums* sums = nullptr);
+  CurvatureSums curvatureSums(void* problem);
+  void setCurvature(const CurvatureSums& sums);
   std::vector<Rows> constraintCurvatures(void* problem, double h);
   double differenceStep(const void* problem) const;
   Merit meritOf(const ChannelMerit& sum, double prior_cost, const Numbers& constraints) const;
@@ -303,6 +328,7 @@ class ConstrainedCore {
   bool leaveSaddle(void* problem, const Numbers& direction, double curvature);
   void setCovariance();
   bool isRefuted();
+  double noiseScale() const;
   bool finish(void* problem, ConstrainedEnd end);
   double equationError(void* problem);
 

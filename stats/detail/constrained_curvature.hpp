@@ -3,12 +3,15 @@
 // stats/detail/constrained_core.hpp.
 #pragma once
 
+#include <lie/detail/small_eigen.hpp>
 #include <stats/detail/constrained_channel.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace liestat::detail {
@@ -39,25 +42,23 @@ inline void ConstrainedChannel::lagrange(std::size_t i, double* lambda) const {
 }
 
 inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parameter, void* problem,
-                                                double parameter_step, Rows& A, Numbers& b) {
-  const int size = N + K;
+                                                double parameter_step, Rows& A, Numbers& b, CurvatureSums* sums) {
+  const int size = N + K, square = size * size;
   base_.resize(n_ * number(K)), slope_.resize(n_ * number(K * N)), curved_.assign(n_, 0);
   misplaced_ = 0;
   // Those where the parameter stays. Those of the last step are in an order of equations that may be another one now: of
   // equal pivots rounding takes the first.
   multipliers_ = r_;
-  // Second derivatives of λᵀ c with respect to parameter and measurement, by central differences of the first.
-  Numbers H(channel_batch * number(size * size)), lambda(channel_batch * number(P)), shift(number(N)),
-      at(channel_batch * number(K)), steps(channel_batch, curvature_step), gradient(number(N)), moved(number(N));
+  // Second derivatives of each equation with respect to parameter and measurement, by central differences of the first.
+  Numbers second(channel_batch * number(P * square)), H(number(square)), lambda(number(P)), shift(number(N)),
+      at(channel_batch * number(K)), steps(channel_batch, curvature_step);
   Rows transport(N, N);
   for (std::size_t first = 0; first < n_; first += channel_batch) {
     const std::size_t count = std::min(channel_batch, n_ - first);
-    for (std::size_t i = 0; i < count; ++i) {
-      lagrange(first + i, block(lambda, i, P));
-      if (!record_.functions->is_vector) continue;
+    for (std::size_t i = 0; i < count && record_.functions->is_vector; ++i) {
       steps[i] = curvature_step * differenceScale(block(record_.coordinates, first + i, K), K);
     }
-    std::fill(H.begin(), H.end(), 0.);
+    std::fill(second.begin(), second.end(), 0.);
     for (int column = 0; column < size; ++column) {
       for (const double sign : {1., -1.}) {
         std::copy_n(block(at_, first, K), count * number(K), at.data());
@@ -72,22 +73,77 @@ inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parame
         record_.functions->linearize(record_.channel, parameter.point(problem, ParameterPoint::shifted), first, count,
                                      at.data(), raw_values_.data(), raw_C_.data(), raw_D_.data());
         for (std::size_t i = 0; i < count; ++i) {
-          const double *l = block(lambda, i, P), *C = block(raw_C_, i, P * N), *D = block(raw_D_, i, P * K);
-          double* h = block(H, i, size * size) + column * size;
           const double factor = sign / (2 * (column < N ? parameter_step : steps[i]));
-          std::fill(gradient.begin(), gradient.end(), 0.);
-          for (int p = 0; p < P; ++p) addScaled(gradient.data(), factor * l[p], C + p * N, N);
-          if (!parameter.is_vector) {
-            moved = gradient;
-            std::fill(gradient.begin(), gradient.end(), 0.);
-            for (int k = 0; k < N; ++k) addScaled(gradient.data(), moved[number(k)], transport[k], N);
+          for (int p = 0; p < P; ++p) {
+            const double *C = block(raw_C_, i, P * N) + p * N, *D = block(raw_D_, i, P * K) + p * K;
+            double* h = block(second, i, P * square) + p * square + column * size;
+            if (parameter.is_vector) addScaled(h, factor, C, N);
+            for (int k = 0; k < N && !parameter.is_vector; ++k) addScaled(h, factor * C[k], transport[k], N);
+            addScaled(h + N, factor, D, K);
           }
-          addScaled(h, 1, gradient.data(), N);
-          for (int p = 0; p < P; ++p) addScaled(h + N, factor * l[p], D + p * K, K);
         }
       }
     }
-    for (std::size_t i = 0; i < count; ++i) addCurved(first + i, block(H, i, size * size), A, b);
+    for (std::size_t i = 0; i < count; ++i) {
+      double* T = block(second, i, P * square);
+      lagrange(first + i, lambda.data());
+      std::fill(H.begin(), H.end(), 0.);
+      for (int p = 0; p < P; ++p) {
+        double* h = T + p * square;
+        for (int k = 0; k < size; ++k) {
+          for (int l = 0; l < k; ++l) h[k * size + l] = h[l * size + k] = 0.5 * (h[k * size + l] + h[l * size + k]);
+        }
+        addScaled(H.data(), lambda[number(p)], h, square);
+      }
+      addCurved(first + i, H.data(), A, b);
+      if (sums) addCurvature(first + i, T, *sums);
+    }
+  }
+}
+
+/// Along u_a = (d_a, -G Ĉ d_a) the equations stay met to first order. What is of second order, in units of the noise, is
+/// a_ab = L⁻¹ c''(u_a, u_b) + Ĉ w_ab; with the part V - G Gᵀ of the noise along the model it is the noise of Ĉ d_a.
+inline void ConstrainedChannel::addCurvature(std::size_t i, const double* second, CurvatureSums& sums) const {
+  if (freeOf(i) > 0) {
+    sums.known = false;
+    return;
+  }
+  const int size = N + K, square = size * size, k = sums.directions.rows(), rank = ranks_[i];
+  const double *C = block(C_, i, P * N), *G = block(G_, i, P * K);
+  Numbers whitened(number(P * square)), v(number(P * k)), u(number(k * size)), along(number(k * size)),
+      V(number(K * K)), noise(number(K)), a(number(k * k));
+  halfSolve(i, second, square, whitened.data());
+  record_.noise.matrix(record_.noise.covariance, i, V.data());
+  for (int p = 0; p < rank; ++p) {
+    for (int l = 0; l < K; ++l) addScaled(V.data() + l * K, -G[p * K + l], G + p * K, K);
+  }
+  for (int j = 0; j < k; ++j) {
+    double* direction = u.data() + j * size;
+    std::copy_n(sums.directions[j], N, direction);
+    for (int p = 0; p < rank; ++p) {
+      v[number(p * k + j)] = dot(C + p * N, sums.directions[j], N);
+      addScaled(direction + N, -v[number(p * k + j)], G + p * K, K);
+    }
+  }
+  for (int p = 0; p < rank; ++p) {
+    const double *T = whitened.data() + p * square, *velocity = v.data() + p * k;
+    multiply(u.data(), T, k, size, size, along.data());
+    double trace = 0, squares = 0, noise_trace = 0;
+    for (int j = 0, bend = 0; j < k; ++j) {
+      for (int l = 0; l <= j; ++l, ++bend) {
+        const double value =
+            dot(along.data() + j * size, u.data() + l * size, size) + dot(C + p * N, sums.bends[bend], N);
+        a[number(j * k + l)] = a[number(l * k + j)] = value;
+        squares += (j == l ? 1 : 2) * value * value;
+        if (j == l) trace += value;
+      }
+      multiply(along.data() + j * size + N, V.data(), 1, K, K, noise.data());
+      for (int l = 0; l < k; ++l) sums.spread[j][l] += dot(noise.data(), along.data() + l * size + N, K);
+    }
+    for (int l = 0; l < K; ++l) noise_trace += dot(T + (N + l) * size + N, V.data() + l * K, K);
+    sums.total += 2 * squares + trace * trace;
+    for (int j = 0; j < k * k; ++j) addScaled(sums.tangent[j], a[number(j)], velocity, k);
+    addScaled(sums.bias.data(), -0.5 * (trace + noise_trace), velocity, k);
   }
 }
 
@@ -191,7 +247,7 @@ inline void ConstrainedChannel::addCurved(std::size_t i, double* H, Rows& A, Num
 
 /// linearize() with the curvature of all equations and constraints under their multipliers.
 /// False if something is not finite.
-LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::linearizeCurved(void* problem) {
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::linearizeCurved(void* problem, CurvatureSums* sums) {
   Rows A(N, N);
   Numbers b(number(N));
   if (hasPrior()) {
@@ -205,7 +261,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::linearizeCurved(void* problem) {
     }
   }
   const double h = differenceStep(problem);
-  for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b);
+  for (ConstrainedChannel& channel : channels_) channel.linearizeCurved(parameter_, problem, h, A, b, sums);
   if (P > 0) {
     const std::vector<Rows> curvatures = constraintCurvatures(problem, h);
     for (int p = 0; p < P; ++p) {
@@ -250,6 +306,67 @@ LIESTAT_ESTIMATION_INLINE std::vector<Rows> ConstrainedCore::constraintCurvature
     }
   }
   return H;
+}
+
+/// The directions that A determines, and how the constraints bend them. Coordinates that no measurement has, such as slack
+/// variables, take up what they can.
+LIESTAT_ESTIMATION_INLINE CurvatureSums ConstrainedCore::curvatureSums(void* problem) {
+  Rows directions = system_.determinedBasis();
+  const int k = directions.rows();
+  Rows bends(k * (k + 1) / 2, N);
+  if (P == 0) return {std::move(directions), std::move(bends)};
+  const std::vector<Rows> curvatures = constraintCurvatures(problem, differenceStep(problem));
+  Rows unmeasured = C_;
+  for (int p = 0; p < P; ++p) {
+    for (int i = 0; i < N; ++i) unmeasured[p][i] *= A_[i][i] == 0;
+  }
+  ConstraintBasis slack(N, P);
+  slack.compute(unmeasured);
+  Numbers values(number(P)), step(number(N));
+  for (int a = 0, row = 0; a < k; ++a) {
+    for (int b = 0; b <= a; ++b, ++row) {
+      for (int p = 0; p < P; ++p) {
+        values[number(p)] = 0;
+        for (int i = 0; i < N; ++i) {
+          values[number(p)] += directions[a][i] * dot(curvatures[number(p)][i], directions[b], N);
+        }
+      }
+      slack.shortest(values, -1, step);
+      addScaled(bends[row], 1, step.data(), N);
+      for (int p = 0; p < P; ++p) values[number(p)] += dot(C_[p], step.data(), N);
+      basis_.shortest(values, -1, step);
+      addScaled(bends[row], 1, step.data(), N);
+    }
+  }
+  return {std::move(directions), std::move(bends)};
+}
+
+/// Root mean squares over all directions, times the radius of the 95 % region (Bates and Watts 1980).
+LIESTAT_ESTIMATION_INLINE void ConstrainedCore::setCurvature(const CurvatureSums& sums) {
+  const int k = sums.directions.rows();
+  if (!sums.known || k == 0) return;
+  double tangent = 0;
+  for (int c = 0; c < k; ++c) {
+    double trace = 0;
+    for (int j = 0; j < k * k; ++j) tangent += 2 * sums.tangent[j][c] * sums.tangent[j][c];
+    for (int j = 0; j < k; ++j) trace += sums.tangent[j * (k + 1)][c];
+    tangent += trace * trace;
+  }
+  double low = 0, high = 10. * k + 10;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = (low + high) / 2;
+    (chiSquaredTail(middle, number(k)) > 0.05 ? low : high) = middle;
+  }
+  const double scale = low / (k * (k + 2));
+  RelativeCurvature& found = result_.relative_curvature;
+  found.parameter = std::sqrt(scale * tangent);
+  found.intrinsic = std::sqrt(scale * std::max(0., sums.total - tangent));
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> spread(k, k);
+  for (int i = 0; i < k; ++i) {
+    for (int j = 0; j < k; ++j) spread(i, j) = sums.spread[i][j];
+  }
+  found.noise_share = SymmetricEigen<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>>(spread).values[k - 1];
+  found.bias = norm(sums.bias);
 }
 
 }  // namespace liestat::detail

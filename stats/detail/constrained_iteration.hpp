@@ -282,7 +282,9 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
   if (!settings_.curvature || !settings_.second_order) return finish(problem, ConstrainedEnd::converged);
   linearize(problem);
-  if (!finite_ || !allFinite(A_) || !linearizeCurved(problem)) return finish(problem, ConstrainedEnd::converged);
+  if (!finite_ || !allFinite(A_)) return finish(problem, ConstrainedEnd::converged);
+  CurvatureSums sums = curvatureSums(problem);
+  if (!linearizeCurved(problem, &sums)) return finish(problem, ConstrainedEnd::converged);
   std::size_t misplaced = 0;
   for (const ConstrainedChannel& channel : channels_) misplaced += channel.misplaced();
   if (misplaced > 0) return finish(problem, ConstrainedEnd::saddle);
@@ -338,6 +340,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
     std::copy(v.begin(), v.end(), along_null.values[a] > least ? bound_[b++] : open_[o++]);
   }
   result_.minimum_checked = true;
+  setCurvature(sums);
   // Along v_i and v_j the parameter moves by -C₀⁺ (v_iᵀ ∇²c v_j) to second order, to one side.
   if (bounds > 0 && P > 0) {
     const std::vector<Rows> curvatures = constraintCurvatures(problem, differenceStep(problem));
@@ -406,10 +409,9 @@ LIESTAT_ESTIMATION_INLINE void ConstrainedCore::setCovariance() {
     system.compute(A_, basis, rows);
     C = system.covariance();
   }
-  if (settings_.noise == StatedNoise::scaled && result_.degrees_of_freedom > 0) {
-    const double factor = std::max(1.0, result_.chi2 / result_.degrees_of_freedom);
-    for (int i = 0; i < N * N; ++i) C.data()[i] *= factor;
-  }
+  result_.widening = result_.relative_curvature.at(std::sqrt(noiseScale())).widening();
+  const double factor = noiseScale() * result_.widening;
+  for (int i = 0; i < N * N && factor != 1; ++i) C.data()[i] *= factor;
   result_.determined_covariance = result_.covariance = C;
   for (int i = 0; i < N; ++i) {
     double open = 0;
@@ -459,12 +461,21 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::finish(void* problem, Constraine
     result_.end = ConstrainedEnd::too_few;
   } else if (end == ConstrainedEnd::converged && isRefuted()) {
     result_.end = ConstrainedEnd::inconsistent;
-    std::fill_n(result_.covariance.data(), N * N, std::numeric_limits<double>::quiet_NaN());
-    result_.determined_covariance = result_.covariance;
   } else if (end == ConstrainedEnd::converged && result_.unobservable > 0) {
     result_.end = ConstrainedEnd::unobservable;
+  } else if (end == ConstrainedEnd::converged && result_.relative_curvature.at(std::sqrt(noiseScale())).large()) {
+    result_.end = ConstrainedEnd::curved;
+  }
+  if (result_.end == ConstrainedEnd::inconsistent || result_.end == ConstrainedEnd::curved) {
+    std::fill_n(result_.covariance.data(), N * N, std::numeric_limits<double>::quiet_NaN());
+    result_.determined_covariance = result_.covariance;
   }
   return false;
+}
+/// Birge's factor where it is asked for.
+LIESTAT_ESTIMATION_INLINE double ConstrainedCore::noiseScale() const {
+  if (settings_.noise != StatedNoise::scaled || result_.degrees_of_freedom <= 0) return 1;
+  return std::max(1.0, result_.chi2 / result_.degrees_of_freedom);
 }
 /// Whether χ² refutes the stated noise; fit_p is set.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::isRefuted() {

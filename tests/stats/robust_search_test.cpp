@@ -124,6 +124,26 @@ TEST(RobustSearch, FindsTheModelAmongMoreOutliersThanInliers) {
   findsTheEllipse(TruncatedCost{threshold}, 80, 120, 895);
 }
 
+// Half the true deviation, 40 % outliers: what is found is right, its covariance is not, and the search says so.
+TEST(RobustSearch, SaysThatTheStatedNoiseIsTooSmall) {
+  int said = 0, alarms = 0;
+  const int seeds = liestat_test::sanitized ? 1 : 10;
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(seeds); ++seed) {
+    for (const double factor : {0.5, 1.0}) {
+      ConicModel model = ellipseScene(120, 80, seed + 40);
+      model.sigma *= factor;
+      RobustSearch search(model, TruncatedCost{threshold}, {.inlier_threshold = threshold, .seed = seed});
+      for (int k = 0; k < 150; ++k) search.iterate();
+      const auto found = search.refined();
+      ASSERT_TRUE(found.parameter && found.noise.tested());
+      EXPECT_EQ(found.status() == Status::inconsistent, found.noise.refuted());
+      (factor < 1 ? said : alarms) += found.noise.refuted();
+    }
+  }
+  EXPECT_GE(said, seeds - 1);
+  EXPECT_LE(alarms, 1);
+}
+
 TEST(RobustSearch, BadDataFindNothing) {
   const auto best = [](std::vector<Eigen::Vector2d> points) {
     const ConicModel model{std::move(points), 0.01};

@@ -308,4 +308,51 @@ TEST(ScaleFromMoments, FollowsTheUnit) {
   }
 }
 
+// Noise of twice the stated deviation moves inliers beyond the threshold; at right noise a thousandth is refuted.
+TEST(CheckNoise, SeesNoiseThatIsLargerThanStated) {
+  constexpr double threshold = 6.6349;
+  const int trials = 1000;
+  for (const int outliers : {0, 40, 100}) {
+    int alarms = 0, seen = 0;
+    std::vector<double> scales;
+    for (int t = 0; t < trials; ++t) {
+      Errors errors = errorsOf(200 - outliers, outliers, static_cast<std::uint64_t>(t) + 700);
+      alarms += checkNoise(errors, threshold).refuted();
+      for (double& e : errors) e *= 4;  // in units of half the noise
+      const NoiseCheck half = checkNoise(errors, threshold);
+      seen += half.refuted();
+      scales.push_back(half.scale);
+    }
+    std::sort(scales.begin(), scales.end());
+    EXPECT_LE(alarms, 0.001 * trials + 4 * std::sqrt(0.001 * trials)) << outliers;
+    EXPECT_GE(seen, 0.99 * trials) << outliers;
+    EXPECT_NEAR(scales[trials / 2], 2, 0.3) << outliers;
+  }
+  const NoiseCheck none = checkNoise(Errors{nan, 100, infinity}, threshold);
+  EXPECT_FALSE(none.tested() || none.refuted());
+  EXPECT_STREQ(none.word(), "untested");
+}
+
+// Inliers and outliers of two equations, as dense in the plane.
+TEST(CheckNoise, KnowsTheNumberOfEquations) {
+  constexpr double threshold = 9.2103;
+  const int trials = 1000;
+  int alarms = 0, seen = 0;
+  for (int t = 0; t < trials; ++t) {
+    CounterRng rng(31, static_cast<std::uint64_t>(t));
+    Errors errors, half;
+    for (int i = 0; i < 150; ++i) {
+      const bool inlier = i < 100;
+      const double x = inlier ? rng.normal() : rng.uniform(-25, 25), y = inlier ? rng.normal() : rng.uniform(-25, 25);
+      errors.push_back(x * x + y * y);
+      half.push_back(4 * errors.back());
+    }
+    alarms += checkNoise(errors, threshold, 2).refuted();
+    seen += checkNoise(half, threshold, 2).refuted();
+    EXPECT_TRUE(std::isnan(checkNoise(half, threshold, 2).scale)) << "that of one equation";
+  }
+  EXPECT_LE(alarms, 0.001 * trials + 4 * std::sqrt(0.001 * trials));
+  EXPECT_GE(seen, 0.99 * trials);
+}
+
 }  // namespace
