@@ -6,7 +6,7 @@
 // the jackknife's S = Σ (p_i/(1 - h_i))² z_i z_iᵀ mends; its own degrees of freedom after Satterthwaite, tr²G/tr G² of
 // the quadratic form, are fewer than 1/Σh² - 1 where some weights dominate, and by themselves too cautious: their
 // geometric mean, four parts to one, holds 93 to 97 % at ln-sd 1 and 2, 1 to 3 dimensions, from an effective number of
-// eight on (docs/theory/means.md, section 3.4).
+// eight on (docs/theory/means.md, section 3.5).
 #pragma once
 
 #include <lie/manifold.hpp>

@@ -5,8 +5,10 @@
 #include <stats/certified_mean.hpp>
 #include <stats/covariance.hpp>
 #include <stats/dispersion.hpp>
+#include <stats/detail/tail_probabilities.hpp>
 #include <stats/group_mean.hpp>
 #include <stats/mean.hpp>
+#include <stats/random.hpp>
 
 #include <lie/lie.hpp>
 
@@ -189,6 +191,91 @@ TEST(Weights, OfAnotherNumber) {
   const auto samples = scattered<SO3d>(static_cast<int>(n), 0.1);
   EXPECT_EQ(mean(samples, std::vector<double>(n - 1, 1.0)).status, Status::not_applicable);
 #endif
+}
+
+/// Rotations of one law under weights that have nothing to do with it: how often the 95 % region holds the truth.
+TEST(Weights, ThatAreImportances) {
+  constexpr int trials = 500;
+  int ok = 0, inside = 0, precise = 0, inside_as_precisions = 0, flagged = 0;
+  for (std::uint64_t t = 0; t < trials; ++t) {
+    CounterRng rng(5, t);
+    std::vector<SO3d> features;
+    std::vector<double> weights;
+    for (int i = 0; i < 50; ++i) {
+      weights.push_back(std::exp(rng.normal()));
+      features.push_back(SO3d::exp(Eigen::Vector3d(0.2 * rng.normalVector<3>())));
+    }
+    const auto holds = [](const CertifiedMean<SO3d>& found) {
+      return detail::hotellingTail(mahalanobisSquared(*found.estimate, SO3d()), 3, found.law_n) > 0.05;
+    };
+    CertifiedMeanOptions<SO3d> options;
+    const auto plain = certifiedMean(features, weights, options);
+    if (plain.estimate) ++precise, inside_as_precisions += holds(plain);
+    options.noise = ResidualNoise::importance;
+    const auto found = certifiedMean(features, weights, options);
+    if (found.estimate) ++ok, inside += holds(found);
+    EXPECT_TRUE(found.estimate || found.status == Status::too_few);
+    flagged += dispersionAbout(features, weights, found.mean.mean).order.weightsAreNoPrecisions();
+  }
+  EXPECT_GT(ok, 0.95 * trials);
+  EXPECT_GE(inside, (0.93 - 4 * std::sqrt(0.93 * 0.07 / ok)) * ok);
+  EXPECT_LT(inside_as_precisions, 0.75 * precise);
+  EXPECT_GT(flagged, 0.9 * trials);
+}
+
+TEST(Weights, ThatArePrecisionsAreNotFlagged) {
+  constexpr int trials = 1000;
+  int flagged = 0;
+  for (std::uint64_t t = 0; t < trials; ++t) {
+    CounterRng rng(6, t);
+    std::vector<SO3d> features;
+    std::vector<double> weights;
+    for (int i = 0; i < 50; ++i) {
+      weights.push_back(std::exp(rng.normal()));
+      features.push_back(SO3d::exp(Eigen::Vector3d(0.1 / std::sqrt(weights.back()) * rng.normalVector<3>())));
+    }
+    flagged += dispersionAbout(features, weights, mean(features, weights).mean).order.weightsAreNoPrecisions();
+  }
+  EXPECT_LE(flagged, (0.01 + 4 * std::sqrt(0.01 * 0.99 / trials)) * trials);
+}
+
+/// Counts give what the features give that are written out, with Hotelling's law for all of them.
+TEST(Weights, ThatAreCounts) {
+  const std::vector<SO3d> features = scattered<SO3d>(n, 0.3);
+  std::vector<double> counts;
+  std::vector<SO3d> written_out;
+  for (std::size_t i = 0; i < n; ++i) {
+    counts.push_back(static_cast<double>(1 + i % 3));
+    written_out.insert(written_out.end(), 1 + i % 3, features[i]);
+  }
+  CertifiedMeanOptions<SO3d> options;
+  options.noise = ResidualNoise::frequency;
+  const auto counted = certifiedMean(features, counts, options), all = certifiedMean(written_out);
+  ASSERT_TRUE(counted.estimate && all.estimate);
+  EXPECT_LT((counted.mean.mean.inverse() * all.mean.mean).log().norm(), 1e-12);
+  EXPECT_EQ(counted.law_n, static_cast<double>(written_out.size()));
+  const double size = all.estimate->covariance.norm();
+  EXPECT_LT((covarianceFromResiduals(counted.mean, ResidualNoise::frequency) - covarianceFromResiduals(all.mean)).norm(),
+            1e-10 * size);
+  CertifiedGroupMeanOptions<SE3d> of_poses;
+  of_poses.noise = ResidualNoise::frequency;
+  std::vector<SE3d> poses, all_poses;
+  for (const SO3d& R : features) poses.push_back(SE3d(R, R.log()));
+  for (const SO3d& R : written_out) all_poses.push_back(SE3d(R, R.log()));
+  const auto barycentre = certifiedGroupMean(poses, counts, of_poses), of_all = certifiedGroupMean(all_poses);
+  ASSERT_TRUE(barycentre.estimate && of_all.estimate);
+  EXPECT_LT((barycentre.estimate->covariance - of_all.estimate->covariance).norm(),
+            1e-6 * of_all.estimate->covariance.norm());
+}
+
+TEST(Weights, WithTooLittleInEffect) {
+  const std::vector<SO3d> features = scattered<SO3d>(n, 0.3);
+  std::vector<double> weights(n, 1e-3);
+  for (std::size_t i = 0; i < 7; ++i) weights[i] = 1;
+  CertifiedMeanOptions<SO3d> options;
+  options.noise = ResidualNoise::importance;
+  EXPECT_EQ(certifiedMean(features, weights, options).status, Status::too_few);
+  EXPECT_EQ(certifiedMean(features, options).status, Status::ok);
 }
 
 }  // namespace
