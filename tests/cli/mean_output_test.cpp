@@ -11,10 +11,14 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include <Eigen/Eigenvalues>
 
 namespace liestat::cli {
 namespace {
@@ -156,6 +160,35 @@ TEST(MeanOutput, MeasurementsWithoutWeightAreNotCounted) {
 // Rotation vectors beyond a half-turn are said.
 TEST(MeanOutput, LongRotationVectorsAreSaid) {
   EXPECT_TRUE(Analysed("rx,ry,rz\n0,0,3.2\n0,0,3.1\n0,0,3.0\n0,0.1,3.0\n").says("longer than a half-turn"));
+}
+
+/// Small files that were answered wrongly once.
+TEST(InputsThatFailed, haveTheRightAnswer) {
+  const char* data = std::getenv("LIESTAT_DATA");
+  if (data == nullptr) GTEST_SKIP() << "skipped: LIESTAT_DATA does not name the directory of the real measurements";
+  const auto analysed = [&](const char* file, std::optional<Criterion> criterion) {
+    const std::string path = std::string(data) + "/inputs-that-fail/" + file;
+    return analyseMean(chooseMeasurements(readFeatureFile(path, {}), {.criterion = criterion}, "liestat mean"), {});
+  };
+  // Two clouds half a turn apart, each with its true covariance.
+  for (const Criterion criterion : {Criterion::lsq, Criterion::wlsq, Criterion::maha}) {
+    const MeanAnalysis clouds = analysed("two_clouds_with_covariances.csv", criterion);
+    EXPECT_EQ(clouds.status, Status::inconsistent) << name(criterion);
+    EXPECT_FALSE(clouds.trusted() || clouds.hasCovariance());
+    EXPECT_LT(clouds.fit.p, 1e-3);
+  }
+  // A quarter of the signs flipped: a circle of minima.
+  const MeanAnalysis ring = analysed("flipped_directions.csv", std::nullopt);
+  EXPECT_EQ(ring.status, Status::ambiguous);
+  // Deviations of 0.3 : 3e-6 : 3e-6 rad about common axes.
+  const MeanAnalysis anisotropic = analysed("anisotropic_same_axes.csv", Criterion::maha);
+  ASSERT_EQ(anisotropic.status, Status::ok) << anisotropic.reason;
+  const Eigen::Matrix3d C = anisotropic.covariance;
+  EXPECT_TRUE(C == C.transpose());
+  const Eigen::Vector3d eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(C).eigenvalues();
+  EXPECT_NEAR(eigenvalues[2], 1.8e-2, 1e-3);
+  EXPECT_NEAR(eigenvalues[0], 1.8e-12, 1e-13);
+  EXPECT_NEAR(eigenvalues[1], 1.8e-12, 1e-13);
 }
 
 }  // namespace
