@@ -2,7 +2,7 @@
 //
 // A conic has six coefficients q up to scale, so ‖q‖ = 1 is a constraint, and a point m lies on it if one equation
 // holds. Both coordinates of each point are noisy: neither is a function of the other.
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/constrained.hpp>
 #include <stats/random.hpp>
 

@@ -2,11 +2,11 @@
 // is a landmark that the robot sees from there?
 //
 // Every motion is known with some noise in the robot's own axes. Composition adds it up; the landmark's direction and
-// range go through a function of our own, whose Jacobian ceres::Jet finds. All of it is compared with 2000 simulated
+// range go through a function of our own, whose Jacobian Jets find. All of it is compared with 2000 simulated
 // drives.
 #include <lie/se3.hpp>
 #include <lie/units.hpp>
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/sampling.hpp>
 
 #include <cstdio>

@@ -1,6 +1,6 @@
 // An ellipse among points of which half lie anywhere: robust search (docs/robust.md), and the covariance of what it
 // finds (docs/constrained.md).
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/constrained.hpp>
 #include <stats/measurement_error.hpp>
 #include <stats/robust_search.hpp>

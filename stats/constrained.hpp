@@ -20,7 +20,7 @@
 // needs no constraint: a rotation is an SO3d, or nine numbers and six equations, and both give the same estimate.
 //
 // Equations are function objects: `e(q, m)` returns the values, `e.linearize(q, m)` an EquationDerivatives in local
-// frames. `autoDiff(f)` of stats/compat/jet.hpp makes one of a function that is generic in the scalar. Constraints are
+// frames. `autoDiff(f)` of stats/auto_diff.hpp makes one of a function that is generic in the scalar. Constraints are
 // the same without m. Equations that are redundant by construction, such as the three of R a - b = 0 between unit vectors,
 // say how many are independent, `static constexpr int rank = 2;`: away from the solution the others look independent.
 //

@@ -1,6 +1,6 @@
 // Constraints with inequalities, alternatives, conditions and qualitative variables, as equations for
 // stats/constrained.hpp (Viéville, Lingrand and Gaspard 2000, appendix F). Needs Eigen alone; derivatives by autoDiff() of
-// stats/compat/jet.hpp.
+// stats/auto_diff.hpp.
 //
 //   // x and y outside of a wall at x = 1, or on the line y = 0; q = (x, y, λ).
 //   const auto outside = atLeastZero([](const auto& q) { return q[0] - 1.0; }, 2);

@@ -10,7 +10,7 @@
 //
 // State and measurements are points of any manifold, errors are x·Exp(e) in local frames. Equations are those of
 // stats/constrained.hpp: `e(x, y)` and `e.linearize(x, y)`, an EquationDerivatives in local frames, by hand or by
-// `autoDiff` of stats/compat/jet.hpp; `static constexpr int rank` where they are redundant by construction. Noises are
+// `autoDiff` of stats/auto_diff.hpp; `static constexpr int rank` where they are redundant by construction. Noises are
 // those of stats/measurement_noise.hpp.
 //
 // With h(exp(x, a), exp(y, b)) = h + C a + D b + …, prior covariance P and noise R the innovation h has the covariance
@@ -204,7 +204,7 @@ class ImplicitEkf {
   /// The state stays where it is and becomes less certain: P + Q, Q in the local frame. ok or not_finite.
   FilterStatus predict(const SquareOf<X>& process_noise) { return predict(state_, process_noise); }
   /// The state moves. `moved` is f(x) or f(x, u) with its covariance, which propagate() of stats/propagation.hpp makes of
-  /// the model, its Jacobian and an input u with or without noise (stats/compat/jet.hpp finds the Jacobian by itself):
+  /// the model, its Jacobian and an input u with or without noise (stats/auto_diff.hpp finds the Jacobian by itself):
   ///   filter.predict(propagate(filter.state(), f, jacobian), Q);
   FilterStatus predict(const Gaussian<X>& moved, const SquareOf<X>& process_noise) {
     Gaussian<X> next = moved;

@@ -251,7 +251,7 @@ template <class G, class P>
 
 /// f(x) with covariance J Σ Jᵀ, first order. `f` takes an M and returns a feature N, a fixed-size vector or a number (a
 /// point of the line); `jacobian` is JacobianOf<N, M>, N::DoF × M::DoF in local frames, or a function of x that returns
-/// it. stats/compat/jet.hpp finds the Jacobian by itself.
+/// it. stats/auto_diff.hpp finds the Jacobian by itself.
 template <Homogeneous M, class F, class J>
   requires std::is_invocable_v<F&, const M&>
 auto propagate(const Gaussian<M>& x, F&& f, const J& jacobian) {

@@ -4,7 +4,7 @@
 // parameter and evaluates the merit function.
 #include "../inputs.hpp"
 
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/constrained.hpp>
 
 #include <benchmark/benchmark.h>

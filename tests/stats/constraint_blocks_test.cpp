@@ -1,6 +1,6 @@
 // Constraints with inequalities, alternatives and qualitative variables: what they mean, and estimates under them.
 
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/constrained.hpp>
 #include <stats/constraint_blocks.hpp>
 #include <stats/random.hpp>

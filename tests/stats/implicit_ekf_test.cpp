@@ -2,7 +2,7 @@
 
 #include <lie/essential.hpp>
 #include <lie/se3.hpp>
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/implicit_ekf.hpp>
 #include <stats/random.hpp>
 #include <stats/sampling.hpp>

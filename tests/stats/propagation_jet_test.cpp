@@ -1,7 +1,7 @@
 // Jacobians by Jets in local frames: those of the groups' own functions, of functions from and to other manifolds.
 
 #include <lie/lie.hpp>
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 
 #include <support/propagated.hpp>
 

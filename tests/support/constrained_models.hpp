@@ -2,7 +2,7 @@
 #pragma once
 
 #include <lie/so3.hpp>
-#include <stats/compat/jet.hpp>
+#include <stats/auto_diff.hpp>
 #include <stats/constrained.hpp>
 #include <stats/random.hpp>
 

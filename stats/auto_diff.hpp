@@ -1,61 +1,63 @@
-// Jacobians between manifolds by automatic differentiation, and the propagation of covariances with them (needs
-// ceres/jet.h, Debian: libceres-dev; nothing to link).
+// Jacobians between manifolds by automatic differentiation, and the propagation of covariances with them. Needs Eigen
+// alone.
 //
 //   const auto range_and_bearing = [](const auto& world_T_body) { … };   // generic in the scalar
 //   const auto measured = liestat::propagate(world_T_body, range_and_bearing);
 //
-// Functions are called twice: with doubles for the value, and with ceres::Jet for the derivative. They take their
+// Functions are called twice: with doubles for the value, and with Jets (lie/jet.hpp) for the derivative. They take their
 // features as they are (`const auto&`, or `template <class T> … (const SE3<T>&)`) and call sqrt, sin … unqualified.
 // double and Jet meet in the groups' operators: a constant SE3d times an SE3<Jet> is an SE3<Jet>.
 #pragma once
 
+#include <lie/jet.hpp>
 #include <stats/constrained_types.hpp>
 #include <stats/propagation.hpp>
 
-#include <ceres/jet.h>
+#include <type_traits>
+#include <utility>
 
 namespace liestat {
 namespace detail {
 
 /// exp(x, d) for a d of Jets, on the same manifold over Jets. A type of a user's own needs cast<Jet>().
-template <class Jet, Homogeneous M>
-auto perturbed(const M& x, const Eigen::Matrix<Jet, ManifoldTraits<M>::DoF, 1>& d) {
-  const auto lifted = asFeature<Jet>(x.template cast<Jet>());
+template <class J, Homogeneous M>
+auto perturbed(const M& x, const Eigen::Matrix<J, ManifoldTraits<M>::DoF, 1>& d) {
+  const auto lifted = asFeature<J>(x.template cast<J>());
   return exp(lifted, d);
 }
 
 /// Coordinates from `first` on, each with its own derivative, all zero.
-template <class Jet, int N>
-Eigen::Matrix<Jet, N, 1> infinitesimals(int first) {
-  Eigen::Matrix<Jet, N, 1> d;
-  for (int i = 0; i < N; ++i) d[i] = Jet(typename Jet::Scalar(0), first + i);
+template <class J, int N>
+Eigen::Matrix<J, N, 1> infinitesimals(int first) {
+  Eigen::Matrix<J, N, 1> d;
+  for (int i = 0; i < N; ++i) d[i] = J(typename J::Scalar(0), first + i);
   return d;
 }
 
 /// The derivative of log(value, moved) at moved = value, and that of all the infinitesimals.
 template <int Columns, Homogeneous N, class Moved>
 Eigen::Matrix<ScalarOf<N>, ManifoldTraits<N>::DoF, Columns> localDerivative(const N& value, const Moved& moved) {
-  using Jet = ceres::Jet<ScalarOf<N>, Columns>;
-  const auto base = asFeature<Jet>(value.template cast<Jet>());
+  using J = Jet<ScalarOf<N>, Columns>;
+  const auto base = asFeature<J>(value.template cast<J>());
   static_assert(std::is_same_v<decltype(base), const Moved>,
                 "the function must return the same feature over Jets as over doubles");
-  const Eigen::Matrix<Jet, ManifoldTraits<N>::DoF, 1> z = log(base, moved);
-  Eigen::Matrix<ScalarOf<N>, ManifoldTraits<N>::DoF, Columns> J;
-  for (int i = 0; i < ManifoldTraits<N>::DoF; ++i) J.row(i) = z[i].v.transpose();
-  return J;
+  const Eigen::Matrix<J, ManifoldTraits<N>::DoF, 1> z = log(base, moved);
+  Eigen::Matrix<ScalarOf<N>, ManifoldTraits<N>::DoF, Columns> derivative;
+  for (int i = 0; i < ManifoldTraits<N>::DoF; ++i) derivative.row(i) = z[i].v.transpose();
+  return derivative;
 }
 
 /// f(a, b) with both Jacobians.
 template <class F, Homogeneous A, Homogeneous B>
 auto linearized(F& f, const A& a, const B& b) {
   constexpr int n_a = ManifoldTraits<A>::DoF, n = n_a + ManifoldTraits<B>::DoF;
-  using Jet = ceres::Jet<ScalarOf<A>, n>;
+  using J = Jet<ScalarOf<A>, n>;
   const auto value = evaluated<ScalarOf<A>>(f, a, b);
   using N = std::remove_const_t<decltype(value)>;
-  const auto moved = evaluated<Jet>(f, perturbed<Jet>(a, infinitesimals<Jet, n_a>(0)),
-                                    perturbed<Jet>(b, infinitesimals<Jet, n - n_a>(n_a)));
-  const auto J = localDerivative<n>(value, moved);
-  return Linearized<N, A, B>{value, J.template leftCols<n_a>(), J.template rightCols<n - n_a>()};
+  const auto moved =
+      evaluated<J>(f, perturbed<J>(a, infinitesimals<J, n_a>(0)), perturbed<J>(b, infinitesimals<J, n - n_a>(n_a)));
+  const auto both = localDerivative<n>(value, moved);
+  return Linearized<N, A, B>{value, both.template leftCols<n_a>(), both.template rightCols<n - n_a>()};
 }
 
 }  // namespace detail
@@ -64,10 +66,9 @@ auto linearized(F& f, const A& a, const B& b) {
 template <class F, Homogeneous M>
 auto jacobian(F&& f, const M& x) {
   constexpr int n = ManifoldTraits<M>::DoF;
-  using Jet = ceres::Jet<ScalarOf<M>, n>;
-  return detail::localDerivative<n>(
-      detail::evaluated<ScalarOf<M>>(f, x),
-      detail::evaluated<Jet>(f, detail::perturbed<Jet>(x, detail::infinitesimals<Jet, n>(0))));
+  using J = Jet<ScalarOf<M>, n>;
+  return detail::localDerivative<n>(detail::evaluated<ScalarOf<M>>(f, x),
+                                    detail::evaluated<J>(f, detail::perturbed<J>(x, detail::infinitesimals<J, n>(0))));
 }
 
 /// f(x) with covariance J Σ Jᵀ, first order. `f` is generic in the scalar; it returns a feature, a fixed-size vector or
