@@ -150,14 +150,16 @@ struct RelativeCurvature {
     return {scale * intrinsic, scale * parameter, scale * scale * noise_share, scale * bias};
   }
   /// Regions of first order were seen to hold below these bounds, in all kinds of docs/constrained.md.
-  bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.4; }
-  /// Widened regions were seen to fail beyond these.
-  bool large() const { return parameter > 0.5 || intrinsic > 0.35 || noise_share > 0.4 || bias > 0.4; }
-  /// The factor of a covariance whose region holds between the two. The edge of the region is off by no more than the
-  /// relative curvatures of its radius; what is noise of the information is none, and its own noise is as large.
+  bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.25; }
+  /// Widened regions were seen to hold up to these, and are worth little beyond.
+  bool large() const { return parameter > 0.9 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.7; }
+  /// The factor of a covariance whose region holds between the two: the edge of the region is off by the relative
+  /// curvatures of its radius, or all of it by the bias, and what is noise of the information is none.
   double widening() const {
     if (!tested() || small()) return 1;
-    const double radius = (1 + parameter + intrinsic) / (1 - std::min(noise_share, 0.9));
+    // The radius is at least two standard deviations.
+    const double edge = std::max(parameter + intrinsic, bias / 2),
+                 radius = (1 + edge) / (1 - std::min(noise_share, 0.9));
     return radius * radius;
   }
   const char* word() const { return !tested() ? "untested" : small() ? "small" : large() ? "large" : "widened"; }

@@ -325,7 +325,7 @@ class ConstrainedCore {
   bool restore(void* problem, const Merit& here);
   bool accept(void* problem);
   bool settle(void* problem);
-  bool leaveSaddle(void* problem, const Numbers& direction, double curvature);
+  bool leaveSaddle(void* problem, const Numbers& direction, double curvature, ConstrainedEnd otherwise);
   void setCovariance();
   bool isRefuted();
   double noiseScale() const;
@@ -343,7 +343,7 @@ class ConstrainedCore {
   ConstraintBasis basis_;
   TangentSystem system_, curved_system_;
   Numbers constraint_values_, trial_values_, constraint_multipliers_;
-  bool have_basis_ = false, finite_ = true, cut_ = false;  // cut: the last step was
+  bool have_basis_ = false, finite_ = true, settled_ = false, cut_ = false;  // cut: the last step was
   double prior_cost_ = 0, penalty_ = 0, constraint_penalty_ = 0, last_length_ = 0, free_step_ = 0;
   int slow_steps_ = 0, left_saddles_ = 0, restorations_ = 0;
   /// Second derivatives at the end: the null directions of A that they determine, rows, those that stay open, and the

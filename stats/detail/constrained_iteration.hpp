@@ -278,7 +278,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::accept(void* problem) {
 /// on. Where A leaves directions open, second derivatives may determine them, as that of c - λ² does at λ = 0.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   // Curvature that differences of first derivatives can tell from none, in units of A or of all curvature.
-  constexpr double certain = 1e-4, resolved = 1e-6, rounding = 1e-13;
+  constexpr double certain = 1e-4, resolved = 1e-4, rounding = 1e-13;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
   if (!settings_.curvature || !settings_.second_order) return finish(problem, ConstrainedEnd::converged);
   linearize(problem);
@@ -309,7 +309,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
     return direction;
   };
   if (k > 0 && eigen.values[0] < -certain) {
-    return leaveSaddle(problem, combine(determined, eigen.vectors.data()), eigen.values[0]);
+    return leaveSaddle(problem, combine(determined, eigen.vectors.data()), eigen.values[0], ConstrainedEnd::saddle);
   }
   double least = 0;
   for (int i = 0; i < N; ++i) {
@@ -330,7 +330,9 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   }
   const SymmetricEigen<Matrix> along_null(rest);
   if (m > 0 && along_null.values[0] < -least) {
-    return leaveSaddle(problem, combine(null, along_null.vectors.data()), along_null.values[0]);
+    // Where the way leads nowhere it was the rounding of derivatives: the direction is open.
+    return leaveSaddle(problem, combine(null, along_null.vectors.data()), along_null.values[0],
+                       ConstrainedEnd::converged);
   }
   int bounds = 0;
   for (int a = 0; a < m; ++a) bounds += along_null.values[a] > least;
@@ -339,7 +341,8 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
     const Numbers& v = combine(null, along_null.vectors.col(a).data());
     std::copy(v.begin(), v.end(), along_null.values[a] > least ? bound_[b++] : open_[o++]);
   }
-  result_.minimum_checked = true;
+  settled_ = true;
+  result_.minimum_checked = sums.known;
   setCurvature(sums);
   // Along v_i and v_j the parameter moves by -C₀⁺ (v_iᵀ ∇²c v_j) to second order, to one side.
   if (bounds > 0 && P > 0) {
@@ -361,10 +364,12 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   }
   return finish(problem, ConstrainedEnd::converged);
 }
-/// A step from a stationary point along a direction of negative curvature; not again and again.
-LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const Numbers& direction, double curvature) {
+/// A step from a stationary point along a direction of negative curvature; not again and again. `otherwise`: the end where
+/// there is no way down.
+LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const Numbers& direction, double curvature,
+                                                            ConstrainedEnd otherwise) {
   constexpr int most = 8;
-  if (left_saddles_++ >= most) return finish(problem, ConstrainedEnd::saddle);
+  if (left_saddles_++ >= most) return finish(problem, otherwise);
   // A third of the parameter's size at first, which the search halves.
   const double length = parameterSize(problem) / (3 * norm(direction));
   for (int i = 0; i < N; ++i) delta_[number(i)] = length * direction[number(i)];
@@ -375,9 +380,8 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const
   }
   last_length_ = 0, slow_steps_ = 0;
   const Merit here = meritOf(sum, prior_cost_, constraint_values_);
-  const bool found = search(problem, here, 0.5 * curvature * length * length, length, 1, false);
-  if (!found && result_.end == ConstrainedEnd::stalled) result_.end = ConstrainedEnd::saddle;
-  return found;
+  const bool found = search(problem, here, 0.5 * curvature * length * length, length, 1, true);
+  return found || finish(problem, otherwise);
 }
 
 /// The covariance of what is determined. Active bounds do not count as equations: an estimate that a convex set cuts off
@@ -442,7 +446,7 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::finish(void* problem, Constraine
   result_.dropped_constraints = P - result_.constraints;
   result_.free_parameters = N - result_.constraints;
   result_.information = A_;
-  if (!result_.minimum_checked) open_ = system_.nullBasis();
+  if (!settled_) open_ = system_.nullBasis();
   result_.unobservable = open_.rows();
   result_.active_bounds = bound_.rows();
   for (int k = 0; k < open_.rows(); ++k) {
