@@ -26,6 +26,31 @@ auto perturbed(const M& x, const Eigen::Matrix<J, ManifoldTraits<M>::DoF, 1>& d)
   return exp(lifted, d);
 }
 
+/// A feature over Jets of so many derivatives.
+template <int Columns, Homogeneous M>
+auto overJets(const M& x) {
+  using J = Jet<ScalarOf<M>, Columns>;
+  return asFeature<J>(x.template cast<J>());
+}
+
+/// The scalar of a feature, or a number.
+template <class R>
+struct ScalarOfResult {
+  using type = R;
+};
+template <Homogeneous R>
+struct ScalarOfResult<R> {
+  using type = ScalarOf<R>;
+};
+/// A function takes features over Jets, and returns something over Jets. (Eigen's matrices convert into each other as far
+/// as a signature says, so that the arguments alone do not tell.)
+template <class F, class... M>
+concept GenericInScalar =
+    std::is_invocable_v<const F&, decltype(overJets<1>(std::declval<const M&>()))...> && requires {
+  ScalarOfResult<std::remove_cvref_t<
+      std::invoke_result_t<const F&, decltype(overJets<1>(std::declval<const M&>()))...>>>::type::DIMENSION;
+};
+
 /// Coordinates from `first` on, each with its own derivative, all zero.
 template <class J, int N>
 Eigen::Matrix<J, N, 1> infinitesimals(int first) {
@@ -115,6 +140,7 @@ struct AutoDiff : detail::SaysRank<F> {
     return detail::evaluated<S>(f, features...);
   }
   template <Homogeneous Q, Homogeneous M>
+    requires detail::GenericInScalar<F, Q, M>
   auto linearize(const Q& q, const M& m) const {
     const auto found = detail::linearized(f, q, m);
     using Value = std::remove_cvref_t<decltype(found.value)>;
@@ -122,6 +148,7 @@ struct AutoDiff : detail::SaysRank<F> {
         found.value.template cast<double>(), found.by_a.template cast<double>(), found.by_b.template cast<double>()};
   }
   template <Homogeneous Q>
+    requires detail::GenericInScalar<F, Q>
   auto linearize(const Q& q) const {
     const auto found = (*this)(q);
     using Value = std::remove_cvref_t<decltype(found)>;

@@ -97,7 +97,12 @@ auto measurements(R&& range, const Noise& noise, const Equation& equation) {
   using M = SampleOf<R>;
   using Model = typename detail::OneOrMany<Noise>::type;
   using Single = typename detail::OneOrMany<Equation>::type;
-  static_assert(NoiseModel<Model>, "a noise of stats/measurement_noise.hpp, or a range of them");
+  static_assert(NoiseModel<Model>, "liestat: a noise of stats/measurement_noise.hpp, or a range of them");
+  if constexpr (NoiseModel<Model>) {
+    static_assert(Model::dimension == ManifoldTraits<M>::DoF,
+                  "liestat: the noise has another dimension than the measurements: IsotropicNoise<2> for points of the "
+                  "plane, IsotropicNoise<3> for rotations");
+  }
   const auto samples = detail::asSamples(range);
   return MeasurementChannel<M, Model, Single>{{samples.begin(), samples.end()},
                                               detail::OneOrMany<Noise>::list(noise),
@@ -224,30 +229,74 @@ class ConstrainedEstimator {
   ConstrainedResult<Q> result_;
 };
 
+namespace detail {
+
+/// A function has derivatives: linearize() of its own, or by autoDiff().
+template <class F, class... Arguments>
+concept Linearizes = requires(const F& f, const Arguments&... arguments) {
+  f.linearize(arguments...);
+};
+
+/// States in one sentence why there is no constrained estimate; `ok` where there is one. That noise and measurements have
+/// one dimension is said by measurements().
+template <class Q, class Constraint, class... Channels>
+struct RequireEstimate {
+  static constexpr bool ok = false;
+  static_assert(sizeof(Q) == 0,  // never: what gives this template has no manifold
+                "liestat: the parameter of a constrained estimate is a point of a manifold or a vector of fixed size, "
+                "such as Eigen::Matrix<double, 6, 1>, not Eigen::VectorXd.");
+};
+template <Homogeneous Q, class Constraint, class... Channels>
+struct RequireEstimate<Q, Constraint, Channels...> {
+  static constexpr bool one_dimension =
+      ((Channels::Noise::dimension == ManifoldTraits<typename Channels::Measurement>::DoF) && ...);
+  static constexpr bool linear = std::is_same_v<Constraint, NoConstraint> || Linearizes<Constraint, Q>;
+  static constexpr bool equations = (Linearizes<typename Channels::Equation, Q, typename Channels::Measurement> && ...);
+  static constexpr bool ok = one_dimension && equations && linear;
+  static_assert(!one_dimension || equations,
+                "liestat: an equation has no linearize(q, m): wrap the function, generic in the scalar, in "
+                "liestat::autoDiff() of stats/auto_diff.hpp. A function of doubles alone has no derivatives.");
+  static_assert(!one_dimension || !equations || linear,
+                "liestat: the constraint has no linearize(q): wrap the function, generic in the scalar, in "
+                "liestat::autoDiff() of stats/auto_diff.hpp. A function of doubles alone has no derivatives.");
+};
+template <class Q>
+using ParameterInSignature = std::conditional_t<Homogeneous<Q>, Q, SO3<double>>;
+
+}  // namespace detail
+
 /// The estimate of a parameter from measurements of one kind or several, started at `start`. A `Status` that is not ok
 /// says what is wrong; nothing throws.
-template <Homogeneous Q, class Constraint, class... Channels>
-LIESTAT_ESTIMATION_API ConstrainedResult<Q> constrainedEstimate(
-    const Q& start, const std::tuple<Channels...>& channels, const Constraint& constraint,
-    const ConstrainedOptions<std::type_identity_t<Q>>& options = {}) {
-  return std::apply(
-      [&](const auto&... channel) {
-        ConstrainedEstimator<Q, Constraint, Channels...> estimator(start, constraint, options, channel...);
-        while (estimator.iterate()) {
-        }
-        return estimator.result();
-      },
-      channels);
-}
-template <Homogeneous Q, Homogeneous M, class Noise, class Equation, class Constraint = NoConstraint>
-LIESTAT_ESTIMATION_API ConstrainedResult<Q> constrainedEstimate(
-    const Q& start, const MeasurementChannel<M, Noise, Equation>& channel, const Constraint& constraint = {},
-    const ConstrainedOptions<std::type_identity_t<Q>>& options = {}) {
-  ConstrainedEstimator<Q, Constraint, MeasurementChannel<M, Noise, Equation>> estimator(start, constraint, options,
-                                                                                        channel);
-  while (estimator.iterate()) {
+template <class Q, class Constraint = NoConstraint, class... Channels>
+LIESTAT_ESTIMATION_API ConstrainedResult<detail::ParameterInSignature<Q>> constrainedEstimate(
+    const Q& start, const std::tuple<Channels...>& channels, const Constraint& constraint = {},
+    const ConstrainedOptions<detail::ParameterInSignature<std::type_identity_t<Q>>>& options = {}) {
+  if constexpr (detail::RequireEstimate<Q, Constraint, Channels...>::ok) {
+    return std::apply(
+        [&](const auto&... channel) {
+          ConstrainedEstimator<Q, Constraint, Channels...> estimator(start, constraint, options, channel...);
+          while (estimator.iterate()) {
+          }
+          return estimator.result();
+        },
+        channels);
+  } else {
+    return {};
   }
-  return estimator.result();
+}
+template <class Q, Homogeneous M, class Noise, class Equation, class Constraint = NoConstraint>
+LIESTAT_ESTIMATION_API ConstrainedResult<detail::ParameterInSignature<Q>> constrainedEstimate(
+    const Q& start, const MeasurementChannel<M, Noise, Equation>& channel, const Constraint& constraint = {},
+    const ConstrainedOptions<detail::ParameterInSignature<std::type_identity_t<Q>>>& options = {}) {
+  using Channel = MeasurementChannel<M, Noise, Equation>;
+  if constexpr (detail::RequireEstimate<Q, Constraint, Channel>::ok) {
+    ConstrainedEstimator<Q, Constraint, Channel> estimator(start, constraint, options, channel);
+    while (estimator.iterate()) {
+    }
+    return estimator.result();
+  } else {
+    return {};
+  }
 }
 
 }  // namespace liestat

@@ -57,10 +57,10 @@ else
   # The headers are read once for all of them.
   grep '^#include' "$here/sentences.cpp" >"$work/sentences.hpp"
   # shellcheck disable=SC2086
-  quietly $CXX -std=c++20 -x c++-header -I"$root" $eigen "$work/sentences.hpp" -o "$work/sentences.hpp.gch"
-  for mistake in $(seq 0 17); do
+  quietly $CXX -std=c++20 -DLIESTAT_HEADER_ONLY -x c++-header -I"$root" $eigen "$work/sentences.hpp" -o "$work/sentences.hpp.gch"
+  for mistake in $(seq 0 22); do
     # shellcheck disable=SC2086
-    errors=$($CXX -std=c++20 -fsyntax-only -DMISTAKE=$mistake -I"$root" $eigen -include "$work/sentences.hpp" \
+    errors=$($CXX -std=c++20 -fsyntax-only -DLIESTAT_HEADER_ONLY -DMISTAKE=$mistake -I"$root" $eigen -include "$work/sentences.hpp" \
       "$here/sentences.cpp" 2>&1 | grep -E '(^|[ :])error:' || true)
     expected=1
     [ "$mistake" != 0 ] || expected=0
@@ -72,7 +72,7 @@ else
     }
   done
   # shellcheck disable=SC2086
-  fast() { $CXX -std=c++20 -fsyntax-only -DMISTAKE=0 -ffast-math "$@" -I"$root" $eigen "$here/sentences.cpp" 2>&1; }
+  fast() { $CXX -std=c++20 -fsyntax-only -DLIESTAT_HEADER_ONLY -DMISTAKE=0 -ffast-math "$@" -I"$root" $eigen "$here/sentences.cpp" 2>&1; }
   errors=$(fast | grep -E '(^|[ :])error:' || true)
   if [ "$(grep -c . <<<"$errors")" != 1 ] || ! grep -q 'liestat: .*-fno-finite-math-only' <<<"$errors" ||
     ! fast -fno-finite-math-only; then
