@@ -39,6 +39,8 @@ struct CertifiedGroupMean {
   std::vector<NearTie<G>> near_ties;  ///< those of the twin's mean, as barycentres
   CutLocusMass cut_locus;             ///< mass at the cut locus of the twin's mean
   double hessian_change = 0;          ///< how much flatter the barycentre's equations are across the confidence region
+  double region_factor = 1;           ///< as in CertifiedMean: that of the twin's mean
+  std::optional<NearTie<G>> valley;   ///< as in CertifiedMean, as a barycentre
   /// The barycentre with its covariance from residuals; none unless status is ok.
   std::optional<Gaussian<G>> estimate;
   Status status = Status::too_few;
@@ -85,6 +87,10 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
     for (const NearTie<Twin>& tie : twin.near_ties) {
       result.near_ties.push_back({from(fromTwin<G>(tie.feature)).mean, tie.z, tie.log_likelihood_ratio});
     }
+    result.region_factor = twin.region_factor;
+    if (twin.valley) {
+      result.valley = NearTie<G>{from(fromTwin<G>(twin.valley->feature)).mean, twin.valley->z};
+    }
     result.cut_locus = twin.cut_locus;
     twin_status = twin.status;
     twin_reason = twin.reason;
@@ -102,7 +108,7 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
   const SettledGroupMean<G> settled = settleGroupMean(samples, weights, result.mean, options.largest_hessian_change);
   result.hessian_change = settled.change;
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
-  result.estimate = Gaussian<G>{result.mean.mean, settled.covariance};
+  result.estimate = Gaussian<G>{result.mean.mean, withWidenedAngles<G>(settled.covariance, result.region_factor)};
   result.status = Status::ok;
   return result;
 }

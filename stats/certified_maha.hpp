@@ -51,6 +51,9 @@ struct CertifiedMaha {
   Concentration concentration;        ///< concentration about the weighted least-squares mean
   CutLocusMass cut_locus;             ///< mass at the cut locus of the weighted least-squares mean
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
+  /// As in CertifiedMean: of the least-squares mean, if the likelihood does not reject the end of its valley either.
+  double region_factor = 1;
+  std::optional<NearTie<M>> valley;
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
   double fit = 0;      ///< Σ μ_i² at the mean, χ² with `fit_dof` degrees of freedom if the covariances are right
@@ -134,6 +137,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (options.maha.start) starts.push_back(options.maha.start);
   Status twin_status = Status::ok;
   const char* twin_reason = "";
+  std::optional<NearTie<M>> twin_valley;
+  double twin_factor = 1;
   if constexpr (has_metric_twin<M>) {
     using Twin = MetricTwinOf<M>;
     CertifiedMeanOptions<Twin> how;
@@ -155,6 +160,11 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     starts.push_back(fromTwin<M>(frechetMean<Twin>(executor, twins, numbers, once_more).mean));
     for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
     for (const NearTie<Twin>& tie : twin.near_ties) starts.push_back(fromTwin<M>(tie.feature));
+    if (twin.valley) {
+      twin_valley = NearTie<M>{fromTwin<M>(twin.valley->feature), twin.valley->z};
+      twin_factor = twin.region_factor;
+      starts.push_back(twin_valley->feature);
+    }
   } else {
     starts.push_back(std::nullopt);  // the one that maha() chooses
   }
@@ -201,7 +211,12 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   } else {
     result.uniqueness.proof = "the best minimum from several starts; there is no certificate for maha";
   }
-  for (const Gaussian<M>& g : samples) result.fit += static_cast<double>(mahalanobisSquared(g, best.mean, at));
+  const auto fitOf = [&](const M& y) {
+    double sum = 0;
+    for (const Gaussian<M>& g : samples) sum += static_cast<double>(mahalanobisSquared(g, y, at));
+    return sum;
+  };
+  result.fit = fitOf(best.mean);
   result.fit_dof = ManifoldTraits<M>::DoF * (static_cast<double>(n) - 1);
 
   if (best.status == Status::not_converged) return without(best.status, not_converged_reason);
@@ -213,9 +228,16 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   result.hessian_change = settled.change;
   setNearTies(result, results, settled.covariance, options);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
+  if (twin_valley) {
+    twin_valley->log_likelihood_ratio = 0.5 * (fitOf(twin_valley->feature) - result.fit);
+    if (twin_valley->log_likelihood_ratio < options.near_ties.log_likelihood_ratio) {
+      result.valley = twin_valley, result.region_factor = twin_factor;
+      if (twin_status == Status::ambiguous) return without(Status::ambiguous, valley_reason);
+    }
+  }
   if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
-  result.estimate = Gaussian<M>{best.mean, settled.covariance};
+  result.estimate = Gaussian<M>{best.mean, withWidenedAngles<M>(settled.covariance, result.region_factor)};
   result.status = Status::ok;
   return result;
 }

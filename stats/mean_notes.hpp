@@ -37,6 +37,11 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.emplace_back(
         "the measurements do not vary in every direction: the covariance from the residuals is singular");
   }
+  if (mean.region_factor > 1 && mean.hasCovariance()) {
+    mean.notes.push_back("the region is widened by " + significant(mean.region_factor, 3) +
+                         ", because the features that explain the measurements as well form a ring or a valley: " +
+                         mean.valleyInWords());
+  }
   if (mean.fit_dof > 0) {
     mean.fit_p = chiSquaredSurvival(mean.fit, mean.fit_dof);
     if (mean.fit_p < poor_fit) {

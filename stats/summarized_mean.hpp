@@ -102,6 +102,12 @@ void setCertified(MeanSummary& mean, const Iteration& iteration, const Certified
   for (const auto& tie : result.near_ties) mean.near_ties.push_back({featureValue(tie.feature), tie.z});
   mean.cut_locus_mass = result.cut_locus.mass;
   mean.hessian_change = result.hessian_change;
+  mean.region_factor = result.region_factor;
+  if (result.valley) {
+    mean.valley = NearRival{featureValue(result.valley->feature), result.valley->z};
+    mean.valley_angle = largestAngle(iteration.mean, result.valley->feature);
+    if (result.status == Status::ambiguous && result.near_ties.empty()) mean.reason += ": " + mean.valleyInWords();
+  }
   if (result.estimate) mean.covariance = result.estimate->covariance.template cast<double>();
 }
 

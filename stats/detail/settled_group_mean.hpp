@@ -4,6 +4,7 @@
 
 #include <lie/detail/small_eigen.hpp>
 #include <stats/detail/angular_part.hpp>
+#include <stats/detail/part_growth.hpp>
 #include <stats/detail/settled_covariance.hpp>
 #include <stats/group_mean.hpp>
 
@@ -26,7 +27,8 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
   constexpr int D = G::DoF;
   constexpr auto angular = angularCoordinates<G>();
   constexpr int K = angular.count;
-  SettledGroupMean<G> settled{mean.covarianceFromResiduals(), 0, true};
+  const SquareOf<G> first = mean.covarianceFromResiduals();
+  SettledGroupMean<G> settled{first, 0, true};
   if constexpr (K > 0) {
     using Matrix = Eigen::Matrix<double, D, D>;
     const std::size_t n = std::ranges::size(samples), stride = (n + max_averaged - 1) / max_averaged;
@@ -78,6 +80,7 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
       const double size = static_cast<double>(settled.covariance.norm());
       settled.covariance = next;
       if (step <= 0.02 * size) {
+        if constexpr (K < D) settled.covariance = first + averagedGrowth<K>(first, next, coordinatesOf<K>(angular));
         settled.settled = true;
         return settled;
       }
