@@ -26,12 +26,31 @@ template <class M>
 class Sampler {
  public:
   explicit Sampler(const VerdictCell& cell)
-      : cell_(cell), fisher_(cell.law == VerdictLaw::fisher ? cell.parameter : 1) {}
+      : cell_(cell), fisher_(cell.law == VerdictLaw::fisher ? cell.parameter : turned_concentration) {
+    if (cell.law == VerdictLaw::flips || cell.law == VerdictLaw::half_turns) findTruth();
+  }
+
+  /// The population's mean, or one of them.
+  const M& truth() const { return truth_; }
 
   M draw(std::size_t i, CounterRng& rng) const {
     constexpr int k = ManifoldTraits<M>::DoF, angles = std::min(k, 3);
     if (cell_.law == VerdictLaw::fisher) return fisher_.draw(rng);
+    if (isTurned()) return drawTurned(rng);
     TangentOf<M> e = rng.template normalVector<k>();
+    if (cell_.law == VerdictLaw::strip) {
+      TangentOf<M> along = TangentOf<M>::Zero();
+      along[0] = rng.uniform(-cell_.parameter, cell_.parameter);
+      e[0] = 0;
+      return exp(exp(ManifoldTraits<M>::origin(), along), TangentOf<M>(0.05 * e));
+    }
+    if (cell_.law == VerdictLaw::lever) {
+      if constexpr (k == 6) {
+        e.template tail<3>() *= 0.8;
+        e.template head<3>() = 0.1 * e.template head<3>() + cell_.parameter * e.template tail<3>();
+      }
+      return exp(ManifoldTraits<M>::origin(), e);
+    }
     if (cell_.law == VerdictLaw::clouds) {
       TangentOf<M> side = TangentOf<M>::Zero();
       side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * units::degree;
@@ -44,13 +63,63 @@ class Sampler {
   }
 
  private:
+  static constexpr double turned_concentration = 20;
+
+  bool isTurned() const {
+    return cell_.law == VerdictLaw::flips || cell_.law == VerdictLaw::half_turns || cell_.law == VerdictLaw::outliers;
+  }
+  /// A feature of Fisher's law, which with the probability of the cell's parameter becomes another one.
+  M drawTurned(CounterRng& rng) const {
+    const M x = fisher_.draw(rng);
+    const bool turned = rng.uniform() < cell_.parameter;
+    if constexpr (std::is_same_v<M, S2d>) {
+      const Eigen::Vector3d anywhere = rng.unitVector<3>(), back = -x.unit_vector();
+      return !turned ? x : S2d(cell_.law == VerdictLaw::outliers ? anywhere : back);
+    } else if constexpr (std::is_same_v<M, SO3d>) {
+      const Eigen::Vector3d axis = cell_.law == VerdictLaw::half_turns ? Eigen::Vector3d::UnitZ() : rng.unitVector<3>();
+      const Eigen::Vector4d q = rng.unitVector<4>();
+      const SO3d anywhere(Eigen::Quaterniond(q[0], q[1], q[2], q[3]));
+      return !turned ? x : cell_.law == VerdictLaw::outliers ? anywhere : x * SO3d::exp(pi * axis);
+    } else {
+      return x;
+    }
+  }
+  /// The population's criterion is symmetric about the last axis, and its minima are as far from the origin as the least of
+  /// its values along a geodesic, across that axis for random axes and along it for half-turns about it.
+  void findTruth() {
+    std::vector<M> some;
+    CounterRng rng(1);
+    for (int i = 0; i < 20000; ++i) some.push_back(drawTurned(rng));
+    TangentOf<M> direction = TangentOf<M>::Zero();
+    direction[cell_.law == VerdictLaw::half_turns ? ManifoldTraits<M>::DoF - 1 : 0] = 1;
+    double least = 0;
+    for (int degrees = 0; degrees <= 90; ++degrees) {
+      double cost = 0;
+      // Both ways, so that the draws are as symmetric as the law.
+      for (const double side : {1.0, -1.0}) {
+        const M y = exp(ManifoldTraits<M>::origin(), TangentOf<M>(side * degrees * units::degree * direction));
+        for (const M& x : some) {
+          const double d = distance(y, x);
+          cost += d * d;
+        }
+      }
+      // The same but for the draws: a single minimum is at the origin.
+      if (degrees == 0 || cost < least * (1 - 1e-4)) {
+        least = cost;
+        truth_ = exp(ManifoldTraits<M>::origin(), TangentOf<M>(degrees * units::degree * direction));
+      }
+    }
+  }
+
   VerdictCell cell_;
   FisherLaw<M> fisher_;
+  M truth_ = ManifoldTraits<M>::origin();
 };
 
 /// The outcomes of one trial: counts of 0 and 1.
 struct Outcome {
   bool ok = false, ambiguous = false, ill_defined = false, outside = false, wrong = false, plain_outside = false;
+  bool widened = false;
 };
 
 template <class M>
@@ -62,7 +131,7 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   // A certificate that is not found changes no verdict; a rival that is, is found early.
   options.uniqueness.budget = 200'000;
   const CertifiedMean<M> result = certifiedMean(samples, options);
-  const M truth = ManifoldTraits<M>::origin();
+  const M& truth = sampler.truth();
   const auto misses = [&](const SquareOf<M>& covariance) {
     return !(mahalanobisSquared(Gaussian<M>{result.mean.mean, covariance}, truth) <= quantile);
   };
@@ -72,6 +141,7 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
                   .plain_outside = misses(covarianceFromResiduals(result.mean))};
   if (!outcome.ok) return outcome;
   outcome.outside = misses(result.estimate->covariance);
+  outcome.widened = result.region_factor > 1;
   const TangentOf<M> error = log(result.mean.mean, truth);
   outcome.wrong = std::abs(error[ManifoldTraits<M>::DoF - 1]) > 0.25 * fold<M> * pi;
   return outcome;
@@ -91,7 +161,7 @@ VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
            },
            true)) {
     row.ok += o.ok, row.ambiguous += o.ambiguous, row.ill_defined += o.ill_defined;
-    row.outside += o.outside, row.wrong += o.wrong, row.plain_outside += o.plain_outside;
+    row.outside += o.outside, row.wrong += o.wrong, row.plain_outside += o.plain_outside, row.widened += o.widened;
   }
   return row;
 }
@@ -123,7 +193,8 @@ void giveVerdict(VerdictRow& row) {
 }  // namespace
 
 std::string name(VerdictLaw law) {
-  constexpr const char* names[] = {"fisher", "report", "isotropic", "clouds"};
+  constexpr const char* names[] = {"fisher",     "report",   "isotropic", "clouds", "flips",
+                                   "half_turns", "outliers", "strip",     "lever"};
   return names[static_cast<std::size_t>(law)];
 }
 
@@ -138,7 +209,20 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
     return promise;
   }
   promise.max_outside = 0.07;
+  if (cell.law == VerdictLaw::flips || cell.law == VerdictLaw::half_turns) {
+    // Three or four of thirty directions are so few that their score is far from normal.
+    if (x == 0.15 && cell.n <= 30) promise.max_outside = 0.10;
+    if (x <= 0.1 && cell.n >= 30 && cell.law == VerdictLaw::flips) promise.min_kept = 0.85;
+    return promise;
+  }
+  if (cell.law == VerdictLaw::lever) promise.max_outside = 0.075;
+  promise.min_coverage = 0.925;
+  if (cell.law == VerdictLaw::lever) return promise;
   promise.min_coverage = 0.93;
+  if (cell.law == VerdictLaw::outliers || cell.law == VerdictLaw::strip) {
+    if (cell.n >= 30) promise.min_kept = 0.98;
+    return promise;
+  }
   if (cell.law == VerdictLaw::fisher) {
     if (x == 0) promise.max_kept = 0.02;
     const bool direction = cell.feature == Feature::direction;
@@ -182,6 +266,13 @@ std::vector<VerdictCell> verdictCells(bool full) {
     add_cell(Feature::rotation, VerdictLaw::report, 1, 30, 200);
     for (const double degrees : {160.0, 178.0, 180.0})
       add_cell(Feature::rotation, VerdictLaw::clouds, degrees, 40, 200);
+    add_cell(Feature::direction, VerdictLaw::flips, 0.1, 100, 200);
+    add_cell(Feature::direction, VerdictLaw::flips, 0.15, 30, 400);
+    add_cell(Feature::direction, VerdictLaw::flips, 0.25, 30, 400);
+    add_cell(Feature::direction, VerdictLaw::outliers, 0.2, 30, 200);
+    add_cell(Feature::rotation, VerdictLaw::flips, 0.3, 30, 200);
+    add_cell(Feature::rotation, VerdictLaw::half_turns, 0.15, 30, 200);
+    add_cell(Feature::frame, VerdictLaw::lever, 20, 30, 200);
     return cells;
   }
   for (const Feature feature : all_features) {
@@ -196,6 +287,27 @@ std::vector<VerdictCell> verdictCells(bool full) {
       }
     }
     for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::isotropic, 0.5, n, 4000);
+    if (feature == Feature::direction || feature == Feature::rotation) {
+      for (const double part : {0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4}) {
+        for (const std::size_t n : {30, 100, 300}) {
+          add_cell(feature, VerdictLaw::flips, part, n, 2000);
+          if (feature == Feature::rotation) add_cell(feature, VerdictLaw::half_turns, part, n, 2000);
+        }
+      }
+      for (const double part : {0.1, 0.2, 0.3}) {
+        for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::outliers, part, n, 2000);
+      }
+    }
+    if (feature == Feature::direction) {
+      for (const double half : {0.8, 1.2, 1.5}) {
+        for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::strip, half, n, 2000);
+      }
+    }
+    if (feature == Feature::frame) {
+      for (const double lever : {0.5, 2.0, 20.0}) {
+        for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::lever, lever, n, 2000);
+      }
+    }
     for (const double degrees : {150.0, 160.0, 170.0, 174.0, 176.0, 178.0, 179.0, 180.0}) {
       for (const std::size_t n : {10, 40, 1000}) {
         add_cell(feature, VerdictLaw::clouds, degrees, n, n < 1000 ? 4000 : 400);

@@ -20,7 +20,14 @@ enum class VerdictLaw {
   fisher,     ///< the matrix Fisher law with F = κ/2 · I, von Mises and Fisher's on directions; of frames N(0, 1) m
   report,     ///< normal in the chart, the report's standard deviations (0.3, 0.6, 0.9) rad times the parameter
   isotropic,  ///< normal in the chart, the parameter in rad along each axis
-  clouds      ///< two clouds 0.05 rad wide, the parameter in degrees apart (of quotient frames half of it)
+  clouds,     ///< two clouds 0.05 rad wide, the parameter in degrees apart (of quotient frames half of it)
+  flips,  ///< Fisher's with κ = 20, of which this fraction is turned half a turn: directions are reversed, rotations
+          ///< turned about random axes. From about a tenth of directions and a quarter of rotations on the minima of
+          ///< the population's criterion lie on a circle or sphere about the axis; the truth is one of them
+  half_turns,  ///< the same turned about the third axis of the rotation; one of two minima is the truth
+  outliers,    ///< Fisher's with κ = 20, of which this fraction is uniform
+  strip,       ///< directions within ± the parameter (rad) on a great circle, 0.05 rad beside it
+  lever        ///< normal in the chart, 0.8 rad; translations 0.1 m and the rotation's error by the parameter, m/rad
 };
 /// The name in tables and JSON fields.
 std::string name(VerdictLaw law);
@@ -51,6 +58,7 @@ struct VerdictRow {
   std::size_t ok = 0, ambiguous = 0, ill_defined = 0;
   std::size_t outside = 0;        ///< ok, but the truth outside the 95 % region
   std::size_t wrong = 0;          ///< ok, but the mean of two clouds on the other side
+  std::size_t widened = 0;        ///< ok, the region widened to the length of a valley
   std::size_t plain_outside = 0;  ///< the same of all trials, with the first-order covariance, which nothing withholds
   std::optional<bool> passed;     ///< within four standard errors of every bound
   std::string failure = {};       ///< which bound was not kept
@@ -65,6 +73,7 @@ void describe(V& v, const VerdictRow& row) {
   v("n", row.cell.n)("trials", row.cell.trials)("ok", row.rate(row.ok), "fraction of the trials");
   v("ambiguous", row.rate(row.ambiguous))("ill_defined", row.rate(row.ill_defined));
   v("ok_but_outside", row.rate(row.outside))("coverage", row.coverage(), "of those that are ok");
+  v("ok_but_widened", row.rate(row.widened), "the region was widened to the length of a ring or a valley");
   v("ok_on_the_wrong_side", row.rate(row.wrong))("first_order_coverage", 1 - row.rate(row.plain_outside));
   v("passed", row.passed);
 }

@@ -50,6 +50,8 @@ struct CertifiedGroupMean {
   std::vector<NearTie<G>> near_ties;  ///< those of the twin's mean, as barycentres
   CutLocusMass cut_locus;             ///< mass at the cut locus of the twin's mean
   double hessian_change = 0;          ///< how much flatter the barycentre's equations are across the confidence region
+  double region_factor = 1;           ///< as in CertifiedMean: that of the twin's mean
+  std::optional<NearTie<G>> valley;   ///< as in CertifiedMean, as a barycentre
   NoiseFit fit;                       ///< of the elements to their known noise; nothing where none was stated
   bool from_noise = false;            ///< the covariance follows from the known noise
   double law_n = 0;                   ///< as CertifiedMean's
@@ -100,6 +102,10 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
     }
     for (const NearTie<Twin>& tie : twin.near_ties) {
       result.near_ties.push_back({from(fromTwin<G>(tie.feature)).mean, tie.z, tie.log_likelihood_ratio});
+    }
+    result.region_factor = twin.region_factor;
+    if (twin.valley) {
+      result.valley = NearTie<G>{from(fromTwin<G>(twin.valley->feature)).mean, twin.valley->z};
     }
     result.cut_locus = twin.cut_locus;
     twin_status = twin.status;
@@ -156,8 +162,9 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
   if (known && have_residuals) {
     GroupMeanResult<G> averaged = result.mean;
     averaged.jacobian = settled.jacobian;
-    covariance = from_noise(averaged);
+    covariance = withAveragedAngles<G>(from_noise(result.mean), from_noise(averaged));
   }
+  covariance = withWidenedAngles<G>(covariance, result.region_factor);
   if (known && options.scale_noise) covariance *= ScalarOf<G>(result.fit.factor());
   result.estimate = Gaussian<G>{result.mean.mean, covariance};
   result.status = Status::ok;

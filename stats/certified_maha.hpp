@@ -54,6 +54,9 @@ struct CertifiedMaha {
   Concentration concentration;        ///< concentration about the weighted least-squares mean
   CutLocusMass cut_locus;             ///< mass at the cut locus of the weighted least-squares mean
   double hessian_change = 0;          ///< as in CertifiedMean, for MAHA's Hessian
+  /// As in CertifiedMean: of the least-squares mean, if the likelihood does not reject the end of its valley either.
+  double region_factor = 1;
+  std::optional<NearTie<M>> valley;
   /// The mean with its covariance; none unless status is ok.
   std::optional<Gaussian<M>> estimate;
   /// A factor of its covariance, as in MahaResult; NaN unless status is ok.
@@ -127,6 +130,8 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   if (options.maha.start) starts.push_back(options.maha.start);
   Status twin_status = Status::ok;
   const char* twin_reason = "";
+  std::optional<NearTie<M>> twin_valley;
+  double twin_factor = 1;
   if constexpr (has_metric_twin<M>) {
     using Twin = MetricTwinOf<M>;
     CertifiedMeanOptions<Twin> how;
@@ -149,6 +154,11 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
     starts.push_back(fromTwin<M>(frechetMean<Twin>(executor, twins, numbers, once_more).mean));
     for (const Twin& rival : twin.uniqueness.rivals) starts.push_back(fromTwin<M>(rival));
     for (const NearTie<Twin>& tie : twin.near_ties) starts.push_back(fromTwin<M>(tie.feature));
+    if (twin.valley) {
+      twin_valley = NearTie<M>{fromTwin<M>(twin.valley->feature), twin.valley->z};
+      twin_factor = twin.region_factor;
+      starts.push_back(twin_valley->feature);
+    }
   } else {
     starts.push_back(std::nullopt);  // the one that maha() chooses
   }
@@ -210,10 +220,23 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   near_ties.log_likelihood_ratio *= result.fit.factor();
   setNearTies(result, results, settled.covariance, options.distinct, near_ties);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
+  if (twin_valley) {
+    double chi2 = 0;
+    for (const Gaussian<M>& g : samples) chi2 += static_cast<double>(mahalanobisSquared(g, twin_valley->feature, at));
+    twin_valley->log_likelihood_ratio = 0.5 * (chi2 - result.fit.chi2);
+    if (twin_valley->log_likelihood_ratio < near_ties.log_likelihood_ratio) {
+      result.valley = twin_valley, result.region_factor = twin_factor;
+      if (twin_status == Status::ambiguous) return without(Status::ambiguous, valley_reason);
+    }
+  }
   if (twin_status == Status::ill_defined) return without(Status::ill_defined, twin_reason);
   if (!settled.settled) return without(Status::ill_defined, cut_locus_reason);
   result.estimate = Gaussian<M>{best.mean, settled.covariance};
   result.factor = settled.factor;
+  if (result.region_factor > 1) {
+    result.estimate->covariance = withWidenedAngles<M>(settled.covariance, result.region_factor);
+    result.factor = Cholesky<ScalarOf<M>, ManifoldTraits<M>::DoF>(result.estimate->covariance).lower();
+  }
   if (options.scale_noise) {
     result.estimate->covariance *= ScalarOf<M>(result.fit.factor());
     result.factor *= ScalarOf<M>(std::sqrt(result.fit.factor()));

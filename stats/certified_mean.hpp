@@ -4,6 +4,7 @@
 
 #include <stats/detail/any_executor.hpp>
 #include <stats/detail/fit_to_noise.hpp>
+#include <stats/detail/possible_region.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/concentration.hpp>
@@ -65,6 +66,13 @@ struct CertifiedMean {
   bool from_noise = false;  ///< the covariance follows from the known noise
   /// Covariance from residuals: the number of measurements for Hotelling's law, n but for weights that are no precisions.
   double law_n = 0;
+  /// The factor by which the region of the rotation or direction was widened, until no feature beyond it explains the
+  /// measurements as well (docs/theory/means.md, section 7.7); of a product that of the factor which was widened most.
+  /// 1: not at all. Of 20 measurements or more status is ambiguous beyond 3.5, or if two thirds of all features are nearer
+  /// than such a one.
+  double region_factor = 1;
+  /// The farthest feature found on the ring or in the valley for which the region was widened, if it was.
+  std::optional<NearTie<M>> valley = {};
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
   std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
@@ -83,6 +91,9 @@ inline constexpr const char* rival_reason = "another feature explains the data a
 inline constexpr const char* too_few_reason = "a covariance from residuals needs more features than their dimension";
 inline constexpr const char* hessian_reason = "the Hessian of the criterion is not positive definite at the mean";
 inline constexpr const char* near_tie_reason = "another feature explains the data as well but for their noise";
+inline constexpr const char* valley_reason =
+    "the features that explain the data as well but for their noise form a ring or a valley, which no covariance "
+    "describes";
 inline constexpr const char* scattered_reason =
     "the features are as scattered as uniform ones: they have no mean, or too few of them show it";
 inline constexpr const char* cut_locus_reason =
@@ -235,8 +246,15 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   if (known && have_residuals) {
     MeanResult<M> averaged = result.mean;
     averaged.hessian = settled.hessian;
-    covariance = known_covariance(averaged);
+    covariance = withAveragedGrowth<M>(known_covariance(result.mean), known_covariance(averaged));
     if (!covariance.allFinite()) return without(Status::ill_defined, hessian_reason);
+  }
+  if (have_residuals) {
+    const GrownRegion<M> grown =
+        growRegion<M>(executor, samples, weights, result.mean, settled.covariance, options.noise, covariance);
+    result.region_factor = grown.factor;
+    result.valley = grown.farthest;
+    if (grown.open) return without(Status::ambiguous, valley_reason);
   }
   if (known && options.scale_noise) covariance *= ScalarOf<M>(result.fit.factor());
   result.estimate = Gaussian<M>{result.mean.mean, covariance};

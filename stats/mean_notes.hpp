@@ -35,6 +35,11 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.emplace_back(
         "the measurements do not vary in every direction: the covariance from the residuals is singular");
   }
+  if (mean.region_factor > 1 && mean.hasCovariance()) {
+    mean.notes.push_back("the region is widened by " + significant(mean.region_factor, 3) +
+                         ", because the features that explain the measurements as well form a ring or a valley: " +
+                         mean.valleyInWords());
+  }
   if (mean.order.weightsAreNoPrecisions() && mean.weighted && mean.fromResiduals() &&
       mean.weights_are == ResidualNoise::precision) {
     mean.notes.push_back("p r^2 depends on the weights p (" + significant(mean.order.weight_z, 2) +

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <lie/concepts.hpp>
+#include <lie/units.hpp>
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/noise_fit.hpp>
@@ -13,9 +14,11 @@
 #include <stats/time_blocks_types.hpp>
 #include <stats/uniqueness_types.hpp>
 #include <stats/verdict.hpp>
+#include <stats/words.hpp>
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -116,6 +119,11 @@ struct MeanSummary {
   double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
   /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
   double hessian_change = 0;
+  /// By which factor the region was widened until no feature beyond it explains the measurements as well; 1: not at all.
+  double region_factor = 1;
+  /// The farthest feature found on the ring or in the valley for which it was widened.
+  std::optional<NearRival> valley = {};
+  double valley_angle = 0;  ///< from the mean, rad
 
   NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
@@ -135,6 +143,12 @@ struct MeanSummary {
     std::string text = std::string(unique == Uniqueness::not_certified ? "not certified" : name(unique)) + ": ";
     text += !proof.empty() ? proof : cells > 0 ? "branch and bound did not finish" : "no certificate holds";
     return cells > 0 ? text + ", " + std::to_string(cells) + " cells" : text;
+  }
+  /// "a feature 31 degrees from the mean is worse by 0.8 standard deviations only", of the farthest one in the valley.
+  std::string valleyInWords() const {
+    if (!valley) return "";
+    return "a feature " + significant(valley_angle / units::degree, 3) + " degrees from the mean is worse by " +
+           significant(std::max(0.0, valley->z), 2) + " standard deviations only";
   }
   /// Verdict on the mean: may it be used?
   Verdict verdict() const {
@@ -194,6 +208,10 @@ void describe(V& v, const MeanSummary& m) {
   v("near_ties", m.near_ties, "other minima that the noise does not exclude, which make the status ambiguous");
   v("cut_locus_mass", m.cut_locus_mass, "fraction of the measurements near the cut locus of the mean");
   v("hessian_change", m.hessian_change, "relative decrease of the Hessian averaged over the confidence region");
+  v("region_factor", m.region_factor,
+    "by which the confidence region was widened to the features that explain the data as well; 1: not at all");
+  v("valley", m.valley, "the farthest of these that was found, on a ring or in a valley; null without");
+  v("valley_angle", where(m.valley.has_value(), m.valley_angle), "its angle from the mean", "rad");
   v("fit", where(fits, m.fit.chi2), "χ² of the measurements under the noise that is stated for them; null: not tested");
   v("fit_dof", where(fits, m.fit.degrees_of_freedom), "its degrees of freedom");
   v("fit_p", where(fits, m.fit.p), "probability of so large a χ²; below 0.001 the stated noise is refuted");

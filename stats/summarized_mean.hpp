@@ -108,6 +108,12 @@ void setCertified(MeanSummary& mean, const Iteration& iteration, const Certified
   mean.cut_locus_mass = result.cut_locus.mass;
   mean.hessian_change = result.hessian_change;
   mean.fit = result.fit;
+  mean.region_factor = result.region_factor;
+  if (result.valley) {
+    mean.valley = NearRival{featureValue(result.valley->feature), result.valley->z};
+    mean.valley_angle = largestAngle(iteration.mean, result.valley->feature);
+    if (result.status == Status::ambiguous && result.near_ties.empty()) mean.reason += ": " + mean.valleyInWords();
+  }
   if (result.estimate) mean.covariance = result.estimate->covariance.template cast<double>();
 }
 

@@ -177,6 +177,10 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
   for (const NearRival& rival : analysis.near_ties) {
     text += fmt::format("  near tie   {}: worse by {:.2g} standard deviations\n", oneLine(rival.feature), rival.z);
   }
+  if (analysis.valley) {
+    text += fmt::format("  valley     {}: {:.3g} deg from the mean, worse by {:.2g} standard deviations\n",
+                        oneLine(analysis.valley->feature), degrees * analysis.valley_angle, analysis.valley->z);
+  }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
   if (analysis.time_blocks) text += "blocks       " + blocksInWords(*analysis.time_blocks) + "\n";
   for (const FarthestMeasurement& f : analysis.farthest) {

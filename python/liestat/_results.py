@@ -226,6 +226,9 @@ class MeanResult:
     cut_locus_mass, hessian_change : float
         Fraction of the features near the cut locus of the mean, and by how much the Hessian averaged over the
         confidence region is lower than at the mean, relative: what a covariance is withheld for as 'ill_defined'.
+    region_factor, valley, valley_angle : float, dict or None, float or None
+        The factor by which the confidence region was widened, as features beyond it explain the measurements as well (1:
+        not at all), the farthest of these that was found, with its z, and its angle from the mean in rad.
     fit, fit_dof, fit_p, fit_factor : float or None
         χ² of the features under the covariances that are stated for them, its degrees of freedom, the probability of so
         large a χ² (below 0.001 the covariances are refuted) and Birge's factor max(1, χ²/ν); None (NaN in an array)

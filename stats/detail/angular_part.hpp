@@ -6,6 +6,7 @@
 #include <stats/concentration.hpp>
 #include <stats/detail/averaged_slope.hpp>
 #include <stats/detail/compact_part.hpp>
+#include <stats/detail/part_growth.hpp>
 
 #include <algorithm>
 #include <array>
@@ -43,6 +44,14 @@ constexpr CoordinateList<ManifoldTraits<M>::DoF> angularCoordinates() {
   return list;
 }
 
+/// The K coordinates of a list.
+template <int K, int N>
+constexpr std::array<int, static_cast<std::size_t>(K)> coordinatesOf(const CoordinateList<N>& list) {
+  std::array<int, static_cast<std::size_t>(K)> index{};
+  for (std::size_t i = 0; i < index.size(); ++i) index[i] = list.index[i];
+  return index;
+}
+
 /// The squared length of a part of a tangent vector; by a loop, as its size is known at run time only.
 template <class Tangent>
 double squaredLength(const Tangent& z, const TangentBlock& part) {
@@ -51,6 +60,19 @@ double squaredLength(const Tangent& z, const TangentBlock& part) {
     sum += static_cast<double>(z[i]) * static_cast<double>(z[i]);
   }
   return sum;
+}
+
+/// The largest angle among the parts of the tangent vector from one feature to another, rad.
+template <Homogeneous M>
+double largestAngle(const M& from, const M& to) {
+  double largest = 0;
+  if constexpr (HasTangentParts<M>) {
+    const TangentOf<M> z = log(from, to);
+    for (const TangentBlock& part : ManifoldTraits<M>::tangent_parts) {
+      if (isAngular(part.part)) largest = std::max(largest, squaredLength(z, part));
+    }
+  }
+  return std::sqrt(largest);
 }
 
 /// The uniform law of an angular part.
@@ -92,6 +114,19 @@ Eigen::Matrix<double, K, K> angularRegion(const Matrix& covariance, const List& 
     region(a, a) += min_region_sigma * min_region_sigma;
   }
   return Cholesky<double, K>(region).lower();
+}
+
+/// A covariance whose part for the angles is that of a region which was widened by a factor.
+template <Homogeneous M>
+SquareOf<M> withWidenedAngles(const SquareOf<M>& covariance, double factor) {
+  constexpr auto angular = angularCoordinates<M>();
+  if constexpr (angular.count > 0) {
+    if (factor > 1) {
+      const auto index = coordinatesOf<angular.count>(angular);
+      return covariance + widening(covariance, index, factor);
+    }
+  }
+  return covariance;
 }
 
 /// The concentration of the angles in features about one of them: by the metric where there is one, else by the parts of

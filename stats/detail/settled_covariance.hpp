@@ -2,11 +2,13 @@
 #pragma once
 
 #include <stats/averaged_hessian.hpp>
+#include <stats/detail/part_growth.hpp>
 #include <stats/mean.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <tuple>
 
 namespace liestat {
 
@@ -22,7 +24,7 @@ namespace liestat::detail {
 template <Metric M>
 struct SettledCovariance {
   SquareOf<M> first;       ///< from the Hessian at the mean
-  SquareOf<M> covariance;  ///< from the averaged one
+  SquareOf<M> covariance;  ///< with what the averaged one adds
   SquareOf<M> hessian;     ///< the averaged Hessian
   double change = 0;       ///< relative change of the Hessian
   bool settled = false;    ///< false: too large a change, or no end of the iteration
@@ -34,6 +36,29 @@ struct SettledCovariance {
 /// law widens their region already.
 inline constexpr double averaging_width = 2;
 inline double averagingWidth(std::size_t n) { return std::min(averaging_width, 0.1 * static_cast<double>(n)); }
+
+/// A covariance from the Hessian at the mean with what one from the averaged Hessian adds (averagedGrowth), for each part
+/// that is averaged over. Of a space that is averaged over as a whole, the averaged one itself.
+template <Metric M, int D>
+void addAveragedGrowth(const Eigen::Matrix<ScalarOf<M>, D, D>& first, const Eigen::Matrix<ScalarOf<M>, D, D>& averaged,
+                       Eigen::Matrix<ScalarOf<M>, D, D>& sum, int offset = 0) {
+  if constexpr (Factored<M>) {
+    forEachIndex<std::tuple_size_v<FactorsOf<M>>>([&](auto i) {
+      addAveragedGrowth<std::tuple_element_t<i, FactorsOf<M>>, D>(first, averaged, sum, offset + factorOffset<i, M>());
+    });
+  } else if constexpr (compactFactor<M>() != CompactFactor::none) {
+    sum += averagedGrowth<averaged_dimension<M>>(first, averaged,
+                                                 coordinatesFrom<averaged_dimension<M>>(offset + averagedBegin<M>()));
+  }
+}
+template <Metric M>
+SquareOf<M> withAveragedGrowth(const SquareOf<M>& first, const SquareOf<M>& averaged) {
+  constexpr int D = ManifoldTraits<M>::DoF;
+  if constexpr (!Factored<M> && averaged_dimension<M> == D) return averaged;
+  SquareOf<M> sum = first;
+  addAveragedGrowth<M, D>(first, averaged, sum);
+  return sum;
+}
 
 /// Iterates: covariance of a mean by covariance_of(mean with its Hessian), region, averaged Hessian.
 template <Metric M, class R, class W, class Covariance>
@@ -65,6 +90,7 @@ SettledCovariance<M> settleCovariance(const R& samples, const W& weights, const 
     const double size = static_cast<double>(result.covariance.norm());
     result.covariance = next;
     if (step <= 0.02 * size) {
+      result.covariance = withAveragedGrowth<M>(result.first, next);
       result.settled = true;
       return result;
     }

@@ -4,6 +4,7 @@
 
 #include <lie/detail/small_eigen.hpp>
 #include <stats/detail/angular_part.hpp>
+#include <stats/detail/part_growth.hpp>
 #include <stats/detail/settled_covariance.hpp>
 #include <stats/group_mean.hpp>
 
@@ -20,6 +21,18 @@ struct SettledGroupMean {
   double change = 0;       ///< its relative change
   bool settled = false;
 };
+
+/// A covariance of first order, with what averaging over the angles adds to it.
+template <LieGroup G>
+SquareOf<G> withAveragedAngles(const SquareOf<G>& first, const SquareOf<G>& averaged) {
+  constexpr auto angular = angularCoordinates<G>();
+  constexpr int K = angular.count;
+  if constexpr (K > 0 && K < G::DoF) {
+    return first + averagedGrowth<K>(first, averaged, coordinatesOf<K>(angular));
+  } else {
+    return averaged;
+  }
+}
 
 /// `covariance_of` a barycentre with its jacobian.
 template <LieGroup G, class R, class W, class Covariance>
@@ -84,6 +97,7 @@ SettledGroupMean<G> settleGroupMean(const R& samples, const W& weights, const Gr
       const double size = static_cast<double>(settled.covariance.norm());
       settled.covariance = next;
       if (step <= 0.02 * size) {
+        settled.covariance = withAveragedAngles<G>(settled.first, next);
         settled.settled = true;
         return settled;
       }

@@ -45,6 +45,7 @@ class NumberList {
     add(name + ".mass", c.cut_locus.mass);
     add(name + ".cut_locus.hessian_change", c.cut_locus.hessian_change);
     add(name + ".hessian_change", c.hessian_change);
+    add(name + ".region_factor", c.region_factor);
     add(name + ".near_ties", static_cast<double>(c.near_ties.size()));
     for (const auto& tie : c.near_ties) add(name + ".near_ties.z", tie.z);
     if (c.estimate) add(name + ".covariance", c.estimate->covariance);
