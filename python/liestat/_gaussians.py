@@ -10,7 +10,7 @@ from . import _core
 from ._manifolds import R3, S2, SO3, Group, Manifold
 from ._operate import as_numbers, operate, require_finite
 from ._results import ConfidenceRegion, Law
-from ._statistics import _FRAMES, _axes, _covariances, _grouped, mahalanobis, require_manifold
+from ._statistics import _FRAMES, _axes, _covariances, _factored, _grouped, mahalanobis, require_manifold
 
 #: Conventions of covariances that `convert_covariance` knows.
 CONVENTIONS = ("body", "left", "world", "rotation_first", "left_rotation_first", "world_rotation_first", "chart")
@@ -76,9 +76,14 @@ class Gaussian:
         In the axes of `mean` ("body"), m² and rad², translation before rotation; broadcast to the shape of `mean`.
     convention : str
         That of the given covariance, see `convert_covariance`.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (..., k, k), or None
+        A with A Aᵀ the covariance, where it was made of one: the small variances have more digits in it. `fuse` uses it.
     """
 
-    __slots__ = ("mean", "covariance")
+    __slots__ = ("mean", "covariance", "factor")
 
     def __init__(self, mean, covariance, convention="body"):
         mean = require_manifold(mean, "Gaussian")
@@ -86,13 +91,30 @@ class Gaussian:
         if convention != "body":
             c = convert_covariance(mean, c, source=convention)
         self.mean = mean
+        self.factor = None
         self.covariance = c if c.shape[:-2] == mean.shape else np.broadcast_to(c, (*mean.shape, *c.shape[-2:]))
 
     @classmethod
-    def _of(cls, mean, covariance):
+    def _of(cls, mean, covariance, factor=None):
         self = object.__new__(cls)
-        self.mean, self.covariance = mean, covariance
+        self.mean, self.covariance, self.factor = mean, covariance, factor
         return self
+
+    @classmethod
+    def from_factor(cls, mean, factor):
+        """The Gaussian of the covariances A Aᵀ; ``factor`` is A, shape (..., k, k), broadcast to the shape of `mean`."""
+        mean = require_manifold(mean, "Gaussian.from_factor")
+        k = (mean.dof, mean.dof)
+        a, _ = _factored("Gaussian.from_factor", None, factor, None, type(mean))
+        a = np.broadcast_to(a, (*mean.shape, *k))
+        c = a @ a.swapaxes(-1, -2)
+        return cls._of(mean, (c + c.swapaxes(-1, -2)) / 2, a)
+
+    @classmethod
+    def from_deviations(cls, mean, deviations):
+        """The Gaussian of standard deviations along the axes of `mean`, shape (..., k), m and rad."""
+        mean = require_manifold(mean, "Gaussian.from_deviations")
+        return cls.from_factor(mean, _factored("Gaussian.from_deviations", None, None, deviations, type(mean))[0])
 
     @property
     def shape(self):
@@ -310,7 +332,7 @@ def random_directions(size=None, rng=None):
     return S2.from_vector(_normals(rng, (*shape, 3), "random_directions"))
 
 
-def fuse(x, covariances=None, axis=None, *, covariance_at=None):
+def fuse(x, covariances=None, axis=None, *, factors=None, deviations=None, covariance_at=None):
     """Independent estimates of one feature, fused: the mean of least Mahalanobis distances with its covariance.
 
     Faster than ``mean(x, covariances=...)``, which looks for other minima, too.
@@ -320,6 +342,8 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
     x : an array of features, or a Gaussian
     covariances : array_like, shape (..., k, k)
         Broadcast to ``x.shape``.
+    factors, deviations : array_like, shapes (..., k, k) and (..., k)
+        In place of covariances, as for `mean`; the result has a `factor`, too.
     axis : None, int or tuple of ints
         Axes along which features are fused; None: all of them.
     covariance_at : {'measured', 'estimated'}
@@ -336,10 +360,11 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
         that is flat where the truth may be.
     """
     if isinstance(x, Gaussian):
-        if covariances is not None:
+        if any(v is not None for v in (covariances, factors, deviations)):
             raise TypeError("fuse: a Gaussian has its covariances already")
-        x, covariances = x.mean, x.covariance
+        x, covariances, factors = x.mean, None if x.factor is not None else x.covariance, x.factor
     x = require_manifold(x, "fuse")
+    covariances, factored = _factored("fuse", covariances, factors, deviations, type(x))
     if covariances is None:
         raise TypeError("fuse: covariances are missing")
     if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
@@ -351,15 +376,17 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
         x = x.reshape(1)
     axes = _axes(axis, x.ndim, "fuse")
     k = (kind.dof, kind.dof)
-    c = np.broadcast_to(_covariances(covariances, "fuse: covariances", kind, x.shape), (*x.shape, *k))
+    c = covariances if factored else _covariances(covariances, "fuse: covariances", kind, x.shape)
+    c = np.broadcast_to(c, (*x.shape, *k))
     features, lead = _grouped(require_finite(x.params, "fuse: x"), axes, x.ndim)
     if features.shape[1] == 0:
         raise ValueError(f"fuse: x, shape {x.shape}: there are no features")
     c = _grouped(c, axes, x.ndim)[0]
-    mean, covariance = _core.fuse(
+    mean, covariance, factor = _core.fuse(
         kind._core_name,
         np.ascontiguousarray(features),
         np.ascontiguousarray(c),
+        factored,
         covariance_at != "estimated",
     )
     bad = int(np.count_nonzero(~np.isfinite(covariance).all(axis=(1, 2))))
@@ -369,7 +396,8 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
             UserWarning,
             stacklevel=2,
         )
-    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, *k))
+    factor = factor.reshape(*lead, *k) if factored else None
+    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, *k), factor)
 
 
 def _tangent_of(value):

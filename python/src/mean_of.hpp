@@ -44,7 +44,10 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
                      .covariance_at = request.covariance_at,
                      .likelihood = request.likelihood};
   for (std::size_t i = 0; i + k * k <= request.covariances.size(); i += k * k) {
-    input.covariances.push_back(square<ManifoldTraits<M>::DoF>(request.covariances.data() + i));
+    const auto matrix = square<ManifoldTraits<M>::DoF>(request.covariances.data() + i);
+    if (request.factored) input.factors.push_back(matrix);
+    input.covariances.push_back(
+        request.factored ? FactoredGaussian<M>{ManifoldTraits<M>::origin(), matrix}.gaussian().covariance : matrix);
   }
   return input;
 }
@@ -60,9 +63,17 @@ MeanSummary meanOf(const MeanRequest& request, SignalWatch& signals) {
 }
 
 template <class M>
-void fuseFeatures(const MeanRequest& request, double* mean, double* covariance) {
+void fuseFeatures(const MeanRequest& request, double* mean, double* covariance, double* factor) {
   const Features<M> features(request.features);
-  const Gaussian<M> result = fuse(inputOf(request, features).gaussians(), request.covariance_at);
+  const MeanInput<M> input = inputOf(request, features);
+  Gaussian<M> result;
+  if (request.factored) {
+    const FactoredGaussian<M> factored = fuse(input.factoredGaussians(), request.covariance_at);
+    store(factored.factor, factor);
+    result = factored.gaussian();
+  } else {
+    result = fuse(input.gaussians(), request.covariance_at);
+  }
   storePoint(result.mean, mean);
   store(result.covariance, covariance);
 }
