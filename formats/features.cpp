@@ -13,6 +13,7 @@
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/detail/rotation_matrix.hpp>
+#include <lie/detail/small_factors.hpp>
 #include <lie/linear.hpp>
 #include <lie/units.hpp>
 
@@ -44,7 +45,11 @@ class FeatureReader {
     }
     layout_ = format.reads(reader_, name_, options_);
     for (std::string& column : layout_.columns) {
-      if (options_.without_covariances && column.rfind("cov_", 0) == 0) column.clear();
+      if (!options_.without_covariances || !detail::isCovarianceColumn(column)) continue;
+      if (column.rfind("cov_", 0) != 0) {
+        throw InputError(name_, reader_.number(), fmt::format("the column {}", column), "cov_00 ... cov_55 of poses");
+      }
+      column.clear();
     }
     const std::size_t first_line = reader_.number();
     places_ = detail::findFeature(layout_.columns, name_, first_line);
@@ -107,7 +112,7 @@ class FeatureReader {
       file_.weights.push_back(weight);
     }
     if (places_.time != detail::absent) file_.times.push_back(value(places_.time) * layout_.time_unit);
-    if (places_.dimension > 0) file_.covariances.push_back(readCovariance());
+    if (places_.dimension > 0) addCovariance();
     file_.lines.push_back(line_);
   }
 
@@ -193,22 +198,70 @@ class FeatureReader {
     return Eigen::Quaterniond(nearest.rotation.params());
   }
 
-  FeatureCovariance readCovariance() const {
+  /// The factor of a row, and its covariance.
+  void addCovariance() {
     const int n = places_.dimension;
-    FeatureCovariance covariance(n, n);
-    std::size_t next = 0;
-    for (int i = 0; i < n; ++i) {
-      for (int j = i; j < n; ++j) covariance(i, j) = covariance(j, i) = value(places_.covariance[next++]);
+    if (!places_.covariance.empty()) {
+      FeatureCovariance covariance(n, n);
+      std::size_t next = 0;
+      for (int i = 0; i < n; ++i) {
+        for (int j = i; j < n; ++j) covariance(i, j) = covariance(j, i) = value(places_.covariance[next++]);
+      }
+      if (!isUnmeasured(covariance)) checkCovariance(covariance);
+      file_.covariances.push_back(std::move(covariance));
+      return;
     }
+    FeatureCovariance factor = FeatureCovariance::Zero(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n && !places_.factor.empty(); ++j) {
+        factor(i, j) = value(places_.factor[static_cast<std::size_t>(i * n + j)]);
+      }
+      if (places_.deviations.empty()) continue;
+      const double deviation = value(places_.deviations[static_cast<std::size_t>(i)]);
+      if (!(deviation > 0)) {
+        throw InputError(name_, line_, fmt::format("sd_{} is {}", i, deviation), "a standard deviation above 0");
+      }
+      factor(i, i) = deviation;
+    }
+    Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Identity();
+    whole.topLeftCorner(n, n) = factor;
+    const Eigen::Matrix<double, 6, 6> square = detail::squareOfFactor<double, 6>(whole);
+    FeatureCovariance covariance = square.topLeftCorner(n, n);
+    if (!isUnmeasured(covariance)) checkCovariance(covariance);
+    file_.covariances.push_back(std::move(covariance));
+    file_.factors.push_back(std::move(factor));
+  }
+
+  /// True, and the row is listed, if a sentinel says that the rotation was not measured; the covariance is NaN then.
+  bool isUnmeasured(FeatureCovariance& covariance) {
+    const int n = places_.dimension;
+    const FeatureParts& parts = info(places_.kind).parts;
+    const bool rotates = parts.contains(FeaturePart::rotation);
+    const int first_angle = rotates ? n - 3 : parts.contains(FeaturePart::direction) ? n - 2 : n;
+    bool found = first_angle < n && covariance(0, 0) == -1, large = false;
+    for (int i = 0; i < n; ++i) {
+      const double v = covariance(i, i);
+      if (i >= first_angle) found = found || v >= unmeasured_variance || v == -1;
+      if (i < first_angle) large = large || v >= unmeasured_variance;
+    }
+    if (large && !found) ++file_.n_large_variances;
+    if (!found) return false;
+    covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
+    file_.unmeasured.push_back(file_.lines.size());
+    return true;
+  }
+
+  void checkCovariance(const FeatureCovariance& covariance) const {
+    const int n = places_.dimension;
     // The share of each variance that the components before it leave: the test does not depend on units.
     Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Identity();
     whole.topLeftCorner(n, n) = covariance;
     const Cholesky<double, 6> factor(whole);
     bool positive = factor.ok();
-    for (int i = 0; positive && i < n; ++i) {
+    for (int i = 0; positive && i < n && places_.factor.empty(); ++i) {
       positive = factor.pivot(i) > n * std::numeric_limits<double>::epsilon() * covariance(i, i);
     }
-    if (positive) return covariance;
+    if (positive) return;
     const SymmetricEigen eigen(covariance);
     throw InputError(name_, line_,
                      fmt::format("the covariance is not positive definite (smallest eigenvalue {:.3g}, largest {:.3g})",
@@ -233,6 +286,26 @@ class FeatureReader {
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options) {
   const TextFile file = loadText(path);
   return readFeatures(file.text, file.name, options);
+}
+
+FeatureFile withoutUnmeasured(FeatureFile file) {
+  const auto keep = [&](auto& list) {
+    if (list.empty()) return;
+    std::size_t kept = 0, next = 0;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      if (next < file.unmeasured.size() && file.unmeasured[next] == i) {
+        ++next;
+        continue;
+      }
+      if (kept != i) list[kept] = std::move(list[i]);
+      ++kept;
+    }
+    list.resize(kept);
+  };
+  keep(file.rotations), keep(file.positions), keep(file.directions), keep(file.weights), keep(file.times);
+  keep(file.covariances), keep(file.factors), keep(file.lines);
+  file.unmeasured.clear();
+  return file;
 }
 
 FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {

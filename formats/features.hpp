@@ -5,7 +5,7 @@
 #pragma once
 
 #include <formats/feature.hpp>
-#include <stats/gaussian.hpp>
+#include <stats/factored_gaussian.hpp>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -17,6 +17,10 @@
 #include <vector>
 
 namespace liestat {
+
+/// A variance from which on a ROS or MAVLink message means "not measured" (99999 and 1e6 are customary), m² or rad². Of
+/// a rotation it means that in any file: no rotation scatters by 300 rad. So does a variance of -1.
+inline constexpr double unmeasured_variance = 9e4;
 
 /// A covariance of the size that the feature has: 3x3, for frames 6x6, for directions 2x2. Its storage needs no heap.
 using FeatureCovariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
@@ -30,14 +34,18 @@ struct FeatureFile {
   std::vector<Eigen::Vector3d> directions;    ///< unit vectors
   std::vector<double> weights;                ///< 0 or more, one above; empty if the file has none
   std::vector<double> times;                  ///< in seconds where the format says so; empty if the file has none
-  std::vector<FeatureCovariance>
-      covariances;                     ///< positive definite, translation before rotation; empty if the file has none
-  std::vector<std::size_t> lines;      ///< the line that each row stands in
-  std::size_t n_normalised = 0;        ///< rows whose rotation or direction was off its norm by more than rounding
-  double largest_norm_error = 0;       ///< the largest such error
-  std::size_t n_beyond_half_turn = 0;  ///< rotation vectors longer than a half-turn, which no logarithm is
-  double largest_rotation_vector = 0;  ///< rad
-  std::string format;                  ///< the name of the format that was read
+  /// Positive definite, translation before rotation; NaN in rows that `unmeasured` lists. Empty if the file has none.
+  std::vector<FeatureCovariance> covariances;
+  /// Factors of these, which have more digits, where the file has factors or standard deviations.
+  std::vector<FeatureCovariance> factors;
+  std::vector<std::size_t> unmeasured;  ///< rows of which a sentinel says that a rotation was not measured
+  std::size_t n_large_variances = 0;    ///< rows with a variance of a length that is a sentinel in messages
+  std::vector<std::size_t> lines;       ///< the line that each row stands in
+  std::size_t n_normalised = 0;         ///< rows whose rotation or direction was off its norm by more than rounding
+  double largest_norm_error = 0;        ///< the largest such error
+  std::size_t n_beyond_half_turn = 0;   ///< rotation vectors longer than a half-turn, which no logarithm is
+  double largest_rotation_vector = 0;   ///< rad
+  std::string format;                   ///< the name of the format that was read
 
   std::size_t size() const { return lines.size(); }
 };
@@ -101,6 +109,9 @@ std::vector<M> featuresOf(const FeatureFile& file) {
   return list;
 }
 
+/// The file without the rows that `unmeasured` lists: sentinels are no variances, and must not be averaged.
+FeatureFile withoutUnmeasured(FeatureFile file);
+
 /// The same with their covariances.
 template <class M>
 std::vector<Gaussian<M>> gaussiansOf(const FeatureFile& file) {
@@ -108,6 +119,16 @@ std::vector<Gaussian<M>> gaussiansOf(const FeatureFile& file) {
   std::vector<Gaussian<M>> list;
   list.reserve(features.size());
   for (std::size_t i = 0; i < features.size(); ++i) list.push_back({features[i], file.covariances[i]});
+  return list;
+}
+
+/// The same with the factors of these, for a file that has them.
+template <class M>
+std::vector<FactoredGaussian<M>> factoredGaussiansOf(const FeatureFile& file) {
+  const std::vector<M> features = featuresOf<M>(file);
+  std::vector<FactoredGaussian<M>> list;
+  list.reserve(features.size());
+  for (std::size_t i = 0; i < features.size(); ++i) list.push_back({features[i], file.factors[i]});
   return list;
 }
 

@@ -30,9 +30,6 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// An entry of a covariance that is not known.
 inline constexpr double unknown_entry = std::numeric_limits<double>::quiet_NaN();
 
-/// A variance from which on a ROS or MAVLink message means "not measured" (99999 and 1e6 are customary), m² or rad².
-inline constexpr double unmeasured_variance = 9e4;
-
 /// The poses of a file in its order, with the matrices beside them.
 struct Trajectory {
   std::string name;                     ///< name of the file in messages

@@ -1,5 +1,4 @@
-// Gaussian<M>: a feature with its covariance, and how the pair moves between frames and charts. FactoredGaussian<M>: the
-// same with a factor of the covariance.
+// Gaussian<M>: a feature with its covariance, and how the pair moves between frames and charts.
 #pragma once
 
 #include <lie/manifold.hpp>
@@ -17,31 +16,6 @@ template <Homogeneous M>
 struct Gaussian {
   M mean = ManifoldTraits<M>::origin();
   SquareOf<M> covariance = SquareOf<M>::Identity();
-
-  /// The Gaussian of the covariance A Aᵀ, symmetric and positive definite to the last bit where A is regular.
-  static Gaussian fromFactor(const M& mean, const SquareOf<M>& factor) {
-    return {mean, detail::squareOfFactor<ScalarOf<M>, ManifoldTraits<M>::DoF>(factor)};
-  }
-  /// The Gaussian of standard deviations along the axes of its frame, in the tangent order of M, rad and m.
-  static Gaussian fromDeviations(const M& mean, const TangentOf<M>& deviations) {
-    return {mean, deviations.cwiseAbs2().asDiagonal()};
-  }
-};
-
-/// A feature and a factor A of the covariance A Aᵀ of its error: x·Exp(A n), n ~ N(0, I). A matrix of variances has the
-/// smallest one to eps times the largest, a factor to the root of that and, if its columns are standard deviations along
-/// principal axes, to eps: what maha() and fuse() make of it.
-template <Homogeneous M>
-struct FactoredGaussian {
-  M mean = ManifoldTraits<M>::origin();
-  SquareOf<M> factor = SquareOf<M>::Identity();
-
-  /// The factor of standard deviations along the axes of its frame, in the tangent order of M, rad and m.
-  static FactoredGaussian fromDeviations(const M& mean, const TangentOf<M>& deviations) {
-    return {mean, deviations.asDiagonal()};
-  }
-  /// The same with the covariance in place of its factor.
-  Gaussian<M> gaussian() const { return Gaussian<M>::fromFactor(mean, factor); }
 };
 
 /// Squared Mahalanobis distance zᵀ Σ⁻¹ z of a tangent vector; NaN if Σ is not positive definite.

@@ -15,6 +15,7 @@
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/settled_maha.hpp>
 #include <stats/executor.hpp>
+#include <stats/factored_gaussian.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/maha_types.hpp>
 #include <stats/mean.hpp>

@@ -104,6 +104,9 @@ struct MeanSummary {
   Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
   double law_n =
       0;  ///< number of measurements for Hotelling's law: n, fewer in effect for weights that are no precisions
+  /// F with F Fᵀ that covariance, where factors were given: its small variances have more digits. NaN where it is
+  /// withheld, empty where no factors were given.
+  Eigen::MatrixXd covariance_factor = {};
   Status covariance_status = Status::ok;
   Eigen::MatrixXd dispersion;                                     ///< the measurements' covariance about the mean
   std::vector<FarthestMeasurement> farthest = {};                 ///< one for each part of the tangent vector
@@ -181,6 +184,9 @@ void describe(V& v, const MeanSummary& m) {
   v("converged", m.converged)("iterations", m.iterations)("residual", m.residual, "norm of the last step");
   v("tolerance", m.tolerance, "of the norm of the last step")("mean", m.mean, "the parts that the feature has");
   v("covariance", where(has, m.covariance), "of the mean, in its own axes; null where it is withheld");
+  if (shown(v, m.covariance_factor.size() > 0)) {
+    v("covariance_factor", m.covariance_factor, "F with F Fᵀ the covariance, where factors or deviations were given");
+  }
   v("covariance_status", name(m.covariance_status), "why there is no covariance; otherwise ok");
   describe(v, covarianceWords(m.parts, m.group));
   if (shown(v, m.tangent_basis.has_value())) {

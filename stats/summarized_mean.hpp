@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -33,6 +34,8 @@ struct MeanInput {
   /// Covariances of the features' errors, one for each feature or a single one, as in CertifiedMeanOptions and maha();
   /// none: the covariance of the mean comes from the residuals.
   std::vector<SquareOf<M>> covariances = {};
+  /// Factors of these, which have more digits, for maha: one for each feature or a single one, or none.
+  std::vector<SquareOf<M>> factors = {};
   CovarianceAt covariance_at = CovarianceAt::measured;  ///< frame of the covariances, for maha
   bool likelihood = false;                              ///< maha: with the volume element
   /// What becomes of covariances that the measurements refute; for lsq, wlsq and barycentre.
@@ -48,6 +51,13 @@ struct MeanInput {
     std::vector<Gaussian<M>> list;
     list.reserve(features.size());
     for (const M& x : features) list.push_back({x, covariances[covariances.size() == 1 ? 0 : list.size()]});
+    return list;
+  }
+  /// The features with the factors.
+  std::vector<FactoredGaussian<M>> factoredGaussians() const {
+    std::vector<FactoredGaussian<M>> list;
+    list.reserve(features.size());
+    for (const M& x : features) list.push_back({x, factors[factors.size() == 1 ? 0 : list.size()]});
     return list;
   }
 };
@@ -208,6 +218,7 @@ template <Homogeneous M, Executor E>
 void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
                     const MeanSummaryOptions& options) {
   const std::vector<Gaussian<M>> samples = input.gaussians();
+  const bool factored = !input.factors.empty();
   if (options.certificates) {
     CertifiedMahaOptions<M> how;
     const std::size_t most = how.uniqueness.budget;
@@ -215,15 +226,23 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
     how.uniqueness = options.uniqueness;
     how.uniqueness.budget = std::min(options.uniqueness.budget, most);
     how.scale_noise = input.scale_noise;
-    const CertifiedMaha<M> result = certifiedMaha(executor, samples, input.covariance_at, how);
+    const CertifiedMaha<M> result = factored
+                                        ? certifiedMaha(executor, input.factoredGaussians(), input.covariance_at, how)
+                                        : certifiedMaha(executor, samples, input.covariance_at, how);
+    if (factored) mean.covariance_factor = result.factor.template cast<double>();
     setCertified(mean, result.maha, result);
     return setDispersion(mean, input, result.maha.mean);
   }
   MahaOptions<M> how;
   how.likelihood = input.likelihood;
-  const MahaResult<M> result = maha(executor, samples, input.covariance_at, how);
+  const MahaResult<M> result = factored ? maha(executor, input.factoredGaussians(), input.covariance_at, how)
+                                        : maha(executor, samples, input.covariance_at, how);
   mean.fit = result.fit;
   setUncertified<M>(mean, result, result.covariance, showAMean<M>(samples, result.mean));
+  if (factored) {
+    mean.covariance_factor = result.factor.template cast<double>();
+    if (!mean.hasCovariance()) mean.covariance_factor.fill(std::numeric_limits<double>::quiet_NaN());
+  }
   setDispersion(mean, input, result.mean);
 }
 

@@ -18,6 +18,7 @@ MeanInput<M> meanInput(const Measurements& measurements, const std::vector<M>& f
   if (measurements.usesWeights()) input.weights = measurements.weights;
   if (measurements.known_noise) {
     input.covariances.assign(measurements.file.covariances.begin(), measurements.file.covariances.end());
+    input.factors.assign(measurements.file.factors.begin(), measurements.file.factors.end());
   }
   return input;
 }

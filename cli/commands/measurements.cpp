@@ -35,7 +35,7 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
   }
   if (!file.covariances.empty() && !(rows.parts == feature.parts)) {
     m.notes.push_back(fmt::format("the file's covariances are those of whole {} and are not used", rows.plural));
-    file.covariances.clear();
+    file.covariances.clear(), file.factors.clear(), file.unmeasured.clear();
   }
   if (file.n_beyond_half_turn > 0 && feature.parts.contains(FeaturePart::rotation)) {
     m.notes.push_back(
@@ -83,6 +83,31 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
                        feature.plural));
   }
 
+  // LSQ's covariance from known noise wants the noise in the frame of the estimate. There is no difference on points
+  // and rotations, and directions carry it along; for frames measured elsewhere the residuals speak instead.
+  const bool least_squares = m.criterion == Criterion::lsq || m.criterion == Criterion::wlsq;
+  m.known_noise = maha || (has_covariances && least_squares &&
+                           (!feature.frameMatters() || options.covariance_at == CovarianceAt::estimated));
+  const bool uses_covariances = m.known_noise || (m.criterion == Criterion::wlsq && file.weights.empty());
+  if (uses_covariances && !file.unmeasured.empty()) {
+    const std::size_t unmeasured = file.unmeasured.size(), all = file.size();
+    if (unmeasured == all) {
+      refuse(fmt::format("no row has a measured rotation: all variances of one are {:g} rad² or more, or -1",
+                         unmeasured_variance));
+    }
+    file = withoutUnmeasured(std::move(file));
+    m.notes.push_back(
+        fmt::format("{} of {} rows have a rotation with a variance of {:g} rad² or more, or -1: not "
+                    "measured, and left out",
+                    unmeasured, all, unmeasured_variance));
+  }
+  if (file.n_large_variances > 0 && uses_covariances) {
+    m.notes.push_back(
+        fmt::format("{} rows have a variance of {:g} m² or more: in messages that means not measured, "
+                    "here it is taken as it is",
+                    file.n_large_variances, unmeasured_variance));
+  }
+
   m.weights.assign(file.size(), 1.0);
   const bool uses_weights =
       m.criterion == Criterion::wlsq || (m.criterion == Criterion::barycentre && !file.weights.empty());
@@ -100,11 +125,6 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
     m.notes.push_back("the file's weights are not used by " + name(m.criterion));
   }
 
-  // LSQ's covariance from known noise wants the noise in the frame of the estimate. There is no difference on points
-  // and rotations, and directions carry it along; for frames measured elsewhere the residuals speak instead.
-  const bool least_squares = m.criterion == Criterion::lsq || m.criterion == Criterion::wlsq;
-  m.known_noise = maha || (has_covariances && least_squares &&
-                           (!feature.frameMatters() || options.covariance_at == CovarianceAt::estimated));
   m.covariance_at_matters = m.known_noise && feature.frameMatters();
   if (has_covariances && !m.known_noise) {
     m.notes.emplace_back(least_squares && options.covariance_at == CovarianceAt::measured

@@ -12,7 +12,11 @@
 namespace liestat::detail {
 namespace {
 
-std::string covarianceColumn(int row, int column) { return fmt::format("cov_{}{}", row, column); }
+constexpr std::string_view covariance_prefix = "cov_", factor_prefix = "factor_", deviation_prefix = "sd_";
+
+std::string covarianceColumn(int row, int column) { return fmt::format("{}{}{}", covariance_prefix, row, column); }
+std::string factorColumn(int row, int column) { return fmt::format("{}{}{}", factor_prefix, row, column); }
+std::string deviationColumn(int row) { return fmt::format("{}{}", deviation_prefix, row); }
 
 /// Finds columns by their names.
 struct Header {
@@ -94,25 +98,49 @@ void findParts(const Header& header, FeatureColumns& found) {
 }
 
 void findCovariance(const Header& header, FeatureColumns& found) {
-  const auto isCovariance = [](const std::string& column) { return column.rfind("cov_", 0) == 0; };
-  if (std::none_of(header.columns.begin(), header.columns.end(), isCovariance)) return;
   const FeatureInfo& feature = info(found.kind);
   const int n = feature.dof;
-  const std::string expected = fmt::format("the upper triangle cov_00 ... cov_{0}{0} of a {1}", n - 1, feature.name);
-  std::vector<std::string> missing;
+  std::vector<std::string> upper, square, diagonal;
   for (int i = 0; i < n; ++i) {
-    for (int j = i; j < n; ++j) {
-      found.covariance.push_back(header.find(covarianceColumn(i, j)));
-      if (found.covariance.back() == absent) missing.push_back(covarianceColumn(i, j));
+    for (int j = 0; j < n; ++j) {
+      if (j >= i) upper.push_back(covarianceColumn(i, j));
+      square.push_back(factorColumn(i, j));
     }
+    diagonal.push_back(deviationColumn(i));
   }
-  for (const std::string& column : header.columns) {
-    if (isCovariance(column) && column[5] >= '0' + n) {
-      header.complain(fmt::format("column '{}' in a file of {}", column, feature.plural), expected);
+  struct Form {
+    std::string_view prefix;
+    const std::vector<std::string>& names;
+    std::vector<int>& places;
+    std::string_view what;
+  };
+  const Form forms[] = {{covariance_prefix, upper, found.covariance, "the upper triangle"},
+                        {factor_prefix, square, found.factor, "the square matrix"},
+                        {deviation_prefix, diagonal, found.deviations, "the standard deviations"}};
+  std::string_view first;
+  for (const Form& form : forms) {
+    const auto isOne = [&](const std::string& column) { return column.rfind(form.prefix, 0) == 0; };
+    if (std::none_of(header.columns.begin(), header.columns.end(), isOne)) continue;
+    const std::string expected =
+        fmt::format("{} {} ... {} of a {}", form.what, form.names.front(), form.names.back(), feature.name);
+    if (!first.empty()) {
+      header.complain(fmt::format("the columns {}.. beside {}..", form.prefix, first), "one form of a covariance");
     }
+    first = form.prefix;
+    std::vector<std::string> missing;
+    for (const std::string& name : form.names) {
+      form.places.push_back(header.find(name));
+      if (form.places.back() == absent) missing.push_back(name);
+    }
+    for (const std::string& column : header.columns) {
+      const auto last = static_cast<char>('0' + n);
+      if (isOne(column) && (column[form.prefix.size()] >= last || column.back() >= last)) {
+        header.complain(fmt::format("column '{}' in a file of {}", column, feature.plural), expected);
+      }
+    }
+    if (!missing.empty()) header.complainMissing(missing, expected);
+    found.dimension = n;
   }
-  if (!missing.empty()) header.complainMissing(missing, expected);
-  found.dimension = n;
 }
 
 }  // namespace
@@ -125,10 +153,19 @@ const std::vector<std::string>& knownColumns() {
     for (const char* column : {"x", "y", "z", "dx", "dy", "dz", "weight"}) result.emplace_back(column);
     for (int i = 0; i < 6; ++i) {
       for (int j = i; j < 6; ++j) result.push_back(covarianceColumn(i, j));
+      for (int j = 0; j < 6; ++j) result.push_back(factorColumn(i, j));
+      result.push_back(deviationColumn(i));
     }
     return result;
   }();
   return columns;
+}
+
+bool isCovarianceColumn(std::string_view column) {
+  for (const std::string_view prefix : {covariance_prefix, factor_prefix, deviation_prefix}) {
+    if (column.substr(0, prefix.size()) == prefix) return true;
+  }
+  return false;
 }
 
 FeatureColumns findFeature(const std::vector<std::string>& columns, const std::string& file, std::size_t line) {

@@ -33,8 +33,13 @@ struct FeatureColumns {
   int weight = absent;
   int time = absent;
   int dimension = 0;                 ///< the covariance's; 0: there is none
-  std::vector<int> covariance = {};  ///< upper triangle, row by row
+  std::vector<int> covariance = {};  ///< upper triangle, row by row; or one of the next two
+  std::vector<int> factor = {};      ///< of the covariance, row by row
+  std::vector<int> deviations = {};  ///< standard deviations: a diagonal factor
 };
+
+/// True for the columns of covariances, in any of their three forms.
+bool isCovarianceColumn(std::string_view column);
 
 /// Finds the parts of a feature among the columns of a file; `line` is where they are named. Throws InputError where
 /// they make no feature or several.

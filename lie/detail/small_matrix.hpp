@@ -121,25 +121,6 @@ class Cholesky {
   bool ok_ = false;
 };
 
-/// A Aᵀ, symmetric to the last bit and with a Cholesky factor where A is regular and finite. Where rounding takes the
-/// smallest eigenvalue (its ratio to the largest is of the order of eps), the diagonal is raised by that rounding.
-template <class S, int N>
-Eigen::Matrix<S, N, N> squareOfFactor(const Eigen::Matrix<S, N, N>& A) {
-  Eigen::Matrix<S, N, N> C;
-  for (int j = 0; j < N; ++j) {
-    for (int i = j; i < N; ++i) {
-      S sum(0);
-      for (int k = 0; k < N; ++k) sum += A(i, k) * A(j, k);
-      C(i, j) = C(j, i) = sum;
-    }
-  }
-  S rounding = S(N) * std::numeric_limits<S>::epsilon();
-  for (int tries = 0; tries < 8 && !Cholesky<S, N>(C).ok(); ++tries, rounding *= S(2)) {
-    for (int i = 0; i < N; ++i) C(i, i) += rounding * C(i, i);
-  }
-  return C;
-}
-
 /// The factors A = L D Lᵀ of a symmetric matrix, of which the lower triangle is read: without the square roots of
 /// Cholesky's, which wait for each other. Where A is not positive definite, ok() is false and all results are NaN.
 template <class S, int N>

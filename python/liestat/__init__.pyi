@@ -221,7 +221,12 @@ class MeanResult(_MeanSummary):
 class Gaussian:
     mean: Any
     covariance: _Array
+    factor: _Array | None
     def __init__(self, mean: Manifold, covariance: ArrayLike, convention: _ConventionWord = "body") -> None: ...
+    @classmethod
+    def from_factor(cls, mean: Manifold, factor: ArrayLike) -> Gaussian: ...
+    @classmethod
+    def from_deviations(cls, mean: Manifold, deviations: ArrayLike) -> Gaussian: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
     @property
@@ -274,6 +279,8 @@ def mean(
     criterion: Literal["lsq", "wlsq", "maha", "barycentre"] | None = None,
     certify: bool = True,
     *,
+    factors: ArrayLike | None = None,
+    deviations: ArrayLike | None = None,
     covariance_at: _CovarianceAt = None,
     likelihood: bool = False,
     times: ArrayLike | None = None,
@@ -319,6 +326,8 @@ def fuse(
     covariances: ArrayLike | None = None,
     axis: _Axis = None,
     *,
+    factors: ArrayLike | None = None,
+    deviations: ArrayLike | None = None,
     covariance_at: _CovarianceAt = None,
 ) -> Gaussian: ...
 class FuseResult(NamedTuple):
@@ -334,6 +343,8 @@ def tested_fuse(
     covariances: ArrayLike | None = None,
     axis: _Axis = None,
     *,
+    factors: ArrayLike | None = None,
+    deviations: ArrayLike | None = None,
     covariance_at: _CovarianceAt = None,
 ) -> FuseResult: ...
 def convert_covariance(

@@ -11,7 +11,7 @@ from . import _core
 from ._manifolds import R3, S2, SO3, Group, Manifold
 from ._operate import as_numbers, operate, require_finite
 from ._results import ConfidenceRegion, Law
-from ._statistics import _FRAMES, _axes, _covariances, _grouped, mahalanobis, require_manifold
+from ._statistics import _FRAMES, _axes, _covariances, _factored, _grouped, mahalanobis, require_manifold
 
 #: Conventions of covariances that `convert_covariance` knows.
 CONVENTIONS = ("body", "left", "world", "rotation_first", "left_rotation_first", "world_rotation_first", "chart")
@@ -77,9 +77,14 @@ class Gaussian:
         In the axes of `mean` ("body"), m² and rad², translation before rotation; broadcast to the shape of `mean`.
     convention : str
         That of the given covariance, see `convert_covariance`.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (..., k, k), or None
+        A with A Aᵀ the covariance, where it was made of one: the small variances have more digits in it. `fuse` uses it.
     """
 
-    __slots__ = ("mean", "covariance")
+    __slots__ = ("mean", "covariance", "factor")
 
     def __init__(self, mean, covariance, convention="body"):
         mean = require_manifold(mean, "Gaussian")
@@ -87,13 +92,30 @@ class Gaussian:
         if convention != "body":
             c = convert_covariance(mean, c, source=convention)
         self.mean = mean
+        self.factor = None
         self.covariance = c if c.shape[:-2] == mean.shape else np.broadcast_to(c, (*mean.shape, *c.shape[-2:]))
 
     @classmethod
-    def _of(cls, mean, covariance):
+    def _of(cls, mean, covariance, factor=None):
         self = object.__new__(cls)
-        self.mean, self.covariance = mean, covariance
+        self.mean, self.covariance, self.factor = mean, covariance, factor
         return self
+
+    @classmethod
+    def from_factor(cls, mean, factor):
+        """The Gaussian of the covariances A Aᵀ; ``factor`` is A, shape (..., k, k), broadcast to the shape of `mean`."""
+        mean = require_manifold(mean, "Gaussian.from_factor")
+        k = (mean.dof, mean.dof)
+        a, _ = _factored("Gaussian.from_factor", None, factor, None, type(mean))
+        a = np.broadcast_to(a, (*mean.shape, *k))
+        c = a @ a.swapaxes(-1, -2)
+        return cls._of(mean, (c + c.swapaxes(-1, -2)) / 2, a)
+
+    @classmethod
+    def from_deviations(cls, mean, deviations):
+        """The Gaussian of standard deviations along the axes of `mean`, shape (..., k), m and rad."""
+        mean = require_manifold(mean, "Gaussian.from_deviations")
+        return cls.from_factor(mean, _factored("Gaussian.from_deviations", None, None, deviations, type(mean))[0])
 
     @property
     def shape(self):
@@ -311,13 +333,14 @@ def random_directions(size=None, rng=None):
     return S2.from_vector(_normals(rng, (*shape, 3), "random_directions"))
 
 
-def _fused(caller, x, covariances, axis, covariance_at):
-    """The type, shape of the results, their parameters and covariances, statuses, χ², degrees of freedom and p."""
+def _fused(caller, x, covariances, factors, deviations, axis, covariance_at):
+    """The Gaussians, statuses, χ², degrees of freedom and p, and the shape of the results."""
     if isinstance(x, Gaussian):
-        if covariances is not None:
+        if any(v is not None for v in (covariances, factors, deviations)):
             raise TypeError(f"{caller}: a Gaussian has its covariances already")
-        x, covariances = x.mean, x.covariance
+        x, covariances, factors = x.mean, None if x.factor is not None else x.covariance, x.factor
     x = require_manifold(x, caller)
+    covariances, factored = _factored(caller, covariances, factors, deviations, type(x))
     if covariances is None:
         raise TypeError(f"{caller}: covariances are missing")
     if covariance_at not in ((None,) if not isinstance(x, _FRAMES) else ()) + ("measured", "estimated"):
@@ -329,21 +352,26 @@ def _fused(caller, x, covariances, axis, covariance_at):
         x = x.reshape(1)
     axes = _axes(axis, x.ndim, caller)
     k = (kind.dof, kind.dof)
-    c = np.broadcast_to(_covariances(covariances, f"{caller}: covariances", kind, x.shape), (*x.shape, *k))
+    c = covariances if factored else _covariances(covariances, f"{caller}: covariances", kind, x.shape)
+    c = np.broadcast_to(c, (*x.shape, *k))
     features, lead = _grouped(require_finite(x.params, f"{caller}: x"), axes, x.ndim)
     if features.shape[1] == 0:
         raise ValueError(f"{caller}: x, shape {x.shape}: there are no features")
     c = _grouped(c, axes, x.ndim)[0]
-    mean, covariance, statuses, chi2, p = _core.fuse(
+    mean, covariance, factor, statuses, chi2, p = _core.fuse(
         kind._core_name,
         np.ascontiguousarray(features),
         np.ascontiguousarray(c),
+        factored,
         covariance_at != "estimated",
     )
-    return kind, lead, mean, covariance, np.array(statuses), chi2, kind.dof * (features.shape[1] - 1), p
+    estimate = Gaussian._of(
+        kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, *k), factor.reshape(*lead, *k) if factored else None
+    )
+    return estimate, np.array(statuses), chi2, kind.dof * (features.shape[1] - 1), p, lead
 
 
-def fuse(x, covariances=None, axis=None, *, covariance_at=None):
+def fuse(x, covariances=None, axis=None, *, factors=None, deviations=None, covariance_at=None):
     """Independent estimates of one feature, fused: the mean of least Mahalanobis distances with its covariance.
 
     Faster than ``mean(x, covariances=...)``, which looks for other minima, too.
@@ -353,6 +381,8 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
     x : an array of features, or a Gaussian
     covariances : array_like, shape (..., k, k)
         Broadcast to ``x.shape``.
+    factors, deviations : array_like, shapes (..., k, k) and (..., k)
+        In place of covariances, as for `mean`; the result has a `factor`, too.
     axis : None, int or tuple of ints
         Axes along which features are fused; None: all of them.
     covariance_at : {'measured', 'estimated'}
@@ -369,10 +399,12 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
         has the test), directions or rotations as scattered as uniform ones, or a criterion that is flat where the truth
         may be.
     """
-    kind, lead, mean, covariance, status, _, _, _ = _fused("fuse", x, covariances, axis, covariance_at)
+    estimate, status, _, _, _, lead = _fused("fuse", x, covariances, factors, deviations, axis, covariance_at)
     refuted = status == "inconsistent"
-    covariance[refuted] = np.nan
-    bad = int(np.count_nonzero(~np.isfinite(covariance).all(axis=(1, 2))))
+    for matrices in (estimate.covariance, estimate.factor):
+        if matrices is not None:
+            matrices[refuted.reshape(lead)] = np.nan
+    bad = int(np.count_nonzero(~np.isfinite(estimate.covariance).all(axis=(-2, -1))))
     if bad:
         n_refuted = int(np.count_nonzero(refuted))
         why = "the measurements do not determine it"
@@ -380,8 +412,8 @@ def fuse(x, covariances=None, axis=None, *, covariance_at=None):
             why = "they lie farther apart than their covariances say"
             if n_refuted < bad:
                 why += f" ({n_refuted}), or do not determine it ({bad - n_refuted})"
-        warnings.warn(f"liestat.fuse: no covariance of {bad} of {len(mean)} results: {why}", UserWarning, stacklevel=2)
-    return Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, kind.dof, kind.dof))
+        warnings.warn(f"liestat.fuse: no covariance of {bad} of {len(status)} results: {why}", UserWarning, stacklevel=2)
+    return estimate
 
 
 class FuseResult(NamedTuple):
@@ -401,17 +433,18 @@ class FuseResult(NamedTuple):
     fit_factor: Any
 
 
-def tested_fuse(x, covariances=None, axis=None, *, covariance_at=None):
+def tested_fuse(x, covariances=None, axis=None, *, factors=None, deviations=None, covariance_at=None):
     """The same as `fuse`, with the test of the covariances by the scatter of the estimates, and without a warning.
 
     Returns
     -------
     FuseResult
     """
-    kind, lead, mean, covariance, status, chi2, dof, p = _fused("tested_fuse", x, covariances, axis, covariance_at)
+    estimate, status, chi2, dof, p, lead = _fused(
+        "tested_fuse", x, covariances, factors, deviations, axis, covariance_at
+    )
     factor = np.maximum(1, chi2 / dof) if dof > 0 else np.ones_like(chi2)
     shaped = [array.reshape(lead)[()] for array in (status, chi2, p, factor)]
-    estimate = Gaussian._of(kind._of(mean.reshape(*lead, -1)), covariance.reshape(*lead, kind.dof, kind.dof))
     return FuseResult(estimate, str(shaped[0]) if lead == () else shaped[0], shaped[1], dof, shaped[2], shaped[3])
 
 

@@ -289,7 +289,7 @@ class MeanResult:
         k, shape = self._kind.dof, self.shape
         if name == "mean":
             return self._kind._of(_array([x.params for x in parts], (*shape, self._kind.parameters)))
-        if name in ("covariance", "dispersion"):
+        if name in ("covariance", "covariance_factor", "dispersion"):
             nan = np.full((k, k), np.nan)
             return _array([nan if m is None else m for m in parts], (*shape, k, k))
         if name in ("fit", "fit_dof", "fit_p", "fit_factor"):

@@ -37,6 +37,21 @@ def _covariances(value, name, kind, shape=None):
     return c
 
 
+def _factored(caller, covariances, factors, deviations, kind):
+    """Covariances or what is given in their place, and whether that is factors of them."""
+    given = [v for v in (covariances, factors, deviations) if v is not None]
+    if len(given) > 1:
+        raise ValueError(f"{caller}: covariances, factors and deviations: give one of them")
+    if deviations is not None:
+        s = require_finite(as_numbers(deviations, f"{caller}: deviations", (kind.dof,)), f"{caller}: deviations")
+        if not (s > 0).all():
+            raise ValueError(f"{caller}: deviations, shape {s.shape}: one is not above zero")
+        factors = s[..., :, None] * np.eye(kind.dof)
+    if factors is None:
+        return covariances, False
+    return require_finite(as_numbers(factors, f"{caller}: factors", (kind.dof, kind.dof)), f"{caller}: factors"), True
+
+
 def _axes(axis, ndim, caller):
     """The axes that are reduced, in order; all of them for None."""
     if axis is None:
@@ -70,6 +85,8 @@ def mean(
     criterion=None,
     certify=True,
     *,
+    factors=None,
+    deviations=None,
     covariance_at=None,
     likelihood=False,
     times=None,
@@ -90,6 +107,11 @@ def mean(
         Relative weights, zero or more, inversely proportional to variances; broadcast to ``x.shape``.
     covariances : array_like, shape (..., k, k), optional
         Covariances of the features' errors, m² and rad², translation before rotation; broadcast to ``x.shape``.
+    factors : array_like, shape (..., k, k), optional
+        In place of covariances matrices A with A Aᵀ the covariance. Where standard deviations differ by factors of
+        thousands 'maha' keeps the digits of the small ones, and returns `covariance_factor`.
+    deviations : array_like, shape (..., k), optional
+        In place of covariances standard deviations along the axes of the features, m and rad: diagonal factors.
     axis : None, int or tuple of ints, optional
         Axes along which means are computed; None: of all features.
     criterion : {'lsq', 'maha', 'barycentre'}, optional
@@ -147,7 +169,7 @@ def mean(
     array([ 0.305,  0.03 , -0.11 ])
     """
     kind, criterion, groups, lead = _requests(
-        "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times
+        "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times, factors, deviations
     )
     if inflate and times is None:
         raise ValueError("mean: inflate needs times")
@@ -187,10 +209,23 @@ def mean(
     return result
 
 
-def _requests(caller, x, weights, covariances, axis, criterion, covariance_at, likelihood, times):
+def _requests(
+    caller,
+    x,
+    weights,
+    covariances,
+    axis,
+    criterion,
+    covariance_at,
+    likelihood,
+    times,
+    factors=None,
+    deviations=None,
+):
     """The type, the criterion, the arguments of the extension for each mean, and the shape of the means."""
     x = require_manifold(x, caller)
     kind = type(x)
+    covariances, factored = _factored(caller, covariances, factors, deviations, kind)
     name = kind._core_name
     if x.ndim == 0:
         x = x.reshape(1)
@@ -247,8 +282,13 @@ def _requests(caller, x, weights, covariances, axis, criterion, covariance_at, l
     if times is not None:
         t = one_for_each(times, "times")
     if covariances is not None:
-        c = _covariances(covariances, f"{caller}: covariances", kind, x.shape)
+        c = covariances if factored else _covariances(covariances, f"{caller}: covariances", kind)
         k = (kind.dof, kind.dof)
+        try:
+            np.broadcast_to(c, (*x.shape, *k))
+        except ValueError:
+            what = "factors" if factored else "covariances"
+            raise ValueError(f"{caller}: {what}, shape {c.shape}: does not broadcast to {(*x.shape, *k)}") from None
         if math.prod(c.shape[:-2]) == 1 and criterion == "maha":
             c = np.broadcast_to(c.reshape(1, 1, *k), (len(features), 1, *k))
         else:
@@ -260,6 +300,7 @@ def _requests(caller, x, weights, covariances, axis, criterion, covariance_at, l
             features=np.ascontiguousarray(features[i]),
             weights=np.ascontiguousarray(w[i]),
             covariances=np.ascontiguousarray(c[i]),
+            factored=factored,
             times=np.ascontiguousarray(t[i]),
             covariances_at_measurement=covariance_at != "estimated",
             likelihood=bool(likelihood),

@@ -53,12 +53,13 @@ Criterion criterionOf(const std::string& text) {
 }
 
 MeanRequest requestOf(const std::string& criterion, const DoubleArray& features, const DoubleArray& weights,
-                      const DoubleArray& covariances, const DoubleArray& times, bool covariances_at_measurement,
-                      bool likelihood, int threads) {
+                      const DoubleArray& covariances, bool factored, const DoubleArray& times,
+                      bool covariances_at_measurement, bool likelihood, int threads) {
   return {.criterion = criterionOf(criterion),
           .features = numbers(features),
           .weights = numbers(weights),
           .covariances = numbers(covariances),
+          .factored = factored,
           .times = numbers(times),
           .covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated,
           .likelihood = likelihood,
@@ -66,12 +67,12 @@ MeanRequest requestOf(const std::string& criterion, const DoubleArray& features,
 }
 
 py::dict mean(const std::string& type, const std::string& criterion, const DoubleArray& features,
-              const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
+              const DoubleArray& weights, const DoubleArray& covariances, bool factored, const DoubleArray& times,
               bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge,
               const std::string& weights_are, bool certify, bool inflate, std::size_t budget, int threads) {
   const MeanType& means = typeOf(type);
-  MeanRequest request =
-      requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
+  MeanRequest request = requestOf(criterion, features, weights, covariances, factored, times,
+                                  covariances_at_measurement, likelihood, threads);
   request.refuted_noise = residuals_if_refuted ? RefutedNoise::residuals : RefutedNoise::withheld;
   request.birge = birge;
   for (const ResidualNoise meaning : {ResidualNoise::importance, ResidualNoise::frequency}) {
@@ -97,12 +98,12 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
 
 /// The validation of a mean by splits, and its verdict in words.
 py::dict split(const std::string& type, const std::string& criterion, const DoubleArray& features,
-               const DoubleArray& weights, const DoubleArray& covariances, const DoubleArray& times,
+               const DoubleArray& weights, const DoubleArray& covariances, bool factored, const DoubleArray& times,
                bool covariances_at_measurement, bool likelihood, std::size_t splits, std::size_t blocks,
                std::uint64_t seed, int threads) {
   const MeanType& means = typeOf(type);
-  const MeanRequest request =
-      requestOf(criterion, features, weights, covariances, times, covariances_at_measurement, likelihood, threads);
+  const MeanRequest request = requestOf(criterion, features, weights, covariances, factored, times,
+                                        covariances_at_measurement, likelihood, threads);
   const SplitOptions options{.splits = splits, .blocks = blocks, .seed = seed};
   const std::size_t n = request.features.size() / static_cast<std::size_t>(means.parameters);
   const std::size_t fewest = fewestMeasurements(means.dof, !request.covariances.empty(), options);
@@ -124,14 +125,14 @@ py::dict split(const std::string& type, const std::string& criterion, const Doub
   return d;
 }
 
-/// Fuses groups of n features: features (g, n, p), covariances (g, n, k, k). Returns means (g, p), covariances (g, k, k),
-/// the names of statuses, χ² and its p (g each).
-py::tuple fuse(const std::string& type, const DoubleArray& features, const DoubleArray& covariances,
+/// Fuses groups of n features: features (g, n, p), covariances or their factors (g, n, k, k). Returns means (g, p),
+/// covariances and, of factors, their factors (g, k, k), the names of statuses, χ² and its p (g each).
+py::tuple fuse(const std::string& type, const DoubleArray& features, const DoubleArray& covariances, bool factored,
                bool covariances_at_measurement) {
   const MeanType& means = typeOf(type);
   const py::ssize_t groups = features.shape(0), p = features.shape(2), k = covariances.shape(3);
   DoubleArray mean({groups, p});
-  DoubleArray covariance({groups, k, k});
+  DoubleArray covariance({groups, k, k}), factor({factored ? groups : 0, k, k});
   std::vector<TestedFuse> tests(static_cast<std::size_t>(groups));
   const auto of_group = [&](const DoubleArray& array, py::ssize_t i) {
     const std::span<const double> all = numbers(array);
@@ -140,6 +141,7 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
   };
   double* const mean_out = mean.mutable_data();
   double* const covariance_out = covariance.mutable_data();
+  double* const factor_out = factor.mutable_data();
   {
     const py::gil_scoped_release released;
     SignalWatch signals;
@@ -147,8 +149,10 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
       MeanRequest request;
       request.features = of_group(features, i);
       request.covariances = of_group(covariances, i);
+      request.factored = factored;
       request.covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated;
-      tests[static_cast<std::size_t>(i)] = means.fuse(request, mean_out + i * p, covariance_out + i * k * k);
+      tests[static_cast<std::size_t>(i)] = means.fuse(request, mean_out + i * p, covariance_out + i * k * k,
+                                                      factor_out + (factored ? i * k * k : 0));
       signals.look();
     }
   }
@@ -159,22 +163,22 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
     chi2.push_back(test.fit.chi2);
     p_values.push_back(test.fit.p);
   }
-  return py::make_tuple(mean, covariance, statuses, arrayOf(chi2, {groups}), arrayOf(p_values, {groups}));
+  return py::make_tuple(mean, covariance, factor, statuses, arrayOf(chi2, {groups}), arrayOf(p_values, {groups}));
 }
 
 }  // namespace
 
 void bindMeans(py::module_& module) {
   using namespace py::literals;
-  module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
-             "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a, "weights_are"_a,
-             "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
+  module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "factored"_a,
+             "times"_a, "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a,
+             "weights_are"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
   py::list fields;
   for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
   module.attr("mean_fields") = fields;
-  module.def("split", &split, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "times"_a,
-             "covariances_at_measurement"_a, "likelihood"_a, "splits"_a, "blocks"_a, "seed"_a, "threads"_a);
-  module.def("fuse", &fuse, "type"_a, "features"_a, "covariances"_a, "covariances_at_measurement"_a);
+  module.def("split", &split, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "factored"_a,
+             "times"_a, "covariances_at_measurement"_a, "likelihood"_a, "splits"_a, "blocks"_a, "seed"_a, "threads"_a);
+  module.def("fuse", &fuse, "type"_a, "features"_a, "covariances"_a, "factored"_a, "covariances_at_measurement"_a);
 }
 
 }  // namespace liestat::python

@@ -47,7 +47,10 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
                      .weights_are = request.weights_are,
                      .scale_noise = request.birge};
   for (std::size_t i = 0; i + k * k <= request.covariances.size(); i += k * k) {
-    input.covariances.push_back(square<ManifoldTraits<M>::DoF>(request.covariances.data() + i));
+    const auto matrix = square<ManifoldTraits<M>::DoF>(request.covariances.data() + i);
+    if (request.factored) input.factors.push_back(matrix);
+    input.covariances.push_back(
+        request.factored ? FactoredGaussian<M>{ManifoldTraits<M>::origin(), matrix}.gaussian().covariance : matrix);
   }
   return input;
 }
@@ -63,9 +66,12 @@ MeanSummary meanOf(const MeanRequest& request, SignalWatch& signals) {
 }
 
 template <class M>
-TestedFuse fuseFeatures(const MeanRequest& request, double* mean, double* covariance) {
+TestedFuse fuseFeatures(const MeanRequest& request, double* mean, double* covariance, double* factor) {
   const Features<M> features(request.features);
-  const FuseResult<M> result = testedFuse(inputOf(request, features).gaussians(), request.covariance_at);
+  const MeanInput<M> input = inputOf(request, features);
+  const FuseResult<M> result = request.factored ? testedFuse(input.factoredGaussians(), request.covariance_at)
+                                                : testedFuse(input.gaussians(), request.covariance_at);
+  if (request.factored) store(result.factor, factor);
   storePoint(result.estimate.mean, mean);
   store(result.estimate.covariance, covariance);
   return {result.status, result.fit};

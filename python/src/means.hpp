@@ -21,6 +21,7 @@ struct MeanRequest {
   std::span<const double> features;     ///< rows of parameters
   std::span<const double> weights;      ///< one for each feature, or empty
   std::span<const double> covariances;  ///< dof×dof matrices, one for each feature or a single one, or empty
+  bool factored = false;                ///< these matrices are factors of the covariances
   std::span<const double> times;        ///< one for each feature, or empty
   CovarianceAt covariance_at = CovarianceAt::measured;
   bool likelihood = false;
@@ -36,12 +37,13 @@ struct MeanRequest {
 using MeanFunction = MeanSummary (*)(const MeanRequest&, SignalWatch&);
 /// splitMean() of a type.
 using SplitFunction = SplitSummary (*)(const MeanRequest&, SignalWatch&, const SplitOptions&);
-/// testedFuse() of features with covariances: writes the mean's parameters and its covariance.
+/// testedFuse() of features with covariances: writes the mean's parameters, its covariance and the factor of that (of
+/// factors only).
 struct TestedFuse {
   Status status = Status::too_few;
   NoiseFit fit;
 };
-using FuseFunction = TestedFuse (*)(const MeanRequest&, double* mean, double* covariance);
+using FuseFunction = TestedFuse (*)(const MeanRequest&, double* mean, double* covariance, double* factor);
 
 /// A type whose means are compiled in.
 struct MeanType {

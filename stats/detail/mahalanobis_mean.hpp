@@ -1,7 +1,7 @@
 // The iteration of maha() of stats/maha.hpp: sums over the measurements and Newton's method on them.
 #pragma once
 
-#include <lie/detail/small_orthogonal.hpp>
+#include <lie/detail/small_factors.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/manifold.hpp>
 #include <stats/detail/maha_groups.hpp>
@@ -81,12 +81,10 @@ struct MahaProblem {
     if constexpr (HasMahaGroups<M>) {
       if (by_kernels) {
         if (groups.add(x, factor.inverse())) return;
-        // The general formulas say what comes out of quaternions that are not unit ones.
         by_kernels = false;
-        for (std::size_t i = 0; i < groups.size(); ++i) whitening.push_back(whiteningOf(i));
       }
     }
-    whitening.push_back(whiteningOf(whitening.size(), factor));
+    appendWhitening(factor);
   }
 
   /// True where the sums have the exact Hessian: the manifold's, or the kernel's.
@@ -163,13 +161,21 @@ struct MahaProblem {
   }
 
  private:
+  /// Apart from append(), whose loop it would slow down.
+  LIESTAT_NO_INLINE void appendWhitening(const Cholesky<S, T::DoF>& factor) {
+    if constexpr (HasMahaGroups<M>) {
+      // The general formulas say what comes out of quaternions that are not unit ones.
+      while (whitening.size() < groups.size()) whitening.push_back(whiteningOf(whitening.size()));
+    }
+    whitening.push_back(whiteningOf(whitening.size(), factor));
+  }
   SquareOf<M> whiteningOf(std::size_t i) const { return whiteningOf(i, Cholesky<S, T::DoF>(samples[i].covariance)); }
   SquareOf<M> whiteningOf(std::size_t i, const Cholesky<S, T::DoF>& factor) const {
     if (factors.empty()) return factor.template halfSolve<T::DoF>(SquareOf<M>::Identity());
     return inverse<S, T::DoF>(factors[i]);
   }
   /// Σ ∂(Jᵀ a)/∂y with a = S⁻¹ z kept, in the coordinates of the axes: what the Hessian has beyond Gauss and Newton's
-  /// matrix, by central differences of the fourth order. With likelihood, with the volume's.
+  /// matrix, by central differences. With likelihood, with the volume's.
   template <Executor E>
   SquareOf<M> curvature(const E& executor, const M& y, const SquareOf<M>& axes) const {
     struct Sum {
@@ -182,18 +188,17 @@ struct MahaProblem {
         return s;
       }
     };
-    using std::pow;
-    // Rounding and the error of the differences are equal at a displacement of eps^(1/5), a quarter of it near cut loci.
-    const S h = S(0.25) * pow(std::numeric_limits<S>::epsilon(), S(0.2));
-    constexpr int reach[4] = {-2, -1, 1, 2};
+    using std::cbrt;
+    // Half of what balances rounding and the error of the differences, which grows towards cut loci.
+    const S h = S(0.5) * cbrt(std::numeric_limits<S>::epsilon());
     std::vector<M> moved;
     std::vector<SquareOf<M>> transport;
     TangentOf<M> scale;
     for (int k = 0; k < T::DoF; ++k) {
       const S length = axes.col(k).norm();
       scale[k] = length < S(1) ? h / length : h;
-      for (const int r : reach) {
-        moved.push_back(exp(y, TangentOf<M>(S(r) * scale[k] * axes.col(k))));
+      for (const S side : {S(-1), S(1)}) {
+        moved.push_back(exp(y, TangentOf<M>(side * scale[k] * axes.col(k))));
         transport.push_back(frameTransport(y, moved.back()));
       }
     }
@@ -215,16 +220,16 @@ struct MahaProblem {
                  }
                  for (std::size_t k = 0; k < static_cast<std::size_t>(T::DoF); ++k) {
                    const auto bent = [&](std::size_t j) {
-                     const M& at_y = moved[4 * k + j];
+                     const M& at_y = moved[2 * k + j];
                      const ErrorVector<M> there = measured ? errorVector(x, at_y) : errorVector(at_y, x);
-                     const SquareOf<M>& carried = transport[4 * k + j];
+                     const SquareOf<M>& carried = transport[2 * k + j];
                      // Errors in the frame of the estimate, and with them a, are carried along.
                      const TangentOf<M> there_a = measured ? a : TangentOf<M>(carried * a);
                      const SquareOf<M>& J = measured ? there.by_feature : there.by_base;
                      return TangentOf<M>(axes.transpose() * (carried.transpose() * (J.transpose() * there_a)));
                    };
                    const int c = static_cast<int>(k);
-                   sum.value.col(c) += (S(8) * (bent(2) - bent(1)) - (bent(3) - bent(0))) / (S(12) * scale[c]);
+                   sum.value.col(c) += (bent(1) - bent(0)) / (S(2) * scale[c]);
                  }
                })
         .value;
@@ -237,27 +242,16 @@ Eigen::Matrix<S, N, N> symmetricPart(const Eigen::Matrix<S, N, N>& A) {
   return S(0.5) * (A + A.transpose());
 }
 
-/// How many times the variance of a coordinate is what it would be if the others were known, at most: a condition of the
-/// information matrix that does not depend on units. Infinite where it is not positive definite.
+/// How many times the variance of a coordinate is what it would be if the others were known, at most: a condition of an
+/// information matrix L Lᵀ that does not depend on units, from L⁻¹. NaN where there is none.
 template <class S, int N>
-S varianceInflation(const Eigen::Matrix<S, N, N>& information) {
-  const Cholesky<S, N> factor(information);
-  if (!factor.ok()) return std::numeric_limits<S>::infinity();
-  const Eigen::Matrix<S, N, N> half = factor.template halfSolve<N>(Eigen::Matrix<S, N, N>::Identity());
-  S most(1);
-  for (int j = 0; j < N; ++j) most = std::max(most, S(information(j, j) * half.col(j).squaredNorm()));
-  return most;
-}
-
-/// Standard deviations along principal axes of A Aᵀ: a factor with orthogonal columns, the shortest first.
-template <class S, int N>
-Eigen::Matrix<S, N, N> principalFactor(const Eigen::Matrix<S, N, N>& A) {
-  const SmallSvd<N> svd(BasicSmallMatrix<N>::of(Eigen::Matrix<double, N, N>(A.template cast<double>())));
-  Eigen::Matrix<S, N, N> result;
-  for (int k = 0; k < N; ++k) {
-    for (int i = 0; i < N; ++i) result(i, N - 1 - k) = static_cast<S>(svd.value(k) * svd.u(k, i));
+S varianceInflation(const Eigen::Matrix<S, N, N>& information, const Eigen::Matrix<S, N, N>& half) {
+  S most(0);
+  for (int j = 0; j < N; ++j) {
+    const S inflation = information(j, j) * half.col(j).squaredNorm();
+    if (!(inflation <= most)) most = inflation;
   }
-  return result;
+  return most;
 }
 
 /// Axes at y in which Gauss and Newton's matrix is near the identity, and the sums in them, from any axes: factors of the
@@ -291,6 +285,32 @@ Eigen::Matrix<S, N, N> covarianceFactor(const Eigen::Matrix<S, N, N>& axes, cons
   return product(axes, Square(inner.template halfSolve<N>(Square::Identity()).transpose()));
 }
 
+/// Reads the measurements of a problem, and for a start their features and weights. Status ill_defined for a covariance
+/// that is not positive definite, not_applicable for an anisotropic one in the frame of an estimate that has none.
+template <Homogeneous M, class R>
+LIESTAT_NO_INLINE Status readMeasurements(MahaProblem<M, R>& problem, bool for_start, std::vector<ScalarOf<M>>& weights,
+                                          std::vector<M>& features) {
+  using T = ManifoldTraits<M>;
+  using S = ScalarOf<M>;
+  const std::size_t n = std::ranges::size(problem.samples);
+  problem.reserve(n);
+  if (for_start) weights.reserve(n), features.reserve(n);
+  for (const Gaussian<M>& g : problem.samples) {
+    const Cholesky<S, T::DoF> factor(g.covariance);
+    const bool finite = g.covariance.allFinite();
+    if (finite && !factor.ok()) return Status::ill_defined;
+    if constexpr (T::Group::DoF != T::DoF) {
+      const S v = g.covariance.trace() / S(T::DoF);
+      if (problem.at == CovarianceAt::estimated && (g.covariance - v * SquareOf<M>::Identity()).norm() > S(1e-6) * v) {
+        return Status::not_applicable;
+      }
+    }
+    problem.append(g.mean, factor);
+    if (for_start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
+  }
+  return Status::ok;
+}
+
 template <Homogeneous M, Executor E, class R>
 MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt at, const MahaOptions<M>& options,
                               std::span<const SquareOf<M>> factors = {}) {
@@ -307,26 +327,11 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
   }
 
   MahaProblem<M, R> problem{samples, at, options.likelihood, factors};
-  problem.reserve(result.n);
   std::vector<S> weights;
   std::vector<M> features;
-  if (!options.start) weights.reserve(result.n), features.reserve(result.n);
-  for (const Gaussian<M>& g : samples) {
-    const Cholesky<S, T::DoF> factor(g.covariance);
-    const bool finite = g.covariance.allFinite();
-    if (finite && !factor.ok()) {
-      result.status = Status::ill_defined;
-      return result;
-    }
-    if constexpr (T::Group::DoF != T::DoF) {
-      const S v = g.covariance.trace() / S(T::DoF);
-      if (at == CovarianceAt::estimated && (g.covariance - v * SquareOf<M>::Identity()).norm() > S(1e-6) * v) {
-        result.status = Status::not_applicable;
-        return result;
-      }
-    }
-    problem.append(g.mean, factor);
-    if (!options.start) weights.push_back(scalarWeight(g.covariance)), features.push_back(g.mean);
+  if (const Status status = readMeasurements(problem, !options.start, weights, features); status != Status::ok) {
+    result.status = status;
+    return result;
   }
 
   M y = options.start ? *options.start
@@ -340,7 +345,7 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
   constexpr S small_step = S(0.01);     // squared, in standard deviations: what is left may be rounding
   std::optional<bool> ill_conditioned;  // a measurement; looked for at most once
   bool own_axes = false, reached = false;
-  SquareOf<M> axes = SquareOf<M>::Identity();
+  SquareOf<M> axes = SquareOf<M>::Identity(), half;  // half: L⁻¹ of Gauss and Newton's matrix L Lᵀ
   S information = sums.gauss_newton.trace();
   const auto takeAxes = [&] {
     own_axes = true;
@@ -403,16 +408,19 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     if (!reached && !stuck) continue;
     // Beyond two thirds of the digits; one third, in the sum or in a measurement, where the steps no longer shrink.
     const S epsilon = std::numeric_limits<S>::epsilon(), many = S(1) / (std::cbrt(epsilon) * std::cbrt(epsilon));
-    const auto isMuch = [&](const SquareOf<M>& matrix, S inflation) {
-      return !(varianceInflation<S, T::DoF>(matrix) < inflation);
+    const auto inverseFactor = [](const SquareOf<M>& matrix) {
+      return Cholesky<S, T::DoF>(matrix).template halfSolve<T::DoF>(SquareOf<M>::Identity());
     };
+    half = inverseFactor(sums.gauss_newton);
     bool drowns = false;
     if (!own_axes) {
-      drowns = isMuch(sums.gauss_newton, reached ? many : std::sqrt(many)) || (reached && !factors.empty());
+      const S inflation = varianceInflation<S, T::DoF>(sums.gauss_newton, half), some = std::sqrt(many);
+      drowns = !(inflation < (reached ? many : some)) || (reached && !factors.empty());
       if (!drowns && !reached) {
         if (!ill_conditioned) {
-          ill_conditioned =
-              std::ranges::any_of(samples, [&](const Gaussian<M>& g) { return isMuch(g.covariance, std::sqrt(many)); });
+          ill_conditioned = std::ranges::any_of(samples, [&](const Gaussian<M>& g) {
+            return !(varianceInflation<S, T::DoF>(g.covariance, inverseFactor(g.covariance)) < some);
+          });
         }
         drowns = *ill_conditioned;
       }
@@ -423,16 +431,14 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
 
   result.mean = y;
   result.cost = sums.cost;
-  result.gauss_newton = sums.gauss_newton;
-  const Cholesky<S, T::DoF> factor(sums.gauss_newton);
-  const SquareOf<M> half = factor.template halfSolve<T::DoF>(SquareOf<M>::Identity());
-  result.axes = half.transpose();
-  if (own_axes) {
-    result.axes = product(axes, result.axes);
-    const SquareOf<M> back = inverse<S, T::DoF>(result.axes);
-    result.gauss_newton = back.transpose() * back;
-  }
+  const auto inTangents = [&](const SquareOf<M>& matrix, const SquareOf<M>& of_axes) {
+    const SquareOf<M> back = inverse<S, T::DoF>(of_axes);
+    return symmetricPart(SquareOf<M>(back.transpose() * matrix * back));
+  };
+  result.gauss_newton = own_axes ? inTangents(sums.gauss_newton, axes) : sums.gauss_newton;
   if (!reached) return result;
+  result.axes = half.transpose();
+  if (own_axes) result.axes = product(axes, result.axes);
   if (problem.second_order || (!own_axes && problem.hasHessian(sums))) {
     const SquareOf<M> bend = product(half, SquareOf<M>(sums.hessian - sums.gauss_newton));
     result.relative_hessian = SquareOf<M>::Identity() + productTransposed(bend, half);
@@ -442,12 +448,8 @@ MahaResult<M> mahalanobisMean(const E& executor, const R& samples, CovarianceAt 
     result.relative_hessian = problem.hessian(executor, y, unit, &result.axes);
   }
   result.relative_hessian = symmetricPart(result.relative_hessian);
-  if (problem.hasHessian(sums) && !own_axes) {
-    result.hessian = sums.hessian;
-  } else {
-    const SquareOf<M> back = inverse<S, T::DoF>(result.axes);
-    result.hessian = symmetricPart(SquareOf<M>(back.transpose() * result.relative_hessian * back));
-  }
+  const bool summed = problem.hasHessian(sums) && !own_axes;
+  result.hessian = summed ? sums.hessian : inTangents(result.relative_hessian, result.axes);
   result.status = Cholesky<S, T::DoF>(result.relative_hessian).ok() ? Status::ok : Status::ill_defined;
   if (result.status == Status::ok) {
     result.factor = covarianceFactor<S, T::DoF>(result.axes, result.relative_hessian, options.likelihood);

@@ -108,6 +108,50 @@ TEST(Reading, CovarianceOfFramesHasTheUpperTriangle) {
   EXPECT_EQ(file.covariances[0], expected);
 }
 
+TEST(Reading, FactorsAndDeviationsOfCovariances) {
+  const FeatureFile deviations = read("rx,ry,rz,sd_0,sd_1,sd_2\n0,0,0,0.3,3e-6,1e-9\n");
+  ASSERT_EQ(deviations.factors.size(), 1U);
+  EXPECT_EQ(deviations.factors[0].diagonal(), Eigen::Vector3d(0.3, 3e-6, 1e-9));
+  EXPECT_EQ(deviations.covariances[0](0, 0), 0.3 * 0.3);
+  const FeatureFile factors = read(
+      "dx,dy,dz,factor_00,factor_01,factor_10,factor_11\n"
+      "0,0,1,3,0,4,1e-9\n");
+  ASSERT_EQ(factors.factors.size(), 1U);
+  EXPECT_EQ(factors.factors[0](1, 0), 4);
+  EXPECT_EQ(factors.factors[0](1, 1), 1e-9);
+  EXPECT_EQ(factors.covariances[0](0, 1), 12);
+  EXPECT_EQ(factors.covariances[0], factors.covariances[0].transpose());
+  EXPECT_TRUE(read("x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n0,0,0,1,0,0,1,0,1\n").factors.empty());
+}
+
+TEST(Reading, FactorsThatAreNone) {
+  EXPECT_EQ(errorIn("x,y,z,sd_0,sd_1,sd_2\n0,0,0,1,0,1\n"),
+            "f.csv:2: sd_1 is 0, expected a standard deviation above 0");
+  EXPECT_EQ(errorIn("x,y,z,sd_0,sd_1,sd_2,cov_00\n0,0,0,1,1,1,1\n").find("f.csv:1: cov_01"), 0U);
+  EXPECT_NE(errorIn("dx,dy,dz,sd_0,sd_1,cov_00,cov_01,cov_11\n0,0,1,1,1,1,0,1\n").find("one form of a covariance"),
+            std::string::npos);
+  EXPECT_NE(errorIn("dx,dy,dz,factor_00,factor_01,factor_10,factor_11\n0,0,1,0,0,0,0\n").find("not positive definite"),
+            std::string::npos);
+}
+
+// What messages write for "not measured" is no variance of a rotation in any file; of a length it may be one.
+TEST(Reading, SentinelsOfRotations) {
+  for (const char* sentinel : {"99999", "1e6", "-1", "1e308"}) {
+    const std::string header = "rx,ry,rz,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n";
+    const FeatureFile file = read(header + "0,0,0,1,0,0,1,0,1\n0,0,0,1,0,0,1,0," + sentinel + "\n1,0,0,1,0,0,2,0,1\n");
+    EXPECT_EQ(file.unmeasured, std::vector<std::size_t>{1}) << sentinel;
+    EXPECT_TRUE(file.covariances[1].hasNaN());
+    const FeatureFile left = withoutUnmeasured(file);
+    ASSERT_EQ(left.size(), 2U);
+    EXPECT_EQ(left.lines, (std::vector<std::size_t>{2, 4}));
+    EXPECT_EQ(left.covariances[1](1, 1), 2);
+    EXPECT_NEAR(left.rotations[1].x(), std::sin(0.5), 1e-15);
+  }
+  const FeatureFile lengths = read("x,y,z,sd_0,sd_1,sd_2\n0,0,0,1000,1,1\n0,0,0,1,1,1\n");
+  EXPECT_TRUE(lengths.unmeasured.empty());
+  EXPECT_EQ(lengths.n_large_variances, 1U);
+}
+
 TEST(Reading, Tum) {
   const FeatureFile file =
       read("# timestamp tx ty tz qx qy qz qw\n1305031102.1 1 2 3 0 0 0 1\n1305031102.2\t1  2 4 0 0 1 0\n");
@@ -222,7 +266,9 @@ TEST(Reading, TextThatIsNone) {
 }
 
 const std::string known =
-    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55";
+    "t; tx,ty,tz; qx,qy,qz,qw or rx,ry,rz or roll,pitch,yaw or r00 ... r22; x,y,z; dx,dy,dz; weight; cov_00 ... cov_55 "
+    "or "
+    "factor_00 ... factor_55 or sd_0 ... sd_5";
 const std::string or_else = " (--ignore-unknown passes over others, --columns maps names)";
 
 TEST(Reading, SemicolonsAndTabs) {
