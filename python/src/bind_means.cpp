@@ -151,8 +151,8 @@ py::tuple fuse(const std::string& type, const DoubleArray& features, const Doubl
       request.covariances = of_group(covariances, i);
       request.factored = factored;
       request.covariance_at = covariances_at_measurement ? CovarianceAt::measured : CovarianceAt::estimated;
-      tests[static_cast<std::size_t>(i)] = means.fuse(request, mean_out + i * p, covariance_out + i * k * k,
-                                                      factor_out + (factored ? i * k * k : 0));
+      tests[static_cast<std::size_t>(i)] =
+          means.fuse(request, mean_out + i * p, covariance_out + i * k * k, factor_out + (factored ? i * k * k : 0));
       signals.look();
     }
   }

@@ -255,8 +255,9 @@ TEST(Weights, ThatAreCounts) {
   EXPECT_LT((counted.mean.mean.inverse() * all.mean.mean).log().norm(), 1e-12);
   EXPECT_EQ(counted.law_n, static_cast<double>(written_out.size()));
   const double size = all.estimate->covariance.norm();
-  EXPECT_LT((covarianceFromResiduals(counted.mean, ResidualNoise::frequency) - covarianceFromResiduals(all.mean)).norm(),
-            1e-10 * size);
+  EXPECT_LT(
+      (covarianceFromResiduals(counted.mean, ResidualNoise::frequency) - covarianceFromResiduals(all.mean)).norm(),
+      1e-10 * size);
   CertifiedGroupMeanOptions<SE3d> of_poses;
   of_poses.noise = ResidualNoise::frequency;
   std::vector<SE3d> poses, all_poses;
