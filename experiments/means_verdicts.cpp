@@ -30,6 +30,15 @@ class Sampler {
     if (cell.law == VerdictLaw::flips || cell.law == VerdictLaw::half_turns) findTruth();
   }
 
+  /// The covariance that is stated, the same for all features; none where the residuals speak.
+  std::vector<SquareOf<M>> statedNoise() const {
+    const double variance = cell_.law == VerdictLaw::stated          ? 0.1 * 0.1 / cell_.parameter
+                            : cell_.law == VerdictLaw::stated_clouds ? 0.05 * 0.05
+                                                                     : 0;
+    if (!(variance > 0)) return {};
+    return {SquareOf<M>(variance * SquareOf<M>::Identity())};
+  }
+
   /// The population's mean, or one of them.
   const M& truth() const { return truth_; }
 
@@ -51,7 +60,8 @@ class Sampler {
       }
       return exp(ManifoldTraits<M>::origin(), e);
     }
-    if (cell_.law == VerdictLaw::clouds) {
+    if (cell_.law == VerdictLaw::stated) return exp(ManifoldTraits<M>::origin(), TangentOf<M>(0.1 * e));
+    if (cell_.law == VerdictLaw::clouds || cell_.law == VerdictLaw::stated_clouds) {
       TangentOf<M> side = TangentOf<M>::Zero();
       side[k - 1] = (i % 2 == 0 ? 0.5 : -0.5) * fold<M> * cell_.parameter * units::degree;
       return exp(exp(ManifoldTraits<M>::origin(), side), TangentOf<M>(0.05 * e));
@@ -119,7 +129,7 @@ class Sampler {
 /// The outcomes of one trial: counts of 0 and 1.
 struct Outcome {
   bool ok = false, ambiguous = false, ill_defined = false, outside = false, wrong = false, plain_outside = false;
-  bool widened = false;
+  bool widened = false, inconsistent = false;
 };
 
 template <class M>
@@ -130,6 +140,7 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   CertifiedMeanOptions<M> options;
   // A certificate that is not found changes no verdict; a rival that is, is found early.
   options.uniqueness.budget = 200'000;
+  options.known_noise = sampler.statedNoise();
   const CertifiedMean<M> result = certifiedMean(samples, options);
   const M& truth = sampler.truth();
   const auto misses = [&](const SquareOf<M>& covariance) {
@@ -138,7 +149,10 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   Outcome outcome{.ok = result.status == Status::ok,
                   .ambiguous = result.status == Status::ambiguous,
                   .ill_defined = result.status == Status::ill_defined,
-                  .plain_outside = misses(covarianceFromResiduals(result.mean))};
+                  .plain_outside = misses(options.known_noise.empty()
+                                              ? covarianceFromResiduals(result.mean)
+                                              : covarianceFromCommonNoise(result.mean, options.known_noise[0])),
+                  .inconsistent = result.status == Status::inconsistent};
   if (!outcome.ok) return outcome;
   outcome.outside = misses(result.estimate->covariance);
   outcome.widened = result.region_factor > 1;
@@ -150,7 +164,10 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
 template <Metric M>
 VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
   const Sampler<M> sampler(cell);
-  const double quantile = ReferenceLaw::hotelling(ManifoldTraits<M>::DoF, static_cast<int>(cell.n)).quantile(0.95);
+  constexpr int k = ManifoldTraits<M>::DoF;
+  const ReferenceLaw law = sampler.statedNoise().empty() ? ReferenceLaw::hotelling(k, static_cast<int>(cell.n))
+                                                         : ReferenceLaw::chiSquared(k);
+  const double quantile = law.quantile(0.95);
   VerdictRow row;
   row.cell = cell;
   // Its rates are of all of its trials.
@@ -162,6 +179,7 @@ VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
            true)) {
     row.ok += o.ok, row.ambiguous += o.ambiguous, row.ill_defined += o.ill_defined;
     row.outside += o.outside, row.wrong += o.wrong, row.plain_outside += o.plain_outside, row.widened += o.widened;
+    row.inconsistent += o.inconsistent;
   }
   return row;
 }
@@ -187,14 +205,15 @@ void giveVerdict(VerdictRow& row) {
   compare(row, "kept", p.max_kept, row.rate(row.ok), trials, true);
   compare(row, "ambiguous", p.max_ambiguous, row.rate(row.ambiguous), trials, true);
   compare(row, "ill-defined", p.max_ill_defined, row.rate(row.ill_defined), trials, true);
+  compare(row, "inconsistent", p.max_inconsistent, row.rate(row.inconsistent), trials, true);
   compare(row, "wrong side", p.max_wrong, row.rate(row.wrong), trials, true);
 }
 
 }  // namespace
 
 std::string name(VerdictLaw law) {
-  constexpr const char* names[] = {"fisher",     "report",   "isotropic", "clouds", "flips",
-                                   "half_turns", "outliers", "strip",     "lever"};
+  constexpr const char* names[] = {"fisher",   "report", "isotropic", "clouds", "flips",        "half_turns",
+                                   "outliers", "strip",  "lever",     "stated", "stated_clouds"};
   return names[static_cast<std::size_t>(law)];
 }
 
@@ -208,7 +227,17 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
     if (x <= 160 && cell.feature == Feature::rotation) promise.max_ambiguous = promise.max_ill_defined = 0;
     return promise;
   }
+  if (cell.law == VerdictLaw::stated_clouds || (cell.law == VerdictLaw::stated && x >= 4)) {
+    promise.max_kept = 0.001;
+    return promise;
+  }
   promise.max_outside = 0.07;
+  if (cell.law == VerdictLaw::stated) {
+    promise.max_inconsistent = 0.01;
+    promise.min_coverage = 0.93;
+    promise.min_kept = 0.98;
+    return promise;
+  }
   if (cell.law == VerdictLaw::flips || cell.law == VerdictLaw::half_turns) {
     // Three or four of thirty directions are so few that their score is far from normal.
     if (x == 0.15 && cell.n <= 30) promise.max_outside = 0.10;
@@ -273,6 +302,11 @@ std::vector<VerdictCell> verdictCells(bool full) {
     add_cell(Feature::rotation, VerdictLaw::flips, 0.3, 30, 200);
     add_cell(Feature::rotation, VerdictLaw::half_turns, 0.15, 30, 200);
     add_cell(Feature::frame, VerdictLaw::lever, 20, 30, 200);
+    for (const Feature feature : {Feature::direction, Feature::rotation, Feature::frame}) {
+      cells.push_back({feature, VerdictLaw::stated, 1, 5, 400});
+      cells.push_back({feature, VerdictLaw::stated, 10, 9, 200});
+    }
+    cells.push_back({Feature::rotation, VerdictLaw::stated_clouds, 179, 40, 200});
     return cells;
   }
   for (const Feature feature : all_features) {
@@ -307,6 +341,14 @@ std::vector<VerdictCell> verdictCells(bool full) {
       for (const double lever : {0.5, 2.0, 20.0}) {
         for (const std::size_t n : {10, 30, 100}) add_cell(feature, VerdictLaw::lever, lever, n, 2000);
       }
+    }
+    for (const std::size_t n : {2, 5, 10, 30, 100}) cells.push_back({feature, VerdictLaw::stated, 1, n, 5000});
+    // χ²/ν of 4, 10, 100 at 40, 15 and 6 degrees of freedom at least.
+    cells.push_back({feature, VerdictLaw::stated, 4, 22, 5000});
+    cells.push_back({feature, VerdictLaw::stated, 10, 9, 5000});
+    cells.push_back({feature, VerdictLaw::stated, 100, 4, 5000});
+    for (const double degrees : {30.0, 60.0, 120.0, 178.0, 179.0, 179.5, 180.0}) {
+      cells.push_back({feature, VerdictLaw::stated_clouds, degrees, 40, 5000});
     }
     for (const double degrees : {150.0, 160.0, 170.0, 174.0, 176.0, 178.0, 179.0, 180.0}) {
       for (const std::size_t n : {10, 40, 1000}) {

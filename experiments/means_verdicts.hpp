@@ -24,10 +24,12 @@ enum class VerdictLaw {
   flips,  ///< Fisher's with κ = 20, of which this fraction is turned half a turn: directions are reversed, rotations
           ///< turned about random axes. From about a tenth of directions and a quarter of rotations on the minima of
           ///< the population's criterion lie on a circle or sphere about the axis; the truth is one of them
-  half_turns,  ///< the same turned about the third axis of the rotation; one of two minima is the truth
-  outliers,    ///< Fisher's with κ = 20, of which this fraction is uniform
-  strip,       ///< directions within ± the parameter (rad) on a great circle, 0.05 rad beside it
-  lever        ///< normal in the chart, 0.8 rad; translations 0.1 m and the rotation's error by the parameter, m/rad
+  half_turns,    ///< the same turned about the third axis of the rotation; one of two minima is the truth
+  outliers,      ///< Fisher's with κ = 20, of which this fraction is uniform
+  strip,         ///< directions within ± the parameter (rad) on a great circle, 0.05 rad beside it
+  lever,         ///< normal in the chart, 0.8 rad; translations 0.1 m and the rotation's error by the parameter, m/rad
+  stated,        ///< normal in the chart, 0.1 rad and m; the covariances that are stated are too small by the parameter
+  stated_clouds  ///< clouds, each with its true covariance
 };
 /// The name in tables and JSON fields.
 std::string name(VerdictLaw law);
@@ -45,7 +47,7 @@ struct VerdictPromise {
   std::optional<double> max_outside;   ///< ok, and the truth outside of the 95 % region
   std::optional<double> min_coverage;  ///< fraction of ok results that hold the truth, where ok are half of all
   std::optional<double> min_kept, max_kept;
-  std::optional<double> max_ambiguous, max_ill_defined;
+  std::optional<double> max_ambiguous, max_ill_defined, max_inconsistent;
   std::optional<double> max_wrong;  ///< ok, and the mean on the wrong side
 };
 /// The promise of docs/uniqueness.md for a cell.
@@ -56,6 +58,7 @@ struct VerdictRow {
   VerdictCell cell;
   VerdictPromise promise;
   std::size_t ok = 0, ambiguous = 0, ill_defined = 0;
+  std::size_t inconsistent = 0;   ///< the stated covariances are refuted
   std::size_t outside = 0;        ///< ok, but the truth outside the 95 % region
   std::size_t wrong = 0;          ///< ok, but the mean of two clouds on the other side
   std::size_t widened = 0;        ///< ok, the region widened to the length of a valley
@@ -72,6 +75,7 @@ void describe(V& v, const VerdictRow& row) {
   v("feature", name(row.cell.feature))("law", name(row.cell.law))("parameter", row.cell.parameter);
   v("n", row.cell.n)("trials", row.cell.trials)("ok", row.rate(row.ok), "fraction of the trials");
   v("ambiguous", row.rate(row.ambiguous))("ill_defined", row.rate(row.ill_defined));
+  v("inconsistent", row.rate(row.inconsistent), "the covariances that are stated are refuted");
   v("ok_but_outside", row.rate(row.outside))("coverage", row.coverage(), "of those that are ok");
   v("ok_but_widened", row.rate(row.widened), "the region was widened to the length of a ring or a valley");
   v("ok_on_the_wrong_side", row.rate(row.wrong))("first_order_coverage", 1 - row.rate(row.plain_outside));
