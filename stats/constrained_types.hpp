@@ -127,8 +127,8 @@ struct ConstrainedOptions {
   /// residuals. `false`: Gauss–Newton steps alone, as in the report.
   bool curvature = true;
   /// Second derivatives, by differences of the first, are looked at where the iteration converged: whether it is a
-  /// minimum, which bounds are active, how curved the model is. It costs about two linearisations for each coordinate of parameter and
-  /// measurement. Without it, or without `curvature`, neither is known.
+  /// minimum, which bounds are active, how curved the model is. It costs two linearisations for each coordinate of
+  /// parameter and measurement. Without it, or without `curvature`, none of this is known.
   bool second_order = true;
   StatedNoise noise = StatedNoise::tested;
 };
@@ -152,14 +152,15 @@ struct RelativeCurvature {
   /// Regions of first order were seen to hold below these bounds, in all kinds of docs/constrained.md.
   bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.25; }
   /// Widened regions were seen to hold up to these, and are worth little beyond.
-  bool large() const { return parameter > 0.9 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.7; }
-  /// The factor of a covariance whose region holds between the two: the edge of the region is off by the relative
-  /// curvatures of its radius, or all of it by the bias, and what is noise of the information is none.
+  bool large() const { return parameter > 0.8 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.6; }
+  /// The factor of a covariance whose region holds between the two. The edge of the region is off by the relative
+  /// curvatures of its radius, or all of it by the bias; the curvature at the truth may be larger than at the estimate, by
+  /// a multiple of its square; and what is noise of the information is none.
   double widening() const {
     if (!tested() || small()) return 1;
     // The radius is at least two standard deviations.
-    const double edge = std::max(parameter + intrinsic, bias / 2),
-                 radius = (1 + edge) / (1 - std::min(noise_share, 0.9));
+    const double edge = std::max(parameter + intrinsic, bias / 2);
+    const double radius = (1 + edge + 2 * edge * edge) / (1 - std::min(noise_share, 0.9));
     return radius * radius;
   }
   const char* word() const { return !tested() ? "untested" : small() ? "small" : large() ? "large" : "widened"; }
