@@ -405,6 +405,7 @@ class _MeanSummary:
     tolerance: float | _Several  # number; of the norm of the last step
     mean: Any  # object; the parts that the feature has
     covariance: _Array | None  # n×n or null; of the mean, in its own axes; null where it is withheld
+    covariance_factor: _Array  # n×n; F with F Fᵀ the covariance, where factors or deviations were given
     covariance_status: str | _Several  # text; why there is no covariance; otherwise ok
     covariance_order: str | _Several  # text; coordinates of the covariance, with units
     covariance_side: str | _Several  # text; on which its errors are applied
