@@ -155,7 +155,7 @@ class Fusion(unittest.TestCase):
         )
         self.assertIsNone(liestat.fuse(x, a @ a.T).factor)
         with self.assertRaisesRegex(ValueError, "give one of them"):
-            liestat.mean(x, np.eye(3), factors=a)
+            liestat.mean(x, covariances=np.eye(3), factors=a)
         with self.assertRaisesRegex(ValueError, "not above zero"):
             liestat.mean(x, deviations=[1, 0, 1])
 
