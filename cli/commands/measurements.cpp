@@ -97,15 +97,15 @@ Measurements chooseMeasurements(FeatureFile file, const MeasurementOptions& opti
     }
     file = withoutUnmeasured(std::move(file));
     m.notes.push_back(
-        fmt::format("{} of {} rows have a rotation with a variance of {:g} rad² or more, or -1: not "
+        fmt::format("{} of {} rows {} a rotation with a variance of {:g} rad² or more, or -1: not "
                     "measured, and left out",
-                    unmeasured, all, unmeasured_variance));
+                    unmeasured, all, unmeasured == 1 ? "has" : "have", unmeasured_variance));
   }
   if (file.n_large_variances > 0 && uses_covariances) {
-    m.notes.push_back(
-        fmt::format("{} rows have a variance of {:g} m² or more: in messages that means not measured, "
-                    "here it is taken as it is",
-                    file.n_large_variances, unmeasured_variance));
+    m.notes.push_back(fmt::format(
+        "{} {} a variance of {:g} m² or more: in messages that means not measured, "
+        "here it is taken as it is",
+        file.n_large_variances, file.n_large_variances == 1 ? "row has" : "rows have", unmeasured_variance));
   }
 
   m.weights.assign(file.size(), 1.0);

@@ -5,6 +5,7 @@
 //
 //   small_orthogonal.hpp   singular values, triangular factors: nothing is squared; run-time sizes up to a maximum
 //   small_eigen.hpp        eigenvalues and eigenvectors of symmetric matrices
+//   small_factors.hpp      A Aᵀ as a covariance, factors along principal axes
 //   small_reduced.hpp      square roots of semi-definite matrices: closest, and reduced to independent rows
 //   small_columns.hpp      3×3 blocks in vector registers
 //   small_products.hpp     products of more rows than that, and A C Aᵀ

@@ -134,6 +134,31 @@ class Fusion(unittest.TestCase):
                     self.assertTrue(one.mean.allclose(fused.mean[i], 1e-9))
                     np.testing.assert_allclose(one.covariance, fused.covariance[i], rtol=1e-6, atol=1e-12)
 
+    def test_factors_keep_small_variances(self):
+        rng = np.random.default_rng(5)
+        q = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        a = q * [0.3, 3e-6, 3e-7]
+        x = liestat.SO3.exp(np.tile([0.1, 0.2, 0.3], (5, 1)))
+        fused = liestat.fuse(liestat.Gaussian.from_factor(x, a))
+        # Its columns are principal axes here, the shortest first; NumPy's singular values lose digits.
+        variances = (fused.factor**2).sum(0) * 5
+        np.testing.assert_allclose(variances, [9e-14, 9e-12, 0.09], rtol=1e-9)
+        np.linalg.cholesky(fused.covariance)
+        self.assertTrue((fused.covariance == fused.covariance.T).all())
+        result = liestat.mean(x, factors=a)
+        self.assertEqual(result.status, "ok")
+        np.testing.assert_allclose((np.asarray(result.covariance_factor) ** 2).sum(0), variances / 5, rtol=1e-9)
+        by_deviations = liestat.fuse(x, deviations=[0.3, 3e-6, 3e-7])
+        np.testing.assert_allclose(by_deviations.sigma * 5**0.5, [0.3, 3e-6, 3e-7], rtol=1e-9)
+        np.testing.assert_array_equal(
+            by_deviations.factor, liestat.fuse(liestat.Gaussian.from_deviations(x, [0.3, 3e-6, 3e-7])).factor
+        )
+        self.assertIsNone(liestat.fuse(x, a @ a.T).factor)
+        with self.assertRaisesRegex(ValueError, "give one of them"):
+            liestat.mean(x, covariances=np.eye(3), factors=a)
+        with self.assertRaisesRegex(ValueError, "not above zero"):
+            liestat.mean(x, deviations=[1, 0, 1])
+
     def test_withheld_and_refused(self):
         opposite = SO3.exp([[0, 0, 0], [0, 0, np.pi]])
         with self.assertWarnsRegex(UserWarning, "no covariance of 1 of 1"):
