@@ -432,7 +432,7 @@ class _MeanSummary:
     near_ties: Any  # list of objects; other minima that the noise does not exclude, which make the status ambiguous
     cut_locus_mass: float | _Several  # number; fraction of the measurements near the cut locus of the mean
     hessian_change: float | _Several  # number; relative decrease of the Hessian averaged over the confidence region
-    # number; by which the confidence region was widened, as features beyond it explain the measurements as well; 1: not at all
+    # number; by which the confidence region was widened to the features that explain the data as well; 1: not at all
     region_factor: float | _Several
     # object or null; the farthest of these that was found, on a ring or in a valley; null without
     valley: dict[str, Any] | _Several | None

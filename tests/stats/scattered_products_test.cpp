@@ -85,4 +85,56 @@ TEST(ScatteredFeatures, barycentresOfPoses) {
   EXPECT_GE(tight.kept, 0.95 * tight.trials);
 }
 
+/// Rotations of which three tenths are turned by half a turn about random axes, with translations.
+std::vector<Frame3d> partlyTurnedFrames(std::uint64_t trial) {
+  const FisherLaw<Frame3d> law(20);
+  CounterRng rng(21, trial);
+  std::vector<Frame3d> samples;
+  for (int i = 0; i < 30; ++i) {
+    const Frame3d x = law.draw(rng);
+    const bool turned = rng.uniform() < 0.3;
+    const Eigen::Vector3d axis = rng.unitVector<3>();
+    samples.emplace_back(turned ? SO3d(x.so3() * SO3d::exp(static_cast<double>(EIGEN_PI) * axis)) : x.so3(),
+                         x.translation());
+  }
+  return samples;
+}
+
+TEST(Rings, barycentresOfPosesHaveTheRegionOfTheirRotations) {
+  int widened = 0;
+  for (std::uint64_t t = 0; t < 12; ++t) {
+    const std::vector<Frame3d> frames = partlyTurnedFrames(t);
+    std::vector<SE3d> poses;
+    for (const Frame3d& x : frames) poses.push_back(ManifoldTraits<SE3d>::fromMetricTwin(x));
+    const auto twin = certifiedMean(frames);
+    const auto result = certifiedGroupMean(poses);
+    EXPECT_EQ(result.region_factor, twin.region_factor);
+    EXPECT_EQ(result.valley.has_value(), twin.valley.has_value());
+    if (twin.status == Status::ambiguous) {
+      EXPECT_EQ(result.status, Status::ambiguous);
+    }
+    if (!result.estimate || !result.valley) continue;
+    ++widened;
+    // No narrower than that of the rotations, which average the same gradient.
+    const SquareOf<SE3d> own = result.estimate->covariance;
+    const SquareOf<Frame3d> of_twin = twin.estimate->covariance;
+    const double trace = own.bottomRightCorner<3, 3>().trace(), twins = of_twin.bottomRightCorner<3, 3>().trace();
+    EXPECT_GT(trace, 0.9 * twins);
+  }
+  EXPECT_GT(widened, 0);
+}
+
+TEST(Rings, mahalanobisMeansAskTheLikelihood) {
+  // A noise that excludes all of the valley of the least-squares mean leaves none.
+  for (std::uint64_t t = 0; t < 12; ++t) {
+    std::vector<Gaussian<SO3d>> narrow;
+    for (const Frame3d& x : partlyTurnedFrames(t)) {
+      narrow.push_back({x.so3(), SquareOf<SO3d>(1e-4 * SquareOf<SO3d>::Identity())});
+    }
+    const auto result = certifiedMaha(narrow, CovarianceAt::measured);
+    EXPECT_FALSE(result.valley);
+    EXPECT_EQ(result.region_factor, 1);
+  }
+}
+
 }  // namespace
