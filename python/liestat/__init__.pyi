@@ -394,11 +394,16 @@ class _MeanSummary:
     # text or null; frame of the measurements' covariances; null where it does not matter
     covariance_at: str | _Several | None
     likelihood: bool | _Several  # bool; whether the volume element is in the criterion
+    # text or null; precision, importance or frequency: what the weights mean to a covariance from residuals
+    weights_are: str | _Several | None
     weighted: bool | _Several  # bool; whether weights were used
     n: int | _Several  # integer; measurements that count: those with a weight
-    # text; ok, not_converged, ambiguous, ill_defined or too_few; not_applicable: a mean, but no covariance can be computed
+    # text; ok, not_converged, ambiguous, ill_defined, inconsistent or too_few; not_applicable: a mean, but no covariance can be computed
     status: str | _Several
     reason: str | _Several | None  # text or null; in words, where status is not ok
+    verdict: str | _Several  # text; a sentence: the mean with its certificate, or why it is not to be trusted
+    # bool; the verdict: whether the mean may be used; unique says no more than its certificate
+    trusted: bool | _Several
     converged: bool | _Several  # bool
     iterations: int | _Several  # integer
     residual: float | _Several  # number; norm of the last step
@@ -413,6 +418,8 @@ class _MeanSummary:
     tangent_basis: _Array | None  # 3×2 or null; directions: the axes of the two tangent coordinates, in columns
     covariance_from: str | _Several | None  # text or null; noise or residuals
     covariance_law: str | _Several | None  # text or null; of squared distances from the truth: chi2 or hotelling
+    # number or null; measurements for Hotelling's law: n, fewer in effect where weights are no precisions
+    covariance_law_n: float | _Several | None
     # by name or null; along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg
     standard_deviations: dict[str, Any] | _Several | None
     # by name or null; translation_m of frames along the axes of the world
@@ -437,9 +444,17 @@ class _MeanSummary:
     # object or null; the farthest of these that was found, on a ring or in a valley; null without
     valley: dict[str, Any] | _Several | None
     valley_angle: float | _Several | None  # number or null; its angle from the mean; rad
-    fit: float | _Several | None  # number or null; sum of the squared Mahalanobis distances, if the noise is known
+    # number or null; χ² of the measurements under the noise that is stated for them; null: not tested
+    fit: float | _Several | None
     fit_dof: float | _Several | None  # number or null; its degrees of freedom
-    fit_p: float | _Several | None  # number or null; probability of so large a sum
+    # number or null; probability of so large a χ²; below 0.001 the stated noise is refuted
+    fit_p: float | _Several | None
+    fit_factor: float | _Several | None  # number or null; Birge's factor max(1, χ²/ν) of the stated covariances
+    noise_scaled: bool | _Several  # bool; whether the covariance is multiplied by it
+    lag_correlation: float | _Several | None  # number or null; of successive measurements' errors
+    # number or null; correlation of log weights with p·r², in standard deviations; beyond 3.3 the weights are no inverse variances
+    weight_z: float | _Several | None
+    lag_z: float | _Several | None  # number or null; the same in standard deviations; above 2.45 a note says so
     # object or null; rows with times: whether their errors are independent; null without
     time_blocks: dict[str, Any] | _Several | None
     notes: list[str] | _Several  # list of text; what is remarkable, in sentences
