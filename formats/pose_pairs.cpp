@@ -75,6 +75,15 @@ std::string countOf(const FeatureFile& file, const std::string& name) {
   return fmt::format("{} {} in {}", file.size(), file.size() == 1 ? "pose" : "poses", name);
 }
 
+/// A pair is a pair of whole poses.
+void requireMeasured(const FeatureFile& file, const std::string& name) {
+  if (file.unmeasured.empty()) return;
+  throw InputError(
+      name, file.lines[file.unmeasured.front()],
+      fmt::format("a variance of -1 or of {:g} and more says that the rotation was not measured", unmeasured_variance),
+      "covariances of whole poses");
+}
+
 }  // namespace
 
 PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, const PosePairOptions& options) {
@@ -82,6 +91,7 @@ PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, co
   if (path_a == "-" && path_b == "-") throw InputError(name_a, 0, "both files are standard input", "a file for one");
   PosePairs pairs;
   pairs.a = readPoses(path_a, options.reading), pairs.b = readPoses(path_b, options.reading);
+  requireMeasured(pairs.a, name_a), requireMeasured(pairs.b, name_b);
   pairs.by_time = !options.by_row && !pairs.a.times.empty() && !pairs.b.times.empty();
   const std::string at_least = fmt::format("at least {}", options.least);
   if (pairs.by_time) {

@@ -430,10 +430,12 @@ TEST(HandEyeCommand, badInputIsNamed) {
   for (int i = 0; i < 6; ++i) {
     for (int j = i; j < 6; ++j) {
       covariances += ",cov_" + std::to_string(i) + std::to_string(j);
-      row += i == j ? (i == 5 ? ",-1" : ",1") : ",0";
+      row += i == j ? (i == 5 ? ",-2" : ",1") : ",0";
     }
   }
   expect(error(covariances + row + "\n", fine), {"a.csv:2: the covariance is not positive definite"});
+  row.replace(row.size() - 2, 2, "-1");
+  expect(error(covariances + row + "\n", fine), {"a.csv:2: a variance of -1", "the rotation was not measured"});
   row.replace(row.size() - 2, 2, "1");
   const std::string with = covariances + row + row + row + row + "\n";
   expect(error(fine, with, {"--sigma-b", "1,1"}), {"b.csv: the file has covariances, and --sigma-b is given"});

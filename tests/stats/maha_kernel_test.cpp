@@ -95,7 +95,8 @@ TYPED_TEST(MahaKernelSums, the_estimate_is_a_zero_of_the_general_gradient) {
   const TypeParam centre = ManifoldTraits<TypeParam>::expOrigin(this->normal(0.7));
   std::vector<Gaussian<TypeParam>> data;
   for (int i = 0; i < 1500; ++i) data.push_back({exp(centre, this->normal(0.3)), this->covariance()});
-  const auto result = maha(data, CovarianceAt::measured);
+  // The covariances have nothing to do with the scatter.
+  const auto result = maha(data, CovarianceAt::measured, {.refutation_level = 0});
   ASSERT_EQ(result.status, Status::ok);
   const auto general = this->problem(data, false).evaluate(SerialExecutor{}, result.mean);
   EXPECT_LE((general.hessian.inverse() * general.gradient).norm(), 1e-13);
@@ -123,7 +124,7 @@ TEST(MahaCovariance, of_two_rotations_by_hand) {
   for (const int copies : {1, 64}) {
     std::vector<Gaussian<SO3d>> data;
     for (int i = 0; i < copies; ++i) data.insert(data.end(), two.begin(), two.end());
-    const auto result = maha(data, CovarianceAt::measured);
+    const auto result = maha(data, CovarianceAt::measured, {.refutation_level = 0});
     ASSERT_EQ(result.status, Status::ok);
     const double across = 1 / std::pow(std::cos(a / 2), 2);
     const Eigen::Vector3d expected = variance / (2 * copies) * Eigen::Vector3d(across, across, 1);

@@ -113,7 +113,13 @@ TYPED_TEST(SumCertificates, agreeWithThoseThatLookAtTheData) {
           }
         }
         ASSERT_EQ(fast.estimate.has_value(), full.estimate.has_value());
-        if (fast.estimate) {
+        if (fast.region_factor != full.region_factor) {
+          // The sums say that no valley leads out of the region. Scores of a few data, which are far from normal, may not
+          // reject a feature just outside of it; those of more do.
+          EXPECT_LT(n, detail::min_data_of_valley);
+          EXPECT_LT(full.region_factor, 1.5);
+          EXPECT_EQ(fast.region_factor, 1);
+        } else if (fast.estimate) {
           EXPECT_LE((fast.estimate->covariance - full.estimate->covariance).norm(),
                     1e-12 * full.estimate->covariance.norm());
           EXPECT_LE(static_cast<double>(log(fast.estimate->mean, full.estimate->mean).norm()), 1e-12);
