@@ -44,7 +44,15 @@ void check(const FeatureFile& file) {
   for (const double weight : file.weights) require(weight >= 0 && std::isfinite(weight));
   require(file.weights.empty() || *std::max_element(file.weights.begin(), file.weights.end()) > 0);
   for (const double time : file.times) require(std::isfinite(time));
-  for (const auto& covariance : file.covariances) require(covariance.allFinite() && covariance(0, 0) > 0);
+  require(isAbsentOrFull(file.factors, n) && file.unmeasured.size() <= n);
+  // Rows whose rotation was not measured have no covariance.
+  for (std::size_t i = 0, next = 0; i < file.covariances.size(); ++i) {
+    const bool measured = next == file.unmeasured.size() || file.unmeasured[next] != i;
+    next += measured ? 0 : 1;
+    require(measured ? file.covariances[i].allFinite() && file.covariances[i](0, 0) > 0 : file.covariances[i].hasNaN());
+  }
+  const FeatureFile measured = withoutUnmeasured(file);
+  require(measured.size() == n - file.unmeasured.size() && measured.lines.size() == measured.size());
 }
 
 }  // namespace
