@@ -13,7 +13,6 @@
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/detail/rotation_matrix.hpp>
-#include <lie/detail/small_factors.hpp>
 #include <lie/linear.hpp>
 #include <lie/units.hpp>
 
@@ -225,7 +224,7 @@ class FeatureReader {
     }
     Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Identity();
     whole.topLeftCorner(n, n) = factor;
-    const Eigen::Matrix<double, 6, 6> square = detail::squareOfFactor<double, 6>(whole);
+    const Eigen::Matrix<double, 6, 6> square = squareOfFactor<double, 6>(whole);
     FeatureCovariance covariance = square.topLeftCorner(n, n);
     if (!isUnmeasured(covariance)) checkCovariance(covariance);
     file_.covariances.push_back(std::move(covariance));

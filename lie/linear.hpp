@@ -6,6 +6,7 @@
 #pragma once
 
 #include <lie/detail/small_eigen.hpp>
+#include <lie/detail/small_factors.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_products.hpp>
 #include <lie/detail/trig.hpp>
@@ -21,6 +22,8 @@ using detail::SemidefiniteRoot;
 using detail::SymmetricEigen;
 /// The cross-product matrix [v] of a vector of three numbers: [v] w = v × w.
 using detail::skew;
+/// F Fᵀ of a factor, symmetric to the last bit, and with a Cholesky factor where F has full rank but for rounding.
+using detail::squareOfFactor;
 /// A B, without a type of expression for each pair of shapes.
 using detail::product;
 

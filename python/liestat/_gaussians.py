@@ -2,8 +2,8 @@
 
 import math
 import numbers
+import typing
 import warnings
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -416,21 +416,21 @@ def fuse(x, covariances=None, axis=None, *, factors=None, deviations=None, covar
     return estimate
 
 
-class FuseResult(NamedTuple):
+class FuseResult(typing.NamedTuple):
     """What `tested_fuse` returns; arrays of the shape of the results, numbers for a single one."""
 
     #: The means with their covariances, those of the stated covariances also where the fit refutes them.
     estimate: Gaussian
     #: 'ok', 'inconsistent', 'ill_defined', ...
-    status: Any
+    status: typing.Any
     #: χ² of the estimates under their covariances.
-    fit: Any
+    fit: typing.Any
     #: Its degrees of freedom; 0 for a single estimate, which nothing tests.
     fit_dof: int
     #: Probability of so large a χ²; below 0.001 the covariances are refuted.
-    fit_p: Any
+    fit_p: typing.Any
     #: Birge's factor max(1, χ²/ν), by which the covariances are too small if all are so by the same factor.
-    fit_factor: Any
+    fit_factor: typing.Any
 
 
 def tested_fuse(x, covariances=None, axis=None, *, factors=None, deviations=None, covariance_at=None):

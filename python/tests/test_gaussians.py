@@ -115,7 +115,7 @@ class Fusion(unittest.TestCase):
     def test_points(self):
         x = support.features("R3", 5)
         c = covariance(3, shape=(5,))
-        fused = liestat.fuse(x, c)
+        fused = liestat.tested_fuse(x, c).estimate
         information = np.linalg.inv(c)
         np.testing.assert_allclose(fused.covariance, np.linalg.inv(information.sum(0)), rtol=1e-8)
         expected = fused.covariance @ (information @ x.params[:, :, None]).sum(0)
@@ -245,7 +245,7 @@ class Validation(unittest.TestCase):
         return truth, truth.retract(0.1 * rng.standard_normal((8, 3)))
 
     def test_a_right_covariance_passes(self):
-        report = liestat.validate(lambda x: liestat.mean(x, covariances=0.01 * np.eye(3)), self.draw, trials=300)
+        report = liestat.validate(lambda x: liestat.tested_fuse(x, 0.01 * np.eye(3)).estimate, self.draw, trials=300)
         self.assertTrue(report.passed, str(report))
         self.assertIn("validation index", str(report))
         self.assertEqual((report.trials, report.failures, len(report.distances)), (300, 0, 300))

@@ -89,7 +89,7 @@ class MeanParity(ParityTest):
 
     def test_mahalanobis(self):
         rng = np.random.default_rng(2)
-        names, values = self.covariances(20, 3, rng)
+        names, values = self.covariances(20, 3, rng, 1e-2)
         rows = np.column_stack([[0.3, 0.2, 0.1] + 0.1 * rng.normal(size=(20, 3)), values])
         json, result = self.assert_equal_means(self.table("rx,ry,rz," + names, rows), use=["covariances"])
         self.assertEqual((json["criterion"], json["covariance_law"]), ("maha", "chi2"))
@@ -134,7 +134,7 @@ class MeanParity(ParityTest):
 
     def test_birges_factor(self):
         """Covariances that say half of the variance of few measurements: doubtful, not refuted."""
-        rows = np.column_stack([[[0, 0, 0], [2, 0, 0], [0, 2.2, 0]], np.tile([0.5, 0, 0, 0.5, 0, 0.5], (3, 1))])
+        rows = np.column_stack([[[0, 0, 0], [2.2, 0, 0], [0, 2.3, 0]], np.tile([0.5, 0, 0, 0.5, 0, 0.5], (3, 1))])
         path = self.table("x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22", rows)
         plain, _ = self.assert_equal_means(path, use=["covariances"])
         scaled, _ = self.assert_equal_means(path, ("--birge",), use=["covariances"], birge=True)

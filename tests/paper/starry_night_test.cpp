@@ -67,7 +67,7 @@ TEST_F(StarryNight, MeansAgainstTheSurvey) {
 
 TEST_F(StarryNight, CovariancesOfIndependentErrorsAreFarTooSmall) {
   for (const LandmarkMeasurements& landmark : measurements) {
-    const double mu2 = mahalanobisSquared(fuse(landmark.points), surveyed.at(landmark.track));
+    const double mu2 = mahalanobisSquared(testedFuse(landmark.points).estimate, surveyed.at(landmark.track));
     EXPECT_GT(mu2, 11) << "track " << landmark.track;  // χ²_3 is above with a probability of 1 %
     EXPECT_LT(mu2, 400) << "track " << landmark.track;
   }
@@ -76,7 +76,7 @@ TEST_F(StarryNight, CovariancesOfIndependentErrorsAreFarTooSmall) {
 /// The factor by which the means of parts of the data disagree more than their covariances say.
 double disagreement(const std::vector<std::vector<MeasuredPoint>>& parts, const Eigen::Vector3d& whole) {
   double sum = 0;
-  for (const auto& part : parts) sum += mahalanobisSquared(fuse(part), whole);
+  for (const auto& part : parts) sum += mahalanobisSquared(testedFuse(part).estimate, whole);
   return sum / (3 * static_cast<double>(parts.size() - 1));
 }
 
@@ -99,7 +99,7 @@ TEST_F(StarryNight, BlocksOfTimeRevealItWithoutTheSurvey) {
   // Inflated by the common factor, the distances to the survey are of the size that they should have.
   double mu2 = 0;
   for (const LandmarkMeasurements& landmark : measurements) {
-    mu2 += mahalanobisSquared(fuse(landmark.points), surveyed.at(landmark.track)) / 20;
+    mu2 += mahalanobisSquared(testedFuse(landmark.points).estimate, surveyed.at(landmark.track)) / 20;
   }
   EXPECT_GT(mu2 / by_time, 1);
   EXPECT_LT(mu2 / by_time, 9);
