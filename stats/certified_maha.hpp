@@ -217,7 +217,7 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
   result.hessian_change = settled.change;
   // Noise that is larger than stated lowers the likelihood ratio as it raises χ².
   NearTieOptions near_ties = options.near_ties;
-  near_ties.log_likelihood_ratio *= result.fit.factor();
+  if (options.refutation_level > 0) near_ties.log_likelihood_ratio *= result.fit.factor();
   setNearTies(result, results, settled.covariance, options.distinct, near_ties);
   if (!result.near_ties.empty()) return without(Status::ambiguous, near_tie_reason);
   if (twin_valley) {

@@ -123,14 +123,16 @@ TEST(NearTies, theRivalOfTwoOppositeCloudsIsListed) {
 }
 
 TEST(NearTies, knownNoiseTurnsCostsIntoLikelihoods) {
-  // Two rotations 170° apart about one axis: of sd 0.05 the rival is out of the question, of sd 1 it is not.
+  // Two rotations 170° apart about one axis: of sd 0.05 the rival is out of the question, of sd 1 it is not. That they are
+  // as far apart refutes either noise, which is not tested here.
+  const CertifiedMahaOptions<SO3d> untested{.refutation_level = 0};
   const std::vector<SO3d> samples{SO3d(), SO3d::exp(Vector3d(0, 0, 170 * pi / 180))};
   // The cost at the other midpoint less that at the mean: (95² - 85²)/2 deg² for each.
   const double difference = (95.0 * 95 - 85.0 * 85) * std::pow(pi / 180, 2);
   for (const double sd : {0.05, 0.2}) {
     const std::vector<Gaussian<SO3d>> measured{{samples[0], sd * sd * SO3d::Adjoint::Identity()},
                                                {samples[1], sd * sd * SO3d::Adjoint::Identity()}};
-    const auto result = certifiedMaha(measured, CovarianceAt::measured);
+    const auto result = certifiedMaha(measured, CovarianceAt::measured, untested);
     const double ratio = difference / (sd * sd);
     EXPECT_EQ(result.near_ties.size(), ratio < 4.5 ? 1u : 0u) << sd << ": " << ratio;
   }
@@ -138,7 +140,7 @@ TEST(NearTies, knownNoiseTurnsCostsIntoLikelihoods) {
   const std::vector<Gaussian<SO3d>> close{
       {SO3d(), 0.01 * SO3d::Adjoint::Identity()},
       {SO3d::exp(Vector3d(0, 0, 179.5 * pi / 180)), 0.01 * SO3d::Adjoint::Identity()}};
-  const auto tie = certifiedMaha(close, CovarianceAt::measured);
+  const auto tie = certifiedMaha(close, CovarianceAt::measured, untested);
   EXPECT_EQ(tie.status, Status::ambiguous) << tie.reason;
   ASSERT_EQ(tie.near_ties.size(), 1u);
   const double expected = (90.25 * 90.25 - 89.75 * 89.75) * std::pow(pi / 180, 2) / 0.01;
