@@ -119,8 +119,12 @@ TYPED_TEST(FactoredCovariance, okImpliesSymmetryAndACholeskyFactor) {
     const auto result = t % 2 ? maha(full, CovarianceAt::measured) : maha(factored, CovarianceAt::measured);
     const auto fused = fuse(full, CovarianceAt::measured);
     const auto fused_factor = fuse(factored, CovarianceAt::measured);
-    if (fused.covariance.allFinite()) ASSERT_TRUE(isFactored<M>(fused.covariance)) << t;
-    if (fused_factor.factor.allFinite()) ASSERT_TRUE(isFactored<M>(fused_factor.gaussian().covariance)) << t;
+    if (fused.covariance.allFinite()) {
+      ASSERT_TRUE(isFactored<M>(fused.covariance)) << t;
+    }
+    if (fused_factor.factor.allFinite()) {
+      ASSERT_TRUE(isFactored<M>(fused_factor.gaussian().covariance)) << t;
+    }
     if (result.status != Status::ok) continue;
     ++ok;
     ASSERT_TRUE(isFactored<M>(result.covariance)) << t;
