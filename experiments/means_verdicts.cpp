@@ -94,8 +94,8 @@ class Sampler {
       return x;
     }
   }
-  /// The population's criterion is symmetric about the last axis, and its minima are as far from the origin as the least of
-  /// its values along a geodesic, across that axis for random axes and along it for half-turns about it.
+  /// The population's criterion is symmetric about the last axis, and its minima are as far from the origin as the
+  /// least of its values along a geodesic, across that axis for random axes and along it for half-turns about it.
   void findTruth() {
     std::vector<M> some;
     CounterRng rng(1);

@@ -72,7 +72,8 @@ struct Jet {
   Jet mapped(const S& value, const S& slope) const { return {value, v * slope}; }
 };
 
-// The functions of <cmath>, found by argument-dependent look-up. Slopes are of the scalar's own type, so that Jets nest.
+// The functions of <cmath>, found by argument-dependent look-up. Slopes are of the scalar's own type, so that Jets
+// nest.
 
 template <class S, int N>
 Jet<S, N> abs(const Jet<S, N>& x) {

@@ -4,9 +4,9 @@
 //   const auto range_and_bearing = [](const auto& world_T_body) { … };   // generic in the scalar
 //   const auto measured = liestat::propagate(world_T_body, range_and_bearing);
 //
-// Functions are called twice: with doubles for the value, and with Jets (lie/jet.hpp) for the derivative. They take their
-// features as they are (`const auto&`, or `template <class T> … (const SE3<T>&)`) and call sqrt, sin … unqualified.
-// double and Jet meet in the groups' operators: a constant SE3d times an SE3<Jet> is an SE3<Jet>.
+// Functions are called twice: with doubles for the value, and with Jets (lie/jet.hpp) for the derivative. They take
+// their features as they are (`const auto&`, or `template <class T> … (const SE3<T>&)`) and call sqrt, sin …
+// unqualified. double and Jet meet in the groups' operators: a constant SE3d times an SE3<Jet> is an SE3<Jet>.
 #pragma once
 
 #include <lie/jet.hpp>
@@ -42,8 +42,8 @@ template <Homogeneous R>
 struct ScalarOfResult<R> {
   using type = ScalarOf<R>;
 };
-/// A function takes features over Jets, and returns something over Jets. (Eigen's matrices convert into each other as far
-/// as a signature says, so that the arguments alone do not tell.)
+/// A function takes features over Jets, and returns something over Jets. (Eigen's matrices convert into each other as
+/// far as a signature says, so that the arguments alone do not tell.)
 template <class F, class... M>
 concept GenericInScalar =
     std::is_invocable_v<const F&, decltype(overJets<1>(std::declval<const M&>()))...> && requires {

@@ -174,8 +174,8 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
 }  // namespace detail
 
 /// The exponential barycentre of a range of group elements, weighted or not, certified by the mean of its metric twin,
-/// with its covariance from the residuals, or from known noise, if that can be trusted: status ok. The result has the same bits on any
-/// executor.
+/// with its covariance from the residuals, or from known noise, if that can be trusted: status ok. The result has the
+/// same bits on any executor.
 template <Executor E, detail::AnyRange R, class G = detail::GroupInSignature<R>>
 CertifiedGroupMean<G> certifiedGroupMean(const E& executor, R&& samples,
                                          const CertifiedGroupMeanOptions<std::type_identity_t<G>>& options = {}) {

@@ -247,12 +247,12 @@ CertifiedMaha<M> findCertifiedMaha(const E& executor, const R& samples, Covarian
 
 }  // namespace detail
 
-/// The Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M> from several starts, with its covariance if that
-/// can be trusted: status ok. The covariance is withheld, with the reason in words, if the iteration did not converge, if
-/// the measurements scatter more than their covariances say (inconsistent; `fit` says by how much), if several
-/// minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is singular or,
-/// averaged over the confidence region, too flat, or the features are as scattered as uniform ones (ill_defined). The
-/// statuses of maha() occur as well. The result has the same bits on any executor.
+/// The Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M> from several starts, with its covariance if
+/// that can be trusted: status ok. The covariance is withheld, with the reason in words, if the iteration did not
+/// converge, if the measurements scatter more than their covariances say (inconsistent; `fit` says by how much), if
+/// several minima are equally low or higher by less than their noise explains (ambiguous), and if the Hessian is
+/// singular or, averaged over the confidence region, too flat, or the features are as scattered as uniform ones
+/// (ill_defined). The statuses of maha() occur as well. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 CertifiedMaha<M> certifiedMaha(const E& executor, R&& samples, CovarianceAt at,
                                const CertifiedMahaOptions<std::type_identity_t<M>>& options = {}) {

@@ -64,12 +64,13 @@ struct CertifiedMean {
   double hessian_change = 0;
   NoiseFit fit = {};        ///< of the measurements to their known noise; nothing where none was stated
   bool from_noise = false;  ///< the covariance follows from the known noise
-  /// Covariance from residuals: the number of measurements for Hotelling's law, n but for weights that are no precisions.
+  /// Covariance from residuals: the number of measurements for Hotelling's law, n but for weights that are no
+  /// precisions.
   double law_n = 0;
   /// The factor by which the region of the rotation or direction was widened, until no feature beyond it explains the
   /// measurements as well (docs/theory/means.md, section 7.7); of a product that of the factor which was widened most.
-  /// 1: not at all. Of 20 measurements or more status is ambiguous beyond 3.5, or if two thirds of all features are nearer
-  /// than such a one.
+  /// 1: not at all. Of 20 measurements or more status is ambiguous beyond 3.5, or if two thirds of all features are
+  /// nearer than such a one.
   double region_factor = 1;
   /// The farthest feature found on the ring or in the valley for which the region was widened, if it was.
   std::optional<NearTie<M>> valley = {};
@@ -279,11 +280,12 @@ CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const
 }  // namespace detail
 
 /// The mean of a range of features, certified, with its covariance from the residuals, or from known noise, if that can
-/// be trusted: status ok. The covariance is withheld, with the reason in words, if the measurements refute the noise that
-/// is stated for them (inconsistent; `fit` says by how much), if another feature explains the measurements as well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or
-/// the criterion is flat within the confidence region (ill_defined), if there are no more features than dimensions and
-/// the noise is not known (too_few), or if the weights are invalid (not_applicable). A mean that is merely not
-/// certified to be unique keeps its covariance. The result has the same bits on any executor.
+/// be trusted: status ok. The covariance is withheld, with the reason in words, if the measurements refute the noise
+/// that is stated for them (inconsistent; `fit` says by how much), if another feature explains the measurements as
+/// well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or the criterion is
+/// flat within the confidence region (ill_defined), if there are no more features than dimensions and the noise is not
+/// known (too_few), or if the weights are invalid (not_applicable). A mean that is merely not certified to be unique
+/// keeps its covariance. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {

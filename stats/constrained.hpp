@@ -237,8 +237,8 @@ concept Linearizes = requires(const F& f, const Arguments&... arguments) {
   f.linearize(arguments...);
 };
 
-/// States in one sentence why there is no constrained estimate; `ok` where there is one. That noise and measurements have
-/// one dimension is said by measurements().
+/// States in one sentence why there is no constrained estimate; `ok` where there is one. That noise and measurements
+/// have one dimension is said by measurements().
 template <class Q, class Constraint, class... Channels>
 struct RequireEstimate {
   static constexpr bool ok = false;

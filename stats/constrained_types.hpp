@@ -107,15 +107,12 @@ struct ParameterPrior {
   SquareOf<Q> information = SquareOf<Q>::Zero();
 };
 
-/// What becomes of the noise that was stated, which the χ² of an estimate tests.
+/// The role of the noise that was stated, which the χ² of an estimate tests.
 enum class StatedNoise {
-  tested,  ///< where χ² refutes it at min_constrained_fit_p the estimate is `inconsistent`, without a covariance
+  tested,  ///< where χ² refutes it at refutation_level the estimate is `inconsistent`, without a covariance
   scaled,  ///< covariances are multiplied by max(1, χ²/r), after R. Birge (1932)
   trusted  ///< nothing: whoever called looks at χ² himself
 };
-
-/// The probability below which χ² refutes the stated noise: a thousandth of estimates from right noise are lost.
-inline constexpr double min_constrained_fit_p = refutation_level;
 
 template <Homogeneous Q>
 struct ConstrainedOptions {
@@ -145,7 +142,7 @@ struct RelativeCurvature {
   double bias = intrinsic;  ///< second-order bias of the estimate, in standard deviations
 
   bool tested() const { return !std::isnan(parameter); }
-  /// Of noise that is larger by a factor than stated.
+  /// The curvature under noise that is larger by a factor than stated.
   RelativeCurvature at(double scale) const {
     return {scale * intrinsic, scale * parameter, scale * scale * noise_share, scale * bias};
   }
@@ -154,8 +151,8 @@ struct RelativeCurvature {
   /// Widened regions were seen to hold up to these, and are worth little beyond.
   bool large() const { return parameter > 0.8 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.6; }
   /// The factor of a covariance whose region holds between the two. The edge of the region is off by the relative
-  /// curvatures of its radius, or all of it by the bias; the curvature at the truth may be larger than at the estimate, by
-  /// a multiple of its square; and what is noise of the information is none.
+  /// curvatures of its radius, or all of it by the bias; the curvature at the truth may be larger than at the estimate,
+  /// by a multiple of its square; and what is noise of the information is none.
   double widening() const {
     if (!tested() || small()) return 1;
     // The radius is at least two standard deviations.
@@ -199,10 +196,11 @@ struct ConstrainedResult {
   /// The covariance of the error's part across these directions, whatever its part along them; NaN as `covariance` is
   /// where it is withheld. Without open directions it is `covariance`.
   SquareOf<Q> determined_covariance = covariance;
-  /// Inequalities that hold with equality: directions, such as a slack variable, that second derivatives alone determine.
+  /// Inequalities that hold with equality: directions, such as a slack variable, that second derivatives alone
+  /// determine.
   int active_bounds = 0;
-  /// Where it is large the estimate is `curved`, without a covariance; where it is not small the covariance is multiplied
-  /// by `widening`.
+  /// Where it is large the estimate is `curved`, without a covariance; where it is not small the covariance is
+  /// multiplied by `widening`.
   RelativeCurvature relative_curvature = {};
   double widening = 1;
   bool minimum_checked = false;  ///< that the end is a minimum was seen in its second derivatives
@@ -215,9 +213,9 @@ struct ConstrainedResult {
   }
   /// √(2 L² / r), by which the stated standard deviations are too small if the model is right.
   double noiseFactor() const { return std::sqrt(varianceFactor()); }
-  /// What χ² says of the stated noise, in a word.
+  /// The verdict of χ² on the stated noise, in a word.
   const char* fit() const {
-    return std::isnan(fit_p) ? "untested" : fit_p < min_constrained_fit_p ? "inconsistent" : "consistent";
+    return std::isnan(fit_p) ? "untested" : fit_p < refutation_level ? "inconsistent" : "consistent";
   }
 };
 

@@ -73,8 +73,8 @@ SquareOf<M> covarianceFromCommonNoise(const MeanResult<M>& result, const SquareO
 }
 
 /// Covariance of the mean when the noise is unknown, from the residuals. Squared distances follow Hotelling's law
-/// (stats/inference.hpp), not χ²; with ResidualNoise::any the sums of the mean know too little of the weights for a law,
-/// which certifiedMean has. Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
+/// (stats/inference.hpp), not χ²; with ResidualNoise::any the sums of the mean know too little of the weights for a
+/// law, which certifiedMean has. Rank min(n - 1, k): with fewer than k + 1 measurements it is singular. NaN for one
 /// measurement.
 template <Metric M>
 LIESTAT_NO_INLINE SquareOf<M> covarianceFromResiduals(const MeanResult<M>& result,

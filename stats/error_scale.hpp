@@ -129,9 +129,9 @@ inline MomentScale scaleFromMoments(std::span<const double> errors, const Moment
 /// √T of scaleFromMoments() for normal inliers, in standard deviations.
 inline constexpr double moment_scale_of_normal_errors = 4.42;
 
-/// What the errors of all measurements under an estimate say of the noise in whose units they are. Of right noise one
-/// inlier in a hundred lies between the threshold and twice that distance, and outliers are as dense there as beyond; noise
-/// that is larger than stated moves inliers there.
+/// A test of the noise by the errors of all measurements under an estimate, in units of that noise. Of right noise one
+/// inlier in a hundred lies between the threshold and twice that distance, and outliers are as dense there as beyond;
+/// noise that is larger than stated moves inliers there.
 struct NoiseCheck {
   /// √T of scaleFromMoments() over what it is where the stated noise is right: by which the true standard deviation is
   /// larger. NaN without a root, or with several equations a measurement.

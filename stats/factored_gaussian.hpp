@@ -8,8 +8,8 @@
 namespace liestat {
 
 /// A feature and a factor A of the covariance A Aᵀ of its error: x·Exp(A n), n ~ N(0, I). A matrix of variances has the
-/// smallest one to eps times the largest, a factor to the root of that and, if its columns are standard deviations along
-/// principal axes, to eps.
+/// smallest one to eps times the largest, a factor to the root of that and, if its columns are standard deviations
+/// along principal axes, to eps.
 template <Homogeneous M>
 struct FactoredGaussian {
   M mean = ManifoldTraits<M>::origin();

@@ -1,5 +1,6 @@
-// Equations and constraints of curves, surfaces and maps, for autoDiff() (stats/auto_diff.hpp) and estimates of a user's
-// own; stats/fits.hpp has them with their starts. Coordinates of parameters are those of the fits. Needs Eigen alone.
+// Equations and constraints of curves, surfaces and maps, for autoDiff() (stats/auto_diff.hpp) and estimates of a
+// user's own; stats/fits.hpp has them with their starts. Coordinates of parameters are those of the fits. Needs Eigen
+// alone.
 #pragma once
 
 #include <Eigen/Core>

@@ -5,8 +5,8 @@
 //   if (ellipse.ok()) std::cout << ellipse.parameter.transpose() << "\n" << ellipse.covariance << "\n";
 //
 // Every coordinate of every point is noisy, with one standard deviation; distances are orthogonal ones. Points are in
-// whatever unit; the fit does not depend on it, nor on the origin. Nothing throws: an end that is not `converged` says why
-// there is no covariance.
+// whatever unit; the fit does not depend on it, nor on the origin. Nothing throws: an end that is not `converged` says
+// why there is no covariance.
 #pragma once
 
 #include <stats/constrained_types.hpp>
@@ -20,7 +20,8 @@
 
 namespace liestat {
 
-/// A model fitted to points. Covariances are first order, of coordinates that a constraint ties (a unit normal) singular.
+/// A model fitted to points. Covariances are first order, of coordinates that a constraint ties (a unit normal)
+/// singular.
 template <int N>
 struct Fit {
   ConstrainedEnd end = ConstrainedEnd::too_few;
@@ -67,8 +68,8 @@ LIESTAT_ESTIMATION_API Fit<6> fitLine3(Points3 points, std::optional<double> sig
 /// A conic, a x² + b xy + c y² + d x + e y + f = 0: coefficients of unit length, a + c ≥ 0.
 LIESTAT_ESTIMATION_API Fit<6> fitConic(Points2 points, std::optional<double> sigma = {},
                                        const FitOptions& options = {});
-/// An ellipse: centre, semi-axes (the longer one first), angle of the longer one against x in (-π/2, π/2], rad. The end is
-/// `contradictory` if the conic through the points is none.
+/// An ellipse: centre, semi-axes (the longer one first), angle of the longer one against x in (-π/2, π/2], rad. The end
+/// is `contradictory` if the conic through the points is none.
 LIESTAT_ESTIMATION_API Fit<5> fitEllipse(Points2 points, std::optional<double> sigma = {},
                                          const FitOptions& options = {});
 /// A homography H, x₂ ∝ H x₁, row by row, of unit length; its largest entry is positive. Four matches at least.

@@ -125,10 +125,10 @@ MahaResult<M> testedMaha(const E& executor, const R& samples, CovarianceAt at, c
 }  // namespace detail
 
 /// Mahalanobis mean of a range of Gaussian<M> or FactoredGaussian<M>. Status inconsistent, with the covariance that the
-/// refuted ones give, if the measurements scatter more than they say; ill_defined if a covariance is not positive definite, too_few for
-/// an empty range, not_converged if the data are not finite, not_applicable for CovarianceAt::estimated with an
-/// anisotropic covariance on a manifold without a continuous placement (directions) and for likelihood where a user's
-/// manifold has no logVolume.
+/// refuted ones give, if the measurements scatter more than they say; ill_defined if a covariance is not positive
+/// definite, too_few for an empty range, not_converged if the data are not finite, not_applicable for
+/// CovarianceAt::estimated with an anisotropic covariance on a manifold without a continuous placement (directions) and
+/// for likelihood where a user's manifold has no logVolume.
 template <Executor E, detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 MahaResult<M> maha(const E& executor, R&& samples, CovarianceAt at,
                    const MahaOptions<std::type_identity_t<M>>& options = {}) {
@@ -155,7 +155,7 @@ MahaResult<M> maha(R&& samples, const MahaOptions<std::type_identity_t<M>>& opti
   }
 }
 
-/// What testedFuse() returns.
+/// The result of testedFuse().
 template <Homogeneous M>
 struct FuseResult {
   /// The mean with its covariance. NaN where there is no trustworthy one; where the fit refutes it (inconsistent) it is
@@ -195,7 +195,7 @@ FuseResult<M> fused(const R& samples, CovarianceAt at, std::span<const SquareOf<
   return result;
 }
 
-/// What fuse() gives back of a range: a Gaussian of Gaussians, a factored one of factored ones.
+/// The result of fuse(): a Gaussian for a range of Gaussians, a factored one for factored ones.
 template <AnyRange R, class M>
 using FusedOf = std::conditional_t<RequireGaussians<R>::factored, FactoredGaussian<M>, Gaussian<M>>;
 
@@ -223,8 +223,8 @@ FuseResult<M> testedFuse(R&& samples) {
   }
 }
 
-/// The estimate of testedFuse() alone; factored Gaussians give a factored one. The covariance is NaN unless its status is
-/// ok: where the Gaussians lie farther apart than their covariances say, directions or rotations are as scattered as
+/// The estimate of testedFuse() alone; factored Gaussians give a factored one. The covariance is NaN unless its status
+/// is ok: where the Gaussians lie farther apart than their covariances say, directions or rotations are as scattered as
 /// uniform ones, or the criterion is flat where the truth may be.
 template <detail::AnyRange R, class M = detail::FeatureInSignature<R>>
 detail::FusedOf<R, M> fuse(R&& samples, CovarianceAt at) {

@@ -122,7 +122,8 @@ struct MeanSummary {
   double cut_locus_mass = 0;  ///< fraction of the measurements near the cut locus of the mean
   /// By how much the Hessian averaged over the confidence region is lower than at the mean, relative.
   double hessian_change = 0;
-  /// By which factor the region was widened until no feature beyond it explains the measurements as well; 1: not at all.
+  /// By which factor the region was widened until no feature beyond it explains the measurements as well; 1: not at
+  /// all.
   double region_factor = 1;
   /// The farthest feature found on the ring or in the valley for which it was widened.
   std::optional<NearRival> valley = {};

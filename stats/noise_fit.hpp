@@ -1,9 +1,9 @@
-// The fit of measurements to the noise that is stated for them: a hypothesis, which their scatter tests before it enters a
-// covariance or a verdict. (Needs the standard library alone.)
+// The fit of measurements to the noise that is stated for them: a hypothesis, which their scatter tests before it
+// enters a covariance or a verdict. (Needs the standard library alone.)
 //
 // χ² = min over y of Σ r_iᵀ V_i⁻¹ r_i, r_i = log(y, x_i), follows χ² of k (n - 1) degrees of freedom where the stated
 // covariances V_i are right. It is the minimum that follows this law: the sum about a least-squares mean does not where
-// the V_i differ, nor does that after one step (docs/theory/means.md, section 5.3).
+// the V_i differ, nor does that after one step (docs/uniqueness.md, "Stated noise is tested").
 #pragma once
 
 #include <stats/detail/tail_probabilities.hpp>
@@ -15,8 +15,8 @@ namespace liestat {
 
 /// The level of every verdict by χ²: stated noise is refuted by a fit that is less probable.
 inline constexpr double refutation_level = 1e-3;
-/// Below this p a result says by which factor its stated covariances are too small, although it is not refuted: with few
-/// measurements the test has little power (of three rotations it sees half the true deviation in 46 of 100 cases).
+/// Below this p a result says by which factor its stated covariances are too small, although it is not refuted: with
+/// few measurements the test has little power (of three rotations it sees half the true deviation in 46 of 100 cases).
 inline constexpr double doubtful_fit = 0.05;
 
 /// The χ² of measurements under their stated noise.
@@ -37,7 +37,7 @@ struct NoiseFit {
   }
 };
 
-/// What becomes of a covariance whose stated noise is refuted.
+/// The fate of a covariance whose stated noise is refuted.
 enum class RefutedNoise {
   withheld,  ///< there is none: status inconsistent
   residuals  ///< it is computed from the residuals, as if no noise had been stated

@@ -85,8 +85,8 @@ struct RobustEstimate {
   std::vector<std::size_t> inliers;  ///< ascending
   std::size_t draw = 0;              ///< in which it was found
   bool refined = false;              ///< estimated from the inliers of what the draw gave
-  /// The stated noise under the parameter; refined() tests it. Where it is larger than stated the inliers are too few, and
-  /// a covariance from them is too small.
+  /// The stated noise under the parameter; refined() tests it. Where it is larger than stated the inliers are too few,
+  /// and a covariance from them is too small.
   NoiseCheck noise = {};
 
   Status status() const {

@@ -1,5 +1,5 @@
-// Dependence of successive measurements, where nothing but the order of rows is known of their times. dispersionAbout() of
-// stats/dispersion.hpp computes it. (Needs the standard library alone.)
+// Dependence of successive measurements, where nothing but the order of rows is known of their times. dispersionAbout()
+// of stats/dispersion.hpp computes it. (Needs the standard library alone.)
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 namespace liestat {
 
 /// A test for errors that resemble those of the row before: the covariance of a mean supposes that they do not. u_i are
-/// the features' tangent vectors at the mean, whitened; T = Σ u_i·u_{i+1} is compared with its own scatter, whatever the
-/// law of the noise, which may differ from row to row.
+/// the features' tangent vectors at the mean, whitened; T = Σ u_i·u_{i+1} is compared with its own scatter, whatever
+/// the law of the noise, which may differ from row to row.
 struct RowOrder {
   /// T over Σ|u_i|²: the correlation of successive errors; NaN where nothing was tested.
   double correlation = std::numeric_limits<double>::quiet_NaN();

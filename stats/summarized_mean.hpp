@@ -38,7 +38,7 @@ struct MeanInput {
   std::vector<SquareOf<M>> factors = {};
   CovarianceAt covariance_at = CovarianceAt::measured;  ///< frame of the covariances, for maha
   bool likelihood = false;                              ///< maha: with the volume element
-  /// What becomes of covariances that the measurements refute; for lsq, wlsq and barycentre.
+  /// The fate of covariances that the measurements refute; for lsq, wlsq and barycentre.
   RefutedNoise refuted_noise = RefutedNoise::withheld;
   ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
   bool scale_noise = false;                              ///< Birge's factor, where they are not refuted

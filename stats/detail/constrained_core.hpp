@@ -179,8 +179,8 @@ class TangentSystem {
   int free_ = 0, null_dimension_ = 0;
 };
 
-/// Second derivatives of the equations along directions d_a of the parameter, one standard deviation long, in units of the
-/// noise: sums over the measurements (docs/theory/constrained.md, section 6).
+/// Second derivatives of the equations along directions d_a of the parameter, one standard deviation long, in units of
+/// the noise: sums over the measurements (docs/theory/constrained.md, section 6).
 struct CurvatureSums {
   CurvatureSums(Rows directions_, Rows bends_)
       : directions(std::move(directions_)),

@@ -46,8 +46,8 @@ inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parame
   const int size = N + K, square = size * size;
   base_.resize(n_ * number(K)), slope_.resize(n_ * number(K * N)), curved_.assign(n_, 0);
   misplaced_ = 0;
-  // Those where the parameter stays. Those of the last step are in an order of equations that may be another one now: of
-  // equal pivots rounding takes the first.
+  // Those where the parameter stays. Those of the last step are in an order of equations that may be another one now:
+  // of equal pivots rounding takes the first.
   multipliers_ = r_;
   // Second derivatives of each equation with respect to parameter and measurement, by central differences of the first.
   Numbers second(channel_batch * number(P * square)), H(number(square)), lambda(number(P)), shift(number(N)),
@@ -101,8 +101,8 @@ inline void ConstrainedChannel::linearizeCurved(const ParameterFunctions& parame
   }
 }
 
-/// Along u_a = (d_a, -G Ĉ d_a) the equations stay met to first order. What is of second order, in units of the noise, is
-/// a_ab = L⁻¹ c''(u_a, u_b) + Ĉ w_ab; with the part V - G Gᵀ of the noise along the model it is the noise of Ĉ d_a.
+/// Along u_a = (d_a, -G Ĉ d_a) the equations stay met to first order. What is of second order, in units of the noise,
+/// is a_ab = L⁻¹ c''(u_a, u_b) + Ĉ w_ab; with the part V - G Gᵀ of the noise along the model it is the noise of Ĉ d_a.
 inline void ConstrainedChannel::addCurvature(std::size_t i, const double* second, CurvatureSums& sums) const {
   if (freeOf(i) > 0) {
     sums.known = false;
@@ -308,8 +308,8 @@ LIESTAT_ESTIMATION_INLINE std::vector<Rows> ConstrainedCore::constraintCurvature
   return H;
 }
 
-/// The directions that A determines, and how the constraints bend them. Coordinates that no measurement has, such as slack
-/// variables, take up what they can.
+/// The directions that A determines, and how the constraints bend them. Coordinates that no measurement has, such as
+/// slack variables, take up what they can.
 LIESTAT_ESTIMATION_INLINE CurvatureSums ConstrainedCore::curvatureSums(void* problem) {
   Rows directions = system_.determinedBasis();
   const int k = directions.rows();

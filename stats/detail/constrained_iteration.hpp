@@ -247,9 +247,9 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::search(void* problem, const Meri
   if (!met && restore(problem, here)) return true;
   return close ? settle(problem) : finish(problem, ConstrainedEnd::stalled);
 }
-/// Where nothing along the direction improves anything and constraints do not hold: a step to the constraints alone. The
-/// linearised constraint c - λ² = 0 near λ = 0 has its multiplier at zero, and at that price the iteration would stay off
-/// it; it is raised to what c costs without λ.
+/// Where nothing along the direction improves anything and constraints do not hold: a step to the constraints alone.
+/// The linearised constraint c - λ² = 0 near λ = 0 has its multiplier at zero, and at that price the iteration would
+/// stay off it; it is raised to what c costs without λ.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::restore(void* problem, const Merit& here) {
   constexpr int most = 8;
   if (restorations_++ >= most) return false;
@@ -273,9 +273,9 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::accept(void* problem) {
   return true;
 }
 
-/// The end at a stationary point, if it is a minimum: the Hessian of the Lagrangian on the tangent space, in units of one
-/// standard deviation along the directions that A determines. Along a direction of negative curvature the iteration goes
-/// on. Where A leaves directions open, second derivatives may determine them, as that of c - λ² does at λ = 0.
+/// The end at a stationary point, if it is a minimum: the Hessian of the Lagrangian on the tangent space, in units of
+/// one standard deviation along the directions that A determines. Along a direction of negative curvature the iteration
+/// goes on. Where A leaves directions open, second derivatives may determine them, as that of c - λ² does at λ = 0.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   // Curvature that differences of first derivatives can tell from none, in units of A or of all curvature.
   constexpr double certain = 1e-4, resolved = 1e-4, rounding = 1e-13;
@@ -364,8 +364,8 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::settle(void* problem) {
   }
   return finish(problem, ConstrainedEnd::converged);
 }
-/// A step from a stationary point along a direction of negative curvature; not again and again. `otherwise`: the end where
-/// there is no way down.
+/// A step from a stationary point along a direction of negative curvature; not again and again. `otherwise`: the end
+/// where there is no way down.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const Numbers& direction, double curvature,
                                                             ConstrainedEnd otherwise) {
   constexpr int most = 8;
@@ -384,8 +384,8 @@ LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::leaveSaddle(void* problem, const
   return found || finish(problem, otherwise);
 }
 
-/// The covariance of what is determined. Active bounds do not count as equations: an estimate that a convex set cuts off
-/// is no farther from a true parameter in that set, in units of A, than one that is not cut off.
+/// The covariance of what is determined. Active bounds do not count as equations: an estimate that a convex set cuts
+/// off is no farther from a true parameter in that set, in units of A, than one that is not cut off.
 LIESTAT_ESTIMATION_INLINE void ConstrainedCore::setCovariance() {
   Rows C = system_.covariance();
   if (open_.rows() + bound_.rows() > 0) {
@@ -481,11 +481,11 @@ LIESTAT_ESTIMATION_INLINE double ConstrainedCore::noiseScale() const {
   if (settings_.noise != StatedNoise::scaled || result_.degrees_of_freedom <= 0) return 1;
   return std::max(1.0, result_.chi2 / result_.degrees_of_freedom);
 }
-/// Whether χ² refutes the stated noise; fit_p is set.
+/// True if χ² refutes the stated noise; fit_p is set.
 LIESTAT_ESTIMATION_INLINE bool ConstrainedCore::isRefuted() {
   if (result_.degrees_of_freedom <= 0) return false;
   result_.fit_p = chiSquaredTail(result_.chi2, number(result_.degrees_of_freedom));
-  return settings_.noise == StatedNoise::tested && result_.fit_p < min_constrained_fit_p;
+  return settings_.noise == StatedNoise::tested && result_.fit_p < refutation_level;
 }
 /// E²: the squared length of the second-order correction at the end.
 LIESTAT_ESTIMATION_INLINE double ConstrainedCore::equationError(void* problem) {

@@ -37,8 +37,8 @@ struct NoiseFitSums {
   }
 };
 
-/// The inverse of a stated covariance; of a singular one that of the covariance with some 1e-6 of its largest deviation,
-/// and at least 1e-12, in every direction. Not finite for what is no covariance.
+/// The inverse of a stated covariance; of a singular one that of the covariance with some 1e-6 of its largest
+/// deviation, and at least 1e-12, in every direction. Not finite for what is no covariance.
 template <class S, int N>
 Eigen::Matrix<S, N, N> statedInformation(const Eigen::Matrix<S, N, N>& covariance) {
   const Cholesky<S, N> factor(covariance);
@@ -47,8 +47,8 @@ Eigen::Matrix<S, N, N> statedInformation(const Eigen::Matrix<S, N, N>& covarianc
   return Cholesky<S, N>(covariance + least * Eigen::Matrix<S, N, N>::Identity()).inverse();
 }
 
-/// The fit to `noise`: one covariance for each of the samples, in the frame there, or one for all in that of `y`, carried
-/// to the estimate as transport() does. Gauss-Newton's iteration from y, a mean of the same samples.
+/// The fit to `noise`: one covariance for each of the samples, in the frame there, or one for all in that of `y`,
+/// carried to the estimate as transport() does. Gauss-Newton's iteration from y, a mean of the same samples.
 template <Homogeneous M, Executor E, class R>
 NoiseFit fitToNoise(const E& executor, const R& samples, const std::vector<SquareOf<M>>& noise, M y) {
   using T = ManifoldTraits<M>;

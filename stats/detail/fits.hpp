@@ -48,7 +48,8 @@ FitVector<N> leastSingularVector(std::size_t count, const Rows& rows) {
   return SymmetricEigen(sum).vectors.col(0);
 }
 
-/// The estimate from `start`, with the sigma of the residuals where none is stated: the first estimate's, for the second.
+/// The estimate from `start`, with the sigma of the residuals where none is stated: the first estimate's, for the
+/// second.
 template <int N, int D, class Equation, class Constraint>
 Fit<N> fitted(const std::vector<FitVector<D>>& points, double scale, const std::optional<double>& sigma,
               const FitVector<N>& start, const Equation& equation, const Constraint& constraint,

@@ -254,8 +254,8 @@ S varianceInflation(const Eigen::Matrix<S, N, N>& information, const Eigen::Matr
   return most;
 }
 
-/// Axes at y in which Gauss and Newton's matrix is near the identity, and the sums in them, from any axes: factors of the
-/// matrix in one system give the next, until rounding no longer counts. False if the data are not finite.
+/// Axes at y in which Gauss and Newton's matrix is near the identity, and the sums in them, from any axes: factors of
+/// the matrix in one system give the next, until rounding no longer counts. False if the data are not finite.
 template <Homogeneous M, Executor E, class R>
 bool settleAxes(const E& executor, const MahaProblem<M, R>& problem, const M& y, SquareOf<M>& axes, MahaSums<M>& sums) {
   using S = ScalarOf<M>;
@@ -264,7 +264,7 @@ bool settleAxes(const E& executor, const MahaProblem<M, R>& problem, const M& y,
     sums = problem.evaluate(executor, y, &axes);
     if ((sums.gauss_newton - SquareOf<M>::Identity()).norm() < S(0.5)) return true;
     SquareOf<M> regular = sums.gauss_newton;
-    // What rounding leaves of directions that the data hardly determine; the next system sees them.
+    // Rounding is all that is left of directions that the data hardly determine; the next system sees them.
     const S rounding = S(4 * D) * std::numeric_limits<S>::epsilon() * regular.trace();
     if (!Cholesky<S, D>(regular).ok()) regular.diagonal().array() += rounding;
     const Cholesky<S, D> factor(regular);

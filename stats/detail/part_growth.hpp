@@ -1,5 +1,5 @@
-// A covariance of which one part has grown: by what first order did not see of an error of rotation, or by the factor of a
-// region that was widened (docs/theory/means.md, sections 7.6 and 7.7).
+// A covariance of which one part has grown: by what first order did not see of an error of rotation, or by the factor
+// of a region that was widened (docs/theory/means.md, sections 7.6 and 7.7).
 #pragma once
 
 #include <lie/detail/small_eigen.hpp>
@@ -62,7 +62,7 @@ Eigen::Matrix<S, D, D> grownBy(const Eigen::Matrix<S, D, K>& lever, const Eigen:
   return sum;
 }
 
-/// What a covariance grows by if the region of some of its coordinates is widened by a factor.
+/// The growth of a covariance if the region of some of its coordinates is widened by a factor.
 template <class S, int D, std::size_t K>
 Eigen::Matrix<S, D, D> widening(const Eigen::Matrix<S, D, D>& C, const std::array<int, K>& index, double factor) {
   constexpr int k = static_cast<int>(K);
@@ -82,9 +82,10 @@ Eigen::Matrix<S, K, K> positivePart(const Eigen::Matrix<S, K, K>& A) {
   return part;
 }
 
-/// What averaging adds to a covariance of first order. The part of the averaged one for the coordinates that were averaged
-/// over says by how much their error is larger; a lever turns it into errors of the others, whatever its size. They are
-/// therefore added with the regression of first order, C + [G; I] Δ [G; I]ᵀ, Δ the positive part of the growth.
+/// The growth of a covariance of first order by averaging. The part of the averaged one for the coordinates that were
+/// averaged over says by how much their error is larger; a lever turns it into errors of the others, whatever its size.
+/// They are therefore added with the regression of first order, C + [G; I] Δ [G; I]ᵀ, Δ the positive part of the
+/// growth.
 template <int K, class S, int D>
 Eigen::Matrix<S, D, D> averagedGrowth(const Eigen::Matrix<S, D, D>& first, const Eigen::Matrix<S, D, D>& averaged,
                                       const std::array<int, static_cast<std::size_t>(K)>& index) {

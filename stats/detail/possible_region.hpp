@@ -1,11 +1,11 @@
 // The region of a mean, grown until no feature beyond it explains the measurements as well. Needs Eigen alone.
 //
-// Minima of a criterion may form a ring or a valley: of directions with flipped signs they lie on a circle about the axis,
-// and the covariance at one of its points says how wide the valley is there and not how long. A feature y is *possible*
-// if neither its score nor its cost is rejected. The score is the mean v̄(y) of the logarithms of the data at y, which
-// vanishes at the truth; T²(y) = n v̄ᵀ S(y)⁻¹ v̄ with their own scatter S(y) is Hotelling's there. The cost is judged by
-// the paired z of stats/near_ties.hpp. On flat ground T² is the squared Mahalanobis distance from the mean. The region is
-// grown shell by shell while shells have possible features (docs/theory/means.md, section 7.7).
+// Minima of a criterion may form a ring or a valley: of directions with flipped signs they lie on a circle about the
+// axis, and the covariance at one of its points says how wide the valley is there and not how long. A feature y is
+// *possible* if neither its score nor its cost is rejected. The score is the mean v̄(y) of the logarithms of the data
+// at y, which vanishes at the truth; T²(y) = n v̄ᵀ S(y)⁻¹ v̄ with their own scatter S(y) is Hotelling's there. The cost
+// is judged by the paired z of stats/near_ties.hpp. On flat ground T² is the squared Mahalanobis distance from the
+// mean. The region is grown shell by shell while shells have possible features (docs/theory/means.md, section 7.7).
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
@@ -33,20 +33,21 @@
 
 namespace liestat::detail {
 
-/// The levels at which the score and, one-sided, the cost of a feature are rejected. That of the score is the level of the
-/// region, so that flat ground does not widen it. There z is half the Mahalanobis distance, and the cost is rejected far
-/// outside the region only; on a ring the minimum of the sample is lower than those of the population by what noise
-/// explains. A higher level of either leaves points of rings outside, a lower one refuses strips of ten data.
+/// The levels at which the score and, one-sided, the cost of a feature are rejected. That of the score is the level of
+/// the region, so that flat ground does not widen it. There z is half the Mahalanobis distance, and the cost is
+/// rejected far outside the region only; on a ring the minimum of the sample is lower than those of the population by
+/// what noise explains. A higher level of either leaves points of rings outside, a lower one refuses strips of ten
+/// data.
 inline constexpr double possible_score_tail = 0.05, possible_cost_tail = 0.005;
 /// The factor of the first shell, which flat ground does not reach (its square times the quantile), and of each to the
-/// next; and that beyond which the data do not determine a mean: a region of more than three times the size has little to
-/// do with the covariance that it was made from.
+/// next; and that beyond which the data do not determine a mean: a region of more than three times the size has little
+/// to do with the covariance that it was made from.
 inline constexpr double first_shell = 1.05, shell_ratio = 1.09, largest_region_factor = 3.5;
-/// The part of the space beyond which a possible feature leaves nothing to be called a mean: two thirds of all features are
-/// nearer (directions: 109 degrees, rotations: 150).
+/// The part of the space beyond which a possible feature leaves nothing to be called a mean: two thirds of all features
+/// are nearer (directions: 109 degrees, rotations: 150).
 inline constexpr double largest_part_of_space = 2.0 / 3;
-/// That is said of so many data. Fewer reject little so far away, and Hotelling's law has made their region large already:
-/// their region is widened, to largest_region_factor at most, and their costs are judged at a higher level.
+/// That is said of so many data. Fewer reject little so far away, and Hotelling's law has made their region large
+/// already: their region is widened, to largest_region_factor at most, and their costs are judged at a higher level.
 inline constexpr std::size_t min_data_of_valley = 20;
 inline constexpr double possible_cost_tail_of_few = 0.02;
 
@@ -104,8 +105,8 @@ struct EvenDirections {
   }
 };
 
-/// Tests features of the compact part of M against data, about their mean. More than max_averaged data are represented by
-/// every m-th, whose departures from their own score and cost at the mean stand for those of all.
+/// Tests features of the compact part of M against data, about their mean. More than max_averaged data are represented
+/// by every m-th, whose departures from their own score and cost at the mean stand for those of all.
 template <Metric M>
 class FeatureTest {
  public:
@@ -195,7 +196,7 @@ class FeatureTest {
   Vector at_mean_ = Vector::Zero();
 };
 
-/// What became of a region.
+/// A region after its growth.
 template <Metric M>
 struct GrownRegion {
   double factor = 1;  ///< of its size: the covariance's root

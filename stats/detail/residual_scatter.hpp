@@ -1,10 +1,10 @@
-// What a covariance of a mean from residuals says, by the meaning of the weights: the scatter S in H⁻¹ W S W H⁻¹, and the
-// number of measurements for Hotelling's law.
+// The scatter S in the covariance H⁻¹ W S W H⁻¹ of a mean from residuals, and the number of measurements for
+// Hotelling's law, by the meaning of the weights.
 //
-// Weights that are no inverse variances leave fewer degrees of freedom than measurements: with leverages h_i = p_i/Σp the
-// effective number is 1/Σh² = (Σp)²/Σp². The residual of a measurement of leverage h is too short by 1 - h about, which
-// the jackknife's S = Σ (p_i/(1 - h_i))² z_i z_iᵀ mends; its own degrees of freedom after Satterthwaite, tr²G/tr G² of
-// the quadratic form, are fewer than 1/Σh² - 1 where some weights dominate, and by themselves too cautious: their
+// Weights that are no inverse variances leave fewer degrees of freedom than measurements: with leverages h_i = p_i/Σp
+// the effective number is 1/Σh² = (Σp)²/Σp². The residual of a measurement of leverage h is too short by 1 - h about,
+// which the jackknife's S = Σ (p_i/(1 - h_i))² z_i z_iᵀ mends; its own degrees of freedom after Satterthwaite, tr²G/tr
+// G² of the quadratic form, are fewer than 1/Σh² - 1 where some weights dominate, and by themselves too cautious: their
 // geometric mean, four parts to one, holds 93 to 97 % at ln-sd 1 and 2, 1 to 3 dimensions, from an effective number of
 // eight on (docs/theory/means.md, section 3.5).
 #pragma once

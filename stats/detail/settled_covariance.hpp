@@ -37,8 +37,8 @@ struct SettledCovariance {
 inline constexpr double averaging_width = 2;
 inline double averagingWidth(std::size_t n) { return std::min(averaging_width, 0.1 * static_cast<double>(n)); }
 
-/// A covariance from the Hessian at the mean with what one from the averaged Hessian adds (averagedGrowth), for each part
-/// that is averaged over. Of a space that is averaged over as a whole, the averaged one itself.
+/// A covariance from the Hessian at the mean with what one from the averaged Hessian adds (averagedGrowth), for each
+/// part that is averaged over. Of a space that is averaged over as a whole, the averaged one itself.
 template <Metric M, int D>
 void addAveragedGrowth(const Eigen::Matrix<ScalarOf<M>, D, D>& first, const Eigen::Matrix<ScalarOf<M>, D, D>& averaged,
                        Eigen::Matrix<ScalarOf<M>, D, D>& sum, int offset = 0) {

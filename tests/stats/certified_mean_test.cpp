@@ -123,8 +123,8 @@ TEST(NearTies, theRivalOfTwoOppositeCloudsIsListed) {
 }
 
 TEST(NearTies, knownNoiseTurnsCostsIntoLikelihoods) {
-  // Two rotations 170° apart about one axis: of sd 0.05 the rival is out of the question, of sd 1 it is not. That they are
-  // as far apart refutes either noise, which is not tested here.
+  // Two rotations 170° apart about one axis: of sd 0.05 the rival is out of the question, of sd 1 it is not. That they
+  // are as far apart refutes either noise, which is not tested here.
   const CertifiedMahaOptions<SO3d> untested{.refutation_level = 0};
   const std::vector<SO3d> samples{SO3d(), SO3d::exp(Vector3d(0, 0, 170 * pi / 180))};
   // The cost at the other midpoint less that at the mean: (95² - 85²)/2 deg² for each.
@@ -200,8 +200,8 @@ TEST(Refusals, oneOutlierNearTheCutLocusIsNoReason) {
 
 // --------------------------------------------------------------------------------------------- rings and valleys
 
-/// Directions about the pole, κ = 20, thirty of which a quarter are reversed. The minima of such data form a ring 43° from
-/// the axis.
+/// Directions about the pole, κ = 20, thirty of which a quarter are reversed. The minima of such data form a ring 43°
+/// from the axis.
 const std::vector<Vector3d> flipped_directions{
     {-0.207921, -0.173811, 0.962579}, {-0.113418, 0.163833, 0.979947},  {0.497742, 0.304442, -0.812138},
     {-0.068295, -0.008369, 0.997630}, {0.450653, 0.120417, -0.884540},  {0.258794, -0.423208, 0.868286},

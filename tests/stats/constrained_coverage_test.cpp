@@ -1,6 +1,6 @@
-// How often the 95 % regions of constrained estimates hold the truth, in kinds that curve on the scale of the noise and in
-// ordinary ones; what a robust search says of noise that is stated too small. It prints the tables of docs/constrained.md
-// and docs/robust.md.
+// How often the 95 % regions of constrained estimates hold the truth, in kinds that curve on the scale of the noise and
+// in ordinary ones; what a robust search says of noise that is stated too small. It prints the tables of
+// docs/constrained.md and docs/robust.md.
 
 #include <support/constrained_models.hpp>
 #include <lie/se3.hpp>
@@ -348,7 +348,8 @@ TEST(ConstrainedCoverage, RegionsHoldWhereTheStatusIsOk) {
     std::printf("| %s | %.1f %% | %.1f %% | %.1f %% | %.1f %% | %.1f %% |\n", kinds[k].name,
                 percent(row.first_inside, row.first), percent(row.curved, trials), percent(row.ok, trials),
                 percent(row.widened, row.ok), percent(row.inside, row.ok));
-    // Four standard errors; no more than 2 % of what is good is lost, beside one of a thousand to the test of the noise.
+    // Four standard errors; no more than 2 % of what is good is lost, beside one of a thousand to the test of the
+    // noise.
     EXPECT_GE(row.inside, 0.93 * row.ok - 4 * std::sqrt(0.0651 * row.ok)) << kinds[k].name;
     if (kinds[k].ordinary) {
       EXPECT_GE(row.ok + row.inconsistent, 0.98 * row.first) << kinds[k].name;

@@ -345,7 +345,7 @@ TEST(Constrained, StatedNoiseIsTested) {
     const auto right = estimate(0.01, StatedNoise::tested), wrong = estimate(0.005, StatedNoise::tested);
     alarms += right.end == ConstrainedEnd::inconsistent;
     refuted += wrong.end == ConstrainedEnd::inconsistent;
-    EXPECT_EQ(right.ok(), right.fit_p >= min_constrained_fit_p);
+    EXPECT_EQ(right.ok(), right.fit_p >= refutation_level);
     if (t > 0 || wrong.ok()) continue;
     EXPECT_EQ(wrong.status(), Status::inconsistent);
     EXPECT_STREQ(wrong.fit(), "inconsistent");
@@ -426,8 +426,8 @@ TEST(Constrained, RelativeCurvaturesAreThoseOfBatesAndWatts) {
   EXPECT_LE((r.covariance - r.widening * untested.covariance).norm(), 1e-6 * r.covariance.norm());
 }
 
-// An ellipse on an arc of 90°, whose first-order region holds the truth in 87 of 100 cases: what is returned holds it, and
-// where too much is missing there is none. A full ellipse with small noise is what it was.
+// An ellipse on an arc of 90°, whose first-order region holds the truth in 87 of 100 cases: what is returned holds it,
+// and where too much is missing there is none. A full ellipse with small noise is what it was.
 TEST(Constrained, RegionsOfCurvedModelsHold) {
   const int trials = trialsOf(1000), n = 30;
   int ok = 0, inside = 0, plain = 0, seen = 0, ordinary = 0;

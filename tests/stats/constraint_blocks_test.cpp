@@ -68,8 +68,8 @@ TEST(ConstraintBlocks, NearestPointOfAHalfPlane) {
 }
 
 TEST(ConstraintBlocks, ASlackThatStartsAtZeroLeavesIt) {
-  // At λ = 0 the inequality is an equation: its gradient by λ vanishes, and the border is a saddle where the measurement is
-  // inside.
+  // At λ = 0 the inequality is an equation: its gradient by λ vanishes, and the border is a saddle where the
+  // measurement is inside.
   const auto result = nearest<3, 2>(Vector<3>(1, 5, 0), Vector<2>(3, 5), atLeastZero(right_of_one, 2));
   EXPECT_TRUE(result.ok()) << name(result.end);
   EXPECT_NEAR(result.parameter[0], 3, 1e-6);
@@ -95,8 +95,8 @@ struct OnSlope {
   }
 };
 
-// A slope that is at least zero, by a slack variable: half of the estimates stand on the bound where it is zero. They are
-// the least-squares answers under the bound, and the region without it holds on either side.
+// A slope that is at least zero, by a slack variable: half of the estimates stand on the bound where it is zero. They
+// are the least-squares answers under the bound, and the region without it holds on either side.
 TEST(ConstraintBlocks, ASlopeThatIsAtLeastZero) {
   const int trials = 300, n = 10;
   const double sigma = 0.1, sd = sigma / std::sqrt(n * 1.2222 / 3);

@@ -1,4 +1,5 @@
-// Fits of the common models: the truth within the 95 % region, far from the origin and in any unit, exact points exactly.
+// Fits of the common models: the truth within the 95 % region, far from the origin and in any unit, exact points
+// exactly.
 #include <stats/fits.hpp>
 #include <stats/random.hpp>
 
@@ -158,8 +159,8 @@ TEST(Fits, homographyAndFundamental) {
     }
     return fitHomography(matches, 0.3);
   });
-  // A camera that moves sideways and turns, in units of its focal length: in pixels the smallest variances of F are below
-  // the rounding of the largest.
+  // A camera that moves sideways and turns, in units of its focal length: in pixels the smallest variances of F are
+  // below the rounding of the largest.
   Eigen::Matrix3d skew, R;
   const Vector3d t(1, 0.2, 0.1);
   skew << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;

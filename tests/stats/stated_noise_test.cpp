@@ -214,7 +214,8 @@ TEST(StatedNoise, aSingleMeasurementKeepsItsCovariance) {
   EXPECT_LT((barycentre.estimate->covariance - of_pose).norm(), 1e-12);
 }
 
-/// χ² about the minimum, not about the least-squares mean: covariances that differ by powers of ten show the difference.
+/// χ² about the minimum, not about the least-squares mean: covariances that differ by powers of ten show the
+/// difference.
 TEST(StatedNoise, chiSquareIsThatOfTheMinimum) {
   Counts counts;
   double sum = 0, sum_of_maha = 0;

@@ -114,8 +114,8 @@ TYPED_TEST(SumCertificates, agreeWithThoseThatLookAtTheData) {
         }
         ASSERT_EQ(fast.estimate.has_value(), full.estimate.has_value());
         if (fast.region_factor != full.region_factor) {
-          // The sums say that no valley leads out of the region. Scores of a few data, which are far from normal, may not
-          // reject a feature just outside of it; those of more do.
+          // The sums say that no valley leads out of the region. Scores of a few data, which are far from normal, may
+          // not reject a feature just outside of it; those of more do.
           EXPECT_LT(n, detail::min_data_of_valley);
           EXPECT_LE(full.region_factor, detail::largest_region_factor);
           EXPECT_EQ(fast.region_factor, 1);
