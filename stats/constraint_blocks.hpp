@@ -16,8 +16,7 @@
 //    and counted (ConstrainedResult::dropped_constraints, dropped_equations).
 //  - At λ = 0 second derivatives decide (ConstrainedOptions::second_order): the bound is active
 //    (ConstrainedResult::active_bounds), or λ leaves zero. The covariance is that without the bound, which holds on
-// both
-//    sides of it.
+//    both sides of it.
 //  - The estimate is a local one: it does not jump to another alternative or value.
 //  - A state that is unknown (which branch of a hysteresis) makes two models of a hierarchy (stats/hierarchy.hpp), not one
 //    product of equations.
