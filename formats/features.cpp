@@ -213,7 +213,8 @@ class FeatureReader {
     FeatureCovariance factor = FeatureCovariance::Zero(n, n);
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n && !places_.factor.empty(); ++j) {
-        factor(i, j) = value(places_.factor[static_cast<std::size_t>(i * n + j)]);
+        factor(i, j) = value(
+            places_.factor[static_cast<std::size_t>(i) * static_cast<std::size_t>(n) + static_cast<std::size_t>(j)]);
       }
       if (places_.deviations.empty()) continue;
       const double deviation = value(places_.deviations[static_cast<std::size_t>(i)]);
