@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
+
 namespace liestat {
 
 /// ‖m - c‖² - r² = 0, parameter (c, r): a circle, a sphere.
@@ -59,6 +61,16 @@ struct ConicEquation {
   template <class S>
   Eigen::Matrix<S, 1, 1> operator()(const Eigen::Matrix<S, 6, 1>& q, const Eigen::Matrix<S, 2, 1>& m) const {
     return Eigen::Matrix<S, 1, 1>(m[0] * (q[0] * m[0] + q[1] * m[1] + q[3]) + m[1] * (q[2] * m[1] + q[4]) + q[5]);
+  }
+};
+/// An ellipse by centre, semi-axes and angle, as fitEllipse() returns it: (u/a)² + (v/b)² = 1 in its axes.
+struct EllipseEquation {
+  template <class S>
+  Eigen::Matrix<S, 1, 1> operator()(const Eigen::Matrix<S, 5, 1>& e, const Eigen::Matrix<S, 2, 1>& m) const {
+    using std::cos, std::sin;
+    const S c = cos(e[4]), s = sin(e[4]), x = m[0] - e[0], y = m[1] - e[1];
+    const S u = (c * x + s * y) / e[2], v = (c * y - s * x) / e[3];
+    return Eigen::Matrix<S, 1, 1>(u * u + v * v - S(1));
   }
 };
 /// ‖q‖² = 1, of N numbers.

@@ -14,6 +14,7 @@ void addTwoViewCommand(const CommandList& program);
 void addConvertCommand(const CommandList& program);
 void addDoctorCommand(const CommandList& program);
 void addEvaluateCommand(const CommandList& program);
+void addFitCommand(const CommandList& program);
 void addHandEyeCommand(const CommandList& program);
 void addSimulateHandEyeCommand(const CommandList& simulate);
 void addSimulateMotionCommand(const CommandList& simulate);

@@ -71,7 +71,7 @@ from ._sensors import (
     two_view,
     vi_init,
 )
-from ._statistics import group_mean, mahalanobis, mean, validate_split
+from ._statistics import fit, group_mean, mahalanobis, mean, validate_split
 from ._trajectories import TrajectoryEvaluation, evaluate_trajectory
 
 __version__ = _core.__version__

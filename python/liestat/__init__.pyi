@@ -321,6 +321,9 @@ def group_mean(
 def mahalanobis(
     x: Manifold, covariance: ArrayLike, y: Manifold, y_covariance: ArrayLike | None = None, threads: int = 1
 ) -> Any: ...
+def fit(
+    points: ArrayLike, model: str, sigma: float | None = None, *, birge: bool = False
+) -> _FitSummary: ...
 def fuse(
     x: Manifold | Gaussian,
     covariances: ArrayLike | None = None,
@@ -1095,6 +1098,28 @@ class _MotionResult(Result):
     undecided_sign: _Array
     lost: _Array
     outliers: _Array
+
+class _FitSummary(Result):
+    model: str
+    points: int
+    status: str  # the status
+    end: str  # how the iteration ended
+    verdict: str  # the verdict in a sentence
+    consistent: bool | None  # whether; null: no verdict
+    causes: list[str]  # tests that speak against it, each with its likely cause
+    names: list[str]  # of the parameters
+    parameter: _Array
+    covariance: _Array
+    sigma: float  # standard deviation of a coordinate: stated, or that of the residuals
+    sigma_stated: bool  # sigma was stated, and chi-squared tests it
+    chi2: float
+    degrees_of_freedom: int
+    fit_p: float  # probability of a larger chi-squared; null: no sigma was stated
+    birge_factor: float  # of the variances, where refuted noise is scaled
+    curvature: str  # untested, small, widened or large
+    widening: float  # factor of the covariance that the curvature asks for
+    iterations: int
+    distances: _Array  # of the points from the model, in their order
 
 # end of fields
 

@@ -400,3 +400,43 @@ def mahalanobis(x, covariance, y, y_covariance=None, threads=1):
         operands.append(("y_covariance", _covariances(y_covariance, "mahalanobis: y_covariance", kind), k))
         name = "mahalanobis_squared_both"
     return np.sqrt(operate(kind._operations[name], "mahalanobis", operands, (), threads))[()]
+
+
+def fit(points, model, sigma=None, *, birge=False):
+    """A curve, a surface or a map between images through noisy points, with its covariance.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 2), (n, 3) or (n, 4)
+        x y for 'circle', 'ellipse', 'conic' and 'line'; x y z for 'sphere', 'plane' and 'line3' (of space);
+        x1 y1 x2 y2, matches, for 'homography' and 'fundamental'.
+    model : str
+    sigma : float, optional
+        Standard deviation of every coordinate, which the points then test; by default that of the residuals.
+    birge : bool
+        Multiply the covariance by Birge's factor where the points scatter more than sigma says.
+
+    Returns
+    -------
+    Result
+        The fields of ``liestat fit --json`` (docs/constrained.md): `status`, `names` of the parameters, `parameter`,
+        `covariance`, `chi2`, `fit_p`, `verdict`, `distances`, …
+
+    Warns
+    -----
+    UserWarning
+        Where there is no covariance.
+    """
+    columns = _core.fit_models()
+    if model not in columns:
+        raise ValueError(f"fit: model: expected one of {', '.join(columns)}, got {model!r}")
+    width = len(columns[model])
+    p = require_finite(as_numbers(points, "fit: points", (width,)), "fit: points")
+    if p.ndim != 2:
+        raise ValueError(f"fit: points: expected shape (n, {width}), got {p.shape}")
+    if sigma is not None and not (sigma > 0 and math.isfinite(sigma)):
+        raise ValueError(f"fit: sigma: expected a positive number, got {sigma}")
+    d = _core.fit(model, np.ascontiguousarray(p), None if sigma is None else float(sigma), bool(birge))
+    if d["status"] != "ok":
+        warnings.warn(f"liestat.fit: {d['verdict']}", UserWarning, stacklevel=2)
+    return Result.of(f"fit of a {model}", d)

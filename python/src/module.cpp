@@ -28,6 +28,7 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindMotion(module);
   liestat::python::bindTrajectories(module);
   liestat::python::bindConversions(module);
+  liestat::python::bindFits(module);
   liestat::python::bindTwoView(module);
   liestat::python::bindViInit(module);
 #ifdef LIESTAT_PYTHON_READERS

@@ -3,4 +3,4 @@
 #define LIESTAT_COMPILED_ESTIMATION
 #endif
 
-#include <stats/detail/fits.hpp>
+#include <stats/detail/fit_summary.hpp>

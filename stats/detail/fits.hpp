@@ -60,8 +60,16 @@ Fit<N> fitted(const std::vector<FitVector<D>>& points, double scale, const std::
     ConstrainedOptions<FitVector<N>> how;
     how.max_iterations = options.max_iterations;
     how.noise = sigma ? options.noise : StatedNoise::trusted;
-    const auto found =
-        constrainedEstimate(start, measurements(points, IsotropicNoise<D>(used), equation), constraint, how);
+    const auto channel = measurements(points, IsotropicNoise<D>(used), equation);
+    ConstrainedEstimator estimator(start, constraint, how, channel);
+    while (estimator.iterate()) {
+    }
+    const ConstrainedResult<FitVector<N>>& found = estimator.result();
+    fit.distances.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      fit.distances.push_back(estimator.correction(i).norm() / scale);
+    }
+    fit.relative_curvature = found.relative_curvature, fit.widening = found.widening;
     fit.end = found.end;
     fit.parameter = found.parameter;
     fit.covariance = found.covariance;
@@ -97,6 +105,8 @@ Fit<M> mapped(const Fit<N>& fit, const F& f) {
   result.covariance = congruence(D, fit.covariance);
   result.end = fit.end, result.sigma = fit.sigma, result.chi2 = fit.chi2, result.fit_p = fit.fit_p;
   result.degrees_of_freedom = fit.degrees_of_freedom, result.iterations = fit.iterations;
+  result.relative_curvature = fit.relative_curvature, result.widening = fit.widening;
+  result.distances = fit.distances;
   return result;
 }
 
@@ -175,6 +185,17 @@ inline Fit<6> conicFit(Points2 points, const std::optional<double>& sigma, const
     return row;
   });
   return fitted<6, 2>(list, frame.scale, sigma, start, autoDiff(ConicEquation{}), autoDiff(UnitLength<6>{}), options);
+}
+
+/// a = c and b = 0, by χ² of the two together.
+inline bool refutesCircle(const Fit<6>& conic) {
+  const FitVector<6>& q = conic.parameter;
+  const Eigen::Matrix<double, 6, 6>& C = conic.covariance;
+  const double u = q[0] - q[2], v = q[1];
+  const double uu = C(0, 0) - 2 * C(0, 2) + C(2, 2), uv = C(0, 1) - C(2, 1), vv = C(1, 1);
+  // NaN, of 0/0, refutes nothing.
+  const double squared = (vv * u * u - 2 * uv * u * v + uu * v * v) / (uu * vv - uv * uv);
+  return chiSquaredTail(squared, 2) < circle_level;
 }
 
 /// Both images in one scale, so that the noise stays isotropic.
@@ -298,10 +319,10 @@ LIESTAT_ESTIMATION_INLINE Fit<5> fitEllipse(Points2 points, std::optional<double
     e[4] = atan2(J(-sign * q[1]), J(sign * (q[2] - q[0]))) * 0.5;
     return e;
   });
-  if (fit.ok() && (!(discriminant > 0) || !fit.parameter.allFinite())) {
-    fit.end = ConstrainedEnd::contradictory;
-    fit.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
-  }
+  if (!fit.ok()) return fit;
+  if (!(discriminant > 0) || !fit.parameter.allFinite()) fit.end = ConstrainedEnd::contradictory;
+  if (fit.ok() && !detail::refutesCircle(conic)) fit.end = ConstrainedEnd::curved;
+  if (!fit.ok()) fit.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
   return fit;
 }
 

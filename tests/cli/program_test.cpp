@@ -154,7 +154,7 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: convert, doctor, evaluate, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, "
+      "Commands: convert, doctor, evaluate, fit, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, "
       "validate (liestat --help "
       "explains "
       "the usage)\n";
@@ -184,7 +184,7 @@ TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
   };
   const std::string manual = output("\"$0\" --man"), completion = output("\"$0\" --completion");
   for (const std::string command :
-       {"convert", "hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
+       {"convert", "fit", "hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
         "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
     EXPECT_NE(manual.find(".SS \"liestat " + command), std::string::npos) << command;
     EXPECT_NE(completion.find('"' + command + "\")\n"), std::string::npos) << command;

@@ -1,15 +1,18 @@
 // Fits of the common models: the truth within the 95 % region, far from the origin and in any unit, exact points
 // exactly.
+#include <stats/fit_summary.hpp>
 #include <stats/fits.hpp>
 #include <stats/random.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 namespace {
@@ -210,6 +213,98 @@ TEST(Fits, tooFewAndBadInput) {
   EXPECT_FALSE(fitEllipse(bad, sigma).ok());
   EXPECT_FALSE(fitCircle(bad, sigma).ok());
   EXPECT_FALSE(fitConic(std::vector<Vector2d>(10, Vector2d(1, 2)), sigma).ok());
+}
+
+/// Points of an ellipse with semi-axes 1 ± e about the origin.
+std::vector<Vector2d> nearlyRound(double e, CounterRng& rng) {
+  std::vector<Vector2d> points;
+  for (int i = 0; i < 20; ++i) {
+    const double angle = 2 * std::numbers::pi * i / 20;
+    points.push_back(noisy(Vector2d((1 + e) * std::cos(angle), (1 - e) * std::sin(angle)), rng));
+  }
+  return points;
+}
+
+// The axes of a circle have no angle, and those of an ellipse that is nearly one no angle to first order.
+TEST(Fits, anEllipseThatMayBeACircleHasNoCovariance) {
+  constexpr int trials = 400;
+  for (const double difference : {0.0, 1.0, 2.0, 6.0}) {  // of the axes, in standard deviations
+    const double e = difference * sigma * std::sqrt(2.0 / 20);
+    Eigen::Matrix<double, 5, 1> truth;
+    truth << 0, 0, 1 + e, 1 - e, 0;
+    int ok = 0, outside = 0;
+    for (std::uint64_t t = 0; t < trials; ++t) {
+      CounterRng rng(17, t);
+      const Fit<5> fit = fitEllipse(nearlyRound(e, rng), sigma);
+      if (!fit.ok()) {
+        EXPECT_TRUE(std::isnan(fit.covariance(0, 0)));
+        continue;
+      }
+      ++ok;
+      Eigen::Matrix<double, 5, 1> error = fit.parameter - truth;
+      error[4] = std::remainder(error[4], std::numbers::pi);
+      outside += error.dot(fit.covariance.inverse() * error) > 11.07 ? 1 : 0;
+    }
+    // 5 % and four standard errors.
+    EXPECT_LE(outside, 0.05 * trials + 4 * std::sqrt(0.05 * 0.95 * trials)) << difference;
+    if (difference == 0) EXPECT_LE(ok, 12);
+    if (difference == 6) EXPECT_GE(ok, 0.98 * trials);
+  }
+}
+
+TEST(FitSummary, saysTheSameAsTheFit) {
+  CounterRng rng(5, 0);
+  Eigen::MatrixXd rows(25, 2);
+  std::vector<Vector2d> points;
+  for (int i = 0; i < 25; ++i) {
+    points.push_back(noisy(Vector2d(3 * std::cos(0.2 * i), 1.5 * std::sin(0.2 * i)), rng));
+    rows.row(i) = points.back().transpose();
+  }
+  const FitSummary summary = summarizedFit(FitModel::ellipse, rows, sigma);
+  const Fit<5> fit = fitEllipse(points, sigma);
+  EXPECT_TRUE(summary.verdict().isYes()) << summary.verdict().text;
+  EXPECT_EQ((summary.parameter - fit.parameter).norm(), 0);
+  EXPECT_EQ((summary.covariance - fit.covariance).norm(), 0);
+  ASSERT_EQ(summary.names.size(), 5U);
+  ASSERT_EQ(summary.distances.size(), 25U);
+  double squares = 0;
+  for (std::size_t i = 0; i < 25; ++i) {
+    squares += summary.distances[i] * summary.distances[i];
+    // The signed distance of the curve is the length of the correction, to first order.
+    EXPECT_NEAR(std::abs(summary.distanceOf(points[i]).value), summary.distances[i], 0.03 * sigma);
+  }
+  EXPECT_NEAR(squares / (sigma * sigma), summary.chi2, 1e-6 * summary.chi2);
+
+  EXPECT_TRUE(summarizedFit(FitModel::ellipse, rows).verdict().isNone()) << "nothing tests the sigma of the residuals";
+  EXPECT_TRUE(summarizedFit(FitModel::ellipse, rows, 0.1 * sigma).verdict().isNo());
+  EXPECT_EQ(summarizedFit(FitModel::sphere, rows, sigma).end, ConstrainedEnd::bad_input);
+  EXPECT_EQ(summarizedFit(FitModel::line, rows, -1.0).end, ConstrainedEnd::bad_input);
+  EXPECT_EQ(summarizedFit(FitModel::ellipse, rows.topRows(4), sigma).end, ConstrainedEnd::too_few);
+  const FitSummary five = summarizedFit(FitModel::conic, rows.topRows(5), sigma);
+  EXPECT_FALSE(five.verdict().isYes()) << "five points test no conic";
+}
+
+// The deviation of the curve's distance covers the true curve.
+TEST(FitSummary, theBandHoldsTheTrueCurve) {
+  constexpr int trials = 300;
+  for (const FitModel model : {FitModel::circle, FitModel::ellipse, FitModel::conic}) {
+    int ok = 0, inside = 0;
+    for (std::uint64_t t = 0; t < trials; ++t) {
+      CounterRng rng(9, t);
+      Eigen::MatrixXd rows(30, 2);
+      const double minor = model == FitModel::circle ? 3 : 1.5;
+      for (int i = 0; i < 30; ++i) {
+        rows.row(i) = noisy(Vector2d(3 * std::cos(0.15 * i), minor * std::sin(0.15 * i)), rng).transpose();
+      }
+      const FitSummary fit = summarizedFit(model, rows, sigma);
+      if (!fit.ok()) continue;
+      ++ok;
+      const CurveDistance d = fit.distanceOf({3 * std::cos(2.0), minor * std::sin(2.0)});
+      inside += std::abs(d.value) < 1.96 * d.deviation ? 1 : 0;
+    }
+    ASSERT_GT(ok, 280) << name(model);
+    EXPECT_NEAR(inside, 0.95 * ok, 4 * std::sqrt(0.95 * 0.05 * ok)) << name(model);
+  }
 }
 
 }  // namespace
