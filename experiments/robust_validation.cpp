@@ -224,6 +224,52 @@ Trial searchedByAll(const Model& model, const RobustValidation& validation, doub
   return trial;
 }
 
+/// A model without its local optimisation: hypotheses are what minimal samples give, as in the report.
+template <class Model>
+struct Unpolished {
+  using Parameter = typename Model::Parameter;
+  static constexpr std::size_t sample_size = Model::sample_size;
+  static constexpr int equations = Model::equations, free_parameters = Model::free_parameters;
+  const Model* model;
+
+  std::size_t size() const { return model->size(); }
+  void solve(std::span<const std::size_t> sample, std::vector<Parameter>& solutions) const {
+    model->solve(sample, solutions);
+  }
+  void errors(const Parameter& q, std::span<double> out) const { model->errors(q, out); }
+  void errors(const Parameter& q, std::span<const std::size_t> some, std::span<double> out) const {
+    model->errors(q, some, out);
+  }
+  std::optional<Parameter> refine(const Parameter& q, std::span<const std::size_t> inliers) const {
+    return model->refine(q, inliers);
+  }
+};
+
+/// The best relevance over the draws, as steps: of a conic on 40 of 100 points.
+template <class Model>
+FigureCurve bestRelevance(const std::string& name, const Model& model, std::uint64_t seed) {
+  constexpr std::size_t draws = 3000;
+  const double threshold = chiSquaredQuantile(inlier_share, Model::equations);
+  RobustSearch search(model, Relevance{2 * threshold}, {.inlier_threshold = threshold, .seed = seed});
+  while (search.draws() < draws) search.iterate();
+  FigureCurve curve{.name = name, .x = {}, .y = {}};
+  const auto add = [&](std::size_t draw, double score) {
+    curve.x.push_back(static_cast<double>(draw)), curve.y.push_back(score);
+  };
+  for (const BestHistory::Entry& entry : search.history().entries()) {
+    if (!curve.y.empty()) add(entry.draw, curve.y.back());
+    add(entry.draw, entry.score);
+  }
+  if (!curve.y.empty()) add(draws, curve.y.back());
+  return curve;
+}
+std::vector<FigureCurve> relevanceOverDraws(std::uint64_t seed) {
+  CounterRng rng(seed, 9);
+  const ConicModel model(40, 60, 1, rng);
+  return {bestRelevance("minimal samples", Unpolished<ConicModel>{&model}, seed),
+          bestRelevance("with local optimisation", model, seed)};
+}
+
 struct Case {
   RobustStructure structure;
   double outliers;
@@ -322,6 +368,10 @@ RobustValidationResult validateRobust(const RobustValidation& validation, const 
   }
   CellRun run(validation.run, sizes, progress);
   RobustValidationResult result;
+  if (validation.figures) {
+    result.figures = vievilleFigures(validation.run.seed);
+    result.figures.relevance = relevanceOverDraws(validation.run.seed);
+  }
   for (const Case& one : cases) {
     const bool conic = one.structure == RobustStructure::conic;
     const int k = conic ? ConicModel::free_parameters : PlaneModel::free_parameters;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +35,7 @@ struct RobustValidation {
   RunSize run{.trials = 100};  ///< trials of a row
   double confidence = 0.99;    ///< that one of the draws was of inliers alone: the search's stop rule
   double draw_factor = 1;      ///< so many times the draws that the rule asks for
+  bool figures = false;        ///< those of the report, too
   /// Standard deviation of the noise that is drawn over that which the search is told.
   double noise_factor = 1;
 };
@@ -91,9 +93,32 @@ void describe(V& v, const ThresholdRow& row) {
   v("moments_found", row.moments_found)("moments_median", row.moments_median)("moments_tenth", row.moments_tenth);
 }
 
+/// The biases of a score on Stewart's distribution, fig. 8 of the report, over samples of 1000.
+struct StewartRow {
+  double e0 = 0, e1 = 1, delta = 0;  ///< shares of outliers, and of the first mode among the others; distance of modes
+  std::string score;
+  int printed = 0;                 ///< the report's figure
+  double mean = 0, deviation = 0;  ///< of the biases
+};
+/// A curve of a figure.
+struct FigureCurve {
+  std::string name;
+  std::vector<double> x, y;
+};
+/// Figures 7, 8, 9 and 18 of Viéville, Lingrand and Gaspard 2000.
+struct VievilleFigures {
+  std::vector<FigureCurve> densities;  ///< 7: of errors |x - v| under Stewart's distribution, v its values
+  std::vector<StewartRow> biases;      ///< 8
+  std::vector<FigureCurve> relevance;  ///< 9: the best one over the draws of searches, of a conic among outliers
+  std::vector<FigureCurve> phi;        ///< 18: Φ_P(d' + 1, d'), by P
+};
+/// Computes all but 9, which are a validation's searches.
+VievilleFigures vievilleFigures(std::uint64_t seed);
+
 struct RobustValidationResult {
   std::vector<RobustRow> rows;
   std::vector<ThresholdRow> thresholds;
+  VievilleFigures figures = {};
 };
 template <class V>
 void describe(V& v, const RobustValidationResult& result) {

@@ -29,7 +29,7 @@ py::dict models() {
   py::dict all;
   const auto names = words(FitModel{});
   for (std::size_t k = 0; k < names.size(); ++k) {
-    all[names[k]] = py::cast(coordinateNames(static_cast<FitModel>(k)));
+    all[names[k]] = DictView::of(coordinateNames(static_cast<FitModel>(k)));
   }
   return all;
 }

@@ -6,10 +6,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -118,6 +121,45 @@ TEST(RobustValidation, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one.rows[i].draws, two.rows[i].draws);
   }
   EXPECT_EQ(one.thresholds[0].moments_median, two.thresholds[0].moments_median);
+}
+
+// The figures of Viéville, Lingrand and Gaspard: tests/paper/ has their numbers, here is that the page has them.
+TEST(RobustFigures, AreThoseOfTheReport) {
+  RobustValidation validation = small(2, {0.3});
+  validation.structures = {RobustStructure::conic};
+  EXPECT_TRUE(validateRobust(validation).figures.densities.empty());
+  validation.figures = true;
+  const VievilleFigures figures = validateRobust(validation).figures;
+
+  ASSERT_EQ(figures.densities.size(), 5U);
+  double highest = 0;
+  std::string sharpest;
+  for (const FigureCurve& curve : figures.densities) {
+    if (curve.y.front() > highest) highest = curve.y.front(), sharpest = curve.name;
+  }
+  EXPECT_EQ(sharpest, "v = 10");
+
+  ASSERT_EQ(figures.biases.size(), 30U);
+  for (const StewartRow& row : figures.biases) {
+    // Only overlapping modes bias a score, and at 80 % of outliers relevance (docs/theory/constrained.md: -1.2 ± 1.5).
+    const double bias = row.score == "R" && row.e0 == 0.8 ? -1.2 : 0;
+    if (row.delta != 10 && row.delta != 20) {
+      EXPECT_NEAR(row.mean, bias, 0.3 + 4 * row.deviation / std::sqrt(50.)) << row.score << " " << row.e0;
+    }
+  }
+
+  ASSERT_EQ(figures.relevance.size(), 2U);
+  for (const FigureCurve& curve : figures.relevance) {
+    EXPECT_TRUE(std::is_sorted(curve.y.begin(), curve.y.end())) << curve.name;
+    EXPECT_GT(curve.y.back(), 0.3) << "of 0.4, the share of the conic";
+  }
+
+  ASSERT_EQ(figures.phi.size(), 4U);
+  const double printed[] = {0.25, 0.38, 0.47, 0.54, 0.60, 0.64, 0.68};  // the diagonal of the report's matrix
+  for (std::size_t d = 0; d < std::size(printed); ++d) {
+    EXPECT_NEAR(figures.phi[2].y[d], printed[d], 0.0101) << figures.phi[2].name;
+    EXPECT_LT(figures.phi[3].y[d], figures.phi[2].y[d]) << "P = 0.9 is the lower curve";
+  }
 }
 
 }  // namespace

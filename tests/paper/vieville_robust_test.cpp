@@ -2,6 +2,7 @@
 // distribution (figs. 7 and 8), thresholds, and what the report says differently from what is right (docs/robust.md
 // lists that).
 
+#include <experiments/stewart.hpp>
 #include <paper/full_run.hpp>
 #include <stats/random.hpp>
 #include <stats/robust.hpp>
@@ -13,14 +14,13 @@
 #include <cstddef>
 #include <cstdio>
 #include <functional>
-#include <limits>
-#include <numbers>
 #include <span>
 #include <vector>
 
 namespace {
 
 using namespace liestat;
+using namespace liestat::experiments;
 
 using Numbers = std::vector<double>;
 
@@ -68,24 +68,6 @@ TEST(RelevanceOf, ExponentialErrors) {
   }
 }
 
-/// Stewart's distribution (32): a share e0 of outliers uniform on [0, 100], of the others a share e1 at 10, the rest at
-/// 10 + delta, standard deviation 5.
-struct Stewart {
-  double e0, e1, delta;
-
-  double draw(CounterRng& rng) const {
-    if (rng.uniform() < e0) return rng.uniform(0, 100);
-    return 10 + (rng.uniform() < e1 ? 0 : delta) + 5 * rng.normal();
-  }
-  double density(double x) const {
-    const auto normal = [](double z) { return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi) / 5; };
-    return (1 - e0) * (e1 * normal((x - 10) / 5) + (1 - e1) * normal((x - 10 - delta) / 5)) +
-           (x >= 0 && x <= 100 ? e0 / 100 : 0);
-  }
-  /// Density of |x - v|: a curve of fig. 7.
-  double curve(double v, double e) const { return density(v + e) + density(v - e); }
-};
-
 TEST(Fig7, TheCurveOfTheTrueValueIsTheSharpest) {
   const Stewart law{0.2, 0.8, 10};
   constexpr int n = 20000;
@@ -111,34 +93,9 @@ TEST(Fig7, TheCurveOfTheTrueValueIsTheSharpest) {
   EXPECT_EQ(highest, 10);
 }
 
-/// The bias of a score: which integer near the data it takes for the mode at 10.
-template <class Rule>
-int bias(const Rule& rule, const Numbers& x, bool squared, int last) {
-  double best = -std::numeric_limits<double>::infinity();
-  int at = 0;
-  Numbers errors(x.size()), scratch;
-  for (int v = 0; v <= last; ++v) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const double e = std::abs(x[i] - v);
-      errors[i] = squared ? e * e : e;
-    }
-    const double score = [&] {
-      if constexpr (requires { rule(errors, scratch); }) {
-        return rule(errors, scratch);
-      } else {
-        return rule(errors);
-      }
-    }();
-    if (score > best) best = score, at = v;
-  }
-  return at - 10;
-}
-
 Numbers sampleOf(const Stewart& law, std::uint64_t trial) {
   CounterRng rng(8, trial);
-  Numbers x(1000);
-  for (double& value : x) value = law.draw(rng);
-  return x;
+  return law.sample(1000, rng);
 }
 
 struct Cell {
@@ -146,8 +103,6 @@ struct Cell {
 };
 
 TEST(Fig8, BiasOfTheScores) {
-  const Stewart columns[] = {{.1, 1, 0},   {.2, 1, 0},   {.5, 1, 0},   {.8, 1, 0},   {.2, .8, 50},
-                             {.2, .6, 50}, {.2, .8, 20}, {.2, .6, 20}, {.2, .8, 10}, {.2, .6, 10}};
   // The corrected table (docs/theory/constrained.md, section 11, fig. 8), means and standard deviations of 1000
   // repetitions of an independent prototype; the printed row of R is within two standard deviations of it, the printed
   // 2 to 6 of S_A and S_B at δ = 50 and 20 are not.
@@ -165,14 +120,11 @@ TEST(Fig8, BiasOfTheScores) {
   double mean[4][10] = {}, deviation[4][10] = {};
   int jumps[4][10] = {};
   for (std::size_t c = 0; c < 10; ++c) {
-    const Stewart& law = columns[c];
-    const int last = static_cast<int>(10 + law.delta + 20);
+    const Stewart& law = stewart_columns[c];
     std::vector<double> biases[4];
     for (std::size_t k = 0; k < trials; ++k) {
-      const Numbers x = sampleOf(law, 10 * k + c);
-      const int found[] = {bias(Relevance{10}, x, false, last), bias(Relevance{25}, x, true, last),
-                           bias(InlierCount{25}, x, true, last),
-                           bias(TrimmedQuantile{(1 - law.e0) * law.e1 / 2}, x, true, last)};
+      const StewartBiases b = stewartBiases(law, sampleOf(law, 10 * k + c));
+      const int found[] = {b.relevance, b.relevance_of_squares, b.count, b.quantile};
       for (std::size_t row = 0; row < 4; ++row) {
         // Seldom the other mode wins; one such trial decides the standard deviation. They are counted apart.
         if (law.delta >= 20 && found[row] > law.delta / 2) {
@@ -333,8 +285,8 @@ TEST(ReportsErrata, Fig8NeedsCandidatesBeyondTheModes) {
   int above = 0, within = 0;
   for (std::uint64_t k = 0; k < 60; ++k) {
     const Numbers x = sampleOf({.8, 1, 0}, 1000 + k);
-    within += bias(InlierCount{25}, x, true, 10) > 0;
-    above += bias(InlierCount{25}, x, true, 30) > 0;
+    within += stewartBias(InlierCount{25}, x, true, 10) > 0;
+    above += stewartBias(InlierCount{25}, x, true, 30) > 0;
   }
   EXPECT_EQ(within, 0);
   EXPECT_GT(above, 3);
@@ -345,8 +297,8 @@ TEST(ReportsErrata, Fig8sCodeMinimisesTheRelevanceAndTakesOutliersForInliers) {
   // end of the window.
   const Numbers x = sampleOf({.2, 1, 0}, 77);
   const auto printed = [](std::span<const double> e) { return -Relevance{10}(e); };
-  EXPECT_LE(std::abs(bias(Relevance{10}, x, false, 30)), 3);
-  EXPECT_GE(std::abs(bias(printed, x, false, 30)), 5);
+  EXPECT_LE(std::abs(stewartBias(Relevance{10}, x, false, 30)), 3);
+  EXPECT_GE(std::abs(stewartBias(printed, x, false, 30)), 5);
   // x_12(P_0, inlier, outlier) draws inliers with "the percentage of outliers", and mod 101 makes 100 % 100/101.
   const auto x_12 = [](int P, int random) { return random % 101 < P; };
   int inliers = 0, certain = 0;
