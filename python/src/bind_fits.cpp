@@ -4,6 +4,7 @@
 #include <stats/fit_summary.hpp>
 
 #include <Eigen/Core>
+#include <pybind11/stl.h>
 
 #include <optional>
 #include <string>
