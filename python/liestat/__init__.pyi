@@ -377,7 +377,7 @@ def validate(
     law: Law | None = None,
     false_alarm: float = 1e-5,
     tolerance: float = 0.0,
-    failure_fraction: float = 0.0,
+    failure_fraction: float | None = None,
     ks_tolerance: float = 0.0,
     tail: float = 0.0,
 ) -> ValidationReport: ...

@@ -577,7 +577,7 @@ def validate(
     law=None,
     false_alarm=1e-5,
     tolerance=0.0,
-    failure_fraction=0.0,
+    failure_fraction=None,
     ks_tolerance=0.0,
     tail=0.0,
 ):
@@ -600,14 +600,15 @@ def validate(
         Probability that a correct estimator fails.
     tolerance, failure_fraction, ks_tolerance, tail : float
         Allowed relative deviation of the index, probability of a failed trial, distance from the law and excess beyond
-        its 99.9 % quantile.
+        its 99.9 % quantile. By default no trial may fail, but for estimates that are `inconsistent` with the noise
+        stated for them: at the level 0.001 the library refutes right noise, too.
 
     Returns
     -------
     ValidationReport
     """
     distances = np.full(int(trials), np.nan)
-    exceptions = 0
+    exceptions = refuted = 0
     dof = 0
     for i in range(int(trials)):
         truth, measurements = draw(np.random.default_rng((int(seed), i)))
@@ -620,6 +621,7 @@ def validate(
             continue
         if estimate is None:
             continue
+        refuted += getattr(estimate, "status", None) == "inconsistent"
         if hasattr(estimate, "covariance"):
             mean, covariance = estimate.mean, estimate.covariance
         else:
@@ -636,6 +638,10 @@ def validate(
             dof = error.size
             distances[i] = error @ np.linalg.solve(np.reshape(covariance, (dof, dof)), error)
     law = Law(dof) if law is None else law
+    if failure_fraction is None:
+        # Other failures than refutations are not excused.
+        others = np.count_nonzero(np.isnan(distances)) - refuted
+        failure_fraction = _core.refutation_level if refuted > 0 and others == 0 else 0.0
     fields = _core.validation_report(
         distances,
         exceptions,

@@ -1,5 +1,6 @@
 // The report of a Monte-Carlo validation for Python, from the distances of its trials.
 #include <python/src/binding.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/validation.hpp>
 
 namespace liestat::python {
@@ -34,6 +35,9 @@ py::dict report(const DoubleArray& distances, std::size_t exceptions, int dof, i
 
 }  // namespace
 
-void bindValidation(py::module_& module) { module.def("validation_report", &report); }
+void bindValidation(py::module_& module) {
+  module.def("validation_report", &report);
+  module.attr("refutation_level") = refutation_level;
+}
 
 }  // namespace liestat::python

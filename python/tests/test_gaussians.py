@@ -254,6 +254,21 @@ class Validation(unittest.TestCase):
         self.assertEqual(by_residuals.law, Law(3, 8))
         self.assertTrue(by_residuals.passed, str(by_residuals))
 
+    def test_noise_that_chance_refutes_is_no_failure(self):
+        def estimator(x):
+            return liestat.mean(x, covariances=0.01 * np.eye(3), criterion="maha")
+
+        report = liestat.validate(estimator, self.draw, trials=3000)
+        self.assertTrue(0 < report.failures < 15, report.failures)
+        self.assertTrue(report.passed, str(report))
+        strict = liestat.validate(estimator, self.draw, trials=3000, failure_fraction=0.0)
+        self.assertEqual(strict.verdict, "too_many_failures")
+
+        def half(x):
+            return liestat.mean(x, covariances=0.005 * np.eye(3), criterion="maha")
+
+        self.assertFalse(liestat.validate(half, self.draw, trials=300).passed)
+
     def test_a_wrong_one_fails(self):
         report = liestat.validate(lambda x: (liestat.mean(x).mean, 0.0003 * np.eye(3)), self.draw, trials=300)
         self.assertEqual((report.passed, report.verdict), (False, "index_too_large"))

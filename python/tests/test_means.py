@@ -201,11 +201,11 @@ class Interrupts(unittest.TestCase):
 
     def test_branch_and_bound(self):
         scattered = ("x = liestat.SO3.exp(rng.normal(size=(1000, 3)) * 3)", "liestat.mean(x, budget=10**12, threads=1)")
-        self.assertLess(self.interrupted(scattered), 0.2)
+        self.assertLess(self.interrupted(scattered), 1)
 
     def test_arrays(self):
         many = ("v = rng.normal(size=(10**6, 3))", "\n    ".join(["while True: liestat.SO3.left_jacobian_inverse(v)"]))
-        self.assertLess(self.interrupted(many), 0.2)
+        self.assertLess(self.interrupted(many), 1)
 
 
 if __name__ == "__main__":
