@@ -9,6 +9,7 @@
 #include <stats/noise_fit.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/shown.hpp>
+#include <stats/time_dependence_types.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -44,6 +45,9 @@ struct HandEyeOptions {
   /// The fit is `inconsistent` if the probability of exceeding its χ² is smaller.
   double min_p = refutation_level;
   std::uint64_t seed = 1;  ///< seed of the fixed starts and samples
+  /// Times of the pairs, s, in their order; empty if they have none. With times the covariance is widened by the
+  /// dependence of successive errors that the residuals show (stats/time_dependence.hpp).
+  std::vector<double> times = {};
 };
 
 /// A direction of X (and Y) that the motions do not determine: the excitation is below the trusted one.
@@ -102,6 +106,9 @@ struct HandEyeResult {
   double p = std::numeric_limits<double>::quiet_NaN();  ///< probability of a larger χ²; NaN if the noise is not known
   /// The factor by which the given covariances of the poses were multiplied: 1 if the noise is known, else χ²/dof.
   double variance_factor = 1;
+  /// Dependence of the errors on time, by which the covariance is widened; untested without times, with few pairs, and
+  /// where directions are open.
+  TimeDependence dependence = {};
   /// Excitations of the six directions, ascending.
   Eigen::Matrix<double, 6, 1> excitations = Eigen::Matrix<double, 6, 1>::Zero();
   std::vector<OpenDirection> directions;  ///< those below the trusted excitation, ascending
@@ -253,6 +260,7 @@ void describe(V& v, const HandEyeResult& r) {
   v("p", r.p, "probability of a larger chi2; null: the noise is not known");
   v("variance_factor", r.variance_factor, "by which the given covariances were multiplied");
   v("noise", r.known_noise ? "given" : "scaled", "given or scaled");
+  describe(v, r.dependence);
   v("excitations", r.excitations, "of the six directions, ascending");
   v("open_directions", r.directions, "that the motions leave open");
   v("rival", r.rival ? std::optional(PoseCoordinates{*r.rival}) : std::nullopt, "X of a second solution");

@@ -136,6 +136,10 @@ HandEyeOutput calibrate(Options options) {
   output.result.world = !options.relative;
   requireNoise(output);
 
+  const auto timed = [](const PoseRows& rows) { return rows.time.has_value(); };
+  if (std::all_of(pairs.rows.begin(), pairs.rows.end(), timed)) {
+    for (const PoseRows& rows : pairs.rows) output.options.times.push_back(*rows.time);
+  }
   const std::vector<PosePair> given = givenPairs(pairs, output);
   requireDifferentPoses(given, output);
   HandEyeHintOptions hints;

@@ -97,6 +97,7 @@ std::string fitInWords(const HandEyeOutput& output) {
                       r.degrees_of_freedom);
   if (output.options.known_noise) text += fmt::format(", p {}", number(r.p, 2));
   text += fmt::format("); {} starts\n", r.starts);
+  if (r.dependence.tested) text += r.dependence.inWords() + "\n";
   if (!output.options.known_noise) {
     text += fmt::format(
         "the noise is not known: the covariances are scaled by chi2/dof = {}, and the residuals are no\n"

@@ -946,6 +946,12 @@ class _HandEyeResult(Result):
     p: float  # probability of a larger chi2; null: the noise is not known
     variance_factor: float  # by which the given covariances were multiplied
     noise: str  # given or scaled
+    time_dependence: str  # in words
+    time_dependence_tested: bool  # whether
+    independence: float  # probability that the errors are independent in time; null: untested
+    correlated_share: float  # of the variance, where they are not
+    correlation_time: float  # s
+    correlation_factor: float  # mean factor of the variances that the dependence asks for
     excitations: _Array  # of the six directions, ascending
     open_directions: list[_OpenDirection]  # that the motions leave open
     rival: CalibratedPose | None  # X of a second solution
@@ -1236,6 +1242,7 @@ def hand_eye(
     gate: float = 22.457744484825327,
     samples: int = 80,
     seed: int = 1,
+    times: ArrayLike | None = None,
 ) -> _HandEyeResult: ...
 def two_view(
     matches: ArrayLike,

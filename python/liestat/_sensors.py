@@ -209,6 +209,7 @@ def hand_eye(
     gate=22.457744484825327,
     samples=80,
     seed=1,
+    times=None,
 ):
     """Hand-eye calibration from pairs of poses that both carry noise.
 
@@ -226,6 +227,8 @@ def hand_eye(
         Squared error of a pair beyond which it is an outlier; χ²₆ at 0.999 by default.
     samples, seed : int
         Of the search for outliers.
+    times : array_like, shape (n,), optional
+        Times of the pairs, s: the covariance is then widened by the dependence of successive errors that shows.
 
     Returns
     -------
@@ -248,6 +251,9 @@ def hand_eye(
     for name, value in (("a_covariance", a_covariance), ("b_covariance", b_covariance)):
         c = _covariances(value, f"hand_eye: {name}", SE3, (n,))
         covariances.append(np.ascontiguousarray(np.broadcast_to(c, (n, 6, 6))))
+    t = np.empty(0) if times is None else _vector(times, "hand_eye: times")
+    if times is not None:
+        _same_length("hand_eye", times=t, a=a)
     d = _core.hand_eye(
         np.ascontiguousarray(a.params),
         covariances[0],
@@ -259,6 +265,7 @@ def hand_eye(
         float(gate),
         int(samples),
         int(seed),
+        t,
     )
     if d["status"] != "ok":
         warnings.warn(f"liestat.hand_eye: {d['status']}: {d['in_words']}", UserWarning, stacklevel=2)

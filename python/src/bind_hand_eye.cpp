@@ -13,7 +13,7 @@ namespace {
 
 py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const DoubleArray& b,
                    const DoubleArray& b_covariance, bool world, bool known_noise, bool find_outliers, double gate,
-                   int samples, std::uint64_t seed) {
+                   int samples, std::uint64_t seed, const DoubleArray& times) {
   const auto n = static_cast<std::size_t>(a.shape(0));
   std::vector<PosePair> pairs(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -26,6 +26,7 @@ py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const 
   options.gate = gate;
   options.samples = samples;
   options.seed = seed;
+  options.times.assign(times.data(), times.data() + times.size());
   HandEyeResult result;
   {
     const py::gil_scoped_release released;

@@ -24,9 +24,10 @@ class HandEyeParity(parity.ParityTest):
             paths = [os.path.join(directory, name) for name in ("a.csv", "b.csv")]
             json = parity.program("hand-eye", *paths, *options, codes=(0 if status == "ok" else 3,))
             a, b = (liestat.read_features(path, liestat.SE3) for path in paths)
+            times = np.loadtxt(paths[0], delimiter=",", skiprows=1, ndmin=2)[:, 0]
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            result = liestat.hand_eye(a.features, b.features, a.covariances, b.covariances, **keywords)
+            result = liestat.hand_eye(a.features, b.features, a.covariances, b.covariances, times=times, **keywords)
         pairs = json["pairs"]
         for name in OF_FILES:
             json.pop(name)

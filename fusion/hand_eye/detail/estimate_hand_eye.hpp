@@ -8,6 +8,7 @@
 #include <fusion/detail/median.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/random.hpp>
+#include <stats/time_dependence.hpp>
 
 #include <Eigen/Core>
 
@@ -66,8 +67,11 @@ class HandEyeRun {
   Fault fault() const {
     const HandEyeOptions& o = options_;
     if (!(o.gate > 0 && o.samples >= 0 && o.min_excitation > 0 && o.trusted_excitation >= o.min_excitation &&
-          o.min_p >= 0)) {
+          o.min_p >= 0 && (o.times.empty() || o.times.size() == pairs_.size()))) {
       return FaultKind::bad_option;
+    }
+    for (const double time : o.times) {
+      if (!std::isfinite(time)) return FaultKind::bad_option;
     }
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
       const PosePair& pair = pairs_[i];
@@ -298,8 +302,30 @@ class HandEyeRun {
       if (!r.pairs[i].inlier) r.outliers.push_back(i);
     }
 
-    if (converged && !r.rotationIsOpen()) setCovariance(strict.covariance);
+    if (converged && !r.rotationIsOpen())
+      setCovariance(open > 0 ? strict.covariance : widened(strict.covariance, value));
     r.status = statusOf(strict, value, open);
+  }
+  /// The covariance with the dependence in time that the whitened errors show.
+  SquareOf<typename Equation::Parameter> widened(const SquareOf<typename Equation::Parameter>& covariance,
+                                                 const HandEyeValue& value) {
+    if (options_.times.empty()) return covariance;
+    std::vector<TimedRow<6, parameters>> rows;
+    for (const std::size_t i : inliers_) {
+      const HandEyeJacobians J(value, pairs_[i].a.mean, pairs_[i].b.mean);
+      const Cholesky<double, 6> S = handEyeErrorFactor(J.A, J.B, pairs_[i]);
+      TimedRow<6, parameters>& row = rows.emplace_back();
+      row.time = options_.times[order_[i]];
+      row.residual = S.halfSolve<1>(J.e);
+      if constexpr (world) {
+        row.columns << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
+      } else {
+        row.columns = S.halfSolve<6>(Matrix6(J.X + J.Y));
+      }
+    }
+    const auto timed = timedCovariance<6, parameters>(rows, covariance, options_.known_noise);
+    result_.dependence = timed.dependence;
+    return timed.covariance;
   }
   void setCovariance(const SquareOf<typename Equation::Parameter>& covariance) {
     if constexpr (world) {

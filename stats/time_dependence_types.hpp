@@ -1,0 +1,42 @@
+// What rows with times say about the dependence of their errors; the test is in stats/time_dependence.hpp. (Needs the
+// standard library alone.)
+#pragma once
+
+#include <stats/words.hpp>
+
+#include <limits>
+#include <string>
+
+namespace liestat {
+
+/// The dependence of errors on time, as rows with times show it: a Gauss–Markov process and white noise
+/// (stats/time_dependence.hpp).
+struct TimeDependence {
+  bool tested = false;  ///< false: too few rows, no times, or columns that leave a parameter open
+  double white = std::numeric_limits<double>::quiet_NaN();  ///< probability that the errors are independent
+  /// Means under the weights of the other cells: share of the variance that depends on time, and its time constant (s).
+  double share = white, time_constant = white;
+  /// Mean factor of the variances, at least 1.
+  double correlation_factor = 1;
+
+  /// In a sentence.
+  std::string inWords() const {
+    if (!tested) return "the dependence of errors on time was not tested";
+    if (white > 0.5) {
+      return "errors are independent in time (probability " + significant(white, 2) + "): variances times " +
+             significant(correlation_factor, 3);
+    }
+    return "errors depend on time, " + significant(100 * share, 2) + " % of them with a time constant of " +
+           significant(time_constant, 3) + " s: variances times " + significant(correlation_factor, 3);
+  }
+};
+
+template <class V>
+void describe(V& v, const TimeDependence& x) {
+  v("time_dependence", x.inWords(), "in words")("time_dependence_tested", x.tested, "whether");
+  v("independence", x.white, "probability that the errors are independent in time; null: untested");
+  v("correlated_share", x.share, "of the variance, where they are not")("correlation_time", x.time_constant, "", "s");
+  v("correlation_factor", x.correlation_factor, "mean factor of the variances that the dependence asks for");
+}
+
+}  // namespace liestat
