@@ -15,7 +15,7 @@
 #include <fusion/trajectory_conversion.hpp>
 #include <fusion/two_view/two_view_types.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>
-#include <stats/fit_summary.hpp>
+#include <stats/fit_summary_types.hpp>
 #include <stats/mean_summary.hpp>
 #include <stats/split_validation_types.hpp>
 

@@ -2,6 +2,7 @@
 #include <cli/show/fit.hpp>
 #include <formats/numeric_table.hpp>
 #include <report/publish.hpp>
+#include <stats/fit_summary.hpp>
 
 #include <cstddef>
 #include <memory>

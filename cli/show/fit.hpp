@@ -1,6 +1,6 @@
 #pragma once
 
-#include <stats/fit_summary.hpp>
+#include <stats/fit_summary_types.hpp>
 
 #include <Eigen/Core>
 
