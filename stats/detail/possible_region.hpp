@@ -65,18 +65,6 @@ double partOfSpace(double angle) {
   }
 }
 
-/// The x at which a tail probability, which falls from 1 at 0, is `tail`.
-template <class Tail>
-double whereTail(double tail, const Tail& of) {
-  double low = 0, high = 1;
-  while (of(high) > tail && high < 1e12) low = high, high *= 2;
-  for (int i = 0; i < 50 && high - low > 1e-9 * high; ++i) {
-    const double middle = 0.5 * (low + high);
-    (of(middle) > tail ? low : high) = middle;
-  }
-  return high;
-}
-
 /// Unit vectors in K = 1, 2 or 3 dimensions, evenly spread: both ways, on a circle, on a spiral.
 template <int K>
 struct EvenDirections {
