@@ -147,7 +147,7 @@ class MeanParity(ParityTest):
     def test_skewed_errors(self):
         """Exponential errors: a note, and on request a wider region."""
         rng = np.random.default_rng(5)
-        path = self.table("rx,ry,rz", 0.05 * rng.exponential(size=(30, 3)))
+        path = self.table("rx,ry,rz", 0.05 * rng.exponential(size=(60, 3)))
         plain, _ = self.assert_equal_means(path)
         self.assertEqual((plain["region"], plain["skew_factor"]), ("law", 1))
         self.assertLess(plain["skewness_p"], 1e-3)
