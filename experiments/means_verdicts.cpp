@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace liestat::experiments {
 namespace {
@@ -39,14 +40,24 @@ class Sampler {
     return {SquareOf<M>(variance * SquareOf<M>::Identity())};
   }
 
-  /// The population's mean, or one of them.
-  const M& truth() const { return truth_; }
+  /// The region is that of a bootstrap.
+  bool isBootstrapped() const {
+    return cell_.law == VerdictLaw::exponential || cell_.law == VerdictLaw::log_normal ||
+           cell_.law == VerdictLaw::normal;
+  }
+
+  /// The population's mean, or all of them: points of a circle or sphere about the origin.
+  const std::vector<M>& truths() const { return truths_; }
 
   M draw(std::size_t i, CounterRng& rng) const {
     constexpr int k = ManifoldTraits<M>::DoF, angles = std::min(k, 3);
     if (cell_.law == VerdictLaw::fisher) return fisher_.draw(rng);
     if (isTurned()) return drawTurned(rng);
     TangentOf<M> e = rng.template normalVector<k>();
+    if (isBootstrapped()) {
+      for (int j = 0; j < k; ++j) e[j] = 0.05 * skewed(e[j]);
+      return exp(ManifoldTraits<M>::origin(), e);
+    }
     if (cell_.law == VerdictLaw::strip) {
       TangentOf<M> along = TangentOf<M>::Zero();
       along[0] = rng.uniform(-cell_.parameter, cell_.parameter);
@@ -78,6 +89,13 @@ class Sampler {
   bool isTurned() const {
     return cell_.law == VerdictLaw::flips || cell_.law == VerdictLaw::half_turns || cell_.law == VerdictLaw::outliers;
   }
+  /// An error of mean 0 and variance 1 from a standard normal one.
+  double skewed(double z) const {
+    if (cell_.law == VerdictLaw::normal) return z;
+    if (cell_.law == VerdictLaw::exponential) return -std::log(0.5 * std::erfc(z / std::numbers::sqrt2)) - 1;
+    const double s2 = cell_.parameter * cell_.parameter, mean = std::exp(0.5 * s2);
+    return (std::exp(cell_.parameter * z) - mean) / (mean * std::sqrt(std::exp(s2) - 1));
+  }
   /// A feature of Fisher's law, which with the probability of the cell's parameter becomes another one.
   M drawTurned(CounterRng& rng) const {
     const M x = fisher_.draw(rng);
@@ -102,7 +120,7 @@ class Sampler {
     for (int i = 0; i < 20000; ++i) some.push_back(drawTurned(rng));
     TangentOf<M> direction = TangentOf<M>::Zero();
     direction[cell_.law == VerdictLaw::half_turns ? ManifoldTraits<M>::DoF - 1 : 0] = 1;
-    double least = 0;
+    double least = 0, radius = 0;
     for (int degrees = 0; degrees <= 90; ++degrees) {
       double cost = 0;
       // Both ways, so that the draws are as symmetric as the law.
@@ -116,14 +134,25 @@ class Sampler {
       // The same but for the draws: a single minimum is at the origin.
       if (degrees == 0 || cost < least * (1 - 1e-4)) {
         least = cost;
-        truth_ = exp(ManifoldTraits<M>::origin(), TangentOf<M>(degrees * units::degree * direction));
+        radius = degrees * units::degree;
       }
+    }
+    if (radius == 0) return;
+    truths_.clear();
+    const auto add = [&](const TangentOf<M>& u) {
+      truths_.push_back(exp(ManifoldTraits<M>::origin(), TangentOf<M>(radius * u)));
+    };
+    if (cell_.law == VerdictLaw::half_turns) {
+      add(direction), add(-direction);
+    } else {
+      CounterRng any(2);
+      for (int i = 0; i < 72; ++i) add(any.unitVector<ManifoldTraits<M>::DoF>());
     }
   }
 
   VerdictCell cell_;
   FisherLaw<M> fisher_;
-  M truth_ = ManifoldTraits<M>::origin();
+  std::vector<M> truths_{ManifoldTraits<M>::origin()};
 };
 
 /// The outcomes of one trial: counts of 0 and 1.
@@ -141,10 +170,13 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   // A certificate that is not found changes no verdict; a rival that is, is found early.
   options.uniqueness.budget = 200'000;
   options.known_noise = sampler.statedNoise();
+  if (sampler.isBootstrapped()) options.region = MeanRegion::bootstrap;
   const CertifiedMean<M> result = certifiedMean(samples, options);
-  const M& truth = sampler.truth();
+  const std::vector<M>& truths = sampler.truths();
   const auto misses = [&](const SquareOf<M>& covariance) {
-    return !(mahalanobisSquared(Gaussian<M>{result.mean.mean, covariance}, truth) <= quantile);
+    return std::any_of(truths.begin(), truths.end(), [&](const M& truth) {
+      return !(mahalanobisSquared(Gaussian<M>{result.mean.mean, covariance}, truth) <= quantile);
+    });
   };
   Outcome outcome{.ok = result.status == Status::ok,
                   .ambiguous = result.status == Status::ambiguous,
@@ -156,7 +188,7 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   if (!outcome.ok) return outcome;
   outcome.outside = misses(result.estimate->covariance);
   outcome.widened = result.region_factor > 1;
-  const TangentOf<M> error = log(result.mean.mean, truth);
+  const TangentOf<M> error = log(result.mean.mean, truths.front());
   outcome.wrong = std::abs(error[ManifoldTraits<M>::DoF - 1]) > 0.25 * fold<M> * pi;
   return outcome;
 }
@@ -212,8 +244,9 @@ void giveVerdict(VerdictRow& row) {
 }  // namespace
 
 std::string name(VerdictLaw law) {
-  constexpr const char* names[] = {"fisher",   "report", "isotropic", "clouds", "flips",        "half_turns",
-                                   "outliers", "strip",  "lever",     "stated", "stated_clouds"};
+  constexpr const char* names[] = {"fisher",        "report",      "isotropic",  "clouds", "flips",
+                                   "half_turns",    "outliers",    "strip",      "lever",  "stated",
+                                   "stated_clouds", "exponential", "log_normal", "normal"};
   return names[static_cast<std::size_t>(law)];
 }
 
@@ -229,6 +262,12 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
   }
   if (cell.law == VerdictLaw::stated_clouds || (cell.law == VerdictLaw::stated && x >= 4)) {
     promise.max_kept = 0.001;
+    return promise;
+  }
+  if (cell.law == VerdictLaw::normal || cell.law == VerdictLaw::exponential || cell.law == VerdictLaw::log_normal) {
+    const bool few = cell.law == VerdictLaw::log_normal && cell.n < 50;
+    promise.min_coverage = cell.law == VerdictLaw::normal ? 0.945 : few ? 0.90 : 0.93;
+    promise.min_kept = 0.99;
     return promise;
   }
   promise.max_outside = 0.07;
@@ -307,7 +346,16 @@ std::vector<VerdictCell> verdictCells(bool full) {
       cells.push_back({feature, VerdictLaw::stated, 10, 9, 200});
     }
     cells.push_back({Feature::rotation, VerdictLaw::stated_clouds, 179, 40, 200});
+    add_cell(Feature::direction, VerdictLaw::exponential, 0, 20, 400);
+    add_cell(Feature::rotation, VerdictLaw::log_normal, 1, 50, 400);
     return cells;
+  }
+  for (const Feature feature : {Feature::point, Feature::direction, Feature::rotation, Feature::frame}) {
+    for (const std::size_t n : {20, 50, 100}) {
+      add_cell(feature, VerdictLaw::normal, 0, n, 2000);
+      add_cell(feature, VerdictLaw::exponential, 0, n, 2000);
+      for (const double s : {0.5, 1.0}) add_cell(feature, VerdictLaw::log_normal, s, n, 2000);
+    }
   }
   for (const Feature feature : all_features) {
     // Points have no cut locus, rigid motions no metric.

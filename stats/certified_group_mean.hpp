@@ -40,6 +40,8 @@ struct CertifiedGroupMeanOptions {
   /// The covariance is withheld if the Hessian of the twin's mean, or without a twin the equations of the barycentre,
   /// averaged over the confidence region, are flatter than those at the mean by more than this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
+  MeanRegion region = MeanRegion::law;  ///< of a covariance from residuals, as in CertifiedMeanOptions
+  BootstrapOptions bootstrap = {};      ///< the draws of MeanRegion::bootstrap
 };
 
 /// A barycentre with its certificates and its covariance.
@@ -55,6 +57,8 @@ struct CertifiedGroupMean {
   NoiseFit fit;                       ///< of the elements to their known noise; nothing where none was stated
   bool from_noise = false;            ///< the covariance follows from the known noise
   double law_n = 0;                   ///< as CertifiedMean's
+  MeanRegion region = MeanRegion::law;  ///< as CertifiedMean's
+  double skew_factor = 1;               ///< as CertifiedMean's
   /// The barycentre with its covariance, from residuals or from known noise; none unless status is ok.
   std::optional<Gaussian<G>> estimate;
   Status status = Status::too_few;
@@ -168,6 +172,7 @@ CertifiedGroupMean<G> findCertifiedGroupMean(const E& executor, const R& samples
   if (known && options.scale_noise) covariance *= ScalarOf<G>(result.fit.factor());
   result.estimate = Gaussian<G>{result.mean.mean, covariance};
   result.status = Status::ok;
+  bootstrapRegion<G>(samples, weights, options, result);
   return result;
 }
 

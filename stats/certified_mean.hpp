@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stats/detail/any_executor.hpp>
+#include <stats/detail/bootstrap_region.hpp>
 #include <stats/detail/fit_to_noise.hpp>
 #include <stats/detail/possible_region.hpp>
 #include <stats/detail/ranges.hpp>
@@ -16,6 +17,7 @@
 #include <stats/executor.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/mean.hpp>
+#include <stats/mean_region.hpp>
 #include <stats/near_ties.hpp>
 #include <stats/noise_fit.hpp>
 #include <stats/status.hpp>
@@ -49,6 +51,9 @@ struct CertifiedMeanOptions {
   /// this fraction.
   double largest_hessian_change = liestat::largest_hessian_change;
   NearTieOptions near_ties = {};  ///< the criterion by which higher minima are rivals
+  /// The region of a covariance from residuals; that of known noise is χ²'s.
+  MeanRegion region = MeanRegion::law;
+  BootstrapOptions bootstrap = {};  ///< the draws of MeanRegion::bootstrap
 };
 
 /// A mean with its certificates and its covariance.
@@ -74,6 +79,9 @@ struct CertifiedMean {
   double region_factor = 1;
   /// The farthest feature found on the ring or in the valley for which the region was widened, if it was.
   std::optional<NearTie<M>> valley = {};
+  MeanRegion region = MeanRegion::law;  ///< of the estimate
+  /// MeanRegion::bootstrap: the factor by which the region was widened for the skewness of the noise.
+  double skew_factor = 1;
   /// The mean with its covariance, from residuals (Hotelling's law) or from known noise (χ²); none unless status is ok.
   std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
@@ -263,6 +271,22 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   return result;
 }
 
+/// Widens the region of a certified mean, whose covariance is from residuals, by a bootstrap if the options ask for it.
+template <class M, class R, class W, class Options, class Result>
+void bootstrapRegion(const R& samples, const W& weights, const Options& options, Result& result) {
+  if (options.region == MeanRegion::law || !result.estimate || result.from_noise) return;
+  result.region = MeanRegion::bootstrap;
+  const double widened =
+      bootstrapWidening<M>(samples, weights, result.mean, options.noise, result.law_n, options.bootstrap);
+  result.skew_factor = std::sqrt(widened);
+  if (std::isfinite(widened)) {
+    result.estimate->covariance *= ScalarOf<M>(widened);
+  } else {
+    result.estimate.reset();
+    result.status = Status::too_few, result.reason = unbounded_region_reason;
+  }
+}
+
 /// The mean of features with its certificates, by the sums of its last pass if they prove all of them.
 template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const W& weights,
@@ -274,6 +298,7 @@ CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const
   if (!certifyBySums(sums, options, result)) {
     result = findCertifiedMean<M>(executor, samples, weights, options, result.mean);
   }
+  bootstrapRegion<M>(samples, weights, options, result);
   return result;
 }
 
@@ -284,7 +309,7 @@ CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const
 /// that is stated for them (inconsistent; `fit` says by how much), if another feature explains the measurements as
 /// well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or the criterion is
 /// flat within the confidence region (ill_defined), if there are no more features than dimensions and the noise is not
-/// known (too_few), or if the weights are invalid (not_applicable). A mean that is merely not certified to be unique
+/// known, or too few for a bootstrap that the options ask for (too_few), or if the weights are invalid (not_applicable). A mean that is merely not certified to be unique
 /// keeps its covariance. The result has the same bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
@@ -295,6 +320,9 @@ CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
     CertifiedMean<M> result{.mean = detail::frechetMean<M>(executor, features, detail::UnitWeights{}, options.mean)};
     if (!detail::certifyBySums(detail::WeightSums::ofOnes(n), options, result)) {
       result = detail::findCertifiedMean<M>(detail::erased(executor), features, detail::ones(n), options, result.mean);
+    }
+    if (options.region == MeanRegion::bootstrap) {
+      detail::bootstrapRegion<M>(features, detail::ones(n), options, result);
     }
     return result;
   } else {

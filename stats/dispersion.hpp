@@ -3,10 +3,12 @@
 #pragma once
 
 #include <lie/manifold.hpp>
+#include <stats/detail/mardia_skewness.hpp>
 #include <stats/detail/ranges.hpp>
 #include <stats/detail/weights.hpp>
 #include <stats/mean.hpp>
 #include <stats/row_order.hpp>
+#include <stats/skewness.hpp>
 
 #include <cmath>
 #include <cstddef>
@@ -30,6 +32,7 @@ struct Dispersion {
   SquareOf<M> covariance = SquareOf<M>::Zero();  ///< Σ p_i z_i z_iᵀ / Σ p_i, z_i = log(y, x_i)
   std::vector<FarthestFeature> farthest = {};    ///< one for each of the type's tangent_parts, none if it says none
   RowOrder order = {};                           ///< of the features as they came
+  Skewness skewness = {};                        ///< of √p_i z_i
 };
 
 namespace detail {
@@ -67,18 +70,25 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
   const double tie = 64 * static_cast<double>(std::numeric_limits<S>::epsilon());
   const std::size_t n = std::ranges::size(samples);
   const bool ordered = n >= RowOrder::min_rows;
+  const bool skewed = n >= Skewness::min_rows && n <= Skewness::max_rows;
   const Cholesky<S, T::DoF> whitening =
-      ordered ? scatterOfSome<M>(samples, to_y) : Cholesky<S, T::DoF>(SquareOf<M>::Identity());
+      ordered || skewed ? scatterOfSome<M>(samples, to_y) : Cholesky<S, T::DoF>(SquareOf<M>::Identity());
   TangentOf<M> before = TangentOf<M>::Zero();
   double lag = 0, squared_lags = 0, squares_of_rows = 0;
   // Σ of a = log p, of q = p |z|² and their products, for the correlation of both.
   double a1 = 0, a2 = 0, q2 = 0, aq = 0;
+  std::vector<Eigen::Matrix<double, T::DoF, 1>> errors;
+  if (skewed) errors.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const TangentOf<M> z = T::logOrigin(T::act(to_y, M(samples[i])));
     const S p = S(weights[i]);
-    if (ordered) {
+    TangentOf<M> u = TangentOf<M>::Zero();
+    if (ordered || skewed) {
       using std::sqrt;
-      const TangentOf<M> u = whitening.halfSolve(TangentOf<M>(sqrt(p) * z));
+      u = whitening.halfSolve(TangentOf<M>(sqrt(p) * z));
+    }
+    if (skewed) errors.push_back(u.template cast<double>());
+    if (ordered) {
       const double product = static_cast<double>(u.dot(before));
       lag += product, squared_lags += product * product;
       const double q = static_cast<double>(u.squaredNorm());
@@ -101,6 +111,7 @@ Dispersion<M> findDispersion(const R& samples, const W& weights, const M& y) {
     }
   }
   result.covariance /= weight;
+  if (skewed) result.skewness = mardiaSkewness<T::DoF>(errors);
   if (ordered && squared_lags > 0) {
     // Errors about their own mean are correlated by -1/n.
     lag += squares_of_rows / static_cast<double>(n);

@@ -54,14 +54,14 @@ struct FitSummary {
   Status status() const { return statusOf(end); }
   bool ok() const { return end == ConstrainedEnd::converged; }
   /// Yes where a stated sigma was tested and the points follow the model; none where the residuals gave sigma.
-  LIESTAT_ESTIMATION_API Verdict verdict() const;
+  Verdict verdict() const;
   /// Standard deviation of a parameter; NaN where there is none.
   double deviation(std::size_t i) const {
     const auto k = static_cast<Eigen::Index>(i);
     return std::sqrt(covariance(k, k) < 0 ? 0 : covariance(k, k));
   }
   /// Of a circle, line, conic or ellipse.
-  LIESTAT_ESTIMATION_API CurveDistance distanceOf(const Eigen::Vector2d& point) const;
+  CurveDistance distanceOf(const Eigen::Vector2d& point) const;
 };
 
 template <class V>

@@ -46,6 +46,17 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
                          " standard deviations): they are no inverse variances, and the covariance supposes that they "
                          "are; importance has a covariance without that");
   }
+  if (mean.skewness.matters() && mean.fromResiduals() && mean.region == MeanRegion::law) {
+    mean.notes.push_back(
+        "the errors are skewed or have heavy tails (Mardia's skewness " + significant(mean.skewness.b, 2) +
+        ", p = " + significant(mean.skewness.p, 1) +
+        "): the 95 % region is that of symmetric noise, and too small for so few skewed errors; region "
+        "bootstrap has one without that");
+  }
+  if (mean.skew_factor > 1 && mean.hasCovariance()) {
+    mean.notes.push_back("the region is widened by " + significant(mean.skew_factor, 3) +
+                         " by a bootstrap, for the skewness of the errors");
+  }
   if (mean.order.dependent() && mean.hasCovariance()) {
     mean.notes.push_back("successive measurements err alike (correlation " + significant(mean.order.correlation, 2) +
                          ", " + significant(mean.order.z, 2) +

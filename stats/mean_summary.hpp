@@ -6,10 +6,12 @@
 #include <lie/units.hpp>
 #include <stats/feature_value.hpp>
 #include <stats/maha_types.hpp>
+#include <stats/mean_region.hpp>
 #include <stats/noise_fit.hpp>
 #include <stats/residual_noise.hpp>
 #include <stats/row_order.hpp>
 #include <stats/shown.hpp>
+#include <stats/skewness.hpp>
 #include <stats/status.hpp>
 #include <stats/time_blocks_types.hpp>
 #include <stats/uniqueness_types.hpp>
@@ -101,7 +103,9 @@ struct MeanSummary {
   double residual = 0;  ///< norm of the last step
   double tolerance = 0, cost = 0;
 
-  Eigen::MatrixXd covariance;  ///< in the local frame at the mean, rad and m; empty if there is none
+  MeanRegion region = MeanRegion::law;  ///< of the covariance
+  double skew_factor = 1;               ///< by which MeanRegion::bootstrap widened it, of lengths
+  Eigen::MatrixXd covariance;           ///< in the local frame at the mean, rad and m; empty if there is none
   double law_n =
       0;  ///< number of measurements for Hotelling's law: n, fewer in effect for weights that are no precisions
   /// F with F Fᵀ that covariance, where factors were given: its small variances have more digits. NaN where it is
@@ -133,6 +137,7 @@ struct MeanSummary {
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
   RowOrder order = {};                         ///< correlation of successive measurements
+  Skewness skewness = {};                      ///< of the measurements' errors
   std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
   std::vector<std::string> notes = {};         ///< remarks, in sentences
 
@@ -198,6 +203,10 @@ void describe(V& v, const MeanSummary& m) {
     "of squared distances from the truth: chi2 or hotelling");
   v("covariance_law_n", where(m.fromResiduals(), m.law_n),
     "measurements for Hotelling's law: n, fewer in effect where weights are no precisions");
+  v("region", where(m.fromResiduals(), std::string(name(m.region))),
+    "law or bootstrap: what the covariance with the 95 % quantile of covariance_law is a region by");
+  v("skew_factor", where(m.fromResiduals(), m.skew_factor),
+    "by which a bootstrap widened the standard deviations for the noise's skewness; 1: not at all");
   v("standard_deviations", partDeviations(m.parts, m.covariance),
     "along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg");
   v("standard_deviations_world", worldDeviations(m.parts, m.mean, m.covariance),
@@ -228,6 +237,8 @@ void describe(V& v, const MeanSummary& m) {
   v("weight_z", where(m.order.weightsTested(), m.order.weight_z),
     "correlation of log weights with p·r², in standard deviations; beyond 3.3 the weights are no inverse variances");
   v("lag_z", where(m.order.tested(), m.order.z), "the same in standard deviations; above 2.45 a note says so");
+  v("skewness", where(m.skewness.tested(), m.skewness.b), "Mardia's, of the errors; zero but for chance if symmetric");
+  v("skewness_p", where(m.skewness.tested(), m.skewness.p), "probability of so large a one of normal errors");
   v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
   v("notes", m.notes, "what is remarkable, in sentences");
 }

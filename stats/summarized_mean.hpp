@@ -42,6 +42,7 @@ struct MeanInput {
   RefutedNoise refuted_noise = RefutedNoise::withheld;
   ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
   bool scale_noise = false;                              ///< Birge's factor, where they are not refuted
+  MeanRegion region = MeanRegion::law;                   ///< of a covariance from residuals; not for maha
 
   bool weighted() const {
     return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
@@ -98,6 +99,7 @@ inline void setStatus(MeanSummary& mean, Status status, const char* reason) {
   mean.status = status, mean.reason = reason;
   if (status == Status::too_few && mean.n > 0) {
     mean.status = Status::not_applicable;
+    if (mean.reason == unbounded_region_reason) return void(mean.covariance_status = mean.status);
     mean.reason = "a covariance from residuals needs more measurements than the feature has dimensions";
   }
   mean.covariance_status = mean.status;
@@ -150,6 +152,7 @@ void setDispersion(MeanSummary& mean, const MeanInput<M>& input, const M& y) {
       input.weights.empty() ? dispersionAbout(input.features, y) : dispersionAbout(input.features, input.weights, y);
   mean.dispersion = dispersion.covariance.template cast<double>();
   mean.order = dispersion.order;
+  mean.skewness = dispersion.skewness;
   for (const FarthestFeature& f : dispersion.farthest) {
     mean.farthest.push_back({f.block.part, f.distance, f.index});
   }
@@ -159,19 +162,21 @@ template <Metric M, Executor E>
 void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
                      const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
-  // Without certificates there is a law for precisions alone.
-  if (options.certificates || input.weights_are != ResidualNoise::precision) {
+  // Without certificates there is Hotelling's law for precisions alone.
+  if (options.certificates || input.weights_are != ResidualNoise::precision || input.region != MeanRegion::law) {
     CertifiedMeanOptions<M> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
     how.refuted_noise = input.refuted_noise;
     how.noise = input.weights_are;
     how.scale_noise = input.scale_noise;
+    how.region = input.region;
     const CertifiedMean<M> result = ones ? certifiedMean(executor, input.features, how)
                                          : certifiedMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
     mean.known_noise = result.from_noise;
     if (!result.from_noise && result.law_n > 0) mean.law_n = result.law_n;
+    mean.region = result.region, mean.skew_factor = result.skew_factor;
     return setDispersion(mean, input, result.mean.mean);
   }
   const MeanResult<M> result =
@@ -192,18 +197,20 @@ void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& i
 template <LieGroup G, Executor E>
 void setBarycentre(MeanSummary& mean, const E& executor, const MeanInput<G>& input, const MeanSummaryOptions& options) {
   const bool ones = input.weights.empty();
-  if (options.certificates || input.weights_are != ResidualNoise::precision) {
+  if (options.certificates || input.weights_are != ResidualNoise::precision || input.region != MeanRegion::law) {
     CertifiedGroupMeanOptions<G> how;
     how.uniqueness = options.uniqueness;
     how.known_noise = input.covariances;
     how.refuted_noise = input.refuted_noise;
     how.noise = input.weights_are;
     how.scale_noise = input.scale_noise;
+    how.region = input.region;
     const CertifiedGroupMean<G> result = ones ? certifiedGroupMean(executor, input.features, how)
                                               : certifiedGroupMean(executor, input.features, input.weights, how);
     setCertified(mean, result.mean, result);
     mean.known_noise = result.from_noise;
     if (!result.from_noise && result.law_n > 0) mean.law_n = result.law_n;
+    mean.region = result.region, mean.skew_factor = result.skew_factor;
     return setDispersion(mean, input, result.mean.mean);
   }
   const GroupMeanResult<G> result =

@@ -38,6 +38,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
     throw OptionError("liestat mean", "--refuted residuals with maha, whose weights are the refuted covariances",
                       "--criterion lsq or wlsq");
   }
+  if (how.region == MeanRegion::bootstrap && measurements.known_noise) {
+    throw OptionError("liestat mean", "--region bootstrap with the measurements' noise, whose region is chi-squared's",
+                      "measurements whose covariances the mean does not use");
+  }
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
   Progress progress("searching for other means", 1000);
@@ -104,6 +108,10 @@ void addMeanCommand(const CommandList& app) {
                   {"importance", ResidualNoise::importance},
                   {"frequency", ResidualNoise::frequency}},
                  "Meaning of the weights: precision (inverse variances, default), importance or frequency (counts)");
+  command.choice(
+      "--region", options->analysis.region, {{"law", MeanRegion::law}, {"bootstrap", MeanRegion::bootstrap}},
+      "The region of a covariance from residuals: Hotelling's law (default), or widened by a bootstrap where "
+      "the noise is skewed");
   command.choice("--refuted", options->analysis.refuted_noise,
                  {{"withheld", RefutedNoise::withheld}, {"residuals", RefutedNoise::residuals}},
                  "The covariance where the scatter refutes the file's: withheld (default) or from the residuals");

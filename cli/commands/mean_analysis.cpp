@@ -45,6 +45,7 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   input.refuted_noise = options.refuted_noise;
   input.scale_noise = options.birge;
   input.weights_are = options.weights_are;
+  input.region = options.region;
   MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];

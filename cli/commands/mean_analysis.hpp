@@ -28,6 +28,7 @@ struct AnalysisOptions {
   std::function<bool()> stop = {};                      ///< ends that search once it says true
   RefutedNoise refuted_noise = RefutedNoise::withheld;  ///< what becomes of the file's covariances once refuted
   ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
+  MeanRegion region = MeanRegion::law;                   ///< of a covariance from residuals
   bool birge = false;                                    ///< multiply the covariance by fit_factor
   bool inflate = false;                                  ///< multiply the covariance by the factor of compareBlocks()
 };

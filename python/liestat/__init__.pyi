@@ -287,6 +287,7 @@ def mean(
     refuted: Literal["withheld", "residuals"] = "withheld",
     birge: bool = False,
     weights_are: Literal["precision", "importance", "frequency"] = "precision",
+    region: Literal["law", "bootstrap"] = "law",
     inflate: bool = False,
     budget: int | None = None,
     threads: int = 0,
@@ -423,6 +424,10 @@ class _MeanSummary:
     covariance_law: str | _Several | None  # text or null; of squared distances from the truth: chi2 or hotelling
     # number or null; measurements for Hotelling's law: n, fewer in effect where weights are no precisions
     covariance_law_n: float | _Several | None
+    # text or null; law or bootstrap: what the covariance with the 95 % quantile of covariance_law is a region by
+    region: str | _Several | None
+    # number or null; by which a bootstrap widened the standard deviations for the noise's skewness; 1: not at all
+    skew_factor: float | _Several | None
     # by name or null; along the axes of the mean: rotation_deg, translation_m, point_m, direction_deg
     standard_deviations: dict[str, Any] | _Several | None
     # by name or null; translation_m of frames along the axes of the world
@@ -458,6 +463,8 @@ class _MeanSummary:
     # number or null; correlation of log weights with p·r², in standard deviations; beyond 3.3 the weights are no inverse variances
     weight_z: float | _Several | None
     lag_z: float | _Several | None  # number or null; the same in standard deviations; above 2.45 a note says so
+    skewness: float | _Several | None  # number or null; Mardia's, of the errors; zero but for chance if symmetric
+    skewness_p: float | _Several | None  # number or null; probability of so large a one of normal errors
     # object or null; rows with times: whether their errors are independent; null without
     time_blocks: dict[str, Any] | _Several | None
     notes: list[str] | _Several  # list of text; what is remarkable, in sentences

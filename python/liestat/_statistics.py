@@ -93,6 +93,7 @@ def mean(
     refuted="withheld",
     birge=False,
     weights_are="precision",
+    region="law",
     inflate=False,
     budget=None,
     threads=0,
@@ -142,6 +143,10 @@ def mean(
         What `weights` mean to a covariance from the residuals: inverse variances; anything else, whatever the noise (by
         the jackknife, with the degrees of freedom that the weights leave, `covariance_law_n`; less than eight features
         of equal weight in effect have no covariance); or counts of features that were measured several times.
+    region : {'law', 'bootstrap'}
+        What makes ``covariance`` with the 95 % quantile of its law a region, where it is from the residuals: Hotelling's
+        law, for symmetric noise, or a bootstrap that widens the covariance by ``skew_factor`` squared for skewed noise.
+        The same features give the same bits.
     inflate : bool
         Multiply the covariance by the factor by which blocks of time disagree, where it is above one.
     budget : int, optional
@@ -177,6 +182,10 @@ def mean(
         raise ValueError(
             f"mean: weights_are: expected 'precision', 'importance' or 'frequency', got {weights_are!r}"
         )
+    if region not in ("law", "bootstrap"):
+        raise ValueError(f"mean: region: expected 'law' or 'bootstrap', got {region!r}")
+    if region == "bootstrap" and any(c is not None for c in (covariances, factors, deviations)):
+        raise ValueError("mean: region='bootstrap': with covariances the region is that of chi-squared")
     if refuted not in ("withheld", "residuals"):
         raise ValueError(f"mean: refuted: expected 'withheld' or 'residuals', got {refuted!r}")
     if (birge or refuted == "residuals") and covariances is None:
@@ -189,6 +198,7 @@ def mean(
             residuals_if_refuted=refuted == "residuals",
             birge=bool(birge),
             weights_are=weights_are,
+            bootstrap=region == "bootstrap",
             certify=bool(certify),
             inflate=bool(inflate),
             budget=int(budget or 0),

@@ -69,7 +69,8 @@ MeanRequest requestOf(const std::string& criterion, const DoubleArray& features,
 py::dict mean(const std::string& type, const std::string& criterion, const DoubleArray& features,
               const DoubleArray& weights, const DoubleArray& covariances, bool factored, const DoubleArray& times,
               bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge,
-              const std::string& weights_are, bool certify, bool inflate, std::size_t budget, int threads) {
+              const std::string& weights_are, bool bootstrap, bool certify, bool inflate, std::size_t budget,
+              int threads) {
   const MeanType& means = typeOf(type);
   MeanRequest request = requestOf(criterion, features, weights, covariances, factored, times,
                                   covariances_at_measurement, likelihood, threads);
@@ -78,6 +79,7 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
   for (const ResidualNoise meaning : {ResidualNoise::importance, ResidualNoise::frequency}) {
     if (weights_are == name(meaning)) request.weights_are = meaning;
   }
+  request.region = bootstrap ? MeanRegion::bootstrap : MeanRegion::law;
   request.certify = certify;
   request.budget = budget;
   MeanSummary answer;
@@ -172,7 +174,7 @@ void bindMeans(py::module_& module) {
   using namespace py::literals;
   module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "factored"_a,
              "times"_a, "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a,
-             "weights_are"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
+             "weights_are"_a, "bootstrap"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
   py::list fields;
   for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
   module.attr("mean_fields") = fields;

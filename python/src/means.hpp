@@ -28,6 +28,7 @@ struct MeanRequest {
   RefutedNoise refuted_noise = RefutedNoise::withheld;
   bool birge = false;  ///< multiply by Birge's factor
   ResidualNoise weights_are = ResidualNoise::precision;
+  MeanRegion region = MeanRegion::law;
   bool certify = true;
   std::size_t budget = 0;  ///< limit of the search; 0: the library's
   int threads = 0;

@@ -144,6 +144,23 @@ class MeanParity(ParityTest):
             np.array(scaled["covariance"]), plain["fit_factor"] * np.array(plain["covariance"]), rtol=1e-12
         )
 
+    def test_skewed_errors(self):
+        """Exponential errors: a note, and on request a wider region."""
+        rng = np.random.default_rng(5)
+        path = self.table("rx,ry,rz", 0.05 * rng.exponential(size=(60, 3)))
+        plain, _ = self.assert_equal_means(path)
+        self.assertEqual((plain["region"], plain["skew_factor"]), ("law", 1))
+        self.assertLess(plain["skewness_p"], 1e-3)
+        self.assertIn("skewed", plain["notes"][-1])
+        wide, _ = self.assert_equal_means(path, ("--region", "bootstrap"), region="bootstrap")
+        self.assertEqual(wide["region"], "bootstrap")
+        self.assertGreater(wide["skew_factor"], 1)
+        np.testing.assert_allclose(
+            np.array(wide["covariance"]), wide["skew_factor"] ** 2 * np.array(plain["covariance"]), rtol=1e-12
+        )
+        with self.assertRaisesRegex(ValueError, "region"):
+            liestat.mean(liestat.R3(np.eye(3)), covariances=0.01 * np.eye(3), region="bootstrap")
+
     def test_ambiguous(self):
         path = self.written("rx,ry,rz\n0,0,1.5707963267948966\n0,0,-1.5707963267948966\n")
         json, result = self.assert_equal_means(path)

@@ -7,6 +7,8 @@
 #define LIESTAT_INSTANTIATE_CERTIFIED_MEAN(instantiate, M)                                                            \
   instantiate CertifiedMean<M> findCertifiedMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&,    \
                                                     const CertifiedMeanOptions<M>&, const MeanResult<M>&);            \
+  instantiate double bootstrapWidening<M>(const Samples<M>&, const Samples<double>&, const MeanResult<M>&,            \
+                                          ResidualNoise, double, const BootstrapOptions&);                            \
   instantiate bool certifyBySums<M>(const WeightSums&, const CertifiedMeanOptions<M>&, CertifiedMean<M>&);            \
   instantiate UniquenessResult<M> findUniqueness<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&,    \
                                                     const MeanResult<M>&, const UniquenessOptions&);                  \

@@ -39,6 +39,10 @@ namespace liestat::detail {
 /// what noise explains. A higher level of either leaves points of rings outside, a lower one refuses strips of ten
 /// data.
 inline constexpr double possible_score_tail = 0.05, possible_cost_tail = 0.005;
+/// The level of the score at which a region is grown further, once a shell has had a possible feature, so that the ground
+/// is not flat: it shall hold all points of a ring, and one of many is rejected more often than each. Whether data
+/// determine a mean is decided before.
+inline constexpr double grown_score_tail = 0.005;
 /// The factor of the first shell, which flat ground does not reach (its square times the quantile), and of each to the
 /// next; and that beyond which the data do not determine a mean: a region of more than three times the size has little
 /// to do with the covariance that it was made from.
@@ -63,18 +67,6 @@ double partOfSpace(double angle) {
     if constexpr (Quotient<M>) representatives = static_cast<double>(std::size(ManifoldTraits<M>::representatives));
     return representatives * (angle - std::sin(angle)) / pi;
   }
-}
-
-/// The x at which a tail probability, which falls from 1 at 0, is `tail`.
-template <class Tail>
-double whereTail(double tail, const Tail& of) {
-  double low = 0, high = 1;
-  while (of(high) > tail && high < 1e12) low = high, high *= 2;
-  for (int i = 0; i < 50 && high - low > 1e-9 * high; ++i) {
-    const double middle = 0.5 * (low + high);
-    (of(middle) > tail ? low : high) = middle;
-  }
-  return high;
 }
 
 /// Unit vectors in K = 1, 2 or 3 dimensions, evenly spread: both ways, on a circle, on a spiral.
@@ -128,12 +120,16 @@ class FeatureTest {
       represented_ += p;
       if (stride > 1) at_mean_ += p * z;
     }
-    score_quantile_ = whereTail(possible_score_tail, [&](double t2) { return hotellingTail(t2, K, n_); });
+    judgeScoresAt(possible_score_tail);
     const double cost_tail = mean.n < min_data_of_valley ? possible_cost_tail_of_few : possible_cost_tail;
     cost_quantile_ = whereTail(cost_tail, [&](double z) { return studentTail(z, n_ - 1); });
   }
 
-  /// Hotelling's quantile of the region.
+  /// Sets the level at which scores are rejected.
+  void judgeScoresAt(double tail) {
+    score_quantile_ = whereTail(tail, [&](double t2) { return hotellingTail(t2, K, n_); });
+  }
+  /// Hotelling's quantile at that level, first that of the region.
   double scoreQuantile() const { return score_quantile_; }
 
   /// How far a feature is from being possible.
@@ -337,7 +333,7 @@ GrownRegion<M> growRegion(const E& executor, const R& samples, const W& weights,
     part.diagonal().array() += singular_part * part.trace();
     const Cholesky<double, K> factor(part);
     if (!factor.ok()) return result;
-    const Test test(samples, weights, mean, noise);
+    Test test(samples, weights, mean, noise);
     ShellSearch<M> search(test);
     const typename Test::Matrix edge = std::sqrt(test.scoreQuantile()) * factor.lower();
     std::optional<std::pair<typename Test::Vector, double>> last;
@@ -348,6 +344,14 @@ GrownRegion<M> growRegion(const E& executor, const R& samples, const W& weights,
       result.factor = shell;
       result.open =
           !few && (shell > largest_region_factor || partOfSpace<M>(last->first.norm()) > largest_part_of_space);
+    }
+    if (last && !few && !result.open) {
+      test.judgeScoresAt(grown_score_tail);
+      for (double shell = result.factor * shell_ratio; shell <= largest_region_factor && search(shell * edge);
+           shell *= shell_ratio) {
+        last = search.farthest(shell * edge);
+        result.factor = shell;
+      }
     }
     if (last) {
       TangentOf<M> step = TangentOf<M>::Zero();

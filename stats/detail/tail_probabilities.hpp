@@ -41,6 +41,18 @@ inline double hotellingTail(double t2, int k, double n) {
   return incompleteBeta(0.5 * (n - k), 0.5 * k, 1 / (1 + t2 / (n - 1)));
 }
 
+/// The x at which a tail probability, which falls from 1 at 0, is `tail`.
+template <class Tail>
+double whereTail(double tail, const Tail& of) {
+  double low = 0, high = 1;
+  while (of(high) > tail && high < 1e12) low = high, high *= 2;
+  for (int i = 0; i < 50 && high - low > 1e-9 * high; ++i) {
+    const double middle = 0.5 * (low + high);
+    (of(middle) > tail ? low : high) = middle;
+  }
+  return high;
+}
+
 /// P(χ²ₙ > x), of relative precision some 1e-14 √n also where it is tiny; 1 for n = 0, NaN for NaN.
 inline double chiSquaredTail(double x, std::size_t n) {
   if (n == 0 || x <= 0) return 1;

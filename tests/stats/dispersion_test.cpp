@@ -198,4 +198,60 @@ TEST(RowOrder, saysTheCorrelation) {
       dispersionAbout(std::vector<Eigen::Vector3d>(30, {1, 2, 3}), Eigen::Vector3d(1, 2, 3)).order.dependent());
 }
 
+TEST(Skewness, isMardias) {
+  CounterRng rng(3);
+  std::vector<Eigen::Vector3d> points;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 40; ++i) {
+    const double a = -std::log(rng.uniform()), b = rng.normal(), c = -std::log(rng.uniform());
+    points.emplace_back(a, a + b, 1e-3 * (b - c));
+    mean += points.back() / 40;
+  }
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const auto& x : points) scatter += (x - mean) * (x - mean).transpose() / 40;
+  const Eigen::Matrix3d inverse = scatter.inverse();
+  double b = 0;
+  for (const auto& x : points) {
+    for (const auto& y : points) b += std::pow((x - mean).dot(inverse * (y - mean)), 3) / (40 * 40);
+  }
+  const Skewness found = dispersionAbout(points, mean).skewness;
+  EXPECT_NEAR(found.b, b, 1e-6 * b);
+  EXPECT_EQ(found.n, 40u);
+  // χ² of ten degrees of freedom, with Mardia's correction.
+  EXPECT_NEAR(found.p, detail::chiSquaredTail(b / 6 * 41 * 43 * 4 / (41.0 * 4 - 6), 10), 1e-6);
+}
+
+TEST(Skewness, ofExponentialErrorsIsSeenAndOfNormalOnesIsNot) {
+  constexpr int trials = 2000;
+  int seen = 0, false_alarms = 0;
+  for (std::uint64_t trial = 0; trial < trials; ++trial) {
+    CounterRng rng(5, trial);
+    std::vector<SO3d> skewed, normal;
+    for (int i = 0; i < 50; ++i) {
+      Eigen::Vector3d e;
+      for (int k = 0; k < 3; ++k) e[k] = -std::log(rng.uniform()) - 1;
+      skewed.push_back(SO3d::exp(0.05 * e));
+      normal.push_back(SO3d::exp(0.05 * rng.normalVector<3>()));
+    }
+    seen += dispersionAbout(skewed, liestat::mean(skewed).mean).skewness.matters();
+    false_alarms += dispersionAbout(normal, liestat::mean(normal).mean).skewness.matters();
+  }
+  // 1 of 1000 by the law of many errors; 4 standard errors of 5 of 1000 are 6 of 1000.
+  EXPECT_LE(false_alarms, trials * 11 / 1000);
+  EXPECT_GE(seen, trials * 95 / 100);
+}
+
+TEST(Skewness, isNotTestedOfTooFewOrManyMeasurements) {
+  CounterRng rng(9);
+  std::vector<S2d> directions;
+  for (std::size_t i = 0; i < Skewness::max_rows + 1; ++i) {
+    directions.push_back(exp(S2d(), TangentOf<S2d>(0.05 * rng.normalVector<2>())));
+  }
+  EXPECT_FALSE(dispersionAbout(directions, S2d()).skewness.tested());
+  directions.resize(Skewness::max_rows);
+  EXPECT_TRUE(dispersionAbout(directions, S2d()).skewness.tested());
+  directions.resize(Skewness::min_rows - 1);
+  EXPECT_FALSE(dispersionAbout(directions, S2d()).skewness.tested());
+}
+
 }  // namespace

@@ -11,6 +11,7 @@
 #include <fusion/init/detail/closed_form_blocks.hpp>
 #include <fusion/detail/median.hpp>
 #include <lie/detail/small_matrix.hpp>
+#include <stats/detail/split_mix.hpp>
 
 #include <Eigen/Core>
 
@@ -18,7 +19,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -58,7 +58,7 @@ class RestParallaxTest {
     result.explained = explained();
     const std::vector<Track> seen = tracks_;
     double sum = 0, squares = 0;
-    Noise random;
+    SplitMix random;  // always the same numbers
     for (int draw = 0; draw < draws; ++draw) {
       for (Track& track : tracks_) {
         for (double& x : track.s) x = random.normal();
@@ -83,23 +83,6 @@ class RestParallaxTest {
  private:
   static constexpr int draws = 100;
   static constexpr double normal_quantile = 2.5758293035489;  ///< the 0.995 quantile
-
-  /// Normal numbers, always the same ones: SplitMix64 (Steele, Lea and Flood 2014) and Box and Muller's formula. The closed
-  /// form's header needs Eigen alone.
-  struct Noise {
-    std::uint64_t state = 1;
-
-    double uniform() {
-      std::uint64_t z = state += 0x9e3779b97f4a7c15;
-      z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-      z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-      return (static_cast<double>((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
-    }
-    double normal() {
-      const double radius = std::sqrt(-2 * std::log(uniform()));
-      return radius * std::cos(6.283185307179586 * uniform());
-    }
-  };
 
   struct Track {
     std::array<double, 4> s{};                   ///< components across the direction: line (2), parabola (2)
