@@ -28,7 +28,7 @@ constexpr const char* inWords(DirectionMeaning meaning) {
 }
 
 /// The flags of an estimate by name.
-inline constexpr std::array<std::pair<const char*, bool MotionFlags::*>, 8> motion_flags{{
+inline constexpr std::array<std::pair<const char*, bool MotionFlags::*>, 10> motion_flags{{
     {"bad_input", &MotionFlags::bad_input},
     {"too_few", &MotionFlags::too_few},
     {"standstill", &MotionFlags::standstill},
@@ -36,6 +36,8 @@ inline constexpr std::array<std::pair<const char*, bool MotionFlags::*>, 8> moti
     {"ambiguous", &MotionFlags::ambiguous},
     {"undecided_sign", &MotionFlags::undecided_sign},
     {"lost", &MotionFlags::lost},
+    {"misfit", &MotionFlags::misfit},
+    {"gyroscope_refuted", &MotionFlags::gyroscope_refuted},
     {"outliers", &MotionFlags::outliers},
 }};
 

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <fusion/motion/flow_rows.hpp>
+#include <lie/detail/small_eigen.hpp>
 #include <lie/detail/small_matrix.hpp>
 
 #include <Eigen/Core>
@@ -252,8 +253,24 @@ struct FilterStep {
   S reduction = S(0);
 };
 
+/// C cut to what a frame can say: eigenvalues of L⁻¹ C L⁻ᵀ to [-1/2, 1], S = L Lᵀ. Second derivatives of points
+/// near the focus of expansion scatter, and may call the information of a frame negative. A singular S leaves C as it is.
+template <class S, int D>
+Eigen::Matrix<S, D, D> cutInformation(const Eigen::Matrix<S, D, D>& C, const Eigen::Matrix<S, D, D>& information) {
+  using Matrix = Eigen::Matrix<S, D, D>;
+  if (detail::Cholesky<S, D>(C).ok() && detail::Cholesky<S, D>(Matrix(information - C)).ok()) return C;
+  const detail::Cholesky<S, D> factor(information);
+  if (!factor.ok()) return C;
+  const Matrix half = factor.template halfSolve<D>(C), turned = half.transpose();
+  const Matrix white = factor.template halfSolve<D>(turned);
+  const detail::SymmetricEigen<Matrix> eigen(white);
+  const Matrix inverse_factor = factor.template halfSolve<D>(Matrix::Identity());
+  const Matrix axes = Matrix(information * inverse_factor.transpose()) * eigen.vectors;
+  return axes * eigen.values.cwiseMax(S(-0.5)).cwiseMin(S(1)).asDiagonal() * axes.transpose();
+}
+
 /// J = P_g⁻¹ + S, ξ = -J⁻¹ g, P_g ← J⁻¹, and the reported covariance in the two-sided form that a gain of any kind asks
-/// for: P ← Γ P Γᵀ + J⁻¹ S J⁻¹, Γ = I - J⁻¹ C. The step is cut to max_step in the first two coordinates. NaN where P_g is
+/// for: P ← Γ P Γᵀ + J⁻¹ S J⁻¹, Γ = I - J⁻¹ C with C cut. The step is cut to max_step in the first two coordinates. NaN where P_g is
 /// not positive definite.
 template <class S, int D>
 FilterStep<S, D> updateCovariance(FilterCovariance<S, D>& P, const FrameInformation<S, D>& frame, const S& max_step,
@@ -269,7 +286,7 @@ FilterStep<S, D> updateCovariance(FilterCovariance<S, D>& P, const FrameInformat
   if (length > max_step) result.step *= max_step / length;
   P.gain = inverse;
   if (second_derivatives) {
-    const Matrix Gamma = Matrix::Identity() - inverse * frame.corrected;
+    const Matrix Gamma = Matrix::Identity() - inverse * cutInformation<S, D>(frame.corrected, frame.gauss_newton);
     P.reported = Matrix(Gamma * P.reported) * Gamma.transpose() + Matrix(inverse * frame.gauss_newton) * inverse;
     P.reported = Matrix(S(0.5) * (P.reported + P.reported.transpose()));
   } else {

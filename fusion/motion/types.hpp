@@ -71,6 +71,10 @@ struct MotionFlags {
   bool undecided_sign = false;  ///< the depths do not tell V from -V yet
   bool lost =
       false;  ///< the normalised innovation was above its bound over `lost_frames` frames; hypotheses start anew
+  /// The frames' χ² refutes the motion at the stated noise: wrong pairs, a second object, a larger sigma, or a motion that
+  /// changes faster than the filter follows.
+  bool misfit = false;
+  bool gyroscope_refuted = false;  ///< the rotation of the images contradicts the gyroscope's, in size or in the mean
   bool outliers = false;  ///< pairs were left out as outliers; the covariance is then not claimed to be an upper bound
 };
 
@@ -109,7 +113,10 @@ struct MotionEstimate {
     return sqrt(mean_inverse_depth_variance) / (mean_inverse_depth * mean_inverse_depth);
   }
   /// True if the direction may be used without a further look.
-  bool ok() const { return frame > 0 && !flags.degenerate && !flags.ambiguous && !flags.undecided_sign && !flags.lost; }
+  bool ok() const {
+    return frame > 0 && !flags.standstill && !flags.degenerate && !flags.ambiguous && !flags.undecided_sign &&
+           !flags.lost && !flags.misfit && !flags.gyroscope_refuted;
+  }
   /// True if the covariance claims to bound the error.
   bool covariance_judged() const { return ok() && !flags.outliers; }
 };
@@ -156,9 +163,12 @@ struct MotionHypothesis {
 
 /// Options of the filters. The values are those of the validation (docs/motion.md).
 struct MotionFilterOptions {
-  Flow flow = Flow::midpoint;    ///< with a gyroscope Flow::discrete is as accurate at any rotation
-  std::size_t starts = 32;       ///< directions of a hemisphere to start from (rad² one each)
-  double process_noise = 1e-5;   ///< rad² per frame of the direction: 1e-5 nearly constant, 1e-3 manoeuvring
+  Flow flow = Flow::midpoint;  ///< with a gyroscope Flow::discrete is as accurate at any rotation
+  std::size_t starts = 32;     ///< directions of a hemisphere to start from (rad² one each)
+  /// rad² per frame of the direction, at least. A direction that wanders further than its covariances say gets more, up to
+  /// `max_process_noise`, until it rests again; not with `outliers`.
+  double process_noise = 1e-5;
+  double max_process_noise = 1e-2;
   double rotation_noise = 1e-6;  ///< rad² per frame of the rotation, where it is a state (essential filter)
 
   // Hypotheses.
@@ -182,7 +192,7 @@ struct MotionFilterOptions {
 
   // Verdicts on a frame.
   std::size_t min_pairs = 8, min_pairs_gyroscope = 2;
-  double standstill_probability = 0.05;  ///< probability of missing a standstill; see MotionFlags
+  double standstill_probability = 0.04;  ///< probability of missing a standstill; see MotionFlags
   double degenerate_sigma = 0.2;         ///< rad, the larger standard deviation of the direction
   std::size_t lost_frames = 10;
   double lost_innovation = 2;  ///< mean normalised innovation of these frames above which hypotheses start anew

@@ -1110,6 +1110,8 @@ class _MotionResult(Result):
     ambiguous: _Array
     undecided_sign: _Array
     lost: _Array
+    misfit: _Array
+    gyroscope_refuted: _Array
     outliers: _Array
 
 class _FitSummary(Result):

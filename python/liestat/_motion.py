@@ -110,7 +110,8 @@ def motion(
         'translation': of what the direction is, and in which axes), `rotation` (SO3, second_R_first over one frame)
         with `rotation_covariance` (m, 3, 3), `mean_inverse_depth`, `sign_evidence`, `innovation`, `pairs`, `inliers`,
         `filter` (in charge), `covariance_judged`, and the flags `bad_input`, `too_few`, `standstill`, `degenerate`,
-        `ambiguous`, `undecided_sign`, `lost`, `outliers`. `ok` is a deprecated name of `usable`.
+        `ambiguous`, `undecided_sign`, `lost`, `misfit`, `gyroscope_refuted`, `outliers`. `ok` is a deprecated name of
+        `usable`.
 
         A velocity is per frame, in the axes half-way through the interval of the pairs; a translation is that over the
         interval, in the axes at its end.

@@ -20,7 +20,7 @@ from liestat import SE3, SO3, _core
 SERIES = (
     "frame usable meaning filter direction direction_covariance rotation rotation_covariance mean_inverse_depth"
     " sign_evidence innovation pairs inliers covariance_judged bad_input too_few standstill degenerate ambiguous"
-    " undecided_sign lost outliers"
+    " undecided_sign lost misfit gyroscope_refuted outliers"
 ).split()
 # Vehicle's axes (x forward, y left, z up) to the camera's (x right, y down, z forward).
 AHEAD = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], dtype=float)

@@ -16,6 +16,12 @@
 
 namespace liestat::detail {
 
+/// The tangent of an angle from the optical axis beyond which no camera sees a point.
+inline constexpr double max_coordinate = 1e6;
+
+/// Cumulative sums of evidence against the sign above which it is undecided, and replaced.
+inline constexpr double reversal_likely = 4, reversal_certain = 8;
+
 /// The state besides the direction.
 enum class MotionState { direction, gyroscope_bias, rotation, rotation_and_bias };
 constexpr bool keepsTheRotation(MotionState state) {
@@ -40,11 +46,16 @@ struct DirectionCandidate {
   static constexpr std::size_t remembered = 24;
   std::array<double, remembered> costs{};  ///< costs of the last frames, a ring buffer
   double evidence = 0, evidence_variance = 0, evidence_weight = 0;
+  double against = 0;                                      ///< cumulative sum of the evidence against the sign
+  double later = 0, later_variance = 0, later_weight = 0;  ///< the evidence since that sum was zero
 
   // Values of the last frame that it was updated with.
   Eigen::Vector3d Omega = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Identity();
   double depth = 0, depth_variance = 0, cost = 0, innovation = 0;
+  double direction_score = 0;                                       ///< gᵀ(S + C P C)⁻¹g: χ² of two degrees
+  Eigen::Vector3d from_gyroscope = Eigen::Vector3d::Zero();         ///< rotation of the images minus the gyroscope's,
+  Eigen::Matrix3d gyroscope_information = Eigen::Matrix3d::Zero();  ///< and its inverse covariance; 0: none
   std::size_t inliers = 0;
 
   void copyFromWhole() {
@@ -110,16 +121,23 @@ class MotionEngine {
   bool evaluate(const DirectionCandidate& candidate, Evaluation& out);
   void weighForward(const Eigen::Vector3d& V, Evaluation& e);
   void rejectOutliers(const DirectionCandidate& candidate, Evaluation& e);
+  void gateDepths(const DirectionCandidate& candidate, const Eigen::Vector3d& Omega);
   bool advance(DirectionCandidate& candidate);
   template <int D>
   bool step(DirectionCandidate& candidate, FilterCovariance<double, D>& P, const Evaluation& e,
             const FrameInformation<double, D>& frame);
   void weighSign(DirectionCandidate& candidate) const;
   void prune();
-  double gapOfChance(const DirectionCandidate& candidate, const DirectionCandidate& best) const;
+  double gapOfChance(const DirectionCandidate& candidate, const DirectionCandidate& best, double sigmas) const;
+  double mixedDepths(const Evaluation& e) const;
+  void compareWithGyroscope(DirectionCandidate& candidate, const Evaluation& e) const;
+  void followProcessNoise();
+  void judgeFit();
+  void judgeGyroscope();
   void advanceAll();
   void publish();
   std::size_t leastPairs() const;
+  bool consistent() const;
 
   MotionFilterOptions options_;
   MotionState state_;
@@ -129,6 +147,8 @@ class MotionEngine {
   double standstill_quantile_ = 0;
   double usual_signal_ = 0;  ///< mean signal of the last ten or so frames that were not at standstill
   std::size_t moving_frames_ = 0;
+  bool was_still_ = false;
+  double outlier_share_ = 0;              ///< of the last fifty or so frames that were used
   double still_sum_ = 0, still_dof_ = 0;  ///< χ² and degrees of freedom of all frames before a clear motion
   SO3d rotation_alone_;
   Eigen::Matrix3d rotation_information_ = Eigen::Matrix3d::Identity();
@@ -137,6 +157,29 @@ class MotionEngine {
   bool updated_ = false;       ///< by the last frame
   double innovation_sum_ = 0;  ///< discounted over lost_frames
   std::size_t innovation_count_ = 0;
+
+  // The fit of the last frames, through restarts.
+  struct FrameFit {
+    double chi_squared = 0, degrees = 0, direction_score = 0;
+  };
+  static constexpr std::size_t fit_frames = 10, score_frames = 4, gyroscope_frames = 20;
+  std::array<FrameFit, fit_frames> fits_{};
+  std::size_t fit_next_ = 0, fit_count_ = 0, fit_since_start_ = 0;
+  double gyroscope_chi_ = 0;  ///< mean over gyroscope_frames or so
+  std::size_t gyroscope_count_ = 0;
+  Eigen::Vector3d gyroscope_pull_ = Eigen::Vector3d::Zero();    ///< weighted sum of the differences, discounted,
+  Eigen::Matrix3d gyroscope_weight_ = Eigen::Matrix3d::Zero();  ///< and its covariance
+
+  // The way of the best direction, for its process noise.
+  struct Place {
+    Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+    Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
+    double noise = 0;  ///< process noise so far
+  };
+  static constexpr std::size_t way_frames = 23;
+  std::array<Place, way_frames> way_{};
+  std::size_t way_count_ = 0, way_start_ = 0, updates_way_ = 0;
+  double process_noise_ = 0, noise_so_far_ = 0;
 
   Frame frame_;
   std::vector<PointPair> pairs_;

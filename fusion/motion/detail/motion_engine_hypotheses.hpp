@@ -54,7 +54,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::spreadBias(DirectionCandidate& c) const
 }
 
 LIESTAT_FUSION_INLINE void MotionEngine::predict(DirectionCandidate& c) const {
-  const double q = options_.process_noise;
+  const double q = std::max(options_.process_noise, process_noise_);
   if (state_ == MotionState::direction) {
     for (Eigen::Matrix2d* P : {&c.narrow.gain, &c.narrow.reported}) P->diagonal().array() += q;
     return;
@@ -79,6 +79,23 @@ LIESTAT_FUSION_INLINE void MotionEngine::predict(DirectionCandidate& c) const {
 LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const {
   if (!(c.depth_variance > 0) || !std::isfinite(c.depth)) return;
   const double decay = options_.evidence_decay;
+  // A sign that holds must be refutable by the frames after it (E. Page, Biometrika 41, 1954): the log likelihood ratio of
+  // a reversal, each frame's cut to 3 so that no single one decides.
+  if (options_.positive_depth && c.evidence_weight > 0) {
+    const double mean = c.evidence / c.evidence_weight;
+    c.against -= std::clamp(2 * mean * c.depth / c.depth_variance, -3.0, 3.0);
+    if (c.against <= 0) c.against = c.later = c.later_variance = c.later_weight = 0;
+    if (c.against > 0) {
+      c.later += c.depth / c.depth_variance;
+      c.later_variance += 1 / c.depth_variance, c.later_weight += 1 / c.depth_variance;
+    }
+    if (c.against > reversal_certain) {
+      c.evidence = c.later, c.evidence_variance = c.later_variance, c.evidence_weight = c.later_weight;
+      c.against = c.later = c.later_variance = c.later_weight = 0;
+      c.evidence -= c.depth / c.depth_variance;
+      c.evidence_variance -= 1 / c.depth_variance, c.evidence_weight -= 1 / c.depth_variance;
+    }
+  }
   c.evidence = decay * c.evidence + c.depth / c.depth_variance;
   c.evidence_variance = decay * decay * c.evidence_variance + 1 / c.depth_variance;
   c.evidence_weight = decay * c.evidence_weight + 1 / c.depth_variance;
@@ -117,8 +134,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
 
 /// How far the scores of two equally good hypotheses may part: costs at different directions are χ² of different
 /// projections of the flow, so their differences are a random walk.
-LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const DirectionCandidate& c,
-                                                       const DirectionCandidate& best) const {
+LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const DirectionCandidate& c, const DirectionCandidate& best,
+                                                       double sigmas) const {
   const std::size_t n = std::min(updates_, DirectionCandidate::remembered);
   if (n < 2) return std::numeric_limits<double>::infinity();
   double sum = 0, squares = 0;
@@ -129,7 +146,7 @@ LIESTAT_FUSION_INLINE double MotionEngine::gapOfChance(const DirectionCandidate&
   const auto count = static_cast<double>(n);
   // No more than that of independent χ²: costs that fall as a hypothesis converges are no chance.
   const double variance = std::min((squares - sum * sum / count) / (count - 1), 4 * static_cast<double>(best.inliers));
-  return options_.rival_sigmas * std::sqrt(std::max(variance, 0.0) * static_cast<double>(updates_));
+  return sigmas * std::sqrt(std::max(variance, 0.0) * static_cast<double>(updates_));
 }
 
 /// Drops hypotheses far worse than the best, and those that have come to the same place as a better one.
@@ -142,11 +159,14 @@ LIESTAT_FUSION_INLINE void MotionEngine::prune() {
   std::sort(candidates_.begin(), candidates_.end(),
             [](const DirectionCandidate& a, const DirectionCandidate& b) { return a.score < b.score; });
   best_ = 0;
+  // A hypothesis is dropped for good, and tested in each frame: a level that holds over all of them together.
+  const double n = static_cast<double>(updates_), doublings = 1 + std::log2(n);
+  const double sigmas = std::max(options_.rival_sigmas, std::sqrt(3 * std::log(1.64 * doublings * doublings / 1e-4)));
   const double nearest = std::cos(options_.merge_angle);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     const double gap = candidates_[i].score - candidates_[0].score;
-    if (gap > options_.prune_gap && gap > gapOfChance(candidates_[i], candidates_[0])) continue;
+    if (gap > options_.prune_gap && gap > gapOfChance(candidates_[i], candidates_[0], sigmas)) continue;
     bool own = true;
     for (std::size_t k = 0; k < kept && own; ++k) {
       own = std::abs(candidates_[k].direction.unit_vector().dot(candidates_[i].direction.unit_vector())) < nearest;

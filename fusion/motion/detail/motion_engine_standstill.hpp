@@ -47,14 +47,21 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
   estimate_.signal = dof > 0 ? statistic / dof : std::numeric_limits<double>::quiet_NaN();
   if (!(dof > 0)) return false;
   const double bound = chiSquaredBound(dof, standstill_quantile_) / dof;
-  const bool still = estimate_.signal <= bound;
-  const bool clear_before = usual_signal_ > 1.5 * bound;
+  // A stop goes on: after a still frame only one in a thousand is missed.
+  const bool still = estimate_.signal <= (was_still_ ? chiSquaredBound(dof, 3.1) / dof : bound);
+  was_still_ = still;
+  // A frame with the usual signal is below the bound by chance once in a thousand times or so: the standard deviation of χ²
+  // of k degrees of freedom with the mean s k is √(2 (2 s - 1) k).
+  const auto isClear = [&] {
+    return usual_signal_ - 3 * std::sqrt(2 * std::max(2 * usual_signal_ - 1, 1.0) / dof) > bound;
+  };
+  const bool clear_before = isClear();
   if (!clear_before) still_sum_ += statistic, still_dof_ += dof;
   if (!still) {
     ++moving_frames_;
     usual_signal_ +=
         (estimate_.signal - usual_signal_) / static_cast<double>(std::min<std::size_t>(moving_frames_, 10));
-    if (!clear_before && usual_signal_ > 1.5 * bound) {
+    if (!clear_before && isClear()) {
       const double rest = still_dof_ - dof;
       if (rest > 0 && still_sum_ - statistic <= chiSquaredBound(rest, standstill_quantile_)) startAnew();
     }
@@ -67,12 +74,15 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
 
 LIESTAT_FUSION_INLINE void MotionEngine::startAnew() {
   candidates_.clear();
+  fit_since_start_ = way_count_ = 0, process_noise_ = 0;
   best_ = updates_ = kept_ = innovation_count_ = 0, innovation_sum_ = 0;
   linear_moments_.setZero(), linear_noise_.setZero();
 }
 
-/// The least Σ |ẋ - BΩ|²/variance, and its degrees of freedom; none where it can't be had, or where it leaves a third of
-/// the points to outliers. With the rotation so found points are turned and the rest is fitted again, so that large
+/// The least Σ |ẋ - BΩ|²/variance, and its degrees of freedom; none where it can't be had. Among outliers a tenth of the
+/// points and one more are left out, or as many as the frames before had; each further one counts with the limit that it
+/// is beyond. One that lies along the flow of the present direction, ahead of the camera, is no outlier but motion, and
+/// counts whole, but for the few that come there by chance. With the rotation so found points are turned and the rest is fitted again, so that large
 /// rotations are no signal.
 LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
   rotation_prior_ = priorWithoutBias();
@@ -124,10 +134,27 @@ LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
     Omega += d;
   }
   rotation_alone_ = SO3d::exp(Omega), rotation_information_ = M, rotation_inliers_ = used;
-  const double dof = 2 * static_cast<double>(used) - (frame_.has_gyroscope ? 0 : 3);
-  if (used * 3 >= n * 2) return dof;
-  statistic = std::numeric_limits<double>::infinity();
-  return dof;
+  double along = 0;
+  std::size_t explained = 0;
+  if (const DirectionCandidate* c = best(); c != nullptr && used < n) {
+    for (std::size_t i = 0; i < n; ++i) {
+      if (weights_[i] > 0) continue;
+      const FlowRow<double> row = flowRow<double>(points_[i], c->direction.unit_vector());
+      const double squared = row.weight * row.q * row.q;
+      const double length = row.n1 * points_[i].u - row.n0 * points_[i].v;
+      if (squared < 9 && length > 0) along += row.weight * length * length, ++explained;
+    }
+  }
+  const double number = static_cast<double>(n), usual = outlier_share_ * number;
+  const auto allowed = std::max(n / 10 + 1, static_cast<std::size_t>(usual + 2 * std::sqrt(usual)));
+  const std::size_t left_out = n - used - explained, counted = left_out > allowed ? left_out - allowed : 0;
+  const std::size_t by_chance = 1 + n / 50;
+  if (explained > by_chance) {
+    statistic += along * static_cast<double>(explained - by_chance) / static_cast<double>(explained);
+  }
+  statistic += limit * static_cast<double>(counted);
+  if (!std::isfinite(statistic)) return 0;
+  return 2 * static_cast<double>(used + counted) - (frame_.has_gyroscope ? 0 : 3);
 }
 
 /// The gyroscope's rotation as far as its bias is known, without that.

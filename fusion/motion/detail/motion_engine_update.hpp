@@ -88,6 +88,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
       rows_[i].weight = error * error <= options_.gate * options_.gate * predicted ? weights_[i] : 0;
     }
   }
+  if (gate) gateDepths(c, Omega);
   if (keepsTheRotation(state_)) {
     Omega.setZero();
   } else {
@@ -97,6 +98,32 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
   for (std::size_t i = 0; i < n; ++i) {
     e.capped_cost += std::min(squared(i, Omega), 9.0);
     e.inliers += rows_[i].weight > 0 ? 1U : 0U;
+  }
+}
+
+/// An outlier along the flow passes every gate across it: pairs far nearer than the others, or behind the camera where the
+/// sign is certain, are left out. Where most are behind it is the sign that is wrong.
+LIESTAT_FUSION_INLINE void MotionEngine::gateDepths(const DirectionCandidate& c, const Eigen::Vector3d& Omega) {
+  const std::size_t n = points_.size();
+  const Eigen::Vector3d at = keepsTheRotation(state_) ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Omega;
+  std::size_t used = 0, behind = 0;
+  const auto depthOf = [&](std::size_t i) { return flowResidual(points_[i], rows_[i], at).rho; };
+  const auto deviationOf = [&](std::size_t i) { return std::sqrt(points_[i].variance) * rows_[i].inverse_length; };
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(rows_[i].weight > 0)) continue;
+    const double rho = depthOf(i);
+    behind += rho < -4 * deviationOf(i) ? 1U : 0U;
+    squared_[used++] = std::abs(rho);
+  }
+  if (used < 5) return;
+  const auto middle = squared_.begin() + static_cast<std::ptrdiff_t>(used / 2);
+  std::nth_element(squared_.begin(), middle, squared_.begin() + static_cast<std::ptrdiff_t>(used));
+  const double largest = 6 * *middle;
+  const bool certain = options_.positive_depth && c.evidence > 4 * std::sqrt(c.evidence_variance) && 2 * behind < used;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(rows_[i].weight > 0)) continue;
+    const double rho = depthOf(i), margin = 4 * deviationOf(i);
+    if (std::abs(rho) > largest + margin || (certain && rho < -margin)) rows_[i].weight = 0;
   }
 }
 
@@ -143,6 +170,35 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, E
   return e.inliers >= std::min<std::size_t>(leastPairs(), 5) && std::isfinite(e.sums.cost);
 }
 
+/// While hypotheses compete: what it costs to have all depths on one side of the camera, the cheaper one. A point on the
+/// other side adds its χ² at infinity, no more than an outlier's.
+LIESTAT_FUSION_INLINE double MotionEngine::mixedDepths(const Evaluation& e) const {
+  if (candidates_.size() < 2) return 0;
+  double ahead = 0, behind = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!(rows_[i].weight > 0)) continue;
+    const double along = flowResidual(points_[i], rows_[i], e.Omega).along;
+    (along > 0 ? ahead : behind) += std::min(rows_[i].weight * along * along, 9.0);
+  }
+  return std::min(ahead, behind);
+}
+
+/// The rotation that the images alone say, direction and rotation both free, minus the gyroscope's.
+LIESTAT_FUSION_INLINE void MotionEngine::compareWithGyroscope(DirectionCandidate& c, const Evaluation& e) const {
+  c.gyroscope_information.setZero();
+  if (!frame_.has_gyroscope || e.inliers < options_.min_pairs) return;
+  const Cholesky<double, 2> xx(e.sums.Hxx);
+  const Eigen::Matrix<double, 2, 3> by_direction = xx.solve<3>(Eigen::Matrix<double, 2, 3>(e.sums.Hox.transpose()));
+  const Cholesky<double, 3> images(Eigen::Matrix3d(e.sums.M - e.sums.Hox * by_direction));
+  const Cholesky<double, 3> gyroscope(e.marginal);
+  if (!xx.ok() || !images.ok() || !gyroscope.ok()) return;
+  const Eigen::Vector3d rest = e.sums.bo - by_direction.transpose() * e.sums.bx;
+  c.from_gyroscope = e.Omega - images.solve<1>(rest) - e.prior.mean;
+  const Eigen::Matrix3d covariance = images.inverse() + gyroscope.inverse();
+  c.gyroscope_information = Cholesky<double, 3>(covariance).inverse();
+  if (!c.gyroscope_information.allFinite() || !c.from_gyroscope.allFinite()) c.gyroscope_information.setZero();
+}
+
 /// Moves a hypothesis by what its frame says; false, and unchanged, where that is not finite.
 template <int D>
 bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, const Evaluation& e,
@@ -154,13 +210,19 @@ bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, c
   const S2d moved = exp(c.direction, Eigen::Vector2d(s.step.template head<2>()));
   const Eigen::Matrix2d T = frameTransport(c.direction, moved);
   turnDirection<D>(next.gain, T), turnDirection<D>(next.reported, T);
+  const Eigen::Matrix<double, D, D> CP = frame.corrected * P.reported;
+  const Eigen::Matrix2d spread =
+      frame.gauss_newton.template topLeftCorner<2, 2>() + (CP * frame.corrected).template topLeftCorner<2, 2>();
+  const Eigen::Vector2d pull = frame.gradient.template head<2>();
+  c.direction_score = pull.dot(Cholesky<double, 2>(spread).template solve<1>(pull));
   P = next;
   c.direction = moved;
   const int equations = static_cast<int>(e.inliers) - (keepsTheRotation(state_) || frame_.has_gyroscope ? 0 : 3);
   c.innovation = (frame.start - s.reduction) / std::max(equations, 1);
   c.cost = frame.cost;
+  compareWithGyroscope(c, e);
   c.inliers = e.inliers;
-  const double cost = options_.outliers ? e.capped_cost : frame.cost;
+  const double cost = (options_.outliers ? e.capped_cost : frame.cost) + mixedDepths(e);
   c.score += cost;
   c.costs[updates_ % DirectionCandidate::remembered] = cost;
 

@@ -170,7 +170,7 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionFilter::next(std::span<const P
     }
     const bool changes =
         in_charge_for_ >= innovation_frames && other_innovation_ > hand_over_.fall_back * own_innovation_;
-    const bool loses = other.flags.degenerate && !own.flags.degenerate;
+    const bool loses = (other.flags.degenerate || other.flags.misfit) && !own.flags.degenerate && !own.flags.misfit;
     if (!other.flags.lost && !own.flags.lost && !changes && !loses) return other;
     fallBack();
     return own;
