@@ -118,8 +118,9 @@ ChoiceRun runChoice(const Normalised& pair, std::uint64_t seed) {
   if (H.hasEstimate() && F.hasEstimate()) {
     ModelFit fit_h{0, 0, 8}, fit_f{0, 0, 7};
     std::size_t far = 0, explained = 0;
+    const double guard = std::clamp(F.excess_noise, 1.0, max_excess_noise);
     for (std::size_t i = 0; i < H.errors.size(); ++i) {
-      const bool in_f = F.errors[i] < F.threshold, is_far = !(H.errors[i] <= options.support.guard * H.threshold);
+      const bool in_f = F.errors[i] < F.threshold, is_far = !(H.errors[i] <= guard * H.threshold);
       far += is_far, explained += is_far && in_f;
       if (!in_f || !(H.errors[i] < H.threshold)) continue;
       fit_h.chi2 += H.errors[i], fit_h.equations += 2;
@@ -127,8 +128,8 @@ ChoiceRun runChoice(const Normalised& pair, std::uint64_t seed) {
     }
     const auto& model = *search.models()[f];
     run.far = static_cast<double>(far), run.explained = static_cast<double>(explained);
-    run.allowed = static_cast<double>(options.support.explained(far, model.freedomBeyond(*search.models()[h]),
-                                                                model.equations(), model.chance(F.threshold)));
+    run.allowed = static_cast<double>(options.choice.support.explained(far, model.freedomBeyond(*search.models()[h]),
+                                                                       model.equations(), model.chance(F.threshold)));
     run.homography_cost = fit_h.normalised(), run.fundamental_cost = fit_f.normalised();
   }
   if (F.hypothesis && F.sample.size() == 7) {

@@ -48,14 +48,15 @@ Rule smallest(const char* name, const Criterion& criterion) {
 const std::vector<Rule>& rules() {
   constexpr double no_guard = std::numeric_limits<double>::infinity();
   static const std::vector<Rule> all = {
-      {"support, exp(-8.8 d/r): default", [](const Search& search, double) { return search.best(); }},
+      {"support and cost, exp(-8.8 d/r): default", [](const Search& search, double) { return search.best(); }},
+      tests("support, guard 9, exp(-8.8 d/r)", 9, ExponentialPhi{}),
       tests("support without guard, exp(-8.8 d/r)", 1, ExponentialPhi{}),
       tests("support without guard, exp(-3.1 d/r)", 1, ExponentialPhi{3.1}),
-      tests("support, F test 0.999", 9, FTestPhi{}),
+      tests("support, guard 9, F test 0.999", 9, FTestPhi{}),
       tests("support without guard, F test 0.999", 1, FTestPhi{}),
       tests("support without guard, F test 0.99", 1, FTestPhi{0.99}),
       tests("majority alone, F test 0.999", no_guard, FTestPhi{}),
-      tests("support, Phi = 1", 9, [](double, double) { return 1.0; }),
+      tests("support, guard 9, Phi = 1", 9, [](double, double) { return 1.0; }),
       smallest("information criterion", [](const CriterionInput& input, double threshold,
                                            double sigma) { return informationCriterion(input, threshold, sigma); }),
       smallest("GRIC", [](const CriterionInput& input, double, double) { return gric(input); }),

@@ -115,7 +115,8 @@ struct TwoViewSceneOptions {
   double outliers = 0.2;  ///< share of the matches, rounded to a whole number of them
   double sigma = 0.5;     ///< standard deviation of each image coordinate, in both images (px)
   double width = 640, height = 480, focal_length = 600;  ///< px
-  double min_depth = 3, max_depth = 9;  ///< depth of the points, or of the plane on the optical axis (m)
+  double min_depth = 3, max_depth = 9;            ///< depth of the points, or of the plane on the optical axis (m)
+  double min_baseline = 0.3, max_baseline = 0.7;  ///< length of the translation (m), but of shared_focal
 };
 
 /// A motion and the matches that show it.
@@ -225,7 +226,7 @@ class TwoViewScene {
     F.setZero();
     const auto move = [&] {
       R = turnInSpace(random, 3, 12);
-      t = displacement<3>(random, 0.3, 0.7);
+      t = displacement<3>(random, options.min_baseline, options.max_baseline);
     };
     switch (options.motion) {
       case TwoViewMotion::none:
@@ -254,7 +255,7 @@ class TwoViewScene {
         break;
       }
       case TwoViewMotion::translation:
-        t = displacement<3>(random, 0.3, 0.7);
+        t = displacement<3>(random, options.min_baseline, options.max_baseline);
         break;
       case TwoViewMotion::essential:
         move();

@@ -1,15 +1,18 @@
-// Robust estimation with a hierarchy of models: which model explains the measurements, with which parameter, and which
-// measurements are outliers (T. Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's estimation
-// method", INRIA RR-4050, 2000, section 5; docs/hierarchy.md has the rules, and where they differ from the report).
+// Robust estimation with a hierarchy of models: which model explains the
+// measurements, with which parameter, and which measurements are outliers (T.
+// Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's
+// estimation method", INRIA RR-4050, 2000, section 5; docs/hierarchy.md has the
+// rules, and where they differ from the report).
 //
-//   Hierarchy<Eigen::Vector4d, Eigen::Matrix3d> search(models);   // shared_ptr to HierarchyModel, one without parents
-//   search.add(matches);
-//   while (search.iterate()) {}                                   // or until there is no time left
-//   const auto& found = search.state(search.best());
+//   Hierarchy<Eigen::Vector4d, Eigen::Matrix3d> search(models);   // shared_ptr
+//   to HierarchyModel, one without parents search.add(matches); while
+//   (search.iterate()) {}                                   // or until there
+//   is no time left const auto& found = search.state(search.best());
 //
-// The search can be interrupted after each hypothesis, and has an answer at any time. Measurements may be added and
-// removed at any time. When it has terminated the answer depends on the measurements alone, not on the order in which they
-// came: draws belong to what a measurement is, not to its place.
+// The search can be interrupted after each hypothesis, and has an answer at any
+// time. Measurements may be added and removed at any time. When it has
+// terminated the answer depends on the measurements alone, not on the order in
+// which they came: draws belong to what a measurement is, not to its place.
 #pragma once
 
 #include <stats/detail/keyed_measurements.hpp>
@@ -53,8 +56,9 @@ class Hierarchy {
     restart();
   }
 
-  /// True if the models form a lattice (names differ, parents exist, no circle, one model without parents), and
-  /// numbers are within their limits. Otherwise nothing is ever estimated, and fault() says why.
+  /// True if the models form a lattice (names differ, parents exist, no circle,
+  /// one model without parents), and numbers are within their limits. Otherwise
+  /// nothing is ever estimated, and fault() says why.
   bool valid() const { return fault_.empty(); }
   const std::string& fault() const { return fault_; }
 
@@ -67,7 +71,8 @@ class Hierarchy {
     return all;
   }
 
-  /// Adds a measurement; the name by which it is removed. Those that are not numbers count as outliers of all models.
+  /// Adds a measurement; the name by which it is removed. Those that are not
+  /// numbers count as outliers of all models.
   Id add(const Measurement& measurement) {
     const auto [at, id] = measurements_.add(measurement);
     if (!valid()) return id;
@@ -127,7 +132,8 @@ class Hierarchy {
     return true;
   }
 
-  /// One hypothesis or one estimate; true while there is more to do. What `stop` ends is begun again by the next call.
+  /// One hypothesis or one estimate; true while there is more to do. What
+  /// `stop` ends is begun again by the next call.
   bool iterate(const StopRequest& stop = {}) {
     const std::size_t m = next();
     if (m == none) return false;
@@ -151,7 +157,7 @@ class Hierarchy {
       if (due && draws.hasBest()) refine(m, 1, stop);
       return true;
     }
-    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop)) return true;
+    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop, true)) return true;
     finish(m);
     if (next() == none) terminate();
     return next() != none;
@@ -177,11 +183,13 @@ class Hierarchy {
   /// True if `general` contains `specific`, through any number of models.
   bool contains(std::size_t general, std::size_t specific) const { return contains_[general][specific]; }
 
-  /// The chosen model: the most specific one that no estimated generalisation rejects. Of several, the one with more
-  /// inliers; of those within 10 %, the one with more equations of a measurement, then with fewer parameters. The null model
-  /// while there is no estimate.
+  /// The chosen model: the most specific one that no estimated generalisation
+  /// rejects. Of several, the one with more inliers; of those within 10 %, the
+  /// one with more equations of a measurement, then with fewer parameters. The
+  /// null model while there is no estimate.
   std::size_t best() const {
-    return bestOf([&](std::size_t m) { return survives(m); });
+    const std::size_t winner = bestOf([&](std::size_t m) { return survives(m); }, !options_.choice.support.guard);
+    return options_.choice.support.guard || winner == none ? orNull(winner) : bestWithin(winner);
   }
   /// The same by other tests than those of the options.
   template <class Phi>
@@ -194,24 +202,51 @@ class Hierarchy {
         survivors[m] = compare(m, g, support, phi) == Rejection::none;
       }
     }
-    return bestOf([&](std::size_t m) { return survivors[m] != 0; });
+    return orNull(bestOf([&](std::size_t m) { return survivors[m] != 0; }, !support.guard));
+  }
+  /// The models that the measurements do not tell apart: the chosen one first,
+  /// then those that cast doubt on it, the most specific ones of them. One
+  /// alone: the choice is clear.
+  std::vector<std::size_t> contested() const {
+    const std::size_t chosen = best();
+    std::vector<std::size_t> all = {chosen}, doubtful;
+    if (!states_[chosen].hasEstimate()) return all;
+    for (std::size_t g = 0; g < models_.size(); ++g) {
+      if (survives(g) && doubts(g, chosen)) doubtful.push_back(g);
+    }
+    for (const std::size_t g : doubtful) {
+      if (std::none_of(doubtful.begin(), doubtful.end(), [&](std::size_t m) { return contains_[g][m]; }))
+        all.push_back(g);
+    }
+    return all;
   }
 
-  /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
+  /// Why `specific` is rejected in favour of `general`, if it is; both are
+  /// estimated.
   Rejection compare(std::size_t specific, std::size_t general) const {
-    return compare(specific, general, options_.support, options_.phi);
+    return compare(specific, general, options_.choice.support, options_.choice.phi);
   }
   /// The same by other tests than those of the options.
   template <class Phi>
   Rejection compare(std::size_t specific, std::size_t general, const SupportTest& support, const Phi& phi) const {
+    return compared(specific, general, support, phi, options_.choice.cost, true);
+  }
+
+ private:
+  template <class Phi>
+  Rejection compared(std::size_t specific, std::size_t general, const SupportTest& support, const Phi& phi, double cost,
+                     bool noise_excuses) const {
     const State &s = states_[specific], &g = states_[general];
-    std::size_t far = 0, explained = 0, common = 0, only_general = 0;
-    ModelFit fit_s{0, 0, models_[specific]->freeParameters()};
-    ModelFit fit_g{0, 0, models_[general]->freeParameters()};
+    const Model &model_s = *models_[specific], &model_g = *models_[general];
+    const double guard = support.guard.value_or(guardOf(general));
+    std::size_t far = 0, common = 0, only_general = 0;
+    std::vector<double> far_errors;
+    std::size_t explained = 0;
+    ModelFit fit_s{0, 0, model_s.freeParameters()}, fit_g{0, 0, model_g.freeParameters()};
     for (std::size_t i = 0; i < size(); ++i) {
       const double limit = limitOf(specific, s.threshold, i);
       const bool in_s = s.errors[i] < limit, in_g = g.errors[i] < limitOf(general, g.threshold, i);
-      if (!(s.errors[i] <= support.guard * limit)) {
+      if (!(s.errors[i] <= guard * limit)) {
         ++far;
         explained += in_g;
       }
@@ -219,19 +254,111 @@ class Hierarchy {
       if (!in_s || !in_g) continue;
       add(fit_s, specific, i, s.errors[i]), add(fit_g, general, i, g.errors[i]);
     }
-    const auto by_chance = [&](std::size_t of) {
-      return support.explained(of, models_[general]->freedomBeyond(*models_[specific]), models_[general]->equations(),
-                               models_[general]->chance(g.threshold));
-    };
-    // Near or far: what leaves most of the other's inliers is not the model of them.
-    if (explained > by_chance(far) || only_general > common + by_chance(size() - common)) return Rejection::support;
-    return fitRejects(fit_s, fit_g, phi) ? Rejection::fit : Rejection::none;
+    const double chance = model_g.chance(g.threshold);
+    const int freedom = model_g.freedomBeyond(model_s);
+    const auto by_chance = [&](std::size_t of) { return support.explained(of, freedom, model_g.equations(), chance); };
+    if (explained > by_chance(far)) {
+      // Noise of any size that is equal in all directions brings measurements
+      // close to a model of fewer equations.
+      const bool may_be_noise = !support.guard && noise_excuses && model_s.equations() > model_g.equations();
+      if (!may_be_noise || explained > explainedByNoise(specific, general, guard, support)) return Rejection::support;
+    }
+    // Near or far: what leaves most of the other's inliers is not the model of
+    // them.
+    if (only_general > common + by_chance(size() - common)) return Rejection::support;
+    if (fitRejects(fit_s, fit_g, phi)) return Rejection::fit;
+    if (support.guard) return Rejection::none;
+    return costExcess(specific, general, freedom) > cost ? Rejection::cost : Rejection::none;
+  }
+  /// The multiple of a threshold beyond which measurements are far, by the
+  /// excess noise of the general model.
+  double guardOf(std::size_t general) const {
+    const State& g = states_[general];
+    const double threshold = g.threshold > 0 ? knownThreshold(models_[general]->equations()) / g.threshold : 1;
+    return std::clamp(g.excess_noise * threshold, 1.0, max_excess_noise);
+  }
+  /// The number of measurements far from the specific model that chance, noise
+  /// and its freedom bring to the general one.
+  std::size_t explainedByNoise(std::size_t specific, std::size_t general, double guard,
+                               const SupportTest& support) const {
+    const State &s = states_[specific], &g = states_[general];
+    const Model& model = *models_[general];
+    const double chance = model.chance(g.threshold);
+    std::vector<double> chances;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (s.errors[i] <= guard * limitOf(specific, s.threshold, i)) continue;
+      const int p = models_[specific]->equationsOf(measurements_[i]), q = model.equationsOf(measurements_[i]);
+      const double limit = limitOf(general, g.threshold, i);
+      chances.push_back(p > q ? std::max(chance, chanceOfIsotropicNoise(s.errors[i], limit, q, p)) : chance);
+    }
+    return support.explained(chances, model.freedomBeyond(*models_[specific]), model.equations());
+  }
+  /// True if a model can reject or doubt another one: it contains it, or has
+  /// fewer equations and is not contained.
+  bool mayExcel(std::size_t general, std::size_t specific) const {
+    const bool fewer = models_[general]->equations() < models_[specific]->equations();
+    return contains_[general][specific] || (fewer && !contains_[specific][general]);
+  }
+  bool rejects(std::size_t general, std::size_t specific) const {
+    return mayExcel(general, specific) && compare(specific, general) != Rejection::none;
+  }
+  /// True if a model casts doubt on another one. A general model of as many
+  /// equations that has not as many residual degrees of freedom as parameters
+  /// fits whatever there is: not tested is not passed.
+  bool doubts(std::size_t general, std::size_t specific) const {
+    if (!mayExcel(general, specific)) return false;
+    const bool same = models_[general]->equations() == models_[specific]->equations();
+    const ModelFit& fit = states_[general].fit;
+    if (same && fit.degreesOfFreedom() < fit.free_parameters) return true;
+    SupportTest support = options_.doubt.support;
+    support.guard = options_.choice.support.guard;
+    return compared(specific, general, support, options_.doubt.phi, options_.doubt.cost, false) != Rejection::none;
+  }
+  /// Standard deviations by which the inliers of a model of fewer equations
+  /// cost more under the other one than its further equations and the freedom
+  /// explain; -∞ where it has no fewer.
+  double costExcess(std::size_t specific, std::size_t general, int freedom) const {
+    const State &s = states_[specific], &g = states_[general];
+    const int d = models_[specific]->equations() - models_[general]->equations();
+    if (d <= 0) return -std::numeric_limits<double>::infinity();
+    const double v = CostTest::scale(guardOf(general)), most = CostTest::most(d);
+    double sum = 0;
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      const auto& one = measurements_[i];
+      if (!(g.errors[i] < limitOf(general, g.threshold, i))) continue;
+      if (models_[specific]->equationsOf(one) - models_[general]->equationsOf(one) != d) continue;
+      // Errors that are not numbers are far.
+      const double cost = (s.errors[i] - g.errors[i]) / v;
+      sum += cost < most ? std::max(cost, 0.0) : most;
+      ++n;
+    }
+    return n > 0 ? CostTest::excess(sum, n, d, freedom, v) : -std::numeric_limits<double>::infinity();
   }
 
- private:
-  /// The best of the most specific models that are not rejected.
+  static constexpr std::size_t max_completions = 100;  // a pair of right ones among 80 % outliers with probability 0.98
+
+  std::size_t orNull(std::size_t m) const { return m == none ? null_ : m; }
+  /// Only the winner and what it contains reject: a model within it that these
+  /// do not even cast doubt on takes its place.
+  std::size_t bestWithin(std::size_t winner) const {
+    const auto doubted = [&](std::size_t m) {
+      for (std::size_t g = 0; g < models_.size(); ++g) {
+        const bool counts = contains_[g][m] && states_[g].hasEstimate() && (g == winner || contains_[winner][g]);
+        if (counts && doubts(g, m)) return true;
+      }
+      return false;
+    };
+    const auto may_replace = [&](std::size_t m) {
+      return contains_[winner][m] && states_[m].hasEstimate() && !doubted(m);
+    };
+    const std::size_t next = bestOf(may_replace, true);
+    return next == none ? winner : bestWithin(next);
+  }
+  /// The best of the most specific models that are not rejected; none: there is
+  /// none. `adaptive`: the noise is not known.
   template <class Survives>
-  std::size_t bestOf(const Survives& survives) const {
+  std::size_t bestOf(const Survives& survives, bool adaptive) const {
     std::vector<std::size_t> chosen;
     for (std::size_t m = 0; m < models_.size(); ++m) {
       if (!survives(m)) continue;
@@ -241,13 +368,31 @@ class Hierarchy {
       }
       if (most_specific) chosen.push_back(m);
     }
-    if (chosen.empty()) return null_;
-    std::size_t most = 0;
-    for (const std::size_t m : chosen) most = std::max(most, states_[m].inliers.size());
-    std::size_t best = none;
+    if (chosen.empty()) return none;
+    // Neither of two models may contain the other; the one with more equations
+    // may cost too much all the same.
+    if (adaptive) {
+      const std::vector<std::size_t> all = chosen;
+      std::erase_if(chosen, [&](std::size_t m) {
+        return std::any_of(all.begin(), all.end(), [&](std::size_t g) { return g != m && rejects(g, m); });
+      });
+    }
+    // Counts at the noise that the data show.
+    double noise = adaptive ? max_excess_noise : 1;
+    for (const std::size_t m : chosen) noise = std::min(noise, guardOf(m));
+    std::vector<std::size_t> counts;
     for (const std::size_t m : chosen) {
-      if (1.1 * static_cast<double>(states_[m].inliers.size()) < static_cast<double>(most)) continue;
-      if (best == none || isSimpler(m, best)) best = m;
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < size(); ++i) {
+        count += states_[m].errors[i] < noise * limitOf(m, states_[m].threshold, i);
+      }
+      counts.push_back(count);
+    }
+    const std::size_t most = *std::max_element(counts.begin(), counts.end());
+    std::size_t best = none;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      if (1.1 * static_cast<double>(counts[k]) < static_cast<double>(most)) continue;
+      if (best == none || isSimpler(chosen[k], best)) best = chosen[k];
     }
     return best;
   }
@@ -310,7 +455,8 @@ class Hierarchy {
   double knownThreshold(int equations) const {
     return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::max_equations))];
   }
-  /// The threshold for one measurement, from that of measurements with the usual number of equations.
+  /// The threshold for one measurement, from that of measurements with the
+  /// usual number of equations.
   double limitOf(std::size_t m, double threshold, std::size_t i) const {
     const int usual = models_[m]->equations(), here = models_[m]->equationsOf(measurements_[i]);
     return here == usual ? threshold : threshold * knownThreshold(here) / knownThreshold(usual);
@@ -341,8 +487,10 @@ class Hierarchy {
     states_[null_].progress = State::Progress::candidate;
     decide();
   }
-  /// The candidate that is next: of the most specific ones the one with the fewest draws, because the n-th draw improves
-  /// the best of those before it with probability 1/n. More general models wait, so that what guides them is final.
+  /// The candidate that is next: of the most specific ones the one with the
+  /// fewest draws, because the n-th draw improves the best of those before it
+  /// with probability 1/n. More general models wait, so that what guides them
+  /// is final.
   std::size_t next() const {
     std::size_t best = none;
     if (!valid()) return best;
@@ -402,13 +550,17 @@ class Hierarchy {
     double threshold = 0;
     std::int64_t score = 0;
   };
-  /// The estimate from a hypothesis: from its inliers, and once again from those of that estimate. To go on until nothing
-  /// changes makes a threshold that follows the errors collapse. None if `stop` ended it.
+  /// The estimate from a hypothesis: from its inliers, and once again from
+  /// those of that estimate. To go on until nothing changes makes a threshold
+  /// that follows the errors collapse. None if `stop` ended it.
   std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
                                   const StopRequest& stop) const {
-    Parameter parameter = draws_[m].at(place).parameter;
     std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
     for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
+    return refine(m, draws_[m].at(place).parameter, key, made, stop);
+  }
+  std::optional<Candidate> refine(std::size_t m, Parameter parameter, std::uint64_t key, std::vector<Refined>& made,
+                                  const StopRequest& stop) const {
     Candidate candidate;
     candidate.errors = errorsOf(m, parameter);
     candidate.threshold = thresholdOf(m, candidate.errors);
@@ -444,16 +596,69 @@ class Hierarchy {
     }
     return candidate;
   }
-  /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
-  /// others may hold an estimate that begins with it. False if `stop` ended it.
-  bool refine(std::size_t m, std::size_t count, const StopRequest& stop) {
+  /// The best hypotheses of a model that the estimates of others and
+  /// measurements far from these determine: of all sets of such measurements,
+  /// or of many that depend on the measurements alone, not on the seed.
+  std::vector<Parameter> completions(std::size_t m, std::size_t count) const {
+    std::vector<std::pair<std::int64_t, Parameter>> found;
+    std::vector<double> errors(size());
+    std::vector<Parameter> solutions;
+    for (std::size_t other = 0; other < models_.size(); ++other) {
+      const std::size_t s = models_[m]->completionSize(*models_[other]);
+      if (s == 0 || !isFinal(other) || states_[other].unsupported) continue;
+      detail::KeyedMeasurements<Measurement> outside;
+      for (std::size_t i = 0; i < size(); ++i) {
+        const double error = states_[other].errors[i];
+        if (std::isfinite(error) && !(error < limitOf(other, states_[other].threshold, i))) {
+          outside.add(measurements_[i]);
+        }
+      }
+      std::vector<std::size_t> sample;
+      std::vector<Measurement> sampled;
+      for (std::size_t draw = 0; draw < max_completions && outside.size() >= s; ++draw) {
+        detail::keyedSample(outside, draw, s, sample, [](std::size_t) { return true; });
+        sampled.clear(), solutions.clear();
+        for (const std::size_t i : sample) sampled.push_back(outside[i]);
+        models_[m]->complete(*models_[other], states_[other].estimate.parameter, sampled, solutions);
+        for (const Parameter& solution : solutions) {
+          models_[m]->errors(solution, measurements_.all(), errors);
+          std::int64_t score = 0;
+          for (std::size_t i = 0; i < size(); ++i) {
+            score += detail::scoreOf(options_.score, errors[i], limitOf(m, knownThreshold(models_[m]->equations()), i));
+          }
+          found.emplace_back(score, solution);
+        }
+      }
+    }
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<Parameter> best;
+    for (std::size_t k = 0; k < std::min(count, found.size()); ++k) best.push_back(found[k].second);
+    return best;
+  }
+  /// The best of the estimates from the best hypotheses: samples of few
+  /// measurements are noisy, and one outlier far from the others may hold an
+  /// estimate that begins with it. False if `stop` ended it.
+  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
     std::optional<Candidate> best;
-    for (const auto& place : draws_[m].ranked(count)) {
-      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
-      if (!candidate) return false;
+    const auto take = [&](std::optional<Candidate> candidate) {
       const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
                           (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
       if (better) best = std::move(candidate);
+    };
+    for (const auto& place : draws_[m].ranked(count)) {
+      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
+      if (!candidate) return false;
+      take(std::move(candidate));
+    }
+    if (last) {
+      // These begin at estimates, which no key of measurements names: nothing
+      // is kept of them.
+      for (const Parameter& parameter : completions(m, count)) {
+        std::vector<Refined> made;
+        std::optional<Candidate> candidate = refine(m, parameter, 0, made, stop);
+        if (!candidate) return false;
+        take(std::move(candidate));
+      }
     }
     State& state = states_[m];
     state.estimate = std::move(best->estimate);
@@ -484,10 +689,16 @@ class Hierarchy {
       add(state.fit, m, i, state.errors[i]);
     }
     state.relevance = size() > 0 ? relevance / static_cast<double>(size()) : 0;
-    const std::size_t chance = binomialQuantile(options_.support.probability, size(), model.chance(state.threshold));
+    const std::size_t chance =
+        binomialQuantile(options_.choice.support.probability, size(), model.chance(state.threshold));
     const auto own = static_cast<double>(model.freeParameters()) / model.equations();
     state.unsupported =
         static_cast<double>(state.inliers.size()) <= static_cast<double>(model.sampleSize() + chance) + own;
+    std::vector<SquaredError> errors(size());
+    for (std::size_t i = 0; i < size(); ++i) {
+      errors[i] = {state.errors[i], limitOf(m, state.threshold, i), model.equationsOf(measurements_[i])};
+    }
+    state.excess_noise = excessNoise(errors, model.freeParameters(), model.chance(max_excess_noise * state.threshold));
   }
   /// Draws of the model have ended: what comes next.
   void finish(std::size_t m) {
@@ -510,17 +721,19 @@ class Hierarchy {
       if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
   }
-  /// True if a general model, which was not estimated, could reject a specific one by its support: there are enough
-  /// measurements that the specific one is far from.
+  /// True if a general model, which was not estimated, could reject a specific
+  /// one by its support or cost: there are enough measurements that the
+  /// specific one is far from, or it has more equations.
   bool mayReject(std::size_t general, std::size_t specific) const {
     const State& state = states_[specific];
+    const Model &g = *models_[general], &s = *models_[specific];
+    if (!options_.choice.support.guard && s.equations() > g.equations()) return true;
     std::size_t far = 0;
     for (std::size_t i = 0; i < size(); ++i) {
-      far += !(state.errors[i] <= options_.support.guard * limitOf(specific, state.threshold, i));
+      far += !(state.errors[i] <= options_.choice.support.guard.value_or(1) * limitOf(specific, state.threshold, i));
     }
-    const Model &g = *models_[general], &s = *models_[specific];
-    return far >
-           options_.support.explained(far, g.freedomBeyond(s), g.equations(), g.chance(knownThreshold(g.equations())));
+    return far > options_.choice.support.explained(far, g.freedomBeyond(s), g.equations(),
+                                                   g.chance(knownThreshold(g.equations())));
   }
   bool isFinal(std::size_t m) const {
     return states_[m].progress == State::Progress::evaluated && states_[m].hasEstimate();

@@ -66,6 +66,13 @@ class HierarchyModel {
 
   /// Appends the parameters that a minimal sample determines to `solutions`; a degenerate sample adds none.
   virtual void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const = 0;
+  /// The number of measurements that determine this model together with the estimate of another one that they do not agree
+  /// with; 0: there is no such way. Minimal samples of a scene that the other model dominates lie within it, and say
+  /// nothing of the rest.
+  virtual std::size_t completionSize(const HierarchyModel&) const { return 0; }
+  /// Appends the parameters that these determine.
+  virtual void complete(const HierarchyModel&, const Parameter&, std::span<const Measurement>,
+                        std::vector<Parameter>&) const {}
   /// The squared error of each measurement in units of its noise; χ² with equationsOf() degrees of freedom for inliers.
   virtual void errors(const Parameter& parameter, std::span<const Measurement> measurements,
                       std::span<double> squared) const = 0;
@@ -84,6 +91,14 @@ enum class HypothesisScore {
   truncated_cost  ///< (1/M) Σ_{e < t} (1 - e/t)
 };
 
+/// The tests by which a general model rejects one that it contains, or one of more equations.
+struct ChoiceTests {
+  SupportTest support = {};
+  std::function<double(double r, double r_general)> phi = ExponentialPhi{};  ///< Φ of (36)
+  /// Standard deviations of CostTest::excess() beyond which the cost rejects.
+  double cost = 4;
+};
+
 struct HierarchyOptions {
   std::uint64_t seed = 1;
   double outlier_share = 0.01;  ///< fraction of inliers whose error exceeds the threshold
@@ -98,8 +113,10 @@ struct HierarchyOptions {
   bool guided = false;
   /// Estimates every model, not only those that the search reaches, for criteria that compare all of them.
   bool all_models = false;
-  SupportTest support = {};
-  std::function<double(double r, double r_general)> phi = ExponentialPhi{};  ///< Φ of (36)
+  ChoiceTests choice = {};
+  /// The same tests at a level that a right model fails in a few of a hundred cases: a chosen model that fails them is
+  /// contested. Here no measurement counts as chance because noise could explain it.
+  ChoiceTests doubt = {{.guard = {}, .probability = 0.999}, ExponentialPhi{5.5}, 1.6};
   /// Returns a model's threshold on squared errors from its errors and number of equations. Empty: the quantile of χ²
   /// at 1 - `outlier_share`, for known noise.
   std::function<double(std::span<const double> errors, int equations)> threshold = {};
@@ -109,10 +126,12 @@ struct HierarchyOptions {
 enum class Rejection {
   none,
   support,  ///< the other model explains measurements that are far from this one
-  fit       ///< the other model fits the common inliers better than its freedom explains
+  fit,      ///< the other model fits the common inliers better than its freedom explains
+  cost      ///< the inliers of the other model, of fewer equations, cost more than their further equations explain
 };
 constexpr const char* name(Rejection rejection) {
-  return rejection == Rejection::support ? "support" : rejection == Rejection::fit ? "fit" : "none";
+  constexpr const char* names[] = {"none", "support", "fit", "cost"};
+  return names[static_cast<std::size_t>(rejection)];
 }
 
 /// The state of one model during the search.
@@ -139,6 +158,8 @@ struct ModelState {
   double relevance = 0;     ///< score (29) of the estimate
   ModelFit fit = {};        ///< fit to the estimate's own inliers
   bool unsupported = true;  ///< the inliers could be chance
+  /// s², the variance of the noise that the estimate shows over the one that was stated (excessNoise()).
+  double excess_noise = 1;
   Rejection rejection = Rejection::none;
   std::optional<std::size_t> rejected_by = {};  ///< number of the model that rejects it
 

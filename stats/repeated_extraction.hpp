@@ -139,7 +139,7 @@ class RepeatedExtraction {
       const Structure& structure = structures_[k];
       const auto& model = *models_[structure.model];
       const std::size_t chance =
-          binomialQuantile(options_.hierarchy.support.probability, structure.inliers.size() + rest().size(),
+          binomialQuantile(options_.hierarchy.choice.support.probability, structure.inliers.size() + rest().size(),
                            model.chance(structure.state.threshold));
       const double own = static_cast<double>(model.freeParameters()) / model.equations();
       if (static_cast<double>(structure.inliers.size()) > static_cast<double>(model.sampleSize() + chance) + own)

@@ -8,6 +8,7 @@ enum class Status {
   ok,             ///< converged
   not_converged,  ///< the iteration ended elsewhere: the budget ran out, or the data are not finite
   ambiguous,      ///< another feature explains the data as well
+  contested,      ///< the data do not tell several models apart; the result lists them
   ill_defined,    ///< the criterion has no smooth minimum; a covariance would be wrong and is withheld
   inconsistent,   ///< the measurements refute the noise that is stated for them; a covariance from it is withheld
   too_few,        ///< fewer measurements than the estimate needs
@@ -16,8 +17,8 @@ enum class Status {
 
 /// True if an iteration that ended with this status found a minimum, whatever else there is to say about it.
 constexpr bool converged(Status status) {
-  return status == Status::ok || status == Status::ambiguous || status == Status::ill_defined ||
-         status == Status::inconsistent;
+  return status == Status::ok || status == Status::ambiguous || status == Status::contested ||
+         status == Status::ill_defined || status == Status::inconsistent;
 }
 
 /// The name used in files and messages.
@@ -29,6 +30,8 @@ constexpr const char* name(Status status) {
       return "not_converged";
     case Status::ambiguous:
       return "ambiguous";
+    case Status::contested:
+      return "contested";
     case Status::ill_defined:
       return "ill_defined";
     case Status::inconsistent:

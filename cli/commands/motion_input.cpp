@@ -7,6 +7,7 @@
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
 #include <cli/show/units.hpp>
+#include <fusion/coordinate_units.hpp>
 #include <fusion/motion/gyroscope.hpp>
 
 #include <fmt/format.h>
@@ -54,11 +55,10 @@ class TrackRays {
 
   void add(std::size_t frame, std::uint64_t track, double u, double v) {
     std::vector<TrackObservation>& observations = tracks_.frames[frame];
-    largest_ = std::max({largest_, std::abs(u), std::abs(v)});
     const auto bearing = camera_.bearing({u, v});
     if (bearing && bearing->z() > 0) {
       observations.push_back({track, bearing->head<2>() / bearing->z(), sigma_});
-      radii_.push_back(observations.back().at.norm());
+      units_.add({u, v}, observations.back().at);
     } else {
       ++tracks_.outside;
     }
@@ -76,33 +76,21 @@ class TrackRays {
 
  private:
   void requireUnit() {
-    const std::size_t n = radii_.size() + tracks_.outside;
-    if (n < min_observations_of_a_unit) return;
-    if (radii_.empty()) {
+    if (units_.size() + tracks_.outside < min_observations_of_a_unit) return;
+    if (units_.size() == 0) {
       throw InputError(options_.tracks, 0, "no point lies where the camera sees",
                        "pixels of the camera that was given");
     }
-    if (largest_ <= 10 && camera_.fu > 50) {
-      throw InputError(
-          options_.tracks, 0,
-          fmt::format("no image coordinate is larger than {:.3g}, and the focal length is {:g}", largest_, camera_.fu),
-          "both in pixels, or both normalised (--intrinsics 1,1,0,0 and --sigma over the focal length)");
-    }
-    const auto middle = radii_.begin() + static_cast<std::ptrdiff_t>(radii_.size() / 2);
-    std::nth_element(radii_.begin(), middle, radii_.end());
-    if (*middle > 10) {
-      throw InputError(
-          options_.tracks, 0,
-          fmt::format("half of the points lie more than {:.3g} focal lengths from the principal point", *middle),
-          fmt::format("focal lengths ({:g}, {:g}) and image coordinates in pixels", camera_.fu, camera_.fv));
+    if (const CoordinateFault fault = units_.fault(camera_)) {
+      throw InputError(options_.tracks, 0, fault.found, fault.expected);
     }
   }
 
   const MotionInputOptions& options_;
   Camera camera_;
-  double sigma_, largest_ = 0;
+  double sigma_;
   MotionTracks tracks_;
-  std::vector<double> radii_;
+  CoordinateUnits units_;
 };
 
 MotionTracks readTracks(const MotionInputOptions& options, const Camera& camera) {

@@ -121,6 +121,8 @@ void addTwoViewCommand(const CommandList& program) {
               "x,y,z,x',y',z': the vertical in both cameras' frames; a motion that keeps it is then a model")
       .list(6, 6);
   command.flag("--planes", options->estimate.planes_only, "Homographies alone: with --motions the planes of a scene");
+  command.flag("--noise-is-known", options->estimate.noise_is_known,
+               "--sigma is right (default: noise may be larger, and the matches say by how much)");
   command.flag("--keep-contradictions", options->estimate.keep_contradictions,
                "Use matches that contradict each other (one point matched with two), too");
   command.option("--seed", options->estimate.search.seed, "Seed of the draws (default 1)");

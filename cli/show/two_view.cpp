@@ -56,6 +56,14 @@ struct HeadedTable {
   std::string heading;
   TableRows table{{"parameter", "value", "sd", "unit"}};
 };
+void addParameters(TableRows& table, const PhysicalParameters& physical) {
+  for (std::size_t i = 0; i < physical.size(); ++i) {
+    const bool angle = physical.units[i] == "rad";
+    const double unit = angle ? degrees : 1;
+    table.rows.push_back({physical.names[i], number(unit * physical.values[static_cast<Eigen::Index>(i)], 5),
+                          number(unit * physical.deviation(i), 2), angle ? "deg" : physical.units[i]});
+  }
+}
 /// The parameters of a motion; the entries of its matrix, where they are all that is known.
 std::vector<HeadedTable> parameterTables(const TwoViewMotionResult& e) {
   std::vector<HeadedTable> tables(e.physical.size());
@@ -66,13 +74,7 @@ std::vector<HeadedTable> parameterTables(const TwoViewMotionResult& e) {
           k == 0 ? "of two poses that explain the plane, the one with more points in front of both cameras:\n"
                  : "the other one:\n";
     }
-    for (std::size_t i = 0; i < physical.size(); ++i) {
-      const bool angle = physical.units[i] == "rad";
-      const double unit = angle ? degrees : 1;
-      tables[k].table.rows.push_back({physical.names[i],
-                                      number(unit * physical.values[static_cast<Eigen::Index>(i)], 5),
-                                      number(unit * physical.deviation(i), 2), angle ? "deg" : physical.units[i]});
-    }
+    addParameters(tables[k].table, physical);
   }
   if (!tables.empty() || e.matrix_covariance.rows() != 9) return tables;
   tables.resize(1);
@@ -84,6 +86,24 @@ std::vector<HeadedTable> parameterTables(const TwoViewMotionResult& e) {
     }
   }
   return tables;
+}
+
+/// The parameters of the motion; of a contested one those that all models of the set share, then each model's own.
+std::vector<HeadedTable> parameterTables(const TwoViewMotionEstimate& e) {
+  std::vector<HeadedTable> all;
+  if (e.shared) {
+    all.emplace_back().heading = "shared by all models of the set, with a covariance that covers each:\n";
+    addParameters(all.back().table, *e.shared);
+  }
+  const auto add = [&](const TwoViewMotionResult& motion, const std::string& model) {
+    for (HeadedTable& table : parameterTables(motion)) {
+      if (!e.rivals.empty()) table.heading = "if it is " + model + ":\n" + table.heading;
+      all.push_back(std::move(table));
+    }
+  };
+  add(e, e.lattice.empty() ? "" : e.chosenModel().name);
+  for (const TwoViewRival& rival : e.rivals) add(rival, rival.model);
+  return all;
 }
 
 std::string summary(const std::string& file, const TwoViewImageFrame& frame) {
@@ -234,7 +254,8 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   report.plot(latticePlot(e));
   report.table(latticeRows(e, ShownOn::page),
                "The chosen model is the most specific one that no model which contains it rejects: by more support "
-               "among matches that the specific one is far from, or by a better fit to the common inliers.");
+               "among matches that the specific one is far from, by a better fit to the common inliers, or, of fewer "
+               "equations, by the cost of its inliers.");
   printLines("\n" + report.write() + "\n");
 }
 

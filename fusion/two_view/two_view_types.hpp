@@ -43,7 +43,9 @@ struct TwoViewModelRow {
   double relevance = 0;
   double chi2 = 0, degrees_of_freedom = 0;  ///< over its own inliers
   double rms = 0;                           ///< σ sqrt(χ²/r): what noise these inliers show, px
-  bool unsupported = true;                  ///< its inliers could be chance
+  /// s², the variance of the noise that the errors below nine thresholds show over σ² (excessNoise()).
+  double excess_noise = 1;
+  bool unsupported = true;  ///< its inliers could be chance
   Rejection rejection = Rejection::none;
   std::string rejected_by;
 
@@ -65,6 +67,12 @@ struct TwoViewMotionResult {
   std::optional<Gaussian<Essentiald>> relative_pose;
 };
 
+/// A motion that explains the matches as well as the chosen one.
+struct TwoViewRival : TwoViewMotionResult {
+  std::string model;
+  std::size_t inliers = 0;
+};
+
 /// Properties of the images and of their matches, as the estimation uses them.
 struct TwoViewImageFrame {
   std::size_t matches = 0;                                 ///< all that were given
@@ -80,7 +88,7 @@ struct TwoViewImageFrame {
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
-  /// are the same one.
+  /// are the same one; contested: the matches do not tell the chosen model from the rivals.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;
@@ -89,6 +97,12 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
   double threshold = 0;  ///< threshold of the chosen model, on squared errors
+  /// Where the status is contested: the other models of the set of which one is right.
+  std::vector<TwoViewRival> rivals;
+  /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the mean
+  /// over the set of the models' own covariances and the squares of their differences from these values, so that it covers
+  /// each of them; what only one model has is listed with that model.
+  std::optional<PhysicalParameters> shared;
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
@@ -152,7 +166,10 @@ void describe(V& v, const TwoViewModelRow& row) {
   if (!shown(v, row.hasEstimate())) return;
   v("inliers", row.inliers, "their number")("relevance", row.relevance, "by which models are compared");
   v("chi2", row.chi2, "over its own inliers")("degrees_of_freedom", row.degrees_of_freedom, "of chi2");
-  v("rms", row.rms, "noise that its inliers show", "px")("unsupported", row.unsupported, "its inliers could be chance");
+  v("rms", row.rms, "noise that its inliers show", "px");
+  v("excess_noise", row.excess_noise,
+    "its variance over that of sigma; covariances are multiplied by it where it exceeds 1");
+  v("unsupported", row.unsupported, "its inliers could be chance");
   v("rejection", name(row.rejection), "why the model was not chosen");
   v("rejected_by", row.rejected_by.empty() ? std::nullopt : std::optional(row.rejected_by), "the model that did it");
 }
@@ -171,6 +188,12 @@ void describe(V& v, const TwoViewMotionResult& x) {
 }
 
 template <class V>
+void describe(V& v, const TwoViewRival& x) {
+  v("model", x.model)("inliers", x.inliers, "their number");
+  describe(v, static_cast<const TwoViewMotionResult&>(x));
+}
+
+template <class V>
 void describe(V& v, const TwoViewImageFrame& x) {
   v("matches", x.matches, "all that were given")("sigma", x.sigma, "of each coordinate", "px");
   v("calibrated", x.calibrated, "with the cameras' intrinsics");
@@ -183,11 +206,14 @@ void describe(V& v, const TwoViewImageFrame& x) {
 template <class V>
 void describe(V& v, const TwoViewMotionEstimate& x) {
   describe(v, static_cast<const TwoViewImageFrame&>(x));
-  v("status", name(x.status), "ok, too_few, not_applicable, not_converged or ill_defined");
+  v("status", name(x.status), "ok, too_few, not_applicable, not_converged, ill_defined or contested");
   v("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason), "in words, where status is not ok");
   v("model", x.lattice.empty() ? std::string() : x.chosenModel().name, "the chosen one");
   v("inliers", x.inliers, "their number");
   describe(v, static_cast<const TwoViewMotionResult&>(x));
+  v("rivals", x.rivals, "where status is contested: the other models of which one may be right");
+  v("shared_parameters", x.shared,
+    "where status is contested: those of the chosen model that all rivals have, with a covariance that covers each");
   v("lattice", x.lattice, "all models")("inlier", x.inlier, "of each match");
   v("squared_errors", x.errors, "of each match, in units of the noise");
 }

@@ -980,6 +980,16 @@ class _RelativePose(Result):
     covariance: _Array  # of the tangent; rad
     covariance_order: str  # in words
 
+class _TwoViewRival(Result):
+    model: str
+    inliers: int  # their number
+    matrix: _Array  # homography or fundamental matrix of undistorted pixels, of norm 1
+    matrix_acts_on: str  # its equation, in words
+    matrix_covariance: _Array | None  # of its entries column after column
+    # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
+    parameters: list[_PhysicalParameters]
+    second_T_first: _RelativePose | None  # of the models with a pose
+
 class _TwoViewModelRow(Result):
     model: str
     parents: list[str]  # more general models
@@ -993,6 +1003,7 @@ class _TwoViewModelRow(Result):
     chi2: float  # over its own inliers
     degrees_of_freedom: float  # of chi2
     rms: float  # noise that its inliers show; px
+    excess_noise: float  # its variance over that of sigma; covariances are multiplied by it where it exceeds 1
     unsupported: bool  # its inliers could be chance
     rejection: str  # why the model was not chosen
     rejected_by: str | None  # the model that did it
@@ -1006,7 +1017,7 @@ class _TwoViewMotionEstimate(Result):
     size_from_matches: bool  # it is that of the matches' box
     repeated: int  # matches equal to another one, which counts for them
     contradicted: int  # matches that take no part, because they contradict each other
-    status: str  # ok, too_few, not_applicable, not_converged or ill_defined
+    status: str  # ok, too_few, not_applicable, not_converged, ill_defined or contested
     reason: str | None  # in words, where status is not ok
     model: str  # the chosen one
     inliers: int  # their number
@@ -1016,6 +1027,9 @@ class _TwoViewMotionEstimate(Result):
     # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
     parameters: list[_PhysicalParameters]
     second_T_first: _RelativePose | None  # of the models with a pose
+    rivals: list[_TwoViewRival]  # where status is contested: the other models of which one may be right
+    # where status is contested: those of the chosen model that all rivals have, with a covariance that covers each
+    shared_parameters: _PhysicalParameters | None
     lattice: list[_TwoViewModelRow]  # all models
     inlier: _Array  # of each match
     squared_errors: _Array  # of each match, in units of the noise

@@ -6,6 +6,7 @@
 #include <fusion/two_view/two_view.hpp>
 #include <lie/s2.hpp>
 #include <lie/so3.hpp>
+#include <stats/random.hpp>
 
 #include <Eigen/Core>
 #include <Eigen/QR>
@@ -22,6 +23,7 @@
 namespace liestat {
 namespace {
 
+using experiments::nameOf;
 using experiments::TwoViewMotion;
 using experiments::TwoViewScene;
 using experiments::TwoViewSceneOptions;
@@ -108,13 +110,15 @@ TEST_P(EachMotion, parametersLieWhereTheirCovarianceSays) {
   const TwoViewMotion motion = GetParam();
   constexpr int trials = 6;
   double sum = 0;
-  int counted = 0;
+  int counted = 0, contested = 0;
   Eigen::Index k = 0;
   for (std::uint64_t seed = 1; seed <= trials; ++seed) {
     const double sigma = motion == TwoViewMotion::fundamental ? 0.05 : 0.2;
     const TwoViewScene scene({.motion = motion, .matches = 80, .sigma = sigma}, seed);
     const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
-    ASSERT_TRUE(found.ok()) << found.reason;
+    // One of twenty right ones is contested: more than two of six have a probability of 0.002.
+    ASSERT_TRUE(found.ok() || found.status == Status::contested) << found.reason;
+    contested += found.ok() ? 0 : 1;
     if (found.chosenModel().name != nameOf(motion)) continue;  // who is chosen how often: validate two-view
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < scene.inlier.size(); ++i) wrong += scene.inlier[i] != found.inlier[i];
@@ -146,6 +150,7 @@ TEST_P(EachMotion, parametersLieWhereTheirCovarianceSays) {
     }
   }
   ASSERT_GE(counted, motion == TwoViewMotion::fundamental ? 2 : trials - 2);
+  EXPECT_LE(contested, 2);
   if (k == 0) return;
   // χ² with k degrees of freedom has the variance 2k; the index is up to a fifth high (docs/two_view.md).
   const double mean = sum / counted, expected = static_cast<double>(k);
@@ -345,6 +350,137 @@ TEST(TwoViewMotion, severalMotionsLeaveContradictionsOut) {
   for (std::size_t i = 0; i < matches.size(); ++i) right += given[i] == owner[i] ? 1 : 0;
   EXPECT_GE(right, matches.size() - 12);
   for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(given[240 + i], given[40 + 3 * i]) << "equal matches belong together";
+}
+
+/// The model that was chosen and those that the matches do not tell from it.
+bool isInSet(const TwoViewMotionEstimate& found, const std::string& model) {
+  const auto is = [&](const TwoViewRival& rival) { return rival.model == model; };
+  return found.chosenModel().name == model || std::any_of(found.rivals.begin(), found.rivals.end(), is);
+}
+
+TEST(TwoViewMotion, parallaxOfAShortBaselineIsNotHiddenByTheNoise) {
+  // 8 cm at depths of 3 to 9 m. A guard of nine times the threshold chose a homography for half of the fundamental
+  // matrices. Of 60 scenes two wrong ones are allowed: at a share of 0.5 % that has a probability of 0.003 to fail.
+  std::size_t right = 0, unmarked = 0, in_set = 0;
+  constexpr std::size_t trials = 60;
+  for (std::uint64_t seed = 0; seed < trials; ++seed) {
+    constexpr TwoViewMotion motions[] = {TwoViewMotion::translation, TwoViewMotion::essential,
+                                         TwoViewMotion::fundamental};
+    TwoViewSceneOptions options{.motion = motions[seed % 3], .outliers = 0.1};
+    options.min_baseline = options.max_baseline = 0.08;
+    const TwoViewScene scene(options, 40 + seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    const std::string truth = nameOf(options.motion);
+    right += found.chosenModel().name == truth, in_set += isInSet(found, truth);
+    unmarked += found.ok() && found.chosenModel().name != truth;
+    EXPECT_EQ(found.status != Status::contested, found.rivals.empty());
+  }
+  EXPECT_GE(right, trials - 4);
+  EXPECT_GE(in_set, trials - 2);
+  EXPECT_LE(unmarked, 2u);
+}
+
+TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
+  // 3 cm: the matches tell in half of the scenes only. Where they do not, and the truth is one of the set, the shared
+  // rotation is closer to the truth in its own deviations than that of the chosen model by its covariance. First-order
+  // regions of an essential pose are too small at such baselines, so that not all are covered.
+  std::size_t contested = 0, covered = 0, covered_by_own = 0, trials = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    TwoViewSceneOptions options{.motion = TwoViewMotion::essential, .outliers = 0};
+    options.min_baseline = options.max_baseline = 0.03;
+    const TwoViewScene scene(options, 300 + seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    if (found.status != Status::contested) continue;
+    ++contested;
+    EXPECT_EQ(found.verdict(), Verdict::Answer::no);
+    EXPECT_NE(found.reason.find(found.rivals[0].model), std::string::npos);
+    if (!found.shared || !isInSet(found, "essential")) continue;
+    ASSERT_EQ(found.shared->names[0], "rotation x");
+    const Eigen::VectorXd error = errorOf(*found.shared, SO3d::fitToSO3(scene.R).log()).head<3>();
+    ++trials;
+    const Eigen::Matrix3d covariance = found.shared->covariance.topLeftCorner<3, 3>();
+    covered += error.dot(covariance.ldlt().solve(error)) < 16.3;
+    const Eigen::Matrix3d own = found.physical[0].covariance.topLeftCorner<3, 3>();
+    covered_by_own += error.dot(own.ldlt().solve(error)) < 16.3;
+  }
+  EXPECT_GE(contested, 8u);
+  EXPECT_GE(trials, 4u);
+  EXPECT_GE(2 * covered, trials);
+  EXPECT_GT(covered, covered_by_own);
+}
+
+TEST(TwoViewMotion, covariancesAreOfTheNoiseThatIsShown) {
+  // Rotations with twice the stated noise: with the stated one a quarter is more than five deviations off.
+  double sum = 0, sum_known = 0;
+  int compared = 0;
+  constexpr int trials = 30;
+  for (std::uint64_t seed = 0; seed < trials; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::rotation, .outliers = 0, .sigma = 1}, seed);
+    TwoViewMotionOptions options = optionsOf(scene);
+    options.sigma = 0.5;
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, options);
+    ASSERT_EQ(found.chosenModel().name, "rotation");
+    EXPECT_NEAR(found.chosenModel().excess_noise, 4, 1.5);
+    const Eigen::VectorXd error = errorOf(found.physical[0], truthOf(scene));
+    sum += squaredDistance(error, found.physical[0].covariance, 3);
+    options.noise_is_known = true;
+    const TwoViewMotionEstimate known = estimateTwoViewMotion(scene.pixels, options);
+    if (known.chosenModel().name != "rotation") continue;
+    ++compared;
+    sum_known += squaredDistance(errorOf(known.physical[0], truthOf(scene)), known.physical[0].covariance, 3);
+  }
+  // χ² of 3 · 30 degrees of freedom over 30: 3 ± 0.45, and 10 % for the noise that is estimated.
+  EXPECT_LT(sum / trials, 5);
+  // By the stated noise four times as far.
+  if (compared > 5) {
+    EXPECT_GT(sum_known / compared, 2 * sum / trials);
+  }
+}
+
+TEST(TwoViewMotion, onlyTheWinnerRejects) {
+  // A third of the matches does not move, tightly; the others follow a loose translation of 1.5 px. A zoom of one fits
+  // all of them no better than `none`, which a model that was not chosen rejected.
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    CounterRng random(seed, 0, 0);
+    std::vector<Eigen::Vector4d> matches;
+    for (int i = 0; i < 200; ++i) {
+      const bool still = i % 10 < 3;
+      const Eigen::Vector4d noise = random.normalVector<4>();
+      const Eigen::Vector2d at(1280 * random.uniform(), 960 * random.uniform());
+      const Eigen::Vector2d to = still ? at : Eigen::Vector2d(at + Eigen::Vector2d(1.5, 0.4));
+      Eigen::Vector4d& m = matches.emplace_back();
+      m << at, to;
+      m += (still ? 0.1 : 1.1) * noise;
+    }
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(matches, {});
+    EXPECT_NE(found.chosenModel().name, "zoom") << seed;
+    if (found.chosenModel().name == "none") {
+      EXPECT_FALSE(found.ok()) << seed;
+    }
+  }
+}
+
+TEST(TwoViewMotion, coordinatesHaveTheUnitOfTheFocalLengths) {
+  const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0}, 1);
+  TwoViewMotionOptions options = optionsOf(scene);
+  // Normalised coordinates.
+  const TwoViewMotionEstimate normalised = estimateTwoViewMotion(scene.matches, options);
+  EXPECT_EQ(normalised.status, Status::not_applicable);
+  EXPECT_NE(normalised.reason.find("no image coordinate is larger"), std::string::npos) << normalised.reason;
+  // Focal lengths that leave no image, and normalised ones for pixels.
+  for (const double f : {1e10, 1.0}) {
+    options.first = cameraOf(scene.options, f);
+    EXPECT_EQ(estimateTwoViewMotion(scene.pixels, options).status, Status::not_applicable) << f;
+    EXPECT_FALSE(estimateTwoViewMotions(scene.pixels, options).ok()) << f;
+  }
+  // A long lens.
+  options.first = cameraOf(scene.options, 60000);
+  EXPECT_NE(estimateTwoViewMotion(scene.pixels, options).status, Status::not_applicable);
+  // Both normalised.
+  options.first = Camera{.fu = 1, .fv = 1, .cu = 0, .cv = 0};
+  options.sigma = scene.options.sigma / scene.options.focal_length;
+  options.image_size = Eigen::Vector2d(640, 480) / 600;
+  EXPECT_TRUE(estimateTwoViewMotion(scene.matches, options).ok());
 }
 
 TEST(TwoViewMotion, badInputHasAStatusAndTheBestLowerModel) {

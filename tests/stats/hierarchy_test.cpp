@@ -85,7 +85,9 @@ TEST(Hierarchy, SaysWhyAModelIsRejected) {
     EXPECT_TRUE(search.contains(*state.rejected_by, search.find(other)));
   }
   // A bend that no point is far from speaks through the fit.
-  Curves bent(curveModels());
+  HierarchyOptions guarded;
+  guarded.choice.support.guard = 9;
+  Curves bent(curveModels(), guarded);
   bent.add(curvePoints({-1, 2, 0.012}, 400, 20, 3));
   finish(bent);
   ASSERT_EQ(chosen(bent), "parabola");

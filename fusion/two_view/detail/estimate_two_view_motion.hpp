@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/coordinate_units.hpp>
 #include <fusion/two_view/detail/two_view_estimate.hpp>
 #include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/two_view.hpp>
@@ -95,10 +96,83 @@ inline TwoViewModelRow rowOf(const Hierarchy<Eigen::Vector4d, TwoViewMotionModel
   row.relevance = state.relevance;
   row.chi2 = state.fit.chi2, row.degrees_of_freedom = state.fit.degreesOfFreedom();
   row.rms = sigma * std::sqrt(state.fit.normalised());
+  row.excess_noise = state.excess_noise;
   row.unsupported = state.unsupported;
   row.rejection = state.rejection;
   if (state.rejected_by) row.rejected_by = search.models()[*state.rejected_by]->name();
   return row;
+}
+
+/// The search, as the options ask for it.
+inline HierarchyOptions searchOptions(const TwoViewMotionOptions& options) {
+  HierarchyOptions search = options.search;
+  if (options.noise_is_known) search.choice.support.guard = 1;
+  return search;
+}
+
+/// An estimate at the noise that the data show, where this exceeds the stated one: from the matches within the threshold
+/// of that noise, with its covariance. Inliers of the stated noise would be a third of the right ones less at twice the
+/// noise, of which the covariance knows nothing.
+inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
+                                                      const ModelState<TwoViewMotionModel>& state,
+                                                      std::span<const Eigen::Vector4d> matches,
+                                                      const TwoViewMotionOptions& options) {
+  ModelEstimate<TwoViewMotionModel> estimate = state.estimate;
+  if (options.noise_is_known || !(state.excess_noise > 1)) return estimate;
+  // Within this the stated threshold cuts off hardly more than it is meant to.
+  constexpr double estimated_again = 1.3;
+  if (state.excess_noise > estimated_again) {
+    std::vector<double> errors(matches.size());
+    model.errors(estimate.parameter, matches, errors);
+    std::vector<Eigen::Vector4d> within;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (errors[i] < state.excess_noise * state.threshold) within.push_back(matches[i]);
+    }
+    ModelEstimate<TwoViewMotionModel> again = model.estimate(estimate.parameter, within, options.stop);
+    if (again.status == estimate.status) estimate = std::move(again);
+  }
+  estimate.covariance *= state.excess_noise, estimate.information /= state.excess_noise;
+  return estimate;
+}
+
+/// The parameters of the first motion that all others have, too: its values, and a covariance that covers each motion.
+inline std::optional<PhysicalParameters> sharedParameters(const TwoViewMotionResult& first,
+                                                          std::span<const TwoViewRival> others) {
+  if (first.physical.empty()) return std::nullopt;
+  const PhysicalParameters& own = first.physical[0];
+  // For each motion the places of the shared ones.
+  std::vector<std::vector<Eigen::Index>> places(others.size() + 1);
+  PhysicalParameters shared;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    std::vector<Eigen::Index> at = {static_cast<Eigen::Index>(i)};
+    for (const TwoViewRival& other : others) {
+      if (other.physical.empty()) return std::nullopt;
+      const auto& names = other.physical[0].names;
+      const auto found = std::find(names.begin(), names.end(), own.names[i]);
+      if (found != names.end()) at.push_back(found - names.begin());
+    }
+    if (at.size() != places.size()) continue;
+    shared.names.push_back(own.names[i]), shared.units.push_back(own.units[i]);
+    for (std::size_t k = 0; k < at.size(); ++k) places[k].push_back(at[k]);
+  }
+  const auto n = static_cast<Eigen::Index>(shared.size());
+  if (n == 0) return std::nullopt;
+  shared.values.resize(n), shared.covariance = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) shared.values[i] = own.values[places[0][static_cast<std::size_t>(i)]];
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const PhysicalParameters& one = k == 0 ? own : others[k - 1].physical[0];
+    const auto difference = [&](Eigen::Index i) {
+      return one.values[places[k][static_cast<std::size_t>(i)]] - shared.values[i];
+    };
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        const double covariance =
+            one.covariance(places[k][static_cast<std::size_t>(i)], places[k][static_cast<std::size_t>(j)]);
+        shared.covariance(i, j) += (covariance + difference(i) * difference(j)) / static_cast<double>(places.size());
+      }
+    }
+  }
+  return shared;
 }
 
 /// The least and the largest coordinate of all points along an axis. Those that lie ten times as far beyond the middle
@@ -199,9 +273,16 @@ struct TwoViewInput {
     if (!(options.search.outlier_share > 0 && options.search.outlier_share < 1)) {
       return refuse(Status::not_applicable, "the share of outliers beyond the threshold must be between 0 and 1");
     }
+    CoordinateUnits units[2];
     for (const Eigen::Vector4d& m : matches) {
       Eigen::Vector4d& u = normalised.emplace_back();
       u << first(m.head<2>()), second(m.tail<2>());
+      units[0].add(m.head<2>(), u.head<2>()), units[1].add(m.tail<2>(), u.tail<2>());
+    }
+    for (int k = 0; k < 2; ++k) {
+      const auto& camera = k == 1 && options.second ? options.second : options.first;
+      const CoordinateFault fault = camera ? units[k].fault(*camera) : CoordinateFault{};
+      if (fault) return refuse(Status::not_applicable, fault.found + "; expected " + fault.expected);
     }
     used = independentMatches(normalised, noise, options.keep_contradictions);
     first_of_equal = firstOfEqualMatches(normalised);
@@ -213,7 +294,7 @@ struct TwoViewInput {
              none ? "the cameras see no match" : "all matches contradict each other");
     }
   }
-  void refuse(Status why, const char* in_words) { status = why, reason = in_words; }
+  void refuse(Status why, const std::string& in_words) { status = why, reason = in_words; }
   static bool isPinhole(const Camera& camera) {
     return camera.fu > 0 && camera.fv > 0 && std::isfinite(camera.fu) && std::isfinite(camera.fv) &&
            std::isfinite(camera.cu) && std::isfinite(camera.cv);
@@ -246,7 +327,8 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   result.status = input.status, result.reason = input.reason;
   result.errors.assign(matches.size(), std::numeric_limits<double>::quiet_NaN());
   result.inlier.assign(matches.size(), false);
-  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.ok() ? options.search : HierarchyOptions{});
+  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(
+      input.models, input.ok() ? detail::searchOptions(options) : HierarchyOptions{});
   if (result.ok()) {
     search.add(input.usedMatches());
     while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
@@ -273,7 +355,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     if (result.inlier[i]) agreeing.push_back(input.normalised[i]);
   }
   result.inliers = agreeing.size(), result.threshold = state.threshold;
-  input.describe(model, state.estimate, agreeing, result);
+  input.describe(model, detail::atShownNoise(model, state, input.usedMatches(), options), agreeing, result);
 
   result.status = state.estimate.status;
   if (search.progress() != HierarchyState::terminated) {
@@ -285,6 +367,23 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   } else if (state.unsupported) {
     result.status = Status::ill_defined;
     result.reason = "no model is supported: the inliers of the chosen one could be chance";
+  } else if (const std::vector<std::size_t> set = search.contested(); set.size() > 1) {
+    result.status = Status::contested, result.reason = "the matches do not tell apart " + model.name();
+    for (auto m = set.begin() + 1; m != set.end(); ++m) {
+      const TwoViewModel& other = *search.models()[*m];
+      const ModelState<TwoViewMotionModel>& its = search.state(*m);
+      std::vector<double> errors(matches.size());
+      other.errors(its.estimate.parameter, input.normalised, errors);
+      std::vector<Eigen::Vector4d> inliers;
+      for (std::size_t i = 0; i < matches.size(); ++i) {
+        if (errors[i] < its.threshold) inliers.push_back(input.normalised[i]);
+      }
+      TwoViewRival& rival = result.rivals.emplace_back();
+      rival.model = other.name(), rival.inliers = inliers.size(), rival.equations = other.equations();
+      input.describe(other, detail::atShownNoise(other, its, input.usedMatches(), options), inliers, rival);
+      result.reason += (m + 1 == set.end() ? " and " : ", ") + other.name();
+    }
+    result.shared = detail::sharedParameters(result, result.rivals);
   }
   return result;
 }
@@ -300,8 +399,8 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
     std::iota(result.rest.begin(), result.rest.end(), std::size_t{0});
     return result;
   }
-  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(input.models, input.usedMatches(),
-                                                                 {.hierarchy = options.search, .max_structures = most});
+  RepeatedExtraction<Eigen::Vector4d, TwoViewMotionModel> search(
+      input.models, input.usedMatches(), {.hierarchy = detail::searchOptions(options), .max_structures = most});
   while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
   }
   std::vector<char> taken(matches.size(), 0);
