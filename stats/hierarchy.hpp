@@ -1,18 +1,15 @@
-// Robust estimation with a hierarchy of models: which model explains the
-// measurements, with which parameter, and which measurements are outliers (T.
-// Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's
-// estimation method", INRIA RR-4050, 2000, section 5; docs/hierarchy.md has the
-// rules, and where they differ from the report).
+// Robust estimation with a hierarchy of models: which model explains the measurements, with which parameter, and which
+// measurements are outliers (T. Viéville, D. Lingrand, F. Gaspard, "Implementing a variant of the Kanatani's estimation
+// method", INRIA RR-4050, 2000, section 5; docs/hierarchy.md has the rules, and where they differ from the report).
 //
-//   Hierarchy<Eigen::Vector4d, Eigen::Matrix3d> search(models);   // shared_ptr
-//   to HierarchyModel, one without parents search.add(matches); while
-//   (search.iterate()) {}                                   // or until there
-//   is no time left const auto& found = search.state(search.best());
+//   Hierarchy<Eigen::Vector4d, Eigen::Matrix3d> search(models);   // shared_ptr to HierarchyModel, one without parents
+//   search.add(matches);
+//   while (search.iterate()) {}                                   // or until there is no time left
+//   const auto& found = search.state(search.best());
 //
-// The search can be interrupted after each hypothesis, and has an answer at any
-// time. Measurements may be added and removed at any time. When it has
-// terminated the answer depends on the measurements alone, not on the order in
-// which they came: draws belong to what a measurement is, not to its place.
+// The search can be interrupted after each hypothesis, and has an answer at any time. Measurements may be added and
+// removed at any time. When it has terminated the answer depends on the measurements alone, not on the order in which they
+// came: draws belong to what a measurement is, not to its place.
 #pragma once
 
 #include <stats/detail/keyed_measurements.hpp>
@@ -56,9 +53,8 @@ class Hierarchy {
     restart();
   }
 
-  /// True if the models form a lattice (names differ, parents exist, no circle,
-  /// one model without parents), and numbers are within their limits. Otherwise
-  /// nothing is ever estimated, and fault() says why.
+  /// True if the models form a lattice (names differ, parents exist, no circle, one model without parents), and numbers
+  /// are within their limits. Otherwise nothing is ever estimated, and fault() says why.
   bool valid() const { return fault_.empty(); }
   const std::string& fault() const { return fault_; }
 
@@ -71,8 +67,7 @@ class Hierarchy {
     return all;
   }
 
-  /// Adds a measurement; the name by which it is removed. Those that are not
-  /// numbers count as outliers of all models.
+  /// Adds a measurement; the name by which it is removed. Those that are not numbers count as outliers of all models.
   Id add(const Measurement& measurement) {
     const auto [at, id] = measurements_.add(measurement);
     if (!valid()) return id;
@@ -132,8 +127,7 @@ class Hierarchy {
     return true;
   }
 
-  /// One hypothesis or one estimate; true while there is more to do. What
-  /// `stop` ends is begun again by the next call.
+  /// One hypothesis or one estimate; true while there is more to do. What `stop` ends is begun again by the next call.
   bool iterate(const StopRequest& stop = {}) {
     const std::size_t m = next();
     if (m == none) return false;
@@ -157,7 +151,7 @@ class Hierarchy {
       if (due && draws.hasBest()) refine(m, 1, stop);
       return true;
     }
-    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop, true)) return true;
+    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop)) return true;
     finish(m);
     if (next() == none) terminate();
     return next() != none;
@@ -183,10 +177,9 @@ class Hierarchy {
   /// True if `general` contains `specific`, through any number of models.
   bool contains(std::size_t general, std::size_t specific) const { return contains_[general][specific]; }
 
-  /// The chosen model: the most specific one that no estimated generalisation
-  /// rejects. Of several, the one with more inliers; of those within 10 %, the
-  /// one with more equations of a measurement, then with fewer parameters. The
-  /// null model while there is no estimate.
+  /// The chosen model: the most specific one that no estimated generalisation rejects. Of several, the one with more
+  /// inliers; of those within 10 %, the one with more equations of a measurement, then with fewer parameters. The null
+  /// model while there is no estimate.
   std::size_t best() const {
     const std::size_t winner = bestOf([&](std::size_t m) { return survives(m); }, !options_.choice.support.guard);
     return options_.choice.support.guard || winner == none ? orNull(winner) : bestWithin(winner);
@@ -204,9 +197,8 @@ class Hierarchy {
     }
     return orNull(bestOf([&](std::size_t m) { return survivors[m] != 0; }, !support.guard));
   }
-  /// The models that the measurements do not tell apart: the chosen one first,
-  /// then those that cast doubt on it, the most specific ones of them. One
-  /// alone: the choice is clear.
+  /// The models that the measurements do not tell apart: the chosen one first, then those that cast doubt on it, the
+  /// most specific ones of them. One alone: the choice is clear.
   std::vector<std::size_t> contested() const {
     const std::size_t chosen = best();
     std::vector<std::size_t> all = {chosen}, doubtful;
@@ -221,8 +213,7 @@ class Hierarchy {
     return all;
   }
 
-  /// Why `specific` is rejected in favour of `general`, if it is; both are
-  /// estimated.
+  /// Why `specific` is rejected in favour of `general`, if it is; both are estimated.
   Rejection compare(std::size_t specific, std::size_t general) const {
     return compare(specific, general, options_.choice.support, options_.choice.phi);
   }
@@ -258,27 +249,24 @@ class Hierarchy {
     const int freedom = model_g.freedomBeyond(model_s);
     const auto by_chance = [&](std::size_t of) { return support.explained(of, freedom, model_g.equations(), chance); };
     if (explained > by_chance(far)) {
-      // Noise of any size that is equal in all directions brings measurements
-      // close to a model of fewer equations.
+      // Noise of any size that is equal in all directions brings measurements close to a model of fewer equations.
       const bool may_be_noise = !support.guard && noise_excuses && model_s.equations() > model_g.equations();
       if (!may_be_noise || explained > explainedByNoise(specific, general, guard, support)) return Rejection::support;
     }
-    // Near or far: what leaves most of the other's inliers is not the model of
-    // them.
+    // Near or far: what leaves most of the other's inliers is not the model of them.
     if (only_general > common + by_chance(size() - common)) return Rejection::support;
     if (fitRejects(fit_s, fit_g, phi)) return Rejection::fit;
     if (support.guard) return Rejection::none;
     return costExcess(specific, general, freedom) > cost ? Rejection::cost : Rejection::none;
   }
-  /// The multiple of a threshold beyond which measurements are far, by the
-  /// excess noise of the general model.
+  /// The multiple of a threshold beyond which measurements are far, by the excess noise of the general model.
   double guardOf(std::size_t general) const {
     const State& g = states_[general];
     const double threshold = g.threshold > 0 ? knownThreshold(models_[general]->equations()) / g.threshold : 1;
     return std::clamp(g.excess_noise * threshold, 1.0, max_excess_noise);
   }
-  /// The number of measurements far from the specific model that chance, noise
-  /// and its freedom bring to the general one.
+  /// The number of measurements far from the specific model that chance, noise and its freedom bring to the general
+  /// one.
   std::size_t explainedByNoise(std::size_t specific, std::size_t general, double guard,
                                const SupportTest& support) const {
     const State &s = states_[specific], &g = states_[general];
@@ -293,8 +281,7 @@ class Hierarchy {
     }
     return support.explained(chances, model.freedomBeyond(*models_[specific]), model.equations());
   }
-  /// True if a model can reject or doubt another one: it contains it, or has
-  /// fewer equations and is not contained.
+  /// True if a model can reject or doubt another one: it contains it, or has fewer equations and is not contained.
   bool mayExcel(std::size_t general, std::size_t specific) const {
     const bool fewer = models_[general]->equations() < models_[specific]->equations();
     return contains_[general][specific] || (fewer && !contains_[specific][general]);
@@ -302,9 +289,8 @@ class Hierarchy {
   bool rejects(std::size_t general, std::size_t specific) const {
     return mayExcel(general, specific) && compare(specific, general) != Rejection::none;
   }
-  /// True if a model casts doubt on another one. A general model of as many
-  /// equations that has not as many residual degrees of freedom as parameters
-  /// fits whatever there is: not tested is not passed.
+  /// True if a model casts doubt on another one. A general model of as many equations that has not as many residual
+  /// degrees of freedom as parameters fits whatever there is: not tested is not passed.
   bool doubts(std::size_t general, std::size_t specific) const {
     if (!mayExcel(general, specific)) return false;
     const bool same = models_[general]->equations() == models_[specific]->equations();
@@ -314,9 +300,8 @@ class Hierarchy {
     support.guard = options_.choice.support.guard;
     return compared(specific, general, support, options_.doubt.phi, options_.doubt.cost, false) != Rejection::none;
   }
-  /// Standard deviations by which the inliers of a model of fewer equations
-  /// cost more under the other one than its further equations and the freedom
-  /// explain; -∞ where it has no fewer.
+  /// Standard deviations by which the inliers of a model of fewer equations cost more under the other one than its
+  /// further equations and the freedom explain; -∞ where it has no fewer.
   double costExcess(std::size_t specific, std::size_t general, int freedom) const {
     const State &s = states_[specific], &g = states_[general];
     const int d = models_[specific]->equations() - models_[general]->equations();
@@ -336,11 +321,9 @@ class Hierarchy {
     return n > 0 ? CostTest::excess(sum, n, d, freedom, v) : -std::numeric_limits<double>::infinity();
   }
 
-  static constexpr std::size_t max_completions = 100;  // a pair of right ones among 80 % outliers with probability 0.98
-
   std::size_t orNull(std::size_t m) const { return m == none ? null_ : m; }
-  /// Only the winner and what it contains reject: a model within it that these
-  /// do not even cast doubt on takes its place.
+  /// Only the winner and what it contains reject: a model within it that these do not even cast doubt on takes its
+  /// place.
   std::size_t bestWithin(std::size_t winner) const {
     const auto doubted = [&](std::size_t m) {
       for (std::size_t g = 0; g < models_.size(); ++g) {
@@ -355,8 +338,8 @@ class Hierarchy {
     const std::size_t next = bestOf(may_replace, true);
     return next == none ? winner : bestWithin(next);
   }
-  /// The best of the most specific models that are not rejected; none: there is
-  /// none. `adaptive`: the noise is not known.
+  /// The best of the most specific models that are not rejected; none: there is none. `adaptive`: the noise is not
+  /// known.
   template <class Survives>
   std::size_t bestOf(const Survives& survives, bool adaptive) const {
     std::vector<std::size_t> chosen;
@@ -369,8 +352,7 @@ class Hierarchy {
       if (most_specific) chosen.push_back(m);
     }
     if (chosen.empty()) return none;
-    // Neither of two models may contain the other; the one with more equations
-    // may cost too much all the same.
+    // Neither of two models may contain the other; the one with more equations may cost too much all the same.
     if (adaptive) {
       const std::vector<std::size_t> all = chosen;
       std::erase_if(chosen, [&](std::size_t m) {
@@ -455,8 +437,7 @@ class Hierarchy {
   double knownThreshold(int equations) const {
     return thresholds_[static_cast<std::size_t>(std::clamp(equations, 0, detail::max_equations))];
   }
-  /// The threshold for one measurement, from that of measurements with the
-  /// usual number of equations.
+  /// The threshold for one measurement, from that of measurements with the usual number of equations.
   double limitOf(std::size_t m, double threshold, std::size_t i) const {
     const int usual = models_[m]->equations(), here = models_[m]->equationsOf(measurements_[i]);
     return here == usual ? threshold : threshold * knownThreshold(here) / knownThreshold(usual);
@@ -487,10 +468,9 @@ class Hierarchy {
     states_[null_].progress = State::Progress::candidate;
     decide();
   }
-  /// The candidate that is next: of the most specific ones the one with the
-  /// fewest draws, because the n-th draw improves the best of those before it
-  /// with probability 1/n. More general models wait, so that what guides them
-  /// is final.
+  /// The candidate that is next: of the most specific ones the one with the fewest draws, because the n-th draw
+  /// improves the best of those before it with probability 1/n. More general models wait, so that what guides them is
+  /// final.
   std::size_t next() const {
     std::size_t best = none;
     if (!valid()) return best;
@@ -550,17 +530,13 @@ class Hierarchy {
     double threshold = 0;
     std::int64_t score = 0;
   };
-  /// The estimate from a hypothesis: from its inliers, and once again from
-  /// those of that estimate. To go on until nothing changes makes a threshold
-  /// that follows the errors collapse. None if `stop` ended it.
+  /// The estimate from a hypothesis: from its inliers, and once again from those of that estimate. To go on until
+  /// nothing changes makes a threshold that follows the errors collapse. None if `stop` ended it.
   std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
                                   const StopRequest& stop) const {
+    Parameter parameter = draws_[m].at(place).parameter;
     std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
     for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
-    return refine(m, draws_[m].at(place).parameter, key, made, stop);
-  }
-  std::optional<Candidate> refine(std::size_t m, Parameter parameter, std::uint64_t key, std::vector<Refined>& made,
-                                  const StopRequest& stop) const {
     Candidate candidate;
     candidate.errors = errorsOf(m, parameter);
     candidate.threshold = thresholdOf(m, candidate.errors);
@@ -596,69 +572,16 @@ class Hierarchy {
     }
     return candidate;
   }
-  /// The best hypotheses of a model that the estimates of others and
-  /// measurements far from these determine: of all sets of such measurements,
-  /// or of many that depend on the measurements alone, not on the seed.
-  std::vector<Parameter> completions(std::size_t m, std::size_t count) const {
-    std::vector<std::pair<std::int64_t, Parameter>> found;
-    std::vector<double> errors(size());
-    std::vector<Parameter> solutions;
-    for (std::size_t other = 0; other < models_.size(); ++other) {
-      const std::size_t s = models_[m]->completionSize(*models_[other]);
-      if (s == 0 || !isFinal(other) || states_[other].unsupported) continue;
-      detail::KeyedMeasurements<Measurement> outside;
-      for (std::size_t i = 0; i < size(); ++i) {
-        const double error = states_[other].errors[i];
-        if (std::isfinite(error) && !(error < limitOf(other, states_[other].threshold, i))) {
-          outside.add(measurements_[i]);
-        }
-      }
-      std::vector<std::size_t> sample;
-      std::vector<Measurement> sampled;
-      for (std::size_t draw = 0; draw < max_completions && outside.size() >= s; ++draw) {
-        detail::keyedSample(outside, draw, s, sample, [](std::size_t) { return true; });
-        sampled.clear(), solutions.clear();
-        for (const std::size_t i : sample) sampled.push_back(outside[i]);
-        models_[m]->complete(*models_[other], states_[other].estimate.parameter, sampled, solutions);
-        for (const Parameter& solution : solutions) {
-          models_[m]->errors(solution, measurements_.all(), errors);
-          std::int64_t score = 0;
-          for (std::size_t i = 0; i < size(); ++i) {
-            score += detail::scoreOf(options_.score, errors[i], limitOf(m, knownThreshold(models_[m]->equations()), i));
-          }
-          found.emplace_back(score, solution);
-        }
-      }
-    }
-    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    std::vector<Parameter> best;
-    for (std::size_t k = 0; k < std::min(count, found.size()); ++k) best.push_back(found[k].second);
-    return best;
-  }
-  /// The best of the estimates from the best hypotheses: samples of few
-  /// measurements are noisy, and one outlier far from the others may hold an
-  /// estimate that begins with it. False if `stop` ended it.
-  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
+  /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
+  /// others may hold an estimate that begins with it. False if `stop` ended it.
+  bool refine(std::size_t m, std::size_t count, const StopRequest& stop) {
     std::optional<Candidate> best;
-    const auto take = [&](std::optional<Candidate> candidate) {
-      const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
-                          (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
-      if (better) best = std::move(candidate);
-    };
     for (const auto& place : draws_[m].ranked(count)) {
       std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
       if (!candidate) return false;
-      take(std::move(candidate));
-    }
-    if (last) {
-      // These begin at estimates, which no key of measurements names: nothing
-      // is kept of them.
-      for (const Parameter& parameter : completions(m, count)) {
-        std::vector<Refined> made;
-        std::optional<Candidate> candidate = refine(m, parameter, 0, made, stop);
-        if (!candidate) return false;
-        take(std::move(candidate));
-      }
+      const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
+                          (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
+      if (better) best = std::move(candidate);
     }
     State& state = states_[m];
     state.estimate = std::move(best->estimate);
@@ -721,9 +644,8 @@ class Hierarchy {
       if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
   }
-  /// True if a general model, which was not estimated, could reject a specific
-  /// one by its support or cost: there are enough measurements that the
-  /// specific one is far from, or it has more equations.
+  /// True if a general model, which was not estimated, could reject a specific one by its support or cost: there are
+  /// enough measurements that the specific one is far from, or it has more equations.
   bool mayReject(std::size_t general, std::size_t specific) const {
     const State& state = states_[specific];
     const Model &g = *models_[general], &s = *models_[specific];
