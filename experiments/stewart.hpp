@@ -1,4 +1,5 @@
-// Stewart's distribution of good and bad data (Viéville, Lingrand and Gaspard 2000, (32)), and the bias of a score on it.
+// Stewart's distribution of good and bad data (Viéville, Lingrand and Gaspard 2000, (32)), and the bias of a score on
+// it.
 #pragma once
 
 #include <stats/random.hpp>

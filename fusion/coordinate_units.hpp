@@ -1,6 +1,6 @@
 // Image coordinates and the camera that they are said to be of: have they the same unit? Estimators of motion refuse
-// normalised coordinates with focal lengths in pixels, pixels with focal lengths of one, and focal lengths that leave no
-// image.
+// normalised coordinates with focal lengths in pixels, pixels with focal lengths of one, and focal lengths that leave
+// no image.
 #pragma once
 
 #include <fusion/camera.hpp>

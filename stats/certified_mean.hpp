@@ -309,8 +309,9 @@ CertifiedMean<M> meanWithCertificates(const E& executor, const R& samples, const
 /// that is stated for them (inconsistent; `fit` says by how much), if another feature explains the measurements as
 /// well, exactly or up to their noise (ambiguous), if the features are as scattered as uniform ones or the criterion is
 /// flat within the confidence region (ill_defined), if there are no more features than dimensions and the noise is not
-/// known, or too few for a bootstrap that the options ask for (too_few), or if the weights are invalid (not_applicable). A mean that is merely not certified to be unique
-/// keeps its covariance. The result has the same bits on any executor.
+/// known, or too few for a bootstrap that the options ask for (too_few), or if the weights are invalid
+/// (not_applicable). A mean that is merely not certified to be unique keeps its covariance. The result has the same
+/// bits on any executor.
 template <Executor E, detail::AnyRange R, class M = detail::MetricInSignature<R>>
 CertifiedMean<M> certifiedMean(const E& executor, R&& samples,
                                const CertifiedMeanOptions<std::type_identity_t<M>>& options = {}) {

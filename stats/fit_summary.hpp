@@ -14,8 +14,8 @@
 
 namespace liestat {
 
-/// Fits a model to points in the rows of a matrix, which has a column for each of coordinateNames(model); with any other
-/// number of columns the end is `bad_input`. A sigma that is not positive ends as `bad_input`, too.
+/// Fits a model to points in the rows of a matrix, which has a column for each of coordinateNames(model); with any
+/// other number of columns the end is `bad_input`. A sigma that is not positive ends as `bad_input`, too.
 LIESTAT_ESTIMATION_API FitSummary summarizedFit(FitModel model, const Eigen::Ref<const Eigen::MatrixXd>& points,
                                                 std::optional<double> sigma = {}, const FitOptions& options = {});
 

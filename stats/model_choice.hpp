@@ -92,10 +92,10 @@ struct SquaredError {
   int equations = 1;
 };
 
-/// The excess noise s²: errors of right measurements follow s² χ². By maximum likelihood with a background of chance, from
-/// the errors below nine times their threshold (over the inliers alone a true 4 would be estimated as 2.5 to 3.5), with
-/// the degrees of freedom less the model's free parameters. `chance` is the share of random measurements below nine
-/// thresholds. Within [0, 9]; 9 where no degree of freedom is left, of which nothing is known.
+/// The excess noise s²: errors of right measurements follow s² χ². By maximum likelihood with a background of chance,
+/// from the errors below nine times their threshold (over the inliers alone a true 4 would be estimated as 2.5 to 3.5),
+/// with the degrees of freedom less the model's free parameters. `chance` is the share of random measurements below
+/// nine thresholds. Within [0, 9]; 9 where no degree of freedom is left, of which nothing is known.
 inline double excessNoise(std::span<const SquaredError> errors, int free_parameters, double chance) {
   double within = 0, beyond = 0;
   int equations = 1;
@@ -136,8 +136,8 @@ inline double excessNoise(std::span<const SquaredError> errors, int free_paramet
 /// The test of support: measurements that a general model explains and a specific one is far from.
 struct SupportTest {
   /// Far is beyond this multiple of the threshold of squared errors, which protects the specific model where noise is
-  /// larger than stated. Empty: the excess noise of the general model, at most 9, and measurements that noise of any size
-  /// explains, equal in all directions, count as chance. 1: the stated noise is right.
+  /// larger than stated. Empty: the excess noise of the general model, at most 9, and measurements that noise of any
+  /// size explains, equal in all directions, count as chance. 1: the stated noise is right.
   std::optional<double> guard = {};
   double probability = 0.999;  ///< with which chance explains no more
 
@@ -158,9 +158,9 @@ struct SupportTest {
   }
 };
 
-/// The probability that a general model of p' equations takes for an inlier, below T', a measurement that has the error e
-/// under a specific one of p > p' equations, if all that is wrong with it is noise of any size and law that is equal in
-/// all directions: e'/e then follows a beta law.
+/// The probability that a general model of p' equations takes for an inlier, below T', a measurement that has the error
+/// e under a specific one of p > p' equations, if all that is wrong with it is noise of any size and law that is equal
+/// in all directions: e'/e then follows a beta law.
 inline double chanceOfIsotropicNoise(double error, double general_threshold, int general_equations, int equations) {
   const double x = std::min(1.0, general_threshold / error);
   if (general_equations == 1 && equations == 2) return 2 / std::numbers::pi * std::asin(std::sqrt(x));

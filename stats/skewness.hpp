@@ -12,8 +12,8 @@ namespace liestat {
 /// Mardia's test for skewed errors: the 95 % region of a mean supposes that they are not, and is too small for few
 /// measurements if they are. Errors with heavy tails raise it, too.
 struct Skewness {
-  /// b = Σ_ij (u_i·u_j)³/n², u_i the errors about their mean, whitened by their scatter; of one coordinate the square of
-  /// its skewness. NaN where nothing was tested.
+  /// b = Σ_ij (u_i·u_j)³/n², u_i the errors about their mean, whitened by their scatter; of one coordinate the square
+  /// of its skewness. NaN where nothing was tested.
   double b = std::numeric_limits<double>::quiet_NaN();
   double p = std::numeric_limits<double>::quiet_NaN();  ///< probability of so large a b if the errors are normal
   std::size_t n = 0;                                    ///< how many errors it is of

@@ -156,8 +156,8 @@ bool isBelievable(const TimeCell& cell, const Rows& rows, std::span<const double
 }  // namespace detail
 
 /// Tests rows, in any order, and widens the covariance of their estimate, `plain`. White noise has the variance 1 in
-/// units of the whitening if `known_noise`, else that of the residuals. At least 20 rows and three times as many residuals
-/// as parameters are needed; rows of one time alone say nothing.
+/// units of the whitening if `known_noise`, else that of the residuals. At least 20 rows and three times as many
+/// residuals as parameters are needed; rows of one time alone say nothing.
 template <int C, int P>
 TimedCovariance<P> timedCovariance(std::span<const TimedRow<C, P>> given, const Eigen::Matrix<double, P, P>& plain,
                                    bool known_noise) {

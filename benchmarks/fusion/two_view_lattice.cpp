@@ -1,6 +1,6 @@
-// A whole lattice of two-view models: every model is searched for, estimated and compared, and one is chosen. Matches of a
-// moving camera, half a pixel of noise, 20 scenes; the time is that of one answer. `right` is the share of the scenes
-// whose own model was chosen, `inliers` their mean number.
+// A whole lattice of two-view models: every model is searched for, estimated and compared, and one is chosen. Matches
+// of a moving camera, half a pixel of noise, 20 scenes; the time is that of one answer. `right` is the share of the
+// scenes whose own model was chosen, `inliers` their mean number.
 #include <experiments/two_view_scene.hpp>
 #include <fusion/two_view/two_view.hpp>
 

@@ -4,9 +4,10 @@
 // parameter and evaluates the merit function.
 //
 // fit/: the whole estimate of the same homography from a linear start, with its covariance, beside a Gauss-Helmert loop
-// written in Eigen for these very sizes and beside Ceres, whose parameters are H and the true first point of each match.
-// The time is that of one match; counters: iterations, and how far the estimate is from this library's, in standard
-// deviations. The library's does more: it tests chi2, the minimum and the curvature; "first order" leaves out the last two.
+// written in Eigen for these very sizes and beside Ceres, whose parameters are H and the true first point of each
+// match. The time is that of one match; counters: iterations, and how far the estimate is from this library's, in
+// standard deviations. The library's does more: it tests chi2, the minimum and the curvature; "first order" leaves out
+// the last two.
 #include "../inputs.hpp"
 
 #include <stats/auto_diff.hpp>
@@ -113,8 +114,8 @@ Answer byLibrary(const std::vector<Match>& matches, const Homography& start, boo
   return {found.parameter, found.covariance, found.iterations};
 }
 
-/// The Gauss-Helmert loop of a textbook: equations linearised at the corrected measurements, normal equations bordered by
-/// the constraint, corrections from the multipliers.
+/// The Gauss-Helmert loop of a textbook: equations linearised at the corrected measurements, normal equations bordered
+/// by the constraint, corrections from the multipliers.
 Answer byGaussHelmert(const std::vector<Match>& matches, const Homography& start) {
   Answer answer{.h = start};
   std::vector<Match> corrected = matches;

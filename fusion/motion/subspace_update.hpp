@@ -254,7 +254,8 @@ struct FilterStep {
 };
 
 /// C cut to what a frame can say: eigenvalues of L⁻¹ C L⁻ᵀ to [-1/2, 1], S = L Lᵀ. Second derivatives of points
-/// near the focus of expansion scatter, and may call the information of a frame negative. A singular S leaves C as it is.
+/// near the focus of expansion scatter, and may call the information of a frame negative. A singular S leaves C as it
+/// is.
 template <class S, int D>
 Eigen::Matrix<S, D, D> cutInformation(const Eigen::Matrix<S, D, D>& C, const Eigen::Matrix<S, D, D>& information) {
   using Matrix = Eigen::Matrix<S, D, D>;
@@ -270,8 +271,8 @@ Eigen::Matrix<S, D, D> cutInformation(const Eigen::Matrix<S, D, D>& C, const Eig
 }
 
 /// J = P_g⁻¹ + S, ξ = -J⁻¹ g, P_g ← J⁻¹, and the reported covariance in the two-sided form that a gain of any kind asks
-/// for: P ← Γ P Γᵀ + J⁻¹ S J⁻¹, Γ = I - J⁻¹ C with C cut. The step is cut to max_step in the first two coordinates. NaN where P_g is
-/// not positive definite.
+/// for: P ← Γ P Γᵀ + J⁻¹ S J⁻¹, Γ = I - J⁻¹ C with C cut. The step is cut to max_step in the first two coordinates. NaN
+/// where P_g is not positive definite.
 template <class S, int D>
 FilterStep<S, D> updateCovariance(FilterCovariance<S, D>& P, const FrameInformation<S, D>& frame, const S& max_step,
                                   bool second_derivatives = true) {

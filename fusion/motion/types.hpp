@@ -71,8 +71,8 @@ struct MotionFlags {
   bool undecided_sign = false;  ///< the depths do not tell V from -V yet
   bool lost =
       false;  ///< the normalised innovation was above its bound over `lost_frames` frames; hypotheses start anew
-  /// The frames' χ² refutes the motion at the stated noise: wrong pairs, a second object, a larger sigma, or a motion that
-  /// changes faster than the filter follows.
+  /// The frames' χ² refutes the motion at the stated noise: wrong pairs, a second object, a larger sigma, or a motion
+  /// that changes faster than the filter follows.
   bool misfit = false;
   bool gyroscope_refuted = false;  ///< the rotation of the images contradicts the gyroscope's, in size or in the mean
   bool outliers = false;  ///< pairs were left out as outliers; the covariance is then not claimed to be an upper bound
@@ -165,8 +165,8 @@ struct MotionHypothesis {
 struct MotionFilterOptions {
   Flow flow = Flow::midpoint;  ///< with a gyroscope Flow::discrete is as accurate at any rotation
   std::size_t starts = 32;     ///< directions of a hemisphere to start from (rad² one each)
-  /// rad² per frame of the direction, at least. A direction that wanders further than its covariances say gets more, up to
-  /// `max_process_noise`, until it rests again; not with `outliers`.
+  /// rad² per frame of the direction, at least. A direction that wanders further than its covariances say gets more, up
+  /// to `max_process_noise`, until it rests again; not with `outliers`.
   double process_noise = 1e-5;
   double max_process_noise = 1e-2;
   double rotation_noise = 1e-6;  ///< rad² per frame of the rotation, where it is a state (essential filter)

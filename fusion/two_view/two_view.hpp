@@ -41,8 +41,8 @@ struct TwoViewMotionOptions {
   std::vector<TwoViewNode> nodes = {};             ///< models beyond the default ones
   std::optional<TwoViewVerticals> verticals = {};  ///< in both cameras' frames; with them `upright` is a model
   bool planes_only = false;                        ///< the models of homographies alone: planes of a scene, one by one
-  /// σ is right: errors beyond its threshold are then evidence for a more general model at once, and covariances are those
-  /// of σ. Otherwise noise may be larger than stated, and the matches say by how much.
+  /// σ is right: errors beyond its threshold are then evidence for a more general model at once, and covariances are
+  /// those of σ. Otherwise noise may be larger than stated, and the matches say by how much.
   bool noise_is_known = false;
   bool keep_contradictions = false;  ///< use matches that contradict each other, too (contradictions.hpp)
   HierarchyOptions search = {};

@@ -99,9 +99,9 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   double threshold = 0;  ///< threshold of the chosen model, on squared errors
   /// Where the status is contested: the other models of the set of which one is right.
   std::vector<TwoViewRival> rivals;
-  /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the mean
-  /// over the set of the models' own covariances and the squares of their differences from these values, so that it covers
-  /// each of them; what only one model has is listed with that model.
+  /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the
+  /// mean over the set of the models' own covariances and the squares of their differences from these values, so that
+  /// it covers each of them; what only one model has is listed with that model.
   std::optional<PhysicalParameters> shared;
 
   bool ok() const { return status == Status::ok; }

@@ -5,7 +5,8 @@
 // one side. The region of a covariance is symmetric, so its quantile is that of the longer side: t* are divided by the
 // plane across their average, and the 0.95 quantile of |t*|² is taken on each side. Drawing with replacement makes it
 // larger than Hotelling's for normal noise already. It is therefore compared with that of normal samples of the same
-// size and weights (docs/theory/means.md, section 7.8). The criterion's Hessian cancels in t*, nothing is averaged again.
+// size and weights (docs/theory/means.md, section 7.8). The criterion's Hessian cancels in t*, nothing is averaged
+// again.
 #pragma once
 
 #include <lie/detail/small_matrix.hpp>
@@ -181,7 +182,8 @@ class Bootstrap {
   std::vector<Row> rows_;
 };
 
-/// The square of the factor for the covariance of a mean from residuals, `sums` its last pass, that has Hotelling's law of n.
+/// The square of the factor for the covariance of a mean from residuals, `sums` its last pass, that has Hotelling's law
+/// of n.
 template <Homogeneous M, class R, class W, class Sums>
 double bootstrapWidening(const R& samples, const W& weights, const Sums& sums, ResidualNoise noise, double n,
                          const BootstrapOptions& options) {

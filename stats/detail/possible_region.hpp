@@ -39,9 +39,9 @@ namespace liestat::detail {
 /// what noise explains. A higher level of either leaves points of rings outside, a lower one refuses strips of ten
 /// data.
 inline constexpr double possible_score_tail = 0.05, possible_cost_tail = 0.005;
-/// The level of the score at which a region is grown further, once a shell has had a possible feature, so that the ground
-/// is not flat: it shall hold all points of a ring, and one of many is rejected more often than each. Whether data
-/// determine a mean is decided before.
+/// The level of the score at which a region is grown further, once a shell has had a possible feature, so that the
+/// ground is not flat: it shall hold all points of a ring, and one of many is rejected more often than each. Whether
+/// data determine a mean is decided before.
 inline constexpr double grown_score_tail = 0.005;
 /// The factor of the first shell, which flat ground does not reach (its square times the quantile), and of each to the
 /// next; and that beyond which the data do not determine a mean: a region of more than three times the size has little

@@ -180,7 +180,8 @@ void expectBiasAtStandstill(std::uint64_t seed) {
   EXPECT_GT(standstills, 40U);
   EXPECT_LT((filter.estimate().gyroscope_bias.mean - bias).norm(), 0.08 * degree);
   EXPECT_LT(filter.estimate().gyroscope_bias.covariance.trace(), 0.5 * before);
-  // Too confident: 22.8 for the worse of the two seeds, where χ² of three degrees of freedom has 16 at one in a thousand.
+  // Too confident: 22.8 for the worse of the two seeds, where χ² of three degrees of freedom has 16 at one in a
+  // thousand.
   EXPECT_LT(mahalanobisSquared(filter.estimate().gyroscope_bias, bias), 30);
 }
 TEST(Gyroscope, StandstillTellsTheBias) {

@@ -1,5 +1,5 @@
-// What the motion filters must not do: claim a direction that the data refute, or carry an infinity from frame to frame.
-// Seeds are fixed; bounds are those of more than one seed in ten thousand failing, unless they say otherwise.
+// What the motion filters must not do: claim a direction that the data refute, or carry an infinity from frame to
+// frame. Seeds are fixed; bounds are those of more than one seed in ten thousand failing, unless they say otherwise.
 #include <experiments/motion_scene.hpp>
 #include <fusion/motion/motion_filter.hpp>
 #include <lie/units.hpp>
@@ -57,8 +57,8 @@ TEST(MotionHonesty, StopsAreRecognisedAmongOutliersToo) {
   }
 }
 
-// Empty frames, single points, wild coordinates and sigmas, stops and identical frames in any order: what is published is
-// finite, and the filter comes back. (Debug builds check the invariant of the states after each frame.)
+// Empty frames, single points, wild coordinates and sigmas, stops and identical frames in any order: what is published
+// is finite, and the filter comes back. (Debug builds check the invariant of the states after each frame.)
 TEST(MotionHonesty, NoInfinityInARecursiveState) {
   for (std::uint64_t trial = 0; trial < 24; ++trial) {
     const bool inertial = trial % 3 == 2;
@@ -111,7 +111,8 @@ TEST(MotionHonesty, InformationOfAFrameIsNeitherNegativeNorMoreThanGaussNewtons)
     FrameInformation<double, 2> frame{S, C, Eigen::Vector2d::Zero()};
     FilterCovariance<double, 2> P;
     updateCovariance(P, frame, 0.5);
-    // Without any information the gain's own noise is all that is added, J⁻¹ S J⁻¹ ≤ I/4 for P = I; uncut this is up to 20.
+    // Without any information the gain's own noise is all that is added, J⁻¹ S J⁻¹ ≤ I/4 for P = I; uncut this is up to
+    // 20.
     const SymmetricPair pair(P.reported);
     EXPECT_LE(pair.values[0], 4);
     EXPECT_GT(pair.values[1], 0);

@@ -1,4 +1,5 @@
-// Covariances from rows whose errors depend on time: right for independent and for Gauss–Markov errors, nothing made up.
+// Covariances from rows whose errors depend on time: right for independent and for Gauss–Markov errors, nothing made
+// up.
 #include <stats/random.hpp>
 #include <stats/time_dependence.hpp>
 

@@ -79,8 +79,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::predict(DirectionCandidate& c) const {
 LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const {
   if (!(c.depth_variance > 0) || !std::isfinite(c.depth)) return;
   const double decay = options_.evidence_decay;
-  // A sign that holds must be refutable by the frames after it (E. Page, Biometrika 41, 1954): the log likelihood ratio of
-  // a reversal, each frame's cut to 3 so that no single one decides.
+  // A sign that holds must be refutable by the frames after it (E. Page, Biometrika 41, 1954): the log likelihood ratio
+  // of a reversal, each frame's cut to 3 so that no single one decides.
   if (options_.positive_depth && c.evidence_weight > 0) {
     const double mean = c.evidence / c.evidence_weight;
     c.against -= std::clamp(2 * mean * c.depth / c.depth_variance, -3.0, 3.0);

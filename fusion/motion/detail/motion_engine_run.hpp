@@ -105,8 +105,8 @@ LIESTAT_FUSION_INLINE const MotionEstimate& MotionEngine::update(std::span<const
   return estimate_;
 }
 
-/// The invariant of what goes from frame to frame: finite, and covariances with positive diagonals. Debug builds check it
-/// after each frame.
+/// The invariant of what goes from frame to frame: finite, and covariances with positive diagonals. Debug builds check
+/// it after each frame.
 LIESTAT_FUSION_INLINE bool MotionEngine::consistent() const {
   const auto isCovariance = [](const auto& P) { return P.allFinite() && P.diagonal().minCoeff() > 0; };
   const auto areCovariances = [&](const auto& P) { return isCovariance(P.gain) && isCovariance(P.reported); };
@@ -195,8 +195,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   }
 }
 
-/// χ² of the last frames together, and the direction's own score, against the stated noise. Frames before a restart count
-/// until those after it fit by themselves.
+/// χ² of the last frames together, and the direction's own score, against the stated noise. Frames before a restart
+/// count until those after it fit by themselves.
 LIESTAT_FUSION_INLINE void MotionEngine::judgeFit() {
   if (updated_) {
     const DirectionCandidate& c = candidates_[best_];
@@ -239,8 +239,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::judgeGyroscope() {
   estimate_.flags.gyroscope_refuted = gyroscope_chi_ > 3 + 6 * std::sqrt(6 / n) || mean > 40;
 }
 
-/// A direction that has gone further than its covariances and the process noise allow needs more process noise. (Among outliers
-/// it may have followed those.)
+/// A direction that has gone further than its covariances and the process noise allow needs more process noise. (Among
+/// outliers it may have followed those.)
 LIESTAT_FUSION_INLINE void MotionEngine::followProcessNoise() {
   process_noise_ *= 0.9;
   if (!updated_ || candidates_.size() > 1 || options_.outliers) return;

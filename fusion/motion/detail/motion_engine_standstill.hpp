@@ -50,8 +50,8 @@ LIESTAT_FUSION_INLINE bool MotionEngine::atStandstill() {
   // A stop goes on: after a still frame only one in a thousand is missed.
   const bool still = estimate_.signal <= (was_still_ ? chiSquaredBound(dof, 3.1) / dof : bound);
   was_still_ = still;
-  // A frame with the usual signal is below the bound by chance once in a thousand times or so: the standard deviation of χ²
-  // of k degrees of freedom with the mean s k is √(2 (2 s - 1) k).
+  // A frame with the usual signal is below the bound by chance once in a thousand times or so: the standard deviation
+  // of χ² of k degrees of freedom with the mean s k is √(2 (2 s - 1) k).
   const auto isClear = [&] {
     return usual_signal_ - 3 * std::sqrt(2 * std::max(2 * usual_signal_ - 1, 1.0) / dof) > bound;
   };
@@ -79,11 +79,11 @@ LIESTAT_FUSION_INLINE void MotionEngine::startAnew() {
   linear_moments_.setZero(), linear_noise_.setZero();
 }
 
-/// The least Σ |ẋ - BΩ|²/variance, and its degrees of freedom; none where it can't be had. Among outliers a tenth of the
-/// points and one more are left out, or as many as the frames before had; each further one counts with the limit that it
-/// is beyond. One that lies along the flow of the present direction, ahead of the camera, is no outlier but motion, and
-/// counts whole, but for the few that come there by chance. With the rotation so found points are turned and the rest is fitted again, so that large
-/// rotations are no signal.
+/// The least Σ |ẋ - BΩ|²/variance, and its degrees of freedom; none where it can't be had. Among outliers a tenth of
+/// the points and one more are left out, or as many as the frames before had; each further one counts with the limit
+/// that it is beyond. One that lies along the flow of the present direction, ahead of the camera, is no outlier but
+/// motion, and counts whole, but for the few that come there by chance. With the rotation so found points are turned
+/// and the rest is fitted again, so that large rotations are no signal.
 LIESTAT_FUSION_INLINE double MotionEngine::fitRotationAlone(double& statistic) {
   rotation_prior_ = priorWithoutBias();
   const RotationPrior<double>& prior = rotation_prior_;

@@ -101,8 +101,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::rejectOutliers(const DirectionCandidate
   }
 }
 
-/// An outlier along the flow passes every gate across it: pairs far nearer than the others, or behind the camera where the
-/// sign is certain, are left out. Where most are behind it is the sign that is wrong.
+/// An outlier along the flow passes every gate across it: pairs far nearer than the others, or behind the camera where
+/// the sign is certain, are left out. Where most are behind it is the sign that is wrong.
 LIESTAT_FUSION_INLINE void MotionEngine::gateDepths(const DirectionCandidate& c, const Eigen::Vector3d& Omega) {
   const std::size_t n = points_.size();
   const Eigen::Vector3d at = keepsTheRotation(state_) ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Omega;
@@ -170,8 +170,8 @@ LIESTAT_FUSION_INLINE bool MotionEngine::evaluate(const DirectionCandidate& c, E
   return e.inliers >= std::min<std::size_t>(leastPairs(), 5) && std::isfinite(e.sums.cost);
 }
 
-/// While hypotheses compete: what it costs to have all depths on one side of the camera, the cheaper one. A point on the
-/// other side adds its χ² at infinity, no more than an outlier's.
+/// While hypotheses compete: what it costs to have all depths on one side of the camera, the cheaper one. A point on
+/// the other side adds its χ² at infinity, no more than an outlier's.
 LIESTAT_FUSION_INLINE double MotionEngine::mixedDepths(const Evaluation& e) const {
   if (candidates_.size() < 2) return 0;
   double ahead = 0, behind = 0;

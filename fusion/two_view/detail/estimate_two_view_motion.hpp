@@ -110,9 +110,9 @@ inline HierarchyOptions searchOptions(const TwoViewMotionOptions& options) {
   return search;
 }
 
-/// An estimate at the noise that the data show, where this exceeds the stated one: from the matches within the threshold
-/// of that noise, with its covariance. Inliers of the stated noise would be a third of the right ones less at twice the
-/// noise, of which the covariance knows nothing.
+/// An estimate at the noise that the data show, where this exceeds the stated one: from the matches within the
+/// threshold of that noise, with its covariance. Inliers of the stated noise would be a third of the right ones less at
+/// twice the noise, of which the covariance knows nothing.
 inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
                                                       const ModelState<TwoViewMotionModel>& state,
                                                       std::span<const Eigen::Vector4d> matches,
