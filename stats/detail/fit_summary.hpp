@@ -18,6 +18,7 @@ namespace detail {
 inline std::vector<std::string> parameterNames(FitModel model) {
   const auto matrix = [](char letter) {
     std::vector<std::string> list;
+    list.reserve(9);
     for (int k = 0; k < 9; ++k)
       list.push_back({letter, static_cast<char>('1' + k / 3), static_cast<char>('1' + k % 3)});
     return list;
