@@ -25,6 +25,7 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <type_traits>
 
 namespace liestat {
 
@@ -253,21 +254,25 @@ struct FilterStep {
   S reduction = S(0);
 };
 
-/// C cut to what a frame can say: eigenvalues of L⁻¹ C L⁻ᵀ to [-1/2, 1], S = L Lᵀ. Second derivatives of points
-/// near the focus of expansion scatter, and may call the information of a frame negative. A singular S leaves C as it
-/// is.
+/// C cut to what a frame can say: eigenvalues of L⁻¹ C L⁻ᵀ to [-1/2, 1], S = L Lᵀ. Second derivatives of points near the
+/// focus of expansion scatter, and may call the information of a frame negative. A singular S leaves C as it is, and so
+/// does a scalar with derivatives, for which the update without the cut is meant.
 template <class S, int D>
 Eigen::Matrix<S, D, D> cutInformation(const Eigen::Matrix<S, D, D>& C, const Eigen::Matrix<S, D, D>& information) {
-  using Matrix = Eigen::Matrix<S, D, D>;
-  if (detail::Cholesky<S, D>(C).ok() && detail::Cholesky<S, D>(Matrix(information - C)).ok()) return C;
-  const detail::Cholesky<S, D> factor(information);
-  if (!factor.ok()) return C;
-  const Matrix half = factor.template halfSolve<D>(C), turned = half.transpose();
-  const Matrix white = factor.template halfSolve<D>(turned);
-  const detail::SymmetricEigen<Matrix> eigen(white);
-  const Matrix inverse_factor = factor.template halfSolve<D>(Matrix::Identity());
-  const Matrix axes = Matrix(information * inverse_factor.transpose()) * eigen.vectors;
-  return axes * eigen.values.cwiseMax(S(-0.5)).cwiseMin(S(1)).asDiagonal() * axes.transpose();
+  if constexpr (std::is_floating_point_v<S>) {
+    using Matrix = Eigen::Matrix<S, D, D>;
+    if (detail::Cholesky<S, D>(C).ok() && detail::Cholesky<S, D>(Matrix(information - C)).ok()) return C;
+    const detail::Cholesky<S, D> factor(information);
+    if (!factor.ok()) return C;
+    const Matrix half = factor.template halfSolve<D>(C), turned = half.transpose();
+    const Matrix white = factor.template halfSolve<D>(turned);
+    const detail::SymmetricEigen<Matrix> eigen(white);
+    const Matrix inverse_factor = factor.template halfSolve<D>(Matrix::Identity());
+    const Matrix axes = Matrix(information * inverse_factor.transpose()) * eigen.vectors;
+    return axes * eigen.values.cwiseMax(S(-0.5)).cwiseMin(S(1)).asDiagonal() * axes.transpose();
+  } else {
+    return C;
+  }
 }
 
 /// J = P_g⁻¹ + S, ξ = -J⁻¹ g, P_g ← J⁻¹, and the reported covariance in the two-sided form that a gain of any kind asks
