@@ -312,7 +312,10 @@ TEST(MotionCommand, AxesOfTheRates) {
   files.write("tilted.csv", turnedRates(files.content("rates.csv"), tilt));
   const auto with = [&](const Words& more) { return Words{"--rates", files / "tilted.csv"} + more + noise; };
   EXPECT_LT(rotationError(files.json(with({"--rates-axes", "vehicle", "--camera-tilt", "5,10,3"}))), 0.001);
-  EXPECT_GT(rotationError(files.json(with({"--rates-axes", "vehicle"}))), 0.01);
+  // Without the tilt the rates are those of another camera: the images refute them.
+  EXPECT_EQ(files.motion(with({"--rates-axes", "vehicle"})).status, 3);
+  const Json untilted = Json::parse(files.content("out.json"));
+  EXPECT_TRUE(hasFlag(untilted["frames"].back(), "gyroscope_refuted"));
   Eigen::Matrix3d camera_R_ahead;
   camera_R_ahead << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   const SO3d R = SO3d::fitToSO3(camera_R_ahead) * tilt.inverse();
@@ -507,9 +510,14 @@ TEST(MotionCommand, IdenticalFramesAndTracksThatVanish) {
   files.write("tracks.csv", repeated);
   const Json twice = files.json({"--sigma", "1"});
   for (std::size_t k = 8; k < 19; ++k) {
-    EXPECT_EQ(hasFlag(twice["frames"][k - 1], "standstill"), k == 15) << k;
-    EXPECT_TRUE(twice["frames"][k - 1]["usable"].get<bool>()) << k;
+    const Json& frame = twice["frames"][k - 1];
+    EXPECT_EQ(hasFlag(frame, "standstill"), k == 15) << k;
+    // At rest there is no direction; after it the sign may have to be found again.
+    EXPECT_EQ(frame["usable"].get<bool>(), k != 15 && !hasFlag(frame, "undecided_sign")) << k;
+    if (k < 15) EXPECT_TRUE(frame["usable"].get<bool>()) << k;
   }
+  const auto usable = [](const Json& frame) { return frame["usable"].get<bool>(); };
+  EXPECT_GE(std::count_if(twice["frames"].begin(), twice["frames"].end(), usable), 14) << "of 18";
 }
 
 TEST(MotionCommand, TwoTracksWithAGyroscope) {

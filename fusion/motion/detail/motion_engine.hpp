@@ -20,7 +20,9 @@ namespace liestat::detail {
 inline constexpr double max_coordinate = 1e6;
 
 /// Cumulative sums of evidence against the sign above which it is undecided, and replaced.
-inline constexpr double reversal_likely = 4, reversal_certain = 8;
+inline constexpr double reversal_likely = 5.5, reversal_certain = 8;
+/// Standard deviations of the evidence that replaces it.
+inline constexpr double reversal_sigmas = 8;
 
 /// The state besides the direction.
 enum class MotionState { direction, gyroscope_bias, rotation, rotation_and_bias };

@@ -89,7 +89,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::weighSign(DirectionCandidate& c) const 
       c.later += c.depth / c.depth_variance;
       c.later_variance += 1 / c.depth_variance, c.later_weight += 1 / c.depth_variance;
     }
-    if (c.against > reversal_certain) {
+    // A hypothesis whose rotation is off for some frames, as after a stop, has depths of either sign, and few of them.
+    const bool clear = c.later * c.later > reversal_sigmas * reversal_sigmas * c.later_variance;
+    if (c.against > reversal_certain && clear) {
       c.evidence = c.later, c.evidence_variance = c.later_variance, c.evidence_weight = c.later_weight;
       c.against = c.later = c.later_variance = c.later_weight = 0;
       c.evidence -= c.depth / c.depth_variance;
