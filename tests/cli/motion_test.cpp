@@ -514,7 +514,9 @@ TEST(MotionCommand, IdenticalFramesAndTracksThatVanish) {
     EXPECT_EQ(hasFlag(frame, "standstill"), k == 15) << k;
     // At rest there is no direction; after it the sign may have to be found again.
     EXPECT_EQ(frame["usable"].get<bool>(), k != 15 && !hasFlag(frame, "undecided_sign")) << k;
-    if (k < 15) EXPECT_TRUE(frame["usable"].get<bool>()) << k;
+    if (k < 15) {
+      EXPECT_TRUE(frame["usable"].get<bool>()) << k;
+    }
   }
 }
 

@@ -247,8 +247,12 @@ TEST(Fits, anEllipseThatMayBeACircleHasNoCovariance) {
     }
     // 5 % and four standard errors.
     EXPECT_LE(outside, 0.05 * trials + 4 * std::sqrt(0.05 * 0.95 * trials)) << difference;
-    if (difference == 0) EXPECT_LE(ok, 12);
-    if (difference == 6) EXPECT_GE(ok, 0.98 * trials);
+    if (difference == 0) {
+      EXPECT_LE(ok, 12);
+    }
+    if (difference == 6) {
+      EXPECT_GE(ok, 0.98 * trials);
+    }
   }
 }
 
