@@ -60,7 +60,7 @@ struct FitSummary {
     const auto k = static_cast<Eigen::Index>(i);
     return std::sqrt(covariance(k, k) < 0 ? 0 : covariance(k, k));
   }
-  /// Of a circle, line, conic or ellipse.
+  /// The distance of a point from a circle, line, conic or ellipse.
   CurveDistance distanceOf(const Eigen::Vector2d& point) const;
 };
 

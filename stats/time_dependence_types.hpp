@@ -1,4 +1,4 @@
-// What rows with times say about the dependence of their errors; the test is in stats/time_dependence.hpp. (Needs the
+// The dependence of errors on time as rows with times show it; the test is in stats/time_dependence.hpp. (Needs the
 // standard library alone.)
 #pragma once
 

@@ -1,5 +1,5 @@
-// What the motion filters must not do: claim a direction that the data refute, or carry an infinity from frame to
-// frame. Seeds are fixed; bounds are those of more than one seed in ten thousand failing, unless they say otherwise.
+// The motion filters claim no direction that the data refute, and carry no infinity from frame to frame. Seeds are fixed;
+// bounds are those of more than one seed in ten thousand failing, unless they say otherwise.
 #include <experiments/motion_scene.hpp>
 #include <fusion/motion/motion_filter.hpp>
 #include <lie/units.hpp>
