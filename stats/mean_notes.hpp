@@ -57,7 +57,14 @@ inline void addMeanNotes(MeanSummary& mean, std::size_t measurements) {
     mean.notes.push_back("the region is widened by " + significant(mean.skew_factor, 3) +
                          " by a bootstrap, for the skewness of the errors");
   }
-  if (mean.order.dependent() && mean.hasCovariance()) {
+  const bool in_time = mean.dependence.dependent();
+  if (in_time && mean.hasCovariance() && !mean.inflated) {
+    mean.notes.push_back("the errors of successive rows are not independent: " + mean.dependence.inWords() +
+                         ", so the standard deviations of the mean are about " +
+                         significant(std::sqrt(mean.dependence.correlation_factor), 2) +
+                         " times too small (inflate widens them)");
+  }
+  if (mean.order.dependent() && !in_time && mean.hasCovariance()) {
     mean.notes.push_back("successive measurements err alike (correlation " + significant(mean.order.correlation, 2) +
                          ", " + significant(mean.order.z, 2) +
                          " standard deviations): the covariance supposes independent errors; if these fade from row to "

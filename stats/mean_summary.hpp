@@ -13,7 +13,7 @@
 #include <stats/shown.hpp>
 #include <stats/skewness.hpp>
 #include <stats/status.hpp>
-#include <stats/time_blocks_types.hpp>
+#include <stats/time_dependence_types.hpp>
 #include <stats/uniqueness_types.hpp>
 #include <stats/verdict.hpp>
 #include <stats/words.hpp>
@@ -136,10 +136,11 @@ struct MeanSummary {
   NoiseFit fit = {};          ///< of the measurements to the noise that is stated for them
   bool noise_scaled = false;  ///< the covariance is multiplied by fit.factor()
 
-  RowOrder order = {};                         ///< correlation of successive measurements
-  Skewness skewness = {};                      ///< of the measurements' errors
-  std::optional<TimeBlocks> time_blocks = {};  ///< measurements with times that can be split
-  std::vector<std::string> notes = {};         ///< remarks, in sentences
+  RowOrder order = {};                  ///< correlation of successive measurements
+  Skewness skewness = {};               ///< of the measurements' errors
+  TimeDependence dependence = {};       ///< of the errors, where the measurements have times
+  bool inflated = false;                ///< the covariance is widened by it
+  std::vector<std::string> notes = {};  ///< remarks, in sentences
 
   bool hasCovariance() const { return covariance.size() > 0; }
   /// A covariance from the residuals.
@@ -239,7 +240,8 @@ void describe(V& v, const MeanSummary& m) {
   v("lag_z", where(m.order.tested(), m.order.z), "the same in standard deviations; above 2.45 a note says so");
   v("skewness", where(m.skewness.tested(), m.skewness.b), "Mardia's, of the errors; zero but for chance if symmetric");
   v("skewness_p", where(m.skewness.tested(), m.skewness.p), "probability of so large a one of normal errors");
-  v("time_blocks", m.time_blocks, "rows with times: whether their errors are independent; null without");
+  describe(v, m.dependence);
+  v("inflated", m.inflated, "whether the covariance is widened by the dependence on time");
   v("notes", m.notes, "what is remarkable, in sentences");
 }
 

@@ -12,6 +12,7 @@
 #include <stats/concentration.hpp>
 #include <stats/covariance.hpp>
 #include <stats/detail/any_executor.hpp>
+#include <stats/detail/mean_dependence.hpp>
 #include <stats/dispersion.hpp>
 #include <stats/mean_summary.hpp>
 
@@ -43,6 +44,11 @@ struct MeanInput {
   ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
   bool scale_noise = false;                              ///< Birge's factor, where they are not refuted
   MeanRegion region = MeanRegion::law;                   ///< of a covariance from residuals; not for maha
+  /// Times of the features, in any unit, one for each or none: whether errors depend on them is tested then, up to
+  /// `max_timed_rows` features.
+  std::span<const double> times = {};
+  bool inflate = false;  ///< widens the covariance by the dependence on time
+  static constexpr std::size_t max_timed_rows = 200000;
 
   bool weighted() const {
     return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
@@ -158,6 +164,46 @@ void setDispersion(MeanSummary& mean, const MeanInput<M>& input, const M& y) {
   }
 }
 
+/// The dependence of errors on the features' times.
+template <Homogeneous M>
+void setTimeDependence(MeanSummary& mean, const MeanInput<M>& input) {
+  using T = ManifoldTraits<M>;
+  constexpr int k = T::DoF;
+  using Matrix = Eigen::Matrix<double, k, k>;
+  if (input.times.size() != input.features.size() || !mean.hasCovariance()) return;
+  if (mean.n > MeanInput<M>::max_timed_rows) return;
+  const auto to_y = T::placement(featureOf<M>(mean.mean)).inverse();
+  // Weights of any meaning but counts and precisions say nothing of the errors' sizes.
+  const bool precisions = mean.weighted && mean.weights_are != ResidualNoise::importance;
+  const auto scale = weightScale<double>(input.weights, input.weights.size());
+  const auto counts = [&](std::size_t i) { return input.weights.empty() || scale.keeps(input.weights[i]); };
+  std::vector<TimedRow<k, k>> rows;
+  Matrix scatter = Matrix::Zero();
+  rows.reserve(mean.n);
+  for (std::size_t i = 0; i < input.features.size(); ++i) {
+    if (!counts(i)) continue;
+    const double root = precisions ? std::sqrt(scale(input.weights[i])) : 1;
+    auto& row = rows.emplace_back();
+    row.time = input.times[i];
+    row.residual = root * T::logOrigin(T::act(to_y, input.features[i])).template cast<double>();
+    row.columns = root * Matrix::Identity();
+    scatter += row.residual * row.residual.transpose() / static_cast<double>(mean.n);
+  }
+  Cholesky<double, k> noise(scatter);
+  for (std::size_t i = 0, r = 0; i < input.features.size(); ++i) {
+    if (!counts(i)) continue;
+    if (mean.known_noise) {
+      noise =
+          Cholesky<double, k>(Matrix(input.covariances[input.covariances.size() > 1 ? i : 0].template cast<double>()));
+    }
+    if (!noise.ok()) return;
+    auto& row = rows[r++];
+    row.residual = noise.template halfSolve<1>(row.residual);
+    row.columns = noise.template halfSolve<k>(row.columns);
+  }
+  setDependence<k>(mean, rows, input.inflate);
+}
+
 template <Metric M, Executor E>
 void setLeastSquares(MeanSummary& mean, const E& executor, const MeanInput<M>& input,
                      const MeanSummaryOptions& options) {
@@ -256,7 +302,7 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
 }  // namespace detail
 
 /// The mean of the measurements by their criterion, with its covariance if that can be trusted, its certificates and the
-/// dispersion; `feature`, notes and time_blocks are left to the caller (stats/mean_notes.hpp, stats/time_blocks.hpp). A
+/// dispersion; `feature` and notes are left to the caller (stats/mean_notes.hpp). A
 /// criterion that the type does not have (barycentre of a type with a metric, lsq without) is taken for the one that it
 /// has. The result has the same bits on any executor.
 template <Homogeneous M, Executor E>
@@ -280,6 +326,7 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   }
   mean.noise_scaled = input.scale_noise && mean.known_noise && mean.hasCovariance() && mean.fit.tested();
   if (mean.noise_scaled && !options.certificates) mean.covariance *= mean.fit.factor();
+  detail::setTimeDependence(mean, input);
   if constexpr (std::is_same_v<M, S2<ScalarOf<M>>>) {
     const M y = featureOf<M>(mean.mean);
     mean.tangent_basis = ManifoldTraits<M>::placement(y).matrix().template leftCols<2>().template cast<double>();

@@ -19,6 +19,10 @@ struct TimeDependence {
   /// Mean factor of the variances, at least 1.
   double correlation_factor = 1;
 
+  /// Independent errors are called dependent below this probability in less than 1 of 100 cases from 50 rows on.
+  static constexpr double max_independence = 0.25;
+  bool dependent() const { return tested && white < max_independence; }
+
   /// In a sentence.
   std::string inWords() const {
     if (!tested) return "the dependence of errors on time was not tested";
@@ -26,7 +30,7 @@ struct TimeDependence {
       return "errors are independent in time (probability " + significant(white, 2) + "): variances times " +
              significant(correlation_factor, 3);
     }
-    return "errors depend on time, " + significant(100 * share, 2) + " % of them with a time constant of " +
+    return "errors depend on time, " + significant(100 * share, 3) + " % of them with a time constant of " +
            significant(time_constant, 3) + " s: variances times " + significant(correlation_factor, 3);
   }
 };

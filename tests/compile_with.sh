@@ -11,8 +11,9 @@ done
 shift 2
 
 # Told to precompile a header as g++ is told, clang would first read the precompiled header that is there, were it stale or
-# g++'s.
+# g++'s. The result holds paths and times of this tree: ccache may not give it to another one.
 if [[ " $* " == *" -x c++-header "* ]]; then
+  export CCACHE_DISABLE=1
   for ((i = 1; i < $#; ++i)); do
     if [ "${!i}" = -o ]; then
       output=$((i + 1))

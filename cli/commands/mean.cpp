@@ -6,7 +6,6 @@
 #include <cli/show/progress.hpp>
 #include <experiments/interruption.hpp>
 #include <stats/mean_notes.hpp>
-#include <stats/time_blocks.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -57,10 +56,9 @@ int runCommand(const Options& options, const Invocation& invocation) {
   progress.finish();
   const bool interrupted = experiments::runStopped();
   if (interrupted) analysis.notes.emplace_back("interrupted: the search for other means did not go on");
-  compareBlocks(analysis, measurements, how);
-  if (how.inflate && !analysis.time_blocks) {
-    throw OptionError("liestat mean", "--inflate, but blocks of time cannot be compared",
-                      "rows with times (a column t), at least ten, and a mean with a covariance");
+  if (how.inflate && !analysis.dependence.tested) {
+    throw OptionError("liestat mean", "--inflate, but the dependence of errors on time cannot be tested",
+                      "rows with times (a column t), from 20 to 200000, and a mean with a covariance");
   }
   publishResult(options.json, formatMean(options.input.file, measurements, analysis), invocation.command_line,
                 std::nullopt, [&](JsonObject& object) {
@@ -81,17 +79,6 @@ MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions
   analysis.notes = measurements.notes;
   addMeanNotes(analysis, measurements.size());
   return analysis;
-}
-
-void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, const AnalysisOptions& options) {
-  if (measurements.file.times.empty() || !analysis.hasCovariance()) return;
-  const auto by_blocks = [&](const SplitOptions& split) {
-    return splitMeasurements(measurements, {split, options.threads}).by_blocks;
-  };
-  setTimeBlocks(analysis,
-                compareTimeBlocks(measurements.size(), degreesOfFreedom(measurements.feature), measurements.known_noise,
-                                  by_blocks),
-                options.inflate);
 }
 
 void addMeanCommand(const CommandList& app) {
@@ -118,7 +105,7 @@ void addMeanCommand(const CommandList& app) {
   command.flag("--birge", options->analysis.birge,
                "Multiply the covariance by Birge's factor where the measurements scatter more than the file's say");
   command.flag("--inflate", options->analysis.inflate,
-               "Multiply the covariance by the factor by which blocks of time disagree");
+               "Widen the covariance by the dependence of the rows' errors on time");
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");

@@ -46,6 +46,8 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   input.scale_noise = options.birge;
   input.weights_are = options.weights_are;
   input.region = options.region;
+  input.times = measurements.file.times;
+  input.inflate = options.inflate;
   MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];

@@ -30,16 +30,12 @@ struct AnalysisOptions {
   ResidualNoise weights_are = ResidualNoise::precision;  ///< for a covariance from residuals
   MeanRegion region = MeanRegion::law;                   ///< of a covariance from residuals
   bool birge = false;                                    ///< multiply the covariance by fit_factor
-  bool inflate = false;                                  ///< multiply the covariance by the factor of compareBlocks()
+  bool inflate = false;                                  ///< widen the covariance by the dependence of errors on time
 };
 
 /// Mean, covariance, dispersion and uniqueness of the measurements, with notes. The same bits for any number of threads.
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options);
 /// The same without notes.
 MeanAnalysis estimateMean(const Measurements& measurements, const AnalysisOptions& options);
-
-/// Compares blocks of time (stats/time_blocks.hpp) where the measurements have times and there is a covariance, which is
-/// multiplied by the factor where the options ask for it.
-void compareBlocks(MeanAnalysis& analysis, const Measurements& measurements, const AnalysisOptions& options);
 
 }  // namespace liestat::cli

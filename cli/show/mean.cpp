@@ -149,14 +149,6 @@ int quaternionDecimals(Feature feature, const MeanAnalysis& analysis) {
   return 9;
 }
 
-std::string blocksInWords(const TimeBlocks& found) {
-  return fmt::format("of time, {}: halves differ by {} times the expected squared distance (95 %: {} to {}){}",
-                     found.blocks, number(found.factor, 3), number(found.low, 3), number(found.high, 3),
-                     !found.applied        ? ""
-                     : !(found.factor > 1) ? ", so the covariance is left as it is"
-                                           : ", by which the covariance was multiplied");
-}
-
 }  // namespace
 
 std::string formatMean(const std::string& source, const Measurements& measurements, const MeanAnalysis& analysis) {
@@ -182,7 +174,10 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
                         oneLine(analysis.valley->feature), degrees * analysis.valley_angle, analysis.valley->z);
   }
   text += "covariance   " + covarianceInWords(measurements, analysis) + "\n";
-  if (analysis.time_blocks) text += "blocks       " + blocksInWords(*analysis.time_blocks) + "\n";
+  if (analysis.dependence.tested) {
+    text += "in time      " + analysis.dependence.inWords();
+    text += analysis.inflated ? ", by which the covariance is widened\n" : "\n";
+  }
   for (const FarthestMeasurement& f : analysis.farthest) {
     if (measurements.size() < 2) break;
     text += fmt::format("farthest     {} {} in {}, line {}\n", number(f.shown()), unitOf(f.part).name, name(f.part),

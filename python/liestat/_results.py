@@ -235,9 +235,14 @@ class MeanResult:
         where nothing was tested.
     noise_scaled : bool
         The covariance is multiplied by Birge's factor.
-    time_blocks : dict or None
-        With `times`: the factor by which the covariance is too small since the errors of successive features depend on
-        each other, `factor`, with its 95 % interval, `p`, and whether it was `applied`.
+    time_dependence, time_dependence_tested : str, bool
+        With `times`: whether errors depend on them, in words, and whether that was tested.
+    independence, correlated_share, correlation_time, correlation_factor : float or None
+        The probability that errors are independent in time; where they are not, the share of their variance that
+        depends on time, its time constant (in the unit of `times`), and the factor by which the variances of the mean
+        are too small.
+    inflated : bool
+        The covariance is widened by that.
     notes : list of str
         What is remarkable about the result.
     cost, residual, tolerance, r_star : float

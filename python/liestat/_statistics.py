@@ -130,9 +130,9 @@ def mean(
     likelihood : bool
         For 'maha': add the logarithm of the volume element, for the maximum of the likelihood.
     times : array_like, optional
-        Of the features, in whatever unit; broadcast to ``x.shape``. Halves of the features made of blocks of time then
-        tell whether the errors of successive features are independent, as the covariance supposes (`time_blocks` of the
-        result, with a note where they are not).
+        Of the features, in whatever unit; broadcast to ``x.shape``. Tells whether the errors of successive features are
+        independent, as the covariance supposes (`time_dependence` of the result, with a note where they are not); from
+        20 to 200 000 features.
     refuted : {'withheld', 'residuals'}
         What becomes of the covariance where the features scatter more than `covariances` say (`fit_p` below 0.001): it
         is withheld, with status 'inconsistent', or it is computed from the residuals. Not for 'maha', whose weights are
@@ -148,7 +148,8 @@ def mean(
         law, for symmetric noise, or a bootstrap that widens the covariance by ``skew_factor`` squared for skewed noise.
         The same features give the same bits.
     inflate : bool
-        Multiply the covariance by the factor by which blocks of time disagree, where it is above one.
+        Widen the covariance by the dependence of the errors on `times`; none is left where errors hold on for so long
+        that the features are worth too few independent ones.
     budget : int, optional
         Of the global search: looks at a datum from a cell, some 30 ns each. Default: 1e8, for 'maha' 1e7 at most.
     threads : int
@@ -206,10 +207,10 @@ def mean(
         )
         for group in groups
     ]
-    if inflate and any(a["time_blocks"] is None for a in answers):
+    if inflate and not all(a["time_dependence_tested"] for a in answers):
         raise ValueError(
-            "mean: inflate, but blocks of time cannot be compared: that needs features with times, at least ten, and a "
-            "mean with a covariance"
+            "mean: inflate, but the dependence of errors on time cannot be tested: that needs 20 to 200000 features with "
+            "times, and a mean with a covariance"
         )
     result = MeanResult(kind, criterion, answers, lead)
     withheld = [a for a in answers if a["covariance"] is None]

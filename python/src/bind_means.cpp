@@ -4,7 +4,6 @@
 #include <python/src/means.hpp>
 #include <stats/mean_notes.hpp>
 #include <stats/split_validation_types.hpp>
-#include <stats/time_blocks.hpp>
 
 #include <cstdint>
 #include <string>
@@ -81,6 +80,7 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
   }
   request.region = bootstrap ? MeanRegion::bootstrap : MeanRegion::law;
   request.certify = certify;
+  request.inflate = inflate;
   request.budget = budget;
   MeanSummary answer;
   {
@@ -90,10 +90,6 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
     answer.feature = means.feature;
     const std::size_t n = request.features.size() / static_cast<std::size_t>(means.parameters);
     addMeanNotes(answer, n);
-    if (!request.times.empty() && answer.hasCovariance()) {
-      const auto by_blocks = [&](const SplitOptions& split) { return means.split(request, signals, split).by_blocks; };
-      setTimeBlocks(answer, compareTimeBlocks(n, means.dof, answer.known_noise, by_blocks), inflate);
-    }
   }
   return answerOf(answer);
 }

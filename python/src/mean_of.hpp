@@ -46,7 +46,9 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
                      .refuted_noise = request.refuted_noise,
                      .weights_are = request.weights_are,
                      .scale_noise = request.birge,
-                     .region = request.region};
+                     .region = request.region,
+                     .times = request.times,
+                     .inflate = request.inflate};
   for (std::size_t i = 0; i + k * k <= request.covariances.size(); i += k * k) {
     const auto matrix = square<ManifoldTraits<M>::DoF>(request.covariances.data() + i);
     if (request.factored) input.factors.push_back(matrix);

@@ -29,6 +29,7 @@ struct MeanRequest {
   bool birge = false;  ///< multiply by Birge's factor
   ResidualNoise weights_are = ResidualNoise::precision;
   MeanRegion region = MeanRegion::law;
+  bool inflate = false;  ///< by the dependence of errors on the times
   bool certify = true;
   std::size_t budget = 0;  ///< limit of the search; 0: the library's
   int threads = 0;

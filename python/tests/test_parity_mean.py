@@ -52,7 +52,7 @@ class MeanParity(ParityTest):
 
     def test_examples(self):
         json, result = self.assert_equal_means(os.path.join(DATA, "rotations.csv"))
-        self.assertEqual((json["status"], json["time_blocks"]), ("ok", None))
+        self.assertEqual((json["status"], json["time_dependence_tested"]), ("ok", False))
         self.assertIs(result.unique == True, True)  # noqa: E712: as it was a bool
         self.assertTrue(result.unique)
 
@@ -61,15 +61,15 @@ class MeanParity(ParityTest):
         path = os.path.join(DATA, "camera_at_rest.tum")
         for kind, feature in ((liestat.SE3, "se3"), (liestat.Frame3, "frame")):
             json, plainly = self.assert_equal_means(path, ("--feature", feature), kind=kind, use=["times"])
-            self.assertGreater(plainly.time_blocks["factor"], 1)
+            self.assertGreater(plainly.correlation_factor, 1)
             self.assertTrue(any("not independent" in note for note in plainly.notes))
             _, inflated = self.assert_equal_means(
                 path, ("--feature", feature, "--inflate"), kind=kind, use=["times"], inflate=True
             )
-            self.assertTrue(inflated.time_blocks["applied"])
-            factor = plainly.time_blocks["factor"]
-            np.testing.assert_allclose(inflated.covariance, factor * plainly.covariance, rtol=1e-12)
-        with self.assertRaisesRegex(ValueError, "blocks of time cannot be compared"):
+            self.assertTrue(inflated.inflated)
+            factor = plainly.correlation_factor
+            np.testing.assert_allclose(inflated.covariance, factor * plainly.covariance, rtol=1e-9)
+        with self.assertRaisesRegex(ValueError, "dependence of errors on time cannot be tested"):
             liestat.mean(liestat.R3(np.eye(3)), times=[0, 1, 2], inflate=True)
 
     def test_weights(self):
