@@ -116,8 +116,8 @@ struct ComparedRecording {
   /// Verdict on the covariances against the truth: no, if one of these tests has a p below `false_alarm`. The errors of the
   /// truth are in no covariance: they must be small. None where no estimate that is ok is covered by the truth.
   Verdict againstTruth(double false_alarm = 1e-5) const;
-  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, where windows were fused those of a
-  /// stretch agree, and with a truth the errors follow the covariances.
+  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, those of a stretch of two and more agree,
+  /// and with a truth the errors follow the covariances. Windows that were not fused are not tested.
   Verdict verdict() const;
   /// Summary of all windows that claim a scale, not only of those that came out well.
   InitialisationSummary summary() const;
@@ -302,7 +302,9 @@ template <class V>
 void describe(V& v, const ComparedStretch& f) {
   v("begin", f.begin, "", "s")("end", f.end, "", "s")("windows", f.windows.size(), "their number");
   v("chi2", f.chi2, "of their disagreement")("degrees_of_freedom", f.degrees_of_freedom, "of chi2");
-  v("p", f.p, "probability of a larger chi2")("ok", f.ok(), "p is 0.001 or more, or the covariance was inflated");
+  v("p", f.p, "probability of a larger chi2");
+  v("ok", f.ok(), "windows met, and p is 0.001 or more, or the covariance was inflated");
+  v("status", f.word(), "ok, inconsistent, untested (a single window: nothing could contradict it) or no_state");
   v("inflation", f.inflation, "factor by which the covariances are too small");
   v("inflated", f.inflated, "the covariance was multiplied by it");
   if (!shown(v, f.has_state)) return;

@@ -144,8 +144,12 @@ struct FusedStretch {
   double gravity = 0;             ///< |G| that was used (m/s²)
   Gaussian<InertialState> state;  ///< at the end
 
-  /// True if there is a state with a covariance that the windows do not contradict: p ≥ 1e-3, or it was inflated.
-  bool ok() const { return has_state && (p >= min_p_of_fusion || inflated); }
+  /// A single window has nothing that could contradict it.
+  bool tested() const { return has_state && degrees_of_freedom > 0; }
+  /// True if there is a state with a covariance that the windows were able to contradict and do not: p ≥ 1e-3, or it was
+  /// inflated.
+  bool ok() const { return tested() && (p >= min_p_of_fusion || inflated); }
+  const char* word() const { return !has_state ? "no_state" : !tested() ? "untested" : ok() ? "ok" : "inconsistent"; }
 };
 
 struct VisualInertialResult {

@@ -199,10 +199,17 @@ TEST(VisualInertialVerdict, OneWindowIsOkAndNoStretchContradictsAll) {
   r.windows.resize(2);
   EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: none of 2 windows is ok.");
   r.windows[1] = okWindow();
-  EXPECT_EQ(text(Verdict::Answer::yes), "1 of 2 windows are ok.");
-  // Stretches that contradict each other: p below the bound.
+  // What was not tested has not passed: no stretches, and stretches of a single window.
+  const auto untested = [&] { return text(Verdict::Answer::no).find("Not tested: 1 of 2 windows are ok, but") == 0; };
+  EXPECT_TRUE(untested());
   r.stretches.resize(2);
-  for (ComparedStretch& f : r.stretches) f.has_state = true, f.p = 1e-6;
+  for (ComparedStretch& f : r.stretches) f.has_state = true;
+  EXPECT_TRUE(untested());
+  EXPECT_FALSE(r.stretches[0].ok());
+  EXPECT_STREQ(r.stretches[0].word(), "untested");
+  // Stretches that contradict each other: p below the bound.
+  for (ComparedStretch& f : r.stretches) f.degrees_of_freedom = 11, f.p = 1e-6;
+  EXPECT_STREQ(r.stretches[0].word(), "inconsistent");
   EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: the windows contradict each other in every stretch.");
   r.stretches[1].inflated = true;
   EXPECT_EQ(text(Verdict::Answer::yes), "1 of 2 windows are ok.");
@@ -219,7 +226,7 @@ ComparedRecording withNees(std::size_t n, double window, double stretch) {
     r.windows[i].nees = window, r.windows[i].velocity_nees = window - 2, r.windows[i].gravity_nees = 2;
   }
   r.stretches.resize(1);
-  r.stretches[0].has_state = true, r.stretches[0].nees = stretch;
+  r.stretches[0].has_state = true, r.stretches[0].degrees_of_freedom = 11, r.stretches[0].nees = stretch;
   return r;
 }
 

@@ -29,12 +29,16 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
   }
   const std::size_t ok = okWindows();
   if (ok == 0) return Verdict::no("Not to be trusted: none of " + n + " windows is ok.");
-  // Stretches without a second window have nothing to contradict.
-  if (!stretches.empty() &&
-      std::none_of(stretches.begin(), stretches.end(), [](const ComparedStretch& f) { return f.ok(); })) {
+  const std::string text = std::to_string(ok) + " of " + n + " windows are ok";
+  const auto none = [&](const auto& property) { return std::none_of(stretches.begin(), stretches.end(), property); };
+  if (none([](const ComparedStretch& f) { return f.tested(); })) {
+    return Verdict::no("Not tested: " + text +
+                       ", but no two of a stretch met, so that nothing could contradict the densities of the inertial "
+                       "sensor's noise: a longer recording, shorter windows or a longer stretch is needed.");
+  }
+  if (none([](const ComparedStretch& f) { return f.ok(); })) {
     return Verdict::no("Not to be trusted: the windows contradict each other in every stretch.");
   }
-  const std::string text = std::to_string(ok) + " of " + n + " windows are ok";
   const Verdict errors = againstTruth();
   if (errors.isNo()) return Verdict::no("Not to be trusted: " + text + ", but " + errors.text + ".", errors.causes);
   return Verdict::yes(text + ".");

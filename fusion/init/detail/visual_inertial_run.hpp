@@ -183,7 +183,7 @@ class RecordingRun {
     stretch.p = fusion.p();
     stretch.inflation = fusion.inflation();
     stretch.state = fusion.state();
-    if (options_.inflate && !stretch.ok()) {
+    if (options_.inflate && stretch.tested() && !stretch.ok()) {
       stretch.inflated = true;
       stretch.state.covariance *= stretch.inflation;
     }
