@@ -1284,6 +1284,8 @@ def hand_eye(
     samples: int = 80,
     seed: int = 1,
     times: ArrayLike | None = None,
+    suspect_sigmas: dict[str, float] | None = None,
+    stream_of_a: tuple[ArrayLike, SE3] | None = None,
 ) -> _HandEyeResult: ...
 def two_view(
     matches: ArrayLike,
