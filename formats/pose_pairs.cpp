@@ -24,10 +24,17 @@ FeatureFile readPoses(const std::string& path, const ReadingOptions& options) {
 /// Times in ascending order, with the rows that they belong to.
 class TimeLine {
  public:
+  /// A row that repeats another, as logs of transformations have them, stands for both.
   TimeLine(const FeatureFile& file, const std::string& name) : rows_(file.size()) {
     std::iota(rows_.begin(), rows_.end(), std::size_t{0});
     std::sort(rows_.begin(), rows_.end(),
               [&](std::size_t i, std::size_t j) { return std::pair(file.times[i], i) < std::pair(file.times[j], j); });
+    const auto repeats = [&](std::size_t i, std::size_t j) {
+      return file.times[i] == file.times[j] && file.positions[i] == file.positions[j] &&
+             file.rotations[i].coeffs() == file.rotations[j].coeffs() &&
+             (file.covariances.empty() || file.covariances[i] == file.covariances[j]);
+    };
+    rows_.erase(std::unique(rows_.begin(), rows_.end(), repeats), rows_.end());
     for (const std::size_t row : rows_) times_.push_back(file.times[row]);
     for (std::size_t k = 1; k < rows_.size(); ++k) {
       if (time(k) == time(k - 1)) {

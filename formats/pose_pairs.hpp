@@ -36,7 +36,7 @@ struct PosePairs {
 
 /// Reads two files of frames. Where both have times, rows whose times are nearest to each other in both directions and
 /// within the tolerance are pairs; else row i belongs to row i. Throws InputError: a file of something else than poses,
-/// different lengths, a time that appears twice, times that do not overlap, too few pairs.
+/// different lengths, a time that appears twice with different poses, times that do not overlap, too few pairs.
 PosePairs readPosePairs(const std::string& path_a, const std::string& path_b, const PosePairOptions& options);
 
 }  // namespace liestat

@@ -58,8 +58,10 @@ struct HandEyeHintOptions {
 /// third of the pairs rejected.
 inline bool asksForExplanation(const HandEyeResult& result) {
   if (result.status == FusionStatus::bad_input) return false;
-  return result.status == FusionStatus::inconsistent || result.status == FusionStatus::not_converged ||
-         !(result.chi2 < 5 * result.degrees_of_freedom) || 3 * result.outliers.size() > result.pairs.size();
+  const bool refuted =
+      result.status == FusionStatus::inconsistent && (result.p < refutation_level || !result.isSuspicious());
+  return refuted || result.status == FusionStatus::not_converged || !(result.chi2 < 5 * result.degrees_of_freedom) ||
+         3 * result.outliers.size() > result.pairs.size();
 }
 
 namespace detail {

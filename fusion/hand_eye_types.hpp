@@ -3,14 +3,17 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/pose_stream.hpp>
 #include <fusion/status.hpp>
 #include <lie/se3.hpp>
 #include <lie/units.hpp>
 #include <stats/noise_fit.hpp>
+#include <stats/score_tests_types.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/shown.hpp>
 #include <stats/time_dependence_types.hpp>
 #include <stats/verdict.hpp>
+#include <stats/words.hpp>
 
 #include <Eigen/Core>
 
@@ -30,6 +33,19 @@ struct PosePair {
   Gaussian<SE3d> a, b;
 };
 
+/// Quantities that the equations take for known.
+enum class HandEyeSuspect {
+  delay,  ///< a pair's B belongs to A at a time that is later by it, s; positive: the stamps of B are early
+  scale,  ///< B's translations are too short by it: the board is larger than stated, or the robot's lengths are too long
+  focal_length,  ///< the camera's is too small by it: distances to the target's origin are too short
+  principal_x,   ///< the principal point, in focal lengths: the target's origin is off by it times its distance
+  principal_y
+};
+inline constexpr std::size_t hand_eye_suspects = 5;
+constexpr auto words(HandEyeSuspect) {
+  return std::array{"delay", "scale", "focal_length", "principal_x", "principal_y"};
+}
+
 struct HandEyeOptions {
   /// `false`: the covariances are known up to one common factor, which is estimated from the residuals.
   bool known_noise = true;
@@ -48,6 +64,12 @@ struct HandEyeOptions {
   /// Times of the pairs, s, in their order; empty if they have none. With times the covariance is widened by the
   /// dependence of successive errors that the residuals show (stats/time_dependence.hpp).
   std::vector<double> times = {};
+  /// The stream that the poses of A are from, for the delay: at `times` it has the poses of the pairs, but for noise.
+  std::vector<TimedPose> stream_of_a = {};
+  /// Standard deviations of what is known about the suspects, which are then estimated with X: 0 takes a suspect for
+  /// known and tests it, infinity is no prior.
+  std::array<double, hand_eye_suspects> suspect_sigmas = {};
+  double delay_start = 0;  ///< s, from which the delay is sought
 };
 
 /// A direction of X (and Y) that the motions do not determine: the excitation is below the trusted one.
@@ -81,11 +103,30 @@ struct PairFit {
   bool inlier = false;
 };
 
+/// A suspect of a calibration.
+struct HandEyeSuspectTest : SuspectTest {
+  double prior_sigma = 0;  ///< as in HandEyeOptions::suspect_sigmas
+  double value = 0;        ///< that the calibration has taken, in the unit of the suspect; 0 if it is taken for known
+  double value_sigma = 0;
+  /// The local movement of X per unit by which the suspect is off.
+  Eigen::Matrix<double, 6, 1> shift_of_X =
+      Eigen::Matrix<double, 6, 1>::Constant(std::numeric_limits<double>::quiet_NaN());
+};
+
+template <class V>
+void describe(V& v, const HandEyeSuspectTest& x) {
+  describe(v, static_cast<const SuspectTest&>(x));
+  v("prior_standard_deviation", x.prior_sigma, "0: taken for known; null: an unknown without a prior");
+  v("value", x.value, "that the calibration has taken")("value_standard_deviation", x.value_sigma);
+  v("shift_of_X", x.shift_of_X, "local movement of X per unit of it", "m, rad");
+}
+
 /// A calibration. Statuses:
 ///   ok             X, and Y, with their covariance
 ///   undetermined   the motions leave `directions` open; X and Y are one of the solutions that fit
 ///   ambiguous      a second solution, `rival`, explains the pairs as well
-///   inconsistent   the residuals are larger than the covariances predict, or fewer than half of the pairs agree
+///   inconsistent   the residuals are larger than the covariances predict, or fewer than half of the pairs agree, or
+///                  they speak for a suspect
 ///   not_converged
 ///   bad_input      see `fault`
 struct HandEyeResult {
@@ -114,10 +155,24 @@ struct HandEyeResult {
   std::vector<OpenDirection> directions;  ///< those below the trusted excitation, ascending
   std::vector<PairFit> pairs;             ///< in the order of the input
   std::vector<std::size_t> outliers;      ///< indices of the outliers, ascending
-  std::optional<SE3d> rival;              ///< X of a second solution that fits as well
-  int starts = 0;                         ///< number of starts that were compared
+  /// Tests of what the equations take for known, in the order of HandEyeSuspect; empty where directions are open and
+  /// with few pairs.
+  std::vector<HandEyeSuspectTest> suspects;
+  /// X as the mixture over the suspects that cannot be told apart, where one is significant.
+  std::optional<Gaussian<SE3d>> X_over_suspects;
+  std::optional<SE3d> rival;  ///< X of a second solution that fits as well
+  int starts = 0;             ///< number of starts that were compared
 
   bool ok() const { return status == FusionStatus::ok; }
+  /// True if a suspect is significant.
+  bool isSuspicious() const {
+    for (const HandEyeSuspectTest& x : suspects) {
+      if (x.significant) return true;
+    }
+    return false;
+  }
+  /// The suspects that the residuals speak for, with the option that takes them in; empty where there are none.
+  std::string suspectsInWords() const;
   /// How it ended, in words.
   std::string inWords() const;
   /// Verdict on the calibration: to be trusted if the status is ok, else not.
@@ -263,6 +318,12 @@ void describe(V& v, const HandEyeResult& r) {
   describe(v, r.dependence);
   v("excitations", r.excitations, "of the six directions, ascending");
   v("open_directions", r.directions, "that the motions leave open");
+  v("suspects", r.suspects, "what the equations take for known");
+  v("suspects_in_words", r.suspectsInWords(), "those that the residuals speak for; empty: none");
+  v("X_over_suspects", r.X_over_suspects ? std::optional(PoseCoordinates{r.X_over_suspects->mean}) : std::nullopt,
+    "X as the mixture over the suspects that cannot be told apart");
+  v("X_over_suspects_covariance", r.X_over_suspects ? std::optional(r.X_over_suspects->covariance) : std::nullopt,
+    "of local errors, m and rad");
   v("rival", r.rival ? std::optional(PoseCoordinates{*r.rival}) : std::nullopt, "X of a second solution");
   v("starts", r.starts, "that were compared")("outliers", r.outliers, "numbers of the wrong pairs, from 0");
 }

@@ -66,6 +66,13 @@ struct TimeCell {
   double weight = 0;
 };
 
+/// Takes a parameter out of normal equations: its row and column become those of the identity.
+template <int N>
+void holdParameter(Eigen::Matrix<double, N, N>& normal, int k) {
+  normal.row(k).setZero(), normal.col(k).setZero();
+  normal(k, k) = 1;
+}
+
 /// [K u]ᵀ R⁻¹ [K u] and log det R of a cell, by the innovations of a scalar Kalman filter. `decay` is that from the row
 /// before.
 template <int P>
@@ -101,12 +108,19 @@ CellSums<P> cellSums(double f, const Rows& rows, std::span<const double> decay) 
   return sums;
 }
 
-/// The likelihoods of a cell.
+/// The likelihoods of a cell, of which the parameters in `held` are known.
 template <int C, int P, class Rows>
-void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay) {
-  const auto [gram, log_det] = cellSums<C, P>(cell.share, rows, decay);
+void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay, const std::array<bool, P>& held) {
+  auto [gram, log_det] = cellSums<C, P>(cell.share, rows, decay);
+  double freedom = static_cast<double>(C) * static_cast<double>(rows.size());
+  for (int k = 0; k < P; ++k) {
+    if (held[static_cast<std::size_t>(k)]) {
+      holdParameter<P + 1>(gram, k);
+    } else {
+      --freedom;
+    }
+  }
   const Cholesky<double, P> normal(gram.template topLeftCorner<P, P>());
-  const double freedom = static_cast<double>(C) * static_cast<double>(rows.size()) - P;
   if (!normal.ok() || !(freedom > 0)) return;
   const Eigen::Matrix<double, P, 1> right = gram.template topRightCorner<P, 1>();
   const double squares = gram(P, P) - normal.template halfSolve<1>(right).squaredNorm();
@@ -136,22 +150,171 @@ Eigen::Matrix<double, P, P> cellSandwich(const TimeCell& cell, const Rows& rows,
   return equal + cell.share * (past + past.transpose());
 }
 
-/// Residuals have the power s² (N - tr C M) under a cell. False where they have less than a third of it: the cell has
-/// taken what a shift of the parameters explains for a process that drifts, and claims errors that are not there.
-template <int C, int P, class Rows>
-bool isBelievable(const TimeCell& cell, const Rows& rows, std::span<const double> decay) {
-  constexpr double min_share = 1. / 3;
-  Eigen::Matrix<double, P, P> information = Eigen::Matrix<double, P, P>::Zero();
-  double power = 0;
-  for (const auto& row : rows) {
-    information += row.template leftCols<P>().transpose() * row.template leftCols<P>();
-    power += row.col(P).squaredNorm();
+/// The dependence that rows show, for the covariance of scores of their columns. Parameters in `held` are known: their
+/// columns stand beside the others, and the residuals were not fitted to them.
+template <int C, int P>
+class TimeModel {
+ public:
+  TimeModel(std::span<const TimedRow<C, P>> given, bool known_noise, const std::array<bool, P>& held = {})
+      : known_noise_(known_noise), held_(held) {
+    std::vector<std::size_t> order(given.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [&](auto i, auto k) { return given[i].time < given[k].time; });
+    rows_.resize(given.size());
+    std::vector<double> gaps;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      rows_[i] << given[order[i]].columns, given[order[i]].residual;
+      if (i > 0) gaps.push_back(given[order[i]].time - given[order[i - 1]].time);
+    }
+    const auto fitted = static_cast<std::size_t>(std::count(held_.begin(), held_.end(), false));
+    if (given.size() < min_rows || C * given.size() < 3 * fitted) return;
+    const double duration = given[order.back()].time - given[order.front()].time;
+    if (duration > 0 && std::isfinite(duration)) findDependence(gaps, duration, fitted);
   }
-  const Eigen::Matrix<double, P, P> sandwich = cellSandwich<C, P>(cell, rows, decay);
-  const double taken = Cholesky<double, P>(information).template solve<P>(sandwich).trace();
-  const double left = static_cast<double>(C) * static_cast<double>(rows.size()) - taken;
-  return power >= min_share * cell.restricted.variance * left;
-}
+
+  const TimeDependence& dependence() const { return found_; }
+  /// True where the rows speak for a dependence.
+  bool isDependent() const { return found_.tested && found_.white < white_prior; }
+  /// Σ K_iᵀ K_i.
+  Eigen::Matrix<double, P, P> information() const {
+    Eigen::Matrix<double, P, P> sum = Eigen::Matrix<double, P, P>::Zero();
+    for (const auto& row : rows_) sum += row.template leftCols<P>().transpose() * row.template leftCols<P>();
+    return sum;
+  }
+  /// Σ u_iᵀ u_i.
+  double power() const {
+    double sum = 0;
+    for (const auto& row : rows_) sum += row.col(P).squaredNorm();
+    return sum;
+  }
+  /// Σ_ij c(t_i - t_j) K_iᵀ K_j under the weights of the cells.
+  Eigen::Matrix<double, P, P> sandwich() const {
+    Eigen::Matrix<double, P, P> middle = Eigen::Matrix<double, P, P>::Zero();
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      if (cells_[k].weight <= min_weight) continue;  // each costs as much as any other
+      const double variance = k == 0 && known_noise_ ? 1 : (cells_[k].*likelihood_).variance;
+      middle += cells_[k].weight * variance * cellSandwich<C, P>(cells_[k], rows_, decayOf(k));
+    }
+    return middle;
+  }
+
+ private:
+  static constexpr std::size_t min_rows = 20;
+  static constexpr double white_prior = 0.8, min_weight = 1e-5, min_time_constants = 10;
+  static constexpr std::array shares{.1, .25, .5, .75, .9, .97, 1 - 1e-6};
+
+  const std::vector<double>& decayOf(std::size_t cell) const {
+    return decay_[cell == 0 ? 0 : 1 + (cell - 1) / shares.size()];
+  }
+  void findDependence(const std::vector<double>& gaps, double duration, std::size_t fitted) {
+    std::vector<double> sorted = gaps;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+    // Many rows may have one time; their median gap is then no scale.
+    const double shortest = std::max(0.7 * sorted[sorted.size() / 2], 1e-6 * duration), longest = 2 * duration;
+    constexpr int steps = 9;
+    cells_.push_back({.prior = white_prior});
+    decay_.push_back(std::vector<double>(gaps.size(), 0.0));
+    for (int k = 0; k < steps; ++k) {
+      const double time_constant = shortest * std::pow(longest / shortest, k / (steps - 1.0));
+      decay_.push_back(decays(gaps, time_constant));
+      for (const double share : shares) {
+        cells_.push_back({.time_constant = time_constant,
+                          .share = share,
+                          .prior = (1 - white_prior) / (steps * static_cast<double>(shares.size()))});
+      }
+    }
+    for (std::size_t k = 0; k < cells_.size(); ++k) judgeCell<C, P>(cells_[k], rows_, decayOf(k), held_);
+    // Over many time constants the residuals show the dependence by themselves. The restricted likelihood, which few of
+    // them need, may take an error of the model that a shift of the parameters explains, such as a delay between
+    // streams, for a process that drifts without end.
+    if (!weigh()) return;
+    if (C * rows_.size() < 20 * fitted || duration < min_time_constants * found_.time_constant) {
+      likelihood_ = &TimeCell::restricted;
+      if (!weigh()) return;
+      const auto heaviest = std::max_element(cells_.begin(), cells_.end(),
+                                             [](const auto& a, const auto& b) { return a.weight < b.weight; });
+      const auto k = static_cast<std::size_t>(heaviest - cells_.begin());
+      if (k != 0 && !isBelievable(*heaviest, decayOf(k))) {
+        likelihood_ = &TimeCell::profile;
+        weigh();
+      }
+    }
+    found_.tested = true;
+  }
+  /// Weights, and what they say, by the likelihood.
+  bool weigh() {
+    double best = -std::numeric_limits<double>::infinity(), sum = 0;
+    for (const TimeCell& cell : cells_) best = std::max(best, (cell.*likelihood_).log_likelihood);
+    if (!std::isfinite(best)) return false;
+    for (TimeCell& cell : cells_) sum += cell.weight = std::exp((cell.*likelihood_).log_likelihood - best);
+    double log_time = 0, share = 0, others = 0;
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      TimeCell& cell = cells_[k];
+      cell.weight /= sum;
+      if (k == 0) continue;
+      others += cell.weight, share += cell.weight * cell.share;
+      log_time += cell.weight * std::log(cell.time_constant);
+    }
+    found_.white = cells_.front().weight;
+    if (others > 0) found_.share = share / others, found_.time_constant = std::exp(log_time / others);
+    return true;
+  }
+  /// Residuals have the power s² (N - tr C M) under a cell. False where they have less than a third of it: the cell has
+  /// taken what a shift of the parameters explains for a process that drifts, and claims errors that are not there.
+  bool isBelievable(const TimeCell& cell, std::span<const double> decay) const {
+    constexpr double min_share = 1. / 3;
+    Eigen::Matrix<double, P, P> normal = information(), sandwich = cellSandwich<C, P>(cell, rows_, decay);
+    double known = 0;
+    for (int k = 0; k < P; ++k) {
+      if (!held_[static_cast<std::size_t>(k)]) continue;
+      holdParameter<P>(normal, k), holdParameter<P>(sandwich, k);
+      ++known;
+    }
+    const double taken = Cholesky<double, P>(normal).template solve<P>(sandwich).trace() - known;
+    const double left = static_cast<double>(C) * static_cast<double>(rows_.size()) - taken;
+    return power() >= min_share * cell.restricted.variance * left;
+  }
+
+  bool known_noise_;
+  std::array<bool, P> held_;
+  std::vector<TimedColumns<C, P>> rows_;    // sorted by time
+  std::vector<TimeCell> cells_;             // white noise first
+  std::vector<std::vector<double>> decay_;  // of white noise, then of each time constant
+  TimeCell::Judged TimeCell::*likelihood_ = &TimeCell::profile;
+  TimeDependence found_;
+};
+
+/// A covariance not below `plain` in any direction, and the mean factor by which it is larger.
+template <int P>
+struct WidenedCovariance {
+  Eigen::Matrix<double, P, P> covariance;
+  double factor = 1;
+
+  /// C M C for the information C⁻¹ where it is larger; `plain` where a factor fails.
+  WidenedCovariance(const Eigen::Matrix<double, P, P>& plain, const Eigen::Matrix<double, P, P>& information,
+                    const Eigen::Matrix<double, P, P>& middle)
+      : covariance(plain) {
+    // In the coordinates where the plain covariance is the identity nothing becomes smaller.
+    const Cholesky<double, P> root(plain), normal(information);
+    if (!root.ok() || !normal.ok()) return;
+    const Eigen::Matrix<double, P, P> L = root.lower();
+    const Eigen::Matrix<double, P, P> half = normal.template solve<P>(middle);
+    const Eigen::Matrix<double, P, P> sandwich = normal.template solve<P>(half.transpose());
+    const Eigen::Matrix<double, P, P> left = root.template halfSolve<P>(sandwich);
+    const Eigen::Matrix<double, P, P> scaled = root.template halfSolve<P>(left.transpose());
+    const SymmetricEigen eigen(Eigen::Matrix<double, P, P>(0.5 * (scaled + scaled.transpose())));
+    Eigen::Matrix<double, P, P> widened = Eigen::Matrix<double, P, P>::Identity();
+    double trace = 0;
+    for (int i = 0; i < P; ++i) {
+      const double more = std::max(0.0, eigen.values[i] - 1);
+      trace += 1 + more;
+      widened += more * eigen.vectors.col(i) * eigen.vectors.col(i).transpose();
+    }
+    factor = trace / P;
+    const Eigen::Matrix<double, P, P> larger = congruence(L, widened);
+    covariance = 0.5 * (larger + larger.transpose());
+  }
+};
 
 }  // namespace detail
 
@@ -161,113 +324,13 @@ bool isBelievable(const TimeCell& cell, const Rows& rows, std::span<const double
 template <int C, int P>
 TimedCovariance<P> timedCovariance(std::span<const TimedRow<C, P>> given, const Eigen::Matrix<double, P, P>& plain,
                                    bool known_noise) {
-  constexpr std::size_t min_rows = 20;
-  constexpr double white_prior = 0.8, min_weight = 1e-5, min_time_constants = 10;
-  TimedCovariance<P> result{{}, plain};
-  if (given.size() < min_rows || C * given.size() < 3 * P) return result;
-  std::vector<std::size_t> order(given.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [&](auto i, auto k) { return given[i].time < given[k].time; });
-  std::vector<detail::TimedColumns<C, P>> rows(given.size());
-  std::vector<double> gaps;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    rows[i] << given[order[i]].columns, given[order[i]].residual;
-    if (i > 0) gaps.push_back(given[order[i]].time - given[order[i - 1]].time);
-  }
-  const double duration = given[order.back()].time - given[order.front()].time;
-  if (!(duration > 0) || !std::isfinite(duration)) return result;
-  std::vector<double> sorted = gaps;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  // Many rows may have one time; their median gap is then no scale.
-  const double shortest = std::max(0.7 * sorted[sorted.size() / 2], 1e-6 * duration), longest = 2 * duration;
-
-  constexpr std::array shares{.1, .25, .5, .75, .9, .97, 1 - 1e-6};
-  constexpr int steps = 9;
-  std::vector<detail::TimeCell> cells{{.prior = white_prior}};
-  std::vector<std::vector<double>> decay{std::vector<double>(gaps.size(), 0.0)};
-  for (int k = 0; k < steps; ++k) {
-    const double time_constant = shortest * std::pow(longest / shortest, k / (steps - 1.0));
-    decay.push_back(detail::decays(gaps, time_constant));
-    for (const double share : shares) {
-      cells.push_back({.time_constant = time_constant,
-                       .share = share,
-                       .prior = (1 - white_prior) / (steps * static_cast<double>(shares.size()))});
-    }
-  }
-  const auto decayOf = [&](std::size_t cell) -> const std::vector<double>& {
-    return decay[cell == 0 ? 0 : 1 + (cell - 1) / shares.size()];
-  };
-  for (std::size_t k = 0; k < cells.size(); ++k) detail::judgeCell<C, P>(cells[k], rows, decayOf(k));
-  TimeDependence& found = result.dependence;
-  // Weights, and what they say, by one of the likelihoods.
-  const auto weigh = [&](detail::TimeCell::Judged detail::TimeCell::*likelihood) {
-    double best = -std::numeric_limits<double>::infinity(), sum = 0;
-    for (const detail::TimeCell& cell : cells) best = std::max(best, (cell.*likelihood).log_likelihood);
-    if (!std::isfinite(best)) return false;
-    for (detail::TimeCell& cell : cells) sum += cell.weight = std::exp((cell.*likelihood).log_likelihood - best);
-    double log_time = 0, share = 0, others = 0;
-    for (std::size_t k = 0; k < cells.size(); ++k) {
-      detail::TimeCell& cell = cells[k];
-      cell.weight /= sum;
-      if (k == 0) continue;
-      others += cell.weight, share += cell.weight * cell.share;
-      log_time += cell.weight * std::log(cell.time_constant);
-    }
-    found.white = cells.front().weight;
-    if (others > 0) found.share = share / others, found.time_constant = std::exp(log_time / others);
-    return true;
-  };
-  // Over many time constants the residuals show the dependence by themselves. The restricted likelihood, which few of
-  // them need, may take an error of the model that a shift of the parameters explains, such as a delay between streams,
-  // for a process that drifts without end.
-  if (!weigh(&detail::TimeCell::profile)) return result;
-  auto likelihood = &detail::TimeCell::profile;
-  if (C * given.size() < 20 * P || duration < min_time_constants * found.time_constant) {
-    if (!weigh(&detail::TimeCell::restricted)) return result;
-    const auto heaviest =
-        std::max_element(cells.begin(), cells.end(), [](const auto& a, const auto& b) { return a.weight < b.weight; });
-    const auto k = static_cast<std::size_t>(heaviest - cells.begin());
-    if (k == 0 || detail::isBelievable<C, P>(*heaviest, rows, decayOf(k))) {
-      likelihood = &detail::TimeCell::restricted;
-    } else {
-      weigh(likelihood);
-    }
-  }
-  found.tested = true;
+  const detail::TimeModel<C, P> model(given, known_noise);
+  TimedCovariance<P> result{model.dependence(), plain};
   // Where the rows do not speak for a dependence the covariance is to the last bit what it was.
-  if (found.white >= white_prior) return result;
-  Eigen::Matrix<double, P, P> middle = Eigen::Matrix<double, P, P>::Zero();
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (cells[k].weight <= min_weight) continue;  // each costs as much as any other
-    const double variance = k == 0 && known_noise ? 1 : (cells[k].*likelihood).variance;
-    middle += cells[k].weight * variance * detail::cellSandwich<C, P>(cells[k], rows, decayOf(k));
-  }
-
-  // In the coordinates where the plain covariance is the identity nothing becomes smaller.
-  const detail::Cholesky<double, P> factor(plain);
-  if (!factor.ok()) return result;
-  const Eigen::Matrix<double, P, P> L = factor.lower();
-  Eigen::Matrix<double, P, P> information = Eigen::Matrix<double, P, P>::Zero();
-  for (const auto& row : rows) {
-    information += row.template leftCols<P>().transpose() * row.template leftCols<P>();
-  }
-  const detail::Cholesky<double, P> normal(information);
-  if (!normal.ok()) return result;
-  const Eigen::Matrix<double, P, P> half = normal.template solve<P>(middle);
-  const Eigen::Matrix<double, P, P> sandwich = normal.template solve<P>(half.transpose());
-  const Eigen::Matrix<double, P, P> left = factor.template halfSolve<P>(sandwich);
-  const Eigen::Matrix<double, P, P> scaled = factor.template halfSolve<P>(left.transpose());
-  const detail::SymmetricEigen eigen(Eigen::Matrix<double, P, P>(0.5 * (scaled + scaled.transpose())));
-  Eigen::Matrix<double, P, P> widened = Eigen::Matrix<double, P, P>::Identity();
-  double trace = 0;
-  for (int i = 0; i < P; ++i) {
-    const double more = std::max(0.0, eigen.values[i] - 1);
-    trace += 1 + more;
-    widened += more * eigen.vectors.col(i) * eigen.vectors.col(i).transpose();
-  }
-  found.correlation_factor = trace / P;
-  const Eigen::Matrix<double, P, P> covariance = detail::congruence(L, widened);
-  result.covariance = 0.5 * (covariance + covariance.transpose());
+  if (!model.isDependent()) return result;
+  const detail::WidenedCovariance<P> widened(plain, model.information(), model.sandwich());
+  result.dependence.correlation_factor = widened.factor;
+  result.covariance = widened.covariance;
   return result;
 }
 

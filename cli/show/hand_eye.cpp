@@ -98,6 +98,11 @@ std::string fitInWords(const HandEyeOutput& output) {
   if (output.options.known_noise) text += fmt::format(", p {}", number(r.p, 2));
   text += fmt::format("); {} starts\n", r.starts);
   if (r.dependence.tested) text += r.dependence.inWords() + "\n";
+  for (const HandEyeSuspectTest& x : r.suspects) {
+    if (!(x.prior_sigma > 0)) continue;
+    text += fmt::format("{} {} +- {}{}\n", x.name, number(x.value, 4), number(x.value_sigma, 2),
+                        x.unit.empty() ? "" : " " + x.unit);
+  }
   if (!output.options.known_noise) {
     text += fmt::format(
         "the noise is not known: the covariances are scaled by chi2/dof = {}, and the residuals are no\n"

@@ -931,6 +931,20 @@ class _OpenDirection(Result):
     description: str  # in words
     rotates: bool  # it rotates X
 
+class _HandEyeSuspectTest(Result):
+    name: str
+    unit: str  # of the estimate; empty: a ratio
+    estimate: float  # that the residuals ask for; null: the parameters explain all that it would do
+    standard_deviation: float  # of the estimate
+    z: float  # deviation from zero in standard deviations
+    p: float  # probability of a larger |z|
+    significant: bool  # whether
+    in_group: bool  # of the suspects that can't be told from the strongest
+    prior_standard_deviation: float  # 0: taken for known; null: an unknown without a prior
+    value: float  # that the calibration has taken
+    value_standard_deviation: float
+    shift_of_X: _Array  # local movement of X per unit of it; m, rad
+
 class _PoseCoordinates(Result):
     translation: _Array  # m
     quaternion_xyzw: _Array  # w >= 0
@@ -961,6 +975,10 @@ class _HandEyeResult(Result):
     correlation_factor: float  # mean factor of the variances that the dependence asks for
     excitations: _Array  # of the six directions, ascending
     open_directions: list[_OpenDirection]  # that the motions leave open
+    suspects: list[_HandEyeSuspectTest]  # what the equations take for known
+    suspects_in_words: str  # those that the residuals speak for; empty: none
+    X_over_suspects: CalibratedPose | None  # X as the mixture over the suspects that cannot be told apart
+    X_over_suspects_covariance: _Array | None  # of local errors, m and rad
     rival: CalibratedPose | None  # X of a second solution
     starts: int  # that were compared
     outliers: _Array  # numbers of the wrong pairs, from 0
@@ -1266,6 +1284,8 @@ def hand_eye(
     samples: int = 80,
     seed: int = 1,
     times: ArrayLike | None = None,
+    suspect_sigmas: dict[str, float] | None = None,
+    stream_of_a: tuple[ArrayLike, SE3] | None = None,
 ) -> _HandEyeResult: ...
 def two_view(
     matches: ArrayLike,

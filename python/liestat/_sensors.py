@@ -210,6 +210,8 @@ def hand_eye(
     samples=80,
     seed=1,
     times=None,
+    suspect_sigmas=None,
+    stream_of_a=None,
 ):
     """Hand-eye calibration from pairs of poses that both carry noise.
 
@@ -229,6 +231,11 @@ def hand_eye(
         Of the search for outliers.
     times : array_like, shape (n,), optional
         Times of the pairs, s: the covariance is then widened by the dependence of successive errors that shows.
+    suspect_sigmas : dict, optional
+        Suspects ('delay', 'scale', 'focal_length', 'principal_x', 'principal_y') that are estimated, each with the
+        standard deviation of its prior, s or a ratio; inf: without one. The others are taken for known and tested.
+    stream_of_a : tuple of array_like, shape (m,), and SE3, shape (m,), optional
+        Times and poses of the stream that `a` is from, without which there is no delay.
 
     Returns
     -------
@@ -254,6 +261,16 @@ def hand_eye(
     t = np.empty(0) if times is None else _vector(times, "hand_eye: times")
     if times is not None:
         _same_length("hand_eye", times=t, a=a)
+    names = ("delay", "scale", "focal_length", "principal_x", "principal_y")
+    sigmas = {} if suspect_sigmas is None else dict(suspect_sigmas)
+    for name in sigmas:
+        if name not in names:
+            raise ValueError(f"hand_eye: suspect_sigmas: expected some of {', '.join(names)}, got {name!r}")
+    stream_times, stream_poses = np.empty(0), np.empty((0, 7))
+    if stream_of_a is not None:
+        stream_times = _vector(stream_of_a[0], "hand_eye: times of stream_of_a")
+        _same_length("hand_eye", stream_times=stream_times, stream_poses=stream_of_a[1])
+        stream_poses = np.ascontiguousarray(stream_of_a[1].params)
     d = _core.hand_eye(
         np.ascontiguousarray(a.params),
         covariances[0],
@@ -266,10 +283,13 @@ def hand_eye(
         int(samples),
         int(seed),
         t,
+        [float(sigmas.get(name, 0)) for name in names],
+        stream_times,
+        stream_poses,
     )
     if d["status"] != "ok":
         warnings.warn(f"liestat.hand_eye: {d['status']}: {d['in_words']}", UserWarning, stacklevel=2)
-    for name in ("X", "Y", "rival"):
+    for name in ("X", "Y", "rival", "X_over_suspects"):
         if d[name] is not None:
             d[name] = CalibratedPose.of(name, d[name])
     d["outliers"] = d["outliers"].tolist()

@@ -5,6 +5,10 @@
 #include <python/src/described.hpp>
 #include <python/src/interruptible.hpp>
 
+#include <pybind11/stl.h>
+
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -13,7 +17,9 @@ namespace {
 
 py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const DoubleArray& b,
                    const DoubleArray& b_covariance, bool world, bool known_noise, bool find_outliers, double gate,
-                   int samples, std::uint64_t seed, const DoubleArray& times) {
+                   int samples, std::uint64_t seed, const DoubleArray& times,
+                   const std::array<double, hand_eye_suspects>& suspect_sigmas, const DoubleArray& stream_times,
+                   const DoubleArray& stream_poses) {
   const auto n = static_cast<std::size_t>(a.shape(0));
   std::vector<PosePair> pairs(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -27,6 +33,10 @@ py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const 
   options.samples = samples;
   options.seed = seed;
   options.times.assign(times.data(), times.data() + times.size());
+  options.suspect_sigmas = suspect_sigmas;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(stream_times.size()); ++i) {
+    options.stream_of_a.push_back({stream_times.data()[i], point<SE3d>(stream_poses.data() + 7 * i)});
+  }
   HandEyeResult result;
   {
     const py::gil_scoped_release released;

@@ -8,6 +8,7 @@
 #include <fusion/detail/median.hpp>
 #include <stats/detail/tail_probabilities.hpp>
 #include <stats/random.hpp>
+#include <stats/score_tests.hpp>
 #include <stats/time_dependence.hpp>
 
 #include <Eigen/Core>
@@ -49,10 +50,18 @@ class HandEyeRun {
     sortByContent();
     Indices all(pairs_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
+    given_ = pairs_;
+    stream_ = PoseStream(options_.stream_of_a);
+    if (!options_.times.empty()) values_[0] = options_.delay_start;
+    takeIn();
     fitAll(all);
+    estimateSuspects();
     // Where the noise is not known, wrong pairs may have been taken for noise.
     const bool suspicious = !options_.known_noise || *std::max_element(errors_.begin(), errors_.end()) > options_.gate;
-    if (options_.find_outliers && pairs_.size() >= min_pairs_for_search && suspicious) findOutliers();
+    if (options_.find_outliers && pairs_.size() >= min_pairs_for_search && suspicious) {
+      findOutliers();
+      estimateSuspects();
+    }
     estimate();
     return std::move(result_);
   }
@@ -67,8 +76,14 @@ class HandEyeRun {
   Fault fault() const {
     const HandEyeOptions& o = options_;
     if (!(o.gate > 0 && o.samples >= 0 && o.min_excitation > 0 && o.trusted_excitation >= o.min_excitation &&
-          o.min_p >= 0 && (o.times.empty() || o.times.size() == pairs_.size()))) {
+          o.min_p >= 0 && std::isfinite(o.delay_start) && (o.times.empty() || o.times.size() == pairs_.size()))) {
       return FaultKind::bad_option;
+    }
+    for (const double sigma : o.suspect_sigmas) {
+      if (!(sigma >= 0)) return FaultKind::bad_option;
+    }
+    for (const TimedPose& pose : o.stream_of_a) {
+      if (!std::isfinite(pose.time) || !pose.pose.params().allFinite()) return FaultKind::bad_option;
     }
     for (const double time : o.times) {
       if (!std::isfinite(time)) return FaultKind::bad_option;
@@ -304,7 +319,135 @@ class HandEyeRun {
 
     if (converged && !r.rotationIsOpen())
       setCovariance(open > 0 ? strict.covariance : widened(strict.covariance, value));
+    if (converged && open == 0) testSuspects(value);
     r.status = statusOf(strict, value, open);
+  }
+
+  // Suspects.
+
+  static constexpr int suspects = static_cast<int>(hand_eye_suspects), columns = parameters + suspects;
+  /// Fewer pairs say little about X itself.
+  static constexpr std::size_t min_pairs_for_suspects = 10;
+
+  /// The pairs with the values of the suspects taken in.
+  void takeIn() {
+    if (values_.isZero(0)) return;
+    const double delay = values_[0];
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      pairs_[i].a.mean = given_[i].a.mean, pairs_[i].b.mean = given_[i].b.mean;
+      if (delay != 0) {
+        const double time = options_.times[order_[i]];
+        const std::optional<SE3d> now = stream_.at(time), then = stream_.at(time + delay);
+        if (now && then) pairs_[i].a.mean = given_[i].a.mean * (now->inverse() * *then);
+      }
+      SE3d& B = pairs_[i].b.mean;
+      const Eigen::Vector3d target = -(B.so3().inverse() * B.translation());
+      Vector6 step = Vector6::Zero();
+      step.head<3>() = -values_[1] * target - Eigen::Vector3d(values_[3], values_[4], values_[2]) * target.z();
+      B = B * SE3d::exp(step);
+    }
+  }
+  /// Whitened errors and their derivatives by X, Y and the suspects, at the corrected poses: at the measured ones noise is
+  /// in both.
+  std::vector<TimedRow<6, columns>> suspectRows(const HandEyeValue& value) const {
+    std::vector<TimedRow<6, columns>> rows;
+    for (const std::size_t i : inliers_) {
+      const PosePair& pair = pairs_[i];
+      const HandEyeJacobians at(value, pair.a.mean, pair.b.mean);
+      const Cholesky<double, 6> S = handEyeErrorFactor(at.A, at.B, pair);
+      const Vector6 k = S.solve<1>(at.e);
+      const Vector6 a = -product(pair.a.covariance, product(at.A.transpose(), k));
+      const Vector6 b = -product(pair.b.covariance, product(at.B.transpose(), k));
+      const SE3d B = pair.b.mean * SE3d::exp(b);
+      const HandEyeJacobians J(value, pair.a.mean * SE3d::exp(a), B);
+      TimedRow<6, columns>& row = rows.emplace_back();
+      row.residual = S.halfSolve<1>(at.e);
+      row.columns.setZero();
+      if constexpr (world) {
+        row.columns.template leftCols<12>() << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
+      } else {
+        row.columns.template leftCols<6>() = S.halfSolve<6>(Matrix6(J.X + J.Y));
+      }
+      if (!options_.times.empty()) {
+        row.time = options_.times[order_[i]];
+        if (const auto velocity = stream_.velocity(row.time + values_[0])) {
+          row.columns.col(parameters) = S.halfSolve<1>(product(J.A, *velocity));
+        }
+      }
+      const Eigen::Vector3d target = -(B.so3().inverse() * B.translation());
+      const auto by = [&](int suspect, const Eigen::Vector3d& shift) {
+        Vector6 step = Vector6::Zero();
+        step.head<3>() = -shift;
+        row.columns.col(parameters + suspect) = S.halfSolve<1>(product(J.B, step));
+      };
+      by(1, target);
+      if constexpr (world) {
+        by(2, target.z() * Eigen::Vector3d::UnitZ());
+        by(3, target.z() * Eigen::Vector3d::UnitX()), by(4, target.z() * Eigen::Vector3d::UnitY());
+      }
+    }
+    return rows;
+  }
+  ScoreTests<parameters, suspects> scoresAt(const HandEyeValue& value) const {
+    ScoreTestOptions<suspects> options{.prior_sigmas = options_.suspect_sigmas, .known_noise = options_.known_noise};
+    for (std::size_t k = 0; k < hand_eye_suspects; ++k) options.values[k] = values_[static_cast<int>(k)];
+    // A prior on what is not in the rows would be all that is known about it.
+    if (options_.times.empty() || stream_.poses().empty()) options.prior_sigmas[0] = 0;
+    if (!world) options.prior_sigmas[2] = options.prior_sigmas[3] = options.prior_sigmas[4] = 0;
+    return scoreTests<6, parameters, suspects>(suspectRows(value), options);
+  }
+  bool hasUnknownSuspects() const {
+    for (const double sigma : options_.suspect_sigmas) {
+      if (sigma > 0) return inliers_.size() >= min_pairs_for_suspects;
+    }
+    return false;
+  }
+  /// Gauss–Newton over suspects, the pairs being made again and X refined at each step.
+  void estimateSuspects() {
+    if (!hasUnknownSuspects() || !std::isfinite(candidates_.front().cost)) return;
+    constexpr int max_rounds = 20;
+    constexpr double small = 1e-2;  // standard deviations
+    for (int round = 0; round < max_rounds; ++round) {
+      const auto scores = scoresAt(candidates_.front().value);
+      const Eigen::Matrix<double, suspects, 1> step = scores.step.template tail<suspects>();
+      if (!step.allFinite()) break;
+      values_ += step;
+      takeIn();
+      candidates_.front() = refined(candidates_.front(), inliers_);
+      double largest = 0;
+      for (int k = 0; k < suspects; ++k) {
+        const double variance = scores.covariance(parameters + k, parameters + k);
+        if (variance > 0) largest = std::max(largest, std::abs(step[k]) / std::sqrt(variance));
+      }
+      if (largest < small) break;
+    }
+    candidates_.resize(1);
+    take({candidates_.front()}, Indices(inliers_));
+  }
+  void testSuspects(const HandEyeValue& value) {
+    if (inliers_.size() < min_pairs_for_suspects) return;
+    const auto scores = scoresAt(value);
+    for (std::size_t k = 0; k < hand_eye_suspects; ++k) {
+      HandEyeSuspectTest& test = result_.suspects.emplace_back();
+      static_cast<SuspectTest&>(test) = scores.suspects[k];
+      test.name = name(static_cast<HandEyeSuspect>(k));
+      test.unit = k == 0 ? "s" : "";
+      test.prior_sigma = options_.suspect_sigmas[k];
+      const int column = static_cast<int>(k);
+      test.value = values_[column];
+      test.value_sigma = std::sqrt(scores.covariance(parameters + column, parameters + column));
+      if (test.tested()) test.shift_of_X = scores.shifts.col(column).template head<6>();
+    }
+    if (hasUnknownSuspects()) {
+      setCovariance(scores.covariance.template topLeftCorner<parameters, parameters>());
+      result_.dependence = scores.dependence;
+    }
+    if (scores.strongest < 0) return;
+    const SquareOf<typename Equation::Parameter> covariance =
+        result_.covariance.template topLeftCorner<parameters, parameters>();
+    const auto [step, spread] = groupMixture<parameters, suspects>(scores, covariance);
+    result_.X_over_suspects = {value.X * SE3d::exp(Vector6(step.template head<6>())),
+                               Matrix6(spread.template topLeftCorner<6, 6>())};
   }
   /// The covariance with the dependence in time that the whitened errors show.
   SquareOf<typename Equation::Parameter> widened(const SquareOf<typename Equation::Parameter>& covariance,
@@ -351,7 +494,7 @@ class HandEyeRun {
         return FusionStatus::ambiguous;
       }
     }
-    return FusionStatus::ok;
+    return result_.isSuspicious() ? FusionStatus::inconsistent : FusionStatus::ok;
   }
 
   HandEyeOptions options_;
@@ -360,6 +503,9 @@ class HandEyeRun {
   Indices inliers_;                     // ascending, of the sorted pairs
   std::vector<HandEyeFit> candidates_;  // the best first
   std::vector<double> errors_;          // squared, at the best
+  std::vector<PosePair> given_;         // the sorted pairs as they were given
+  PoseStream stream_;
+  Eigen::Matrix<double, suspects, 1> values_ = Eigen::Matrix<double, suspects, 1>::Zero();
   HandEyeResult result_;
 };
 

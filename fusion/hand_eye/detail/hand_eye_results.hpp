@@ -29,6 +29,26 @@ LIESTAT_FUSION_INLINE std::string describe(const OpenDirection& direction, const
          frame;
 }
 
+LIESTAT_FUSION_INLINE std::string HandEyeResult::suspectsInWords() const {
+  const auto written = [](const HandEyeSuspectTest& x) {
+    const bool time = !x.unit.empty();
+    const double scale = time ? 1e3 : 100;
+    return x.name + " off by " + significant(scale * x.estimate, 3) + " +- " + significant(scale * x.sigma, 2) +
+           (time ? " ms" : " %");
+  };
+  std::string group, options, refuted;
+  for (const HandEyeSuspectTest& x : suspects) {
+    if (x.in_group) {
+      group += (group.empty() ? "" : " or ") + written(x);
+      options += (options.empty() ? "--estimate " : " or ") + x.name;
+    } else if (x.significant && x.prior_sigma > 0) {
+      refuted += (refuted.empty() ? "" : ", ") + written(x) + " against its prior";
+    }
+  }
+  if (!group.empty()) group = "the residuals speak for " + group + " (" + options + ")";
+  return group + (group.empty() || refuted.empty() ? "" : "; ") + refuted;
+}
+
 LIESTAT_FUSION_INLINE std::string HandEyeResult::inWords() const {
   if (fault) return describe(fault);
   switch (status) {
@@ -39,7 +59,10 @@ LIESTAT_FUSION_INLINE std::string HandEyeResult::inWords() const {
     case FusionStatus::ambiguous:
       return "two solutions explain the pairs";
     case FusionStatus::inconsistent:
-      return "the residuals are larger than the covariances of the poses say";
+      return isSuspicious() && !(p < refutation_level)
+                 ? suspectsInWords()
+                 : "the residuals are larger than the covariances of the poses say" +
+                       (isSuspicious() ? "; " + suspectsInWords() : std::string());
     case FusionStatus::not_converged:
       return "the iterations ended before the estimate stayed";
     default:
