@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -624,16 +625,24 @@ class Hierarchy {
     return found;
   }
   /// True if a completed model has more of the measurements off the other one than its freedom and chance explain in the
-  /// best of so many samples.
+  /// best of so many samples. Chance is at least what the measurements just beyond the threshold show: errors that are
+  /// not noise, as those of another structure, are spread evenly about the model.
   bool isBeyondChance(std::size_t m, std::size_t other, const Completions& completions,
                       const Candidate& candidate) const {
-    std::size_t explained = 0;
-    for (const std::size_t i : completions.off) explained += candidate.errors[i] < limitOf(m, candidate.threshold, i);
+    const Model& model = *models_[m];
+    std::size_t explained = 0, beyond = 0;
+    for (const std::size_t i : completions.off) {
+      const double limit = limitOf(m, candidate.threshold, i);
+      explained += candidate.errors[i] < limit;
+      beyond += candidate.errors[i] >= limit && candidate.errors[i] < max_excess_noise * limit;
+    }
+    // The volume between these bounds over that within the threshold.
+    const double ratio = std::pow(max_excess_noise, 0.5 * model.equations()) - 1;
+    const double shown = static_cast<double>(beyond) / ratio / static_cast<double>(completions.off.size());
     SupportTest support = options_.choice.support;
     support.probability = 1 - (1 - support.probability) / static_cast<double>(completions.draws);
-    const Model& model = *models_[m];
     return explained > support.explained(completions.off.size(), model.freedomBeyond(*models_[other]),
-                                         model.equations(), model.chance(candidate.threshold));
+                                         model.equations(), std::max(shown, model.chance(candidate.threshold)));
   }
 
   /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
