@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -151,7 +152,7 @@ class Hierarchy {
       if (due && draws.hasBest()) refine(m, 1, stop);
       return true;
     }
-    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop)) return true;
+    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop, true)) return true;
     finish(m);
     if (next() == none) terminate();
     return next() != none;
@@ -379,6 +380,8 @@ class Hierarchy {
     return best;
   }
 
+  /// The share of right measurements among those off a dominant model that its completion reckons with.
+  static constexpr double min_completing_share = 0.15;
   static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   using Draws = detail::ModelDraws<Measurement, Parameter>;
   /// An estimate of a model, by what it was made from.
@@ -534,9 +537,12 @@ class Hierarchy {
   /// nothing changes makes a threshold that follows the errors collapse. None if `stop` ended it.
   std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
                                   const StopRequest& stop) const {
-    Parameter parameter = draws_[m].at(place).parameter;
     std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
     for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
+    return refine(m, draws_[m].at(place).parameter, key, made, stop);
+  }
+  std::optional<Candidate> refine(std::size_t m, Parameter parameter, std::uint64_t key, std::vector<Refined>& made,
+                                  const StopRequest& stop) const {
     Candidate candidate;
     candidate.errors = errorsOf(m, parameter);
     candidate.threshold = thresholdOf(m, candidate.errors);
@@ -572,16 +578,95 @@ class Hierarchy {
     }
     return candidate;
   }
+  /// Hypotheses of a model from the estimate of another one that dominates its inliers, and measurements off that.
+  struct Completions {
+    std::vector<std::size_t> off;  ///< places of the measurements off the other model
+    std::size_t draws = 0;         ///< samples of these
+    std::vector<Parameter> best = {};
+  };
+  /// The best so many of the hypotheses that samples off another model determine. The samples depend on what is off it
+  /// alone, not on the seed.
+  Completions completionsBy(std::size_t other, std::size_t m, std::size_t count) const {
+    const Model& model = *models_[m];
+    Completions found;
+    const std::size_t s = model.completionSize(*models_[other]);
+    const bool dominates = s > 0 && isFinal(other) && !states_[other].unsupported && draws_[m].hasBest() &&
+                           2 * states_[other].inliers.size() > draws_[m].best().inliers;
+    if (!dominates) return found;
+    detail::KeyedMeasurements<Measurement> off;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (!(states_[other].errors[i] >= limitOf(other, states_[other].threshold, i))) continue;
+      off.add(measurements_[i]), found.off.push_back(i);
+    }
+    if (off.size() < s) return found;
+    found.draws = sampleCount(min_completing_share, s, options_.confidence);
+    std::vector<std::pair<std::int64_t, Parameter>> scored;
+    std::vector<double> errors(size());
+    std::vector<std::size_t> sample;
+    std::vector<Measurement> sampled;
+    std::vector<Parameter> solutions;
+    for (std::size_t draw = 0; draw < found.draws; ++draw) {
+      detail::keyedSample(off, draw, s, sample, [](std::size_t) { return true; });
+      sampled.clear(), solutions.clear();
+      for (const std::size_t i : sample) sampled.push_back(off[i]);
+      model.complete(*models_[other], states_[other].estimate.parameter, sampled, solutions);
+      for (const Parameter& solution : solutions) {
+        model.errors(solution, measurements_.all(), errors);
+        std::int64_t score = 0;
+        for (std::size_t i = 0; i < size(); ++i) {
+          score += detail::scoreOf(options_.score, errors[i], limitOf(m, knownThreshold(model.equations()), i));
+        }
+        scored.emplace_back(score, solution);
+      }
+    }
+    std::stable_sort(scored.begin(), scored.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    scored.resize(std::min(count, scored.size()));
+    for (auto& [score, parameter] : scored) found.best.push_back(std::move(parameter));
+    return found;
+  }
+  /// True if a completed model has more of the measurements off the other one than its freedom and chance explain in the
+  /// best of so many samples. Chance is at least what the measurements just beyond the threshold show: errors that are
+  /// not noise, as those of another structure, are spread evenly about the model.
+  bool isBeyondChance(std::size_t m, std::size_t other, const Completions& completions,
+                      const Candidate& candidate) const {
+    const Model& model = *models_[m];
+    std::size_t explained = 0, beyond = 0;
+    for (const std::size_t i : completions.off) {
+      const double limit = limitOf(m, candidate.threshold, i);
+      explained += candidate.errors[i] < limit;
+      beyond += candidate.errors[i] >= limit && candidate.errors[i] < max_excess_noise * limit;
+    }
+    // The volume between these bounds over that within the threshold.
+    const double ratio = std::pow(max_excess_noise, 0.5 * model.equations()) - 1;
+    const double shown = static_cast<double>(beyond) / ratio / static_cast<double>(completions.off.size());
+    SupportTest support = options_.choice.support;
+    support.probability = 1 - (1 - support.probability) / static_cast<double>(completions.draws);
+    return explained > support.explained(completions.off.size(), model.freedomBeyond(*models_[other]),
+                                         model.equations(), std::max(shown, model.chance(candidate.threshold)));
+  }
+
   /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
   /// others may hold an estimate that begins with it. False if `stop` ended it.
-  bool refine(std::size_t m, std::size_t count, const StopRequest& stop) {
+  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
     std::optional<Candidate> best;
-    for (const auto& place : draws_[m].ranked(count)) {
-      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
-      if (!candidate) return false;
+    const auto take = [&](std::optional<Candidate> candidate) {
       const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
                           (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
       if (better) best = std::move(candidate);
+    };
+    for (const auto& place : draws_[m].ranked(count)) {
+      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
+      if (!candidate) return false;
+      take(std::move(candidate));
+    }
+    for (std::size_t other = 0; last && other < models_.size(); ++other) {
+      const Completions completions = completionsBy(other, m, count);
+      for (const Parameter& parameter : completions.best) {
+        std::vector<Refined> made;  // no key of measurements names where these begin: nothing is kept
+        std::optional<Candidate> candidate = refine(m, parameter, 0, made, stop);
+        if (!candidate) return false;
+        if (isBeyondChance(m, other, completions, *candidate)) take(std::move(candidate));
+      }
     }
     State& state = states_[m];
     state.estimate = std::move(best->estimate);

@@ -437,6 +437,43 @@ TEST(TwoViewMotion, covariancesAreOfTheNoiseThatIsShown) {
   }
 }
 
+TEST(TwoViewMotion, theSeedDoesNotDecideWhereAPlaneDominates) {
+  // Samples of seven matches lie in the plane, and say nothing of the epipole: a plane and two matches off it do.
+  const TwoViewScene plane({.motion = TwoViewMotion::homography, .matches = 120, .outliers = 0}, 3);
+  const TwoViewSceneOptions& o = plane.options;
+  std::vector<Eigen::Vector4d> matches = plane.pixels, off;
+  CounterRng random(5);
+  const auto pixel = [&] {
+    const double x = random.uniform() * o.width;
+    return Eigen::Vector2d(x, random.uniform() * o.height);
+  };
+  const Eigen::Vector2d centre(0.5 * o.width, 0.5 * o.height);
+  while (off.size() < 20) {
+    const Eigen::Vector2d first = pixel();
+    const double depth = 2 + 5 * random.uniform();
+    const Eigen::Vector3d x = depth * ((first - centre) / o.focal_length).homogeneous();
+    const Eigen::Vector2d second = centre + o.focal_length * (plane.R * x + plane.t).hnormalized();
+    off.emplace_back(first.x(), first.y(), second.x() + o.sigma * random.normal(),
+                     second.y() + o.sigma * random.normal());
+  }
+  matches.insert(matches.end(), off.begin(), off.end());
+  for (int k = 0; k < 60; ++k) {
+    const Eigen::Vector2d first = pixel(), second = pixel();
+    matches.emplace_back(first.x(), first.y(), second.x(), second.y());
+  }
+  for (const bool calibrated : {false, true}) {
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+      TwoViewMotionOptions options = optionsOf(plane);
+      if (!calibrated) options.first.reset(), options.image_size = Eigen::Vector2d(o.width, o.height);
+      options.search.seed = seed;
+      const auto found = estimateTwoViewMotion(matches, options);
+      EXPECT_EQ(found.chosenModel().name, calibrated ? "essential" : "fundamental") << seed << " " << found.reason;
+      const auto agree = std::count(found.inlier.begin() + 120, found.inlier.begin() + 140, true);
+      EXPECT_GE(agree, 18) << seed << ": 1 % are beyond the threshold";
+    }
+  }
+}
+
 TEST(TwoViewMotion, onlyTheWinnerRejects) {
   // A third of the matches does not move, tightly; the others follow a loose translation of 1.5 px. A zoom of one fits
   // all of them no better than `none`, which a model that was not chosen rejected.

@@ -39,6 +39,21 @@ struct EpipolarEquation {
   }
 };
 
+/// Plane and parallax: a match off the plane of H lies on the line through its image under H and the epipole, so two
+/// matches determine e' = (x₁' × H x₁) × (x₂' × H x₂) and F = [e']× H (R. Hartley and A. Zisserman, Multiple View Geometry,
+/// section 13.3).
+inline void planeAndParallax(const Eigen::Matrix3d& H, std::span<const Eigen::Vector4d> off,
+                             std::vector<TwoViewMotionModel>& solutions) {
+  const auto line = [&](const Eigen::Vector4d& m) {
+    const Eigen::Vector3d first(m[0], m[1], 1), second(m[2], m[3], 1);
+    return Eigen::Vector3d(second.cross(H * first));
+  };
+  const Eigen::Vector3d epipole = line(off[0]).cross(line(off[1]));
+  const Eigen::Matrix3d F = skew(epipole) * H;
+  const double norm = F.norm();
+  if (norm > 0 && std::isfinite(norm)) solutions.emplace_back().matrix = F * (std::sqrt(2.0) / norm);
+}
+
 /// F under constraints.
 class EpipolarModel : public EpipolarTypeModel {
  public:
@@ -51,6 +66,13 @@ class EpipolarModel : public EpipolarTypeModel {
   int freedomBeyond(const TwoViewModel& specific) const override {
     if (constraint_.family == EpipolarFamily::affine && specific.equations() == 2) return 1;
     return EpipolarTypeModel::freedomBeyond(specific);
+  }
+  std::size_t completionSize(const TwoViewModel& plane) const override {
+    return constraint_.family == EpipolarFamily::fundamental && plane.name() == "homography" ? 2 : 0;
+  }
+  void complete(const TwoViewModel&, const Parameter& plane, std::span<const Measurement> off,
+                std::vector<Parameter>& solutions) const override {
+    planeAndParallax(plane.matrix, off, solutions);
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
@@ -71,6 +93,11 @@ class EssentialModel : public EpipolarTypeModel {
   using EpipolarTypeModel::EpipolarTypeModel;
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
     for (const Eigen::Matrix3d& E : solveEssential(sample)) solutions.emplace_back().matrix = E;
+  }
+  std::size_t completionSize(const TwoViewModel& plane) const override { return plane.name() == "homography" ? 2 : 0; }
+  void complete(const TwoViewModel&, const Parameter& plane, std::span<const Measurement> off,
+                std::vector<Parameter>& solutions) const override {
+    planeAndParallax(plane.matrix, off, solutions);
   }
   ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                     const StopRequest& stop) const override {
