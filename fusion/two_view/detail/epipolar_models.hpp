@@ -40,8 +40,8 @@ struct EpipolarEquation {
 };
 
 /// Plane and parallax: a match off the plane of H lies on the line through its image under H and the epipole, so two
-/// matches determine e' = (x₁' × H x₁) × (x₂' × H x₂) and F = [e']× H (R. Hartley and A. Zisserman, Multiple View Geometry,
-/// section 13.3).
+/// matches determine e' = (x₁' × H x₁) × (x₂' × H x₂) and F = [e']× H (R. Hartley and A. Zisserman, Multiple View
+/// Geometry, section 13.3).
 inline void planeAndParallax(const Eigen::Matrix3d& H, std::span<const Eigen::Vector4d> off,
                              std::vector<TwoViewMotionModel>& solutions) {
   const auto line = [&](const Eigen::Vector4d& m) {
