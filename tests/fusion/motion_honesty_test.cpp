@@ -170,6 +170,35 @@ TEST(MotionHonesty, GyroscopeIsTestedAgainstTheImages) {
   EXPECT_GE(right.usable, right.frames * 97 / 100);
 }
 
+// A ground plane ahead has two solutions that no number of frames tells apart: the points of each frame are new ones.
+TEST(MotionHonesty, SecondSolutionOfAGroundPlaneIsNotForgotten) {
+  std::size_t frames = 0, wrong = 0;
+  for (std::uint64_t trial = 0; trial < 40; ++trial) {
+    CounterRng rng(85, trial);
+    const double sigma = 1. / 500;
+    const Eigen::Vector3d velocity = 0.1 * Eigen::Vector3d(0.1 * rng.normal(), 0.02 * rng.normal(), -1).normalized();
+    const Eigen::Vector3d axis = rng.unitVector<3>(), rotation = 0.5 * units::degree * axis;
+    const Eigen::Vector3d translation = SO3d::leftJacobian(rotation) * velocity;
+    MotionFilter filter;
+    for (int k = 1; k <= 100; ++k) {
+      std::vector<PointPair> pairs;
+      while (pairs.size() < 20) {
+        const double x = rng.uniform(-0.5, 0.5), y = rng.uniform(0.05, 0.5);
+        const Eigen::Vector3d first = 0.5 / y * Eigen::Vector3d(x, y, 1);
+        const Eigen::Vector3d second = SO3d::exp(rotation) * first + translation;
+        const Eigen::Vector2d a = rng.normalVector<2>(), b = rng.normalVector<2>();
+        if (second.z() < 0.5) continue;
+        pairs.push_back({first.head<2>() / first.z() + sigma * a, second.head<2>() / second.z() + sigma * b, sigma});
+      }
+      const MotionEstimate& e = filter.update(pairs);
+      if (k < 20) continue;
+      const S2d truth(e.meaning == DirectionMeaning::velocity ? velocity : translation);
+      ++frames, wrong += e.ok() && distance(e.direction.mean, truth) > 10 * units::degree ? 1U : 0U;
+    }
+  }
+  EXPECT_LE(wrong, frames / 100);
+}
+
 TEST(MotionHonesty, ReversalAndTurnAreNoticed) {
   const MotionSceneOptions general{.world = MotionWorld::general};
   const Usable reversal = usableOf(

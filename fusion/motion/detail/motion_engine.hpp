@@ -24,6 +24,10 @@ inline constexpr double reversal_likely = 5.5, reversal_certain = 8;
 /// Standard deviations of the evidence that replaces it.
 inline constexpr double reversal_sigmas = 8;
 
+/// Mean χ² over its degrees of freedom of a plane through the inverse depths below which the scene passes for a plane,
+/// and the standard deviations by which a rival must then be worse.
+inline constexpr double largest_plane_misfit = 1.35, plane_rival_sigmas = 6;
+
 /// The state besides the direction.
 enum class MotionState { direction, gyroscope_bias, rotation, rotation_and_bias };
 constexpr bool keepsTheRotation(MotionState state) {
@@ -55,7 +59,8 @@ struct DirectionCandidate {
   Eigen::Vector3d Omega = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Identity();
   double depth = 0, depth_variance = 0, cost = 0, innovation = 0;
-  double direction_score = 0;                                       ///< gᵀ(S + C P C)⁻¹g: χ² of two degrees
+  double plane_misfit = 0;     ///< χ² of a plane through the inverse depths over its degrees of freedom
+  double direction_score = 0;  ///< gᵀ(S + C P C)⁻¹g: χ² of two degrees
   Eigen::Vector3d from_gyroscope = Eigen::Vector3d::Zero();         ///< rotation of the images minus the gyroscope's,
   Eigen::Matrix3d gyroscope_information = Eigen::Matrix3d::Zero();  ///< and its inverse covariance; 0: none
   std::size_t inliers = 0;
@@ -132,6 +137,7 @@ class MotionEngine {
   void prune();
   double gapOfChance(const DirectionCandidate& candidate, const DirectionCandidate& best, double sigmas) const;
   double mixedDepths(const Evaluation& e) const;
+  double planeMisfit(const Evaluation& e) const;
   void compareWithGyroscope(DirectionCandidate& candidate, const Evaluation& e) const;
   void followProcessNoise();
   void judgeFit();
@@ -157,6 +163,7 @@ class MotionEngine {
   RotationPrior<double> rotation_prior_;  ///< the share of the gyroscope in them
   std::size_t rotation_inliers_ = 0;
   bool updated_ = false;       ///< by the last frame
+  double plane_misfit_ = 0;    ///< of the best hypothesis, mean over ten frames or so
   double innovation_sum_ = 0;  ///< discounted over lost_frames
   std::size_t innovation_count_ = 0;
 

@@ -132,6 +132,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::advanceAll() {
   }
   ++updates_;
   prune();
+  const double misfit = std::min(candidates_[best_].plane_misfit, 10.0);
+  plane_misfit_ += (misfit - plane_misfit_) / static_cast<double>(std::min<std::size_t>(updates_, 10));
 }
 
 /// How far the scores of two equally good hypotheses may part: costs at different directions are χ² of different

@@ -162,6 +162,9 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   // A rival is another place, not one within the noise of the best.
   out.rival_gap = std::numeric_limits<double>::infinity();
   bool by_chance = false;
+  // The two solutions of a plane are equally good for ever: their gap has as many occasions to exceed a bound as frames.
+  const bool plane = plane_misfit_ < largest_plane_misfit;
+  const double sigmas = plane ? std::max(options_.rival_sigmas, plane_rival_sigmas) : options_.rival_sigmas;
   const Eigen::Vector3d V = c.direction.unit_vector();
   for (const DirectionCandidate& other : candidates_) {
     if (&other == &c) continue;
@@ -171,7 +174,7 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
     if (z.norm() > options_.merge_angle && mahalanobisSquared<double, 2>(z, out.direction.covariance) > 9) {
       const double gap = other.score - c.score;
       out.rival_gap = std::min(out.rival_gap, gap);
-      by_chance = by_chance || gap < std::max(options_.ambiguous_gap, gapOfChance(other, c, options_.rival_sigmas));
+      by_chance = by_chance || gap < std::max(options_.ambiguous_gap, gapOfChance(other, c, sigmas));
     }
   }
   out.flags.ambiguous = by_chance;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace liestat::detail {
 
@@ -183,6 +184,25 @@ LIESTAT_FUSION_INLINE double MotionEngine::mixedDepths(const Evaluation& e) cons
   return std::min(ahead, behind);
 }
 
+/// While hypotheses compete: χ² of inverse depths that are linear in the image, over its degrees of freedom. Points of a
+/// plane have such depths under both of its solutions.
+LIESTAT_FUSION_INLINE double MotionEngine::planeMisfit(const Evaluation& e) const {
+  if (candidates_.size() < 2) return 0;
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double squares = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const FlowRow<double>& row = rows_[i];
+    if (!(row.weight > 0) || !(row.inverse_length > 0)) continue;
+    const double along = flowResidual(points_[i], row, e.Omega).along, length = 1 / row.inverse_length;
+    const Eigen::Vector3d a = length * Eigen::Vector3d(points_[i].x, points_[i].y, 1);
+    A += row.weight * a * a.transpose(), b += row.weight * along * a, squares += row.weight * along * along;
+  }
+  const double rest = squares - b.dot(Cholesky<double, 3>(A).solve<1>(b));
+  const double degrees = static_cast<double>(e.inliers) - 3;
+  return degrees > 0 && std::isfinite(rest) ? rest / degrees : std::numeric_limits<double>::infinity();
+}
+
 /// The rotation that the images alone say, direction and rotation both free, minus the gyroscope's.
 LIESTAT_FUSION_INLINE void MotionEngine::compareWithGyroscope(DirectionCandidate& c, const Evaluation& e) const {
   c.gyroscope_information.setZero();
@@ -221,6 +241,7 @@ bool MotionEngine::step(DirectionCandidate& c, FilterCovariance<double, D>& P, c
   c.innovation = (frame.start - s.reduction) / std::max(equations, 1);
   c.cost = frame.cost;
   compareWithGyroscope(c, e);
+  c.plane_misfit = planeMisfit(e);
   c.inliers = e.inliers;
   const double cost = (options_.outliers ? e.capped_cost : frame.cost) + mixedDepths(e);
   c.score += cost;
