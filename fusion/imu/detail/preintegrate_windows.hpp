@@ -52,12 +52,15 @@ LIESTAT_FUSION_INLINE RecordingWindows preintegrateWindows(std::span<const ImuSa
                                                            std::span<const GroundTruth> truth,
                                                            const RecordingWindowOptions& options) {
   RecordingWindows result;
+  RecordingWindowOptions how = options;
+  double& rate = how.integration.preintegration.rate;
+  if (!(rate > 0)) rate = readingRate<double>(readings, how.integration.max_gap);
   const ImuNoise<double>& noise = options.integration.preintegration.noise;
   result.with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
   result.with_truth = !truth.empty();
   result.windows.reserve(windows.size());
   for (const TimeInterval& window : windows) {
-    result.windows.push_back(preintegrateWindow(readings, window, truth, options));
+    result.windows.push_back(preintegrateWindow(readings, window, truth, how));
   }
   return result;
 }
