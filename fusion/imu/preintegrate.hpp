@@ -47,6 +47,12 @@ enum class ImuSampling {
   bunched        ///< readings come in bunches: their times may be those of arrival
 };
 
+/// "adequate", "untested", …
+inline const char* nameOf(ImuSampling sampling) {
+  constexpr const char* names[] = {"adequate", "untested", "rough", "undersampled", "bunched"};
+  return names[static_cast<int>(sampling)];
+}
+
 /// The result of preintegrate(). Only one without fault is to be used.
 template <class S>
 struct RecordingResult {
