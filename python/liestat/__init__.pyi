@@ -701,7 +701,8 @@ class _RecordingWindow(Result):
     covariance: _Array | None  # 9 errors in m, rad, m/s; null without noise
     rate: float  # of the readings: the variance of one is the square of the density times this; Hz
     sampling: str  # adequate, untested, rough, undersampled or bunched
-    scheme_error: float | None  # squared length of the integration scheme's error, which the covariance has, in standard deviations of the noise
+    # squared length of the integration scheme's error, which the covariance has, in standard deviations of the noise
+    scheme_error: float | None
     bias_jacobian: _Array  # by the biases of gyroscope and accelerometer
     error: _Array  # with a truth: position, rotation, velocity; m, rad, m/s
     squared_distance: float  # of the error, 9 expected; with a truth and noise
