@@ -401,8 +401,8 @@ class SchemeWatch {
 
 /// The motion from time `begin` to `end` (s) out of readings in the order of time. The readings may be those of a whole
 /// recording: the interval's are found by bisection, and only they are checked, with the one next to them at each end that
-/// the cubic scheme needs. Readings beside the interval serve the estimate of the scheme's error where they have no fault. Where times do not ascend the result is a fault, or that of readings which
-/// do ascend from `begin` to `end`.
+/// the cubic scheme needs. Readings beside the interval serve the estimate of the scheme's error where they have no
+/// fault. Where times do not ascend the result is a fault, or that of readings which do ascend from `begin` to `end`.
 template <class S>
 RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& begin, const S& end,
                                 const RecordingOptions<S>& options = {}) {
