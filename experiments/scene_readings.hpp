@@ -59,7 +59,8 @@ inline InertialWindow windowOf(const InertialScene& scene, const std::vector<Imu
 /// The motions from each image of a scene to the next.
 inline std::vector<Preintegration<double>> motionsOf(const InertialScene& scene,
                                                      const std::vector<ImuSample<double>>& readings,
-                                                     const RecordingOptions<double>& options = {}) {
+                                                     RecordingOptions<double> options = {}) {
+  options.chained = true;
   std::vector<Preintegration<double>> motions;
   for (std::size_t j = 1; j < scene.times.size(); ++j) {
     motions.push_back(preintegrate<double>(readings, scene.times[j - 1], scene.times[j], options).motion);

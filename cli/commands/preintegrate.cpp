@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace liestat::cli {
 namespace {
@@ -23,7 +24,8 @@ struct Options {
   ImuOptions imu;
   std::string calibration, truth, json, report;
   std::optional<double> begin, end, window;
-  double gravity = 9.81;
+  double gravity = 9.81, rate = 0;
+  std::vector<double> world_rate;
 };
 
 int runCommand(const Options& options, const Invocation& invocation) {
@@ -35,6 +37,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   noise = options.imu.noiseOver(options.calibration.empty() ? ImuNoise<double>{} : readImuNoise(options.calibration));
   if (options.imu.hasBias()) how.bias = options.imu.bias();
   how.gravity = options.gravity;
+  how.integration.preintegration.rate = options.rate;
+  if (const std::vector<double>& w = options.world_rate; !w.empty()) how.world_rate = {w[0], w[1], w[2]};
   std::vector<GroundTruth> truth;
   if (!options.truth.empty()) truth = readGroundTruth(options.truth, imu.start_ns);
 
@@ -85,6 +89,14 @@ void addPreintegrateCommand(const CommandList& app) {
       .positive();
   command.option("--truth", options->truth, "EuRoC's ground truth, to compare with; its biases are used");
   command.option("--gravity", options->gravity, "m/s^2, downwards in the truth's world (default 9.81)");
+  command
+      .option("--rate", options->rate,
+              "Hz, readings per second of the sensor: a reading's variance is density^2 rate (default: measured)")
+      .positive();
+  command
+      .option("--world-rate", options->world_rate,
+              "rad/s, x,y,z: rotation of the truth's world in its axes (the Earth's: 7.292e-5; default 0)")
+      .list(3, 3);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });

@@ -13,7 +13,7 @@ namespace {
 
 using Row = PreintegrationRow;
 
-const Columns<Row> columns{{"check", [](const Row& row) { return name(row.check); }},
+const Columns<Row> columns{{"check", [](const Row& row) { return row.scene.empty() ? name(row.check) : row.scene; }},
                            {"window s", &Row::window},
                            {"noise", &Row::noise},
                            {"k", Judged::dof, ShownOn::terminal},
@@ -33,6 +33,7 @@ Plot overWindows(const std::vector<Row>& rows, const char* name_of, const char* 
   Plot plot{.name = name_of, .caption = caption, .columns = 3};
   std::vector<Panel>& list = plot.panels;
   for (const Row& row : rows) {
+    if (row.check == PreintegrationCheck::recording) continue;
     const std::string title = fmt::format("{}, noise {:g}", quantity, row.noise);
     auto panel = std::find_if(list.begin(), list.end(), [&](const Panel& p) { return p.title == title; });
     if (panel == list.end()) {
@@ -75,7 +76,7 @@ void addValidatePreintegrationCommand(const CommandList& validate) {
   const Command app =
       validate.add("preintegration", "Motions preintegrated from noisy inertial readings: are their covariances true?");
   declareNames(app, "--check", options->names, all_preintegration_checks,
-               "motion, walk, motion_and_bias: a comma list (default: all)");
+               "motion, walk, motion_and_bias, recording: a comma list (default: all)");
   app.option("--window", options->validation.windows, "Seconds, a comma list (default 0.1,0.5,1,2)")
       .list()
       .range(0.005, 100.0);
@@ -83,11 +84,13 @@ void addValidatePreintegrationCommand(const CommandList& validate) {
              "Multiples of an ADIS16448's noise, a comma list (default 1,10,100)")
       .list()
       .range(1e-3, 1e4);
-  options->run.declare(app, "2000");
+  app.flag("--full", options->run.full, "4000 trials a row, and all recordings");
+  options->run.declare(app, "2000, with --full 4000");
   const auto compute = [](const auto& given, const RunProgress& progress) {
     PreintegrationValidation validation = given.validation;
     validation.checks = chosen(all_preintegration_checks, given.names);
-    validation.run = given.run.size(validation.run.trials);
+    validation.run = given.run.size(validation.run.trials, 4000);
+    validation.all_recordings = given.run.full;
     return validatePreintegration(validation, progress);
   };
   runValidation(app, options, "validate preintegration", compute, viewOf);

@@ -87,6 +87,7 @@ std::string preintegrationRemarks(const RecordingWindows& result) {
 
 std::string formatPreintegration(const RecordingWindows& result) {
   std::string text = Table(preintegrationTable(result)).str() + preintegrationRemarks(result);
+  for (const std::string& note : result.notes()) text += "note: " + note + "\n";
   if (!result.with_truth) return text;
   const Verdict verdict = result.verdict();
   for (const std::string& cause : verdict.causes) text += cause + "\n";

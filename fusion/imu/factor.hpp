@@ -8,6 +8,8 @@
 #include <fusion/imu/preintegration.hpp>
 #include <lie/detail/small_products.hpp>
 
+#include <utility>
+
 namespace liestat {
 
 /// A residual with its derivatives, exact at any size: by both states (right perturbations, position, rotation,
@@ -30,6 +32,25 @@ SE23<S> impliedIncrement(const SE23<S>& first, const SE23<S>& second, const S& t
   const Vector3 position =
       back * Vector3(second.translation() - first.translation() - t * first.velocity() - (S(0.5) * t * t) * gravity);
   return SE23<S>(back * SO3<S>(second.so3()), position, velocity);
+}
+
+/// The states in a world that turns at `world_rate` (rad/s, in its axes; the Earth's, east, north and up, is 7.292e-5 times
+/// (0, cos latitude, sin latitude)) as impliedIncrement() wants them: in axes that coincide with the world's at the first
+/// state and do not turn. Gravity is that of the turning world, with the centrifugal acceleration at its origin; where it
+/// points during the interval is in the second state. Gravity's gains to the second power of the angle.
+template <class S>
+std::pair<SE23<S>, SE23<S>> statesInFixedAxes(const SE23<S>& first, const SE23<S>& second, const S& t,
+                                              const Eigen::Matrix<S, 3, 1>& gravity,
+                                              const Eigen::Matrix<S, 3, 1>& world_rate) {
+  using Vector3 = Eigen::Matrix<S, 3, 1>;
+  const Vector3 angle = t * world_rate;
+  const SO3<S> turn = SO3<S>::exp(angle);
+  const Vector3 once = angle.cross(gravity), twice = angle.cross(once);
+  const Vector3 p = first.translation(), q = second.translation();
+  return {SE23<S>(SO3<S>(first.so3()), p, Vector3(first.velocity() + world_rate.cross(p))),
+          SE23<S>(turn * SO3<S>(second.so3()), Vector3(turn * q - (t * t) * (S(1. / 6) * once + S(1. / 24) * twice)),
+                  Vector3(turn * Vector3(second.velocity() + world_rate.cross(q)) -
+                          t * (S(0.5) * once + S(1. / 6) * twice)))};
 }
 
 /// The residual alone; through Jets too, in the states, the biases and gravity.

@@ -37,6 +37,10 @@ template <class S>
 struct PreintegrationOptions {
   ImuNoise<S> noise = {};
   ImuBias<S> bias = {};  ///< taken off every reading
+  /// Readings per second (Hz) of the sensor, which with the densities gives the variance of a reading: density²·rate,
+  /// however long the step is that it is used for. Not positive: add() takes a reading for the mean over its step, and
+  /// preintegrate() measures the rate, see readingRate().
+  S rate = S(0);
 };
 
 /// An increment that grows with every reading, with its covariance and its derivatives by the biases; no allocation.
@@ -55,6 +59,11 @@ class Preintegration {
 
   /// Adds a step of h > 0 seconds with constant rate (rad/s) and force (m/s²) in the body's axes, as measured.
   void add(const S& h, const Vector3& angular_rate, const Vector3& specific_force) {
+    add(h, angular_rate, specific_force, noiseTime(h));
+  }
+  /// The same with the variance of the noise integrated over the step as density² times noise_time (s): h for white
+  /// noise over the step, rate·h² for a reading that is held longer or shorter than the sensor's period.
+  void add(const S& h, const Vector3& angular_rate, const Vector3& specific_force, const S& noise_time) {
     const Matrix3 R = increment_.so3().matrix();
     const Vector3 rotation = h * (angular_rate - options_.bias.gyroscope);
     const Vector3 force = specific_force - options_.bias.accelerometer;
@@ -63,7 +72,7 @@ class Preintegration {
     const detail::StepCoefficients<S> k(rotation.squaredNorm());
     const Vector3 velocity = h * (step.force + k.b * step.once + k.c * step.twice);
     const Vector3 position = (h * h) * (S(0.5) * step.force + k.c * step.once + k.d * step.twice);
-    advance(h, R, rotation, force, position, velocity, step, k);
+    advance(h, R, rotation, force, position, velocity, step, k, noise_time);
   }
 
   /// The same over a step within which rate and force vary: the mean force, for the covariance, and what they do: the
@@ -71,11 +80,27 @@ class Preintegration {
   /// without the biases.
   void addVarying(const S& h, const Vector3& specific_force, const Vector3& rotation, const Vector3& position,
                   const Vector3& velocity) {
+    addVarying(h, specific_force, rotation, position, velocity, noiseTime(h));
+  }
+  void addVarying(const S& h, const Vector3& specific_force, const Vector3& rotation, const Vector3& position,
+                  const Vector3& velocity, const S& noise_time) {
     const Matrix3 R = increment_.so3().matrix();
     const Vector3 force = specific_force - options_.bias.accelerometer;
     const detail::StepVectors<S> step(R * rotation, R * force);
     advance(h, R, rotation, force, R * position, R * velocity, step,
-            detail::StepCoefficients<S>(rotation.squaredNorm()));
+            detail::StepCoefficients<S>(rotation.squaredNorm()), noise_time);
+  }
+
+  /// Adds an error of the increment so far to its covariance: one standard deviation of position (m), rotation (rad) and
+  /// velocity (m/s), along the one direction of all nine, in the axes of the start.
+  void addError(const Vector3& position, const Vector3& rotation, const Vector3& velocity) {
+    const auto p = Columns::column(position), v = Columns::column(velocity), r = Columns::column(rotation);
+    covariance_.pp.addOuter(p, position);
+    covariance_.pr.addOuter(p, rotation);
+    covariance_.pv.addOuter(p, velocity);
+    covariance_.rr.addOuter(r, rotation);
+    covariance_.vr.addOuter(v, rotation);
+    covariance_.vv.addOuter(v, velocity);
   }
 
   /// Seconds.
@@ -186,6 +211,8 @@ class Preintegration {
   using BiasBlocks = detail::BiasBlocks<S>;
   using Covariance = detail::IncrementCovariance<S>;
 
+  /// Seconds of white noise over a step of h seconds.
+  S noiseTime(const S& h) const { return options_.rate > S(0) ? options_.rate * h * h : h; }
   /// Variance of a bias that has walked for t seconds.
   S gyroscopeWalk(const S& t) const { return options_.noise.gyroscope_walk * options_.noise.gyroscope_walk * t; }
   S accelerometerWalk(const S& t) const {
@@ -212,7 +239,8 @@ class Preintegration {
   /// A step by its rotation vector and its force in the body's axes at its start, whose orientation is R, and its gains in
   /// the axes of the start of the interval.
   void advance(const S& h, const Matrix3& R, const Vector3& rotation, const Vector3& force, const Vector3& position,
-               const Vector3& velocity, const detail::StepVectors<S>& step, const detail::StepCoefficients<S>& k) {
+               const Vector3& velocity, const detail::StepVectors<S>& step, const detail::StepCoefficients<S>& k,
+               const S& noise_time) {
     // First what the next reading waits for: a processor looks ahead by less than a reading's instructions.
     increment_.translation() += h * Vector3(increment_.velocity()) + position;
     increment_.velocity() += velocity;
@@ -228,16 +256,18 @@ class Preintegration {
 
     // Over a step white noise is an error of the reading with this variance over h², the same along all axes, so that R
     // cancels from its covariance. So do products of polynomials in K, by K³ = -|θ|² K.
-    const S gyroscope = options_.noise.gyroscope * options_.noise.gyroscope * h;
-    const S accelerometer = options_.noise.accelerometer * options_.noise.accelerometer * h;
+    const S gyroscope = options_.noise.gyroscope * options_.noise.gyroscope * noise_time;
+    const S accelerometer = options_.noise.accelerometer * options_.noise.accelerometer * noise_time;
     const S& t = step.squared_angle;
     const S turned = S(2) * k.c - k.b * k.b - k.c * k.c * t;  // G1 G1ᵀ = I + turned K²
     const S bend = k.c * k.c - k.b * k.d;
     const Columns pg = response.gp.transposed() * gyroscope, vg = response.gv.transposed() * gyroscope;
     Covariance& c = covariance_;
     c.pp.addProduct(pg, response.gp);
-    const S p = accelerometer * h * h;  // G2 G2ᵀ
-    step.addSymmetric(c.pp, S(0.25) * p, (k.d - k.c * k.c - k.d * k.d * t) * p);
+    // G2 G2ᵀ, and the position that the reading does not know: it is the force's mean, and where in the step the force
+    // acted is as unknown as white noise leaves it. That adds h²/12 to h²/4, as of noise integrated twice.
+    const S p = accelerometer * h * h;
+    step.addSymmetric(c.pp, S(1. / 3) * p, (k.d - k.c * k.c - k.d * k.d * t) * p);
     c.pr.addProduct(pg, response.gr);
     c.pv.addProduct(pg, response.gv);
     const S v = accelerometer * h;  // G2 G1ᵀ

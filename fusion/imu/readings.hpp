@@ -21,7 +21,8 @@ struct ImuBias {
   Eigen::Matrix<S, 3, 1> accelerometer = Eigen::Matrix<S, 3, 1>::Zero();
 };
 
-/// Densities of white noise, as data sheets give them: a reading over h seconds has a standard deviation of density/√h.
+/// Densities of white noise, as data sheets give them: a reading of a sensor that gives `rate` of them per second has a
+/// standard deviation of density·√rate.
 template <class S>
 struct ImuNoise {
   S gyroscope = S(0);      ///< rad/s/√Hz

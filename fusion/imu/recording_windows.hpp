@@ -36,6 +36,8 @@ struct RecordingWindowOptions {
   /// The sensor's bias; none: that of the truth at the beginning of each window, zero where there is no truth.
   std::optional<ImuBias<double>> bias = {};
   double gravity = 9.81;  ///< m/s², downwards along z in the truth's world
+  /// rad/s, of the truth's world in its own axes: see statesInFixedAxes(). Zero: the Earth's is neglected.
+  Eigen::Vector3d world_rate = Eigen::Vector3d::Zero();
 };
 
 /// The motion over one window of readings (in the order of time, as for preintegrate()); `truth` may be empty. Nothing

@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace liestat {
@@ -24,6 +25,9 @@ struct RecordingWindow {
   /// preintegrationError() between the true states: position (m), rotation (rad), velocity (m/s).
   std::optional<Eigen::Matrix<double, 9, 1>> error = {};
   std::optional<double> squared_distance = {};  ///< the error's, under the covariance; none without noise
+  /// Standard deviations of the noise that the Earth's rotation is worth where it is neglected: its angle, and with a truth
+  /// Coriolis' acceleration. Zero without noise.
+  double earth_rotation = 0;
 
   bool ok() const { return result.ok(); }
   /// "ok", "gap", "not covered", …
@@ -68,6 +72,9 @@ struct RecordingWindows {
   /// Verdict on the windows together: no, if one has no increment or the covariances are not those of the errors; with
   /// a truth as verdict(), else yes.
   Verdict outcome() const;
+  /// What the readings say about the increments beyond the faults: windows that are bunched, undersampled, rough or
+  /// untested, and where the Earth's rotation matters. They leave the verdict as it is.
+  std::vector<std::string> notes() const;
   /// Every window has an increment.
   bool complete() const { return okWindows() > 0 && okWindows() == windows.size(); }
   /// There is an increment, and the verdict is not no.
@@ -92,6 +99,10 @@ void describe(V& v, const RecordingWindow& w) {
   v("covariance",
     with_noise ? std::optional(Eigen::Matrix<double, 9, 9>(w.result.motion.gaussian().covariance)) : std::nullopt,
     "9 errors in m, rad, m/s; null without noise");
+  v("rate", w.result.rate, "of the readings: the variance of one is the square of the density times this", "Hz");
+  v("sampling", nameOf(w.result.sampling), "adequate, untested, rough, undersampled or bunched");
+  v("scheme_error", with_noise ? std::optional(w.result.scheme_error) : std::nullopt,
+    "squared length of the integration scheme's error, which the covariance has, in standard deviations of the noise");
   v("bias_jacobian", w.result.motion.biasJacobian(), "by the biases of gyroscope and accelerometer");
   using Error = Eigen::Matrix<double, 9, 1>;
   if (shown(v, w.error.has_value())) {
@@ -107,6 +118,7 @@ void describe(V& v, const RecordingWindows& r) {
   v("covariance_order", "position rotation velocity", "of the windows' covariances");
   v("covariance_side", "right", "on which errors are applied");
   v("covariance_frame", "axes of the body at the end of the window, m rad m/s", "in words")("windows", r.windows);
+  v("notes", r.notes(), "what the readings say about the increments, besides their faults");
   const std::optional<IncrementTest> test = r.test();
   if (shown(v, test.has_value())) {
     const IncrementTest sum = test.value_or(IncrementTest{});

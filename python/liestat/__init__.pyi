@@ -699,6 +699,10 @@ class _RecordingWindow(Result):
     position: _Array  # m
     velocity: _Array  # m/s
     covariance: _Array | None  # 9 errors in m, rad, m/s; null without noise
+    rate: float  # of the readings: the variance of one is the square of the density times this; Hz
+    sampling: str  # adequate, untested, rough, undersampled or bunched
+    # squared length of the integration scheme's error, which the covariance has, in standard deviations of the noise
+    scheme_error: float | None
     bias_jacobian: _Array  # by the biases of gyroscope and accelerometer
     error: _Array  # with a truth: position, rotation, velocity; m, rad, m/s
     squared_distance: float  # of the error, 9 expected; with a truth and noise
@@ -708,6 +712,7 @@ class _RecordingWindows(Result):
     covariance_side: str  # on which errors are applied
     covariance_frame: str  # in words
     windows: list[_RecordingWindow]
+    notes: list[str]  # what the readings say about the increments, besides their faults
     squared_distance: float  # with a truth and noise: sum over the windows
     degrees_of_freedom: float  # of the sum
     p: float  # probability of a larger sum
@@ -1233,6 +1238,8 @@ def preintegrate(
     threads: int = 0,
     truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
     gravity: float = 9.81,
+    rate: float = 0.0,
+    world_rate: ArrayLike = (0.0, 0.0, 0.0),
 ) -> _Preintegrated: ...
 class TrajectoryEvaluation(_TrajectoryEvaluation):
     pairs: _Array

@@ -87,6 +87,8 @@ def preintegrate(
     threads=0,
     truth=None,
     gravity=9.81,
+    rate=0.0,
+    world_rate=(0.0, 0.0, 0.0),
 ):
     """Preintegrated motions of many intervals of one inertial recording.
 
@@ -113,6 +115,10 @@ def preintegrate(
         accelerometer (m/s²).
     gravity : float
         m/s², downwards along z in the truth's world.
+    rate : float
+        Hz, readings per second of the sensor: the variance of a reading is density² · rate. By default measured.
+    world_rate : array_like, shape (3,)
+        rad/s, rotation of the truth's world in its axes (the Earth's: 7.292e-5 (0, cos φ, sin φ), φ the latitude).
 
     Returns
     -------
@@ -147,6 +153,8 @@ def preintegrate(
         int(threads),
         _truth("preintegrate", truth),
         float(gravity),
+        float(rate),
+        _numbers(world_rate, "preintegrate: world_rate", (3,)),
     )
     ok = np.array([not fault for fault in d["faults"]], dtype=bool)
     if not ok.all():

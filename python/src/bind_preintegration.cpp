@@ -53,15 +53,18 @@ namespace {
 /// `bias` has six numbers, or none: then it is that of the truth, or zero.
 py::dict preintegrateAll(const DoubleArray& readings, const DoubleArray& begin, const DoubleArray& end,
                          const DoubleArray& noise, const DoubleArray& bias, const std::string& scheme, double max_gap,
-                         int threads, const DoubleArray& truth_rows, double gravity) {
+                         int threads, const DoubleArray& truth_rows, double gravity, double rate,
+                         const DoubleArray& world_rate) {
   RecordingWindowOptions options;
   options.integration.preintegration.noise = noiseOf(noise);
   options.integration.scheme = schemeOf(scheme);
   options.integration.max_gap = max_gap;
   if (bias.size() > 0) options.bias = {vector<3>(bias.data()), vector<3>(bias.data() + 3)};
   options.gravity = gravity;
+  options.world_rate = vector<3>(world_rate.data());
   const std::vector<ImuSample<double>> list = readingsOf(readings);
   const std::vector<GroundTruth> truth = truthOf(truth_rows);
+  options.integration.preintegration.rate = rate > 0 ? rate : readingRate<double>(list, max_gap);
   const auto n = begin.size();
   DoubleArray increment({n, py::ssize_t{10}});
   DoubleArray covariance({n, py::ssize_t{9}, py::ssize_t{9}});

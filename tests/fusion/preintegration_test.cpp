@@ -4,6 +4,9 @@
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/factor.hpp>
 
+#include <stats/maha.hpp>
+
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -99,6 +102,9 @@ TEST(Preintegration, CovarianceIsTheSumOverTheReadings) {
       const double density = k < 3 ? some_options.noise.gyroscope : some_options.noise.accelerometer;
       sum += density * density / steps.h[i] * column * column.transpose();
     }
+    // The position within the step, which the mean force leaves open.
+    const double h = steps.h[i], density = some_options.noise.accelerometer;
+    sum.topLeftCorner<3, 3>() += density * density * h * h * h / 12 * Eigen::Matrix3d::Identity();
   }
   const Matrix9 covariance = motion.gaussian().covariance;
   EXPECT_LE((covariance - sum).norm(), 1e-8 * sum.norm());
@@ -314,6 +320,37 @@ double errorOf(ImuScheme scheme, double rate) {
       .norm();
 }
 
+// States of a world that turns, by Euler's steps of its equations of motion.
+TEST(PreintegrationFactor, AWorldMayTurn) {
+  const Vector3 world(1e-3, 2e-3, -3e-3), g(0, 0, -9.81), rate(0.3, -0.2, 0.5), force(3, 50, 20);
+  const SE23d first(SO3d::exp(Vector3(0.3, 0.1, -2)), Vector3(30, -20, 10), Vector3(100, 50, -20));
+  constexpr int n = 200000;
+  constexpr double t = 2, h = t / n;
+  SO3d R(first.so3());
+  Vector3 p = first.translation(), v = first.velocity();
+  for (int i = 0; i < n; ++i) {
+    const SO3d half = SO3d::exp(-0.5 * h * world) * R * SO3d::exp(0.5 * h * rate);
+    // At the middle of the step, to second order.
+    const auto acceleration = [&](const Vector3& at, const Vector3& moving) {
+      return Vector3(half * force + g - 2 * world.cross(moving) - world.cross(world.cross(at)));
+    };
+    const Vector3 a = acceleration(p, v), a_middle = acceleration(p + 0.5 * h * v, v + 0.5 * h * a);
+    p += h * v + 0.5 * h * h * a_middle;
+    v += h * a_middle;
+    R = SO3d::exp(-h * world) * R * SO3d::exp(h * rate);
+  }
+  const SE23d second(R, p, v);
+  Preintegration<double> motion;
+  motion.add(t, rate, force);
+  const auto error = [&](const Vector3& turning) {
+    const auto [from, to] = statesInFixedAxes<double>(first, second, t, g, turning);
+    return preintegrationError<double>(motion, from, to, {}, g).norm();
+  };
+  // Gravity's gains are exact to the third power of the world's angle, 4e-7; Euler's steps to h².
+  EXPECT_LE(error(world), 2e-6);
+  EXPECT_GE(error(Vector3::Zero()), 0.1) << "which is what the world's rotation does here";
+}
+
 TEST(Schemes, HaveTheirOrders) {
   // Doubling the rate divides the error by 2^order.
   const double held = errorOf(ImuScheme::held, 200) / errorOf(ImuScheme::held, 400);
@@ -337,6 +374,155 @@ TEST(Recordings, HeldReadingsAreDeltaAngles) {
   const auto result = preintegrate<double>(list, 0., 0.15, {.scheme = ImuScheme::held, .max_gap = 0.2});
   ASSERT_TRUE(result.ok());
   EXPECT_LE(difference(expected.increment(), result.motion.increment()).norm(), 1e-15);
+}
+
+TEST(Preintegration, OneReadingHasACovarianceWithAFactor) {
+  std::mt19937 generator(5);
+  const auto draw = [&] { return static_cast<double>(generator()) * 0x1p-31 - 1; };
+  PreintegrationOptions<double> options = some_options;
+  options.noise.gyroscope_walk = 2e-5, options.noise.accelerometer_walk = 3e-3;
+  for (int i = 0; i < 1000; ++i) {
+    Preintegration<double> motion(options);
+    motion.add(std::pow(10, -2.5 + draw()), 5 * Vector3(draw(), draw(), draw()), 100 * Vector3(draw(), draw(), draw()));
+    ASSERT_EQ(Eigen::LLT<Matrix9>(motion.gaussian().covariance).info(), Eigen::Success) << i;
+    ASSERT_EQ((Eigen::LLT<Eigen::Matrix<double, 15, 15>>(motion.covarianceWithBias()).info()), Eigen::Success) << i;
+  }
+}
+
+/// Readings of which every third and fourth of seven is missing.
+std::vector<ImuSample<double>> withDropouts(double rate) {
+  std::vector<ImuSample<double>> list;
+  std::size_t i = 0;
+  for (const ImuSample<double>& s : AnalyticMotion::samples(rate)) {
+    if (i % 7 != 2 && i % 7 != 3) list.push_back(s);
+    ++i;
+  }
+  return list;
+}
+
+// Each reading's noise by itself, with the variance density²·rate however long its steps are.
+TEST(Recordings, NoiseBelongsToTheReading) {
+  constexpr double rate = 200;
+  const auto list = withDropouts(rate);
+  for (const ImuScheme scheme : {ImuScheme::averaged, ImuScheme::held, ImuScheme::cubic}) {
+    RecordingOptions<double> options{.preintegration = {.noise = {1e-1, 1e1}}, .scheme = scheme};
+    const double begin = 0.1013, end = 0.4027;
+    const auto result = preintegrate<double>(list, begin, end, options);
+    ASSERT_TRUE(result.ok());
+    EXPECT_NEAR(result.rate, rate, 1e-9 * rate) << "measured";
+    Matrix9 sum = Matrix9::Zero();
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      if (std::abs(list[i].time - 0.25) > 0.2) continue;
+      for (int k = 0; k < 6; ++k) {
+        auto moved = list;
+        constexpr double e = 1e-5;
+        (k < 3 ? moved[i].angular_rate[k] : moved[i].specific_force[k - 3]) += e;
+        const Vector9 column =
+            difference(result.motion.increment(), preintegrate<double>(moved, begin, end, options).motion.increment()) /
+            e;
+        const double density = k < 3 ? 1e-1 : 1e1;
+        sum += density * density * rate * column * column.transpose();
+      }
+    }
+    // The scheme's error is nothing beside so much noise.
+    const Eigen::Matrix3d rotation = result.motion.gaussian().covariance.block<3, 3>(3, 3);
+    EXPECT_NEAR((rotation.inverse() * sum.block<3, 3>(3, 3)).trace() / 3, 1, 0.02) << static_cast<int>(scheme);
+    EXPECT_NEAR((result.motion.gaussian().covariance.inverse() * sum).trace() / 9, 1, 0.12) << static_cast<int>(scheme);
+    // Two intervals of a chain have the variance of both together, with one reading shared.
+    options.chained = true;
+    const auto first = preintegrate<double>(list, begin, 0.25, options),
+               second = preintegrate<double>(list, 0.25, end, options);
+    const Matrix9 chained = (first.motion * second.motion).gaussian().covariance;
+    EXPECT_NEAR((chained.block<3, 3>(3, 3).inverse() * sum.block<3, 3>(3, 3)).trace() / 3, 1, 0.05)
+        << static_cast<int>(scheme);
+  }
+}
+
+TEST(Recordings, TheRateIsThatOfTheSensor) {
+  const auto rateOf = [](const std::vector<double>& times) {
+    std::vector<ImuSample<double>> list;
+    for (const double t : times) list.push_back({t, Vector3::Zero(), Vector3::Zero()});
+    return readingRate<double>(list);
+  };
+  std::mt19937 generator(9);
+  const auto uniform = [&] { return static_cast<double>(generator()) * 0x1p-32; };
+  std::vector<double> even, halved, jitter, bunched, hole;
+  for (int i = 0; i < 400; ++i) {
+    const double t = 0.005 * i;
+    even.push_back(t);
+    if (uniform() < 0.5) halved.push_back(t);
+    jitter.push_back(t + 0.001 * (uniform() - 0.5));
+    bunched.push_back(0.02 * (i / 4) + 2e-5 * (i % 4));
+    hole.push_back(t + (i > 100 ? 3 : 0) + (i > 200 ? 0.05 : 0));
+  }
+  EXPECT_NEAR(rateOf(even), 200, 1e-9);
+  EXPECT_NEAR(rateOf(halved), 200, 1e-9);
+  EXPECT_NEAR(rateOf(jitter), 200, 2);
+  EXPECT_NEAR(rateOf(bunched), 200, 2);
+  EXPECT_NEAR(rateOf(hole), 200, 1e-9);
+  EXPECT_EQ(rateOf({}), 0);
+  EXPECT_EQ(rateOf({1}), 0);
+  EXPECT_EQ(rateOf({1, std::nan("")}), 0);
+}
+
+// The squared length of the scheme's own error under a covariance that has it: d²/(1 + d²) of a d² that may be thousands.
+TEST(Recordings, TheErrorOfTheSchemeIsInTheCovariance) {
+  const PreintegrationOptions<double> noise{.noise = {.gyroscope = 1e-6, .accelerometer = 1e-5}};
+  for (const double rate : {50., 100., 200.}) {
+    const auto list = AnalyticMotion::samples(rate);
+    for (const double begin : {0.0123, 0.1}) {
+      const double end = begin + 0.9;
+      for (const ImuScheme scheme : {ImuScheme::averaged, ImuScheme::cubic}) {
+        const auto result = preintegrate<double>(list, begin, end, {.preintegration = noise, .scheme = scheme});
+        const Vector9 error = preintegrationError<double>(result.motion, AnalyticMotion::state(begin),
+                                                          AnalyticMotion::state(end), {}, Vector3::Zero());
+        const double d2 = mahalanobisSquared<double, 9>(error, result.motion.gaussian().covariance);
+        if (scheme == ImuScheme::averaged) {
+          EXPECT_GE(result.scheme_error, 1e3) << rate;
+          EXPECT_EQ(result.sampling, ImuSampling::undersampled) << rate;
+          EXPECT_LE(d2, 1 + 0.003 * result.scheme_error) << "an estimate to 5 %";
+        } else {
+          EXPECT_LE(result.sampling == ImuSampling::undersampled ? 0 : d2, 3) << rate;
+        }
+      }
+    }
+  }
+  // At this noise there is nothing to say.
+  const auto list = AnalyticMotion::samples(200);
+  EXPECT_EQ(preintegrate<double>(list, 0., 1., {.preintegration = {.noise = {1e-3, 1e-1}}}).sampling,
+            ImuSampling::adequate);
+}
+
+TEST(Recordings, TimesOfArrivalAndWantOfReadingsAreSaid) {
+  const PreintegrationOptions<double> noise{.noise = {.gyroscope = 1e-3, .accelerometer = 1e-1}};
+  std::vector<ImuSample<double>> bunched, jitter;
+  std::mt19937 generator(2);
+  int i = 0;
+  for (ImuSample<double> s : AnalyticMotion::samples(200)) {
+    const int place = i++ % 4;
+    ImuSample<double> late = s;
+    s.time -= place * (0.005 - 2e-5);
+    bunched.push_back(s);
+    late.time += 1e-3 * (static_cast<double>(generator()) * 0x1p-32 - 0.5);
+    jitter.push_back(late);
+  }
+  for (const ImuScheme scheme : {ImuScheme::averaged, ImuScheme::held, ImuScheme::cubic}) {
+    EXPECT_EQ(preintegrate<double>(bunched, 0.1, 0.9, {.preintegration = noise, .scheme = scheme}).sampling,
+              ImuSampling::bunched);
+    EXPECT_EQ(
+        preintegrate<double>(jitter, 0.1, 0.9, {.preintegration = {.noise = {3e-5, 1e-3}}, .scheme = scheme}).sampling,
+        ImuSampling::rough);
+  }
+  const auto list = AnalyticMotion::samples(200);
+  const std::vector<ImuSample<double>> two(list.begin() + 10, list.begin() + 12);
+  EXPECT_EQ(preintegrate<double>(two, two[0].time, two[1].time, {.preintegration = noise}).sampling,
+            ImuSampling::untested);
+  // A fault beside the interval is no fault of it, and not in its covariance.
+  auto broken = list;
+  broken[42].angular_rate[2] = broken[85].specific_force[0] = std::nan("");
+  const auto result = preintegrate<double>(broken, list[43].time, list[84].time, {.preintegration = noise});
+  ASSERT_TRUE(result.ok());
+  EXPECT_TRUE(result.motion.gaussian().covariance.allFinite());
 }
 
 TEST(Recordings, FaultsAreNamed) {

@@ -31,6 +31,8 @@ LIESTAT_FUSION_INLINE InertialWindow::InertialWindow(std::span<const ImuSample<d
   const std::span<const ImuSample<double>> used =
       readings.subspan(first_reading_, std::min(end + 3, readings.size()) - first_reading_);
   readings_.assign(used.begin(), used.end());
+  if (!(how_.preintegration.rate > 0)) how_.preintegration.rate = readingRate<double>(readings_, how_.max_gap);
+  how_.chained = true;
   fault_ = integrate(how_.preintegration.bias);
 }
 

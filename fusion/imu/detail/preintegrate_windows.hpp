@@ -3,6 +3,7 @@
 #include <fusion/imu/factor.hpp>
 #include <fusion/imu/recording_windows.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace liestat {
@@ -38,10 +39,23 @@ LIESTAT_FUSION_INLINE RecordingWindow preintegrateWindow(std::span<const ImuSamp
   }
   if (w.ok() && first && last) {
     const Eigen::Vector3d gravity(0, 0, -options.gravity);
-    w.error = preintegrationError<double>(w.result.motion, first->state, last->state, w.bias, gravity);
+    const auto [from, to] =
+        statesInFixedAxes<double>(first->state, last->state, w.result.motion.duration(), gravity, options.world_rate);
+    w.error = preintegrationError<double>(w.result.motion, from, to, w.bias, gravity);
     const ImuNoise<double>& noise = how.preintegration.noise;
     if (noise.gyroscope > 0 && noise.accelerometer > 0) {
       w.squared_distance = mahalanobisSquared<double, 9>(*w.error, w.result.motion.gaussian().covariance);
+    }
+  }
+  const ImuNoise<double>& noise = how.preintegration.noise;
+  if (w.ok() && options.world_rate.isZero() && noise.gyroscope > 0 && noise.accelerometer > 0) {
+    constexpr double earth = 7.292115e-5;  // rad/s
+    const double angle = earth * w.result.motion.duration();
+    const Eigen::Matrix<double, 9, 1> sigma = w.result.motion.gaussian().covariance.diagonal().cwiseSqrt();
+    w.earth_rotation = angle / sigma.segment<3>(3).minCoeff();
+    if (first && last) {
+      const double speed = 0.5 * (first->state.velocity() + last->state.velocity()).norm();
+      w.earth_rotation = std::max(w.earth_rotation, 2 * angle * speed / sigma.tail<3>().minCoeff());
     }
   }
   return w;
@@ -52,12 +66,15 @@ LIESTAT_FUSION_INLINE RecordingWindows preintegrateWindows(std::span<const ImuSa
                                                            std::span<const GroundTruth> truth,
                                                            const RecordingWindowOptions& options) {
   RecordingWindows result;
+  RecordingWindowOptions how = options;
+  double& rate = how.integration.preintegration.rate;
+  if (!(rate > 0)) rate = readingRate<double>(readings, how.integration.max_gap);
   const ImuNoise<double>& noise = options.integration.preintegration.noise;
   result.with_noise = noise.gyroscope > 0 && noise.accelerometer > 0;
   result.with_truth = !truth.empty();
   result.windows.reserve(windows.size());
   for (const TimeInterval& window : windows) {
-    result.windows.push_back(preintegrateWindow(readings, window, truth, options));
+    result.windows.push_back(preintegrateWindow(readings, window, truth, how));
   }
   return result;
 }

@@ -112,6 +112,40 @@ LIESTAT_FUSION_INLINE Verdict RecordingWindows::verdict(double false_alarm) cons
   return Verdict::yes("consistent with the truth: " + figures);
 }
 
+LIESTAT_FUSION_INLINE std::vector<std::string> RecordingWindows::notes() const {
+  struct Kind {
+    ImuSampling sampling;
+    const char* text;
+  };
+  constexpr Kind kinds[] = {
+      {ImuSampling::bunched, "bunched: readings come in bunches, and their times may be those of arrival"},
+      {ImuSampling::undersampled,
+       "undersampled: rate and force vary so much between readings that the integration scheme's error, as it is in "
+       "the "
+       "covariance, may be off; the cubic scheme or more readings per second help"},
+      {ImuSampling::rough,
+       "rough: readings differ from their neighbours by more than the stated noise: vibration, wrong times, or "
+       "densities "
+       "too low"},
+      {ImuSampling::untested, "untested: too few readings to see how rate and force vary between them"}};
+  std::vector<std::string> notes;
+  const std::string of_all = " of " + std::to_string(okWindows()) + " windows ";
+  for (const Kind& kind : kinds) {
+    const auto n = std::count_if(windows.begin(), windows.end(), [&](const RecordingWindow& w) {
+      return w.ok() && w.result.sampling == kind.sampling;
+    });
+    if (n > 0) notes.push_back(std::to_string(n) + of_all + kind.text);
+  }
+  double earth = 0;
+  for (const RecordingWindow& w : windows) earth = std::max(earth, w.earth_rotation);
+  // An error of one standard deviation raises the expected squared distance from 9 to 10.
+  if (earth > 1) {
+    notes.push_back("the Earth's rotation is worth up to " + significant(earth, 2) +
+                    " standard deviations of the noise: state it (world rate)");
+  }
+  return notes;
+}
+
 LIESTAT_FUSION_INLINE Verdict RecordingWindows::outcome() const {
   const std::size_t ok = okWindows(), all = windows.size();
   if (ok == 0) return Verdict::no("NOT TO BE TRUSTED: no window has an increment, as the readings have faults.");

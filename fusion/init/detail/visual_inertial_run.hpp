@@ -29,7 +29,10 @@ class RecordingRun {
  public:
   RecordingRun(const VisualInertialRecording& recording, const VisualInertialOptions& options,
                VisualInertialResult& result)
-      : recording_(recording), options_(options), noise_(recording.noise) {
+      : recording_(recording),
+        options_(options),
+        noise_(recording.noise),
+        rate_(readingRate<double>(recording.readings, options.max_gap)) {
     std::vector<double> sigmas;
     by_image_.resize(times().size());
     for (std::size_t i = 0; i < recording.observations.size(); ++i) {
@@ -193,7 +196,10 @@ class RecordingRun {
  private:
   const std::vector<double>& times() const { return recording_.image_times; }
   RecordingOptions<double> how(const ImuBias<double>& bias) const {
-    return {.preintegration = {.noise = noise_, .bias = bias}, .scheme = options_.scheme, .max_gap = options_.max_gap};
+    return {.preintegration = {.noise = noise_, .bias = bias, .rate = rate_},
+            .scheme = options_.scheme,
+            .max_gap = options_.max_gap,
+            .chained = true};
   }
   RecordingResult<double> motion(double from, double to, const ImuBias<double>& bias) const {
     return preintegrate<double>(recording_.readings, from, to, how(bias));
@@ -272,6 +278,7 @@ class RecordingRun {
   const VisualInertialRecording& recording_;
   const VisualInertialOptions& options_;
   ImuNoise<double> noise_;
+  double rate_;  ///< of the readings, Hz
   std::vector<std::vector<const BearingMeasurement*>> by_image_;
   std::vector<bool> covered_;
   std::size_t tracks_ = 0;

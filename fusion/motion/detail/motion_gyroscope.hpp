@@ -116,6 +116,10 @@ LIESTAT_FUSION_INLINE MotionGyroscope gyroscopeOfReadings(GyroscopeReadings read
   gyroscope.bias = readings.how.preintegration.bias.gyroscope;
   gyroscope.bias_walk = readings.how.preintegration.noise.gyroscope_walk;
   gyroscope.seconds = detail::medianStep(readings.times);
+  // The motions from frame to frame follow each other.
+  double& rate = readings.how.preintegration.rate;
+  if (!(rate > 0)) rate = readingRate<double>(readings.samples, readings.how.max_gap);
+  readings.how.chained = true;
   gyroscope.between = [all = std::make_shared<const GyroscopeReadings>(std::move(readings)), camera_R_sensor](
                           std::size_t first, std::size_t second) -> MotionGyroscope::Between {
     const auto a = all->times.find(first), b = all->times.find(second);
