@@ -124,8 +124,8 @@ std::vector<Scene> scenes(bool all) {
   return list;
 }
 
-/// Rate and force as sums of a constant and a sine along each axis: calm, up to 0.5 rad/s and 1.5 m/s² below 1 Hz; wild,
-/// 10 rad/s and 12 g at 2 to 3 Hz; rocket, a spin of 6 rad/s under 12 g.
+/// Rate and force as sums of a constant and a sine along each axis: calm, up to 0.5 rad/s and 1.5 m/s² below 1 Hz;
+/// wild, 10 rad/s and 12 g at 2 to 3 Hz; rocket, a spin of 6 rad/s under 12 g.
 class SceneMotion {
  public:
   SceneMotion(const std::string& name, CounterRng& rng) {

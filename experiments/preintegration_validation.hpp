@@ -42,8 +42,8 @@ struct PreintegrationRow : JudgedReport {
   PreintegrationCheck check{};
   double window = 0;  ///< s
   double noise = 0;   ///< densities over those of an ADIS16448
-  /// A recording: "wild 200 Hz, 20 % dropped, cubic". Trials in which preintegrate() says that the covariance may be off
-  /// (RecordingResult::sampling) count as failures, and are not judged.
+  /// A recording: "wild 200 Hz, 20 % dropped, cubic". Trials in which preintegrate() says that the covariance may be
+  /// off (RecordingResult::sampling) count as failures, and are not judged.
   std::string scene;
 };
 

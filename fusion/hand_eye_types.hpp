@@ -36,7 +36,7 @@ struct PosePair {
 /// Quantities that the equations take for known.
 enum class HandEyeSuspect {
   delay,  ///< a pair's B belongs to A at a time that is later by it, s; positive: the stamps of B are early
-  scale,  ///< B's translations are too short by it: the board is larger than stated, or the robot's lengths are too long
+  scale,  ///< B's translations are too short by it: the board is larger than stated, or the robot's lengths too long
   focal_length,  ///< the camera's is too small by it: distances to the target's origin are too short
   principal_x,   ///< the principal point, in focal lengths: the target's origin is off by it times its distance
   principal_y

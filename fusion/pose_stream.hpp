@@ -21,8 +21,8 @@ struct TimedPose {
   SE3d pose;
 };
 
-/// Poses in the order of their times. Between four stamps a pose is the cubic polynomial through the logarithms of their
-/// motions from the second: accurate to the fourth order of the step, and as invariant as SE(3) itself.
+/// Poses in the order of their times. Between four stamps a pose is the cubic polynomial through the logarithms of
+/// their motions from the second: accurate to the fourth order of the step, and as invariant as SE(3) itself.
 class PoseStream {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -61,8 +61,8 @@ class PoseStream {
     if (!before || !after) return std::nullopt;
     return (before->inverse() * *after).log() / (2 * half);
   }
-  /// The mean square of the interpolation's error as a local error: with every second stamp left out it is that of twice
-  /// the step, sixteen times as large as at the step itself. Zero for fewer than eight poses.
+  /// The mean square of the interpolation's error as a local error: with every second stamp left out it is that of
+  /// twice the step, sixteen times as large as at the step itself. Zero for fewer than eight poses.
   Matrix6 interpolationError() const {
     Matrix6 sum = Matrix6::Zero();
     double n = 0;

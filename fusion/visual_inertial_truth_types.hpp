@@ -116,8 +116,8 @@ struct ComparedRecording {
   /// Verdict on the covariances against the truth: no, if one of these tests has a p below `false_alarm`. The errors of the
   /// truth are in no covariance: they must be small. None where no estimate that is ok is covered by the truth.
   Verdict againstTruth(double false_alarm = 1e-5) const;
-  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, those of a stretch of two and more agree,
-  /// and with a truth the errors follow the covariances. Windows that were not fused are not tested.
+  /// Verdict on the result: trusted if nothing was interrupted, a window is ok, those of a stretch of two and more
+  /// agree, and with a truth the errors follow the covariances. Windows that were not fused are not tested.
   Verdict verdict() const;
   /// Summary of all windows that claim a scale, not only of those that came out well.
   InitialisationSummary summary() const;

@@ -146,8 +146,8 @@ struct FusedStretch {
 
   /// A single window has nothing that could contradict it.
   bool tested() const { return has_state && degrees_of_freedom > 0; }
-  /// True if there is a state with a covariance that the windows were able to contradict and do not: p ≥ 1e-3, or it was
-  /// inflated.
+  /// True if there is a state with a covariance that the windows were able to contradict and do not: p ≥ 1e-3, or it
+  /// was inflated.
   bool ok() const { return tested() && (p >= min_p_of_fusion || inflated); }
   const char* word() const { return !has_state ? "no_state" : !tested() ? "untested" : ok() ? "ok" : "inconsistent"; }
 };

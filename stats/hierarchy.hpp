@@ -624,9 +624,9 @@ class Hierarchy {
     for (auto& [score, parameter] : scored) found.best.push_back(std::move(parameter));
     return found;
   }
-  /// True if a completed model has more of the measurements off the other one than its freedom and chance explain in the
-  /// best of so many samples. Chance is at least what the measurements just beyond the threshold show: errors that are
-  /// not noise, as those of another structure, are spread evenly about the model.
+  /// True if a completed model has more of the measurements off the other one than its freedom and chance explain in
+  /// the best of so many samples. Chance is at least what the measurements just beyond the threshold show: errors that
+  /// are not noise, as those of another structure, are spread evenly about the model.
   bool isBeyondChance(std::size_t m, std::size_t other, const Completions& completions,
                       const Candidate& candidate) const {
     const Model& model = *models_[m];

@@ -67,7 +67,8 @@ class HierarchyModel {
   /// Appends the parameters that a minimal sample determines to `solutions`; a degenerate sample adds none.
   virtual void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const = 0;
   /// The number of measurements off the estimate of another model that determine this one together with it; 0: no such
-  /// way is known. Minimal samples of a scene that the other model dominates lie within it, and say nothing of the rest.
+  /// way is known. Minimal samples of a scene that the other model dominates lie within it, and say nothing of the
+  /// rest.
   virtual std::size_t completionSize(const HierarchyModel&) const { return 0; }
   /// Appends the parameters that these determine.
   virtual void complete(const HierarchyModel&, const Parameter&, std::span<const Measurement>,

@@ -1,6 +1,6 @@
 // Tests of named suspects with one degree of freedom each: a χ² of a hundred degrees of freedom does not see one wrong
-// quantity, a test in its direction does. Rows have whitened residuals u, their derivatives K by the parameters, to which
-// they were fitted, and G by the suspects, which the model takes for known.
+// quantity, a test in its direction does. Rows have whitened residuals u, their derivatives K by the parameters, to
+// which they were fitted, and G by the suspects, which the model takes for known.
 //
 // Of a suspect g = G_j, g̃ = g - K C Σ Kᵀ g is what the parameters leave, U = Σ g̃ᵀ u its score, I = Σ g̃ᵀ g̃:
 // the residuals ask for η = -U/I, and z = -U/√V, sd(η) = √V/I. V is the variance of the score, with the dependence in

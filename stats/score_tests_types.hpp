@@ -1,5 +1,5 @@
-// Named suspects: what a model leaves out that may be wrong all the same. The tests are in stats/score_tests.hpp. (Needs
-// the standard library alone.)
+// Named suspects: what a model leaves out that may be wrong all the same. The tests are in stats/score_tests.hpp.
+// (Needs the standard library alone.)
 #pragma once
 
 #include <stats/shown.hpp>

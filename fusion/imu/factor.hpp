@@ -34,10 +34,11 @@ SE23<S> impliedIncrement(const SE23<S>& first, const SE23<S>& second, const S& t
   return SE23<S>(back * SO3<S>(second.so3()), position, velocity);
 }
 
-/// The states in a world that turns at `world_rate` (rad/s, in its axes; the Earth's, east, north and up, is 7.292e-5 times
-/// (0, cos latitude, sin latitude)) as impliedIncrement() wants them: in axes that coincide with the world's at the first
-/// state and do not turn. Gravity is that of the turning world, with the centrifugal acceleration at its origin; where it
-/// points during the interval is in the second state. Gravity's gains to the second power of the angle.
+/// The states in a world that turns at `world_rate` (rad/s, in its axes; the Earth's, east, north and up, is 7.292e-5
+/// times (0, cos latitude, sin latitude)) as impliedIncrement() wants them: in axes that coincide with the world's at
+/// the first state and do not turn. Gravity is that of the turning world, with the centrifugal acceleration at its
+/// origin; where it points during the interval is in the second state. Gravity's gains to the second power of the
+/// angle.
 template <class S>
 std::pair<SE23<S>, SE23<S>> statesInFixedAxes(const SE23<S>& first, const SE23<S>& second, const S& t,
                                               const Eigen::Matrix<S, 3, 1>& gravity,

@@ -32,9 +32,9 @@ struct RecordingOptions {
   PreintegrationOptions<S> preintegration = {};
   ImuScheme scheme = ImuScheme::averaged;
   S max_gap = S(0.1);  ///< s; readings further apart than this make the result not usable
-  /// The interval is one of several that follow each other and are taken for independent. Two intervals share the readings
-  /// at their common end: by itself each has the variance of what it uses of them; one after the other each has half of the
-  /// variance of both together.
+  /// The interval is one of several that follow each other and are taken for independent. Two intervals share the
+  /// readings at their common end: by itself each has the variance of what it uses of them; one after the other each
+  /// has half of the variance of both together.
   bool chained = false;
 };
 
@@ -76,8 +76,8 @@ ImuReading<S> unbiased(const ImuSample<S>& s, const ImuBias<S>& bias) {
   return {s.angular_rate - bias.gyroscope, s.specific_force - bias.accelerometer};
 }
 
-/// Readings beside a step [k, k+1] that are at least half a step away from it, so that a polynomial through four does not
-/// magnify their noise: four of one bunch have differences that are noise alone.
+/// Readings beside a step [k, k+1] that are at least half a step away from it, so that a polynomial through four does
+/// not magnify their noise: four of one bunch have differences that are noise alone.
 template <class S>
 struct ImuNeighbours {
   static constexpr std::size_t reach = 16;
@@ -164,8 +164,9 @@ S heldPeriods(const S& step, const S& rate) {
 }
 
 /// Seconds of white noise over a part [from, to] of the step between readings k and k+1, density² times which is its
-/// variance. Two steps share the reading between them, and each has half of what they have in common, so that the sum over
-/// an interval is right: Σ c W over a step's readings, c (s) the weight that the step gives a reading and W that of all.
+/// variance. Two steps share the reading between them, and each has half of what they have in common, so that the sum
+/// over an interval is right: Σ c W over a step's readings, c (s) the weight that the step gives a reading and W that
+/// of all.
 template <class S>
 S averagedNoiseTime(std::span<const ImuSample<S>> samples, std::size_t k, const S& begin, const S& end, bool chained,
                     const S& rate) {
@@ -309,8 +310,8 @@ class SchemeWatch {
     bool undersampled = result.scheme_error > S(max_scheme_error);
     SchemeError<S> error = error_;
     if (options_.scheme == ImuScheme::cubic) {
-      // The error of the cubic scheme is less than that of the averaged one. Its estimate need not be: fourth differences
-      // over unequal steps are mostly noise.
+      // The error of the cubic scheme is less than that of the averaged one. Its estimate need not be: fourth
+      // differences over unequal steps are mostly noise.
       const S fourth = has_noise ? squaredLength(next_) : result.scheme_error;
       if (!(fourth > result.scheme_error)) error = next_, result.scheme_error = fourth;
       undersampled = result.scheme_error > S(max_cubic_error);
@@ -332,8 +333,8 @@ class SchemeWatch {
   }
 
  private:
-  /// Half of the second derivative within the step: two second divided differences, of the step with one neighbour each,
-  /// weighted as the integral of the cubic through all four is.
+  /// Half of the second derivative within the step: two second divided differences, of the step with one neighbour
+  /// each, weighted as the integral of the cubic through all four is.
   ImuReading<S> curvature(std::size_t k, const ImuNeighbours<S>& beside, const ImuReading<S>& slope) const {
     const S h = samples_[k + 1].time - samples_[k].time;
     ImuReading<S> left, right;
@@ -400,9 +401,10 @@ class SchemeWatch {
 }  // namespace detail
 
 /// The motion from time `begin` to `end` (s) out of readings in the order of time. The readings may be those of a whole
-/// recording: the interval's are found by bisection, and only they are checked, with the one next to them at each end that
-/// the cubic scheme needs. Readings beside the interval serve the estimate of the scheme's error where they have no
-/// fault. Where times do not ascend the result is a fault, or that of readings which do ascend from `begin` to `end`.
+/// recording: the interval's are found by bisection, and only they are checked, with the one next to them at each end
+/// that the cubic scheme needs. Readings beside the interval serve the estimate of the scheme's error where they have
+/// no fault. Where times do not ascend the result is a fault, or that of readings which do ascend from `begin` to
+/// `end`.
 template <class S>
 RecordingResult<S> preintegrate(std::span<const ImuSample<S>> samples, const S& begin, const S& end,
                                 const RecordingOptions<S>& options = {}) {

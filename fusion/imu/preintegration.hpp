@@ -91,8 +91,8 @@ class Preintegration {
             detail::StepCoefficients<S>(rotation.squaredNorm()), noise_time);
   }
 
-  /// Adds an error of the increment so far to its covariance: one standard deviation of position (m), rotation (rad) and
-  /// velocity (m/s), along the one direction of all nine, in the axes of the start.
+  /// Adds an error of the increment so far to its covariance: one standard deviation of position (m), rotation (rad)
+  /// and velocity (m/s), along the one direction of all nine, in the axes of the start.
   void addError(const Vector3& position, const Vector3& rotation, const Vector3& velocity) {
     const auto p = Columns::column(position), v = Columns::column(velocity), r = Columns::column(rotation);
     covariance_.pp.addOuter(p, position);

@@ -11,9 +11,9 @@
 namespace liestat {
 
 /// Readings per second (Hz) that a sensor gives, out of the times of those that arrived: one over the mean of the steps
-/// that are not longer than others for want of a reading, which half of the readings may be. Times of arrival in bunches
-/// do not show the sensor's steps: for them it is the number of readings over their time. Steps that do not ascend, or of
-/// more than `max_gap` s, are passed over. Zero for less than two readings.
+/// that are not longer than others for want of a reading, which half of the readings may be. Times of arrival in
+/// bunches do not show the sensor's steps: for them it is the number of readings over their time. Steps that do not
+/// ascend, or of more than `max_gap` s, are passed over. Zero for less than two readings.
 template <class S>
 S readingRate(std::span<const ImuSample<S>> samples, const S& max_gap = S(0.1)) {
   S sum(0), shortest = max_gap, longest(0);

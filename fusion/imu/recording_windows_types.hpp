@@ -25,8 +25,8 @@ struct RecordingWindow {
   /// preintegrationError() between the true states: position (m), rotation (rad), velocity (m/s).
   std::optional<Eigen::Matrix<double, 9, 1>> error = {};
   std::optional<double> squared_distance = {};  ///< the error's, under the covariance; none without noise
-  /// Standard deviations of the noise that the Earth's rotation is worth where it is neglected: its angle, and with a truth
-  /// Coriolis' acceleration. Zero without noise.
+  /// Standard deviations of the noise that the Earth's rotation is worth where it is neglected: its angle, and with a
+  /// truth Coriolis' acceleration. Zero without noise.
   double earth_rotation = 0;
 
   bool ok() const { return result.ok(); }

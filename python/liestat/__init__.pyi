@@ -1301,6 +1301,7 @@ def two_view(
     second_camera: Camera | None = None,
     *,
     image_size: Sequence[float] | None = None,
+    noise_is_known: bool = False,
     seed: int = 1,
 ) -> TwoViewResult: ...
 def robust_two_view(

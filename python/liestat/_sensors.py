@@ -389,7 +389,9 @@ class TwoViewResult(Result):
 _TWO_VIEW_NAMES = {"physical": "parameters", "errors": "squared_errors", "name": "model"}
 
 
-def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, seed=1):
+def two_view(
+    matches, sigma=1.0, camera=None, second_camera=None, *, image_size=None, noise_is_known=False, seed=1
+):
     """The motion between two images from matches of which some are wrong, its model chosen from several.
 
     Parameters
@@ -401,6 +403,8 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
     camera, second_camera : Camera, optional
         Of the first image, and of the second if it is another one.
     image_size : (width, height), optional
+    noise_is_known : bool
+        `sigma` is exact: the noise that the matches show does not replace it, and shorter baselines are told.
     seed : int
 
     Returns
@@ -425,6 +429,7 @@ def two_view(matches, sigma=1.0, camera=None, second_camera=None, *, image_size=
         nothing if camera is None else camera._list(),
         nothing if second_camera is None else second_camera._list(),
         size,
+        bool(noise_is_known),
         int(seed),
     )
     if d["status"] != "ok":

@@ -209,8 +209,8 @@ def mean(
     ]
     if inflate and not all(a["time_dependence_tested"] for a in answers):
         raise ValueError(
-            "mean: inflate, but the dependence of errors on time cannot be tested: that needs 20 to 200000 features with "
-            "times, and a mean with a covariance"
+            "mean: inflate, but the dependence of errors on time cannot be tested: that needs 20 to 200000 features "
+            "with times, and a mean with a covariance"
         )
     result = MeanResult(kind, criterion, answers, lead)
     withheld = [a for a in answers if a["covariance"] is None]

@@ -44,8 +44,9 @@ py::dict poseOf(const Gaussian<Essentiald>& pose) {
 }
 
 py::dict twoView(const DoubleArray& matches, double sigma, const DoubleArray& first, const DoubleArray& second,
-                 const DoubleArray& image_size, std::uint64_t seed) {
+                 const DoubleArray& image_size, bool noise_is_known, std::uint64_t seed) {
   TwoViewMotionOptions options;
+  options.noise_is_known = noise_is_known;
   options.sigma = sigma;
   options.first = optionalCamera(first);
   options.second = optionalCamera(second);

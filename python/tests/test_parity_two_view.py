@@ -47,6 +47,7 @@ class TwoViewParity(parity.ParityTest):
         self.calibrated("--motion", "homography", "--seed", 3)
         self.run_both("--motion", "homography", "--sigma", 1)
         self.run_both("--seed", 7, options=("--seed", 8), seed=8)
+        self.run_both("--seed", 7, options=("--noise-is-known",), noise_is_known=True)
 
     def test_what_is_not_to_be_trusted(self):
         result = self.calibrated("--outliers", 1, "--matches", 30, codes=(3,))

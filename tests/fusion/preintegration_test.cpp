@@ -465,7 +465,8 @@ TEST(Recordings, TheRateIsThatOfTheSensor) {
   EXPECT_EQ(rateOf({1, std::nan("")}), 0);
 }
 
-// The squared length of the scheme's own error under a covariance that has it: d²/(1 + d²) of a d² that may be thousands.
+// The squared length of the scheme's own error under a covariance that has it: d²/(1 + d²) of a d² that may be
+// thousands.
 TEST(Recordings, TheErrorOfTheSchemeIsInTheCovariance) {
   const PreintegrationOptions<double> noise{.noise = {.gyroscope = 1e-6, .accelerometer = 1e-5}};
   for (const double rate : {50., 100., 200.}) {

@@ -66,8 +66,8 @@ TEST(MeanDependence, IndependentErrorsKeepTheirCovariance) {
   EXPECT_LE(changed, 30);
 }
 
-// Of 300 rows whose errors keep nine tenths from row to row: without times or the request 95 % of the truths are outside
-// of the region, with it 5 %; binomial, 4 standard errors. With stated noise, χ²'s law holds.
+// Of 300 rows whose errors keep nine tenths from row to row: without times or the request 95 % of the truths are
+// outside of the region, with it 5 %; binomial, 4 standard errors. With stated noise, χ²'s law holds.
 TEST(MeanDependence, ErrorsWithMemoryAreInTheWidenedRegion) {
   constexpr int trials = 150;
   for (const bool stated : {false, true}) {

@@ -347,8 +347,8 @@ class HandEyeRun {
       B = B * SE3d::exp(step);
     }
   }
-  /// Whitened errors and their derivatives by X, Y and the suspects, at the corrected poses: at the measured ones noise is
-  /// in both.
+  /// Whitened errors and their derivatives by X, Y and the suspects, at the corrected poses: at the measured ones noise
+  /// is in both.
   std::vector<TimedRow<6, columns>> suspectRows(const HandEyeValue& value) const {
     std::vector<TimedRow<6, columns>> rows;
     for (const std::size_t i : inliers_) {

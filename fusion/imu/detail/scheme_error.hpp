@@ -17,16 +17,16 @@ struct ImuReading {
   ImuReading operator*(const S& s) const { return {s * rate, s * force}; }
 };
 
-/// What a scheme of the next order would add to an increment, to first order: position, rotation and velocity in the axes
-/// of the start.
+/// What a scheme of the next order would add to an increment, to first order: position, rotation and velocity in the
+/// axes of the start.
 template <class S>
 struct SchemeError {
   using Vector3 = Eigen::Matrix<S, 3, 1>;
 
   Vector3 position = Vector3::Zero(), rotation = Vector3::Zero(), velocity = Vector3::Zero();
 
-  /// Carries it over a step of h seconds from one increment to the next, and adds the step's own error in the axes of the
-  /// body at its start.
+  /// Carries it over a step of h seconds from one increment to the next, and adds the step's own error in the axes of
+  /// the body at its start.
   void advance(const S& h, const SE23<S>& before, const SE23<S>& after, const SchemeError& own) {
     const SO3<S> R = before.so3();
     const Vector3 gain = after.velocity() - before.velocity();

@@ -162,7 +162,8 @@ LIESTAT_FUSION_INLINE void MotionEngine::publish() {
   // A rival is another place, not one within the noise of the best.
   out.rival_gap = std::numeric_limits<double>::infinity();
   bool by_chance = false;
-  // The two solutions of a plane are equally good for ever: their gap has as many occasions to exceed a bound as frames.
+  // The two solutions of a plane are equally good for ever: their gap has as many occasions to exceed a bound as
+  // frames.
   const bool plane = plane_misfit_ < largest_plane_misfit;
   const double sigmas = plane ? std::max(options_.rival_sigmas, plane_rival_sigmas) : options_.rival_sigmas;
   const Eigen::Vector3d V = c.direction.unit_vector();

@@ -184,8 +184,8 @@ LIESTAT_FUSION_INLINE double MotionEngine::mixedDepths(const Evaluation& e) cons
   return std::min(ahead, behind);
 }
 
-/// While hypotheses compete: χ² of inverse depths that are linear in the image, over its degrees of freedom. Points of a
-/// plane have such depths under both of its solutions.
+/// While hypotheses compete: χ² of inverse depths that are linear in the image, over its degrees of freedom. Points of
+/// a plane have such depths under both of its solutions.
 LIESTAT_FUSION_INLINE double MotionEngine::planeMisfit(const Evaluation& e) const {
   if (candidates_.size() < 2) return 0;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
