@@ -223,7 +223,7 @@ class TimeModel {
                           .prior = (1 - white_prior) / (steps * static_cast<double>(shares.size()))});
       }
     }
-    for (std::size_t k = 0; k < cells_.size(); ++k) judgeCell<C, P>(cells_[k], rows_, decayOf(k), held_);
+    judgeCells();
     // Over many time constants the residuals show the dependence by themselves. The restricted likelihood, which few of
     // them need, may take an error of the model that a shift of the parameters explains, such as a delay between
     // streams, for a process that drifts without end.
@@ -240,6 +240,33 @@ class TimeModel {
       }
     }
     found_.tested = true;
+  }
+  /// Of many rows a block in the middle tells which cells are worth all of them: white noise, and those that it does not
+  /// rule out.
+  void judgeCells() {
+    constexpr std::size_t many = 20000, block = 10000;
+    constexpr double ruled_out = 40;  // of a logarithm of likelihoods
+    std::vector<bool> worth(cells_.size(), true);
+    if (rows_.size() > many) {
+      const std::size_t first = (rows_.size() - block) / 2;
+      const auto some = std::span<const TimedColumns<C, P>>(rows_).subspan(first, block);
+      TimeCell::Judged restricted, profile;
+      for (std::size_t k = 0; k < cells_.size(); ++k) {
+        TimeCell& cell = cells_[k];
+        judgeCell<C, P>(cell, some, std::span<const double>(decayOf(k)).subspan(first, block - 1), held_);
+        restricted.log_likelihood = std::max(restricted.log_likelihood, cell.restricted.log_likelihood);
+        profile.log_likelihood = std::max(profile.log_likelihood, cell.profile.log_likelihood);
+      }
+      for (std::size_t k = 0; k < cells_.size(); ++k) {
+        TimeCell& cell = cells_[k];
+        worth[k] = k == 0 || cell.restricted.log_likelihood > restricted.log_likelihood - ruled_out ||
+                   cell.profile.log_likelihood > profile.log_likelihood - ruled_out;
+        cell.restricted = cell.profile = {};
+      }
+    }
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      if (worth[k]) judgeCell<C, P>(cells_[k], rows_, decayOf(k), held_);
+    }
   }
   /// Weights, and what they say, by the likelihood.
   bool weigh() {
