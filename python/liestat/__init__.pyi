@@ -465,8 +465,13 @@ class _MeanSummary:
     lag_z: float | _Several | None  # number or null; the same in standard deviations; above 2.45 a note says so
     skewness: float | _Several | None  # number or null; Mardia's, of the errors; zero but for chance if symmetric
     skewness_p: float | _Several | None  # number or null; probability of so large a one of normal errors
-    # object or null; rows with times: whether their errors are independent; null without
-    time_blocks: dict[str, Any] | _Several | None
+    time_dependence: str | _Several  # text; in words
+    time_dependence_tested: bool | _Several  # bool; whether
+    independence: float | _Several  # number; probability that the errors are independent in time; null: untested
+    correlated_share: float | _Several  # number; of the variance, where they are not
+    correlation_time: float | _Several  # number; s
+    correlation_factor: float | _Several  # number; mean factor of the variances that the dependence asks for
+    inflated: bool | _Several  # bool; whether the covariance is widened by the dependence on time
     notes: list[str] | _Several  # list of text; what is remarkable, in sentences
 
 class _SplitSeries(Result):
@@ -838,7 +843,8 @@ class _ComparedStretch(Result):
     chi2: float  # of their disagreement
     degrees_of_freedom: int  # of chi2
     p: float  # probability of a larger chi2
-    ok: bool  # p is 0.001 or more, or the covariance was inflated
+    ok: bool  # windows met, and p is 0.001 or more, or the covariance was inflated
+    status: str  # ok, inconsistent, untested (a single window: nothing could contradict it) or no_state
     inflation: float  # factor by which the covariances are too small
     inflated: bool  # the covariance was multiplied by it
     gravity_direction: _Array  # unit vector, downwards

@@ -26,9 +26,7 @@ namespace {
 struct Analysed {
   explicit Analysed(const std::string& text, const AnalysisOptions& options = {})
       : measurements(chooseMeasurements(readFeatures(text, "f.csv"), {}, "liestat mean")),
-        analysis(analyseMean(measurements, options)) {
-    compareBlocks(analysis, measurements, options);
-  }
+        analysis(analyseMean(measurements, options)) {}
   std::string text() const { return formatMean("f.csv", measurements, analysis); }
   nlohmann::json json() const {
     return nlohmann::json::parse(JsonObject().fieldsOf(measurements.file).fieldsOf<MeanSummary>(analysis).str());
