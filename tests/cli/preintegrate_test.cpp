@@ -163,8 +163,9 @@ TEST(Preintegrate, AConstantForceForTwoSeconds) {
   EXPECT_NEAR(w["rotation_vector"][2].get<double>(), 1, 1e-12);
   EXPECT_NEAR(w["velocity"][2].get<double>(), 6, 1e-12);
   EXPECT_NEAR(w["position"][2].get<double>(), 6, 1e-12);
-  // White noise of a rate over two seconds; of a force along the axis of rotation.
-  EXPECT_NEAR(w["covariance"][5][5].get<double>(), 2e-6, 1e-12);
+  // White noise of a rate over two seconds, of whose 41 readings the first and the last count half; of a force along the
+  // axis of rotation.
+  EXPECT_NEAR(w["covariance"][5][5].get<double>(), 2e-6 * 39.5 / 40, 1e-12);
   EXPECT_NEAR(w["covariance"][8][8].get<double>(), 2e-4, 1e-4);
   EXPECT_EQ(w["bias_jacobian"].size(), 9U);
 
