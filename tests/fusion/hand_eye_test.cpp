@@ -621,7 +621,9 @@ TEST(PoseStreams, InterpolateToTheFourthOrderAndFindADelay) {
     for (double t = 1 + step / 2; t < 18; t += step, ++n) squares += (pose(t).inverse() * *s.at(t)).log().squaredNorm();
     const double error = std::sqrt(squares / n);
     EXPECT_NEAR(s.interpolationError().trace() / (error * error), 1, 0.3) << "measured without the truth";
-    if (before > 0) EXPECT_NEAR(before / error, 16, 3);
+    if (before > 0) {
+      EXPECT_NEAR(before / error, 16, 3);
+    }
     before = error;
   }
   const PoseStream a = stream(0.02, 0), b = stream(0.05, 0.3);

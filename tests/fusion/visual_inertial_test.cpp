@@ -274,7 +274,9 @@ TEST(VisualInertialVerdict, MeansOfDependentNumbersHaveABound) {
       const double tail = detail::chiSquaredTail(x, k);
       EXPECT_EQ(detail::dependentMeanTail(x, k, 1), tail);
       EXPECT_GE(detail::dependentMeanTail(x, k, 9), tail);
-      if (x >= 2 * static_cast<double>(k)) EXPECT_LE(detail::dependentMeanTail(x, k, 9), 1.2 * std::exp(1.) * tail);
+      if (x >= 2 * static_cast<double>(k)) {
+        EXPECT_LE(detail::dependentMeanTail(x, k, 9), 1.2 * std::exp(1.) * tail);
+      }
     }
   }
   EXPECT_EQ(detail::dependentMeanTail(3, 5, 0), 1);

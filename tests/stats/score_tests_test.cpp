@@ -159,7 +159,9 @@ TEST(ScoreTests, CommonEstimatesAreCoveredUnderDependenceToo) {
     }
     EXPECT_LT(nees, rho > 0 ? 1.5 : 1 + 4 * std::sqrt(2.0 / (P + 1) / trials)) << rho;
     EXPECT_GT(nees, rho > 0 ? 0.3 : 1 - 4 * std::sqrt(2.0 / (P + 1) / trials)) << rho;
-    if (rho > 0) EXPECT_GT(without, 4);
+    if (rho > 0) {
+      EXPECT_GT(without, 4);
+    }
   }
 }
 
