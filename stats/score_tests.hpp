@@ -159,10 +159,11 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
     test.p = std::erfc(std::abs(test.z) / std::sqrt(2.0));
     ++tested;
   }
+  const auto at = [](int suspect) { return static_cast<std::size_t>(P) + static_cast<std::size_t>(suspect); };
   for (int j = 0; j < G; ++j) {
     SuspectTest& test = result.suspects[static_cast<std::size_t>(j)];
     test.significant = test.tested() && test.p * tested < suspicion_level;
-    if (!test.significant || !held[static_cast<std::size_t>(P + j)]) continue;
+    if (!test.significant || !held[at(j)]) continue;
     if (result.strongest < 0 ||
         std::abs(test.z) > std::abs(result.suspects[static_cast<std::size_t>(result.strongest)].z)) {
       result.strongest = j;
@@ -172,8 +173,7 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
     const double most = result.suspects[static_cast<std::size_t>(result.strongest)].z;
     for (int j = 0; j < G; ++j) {
       SuspectTest& test = result.suspects[static_cast<std::size_t>(j)];
-      test.in_group =
-          held[static_cast<std::size_t>(P + j)] && test.tested() && most * most - test.z * test.z < group_limit;
+      test.in_group = held[at(j)] && test.tested() && most * most - test.z * test.z < group_limit;
     }
   }
 

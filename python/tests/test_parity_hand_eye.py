@@ -25,6 +25,8 @@ class HandEyeParity(parity.ParityTest):
             json = parity.program("hand-eye", *paths, *options, codes=(0 if status == "ok" else 3,))
             a, b = (liestat.read_features(path, liestat.SE3) for path in paths)
             times = np.loadtxt(paths[0], delimiter=",", skiprows=1, ndmin=2)[:, 0]
+        if not keywords.get("relative"):
+            keywords["stream_of_a"] = (times, a.features)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             result = liestat.hand_eye(a.features, b.features, a.covariances, b.covariances, times=times, **keywords)

@@ -90,7 +90,10 @@ class ViInitParity(parity.ParityTest):
 
     def test_options(self):
         self.run_both("--window", 3, "--stride", 1, "--image-rate", 5, window=3.0, stride=1.0, image_rate=5.0)
-        self.run_both("--no-refinement", "--no-consensus", "--fuse", 0, refinement=False, consensus=False, stretch=0.0)
+        # No windows met: not tested.
+        self.run_both(
+            "--no-refinement", "--no-consensus", "--fuse", 0, codes=(3,), refinement=False, consensus=False, stretch=0.0
+        )
 
     def test_what_is_not_to_be_trusted(self):
         result = self.run_both("--gravity", 5, codes=(3,), gravity=5.0)
