@@ -33,9 +33,9 @@ namespace liestat {
 template <int G>
 struct ScoreTestOptions {
   /// Standard deviations of priors: 0 if the suspect keeps its value, infinite if it is an unknown without a prior.
-  std::array<double, G> prior_sigmas = {};
+  std::array<double, static_cast<std::size_t>(G)> prior_sigmas = {};
   /// Values at which the residuals and derivatives were taken; priors are about zero.
-  std::array<double, G> values = {};
+  std::array<double, static_cast<std::size_t>(G)> values = {};
   /// The whitening is known; otherwise it is known up to a factor, which the residuals tell.
   bool known_noise = true;
 };
@@ -44,7 +44,7 @@ struct ScoreTestOptions {
 template <int P, int G>
 struct ScoreTests {
   /// In the order of the columns, without names.
-  std::array<SuspectTest, G> suspects;
+  std::array<SuspectTest, static_cast<std::size_t>(G)> suspects;
   /// The movement of the parameters' estimate per unit by which a suspect is off.
   Eigen::Matrix<double, P, G> shifts = Eigen::Matrix<double, P, G>::Zero();
   /// Where suspects are unknowns: the step to the common estimate, first of the parameters, and its covariance. Zero
@@ -63,7 +63,8 @@ struct SuspectDirection {
   Eigen::Matrix<double, N, 1> w;  ///< its unit step and what the other unknowns do to undo it
   double information = 0, remaining = 0;
 
-  SuspectDirection(const Eigen::Matrix<double, N, N>& information_of_all, int k, const std::array<bool, N>& held)
+  SuspectDirection(const Eigen::Matrix<double, N, N>& information_of_all, int k,
+                   const std::array<bool, static_cast<std::size_t>(N)>& held)
       : w(Eigen::Matrix<double, N, 1>::Zero()) {
     Eigen::Matrix<double, N, N> normal = information_of_all;
     Eigen::Matrix<double, N, 1> right = information_of_all.col(k);
@@ -93,7 +94,7 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
   using Matrix = Eigen::Matrix<double, N, N>;
   using Vector = Eigen::Matrix<double, N, 1>;
   ScoreTests<P, G> result;
-  std::array<bool, N> held = {};
+  std::array<bool, static_cast<std::size_t>(N)> held = {};
   int unknowns = P;
   Vector prior = Vector::Zero();  // information
   for (int j = 0; j < G; ++j) {
@@ -110,7 +111,7 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
   }
   // Noise and its dependence are what is left when all suspects that can be told apart have been fitted: one that is
   // wrong would pass for an error that lasts.
-  std::array<bool, N> left_out = {};
+  std::array<bool, static_cast<std::size_t>(N)> left_out = {};
   for (int k = P; k < N; ++k) left_out[static_cast<std::size_t>(k)] = true;
   int fitted = P;
   for (int k = P; k < N; ++k) {
@@ -213,7 +214,7 @@ std::pair<Eigen::Matrix<double, P, 1>, Eigen::Matrix<double, P, P>> groupMixture
   if (tests.strongest < 0) return {mean, spread};
   const double most = tests.suspects[static_cast<std::size_t>(tests.strongest)].z;
   double sum = 0;
-  std::array<double, G> weights = {};
+  std::array<double, static_cast<std::size_t>(G)> weights = {};
   for (std::size_t j = 0; j < G; ++j) {
     const SuspectTest& test = tests.suspects[j];
     if (!test.in_group) continue;

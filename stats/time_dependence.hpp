@@ -110,7 +110,8 @@ CellSums<P> cellSums(double f, const Rows& rows, std::span<const double> decay) 
 
 /// The likelihoods of a cell, of which the parameters in `held` are known.
 template <int C, int P, class Rows>
-void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay, const std::array<bool, P>& held) {
+void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay,
+               const std::array<bool, static_cast<std::size_t>(P)>& held) {
   auto [gram, log_det] = cellSums<C, P>(cell.share, rows, decay);
   double freedom = static_cast<double>(C) * static_cast<double>(rows.size());
   for (int k = 0; k < P; ++k) {
@@ -155,7 +156,8 @@ Eigen::Matrix<double, P, P> cellSandwich(const TimeCell& cell, const Rows& rows,
 template <int C, int P>
 class TimeModel {
  public:
-  TimeModel(std::span<const TimedRow<C, P>> given, bool known_noise, const std::array<bool, P>& held = {})
+  TimeModel(std::span<const TimedRow<C, P>> given, bool known_noise,
+            const std::array<bool, static_cast<std::size_t>(P)>& held = {})
       : known_noise_(known_noise), held_(held) {
     std::vector<std::size_t> order(given.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -303,7 +305,7 @@ class TimeModel {
   }
 
   bool known_noise_;
-  std::array<bool, P> held_;
+  std::array<bool, static_cast<std::size_t>(P)> held_;
   std::vector<TimedColumns<C, P>> rows_;    // sorted by time
   std::vector<TimeCell> cells_;             // white noise first
   std::vector<std::vector<double>> decay_;  // of white noise, then of each time constant
