@@ -76,7 +76,7 @@ double trial(PreintegrationCheck check, double window, double scale, CounterRng&
   return mahalanobisSquared<double, 9>(Eigen::Matrix<double, 9, 1>(error.head<9>()), whole.gaussian().covariance);
 }
 
-/// What happens to the times of a recording's readings.
+/// Disturbances of the times of a recording's readings.
 enum class Readings { regular, dropped, jitter, bunched, one };
 
 /// A recording: a motion, readings of it, and how they are integrated.

@@ -2,7 +2,7 @@
 // quantity, a test in its direction does. Rows have whitened residuals u, their derivatives K by the parameters, to
 // which they were fitted, and G by the suspects, which the model takes for known.
 //
-// Of a suspect g = G_j, g̃ = g - K C Σ Kᵀ g is what the parameters leave, U = Σ g̃ᵀ u its score, I = Σ g̃ᵀ g̃:
+// The parameters leave g̃ = g - K C Σ Kᵀ g of a suspect g = G_j, whose score is U = Σ g̃ᵀ u, with I = Σ g̃ᵀ g̃:
 // the residuals ask for η = -U/I, and z = -U/√V, sd(η) = √V/I. V is the variance of the score, with the dependence in
 // time that the residuals show (stats/time_dependence.hpp): V = I for independent errors of known variance. Where
 // suspects are unknowns, with or without a prior, they are eliminated like parameters, and a prior is one more row.
@@ -40,7 +40,7 @@ struct ScoreTestOptions {
   bool known_noise = true;
 };
 
-/// What rows say about G suspects beside P parameters.
+/// The result of scoreTests() for G suspects beside P parameters.
 template <int P, int G>
 struct ScoreTests {
   /// In the order of the columns, without names.

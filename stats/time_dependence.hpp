@@ -243,7 +243,7 @@ class TimeModel {
     }
     found_.tested = true;
   }
-  /// Of many rows a block in the middle tells which cells are worth all of them: white noise, and those that it does not
+  /// Judges the cells; where there are many rows, white noise and those cells alone that a block in the middle does not
   /// rule out.
   void judgeCells() {
     constexpr std::size_t many = 20000, block = 10000;

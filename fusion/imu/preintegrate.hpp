@@ -38,7 +38,7 @@ struct RecordingOptions {
   bool chained = false;
 };
 
-/// What the times and the changes of readings say about an increment, the worst first.
+/// Verdict of the times and the changes of readings on an increment, the worst first.
 enum class ImuSampling {
   adequate,
   untested,  ///< too few readings to see how rate and force vary within a step

@@ -72,7 +72,7 @@ struct RecordingWindows {
   /// Verdict on the windows together: no, if one has no increment or the covariances are not those of the errors; with
   /// a truth as verdict(), else yes.
   Verdict outcome() const;
-  /// What the readings say about the increments beyond the faults: windows that are bunched, undersampled, rough or
+  /// Remarks on the increments beyond the faults, in sentences: windows that are bunched, undersampled, rough or
   /// untested, and where the Earth's rotation matters. They leave the verdict as it is.
   std::vector<std::string> notes() const;
   /// Every window has an increment.

@@ -199,7 +199,7 @@ TEST(VisualInertialVerdict, OneWindowIsOkAndNoStretchContradictsAll) {
   r.windows.resize(2);
   EXPECT_EQ(text(Verdict::Answer::no), "Not to be trusted: none of 2 windows is ok.");
   r.windows[1] = okWindow();
-  // What was not tested has not passed: no stretches, and stretches of a single window.
+  // No stretches, and stretches of a single window, are not tested and have not passed.
   const auto untested = [&] { return text(Verdict::Answer::no).find("Not tested: 1 of 2 windows are ok, but") == 0; };
   EXPECT_TRUE(untested());
   r.stretches.resize(2);

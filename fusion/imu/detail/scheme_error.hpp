@@ -17,8 +17,8 @@ struct ImuReading {
   ImuReading operator*(const S& s) const { return {s * rate, s * force}; }
 };
 
-/// What a scheme of the next order would add to an increment, to first order: position, rotation and velocity in the
-/// axes of the start.
+/// The increment by a scheme of the next order minus that of the scheme, to first order: position, rotation and velocity
+/// in the axes of the start.
 template <class S>
 struct SchemeError {
   using Vector3 = Eigen::Matrix<S, 3, 1>;
