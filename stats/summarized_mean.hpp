@@ -17,11 +17,13 @@
 #include <stats/mean_summary.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -50,6 +52,24 @@ struct MeanInput {
   bool inflate = false;  ///< widens the covariance by the dependence on time
   static constexpr std::size_t max_timed_rows = 200000;
 
+  /// What is wrong with the lists, or nothing: each has one entry for each feature, covariances and factors may have a
+  /// single one, and times are finite.
+  std::string fault() const {
+    const auto wrong = [&](std::size_t n, bool single) {
+      return n != 0 && n != features.size() && !(single && n == 1);
+    };
+    const auto sentence = [&](const char* list, std::size_t n) {
+      return std::string(list) + ": " + std::to_string(n) + " for " + std::to_string(features.size()) + " features";
+    };
+    if (wrong(weights.size(), false)) return sentence("weights", weights.size());
+    if (wrong(covariances.size(), true)) return sentence("covariances", covariances.size());
+    if (wrong(factors.size(), true)) return sentence("factors", factors.size());
+    if (wrong(times.size(), false)) return sentence("times", times.size());
+    const auto finite = [](double t) { return std::isfinite(t); };
+    if (!std::all_of(times.begin(), times.end(), finite)) return "times that are not finite";
+    if (criterion == Criterion::maha && covariances.empty()) return "a Mahalanobis mean without covariances";
+    return {};
+  }
   bool weighted() const {
     return std::any_of(weights.begin(), weights.end(), [&](double w) { return w != weights.front(); });
   }
@@ -170,7 +190,7 @@ void setTimeDependence(MeanSummary& mean, const MeanInput<M>& input) {
   using T = ManifoldTraits<M>;
   constexpr int k = T::DoF;
   using Matrix = Eigen::Matrix<double, k, k>;
-  if (input.times.size() != input.features.size() || !mean.hasCovariance()) return;
+  if (input.times.empty() || !mean.hasCovariance()) return;
   if (mean.n > MeanInput<M>::max_timed_rows) return;
   const auto to_y = T::placement(featureOf<M>(mean.mean)).inverse();
   // Weights of any meaning but counts and precisions say nothing of the errors' sizes.
@@ -185,9 +205,9 @@ void setTimeDependence(MeanSummary& mean, const MeanInput<M>& input) {
     const double root = precisions ? std::sqrt(scale(input.weights[i])) : 1;
     auto& row = rows.emplace_back();
     row.time = input.times[i];
-    row.residual = root * T::logOrigin(T::act(to_y, input.features[i])).template cast<double>();
-    row.columns = root * Matrix::Identity();
-    scatter += row.residual * row.residual.transpose() / static_cast<double>(mean.n);
+    row.residual() = root * T::logOrigin(T::act(to_y, input.features[i])).template cast<double>();
+    row.columns() = root * Matrix::Identity();
+    scatter += row.residual() * row.residual().transpose() / static_cast<double>(mean.n);
   }
   Cholesky<double, k> noise(scatter);
   for (std::size_t i = 0, r = 0; i < input.features.size(); ++i) {
@@ -198,10 +218,9 @@ void setTimeDependence(MeanSummary& mean, const MeanInput<M>& input) {
     }
     if (!noise.ok()) return;
     auto& row = rows[r++];
-    row.residual = noise.template halfSolve<1>(row.residual);
-    row.columns = noise.template halfSolve<k>(row.columns);
+    row.values = noise.template halfSolve<k + 1>(row.values);
   }
-  setDependence<k>(mean, rows, input.inflate);
+  setDependence<k>(mean, std::move(rows), input.inflate);
 }
 
 template <Metric M, Executor E>
@@ -304,7 +323,8 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
 /// The mean of the measurements by their criterion, with its covariance if that can be trusted, its certificates and the
 /// dispersion; `feature` and notes are left to the caller (stats/mean_notes.hpp). A
 /// criterion that the type does not have (barycentre of a type with a metric, lsq without) is taken for the one that it
-/// has. The result has the same bits on any executor.
+/// has. The result has the same bits on any executor. Lists of the wrong length give `not_applicable` with the reason, and
+/// nothing else.
 template <Homogeneous M, Executor E>
 MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const MeanSummaryOptions& options = {}) {
   decltype(auto) any = detail::erased(executor);
@@ -317,6 +337,10 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
   mean.weights_are = input.weights_are;
   mean.known_noise = !input.covariances.empty();
   if (mean.known_noise && covarianceFrameMatters<M>()) mean.covariance_at = input.covariance_at;
+  if (mean.reason = input.fault(); !mean.reason.empty()) {
+    mean.status = mean.covariance_status = Status::not_applicable;
+    return mean;
+  }
   if (input.criterion == Criterion::maha) {
     detail::setMahalanobis(mean, any, input, options);
   } else if constexpr (Metric<M>) {

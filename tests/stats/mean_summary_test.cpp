@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -49,6 +50,33 @@ MeanSummary timedMean(const std::vector<Point>& points, bool inflate, std::vecto
   return summarizedMean(
       SerialExecutor{},
       MeanInput<Point>{.features = points, .covariances = std::move(covariances), .times = times, .inflate = inflate});
+}
+
+// Lists that do not belong to the features give a reason and no number; each of them did harm in silence.
+TEST(MeanInputs, ListsOfTheWrongLengthAreRefused) {
+  const std::vector<Point> points = series(30, 0, 1);
+  const std::vector<double> weights(29, 1.0), times = everyTenth(31);
+  std::vector<double> broken = everyTenth(30);
+  broken[7] = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<SquareOf<Point>> two(2, SquareOf<Point>::Identity());
+  const struct {
+    MeanInput<Point> input;
+    const char* reason;
+  } cells[] = {{{.weights = weights}, "weights: 29 for 30 features"},
+               {{.covariances = two}, "covariances: 2 for 30 features"},
+               {{.criterion = Criterion::maha, .covariances = two}, "covariances: 2 for 30 features"},
+               {{.criterion = Criterion::maha}, "a Mahalanobis mean without covariances"},
+               {{.times = times}, "times: 31 for 30 features"},
+               {{.times = broken}, "times that are not finite"}};
+  for (auto [input, reason] : cells) {
+    input.features = points;
+    const MeanSummary mean = summarizedMean(SerialExecutor{}, input);
+    EXPECT_EQ(mean.status, Status::not_applicable);
+    EXPECT_EQ(mean.reason, reason);
+    EXPECT_FALSE(mean.hasCovariance());
+    EXPECT_TRUE(mean.verdict().isNo());
+  }
+  EXPECT_EQ(summarizedMean(SerialExecutor{}, MeanInput<Point>{.features = points}).status, Status::ok);
 }
 
 // The region of a mean of independent errors stays what it is but in few samples, to the last bit.
