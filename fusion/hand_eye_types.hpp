@@ -66,10 +66,23 @@ struct HandEyeOptions {
   std::vector<double> times = {};
   /// The stream that the poses of A are from, for the delay: at `times` it has the poses of the pairs, but for noise.
   std::vector<TimedPose> stream_of_a = {};
+  /// A of each pair is the stream's pose at the pair's time, that of B, in place of a row nearby; the error of
+  /// interpolation enters its covariance. Needs `times` and `stream_of_a`; a pair in a gap of the stream keeps its A.
+  bool interpolate = false;
   /// Standard deviations of what is known about the suspects, which are then estimated with X: 0 takes a suspect for
   /// known and tests it, infinity is no prior.
   std::array<double, hand_eye_suspects> suspect_sigmas = {};
   double delay_start = 0;  ///< s, from which the delay is sought
+  /// Where positive, the delay is sought from where the angular speeds of `stream_of_a` and of B at `times` agree best
+  /// within so many seconds of `delay_start`.
+  double largest_delay = 0;
+};
+
+/// The interpolation of A at the times of B.
+struct HandEyeInterpolation {
+  std::size_t in_gaps = 0;  ///< pairs that keep their A
+  /// The rms error of a pose, local, from every second pose of the stream left out.
+  double translation = 0, rotation = 0;  // m, rad
 };
 
 /// A direction of X (and Y) that the motions do not determine: the excitation is below the trusted one.
@@ -150,6 +163,7 @@ struct HandEyeResult {
   /// Dependence of the errors on time, by which the covariance is widened; untested without times, with few pairs, and
   /// where directions are open.
   TimeDependence dependence = {};
+  std::optional<HandEyeInterpolation> interpolation;  ///< where A was interpolated
   /// Excitations of the six directions, ascending.
   Eigen::Matrix<double, 6, 1> excitations = Eigen::Matrix<double, 6, 1>::Zero();
   std::vector<OpenDirection> directions;  ///< those below the trusted excitation, ascending
@@ -171,7 +185,7 @@ struct HandEyeResult {
     }
     return false;
   }
-  /// The suspects that the residuals speak for, with the option that takes them in; empty where there are none.
+  /// The suspects that the residuals speak for, and which of them to estimate; empty where there are none.
   std::string suspectsInWords() const;
   /// How it ended, in words.
   std::string inWords() const;
@@ -288,6 +302,12 @@ void describe(V& v, const OpenDirection& d) {
 }
 
 template <class V>
+void describe(V& v, const HandEyeInterpolation& x) {
+  v("in_gaps", x.in_gaps, "pairs that keep the row nearby");
+  v("rms_translation", x.translation, "of the error", "m")("rms_rotation", x.rotation, "", "rad");
+}
+
+template <class V>
 void describe(V& v, const PairFit& fit) {
   v("error_translation", Eigen::Vector3d(fit.error.head<3>()), "in the camera's frame", "m");
   v("error_rotation", Eigen::Vector3d(fit.error.tail<3>()), "", "rad");
@@ -316,6 +336,7 @@ void describe(V& v, const HandEyeResult& r) {
   v("variance_factor", r.variance_factor, "by which the given covariances were multiplied");
   v("noise", r.known_noise ? "given" : "scaled", "given or scaled");
   describe(v, r.dependence);
+  v("interpolation", r.interpolation, "of A at the times of B; null: rows nearby");
   v("excitations", r.excitations, "of the six directions, ascending");
   v("open_directions", r.directions, "that the motions leave open");
   v("suspects", r.suspects, "what the equations take for known");

@@ -24,7 +24,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -85,7 +84,7 @@ struct SuspectDirection {
 /// Tests G suspects, whose columns stand behind those of P parameters; the residuals are those of a fit. Rows without
 /// times have the same one.
 template <int C, int P, int G>
-ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const ScoreTestOptions<G>& options) {
+ScoreTests<P, G> scoreTests(std::vector<TimedRow<C, P + G>> rows, const ScoreTestOptions<G>& options) {
   constexpr int N = P + G;
   // Less is rounding: the parameters do all that the suspect would.
   constexpr double min_remaining = 1e-9;
@@ -106,8 +105,8 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
   Matrix of_rows = Matrix::Zero();
   Vector score = Vector::Zero();
   for (const TimedRow<C, N>& row : rows) {
-    of_rows += row.columns.transpose() * row.columns;
-    score += row.columns.transpose() * row.residual;
+    of_rows += row.columns().transpose() * row.columns();
+    score += row.columns().transpose() * row.residual();
   }
   // Noise and its dependence are what is left when all suspects that can be told apart have been fitted: one that is
   // wrong would pass for an error that lasts.
@@ -124,15 +123,14 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
     if (left_out[static_cast<std::size_t>(k)]) detail::holdParameter<N>(normal_of_all, k), off_of_all[k] = 0;
   }
   const Vector step_of_all = detail::Cholesky<double, N>(normal_of_all).template solve<1>(off_of_all);
-  std::vector<TimedRow<C, N>> noise(rows.begin(), rows.end());
-  for (TimedRow<C, N>& row : noise) row.residual -= row.columns * step_of_all;
-  const detail::TimeModel<C, N> model(noise, options.known_noise, left_out);
-  result.dependence = model.dependence();
   const double freedom = static_cast<double>(C) * static_cast<double>(rows.size()) - fitted;
+  for (TimedRow<C, N>& row : rows) row.residual() -= row.columns() * step_of_all;
+  const detail::TimeModel<C, N> model(std::move(rows), options.known_noise, left_out);
+  result.dependence = model.dependence();
   const double found = freedom > 0 ? model.power() / freedom : 1;
   // Noise that is larger than stated is no suspect.
   const double variance = options.known_noise ? std::max(1.0, found) : found;
-  const Matrix middle = model.isDependent() ? model.sandwich() : Matrix(variance * of_rows);
+  const Matrix middle = model.widens() ? model.sandwich() : Matrix(variance * of_rows);
   for (int j = 0; j < G; ++j) score[P + j] += prior[P + j] * options.values[static_cast<std::size_t>(j)];
 
   int tested = 0;
@@ -196,7 +194,7 @@ ScoreTests<P, G> scoreTests(std::span<const TimedRow<C, P + G>> rows, const Scor
   const detail::WidenedCovariance<N> widened(0.5 * (independent + independent.transpose()), information, spread);
   result.covariance = widened.covariance;
   // Suspects that keep their values count as one each in the mean.
-  if (model.isDependent()) result.dependence.correlation_factor = 1 + (widened.factor - 1) * N / unknowns;
+  if (model.widens()) result.dependence.correlation_factor = 1 + (widened.factor - 1) * N / unknowns;
   for (int k = P; k < N; ++k) {
     if (held[static_cast<std::size_t>(k)]) result.covariance(k, k) = 0;
   }

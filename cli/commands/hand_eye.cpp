@@ -30,8 +30,6 @@ struct Options {
   bool relative = false, invert_a = false, invert_b = false, keep_outliers = false;
   bool in_degrees = false, in_radians = false;
   std::vector<double> sigma_a, sigma_b;
-  bool interpolate = false;
-  double largest_delay = 0;
   std::vector<std::string> unknowns;
   HandEyeOptions estimate;
 };
@@ -131,28 +129,6 @@ void requireNoise(const HandEyeOutput& output) {
   }
 }
 
-/// A at the times of B instead of the nearest row, with the error of interpolation. A pair in a gap keeps its row.
-void interpolateA(std::vector<PosePair>& meant, HandEyeOutput& output, const PosePairs& pairs) {
-  const PoseStream stream(output.options.stream_of_a);
-  const Eigen::Matrix<double, 6, 6> error = stream.interpolationError();
-  std::size_t in_gaps = 0;
-  for (std::size_t i = 0; i < meant.size(); ++i) {
-    const double time = pairs.b.times[pairs.rows[i].b];
-    const auto pose = stream.at(time);
-    if (!pose) {
-      ++in_gaps;
-      continue;
-    }
-    meant[i].a.mean = *pose;
-    if (output.options.known_noise) meant[i].a.covariance += error;
-    output.options.times[i] = time;
-  }
-  if (in_gaps > 0) output.notes.push_back(fmt::format("{} pairs lie in gaps of A and keep the nearest row", in_gaps));
-  output.notes.push_back(fmt::format("A interpolated at the times of B, rms error {:.2g} m, {:.2g} deg",
-                                     std::sqrt(error.topLeftCorner<3, 3>().trace()),
-                                     std::sqrt(error.bottomRightCorner<3, 3>().trace()) * degrees));
-}
-
 HandEyeOutput calibrate(Options options) {
   options.pairs.reading.angles = options.in_degrees   ? AngleUnit::degrees
                                  : options.in_radians ? AngleUnit::radians
@@ -188,19 +164,18 @@ HandEyeOutput calibrate(Options options) {
     const auto suspect = static_cast<std::size_t>(*named<HandEyeSuspect>(unknown));
     output.options.suspect_sigmas[suspect] = std::numeric_limits<double>::infinity();
   }
+  HandEyeOptions& estimate = output.options;
   if (pairs.by_time && !options.relative) {
-    output.options.stream_of_a = streamOf(pairs.a, options.invert_a);
-    if (options.interpolate) interpolateA(meant, output, pairs);
-    if (options.largest_delay > 0) {
-      output.options.delay_start =
-          delayOfSpeeds(PoseStream(output.options.stream_of_a), PoseStream(streamOf(pairs.b, options.invert_b)),
-                        options.largest_delay);
+    estimate.stream_of_a = streamOf(pairs.a, options.invert_a);
+    if (estimate.interpolate) {
+      for (std::size_t i = 0; i < meant.size(); ++i) estimate.times[i] = pairs.b.times[pairs.rows[i].b];
     }
-  } else if (options.interpolate || options.largest_delay > 0 || output.options.suspect_sigmas[0] > 0) {
+  } else if (estimate.interpolate || estimate.largest_delay > 0 || estimate.suspect_sigmas[0] > 0) {
     throw OptionError(command_name, "--interpolate, --largest-delay and a delay need poses with times",
                       "files with times, without --by-row and --relative");
   }
   hints.estimate = output.options;
+  hints.estimate.interpolate = false;  // the stream is read as is meant, the hints are other readings
   output.result = options.relative ? estimateHandEye(meant, output.options) : estimateRobotWorld(meant, output.options);
   if (output.result.fault.kind == FaultKind::bad_covariance) {
     const PoseRows& rows = pairs.rows[output.result.fault.index];
@@ -245,7 +220,7 @@ void addHandEyeCommand(const CommandList& program) {
       .option("--tolerance", options->pairs.tolerance,
               "Largest difference of times that belong together, s (default 0.01)")
       .notNegative();
-  command.flag("--interpolate", options->interpolate,
+  command.flag("--interpolate", options->estimate.interpolate,
                "A is interpolated at the times of B; the error of interpolation, from every second row, is added");
   command
       .option("--estimate", options->unknowns,
@@ -265,7 +240,7 @@ void addHandEyeCommand(const CommandList& program) {
               "The same of the camera's focal length, a ratio")
       .notNegative();
   command
-      .option("--largest-delay", options->largest_delay,
+      .option("--largest-delay", options->estimate.largest_delay,
               "The delay is sought from where angular speeds agree best within so many seconds (default 0)")
       .notNegative();
   command.flag("--by-row", options->pairs.by_row, "Row i of A belongs to row i of B, whatever their times");

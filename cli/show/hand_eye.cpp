@@ -88,6 +88,12 @@ std::string summary(const HandEyeOutput& output) {
     text += fmt::format("{} pairs by row\n", output.rows.size());
   }
   for (const std::string& note : output.notes) text += note + "\n";
+  if (const auto& x = output.result.interpolation) {
+    text += fmt::format("A interpolated at the times of B, rms error {:.2g} m, {:.2g} deg", x->translation,
+                        x->rotation * degrees);
+    if (x->in_gaps > 0) text += fmt::format("; {} pairs lie in gaps of A and keep the nearest row", x->in_gaps);
+    text += "\n";
+  }
   return text;
 }
 std::string fitInWords(const HandEyeOutput& output) {
@@ -97,7 +103,7 @@ std::string fitInWords(const HandEyeOutput& output) {
                       r.degrees_of_freedom);
   if (output.options.known_noise) text += fmt::format(", p {}", number(r.p, 2));
   text += fmt::format("); {} starts\n", r.starts);
-  if (r.dependence.tested) text += r.dependence.inWords() + "\n";
+  if (r.dependence.tested || r.dependence.unequal_axes) text += r.dependence.inWords() + "\n";
   for (const HandEyeSuspectTest& x : r.suspects) {
     if (!(x.prior_sigma > 0)) continue;
     text += fmt::format("{} {} +- {}{}\n", x.name, number(x.value, 4), number(x.value_sigma, 2),

@@ -1299,6 +1299,8 @@ def hand_eye(
     times: ArrayLike | None = None,
     suspect_sigmas: dict[str, float] | None = None,
     stream_of_a: tuple[ArrayLike, SE3] | None = None,
+    interpolate: bool = False,
+    largest_delay: float = 0.0,
 ) -> _HandEyeResult: ...
 def two_view(
     matches: ArrayLike,

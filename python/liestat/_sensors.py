@@ -220,6 +220,8 @@ def hand_eye(
     times=None,
     suspect_sigmas=None,
     stream_of_a=None,
+    interpolate=False,
+    largest_delay=0.0,
 ):
     """Hand-eye calibration from pairs of poses that both carry noise.
 
@@ -244,6 +246,10 @@ def hand_eye(
         standard deviation of its prior, s or a ratio; inf: without one. The others are taken for known and tested.
     stream_of_a : tuple of array_like, shape (m,), and SE3, shape (m,), optional
         Times and poses of the stream that `a` is from, without which there is no delay.
+    interpolate : bool
+        `a` is replaced by the stream's poses at `times`, those of `b`; the error of interpolation is added.
+    largest_delay : float
+        The delay is sought from where angular speeds agree best within so many seconds.
 
     Returns
     -------
@@ -279,6 +285,8 @@ def hand_eye(
         stream_times = _vector(stream_of_a[0], "hand_eye: times of stream_of_a")
         _same_length("hand_eye", stream_times=stream_times, stream_poses=stream_of_a[1])
         stream_poses = np.ascontiguousarray(stream_of_a[1].params)
+    if (interpolate or largest_delay > 0) and (times is None or stream_of_a is None):
+        raise ValueError("hand_eye: interpolate and largest_delay need times and stream_of_a")
     d = _core.hand_eye(
         np.ascontiguousarray(a.params),
         covariances[0],
@@ -294,6 +302,8 @@ def hand_eye(
         [float(sigmas.get(name, 0)) for name in names],
         stream_times,
         stream_poses,
+        bool(interpolate),
+        float(largest_delay),
     )
     if d["status"] != "ok":
         warnings.warn(f"liestat.hand_eye: {d['status']}: {d['in_words']}", UserWarning, stacklevel=2)

@@ -19,7 +19,7 @@ py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const 
                    const DoubleArray& b_covariance, bool world, bool known_noise, bool find_outliers, double gate,
                    int samples, std::uint64_t seed, const DoubleArray& times,
                    const std::array<double, hand_eye_suspects>& suspect_sigmas, const DoubleArray& stream_times,
-                   const DoubleArray& stream_poses) {
+                   const DoubleArray& stream_poses, bool interpolate, double largest_delay) {
   const auto n = static_cast<std::size_t>(a.shape(0));
   std::vector<PosePair> pairs(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -34,6 +34,8 @@ py::dict calibrate(const DoubleArray& a, const DoubleArray& a_covariance, const 
   options.seed = seed;
   options.times.assign(times.data(), times.data() + times.size());
   options.suspect_sigmas = suspect_sigmas;
+  options.interpolate = interpolate;
+  options.largest_delay = largest_delay;
   for (std::size_t i = 0; i < static_cast<std::size_t>(stream_times.size()); ++i) {
     options.stream_of_a.push_back({stream_times.data()[i], point<SE3d>(stream_poses.data() + 7 * i)});
   }

@@ -60,6 +60,15 @@ class HandEyeParity(parity.ParityTest):
         )
         self.assertGreater(len(result.outliers), 0)
 
+    def test_interpolated_streams(self):
+        result = self.run_both(
+            "--seed", 3, options=("--interpolate", "--largest-delay", 0.1), interpolate=True, largest_delay=0.1
+        )
+        self.assertEqual(result.interpolation.in_gaps, 0)
+        with self.assertRaisesRegex(ValueError, "need times and stream_of_a"):
+            one = liestat.SE3.identity(3)
+            liestat.hand_eye(one, one, np.eye(6), np.eye(6), interpolate=True)
+
     def test_what_is_not_to_be_trusted(self):
         planar = self.run_both("--motion", "planar", status="undetermined")
         self.assertEqual(len(planar.open_directions), 1)

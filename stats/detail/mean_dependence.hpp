@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace liestat::detail {
@@ -22,20 +23,21 @@ inline double rowsInEffect(double n, double factor) { return 2 * n / (factor + 1
 /// covariance, with the measurements in effect for its law, and withholds it where they are less than three times the
 /// dimensions: the scatter of fewer says nothing of errors that hold on for so long (docs/which_mean.md).
 template <int K>
-void setDependence(MeanSummary& mean, const std::vector<TimedRow<K, K>>& rows, bool inflate) {
+void setDependence(MeanSummary& mean, std::vector<TimedRow<K, K>> rows, bool inflate) {
   using Matrix = Eigen::Matrix<double, K, K>;
   constexpr double min_rows_per_dimension = 3, min_rows = 6;
   Matrix information = Matrix::Zero();
-  for (const auto& row : rows) information += row.columns.transpose() * row.columns;
+  for (const auto& row : rows) information += row.columns().transpose() * row.columns();
   const Cholesky<double, K> normal(information);
   if (!normal.ok()) return;
   const Matrix plain = normal.template solve<K>(Matrix(Matrix::Identity()));
-  const TimedCovariance<K> timed = timedCovariance<K, K>(rows, plain, mean.known_noise);
+  const double n = static_cast<double>(rows.size());
+  const TimedCovariance<K> timed = timedCovariance<K, K>(std::move(rows), plain, mean.known_noise);
   mean.dependence = timed.dependence;
   mean.inflated = inflate && timed.dependence.tested;
   const double factor = timed.dependence.correlation_factor;
   if (!mean.inflated || !(factor > 1)) return;
-  const double in_effect = rowsInEffect(static_cast<double>(rows.size()), factor);
+  const double in_effect = rowsInEffect(n, factor);
   if (in_effect < std::max(min_rows, min_rows_per_dimension * K)) {
     mean.covariance.resize(0, 0);
     mean.covariance_factor.fill(std::numeric_limits<double>::quiet_NaN());

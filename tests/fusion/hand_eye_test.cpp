@@ -573,7 +573,7 @@ TEST(HandEyeSuspects, WhatIsPlantedIsNamedAndTakenIn) {
       const HandEyeResult plain = estimateRobotWorld(scene.pairs, scene.options);
       ASSERT_EQ(plain.suspects.size(), hand_eye_suspects);
       named += !plain.ok() && plain.suspects[k].in_group && plain.X_over_suspects &&
-               plain.suspectsInWords().find("--estimate") != std::string::npos;
+               plain.suspectsInWords().find("(estimate ") != std::string::npos;
       scene.options.suspect_sigmas[k] = std::numeric_limits<double>::infinity();
       const HandEyeResult taken = estimateRobotWorld(scene.pairs, scene.options);
       nees += scene.squaredError(taken.X) / trials;
@@ -602,6 +602,30 @@ TEST(HandEyeSuspects, NothingIsNamedWhereNothingIsPlantedAndPriorsAreConsistent)
   }
   EXPECT_LE(alarms, 3) << "at 1.5 % four of thirty have the probability 1e-3";
   for (const double nees : {plain, clean, planted}) EXPECT_NEAR(nees, 6, 4 * std::sqrt(12.0 / trials));
+}
+
+TEST(HandEyeStreams, AreInterpolatedAtTheTimesOfBAndALargeDelayIsFound) {
+  constexpr int trials = 12;
+  constexpr double delay = 0.3, off = 0.007;  // s
+  double nees = 0;
+  for (std::uint64_t t = 0; t < trials; ++t) {
+    MovingScene scene(60, delay + off, 0, 0, 300 + t);
+    for (double& time : scene.options.times) time += off;
+    scene.options.interpolate = true;
+    scene.options.largest_delay = 0.5;
+    scene.options.suspect_sigmas[0] = std::numeric_limits<double>::infinity();
+    const HandEyeResult result = estimateRobotWorld(scene.pairs, scene.options);
+    ASSERT_TRUE(result.interpolation.has_value());
+    EXPECT_EQ(result.interpolation->in_gaps, 0u);
+    EXPECT_LT(result.interpolation->translation, 1e-3);
+    EXPECT_LT(std::abs(result.suspects[0].value - delay), 4.5 * result.suspects[0].value_sigma);
+    nees += scene.squaredError(result.X) / trials;
+    scene.options.largest_delay = -1;
+    EXPECT_EQ(estimateRobotWorld(scene.pairs, scene.options).fault.kind, FaultKind::bad_option);
+    scene.options.largest_delay = 0, scene.options.times.clear();
+    EXPECT_EQ(estimateRobotWorld(scene.pairs, scene.options).fault.kind, FaultKind::bad_option);
+  }
+  EXPECT_NEAR(nees, 6, 4 * std::sqrt(12.0 / trials));
 }
 
 TEST(PoseStreams, InterpolateToTheFourthOrderAndFindADelay) {

@@ -40,19 +40,19 @@ Drawn draw(int n, double rho, const Eigen::Vector3d& planted, std::uint64_t tria
     TimedRow<C, N>& row = d.rows.emplace_back();
     row.time = 0.1 * i;
     for (int c = 0; c < C; ++c) {
-      for (int p = 0; p < P; ++p) row.columns(c, p) = p == c ? 1 : std::sin(0.4 * (p + c) + 0.03 * (p + 1) * i);
-      row.columns(c, P) = std::cos(1.3 * c + 0.23 * i);
-      row.columns(c, P + 1) = std::cos(0.7 * c + 0.19 * i);
-      row.columns(c, P + 2) = row.columns(c, P + 1) + 0.05 * std::sin(0.9 * c + 0.31 * i);
+      for (int p = 0; p < P; ++p) row.values(c, p) = p == c ? 1 : std::sin(0.4 * (p + c) + 0.03 * (p + 1) * i);
+      row.values(c, P) = std::cos(1.3 * c + 0.23 * i);
+      row.values(c, P + 1) = std::cos(0.7 * c + 0.19 * i);
+      row.values(c, P + 2) = row.values(c, P + 1) + 0.05 * std::sin(0.9 * c + 0.31 * i);
     }
     if (i > 0) error = rho * error + std::sqrt(1 - rho * rho) * rng.normalVector<C>();
-    row.residual = sigma * error - row.columns.rightCols<G>() * planted;
-    information += row.columns.leftCols<P>().transpose() * row.columns.leftCols<P>();
-    right += row.columns.leftCols<P>().transpose() * row.residual;
+    row.residual() = sigma * error - row.columns().rightCols<G>() * planted;
+    information += row.columns().leftCols<P>().transpose() * row.columns().leftCols<P>();
+    right += row.columns().leftCols<P>().transpose() * row.residual();
   }
   d.plain = information.inverse();
   d.off = -d.plain * right;
-  for (TimedRow<C, N>& row : d.rows) row.residual += row.columns.leftCols<P>() * d.off;
+  for (TimedRow<C, N>& row : d.rows) row.residual() += row.columns().leftCols<P>() * d.off;
   return d;
 }
 
@@ -120,10 +120,10 @@ TEST(ScoreTests, UnknownsWithAndWithoutPriorsAreThoseOfLeastSquares) {
   Vector right = Vector::Zero();
   double squares = 0;
   for (const auto& row : d.rows) {
-    all += row.columns.transpose() * row.columns, right += row.columns.transpose() * row.residual;
-    H += row.columns.leftCols<K>().transpose() * row.columns.leftCols<K>();
-    g += row.columns.leftCols<K>().transpose() * row.residual;
-    squares += row.residual.squaredNorm();
+    all += row.columns().transpose() * row.columns(), right += row.columns().transpose() * row.residual();
+    H += row.columns().leftCols<K>().transpose() * row.columns().leftCols<K>();
+    g += row.columns().leftCols<K>().transpose() * row.residual();
+    squares += row.residual().squaredNorm();
   }
   // The noise is what all suspects together leave.
   const double variance = (squares - right.dot(all.ldlt().solve(right))) / (C * 60.0 - N);
@@ -168,8 +168,8 @@ TEST(ScoreTests, CommonEstimatesAreCoveredUnderDependenceToo) {
 TEST(ScoreTests, WhatTheParametersExplainIsNotTested) {
   Drawn d = draw(60, 0, Eigen::Vector3d::Zero(), 3);
   for (auto& row : d.rows) {
-    row.columns.col(P) = row.columns.col(0) - 2 * row.columns.col(2);
-    row.columns.col(P + 1).setZero();
+    row.values.col(P) = row.columns().col(0) - 2 * row.columns().col(2);
+    row.values.col(P + 1).setZero();
     row.time = 0;
   }
   const auto tests = scoreTests<C, P, G>(d.rows, {});

@@ -29,8 +29,9 @@ struct Drawn {
   Eigen::Matrix<double, P, 1> estimate;  ///< the truth is zero
 };
 
-/// Rows of slowly moving columns, ten a second, with errors of unit variance and correlation `rho` from row to row.
-Drawn draw(int n, double rho, std::uint64_t trial) {
+/// Rows of slowly moving columns, ten a second, with errors of unit variance and correlation `rho` from row to row; those
+/// of the first `loud` channels are white and five times as large.
+Drawn draw(int n, double rho, std::uint64_t trial, int loud = 0) {
   CounterRng rng(static_cast<std::uint64_t>(n), trial);
   Drawn drawn;
   Eigen::Matrix<double, C, 1> error = rng.normalVector<C>();
@@ -41,18 +42,19 @@ Drawn draw(int n, double rho, std::uint64_t trial) {
     row.time = 0.1 * i;
     for (int c = 0; c < C; ++c) {
       for (int p = 0; p < P; ++p) {
-        row.columns(c, p) = (p == c ? 1 : 0) + (p < C ? 0 : std::sin(0.3 * (p + c) + 0.02 * (p + 1) * i));
+        row.values(c, p) = (p == c ? 1 : 0) + (p < C ? 0 : std::sin(0.3 * (p + c) + 0.02 * (p + 1) * i));
       }
     }
     if (i > 0) error = rho * error + std::sqrt(1 - rho * rho) * rng.normalVector<C>();
-    row.residual = error;
-    information += row.columns.transpose() * row.columns;
-    right += row.columns.transpose() * error;
+    row.residual() = error;
+    for (int c = 0; c < loud; ++c) row.values(c, P) = 5 * rng.normal();
+    information += row.columns().transpose() * row.columns();
+    right += row.columns().transpose() * row.residual();
   }
   drawn.plain = information.inverse();
   drawn.plain = 0.5 * (drawn.plain + drawn.plain.transpose()).eval();
   drawn.estimate = drawn.plain * right;
-  for (TimedRow<C, P>& row : drawn.rows) row.residual -= row.columns * drawn.estimate;
+  for (TimedRow<C, P>& row : drawn.rows) row.residual() -= row.columns() * drawn.estimate;
   return drawn;
 }
 
@@ -94,6 +96,57 @@ TEST(TimeDependence, GaussMarkovErrorsAreCovered) {
   }
 }
 
+// Loud channels are white, quiet ones last: one dependence for all would be that of the loud, 2.6 times too small.
+TEST(TimeDependence, EachPrincipalAxisHasItsOwn) {
+  constexpr int n = 300, trials = 40;
+  double plain = 0, widened = 0;
+  for (int t = 0; t < trials; ++t) {
+    const Drawn d = draw(n, 0.99, static_cast<std::uint64_t>(t), 3);
+    double squares = 0;
+    for (const TimedRow<C, P>& row : d.rows) squares += row.residual().squaredNorm();
+    const Matrix scaled = squares / (C * n - P) * d.plain;
+    const TimedCovariance<P> timed = timedCovariance<C, P>(d.rows, scaled, false);
+    plain += d.estimate.dot(scaled.ldlt().solve(d.estimate)) / P / trials;
+    widened += d.estimate.dot(timed.covariance.ldlt().solve(d.estimate)) / P / trials;
+    EXPECT_TRUE(timed.dependence.dependent());
+  }
+  EXPECT_GT(plain, 2);
+  EXPECT_LT(widened, 1.3);
+  EXPECT_GT(widened, 0.3);
+}
+
+// Noise known up to a factor states the ratios of sizes, which the residuals may refute, times or not.
+TEST(TimeDependence, SizesThatAreNotInTheStatedRatiosAreTheirOwn) {
+  constexpr int n = 60, trials = 100, loud = 2;
+  double plain = 0, widened = 0;
+  int found = 0, alarms = 0;
+  for (int t = 0; t < trials; ++t) {
+    for (const int channels : {0, loud}) {
+      Drawn d = draw(n, 0, static_cast<std::uint64_t>(1000 + t), channels);
+      for (TimedRow<C, P>& row : d.rows) row.time = 0;
+      double squares = 0;
+      for (const TimedRow<C, P>& row : d.rows) squares += row.residual().squaredNorm();
+      const Matrix scaled = squares / (C * n - P) * d.plain;
+      const TimedCovariance<P> timed = timedCovariance<C, P>(d.rows, scaled, false);
+      EXPECT_FALSE(timed.dependence.tested);
+      (channels == 0 ? alarms : found) += timed.dependence.unequal_axes;
+      if (channels == 0) {
+        EXPECT_EQ(timed.dependence.unequal_axes, timed.covariance != scaled);
+        continue;
+      }
+      const auto of_loud = [&](const Matrix& covariance) {
+        const Eigen::Matrix<double, loud, 1> off = d.estimate.head<loud>();
+        return off.dot(covariance.topLeftCorner<loud, loud>().ldlt().solve(off)) / loud / trials;
+      };
+      plain += of_loud(scaled), widened += of_loud(timed.covariance);
+    }
+  }
+  EXPECT_EQ(found, trials);
+  EXPECT_LE(alarms, 2) << "of 100, at 1e-3";
+  EXPECT_GT(plain, 1.8);
+  EXPECT_NEAR(widened, 1, 4 * std::sqrt(2.0 / loud / trials));
+}
+
 TEST(TimeDependence, DoesNotDependOnTheOrderAndMakesNothingSmaller) {
   Drawn d = draw(60, 0.9, 1);
   const TimedCovariance<P> one = timedCovariance<C, P>(d.rows, d.plain, true);
@@ -118,7 +171,7 @@ TEST(TimeDependence, WhatCannotBeTestedIsNot) {
   for (TimedRow<C, P>& row : d.rows) row.time = 5;
   EXPECT_FALSE((timedCovariance<C, P>(d.rows, d.plain, true).dependence.tested)) << "all at one time";
   d = draw(60, 0, 1);
-  for (TimedRow<C, P>& row : d.rows) row.columns.col(3).setZero();
+  for (TimedRow<C, P>& row : d.rows) row.values.col(3).setZero();
   timed = timedCovariance<C, P>(d.rows, d.plain, true);
   EXPECT_FALSE(timed.dependence.tested) << "a parameter that is open";
   EXPECT_EQ((timed.covariance - d.plain).norm(), 0);

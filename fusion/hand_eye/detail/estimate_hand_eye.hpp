@@ -47,12 +47,12 @@ class HandEyeRun {
   HandEyeResult run() {
     result_.fault = fault();
     if (result_.fault) return std::move(result_);
-    sortByContent();
-    Indices all(pairs_.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    given_ = pairs_;
     stream_ = PoseStream(options_.stream_of_a);
-    if (!options_.times.empty()) values_[0] = options_.delay_start;
+    if (options_.interpolate) interpolate();
+    if (!options_.times.empty()) values_[0] = startOfDelay();
+    sortByContent();
+    const Indices all = allPairs();
+    if (isUnknown() || !values_.isZero(0)) given_ = pairs_;
     takeIn();
     fitAll(all);
     estimateSuspects();
@@ -76,9 +76,12 @@ class HandEyeRun {
   Fault fault() const {
     const HandEyeOptions& o = options_;
     if (!(o.gate > 0 && o.samples >= 0 && o.min_excitation > 0 && o.trusted_excitation >= o.min_excitation &&
-          o.min_p >= 0 && std::isfinite(o.delay_start) && (o.times.empty() || o.times.size() == pairs_.size()))) {
+          o.min_p >= 0 && std::isfinite(o.delay_start) && o.largest_delay >= 0 && std::isfinite(o.largest_delay) &&
+          (o.times.empty() || o.times.size() == pairs_.size()))) {
       return FaultKind::bad_option;
     }
+    const bool has_stream = !o.times.empty() && !o.stream_of_a.empty();
+    if ((o.interpolate || o.largest_delay > 0) && !has_stream) return FaultKind::bad_option;
     for (const double sigma : o.suspect_sigmas) {
       if (!(sigma >= 0)) return FaultKind::bad_option;
     }
@@ -99,25 +102,49 @@ class HandEyeRun {
     if (pairs_.size() < (world ? 3 : 2)) return {FaultKind::too_few_poses, pairs_.size()};
     return {};
   }
+  /// A at the times of the pairs; with noise that is known up to a factor its error, in metres, can't be added.
+  void interpolate() {
+    HandEyeInterpolation done;
+    const Matrix6 error = stream_.interpolationError();
+    done.translation = std::sqrt(error.topLeftCorner<3, 3>().trace());
+    done.rotation = std::sqrt(error.bottomRightCorner<3, 3>().trace());
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const std::optional<SE3d> pose = stream_.at(options_.times[i]);
+      if (!pose) {
+        ++done.in_gaps;
+        continue;
+      }
+      pairs_[i].a.mean = *pose;
+      if (options_.known_noise) pairs_[i].a.covariance += error;
+    }
+    result_.interpolation = done;
+  }
+  double startOfDelay() const {
+    if (!(options_.largest_delay > 0)) return options_.delay_start;
+    std::vector<TimedPose> of_b;
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      of_b.push_back({options_.times[i] + options_.delay_start, pairs_[i].b.mean});
+    }
+    return options_.delay_start + delayOfSpeeds(stream_, PoseStream(of_b), options_.largest_delay);
+  }
   /// By the numbers in the pairs, so that sums and samples do not depend on the order of the input.
   void sortByContent() {
-    using Key = std::array<double, 86>;
-    std::vector<std::pair<Key, std::size_t>> keys(pairs_.size());
-    for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      std::size_t n = 0;
-      const auto put = [&](const auto& values) {
-        for (Eigen::Index k = 0; k < values.size(); ++k) keys[i].first[n++] = values.data()[k];
-      };
-      put(pairs_[i].b.mean.params()), put(pairs_[i].a.mean.params());
-      put(pairs_[i].b.covariance), put(pairs_[i].a.covariance);
-      keys[i].second = i;
-    }
-    std::sort(keys.begin(), keys.end());
+    const auto numbers = [](const PosePair& x) {
+      return std::array{std::span(x.b.mean.params().data(), 7), std::span(x.a.mean.params().data(), 7),
+                        std::span(x.b.covariance.data(), 36), std::span(x.a.covariance.data(), 36)};
+    };
+    const auto before = [&](std::size_t i, std::size_t k) {
+      const auto x = numbers(pairs_[i]), y = numbers(pairs_[k]);
+      for (std::size_t part = 0; part < x.size(); ++part) {
+        const auto [at, other] = std::mismatch(x[part].begin(), x[part].end(), y[part].begin());
+        if (at != x[part].end()) return *at < *other;
+      }
+      return i < k;
+    };
+    std::sort(order_.begin(), order_.end(), before);
     std::vector<PosePair> sorted;
-    for (std::size_t i = 0; i < keys.size(); ++i) {
-      order_[i] = keys[i].second;
-      sorted.push_back(pairs_[keys[i].second]);
-    }
+    sorted.reserve(pairs_.size());
+    for (const std::size_t i : order_) sorted.push_back(pairs_[i]);
     pairs_ = std::move(sorted);
   }
 
@@ -132,20 +159,29 @@ class HandEyeRun {
   HandEyeFit refined(const HandEyeFit& fit, const Indices& indices, int iterations = 30, double factor = 1) const {
     return refineHandEye(fit, pairs_, indices, world, options_.trusted_excitation, iterations, factor);
   }
-  std::vector<double> errorsAt(const HandEyeValue& value) const {
+  /// The squared errors of the pairs of a list.
+  std::vector<double> errorsAt(const HandEyeValue& value, const Indices& list) const {
     std::vector<double> errors;
-    for (const PosePair& pair : pairs_) {
-      const double error = handEyeSquaredError(value, pair);
+    errors.reserve(list.size());
+    for (const std::size_t i : list) {
+      const double error = handEyeSquaredError(value, pairs_[i]);
       errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::max());
     }
     return errors;
   }
-  static Indices below(const std::vector<double>& errors, double bound) {
-    Indices list;
+  std::vector<double> errorsAt(const HandEyeValue& value) const { return errorsAt(value, allPairs()); }
+  /// Those of a list whose errors, in its order, are below a bound.
+  static Indices below(const std::vector<double>& errors, double bound, const Indices& list) {
+    Indices below;
     for (std::size_t i = 0; i < errors.size(); ++i) {
-      if (errors[i] <= bound) list.push_back(i);
+      if (errors[i] <= bound) below.push_back(list[i]);
     }
-    return list;
+    return below;
+  }
+  Indices allPairs() const {
+    Indices all(pairs_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    return all;
   }
   static double truncated(const std::vector<double>& errors, double bound) {
     double sum = 0;
@@ -161,23 +197,51 @@ class HandEyeRun {
   /// The best of all starts, from all pairs. Where the noise is not known its factor follows from the median error, which
   /// a minority of wrong pairs does not move much; what is excited depends on it, so that it is found twice.
   void fitAll(const Indices& all) {
+    const Indices some = spread(all);
     for (int round = 0; round < (options_.known_noise ? 1 : 3); ++round) {
       std::vector<HandEyeFit> fits;
-      for (const HandEyeValue& value : handEyeStarts(pairs_, all, world, options_.seed)) {
-        const double cost = handEyeCost(value, pairs_, all);
+      for (const HandEyeValue& value : handEyeStarts(pairs_, some, world, options_.seed)) {
+        const double cost = handEyeCost(value, pairs_, some);
         if (std::isfinite(cost)) fits.push_back({value, cost, false});
       }
       result_.starts = static_cast<int>(fits.size());
       if (fits.empty()) fits.push_back({});
       keepBest(fits);
-      for (HandEyeFit& fit : fits) fit = refined(fit, all);
+      for (HandEyeFit& fit : fits) fit = refined(fit, some);
       keepBest(fits);
+      if (some.size() < all.size()) refineDifferent(fits, all);
       take(fits, all);
       if (!options_.known_noise) {
         const double share = 1 - static_cast<double>(parameters) / (6 * static_cast<double>(pairs_.size()));
         rescale(median(errors_) / (median_error * share));
       }
     }
+  }
+  /// At most some thousands of the sorted pairs, evenly: enough for starts to part.
+  static Indices spread(const Indices& all) {
+    constexpr std::size_t enough = 2000;
+    const std::size_t step = all.size() / enough + 1;
+    Indices some;
+    for (std::size_t i = 0; i < all.size(); i += step) some.push_back(all[i]);
+    return some;
+  }
+  /// Refines the fits that are not the same one, which have converged to it, from all pairs.
+  void refineDifferent(std::vector<HandEyeFit>& fits, const Indices& all) const {
+    constexpr double same = 1e-3;  // m, rad
+    std::vector<HandEyeFit> different;
+    for (const HandEyeFit& fit : fits) {
+      const auto equals = [&](const HandEyeFit& x) {
+        return (x.value.X.inverse() * fit.value.X).log().norm() + (x.value.Y.inverse() * fit.value.Y).log().norm() <
+               same;
+      };
+      if (std::none_of(different.begin(), different.end(), equals)) different.push_back(fit);
+    }
+    for (HandEyeFit& fit : different) {
+      fit.cost = handEyeCost(fit.value, pairs_, all);
+      fit = refined(fit, all);
+    }
+    fits = std::move(different);
+    keepBest(fits);
   }
   static void keepBest(std::vector<HandEyeFit>& fits) {
     std::stable_sort(fits.begin(), fits.end(), [](const auto& x, const auto& y) { return x.cost < y.cost; });
@@ -189,6 +253,7 @@ class HandEyeRun {
   /// at first.
   void findOutliers() {
     const bool known = options_.known_noise;
+    const Indices all = allPairs(), some = spread(all);
     std::vector<HandEyeFit> fits;
     for (int s = 0; s < options_.samples; ++s) {
       CounterRng rng(options_.seed, static_cast<std::uint64_t>(s), 2);
@@ -202,22 +267,22 @@ class HandEyeRun {
       std::sort(sample.begin(), sample.end());
       const HandEyeMoments moments(pairs_, sample, world);
       const HandEyeValue value = closedFormStart(moments, pairs_, sample, world);
-      const std::vector<double> errors = errorsAt(value);
+      const std::vector<double> errors = errorsAt(value, some);
       fits.push_back({value, known ? truncated(errors, 4 * options_.gate) : median(errors), false});
       if (fits.size() > 64) keepBest(fits);
     }
     if (fits.empty()) return;
     keepBest(fits);
     for (HandEyeFit& fit : fits) {
-      std::vector<double> errors = errorsAt(fit.value);
+      std::vector<double> errors = errorsAt(fit.value, some);
       for (double widening : {4.0, 2.0, 1.0}) {
         // A scale that was found in the errors has grown with them.
         if (!known) widening = 1;
         const double gate = gateFor(errors);
-        const Indices inliers = below(errors, widening * gate);
+        const Indices inliers = below(errors, widening * gate, some);
         if (inliers.size() < 3) break;
         fit = refined(fit, inliers, 5, gate / options_.gate);
-        errors = errorsAt(fit.value);
+        errors = errorsAt(fit.value, some);
       }
       fit.cost = known ? truncated(errors, options_.gate) : median(errors);
     }
@@ -225,12 +290,12 @@ class HandEyeRun {
     HandEyeFit best = fits.front();
     std::vector<double> errors = errorsAt(best.value);
     double gate = gateFor(errors);
-    Indices inliers = below(errors, gate);
+    Indices inliers = below(errors, gate, all);
     for (int round = 0; round < 20 && inliers.size() >= 3; ++round) {
       best = refined(best, inliers, 30, gate / options_.gate);
       errors = errorsAt(best.value);
       gate = gateFor(errors);
-      Indices next = below(errors, gate);
+      Indices next = below(errors, gate, all);
       const bool same = next == inliers;
       inliers = std::move(next);
       if (same) break;
@@ -250,10 +315,10 @@ class HandEyeRun {
     const double most = median(errors) / median_error;
     double factor = most;
     for (int k = 0; k < 3; ++k) {
-      const Indices inliers = below(errors, factor * options_.gate);
-      double sum = 0;
-      for (const std::size_t i : inliers) sum += errors[i];
-      const double freedom = 6 * static_cast<double>(inliers.size()) - parameters;
+      double sum = 0, freedom = -parameters;
+      for (const double error : errors) {
+        if (error <= factor * options_.gate) sum += error, freedom += 6;
+      }
       if (freedom <= 0) break;
       factor = std::min(most, sum / freedom);
     }
@@ -351,6 +416,7 @@ class HandEyeRun {
   /// is in both.
   std::vector<TimedRow<6, columns>> suspectRows(const HandEyeValue& value) const {
     std::vector<TimedRow<6, columns>> rows;
+    rows.reserve(inliers_.size());
     for (const std::size_t i : inliers_) {
       const PosePair& pair = pairs_[i];
       const HandEyeJacobians at(value, pair.a.mean, pair.b.mean);
@@ -361,24 +427,24 @@ class HandEyeRun {
       const SE3d B = pair.b.mean * SE3d::exp(b);
       const HandEyeJacobians J(value, pair.a.mean * SE3d::exp(a), B);
       TimedRow<6, columns>& row = rows.emplace_back();
-      row.residual = S.halfSolve<1>(at.e);
-      row.columns.setZero();
+      row.values.setZero();
+      row.residual() = S.halfSolve<1>(at.e);
       if constexpr (world) {
-        row.columns.template leftCols<12>() << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
+        row.values.template leftCols<12>() << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
       } else {
-        row.columns.template leftCols<6>() = S.halfSolve<6>(Matrix6(J.X + J.Y));
+        row.values.template leftCols<6>() = S.halfSolve<6>(Matrix6(J.X + J.Y));
       }
       if (!options_.times.empty()) {
         row.time = options_.times[order_[i]];
         if (const auto velocity = stream_.velocity(row.time + values_[0])) {
-          row.columns.col(parameters) = S.halfSolve<1>(product(J.A, *velocity));
+          row.values.col(parameters) = S.halfSolve<1>(product(J.A, *velocity));
         }
       }
       const Eigen::Vector3d target = -(B.so3().inverse() * B.translation());
       const auto by = [&](int suspect, const Eigen::Vector3d& shift) {
         Vector6 step = Vector6::Zero();
         step.head<3>() = -shift;
-        row.columns.col(parameters + suspect) = S.halfSolve<1>(product(J.B, step));
+        row.values.col(parameters + suspect) = S.halfSolve<1>(product(J.B, step));
       };
       by(1, target);
       if constexpr (world) {
@@ -396,12 +462,10 @@ class HandEyeRun {
     if (!world) options.prior_sigmas[2] = options.prior_sigmas[3] = options.prior_sigmas[4] = 0;
     return scoreTests<6, parameters, suspects>(suspectRows(value), options);
   }
-  bool hasUnknownSuspects() const {
-    for (const double sigma : options_.suspect_sigmas) {
-      if (sigma > 0) return inliers_.size() >= min_pairs_for_suspects;
-    }
-    return false;
+  bool isUnknown() const {
+    return std::any_of(options_.suspect_sigmas.begin(), options_.suspect_sigmas.end(), [](double s) { return s > 0; });
   }
+  bool hasUnknownSuspects() const { return isUnknown() && inliers_.size() >= min_pairs_for_suspects; }
   /// Gauss–Newton over suspects, the pairs being made again and X refined at each step.
   void estimateSuspects() {
     if (!hasUnknownSuspects() || !std::isfinite(candidates_.front().cost)) return;
@@ -449,24 +513,24 @@ class HandEyeRun {
     result_.X_over_suspects = {value.X * SE3d::exp(Vector6(step.template head<6>())),
                                Matrix6(spread.template topLeftCorner<6, 6>())};
   }
-  /// The covariance with the dependence in time that the whitened errors show.
+  /// The covariance with the dependence in time and the sizes that the whitened errors show.
   SquareOf<typename Equation::Parameter> widened(const SquareOf<typename Equation::Parameter>& covariance,
                                                  const HandEyeValue& value) {
-    if (options_.times.empty()) return covariance;
     std::vector<TimedRow<6, parameters>> rows;
+    rows.reserve(inliers_.size());
     for (const std::size_t i : inliers_) {
       const HandEyeJacobians J(value, pairs_[i].a.mean, pairs_[i].b.mean);
       const Cholesky<double, 6> S = handEyeErrorFactor(J.A, J.B, pairs_[i]);
       TimedRow<6, parameters>& row = rows.emplace_back();
-      row.time = options_.times[order_[i]];
-      row.residual = S.halfSolve<1>(J.e);
+      if (!options_.times.empty()) row.time = options_.times[order_[i]];
+      row.residual() = S.halfSolve<1>(J.e);
       if constexpr (world) {
-        row.columns << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
+        row.columns() << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
       } else {
-        row.columns = S.halfSolve<6>(Matrix6(J.X + J.Y));
+        row.columns() = S.halfSolve<6>(Matrix6(J.X + J.Y));
       }
     }
-    const auto timed = timedCovariance<6, parameters>(rows, covariance, options_.known_noise);
+    const auto timed = timedCovariance<6, parameters>(std::move(rows), covariance, options_.known_noise);
     result_.dependence = timed.dependence;
     return timed.covariance;
   }
@@ -503,7 +567,7 @@ class HandEyeRun {
   Indices inliers_;                     // ascending, of the sorted pairs
   std::vector<HandEyeFit> candidates_;  // the best first
   std::vector<double> errors_;          // squared, at the best
-  std::vector<PosePair> given_;         // the sorted pairs as they were given
+  std::vector<PosePair> given_;         // the sorted pairs as they were given, where suspects are taken in
   PoseStream stream_;
   Eigen::Matrix<double, suspects, 1> values_ = Eigen::Matrix<double, suspects, 1>::Zero();
   HandEyeResult result_;

@@ -150,6 +150,7 @@ ConstrainedResult<typename Equation::Parameter> strictHandEye(const HandEyeValue
                                                               const Indices& indices,
                                                               const HandEyeExcitation& excitation, int open) {
   MeasurementChannel<typename Equation::Measurement, PosePairNoise, Equation> channel{{}, {}, {Equation{}}};
+  channel.measurements.reserve(indices.size()), channel.noises.reserve(indices.size());
   for (const std::size_t i : indices) {
     channel.measurements.emplace_back(pairs[i].a.mean, pairs[i].b.mean);
     channel.noises.emplace_back(pairs[i].a.covariance, pairs[i].b.covariance);

@@ -40,12 +40,12 @@ LIESTAT_FUSION_INLINE std::string HandEyeResult::suspectsInWords() const {
   for (const HandEyeSuspectTest& x : suspects) {
     if (x.in_group) {
       group += (group.empty() ? "" : " or ") + written(x);
-      options += (options.empty() ? "--estimate " : " or ") + x.name;
+      options += (options.empty() ? "estimate " : " or ") + x.name;
     } else if (x.significant && x.prior_sigma > 0) {
       refuted += (refuted.empty() ? "" : ", ") + written(x) + " against its prior";
     }
   }
-  if (!group.empty()) group = "the residuals speak for " + group + " (" + options + ")";
+  if (!group.empty()) group = "the residuals speak for " + group + " (" + options + " with X, or state a prior)";
   return group + (group.empty() || refuted.empty() ? "" : "; ") + refuted;
 }
 
