@@ -68,6 +68,7 @@ figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
   .wide thead { display: none; }
   .wide tr { border-bottom: 2px solid var(--rule); padding: .3rem 0; }
   .wide td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .4rem; text-align: right; }
+  .wide td:empty { display: none; }
   .wide td::before { content: attr(data-label); color: var(--soft); text-align: left; flex: none; max-width: 60%; }
 }
 footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85rem; }

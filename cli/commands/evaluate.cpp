@@ -19,6 +19,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -101,20 +102,23 @@ std::vector<SegmentErrors> segmentErrors(const TrajectoryEvaluation& e) {
   return segments;
 }
 
-/// A file as the library takes it, with the convention of its covariances if the file does not state it.
-PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention, std::string_view option) {
-  PoseTrajectory p{.times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = t.lines};
+/// A file as the library takes it, with the convention of its covariances if the file does not state it. The file's poses
+/// are given up, of which millions would stand in memory twice.
+PoseTrajectory poseTrajectory(Trajectory& t, const std::string& convention, std::string_view option) {
+  PoseTrajectory p{
+      .times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = std::move(t.lines)};
   for (std::size_t i = 0; i < p.lines.size(); ++i) {
     if (p.lines[i] == 0) p.lines[i] = i + 1;
   }
   if (!t.hasCovariances()) {
-    p.poses = exactPoses(t.poses);
+    p.poses = exactPoses(std::exchange(t.poses, {}));
     return p;
   }
   const auto given = convention.empty() ? std::nullopt : std::optional(conventionNamed(convention, option));
   const Convention c = conventionOf(t, given, option);
   p.covariance_convention = describe(c);
   p.poses = gaussiansOf(t, c);
+  t.poses = {}, t.covariances = {};
   return p;
 }
 
@@ -138,7 +142,7 @@ PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention
 EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& reference,
                               const PoseTrajectory& reference_poses, const std::string& path,
                               const std::string& shown_name) {
-  const Trajectory estimate = readTimedTrajectory(path, o.input.estimate, o.input.duplicates);
+  Trajectory estimate = readTimedTrajectory(path, o.input.estimate, o.input.duplicates);
   requireSameVertices(reference, estimate);
   if (!o.cov_from.empty() && !estimate.hasCovariances()) {
     throw InputError(estimate.name, 0, "the file has no covariances, and --cov-from is given",

@@ -15,8 +15,9 @@
 
 namespace liestat::detail {
 void readAsFeatures(const TrajectorySource& source, Trajectory& trajectory) {
-  const auto& [text, format, options] = source;
-  ReadingOptions reading = options.reading;
+  const TrajectoryFormat& format = source.format;
+  const std::string_view text = source.text;
+  ReadingOptions reading = source.options.reading;
   reading.format = std::string(format.name);
   reading.without_covariances = true;
   const std::size_t rows = mostRows(text, 7);
