@@ -46,8 +46,8 @@ void refuseAliases(const std::string& yaml, const std::string& file, std::size_t
   std::istringstream text(yaml);
   YAML::Parser parser(text);
   AliasFinder finder(file, first_line);
-  while (parser.HandleNextDocument(finder)) {
-  }
+  // One document, as YAML::Load; on a document that it cannot end, yaml-cpp would be asked for the next one for ever.
+  parser.HandleNextDocument(finder);
 }
 
 std::string shown(const YAML::Node& node) {

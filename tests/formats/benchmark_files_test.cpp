@@ -218,6 +218,8 @@ TEST(Limits, AliasesOfYamlAreRefused) {
             "f:4: an alias of YAML (*name), expected each value where it belongs");
   EXPECT_EQ(errorOf([&] { read("---\nheader: &h {a: *h}\n"); }),
             "f:2: an alias of YAML (*name), expected each value where it belongs");
+  // Text that yaml-cpp hands out as documents without an end.
+  EXPECT_NE(errorOf([&] { read("*0\n}\n*1\n", {.format = "ros-yaml"}); }), "");
   // A star in a text is none.
   const std::string pose = "pose:\n  position: {x: 1, y: 2, z: 3}\n  orientation: {x: 0, y: 0, z: 0, w: 1}\n";
   EXPECT_EQ(read("note: 'a *b'\n" + pose, {.format = "ros-yaml"}).size(), 1U);
