@@ -6,10 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <unordered_map>
 #include <utility>
 
 #include <formats/detail/feature_columns.hpp>
 #include <formats/detail/feature_formats.hpp>
+#include <formats/detail/rows.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/detail/rotation_matrix.hpp>
@@ -21,35 +23,24 @@ namespace {
 
 constexpr double rounding = 1e-12;
 
-/// At most that many rows fit into a text: a row has a digit and a separator for each field.
-std::size_t mostRows(std::string_view text, std::size_t columns) {
-  const auto newlines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-  return std::min(newlines + 1, text.size() / (2 * columns) + 1);
-}
-
 /// Reads the rows of one text, whose format says how they are laid out.
 class FeatureReader {
  public:
-  FeatureReader(std::string_view text, std::string file, const ReadingOptions& options)
-      : text_(text), reader_(text), name_(std::move(file)), options_(options) {}
+  /// `take`: nothing, or where the rows go instead of into the file.
+  FeatureReader(std::string_view text, std::string file, const ReadingOptions& options, const detail::TakeFeature& take)
+      : text_(text), reader_(text), name_(std::move(file)), options_(options), take_(take) {}
 
   FeatureFile read() {
     requireText(text_, name_);
     if (!reader_.next()) throw InputError(name_, 0, "the file has no data, only blank lines and comments");
-    const detail::FeatureFormat& format = detail::featureFormat(options_.format, reader_, name_);
+    const detail::FeatureFormat& format = detail::featureFormat(options_, reader_, name_);
     file_.format = std::string(format.name);
     if (!options_.columns.empty() && !format.names_columns) {
       throw InputError(name_, reader_.number(), fmt::format("--columns for a file of the format {}", format.name),
                        "a CSV file, whose header names the columns");
     }
     layout_ = format.reads(reader_, name_, options_);
-    for (std::string& column : layout_.columns) {
-      if (!options_.without_covariances || !detail::isCovarianceColumn(column)) continue;
-      if (column.rfind("cov_", 0) != 0) {
-        throw InputError(name_, reader_.number(), fmt::format("the column {}", column), "cov_00 ... cov_55 of poses");
-      }
-      column.clear();
-    }
+    if (options_.without_covariances) passOverCovariances();
     const std::size_t first_line = reader_.number();
     places_ = detail::findFeature(layout_.columns, name_, first_line);
     if (layout_.has_header && !reader_.next()) {
@@ -65,8 +56,37 @@ class FeatureReader {
   }
 
  private:
+  void passOverCovariances() {
+    std::unordered_map<std::string, std::size_t> places;
+    for (std::size_t k = 0; k < layout_.columns.size(); ++k) {
+      std::string& column = layout_.columns[k];
+      if (!detail::isCovarianceColumn(column)) continue;
+      if (column.rfind("cov_", 0) != 0) {
+        throw InputError(name_, reader_.number(), fmt::format("the column {}", column), "cov_00 ... cov_55 of poses");
+      }
+      places.emplace(std::exchange(column, {}), k);
+    }
+    for (int i = 0; i < 6 && !places.empty(); ++i) {
+      for (int j = i; j < 6; ++j) {
+        const auto place = places.find(fmt::format("cov_{}{}", i, j));
+        if (place == places.end()) {
+          throw InputError(name_, reader_.number(), fmt::format("there is no column 'cov_{}{}'", i, j),
+                           "the upper triangle cov_00 ... cov_55");
+        }
+        layout_.covariance.push_back(place->second);
+      }
+    }
+  }
+
+  /// Forgets the row that has been taken.
+  void forget() {
+    file_.lines.clear(), file_.rotations.clear(), file_.positions.clear(), file_.directions.clear();
+    file_.weights.clear(), file_.times.clear(), file_.covariances.clear(), file_.factors.clear();
+    file_.unmeasured.clear();
+  }
+
   void readRows() {
-    const std::size_t rows = mostRows(text_, layout_.columns.size());
+    const std::size_t rows = take_ ? 1 : detail::mostRows(text_, layout_.columns.size());
     const FeatureParts& parts = info(places_.kind).parts;
     file_.kind = places_.kind;
     file_.lines.reserve(rows);
@@ -85,7 +105,11 @@ class FeatureReader {
         if (!layout_.columns[i].empty()) values_[i] = numberField(fields_[i], layout_.columns[i], name_, line_);
       }
       addRow();
+      if (!take_) continue;
+      take_(file_, layout_, fields_);
+      forget();
     } while (reader_.next());
+    if (take_) return;
     if (places_.weight != detail::absent && *std::max_element(file_.weights.begin(), file_.weights.end()) == 0) {
       throw InputError(name_, file_.lines.front(), "every weight is 0", "one above 0");
     }
@@ -137,7 +161,7 @@ class FeatureReader {
     if (norm == 0) throw InputError(name_, line_, fmt::format("the {} is zero", what), "a unit vector");
     if (!(error <= options_.norm_tolerance) || !regular) {
       throw InputError(name_, line_, fmt::format("the norm of the {} is {:.6g}", what, norm),
-                       fmt::format("1 within {:g}", options_.norm_tolerance));
+                       fmt::format("1 within {:g}{}", options_.norm_tolerance, detail::norm_remedy));
     }
     countNormalised(error);
     return norm;
@@ -192,7 +216,8 @@ class FeatureReader {
     }
     Eigen::Matrix3d matrix;
     for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = value(places_.matrix[static_cast<std::size_t>(i)]);
-    const detail::NearestRotation nearest = detail::nearestRotation(matrix, options_.norm_tolerance, name_, line_);
+    const detail::NearestRotation nearest =
+        detail::nearestRotation(matrix, options_.norm_tolerance, name_, line_, detail::norm_remedy);
     countNormalised(nearest.error);
     return Eigen::Quaterniond(nearest.rotation.params());
   }
@@ -273,6 +298,7 @@ class FeatureReader {
   LineReader reader_;
   std::string name_;
   ReadingOptions options_;
+  detail::TakeFeature take_;
   detail::RowLayout layout_;
   detail::FeatureColumns places_;
   FeatureFile file_;
@@ -284,7 +310,7 @@ class FeatureReader {
 }  // namespace
 
 FeatureFile readFeatureFile(const std::string& path, const ReadingOptions& options) {
-  const TextFile file = loadText(path);
+  const TextFile file = loadText(path, options.largest_file);
   return readFeatures(file.text, file.name, options);
 }
 
@@ -309,7 +335,12 @@ FeatureFile withoutUnmeasured(FeatureFile file) {
 }
 
 FeatureFile readFeatures(std::string_view text, std::string file, const ReadingOptions& options) {
-  return FeatureReader(text, std::move(file), options).read();
+  return FeatureReader(text, std::move(file), options, {}).read();
+}
+
+FeatureFile detail::readFeatureRows(std::string_view text, std::string name, const ReadingOptions& options,
+                                    const TakeFeature& take) {
+  return FeatureReader(text, std::move(name), options, take).read();
 }
 
 std::vector<std::string> formatNames() {

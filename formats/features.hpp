@@ -5,6 +5,7 @@
 #pragma once
 
 #include <formats/feature.hpp>
+#include <formats/text.hpp>
 #include <stats/factored_gaussian.hpp>
 
 #include <Eigen/Core>
@@ -65,9 +66,11 @@ struct ReadingOptions {
   /// matrices the error is half the Frobenius norm of RᵀR − I.
   double norm_tolerance = 1e-3;
   AngleUnit angles = AngleUnit::unsaid;
-  bool ignore_unknown = false;            ///< CSV columns without a meaning are passed over
-  bool without_covariances = false;       ///< the columns cov_00 … are passed over too
-  std::vector<std::string> columns = {};  ///< names of CSV columns that are not ours, each as "ours=theirs"
+  bool ignore_unknown = false;       ///< CSV columns without a meaning are passed over
+  bool without_covariances = false;  ///< the columns cov_00 … are passed over too
+  /// Names of CSV columns that are not ours, each as "ours=theirs"; or, all of them, their numbers from 1, as "ours=1".
+  std::vector<std::string> columns = {};
+  double largest_file = largest_text;  ///< GB of text at most, see loadText
 };
 
 /// The names of the formats that are known (formats/feature_formats.cpp), `auto` first.

@@ -130,6 +130,9 @@ void requireText(std::string_view text, const std::string& file) {
 
 std::vector<std::string> readHeader(const std::vector<std::string_view>& fields, const std::string& file,
                                     std::size_t line) {
+  if (fields.size() > most_columns) {
+    throw InputError(file, line, fmt::format("{} columns", fields.size()), fmt::format("at most {}", most_columns));
+  }
   std::vector<std::string> names(fields.begin(), fields.end());
   std::vector<std::string> sorted = names;
   for (std::size_t i = 0; i < names.size(); ++i) {

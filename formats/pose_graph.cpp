@@ -41,6 +41,8 @@ constexpr GraphTag graph_tags[] = {
     {GraphFormat::toro, "EDGE", true, true, 3, CovarianceLayout::toro6},
 };
 
+constexpr std::string_view parameters = "PARAMS_";
+
 const GraphTag* graphTag(std::string_view word) {
   for (const GraphTag& tag : graph_tags) {
     if (tag.tag == word) return &tag;
@@ -97,7 +99,8 @@ class GraphReader {
     }
     const GraphTag* const tag = graphTag(fields_[0]);
     if (tag == nullptr) {
-      if (ignore_unknown_) return;
+      // Only edges of other kinds than ours refer to parameters.
+      if (ignore_unknown_ || fields_[0].substr(0, parameters.size()) == parameters) return;
       throw InputError(graph_.name, line(), fmt::format("a line of '{}'", printable(fields_[0])),
                        "vertices and edges of g2o (VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX_SE2, EDGE_SE2, FIX) or TORO "
                        "(VERTEX3, EDGE3, VERTEX2, EDGE2); --ignore-unknown passes over others");
@@ -110,8 +113,8 @@ class GraphReader {
     }
     const std::size_t ids = tag->edge ? 2 : 1, begin = 1 + ids, end = begin + tag->pose;
     const std::size_t matrix = tag->edge ? layoutSize(tag->layout) : 0;
-    // Public files of EDGE3 exist without their matrices.
-    const bool bare = fields_.size() == end && tag->format == GraphFormat::toro;
+    // Public files of edges exist without their matrices.
+    const bool bare = tag->edge && fields_.size() == end;
     if (fields_.size() != end + matrix && !bare) {
       throwWrongWidth(fields_.size(), end + matrix, fmt::format("of {}", tag->tag), graph_.name, line());
     }
@@ -181,12 +184,18 @@ std::optional<Convention> statedConvention(GraphFormat format, bool planar) {
                     .layout = CovarianceLayout::planar6};
 }
 
-bool looksLikeGraph(std::string_view text) {
+std::optional<GraphFormat> graphFormatOf(std::string_view text) {
   LineReader reader(text);
-  if (!reader.next()) return false;
   std::vector<std::string_view> fields;
-  splitFields(reader.line(), Separator::blanks, fields);
-  return fields[0] == "FIX" || graphTag(fields[0]) != nullptr;
+  // Lines of other kinds may stand above those that count.
+  for (int line = 0; line < 100 && reader.next(); ++line) {
+    splitFields(reader.line(), Separator::blanks, fields);
+    if (const GraphTag* const tag = graphTag(fields[0])) return tag->format;
+    const auto begins = [&](std::string_view word) { return fields[0].substr(0, word.size()) == word; };
+    if (fields[0] == "FIX" || begins(parameters)) return GraphFormat::g2o;
+    if (!begins("VERTEX") && !begins("EDGE")) break;
+  }
+  return std::nullopt;
 }
 
 PoseGraph readPoseGraph(const std::string& path, bool ignore_unknown, double norm_tolerance) {

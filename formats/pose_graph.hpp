@@ -46,8 +46,9 @@ struct PoseGraph {
   std::size_t n_normalised = 0;                 ///< rotations that were off their norm by more than rounding
 };
 
-/// True if a text begins like a file of vertices and edges.
-bool looksLikeGraph(std::string_view text);
+/// The format of a text that begins like a file of vertices and edges; nothing for others.
+std::optional<GraphFormat> graphFormatOf(std::string_view text);
+inline bool looksLikeGraph(std::string_view text) { return graphFormatOf(text).has_value(); }
 
 /// The convention that a format fixes for the matrices of its edges; nothing where it is for the user to say.
 std::optional<Convention> statedConvention(GraphFormat format, bool planar);

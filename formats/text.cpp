@@ -1,5 +1,7 @@
 #include <formats/text.hpp>
 
+#include <fmt/format.h>
+
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -14,6 +16,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include <formats/detail/gzip.hpp>
 #include <formats/input_error.hpp>
@@ -57,6 +60,12 @@ std::string systemMessage(int error) {
   if (error == ENOENT) return "no such file";
   if (error == EISDIR) return "this is a directory";
   return std::string("cannot be read: ") + std::strerror(error);
+}
+
+[[noreturn]] void throwTooLarge(const std::string& file, std::string_view what, std::size_t limit, bool has_option) {
+  throw InputError(file, 0, std::string(what),
+                   fmt::format("at most {:g} GB{}", 1e-9 * static_cast<double>(limit),
+                               has_option ? ", or --largest-file with more" : ""));
 }
 
 std::size_t editDistance(std::string_view a, std::string_view b) {
@@ -156,8 +165,9 @@ std::string sourceName(const std::string& path) {
   return path == "-" ? "standard input" : printable(path, path.size());
 }
 
-TextFile loadText(const std::string& path) {
+TextFile loadText(const std::string& path, std::optional<double> largest) {
   const bool standard_input = path == "-";
+  const auto limit = static_cast<std::size_t>(std::min(1e9 * largest.value_or(largest_text), 1e18));
   TextFile file{standard_input ? "standard input" : path, {}};
   const Descriptor descriptor(standard_input ? STDIN_FILENO : ::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (descriptor.get() < 0)
@@ -168,10 +178,12 @@ TextFile loadText(const std::string& path) {
   }
   // A regular file tells its size; pipes do not, and files under /proc say 0.
   std::size_t capacity = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : 0;
+  if (capacity > limit + 1) throwTooLarge(file.name, fmt::format("{} bytes", capacity - 1), limit, largest.has_value());
   capacity = std::max<std::size_t>(capacity, 65536);
   std::size_t size = 0;
   file.text.resize(capacity);
   while (true) {
+    if (size > limit) throwTooLarge(file.name, "a text without an end in sight", limit, largest.has_value());
     if (size == file.text.size()) file.text.resize(2 * size);
     const ssize_t count = ::read(descriptor.get(), file.text.data() + size, file.text.size() - size);
     if (count < 0 && errno == EINTR) continue;
@@ -180,7 +192,10 @@ TextFile loadText(const std::string& path) {
     size += static_cast<std::size_t>(count);
   }
   file.text.resize(size);
-  if (detail::isGzip(file.text)) file.text = detail::decompressed(file.text, file.name);
+  if (!detail::isGzip(file.text)) return file;
+  auto text = detail::decompressed(file.text, file.name, limit);
+  if (!text) throwTooLarge(file.name, "the compressed data expand to a larger text", limit, largest.has_value());
+  file.text = std::move(*text);
   return file;
 }
 

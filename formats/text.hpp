@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,9 +18,14 @@ struct TextFile {
 /// The name of an input in messages: `-` is standard input, and control characters never reach a terminal.
 std::string sourceName(const std::string& path);
 
-/// Reads a file in one go, decompressed if it is a gzip file; `-` is standard input. Throws InputError where that is
-/// not possible.
-TextFile loadText(const std::string& path);
+/// The size of a text that is read unless the caller says otherwise, GB: of a file, of what a pipe delivers, and of what a
+/// gzip file expands to.
+inline constexpr double largest_text = 1;
+
+/// Reads a file in one go, and once, so that a pipe is as good as a file; decompressed if it is a gzip file; `-` is
+/// standard input. Throws InputError where that is not possible, and for a text of more than `largest` GB (nothing:
+/// largest_text; a caller who gives it has the option --largest-file, which the message then names).
+TextFile loadText(const std::string& path, std::optional<double> largest = {});
 
 /// Walks over the lines of a text that carry data: comments (from `#` to the end of the line), blank lines, a byte
 /// order mark and carriage returns are passed over, and the numbers of the lines are those that an editor shows.
@@ -65,6 +71,29 @@ double numberField(std::string_view field, std::string_view column, const std::s
 
 /// The candidate nearest to a misspelt name, empty if none is near.
 std::string nearestName(std::string_view name, const std::vector<std::string>& candidates);
+
+/// The most columns that a row may have.
+inline constexpr std::size_t most_columns = 10000;
+
+/// Short texts one after the other, in a third of the memory of as many strings.
+class TextList {
+ public:
+  std::size_t size() const { return ends_.size(); }
+  bool empty() const { return ends_.empty(); }
+  std::string operator[](std::size_t i) const { return characters_.substr(begin(i), ends_[i] - begin(i)); }
+  std::string front() const { return (*this)[0]; }
+  std::string back() const { return (*this)[size() - 1]; }
+  void push_back(std::string_view text) {
+    characters_ += text;
+    ends_.push_back(characters_.size());
+  }
+  void reserve(std::size_t texts, std::size_t characters) { ends_.reserve(texts), characters_.reserve(characters); }
+
+ private:
+  std::size_t begin(std::size_t i) const { return i == 0 ? 0 : ends_[i - 1]; }
+  std::string characters_;
+  std::vector<std::size_t> ends_;
+};
 
 /// Names joined by a separator.
 std::string joined(const std::vector<std::string>& names, std::string_view separator);

@@ -9,13 +9,17 @@
 #pragma once
 
 #include <formats/features.hpp>
+#include <formats/text.hpp>
 #include <lie/se3.hpp>
 #include <stats/conventions.hpp>
 #include <stats/gaussian.hpp>
+#include <stats/words.hpp>
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -32,11 +36,12 @@ inline constexpr double unknown_entry = std::numeric_limits<double>::quiet_NaN()
 
 /// The poses of a file in its order, with the matrices beside them.
 struct Trajectory {
-  std::string name;                     ///< name of the file in messages
-  std::string format;                   ///< one of trajectoryFormatNames()
-  std::vector<std::string> time_texts;  ///< seconds as the file writes them, exactly; empty if the file has no times
-  std::vector<double> times;            ///< the same as numbers, rounded; empty with time_texts
+  std::string name;           ///< name of the file in messages
+  std::string format;         ///< one of trajectoryFormatNames()
+  TextList time_texts;        ///< seconds with the digits of the file, exactly; empty if the file has no times
+  std::vector<double> times;  ///< the same as numbers, rounded; empty with time_texts
   std::vector<SE3d> poses;
+  std::vector<std::int64_t> ids;  ///< numbers of the vertices, ascending, where the poses are those of a graph
   /// The matrices in the convention of the file, of which only the layout is undone: fromConvention reads them. NaN for
   /// what is unknown, a whole matrix of it where a row has none. Empty if the file has no covariances.
   std::vector<Matrix6d> covariances;
@@ -50,11 +55,21 @@ struct Trajectory {
   double largest_norm_error = 0;               ///< the largest such error
   std::size_t n_unmeasured = 0;                ///< rows with a component that a sentinel marks as not measured
   std::vector<std::string> frames;             ///< frame and child frame of messages, if they name them
+  std::size_t stamp_decimals = 0;              ///< the file has times in units of so many decimals of a second
+  std::vector<std::string> notes;              ///< sentences on what reading has decided
 
   std::size_t size() const { return poses.size(); }
   bool hasCovariances() const { return !covariances.empty(); }
   bool hasTimes() const { return !times.empty(); }
 };
+
+/// The unit of time stamps.
+enum class StampUnit { s, ms, us, ns };
+constexpr auto words(StampUnit) { return std::array{"s", "ms", "us", "ns"}; }
+
+/// The pose of a stamp that several rows have, with different poses: of the first row, or their mean.
+enum class DuplicateRule { drop, mean };
+constexpr auto words(DuplicateRule) { return std::array{"drop", "mean"}; }
 
 /// Options of readTrajectory.
 struct TrajectoryOptions {
@@ -64,17 +79,27 @@ struct TrajectoryOptions {
   /// The layout of the numbers that follow TUM's eight, which no file says.
   std::optional<CovarianceLayout> layout;
   double unmeasured = unmeasured_variance;  ///< see unmeasured_variance
-  ReadingOptions reading;                   ///< norms, CSV columns; its format is not used
+  /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year 5000
+  /// and are stamps since 1970 in ms, us or ns.
+  std::optional<StampUnit> time_unit;
+  ReadingOptions reading;  ///< norms, CSV columns, size; its format is not used
 };
 
-/// The names of the formats, `auto` first: tum, kitti, euroc, csv, openvins, ros-csv, ros-json, ros-yaml, mavlink-csv,
-/// mavlink-json.
-std::vector<std::string> trajectoryFormatNames();
+/// The names of the formats, `auto` first. Some are only read: matrix, colmap, g2o and toro (their vertices).
+std::vector<std::string> trajectoryFormatNames(bool with_read_only = true);
 
 /// Reads poses, and covariances if there are any, from a file; `-` is standard input. Throws InputError.
 Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& options = {});
+/// The same of a file whose text has been loaded, such as a pipe, which can be read only once.
+Trajectory readTrajectory(const std::string& path, const TextFile& file, const TrajectoryOptions& options);
 /// The same from memory, without side file; `name` stands for the file in messages.
 Trajectory parseTrajectory(std::string_view text, std::string name, const TrajectoryOptions& options = {});
+
+/// Puts the rows in the order of their times, each time once, and adds notes on what has changed. A row that repeats stamp,
+/// pose (within 1e-9 m and rad) and covariance of an earlier one is dropped; if the poses differ, the rule decides.
+/// Throws InputError where they do and there is no rule, and for the mean of poses with covariances, whose convention it
+/// would take. Without times there is nothing to do.
+void orderInTime(Trajectory& trajectory, std::optional<DuplicateRule> duplicates);
 
 /// Sentences on what reading has changed: rotations normalised, components not measured.
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options);

@@ -41,6 +41,7 @@ void check(const Trajectory& trajectory) {
     require(pose.translation().allFinite() && std::abs(pose.unit_quaternion().norm() - 1) < 1e-14);
   }
   for (const double time : trajectory.times) require(std::isfinite(time));
+  require(trajectory.ids.empty() || trajectory.ids.size() == n);
   for (const auto& C : trajectory.covariances) {
     for (int i = 0; i < 6; ++i) require(std::isnan(C(i, i)) || C(i, i) >= 0);
   }
@@ -57,11 +58,27 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       options.format = format;
       const Trajectory trajectory = parseTrajectory(text, "fuzz", options);
       check(trajectory);
-      for (const std::string& to : formats) {
+      for (const std::string& to : trajectoryFormatNames(false)) {
         if (to != "auto") mayRefuse([&] { (void)formatTrajectory(trajectory, to, {}); });
+      }
+      for (const DuplicateRule rule : {DuplicateRule::drop, DuplicateRule::mean}) {
+        mayRefuse([&] {
+          Trajectory ordered = trajectory;
+          orderInTime(ordered, rule);
+          check(ordered);
+          for (std::size_t i = 1; i < ordered.times.size(); ++i) require(ordered.times[i] > ordered.times[i - 1]);
+        });
       }
     });
   }
+  for (const StampUnit unit : {StampUnit::s, StampUnit::ms, StampUnit::us, StampUnit::ns}) {
+    mayRefuse([&] { check(parseTrajectory(text, "fuzz", {.time_unit = unit})); });
+  }
+  mayRefuse([&] {
+    TrajectoryOptions by_number;
+    by_number.reading.columns = {"t=1", "tx=2", "ty=3", "tz=4", "qx=5", "qy=6", "qz=7", "qw=8"};
+    check(parseTrajectory(text, "fuzz", by_number));
+  });
   mayRefuse([&] {
     const PoseGraph graph = parseGraph(text, "fuzz");
     for (const GraphFormat to : {GraphFormat::g2o, GraphFormat::toro})

@@ -32,18 +32,20 @@ h1 { font-size: 1.7rem; line-height: 1.25; overflow-wrap: anywhere; margin: 0 0 
 h2 { font-size: 1.2rem; margin: 2.5rem 0 .8rem; }
 p { max-width: 46rem; margin: 0 0 1rem; }
 a { color: var(--link); }
-pre { background: var(--stripe); border: 1px solid var(--rule); border-radius: 4px; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem; }
+pre { background: var(--stripe); border: 1px solid var(--rule); border-radius: 4px; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem; }
 .scroll { overflow-x: auto; margin: 0 0 1.5rem; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 caption { caption-side: bottom; text-align: left; color: var(--soft); padding-top: .5rem; }
-th, td { padding: .3rem .8rem; text-align: left; white-space: nowrap; }
-th { border-bottom: 2px solid var(--rule); font-weight: 600; }
+th, td { padding: .3rem .8rem; text-align: left; }
+th { border-bottom: 2px solid var(--rule); font-weight: 600; vertical-align: bottom; }
 td { border-bottom: 1px solid var(--rule); }
 tbody tr:nth-child(even) { background: var(--stripe); }
-.number { text-align: right; }
+td.number { text-align: right; white-space: nowrap; }
+th.number { text-align: right; }
 figure { margin: 1.5rem 0 2rem; }
-.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem 0; overflow-x: auto; }
-.plot svg { display: block; width: 100%; height: auto; margin: 0 auto; }
+.plot { background: #ffffff; border: 1px solid var(--rule); border-radius: 6px; padding: .5rem 0; display: flex; flex-wrap: wrap; justify-content: center; }
+.plot svg { display: block; max-width: 100%; height: auto; }
+.drawing { position: absolute; width: 0; height: 0; overflow: hidden; }
 @media (prefers-color-scheme: dark) {
   .plot { background: #161616; }
   .plot svg { filter: invert(.914) hue-rotate(180deg); }
@@ -56,6 +58,19 @@ figcaption { color: var(--soft); font-size: .88rem; margin-top: .5rem; }
 .none { border-color: var(--rule); }
 .contents { columns: 2; padding-left: 1.2rem; max-width: 46rem; }
 .notice { border-left: 4px solid #d99a00; background: var(--stripe); padding: .6rem .9rem; max-width: none; }
+/* On a narrow screen the rows of a wide table stand one below the other. */
+@media (max-width: 56rem) {
+  body { padding: 1rem .6rem 2rem; }
+  pre { padding: .4rem .3rem; font-size: min(.85rem, 1.85vw); }
+  .contents { columns: 1; }
+  th, td { overflow-wrap: anywhere; padding: .3rem .4rem; }
+  .wide table, .wide tbody, .wide tr, .wide caption { display: block; }
+  .wide thead { display: none; }
+  .wide tr { border-bottom: 2px solid var(--rule); padding: .3rem 0; }
+  .wide td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .4rem; text-align: right; }
+  .wide td:empty { display: none; }
+  .wide td::before { content: attr(data-label); color: var(--soft); text-align: left; flex: none; max-width: 60%; }
+}
 footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85rem; }
 )css";
 
@@ -144,13 +159,47 @@ std::string named(std::string svg, const std::string& name, const std::string& t
   return svg;
 }
 
-/// The width that the drawing was made for, from its viewBox: wider would blow up its letters.
-int svgWidth(std::string_view svg) {
+/// Width and height that the drawing was made for, from its viewBox: wider would blow up its letters.
+std::pair<int, int> svgSize(std::string_view svg) {
   const std::size_t start = svg.find("viewBox=\"0 0 ");
-  double width = 0;
-  if (start == std::string_view::npos) return 680;
-  const std::string_view rest = svg.substr(start + 13);
-  return parseNumber(rest.substr(0, rest.find(' ')), width) == NumberKind::finite ? static_cast<int>(width) : 680;
+  if (start == std::string_view::npos) return {680, 440};
+  std::string_view rest = svg.substr(start + 13);
+  rest = rest.substr(0, rest.find('"'));
+  const std::size_t blank = rest.find(' ');
+  double width = 0, height = 0;
+  if (blank == std::string_view::npos || parseNumber(rest.substr(0, blank), width) != NumberKind::finite ||
+      parseNumber(rest.substr(blank + 1), height) != NumberKind::finite) {
+    return {680, 440};
+  }
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+/// The drawing as the page has it: one panel as it is, several each by itself, so that they stand side by side where there
+/// is room, and one below the other where there is not. A panel is a view of its part of the drawing.
+std::string inPanels(const std::string& drawing, const Plot& plot, const std::string& name) {
+  const auto [width, height] = svgSize(drawing);
+  const std::size_t n = plot.panels.size();
+  std::string text = fmt::format("<div class=\"plot\" style=\"max-width:{}px\">", width + 18);
+  if (n < 2) {
+    std::string sized = drawing;
+    sized.insert(4, fmt::format(" style=\"width:{}px\"", width));
+    return text + sized + "</div>\n";
+  }
+  const std::size_t columns = panelColumns(plot), rows = (n + columns - 1) / columns;
+  // Letters of 12 px stay at 10 px.
+  const int w = width / static_cast<int>(columns), h = height / static_cast<int>(rows);
+  std::string whole = drawing;
+  whole.insert(4, fmt::format(" id=\"{}_drawing\"", name));
+  text += "<div class=\"drawing\">" + whole + "</div>";
+  for (std::size_t k = 0; k < n; ++k) {
+    text += fmt::format(
+        "<svg viewBox=\"{} {} {} {}\" style=\"flex:1 1 {}px;max-width:min({}px,100%)\" aria-hidden=\"true\"><use "
+        "href=\"#{}_drawing\" width=\"{}\" "
+        "height=\"{}\"/></svg>",
+        static_cast<int>(k % columns) * w, static_cast<int>(k / columns) * h, w, h, w * 10 / 12, w, name, width,
+        height);
+  }
+  return text + "</div>\n";
 }
 
 /// gnuplot repeats the command, points at the place in it and says what is wrong last.
@@ -298,7 +347,8 @@ void Report::table(const std::vector<std::string>& headers, const std::vector<st
                    std::string_view caption) {
   std::vector<std::string_view> classes;
   for (std::size_t i = 0; i < headers.size(); ++i) classes.push_back(isNumeric(rows, i) ? " class=\"number\"" : "");
-  body_ += "<div class=\"scroll\"><table>\n";
+  const bool wide = headers.size() > 4;
+  body_ += fmt::format("<div class=\"scroll{}\"><table>\n", wide ? " wide" : "");
   if (!caption.empty()) body_ += fmt::format("<caption>{}</caption>\n", escaped(caption));
   body_ += "<thead><tr>";
   for (std::size_t i = 0; i < headers.size(); ++i)
@@ -307,7 +357,9 @@ void Report::table(const std::vector<std::string>& headers, const std::vector<st
   for (const auto& row : rows) {
     body_ += "<tr>";
     for (std::size_t i = 0; i < headers.size(); ++i) {
-      body_ += fmt::format("<td{}>{}</td>", classes[i], i < row.size() ? escaped(row[i]) : std::string());
+      body_ += fmt::format("<td{}{}>{}</td>", classes[i],
+                           wide ? fmt::format(" data-label=\"{}\"", escaped(headers[i])) : std::string(),
+                           i < row.size() ? escaped(row[i]) : std::string());
     }
     body_ += "</tr>\n";
   }
@@ -341,10 +393,7 @@ void Report::plot(const Plot& plot) {
 
   body_ += "<figure>\n";
   if (!svg.empty()) {
-    const std::string drawing = named(withOwnIdentifiers(svgElement(svg), name), name, titleOf(plot));
-    const int width = svgWidth(drawing);
-    body_ += fmt::format("<div class=\"plot\" style=\"max-width:{}px\">{}</div>\n", width + 18,
-                         "<div style=\"min-width:" + std::to_string(width * 10 / 12) + "px\">" + drawing + "</div>");
+    body_ += inPanels(named(withOwnIdentifiers(svgElement(svg), name), name, titleOf(plot)), plot, name);
   } else {
     body_ += fmt::format("<p class=\"notice\">{}</p>\n", escaped(notice));
   }

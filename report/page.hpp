@@ -21,6 +21,7 @@ enum class Style {
   stars,         ///< the same, of a few points that matter
   linespoints,   ///< both
   errorbars,     ///< a point at x, y with a bar from low to high
+  spans,         ///< a box of `width` about x from low to high
   boxes,         ///< histogram bars at x of height y; `width` where they are not as wide as their distance
   filled_curve,  ///< the area between low and high over x
   image,         ///< a coloured cell about each x, y of a grid, by its `value`; NaN is left white
@@ -37,7 +38,7 @@ struct Series {
   std::vector<double> low = {};
   std::vector<double> high = {};
   std::vector<double> width = {};
-  std::vector<double> value = {};          ///< values of images and contours
+  std::vector<double> value = {};          ///< values of images and contours, or of any line that they colour
   std::optional<std::size_t> colour = {};  ///< the number of the palette's colour; series of one colour belong together
   bool dashed = false;
 

@@ -116,7 +116,7 @@ Extent extentOf(const Panel& panel, bool horizontal) {
     const double half = isBoxes(series) || isImage(series) ? 0.5 * spacing(horizontal ? series.x : series.y) : 0;
     for (std::size_t i = 0; i < series.x.size(); ++i) {
       if (horizontal) {
-        const double reach = isBoxes(series) && i < series.width.size() ? 0.5 * series.width[i] : half;
+        const double reach = i < series.width.size() ? 0.5 * series.width[i] : half;
         extent.add(series.x[i] - reach, axis), extent.add(series.x[i] + reach, axis);
         continue;
       }
@@ -259,6 +259,8 @@ std::string styleText(const Series& series, std::string_view colour) {
       return fmt::format("with linespoints pt 7 ps 0.45 lw 1.6 lc rgb '{}'{}", colour, dash);
     case Style::errorbars:
       return fmt::format("with yerrorbars pt 7 ps 0.45 lw 1.3 lc rgb '{}'", colour);
+    case Style::spans:
+      return fmt::format("with boxxyerror lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
     case Style::boxes:
       return fmt::format("with boxes lw 0.8 lc rgb '{0}' fs solid 0.35 border lc rgb '{0}'", colour);
     case Style::filled_curve:
@@ -277,6 +279,8 @@ std::string usingText(const Series& series) {
   switch (series.style) {
     case Style::errorbars:
       return "3:4:5:6";
+    case Style::spans:
+      return "3:4:($3-0.5*$7):($3+0.5*$7):5:6";
     case Style::boxes:
       return series.width.empty() ? "3:4" : "3:4:7";
     case Style::filled_curve:
@@ -404,11 +408,15 @@ std::string plotCsv(const Plot& plot) {
   return text;
 }
 
+std::size_t panelColumns(const Plot& plot) {
+  return std::max<std::size_t>(1, std::min(plot.panels.size(), plot.columns));
+}
+
 std::string plotScript(const Plot& plot, const std::string& name) {
   if (std::none_of(plot.panels.begin(), plot.panels.end(), [](const Panel& panel) { return drawable(panel); }))
     return {};
   const std::size_t n = plot.panels.size();
-  const std::size_t columns = std::max<std::size_t>(1, std::min(n, plot.columns));
+  const std::size_t columns = panelColumns(plot);
   const std::size_t rows = (n + columns - 1) / columns;
   const int width = n == 1 ? single_width : static_cast<int>(columns) * panel_width;
   // If a unit is as long on both axes, a square leaves the least paper empty.

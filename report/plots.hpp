@@ -10,6 +10,9 @@ namespace liestat {
 /// gnuplot counts.
 std::string plotCsv(const Plot& plot);
 
+/// The number of panels in a row of a plot's drawing, whose panels are all of one size.
+std::size_t panelColumns(const Plot& plot);
+
 /// The largest number of points of a series that are drawn.
 inline constexpr std::size_t most_points_drawn = 5000;
 

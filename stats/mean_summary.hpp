@@ -141,6 +141,8 @@ struct MeanSummary {
   TimeDependence dependence = {};       ///< of the errors, where the measurements have times
   bool inflated = false;                ///< the covariance is widened by it
   std::vector<std::string> notes = {};  ///< remarks, in sentences
+  /// The remark that says why the covariance does not hold, `no`, or may not, `none`; `yes` and empty: none says so.
+  Verdict doubt = Verdict::yes({});
 
   bool hasCovariance() const { return covariance.size() > 0; }
   /// A covariance from the residuals.
@@ -160,9 +162,16 @@ struct MeanSummary {
     return "a feature " + significant(valley_angle / units::degree, 3) + " degrees from the mean is worse by " +
            significant(std::max(0.0, valley->z), 2) + " standard deviations only";
   }
-  /// Verdict on the mean: may it be used?
+  /// Verdict on the mean with its covariance: may they be used? The worst of what was found.
   Verdict verdict() const {
-    if (trusted()) return Verdict::yes("The mean is " + uniquenessInWords() + ".");
+    const std::string mean_is = "The mean is " + uniquenessInWords();
+    if (trusted() && doubt.isYes()) return Verdict::yes(mean_is + ".");
+    if (trusted()) {
+      return {doubt.answer,
+              mean_is + (doubt.isNo() ? ", but its covariance does not hold: " : ", but its covariance is in doubt: ") +
+                  doubt.text + ".",
+              {}};
+    }
     return Verdict::no(std::string("Not to be trusted (") + name(status) + "): " + reason + ".");
   }
 };

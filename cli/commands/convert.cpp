@@ -1,4 +1,5 @@
 #include <cli/commands/commands.hpp>
+#include <cli/commands/reading_options.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/output_file.hpp>
@@ -25,8 +26,9 @@ namespace {
 constexpr const char* convert_name = "liestat convert";
 
 struct ConvertOptions {
-  std::string input, output, to, cov_from, cov_to, cov_layout, times, json;
+  std::string input, output, to, cov_from, cov_to, times, json;
   TrajectoryOptions reading;
+  std::optional<DuplicateRule> duplicates;
   bool assume_uncorrelated = false, sampled = false;
   int samples = 2000;
   std::uint64_t seed = 1;
@@ -105,8 +107,8 @@ void writeConverted(const ConvertOptions& options, ConvertOutput& output, const 
 }
 
 /// One time for each pose, in seconds, in the first column of a file.
-void readTimes(const std::string& path, Trajectory& trajectory) {
-  const TextFile file = loadText(path);
+void readTimes(const std::string& path, double largest_file, Trajectory& trajectory) {
+  const TextFile file = loadText(path, largest_file);
   requireText(file.text, file.name);
   Trajectory times;
   times.name = file.name;
@@ -115,7 +117,7 @@ void readTimes(const std::string& path, Trajectory& trajectory) {
   while (reader.next()) {
     splitFields(reader.line(), Separator::comma_or_blanks, fields);
     times.times.push_back(numberField(fields[0], "the time", file.name, reader.number()));
-    times.time_texts.emplace_back(fields[0]);
+    times.time_texts.push_back(fields[0]);
   }
   if (times.times.size() != trajectory.size()) {
     throw InputError(file.name, 0, fmt::format("{} times", times.times.size()),
@@ -124,9 +126,10 @@ void readTimes(const std::string& path, Trajectory& trajectory) {
   trajectory.times = std::move(times.times), trajectory.time_texts = std::move(times.time_texts);
 }
 
-void convertPoses(const ConvertOptions& options, ConvertOutput& output) {
-  Trajectory trajectory = readTrajectory(options.input, options.reading);
-  if (!options.times.empty()) readTimes(options.times, trajectory);
+void convertPoses(const ConvertOptions& options, ConvertOutput& output, const TextFile& file) {
+  Trajectory trajectory = readTrajectory(options.input, file, options.reading);
+  if (!options.times.empty()) readTimes(options.times, options.reading.reading.largest_file, trajectory);
+  if (options.duplicates) orderInTime(trajectory, options.duplicates);
   output.from_format = trajectory.format, output.to_format = options.to.empty() ? trajectory.format : options.to;
   output.poses = trajectory.size();
   Convention to;
@@ -176,28 +179,20 @@ void convertGraph(const ConvertOptions& options, ConvertOutput& output, const Te
   writeConverted(options, output, text, {});
 }
 
-int runConvert(const ConvertOptions& given, const Invocation& invocation) {
-  ConvertOptions options = given;
-  if (!options.cov_layout.empty()) {
-    Convention c;
-    setConventionField(c, "layout", options.cov_layout);
-    options.reading.layout = c.layout;
-  }
+int runConvert(const ConvertOptions& options, const Invocation& invocation) {
   ConvertOutput output;
-  bool graph = named<GraphFormat>(options.reading.format).has_value();
-  TextFile file;
-  if (graph || (options.reading.format == "auto" && options.input != "-")) {
-    file = loadText(options.input);
-    graph = graph || looksLikeGraph(file.text);
-  }
-  if (graph) {
+  const TextFile file = loadText(options.input, options.reading.reading.largest_file);
+  const bool is_graph = named<GraphFormat>(options.reading.format).has_value() ||
+                        (options.reading.format == "auto" && looksLikeGraph(file.text));
+  // A graph in the format of a trajectory is its vertices.
+  if (is_graph && (options.to.empty() || named<GraphFormat>(options.to))) {
     convertGraph(options, output, file);
   } else {
     if (named<GraphFormat>(options.to)) {
       throw InputError(sourceName(options.input), 0, fmt::format("poses to the format {}, which has edges", options.to),
                        "a file of g2o or TORO");
     }
-    convertPoses(options, output);
+    convertPoses(options, output, file);
   }
   // The figures go where the result does not.
   const std::string summary = formatConvert(output);
@@ -220,39 +215,25 @@ void addConvertCommand(const CommandList& program) {
       program.add("convert", "Poses with covariances between the formats and conventions of other programs");
   command.option("IN", options->input, "Trajectory, or graph of g2o or TORO ('-': standard input)").required();
   command.option("OUT", options->output, "The result ('-': standard output); covariances may go to OUT.cov").required();
-  std::vector<std::string> formats = trajectoryFormatNames();
-  for (const char* graph : words(GraphFormat{})) formats.emplace_back(graph);
-  command.option("--from", options->reading.format, "Format of IN (default auto: by its first lines)").oneOf(formats);
-  formats.erase(formats.begin());
-  command.option("--to", options->to, "Format of OUT (default: that of IN)").oneOf(formats);
+  command.option("--from", options->reading.format, "Format of IN (default auto: by its first lines)")
+      .oneOf(trajectoryFormatNames());
+  std::vector<std::string> written = trajectoryFormatNames(false);
+  written.erase(written.begin());
+  for (const char* graph : words(GraphFormat{})) written.emplace_back(graph);
+  command.option("--to", options->to, "Format of OUT (default: that of IN)").oneOf(written);
   command.option("--cov-from", options->cov_from,
                  "Convention of IN's covariances: right, left, ros-fixed, ros-rpy, g2o-half ... and fields after it: "
                  "ros-fixed,unit=deg");
   command.option("--cov-to", options->cov_to,
                  "Convention of OUT's covariances, likewise (default right, if OUT can say so)");
   command.option("--cov", options->reading.covariance_file, "File of covariances beside IN (default IN.cov)");
-  command.option("--cov-layout", options->cov_layout, "What follows the eight columns of a TUM file")
-      .oneOf({"full36", "upper21", "lower21", "blocks12", "diag6"});
   command.flag("--assume-uncorrelated", options->assume_uncorrelated,
                "Take unknown correlations between known components as 0");
-  command
-      .option("--unmeasured-above", options->reading.unmeasured,
-              "Variances in messages from which on a component is not measured (default 90000)")
-      .positive();
   command.flag("--sampled", options->sampled, "Second moments by sampling, for rotations above 0.1 rad");
   command.option("--samples", options->samples, "Samples for each pose (default 2000)").range(2, 10000000);
   command.option("--seed", options->seed, "Seed of the samples (default 1)");
   command.option("--times", options->times, "File of one time in seconds for each pose, for formats without times");
-  command
-      .option("--columns", options->reading.reading.columns,
-              "Names of CSV columns that are not ours: tx=px,ty=py (ours=the file's)")
-      .list();
-  command.flag("--ignore-unknown", options->reading.reading.ignore_unknown,
-               "Pass over CSV columns and lines of graphs without a meaning");
-  command
-      .option("--norm-tolerance", options->reading.reading.norm_tolerance,
-              "Quaternions and matrices that are off by less are normalised (default 0.001)")
-      .range(0.0, 0.5);
+  declareReading(command, options->reading, options->duplicates);
   command.option("--json", options->json, "Write figures of the conversion to a JSON file ('-': standard output)");
   command.run([options](const Invocation& invocation) { return runConvert(*options, invocation); });
 }

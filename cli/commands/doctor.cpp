@@ -32,8 +32,8 @@ struct DoctorOptions {
   double alpha = 1e-3;
 };
 
-Trajectory readWithCovariances(const std::string& path, const TrajectoryOptions& options) {
-  Trajectory t = readTimedTrajectory(path, options);
+Trajectory readWithCovariances(const std::string& path, const TextFile& file, const TrajectoryInputOptions& input) {
+  Trajectory t = readTimedTrajectory(path, file, input.estimate, input.duplicates);
   if (!t.hasCovariances()) {
     throw InputError(t.name, 0, "the file has no covariances",
                      "them beside the poses, or in a file of its name with .cov after it");
@@ -66,12 +66,6 @@ DiagnosedRun edgesOf(const PoseGraph& graph, const std::vector<GraphVertex>& ver
   return run;
 }
 
-bool isGraph(const std::string& path, const std::string& format, TextFile& file) {
-  if (format != "auto" || path == "-") return false;
-  file = loadText(path);
-  return looksLikeGraph(file.text);
-}
-
 int runDoctor(DoctorOptions o, const Invocation& invocation) {
   o.input.settle();
   DiagnosisOutput output;
@@ -91,20 +85,26 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   }
   if (!has_truth && estimates.size() > 1) throw OptionError(doctor_name, "several estimates", "one without a truth");
   std::vector<DiagnosedRun> runs;
-  TextFile text;
-  if (isGraph(estimates.front(), o.input.estimate.format, text)) {
+  const auto load = [&](const std::string& path) { return loadText(path, o.input.estimate.reading.largest_file); };
+  TextFile text = load(estimates.front());
+  const std::string& format = o.input.estimate.format;
+  if (named<GraphFormat>(format) || (format == "auto" && looksLikeGraph(text.text))) {
     if (o.no_truth) throw InputError(text.name, 0, "edges, and --no-truth", "a trajectory, or the true vertices");
     if (estimates.size() > 1) throw OptionError(doctor_name, "several graphs", "one, and its truth");
-    const PoseGraph graph = parseGraph(text.text, text.name, true);
+    const double tolerance = o.input.estimate.reading.norm_tolerance;
+    const PoseGraph graph = parseGraph(text.text, text.name, true, tolerance);
+    if (graph.n_unknown == graph.edges.size()) {
+      throw InputError(graph.name, 0, "the edges have no information matrices", "them, which are what is to be judged");
+    }
     if (graph.planar)
       throw InputError(graph.name, 0, "planar edges", "EDGE_SE3:QUAT or EDGE3, whose matrices have six rows");
     std::vector<GraphVertex> vertices;
     if (has_truth) {
-      const TextFile truth = loadText(truth_path);
+      const TextFile truth = load(truth_path);
       if (!looksLikeGraph(truth.text)) {
         throw InputError(truth.name, 0, "no vertices", "a graph whose vertices are the truth (VERTEX_SE3:QUAT)");
       }
-      vertices = parseGraph(truth.text, truth.name, true).vertices;
+      vertices = parseGraph(truth.text, truth.name, true, tolerance).vertices;
       output.reference = truth.name;
     }
     runs.push_back(edgesOf(graph, vertices, has_truth));
@@ -116,11 +116,12 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
   } else {
     Trajectory truth;
     if (!truth_path.empty()) {
-      truth = readTimedTrajectory(truth_path, o.input.reference);
+      truth = readTimedTrajectory(truth_path, o.input.reference, o.input.duplicates);
       output.reference = truth.name;
     }
-    for (const std::string& path : estimates) {
-      const Trajectory estimate = readWithCovariances(path, o.input.estimate);
+    for (std::size_t k = 0; k < estimates.size(); ++k) {
+      if (k > 0) text = load(estimates[k]);
+      const Trajectory estimate = readWithCovariances(estimates[k], text, o.input);
       output.files.push_back(estimate.name);
       options.order = estimate.fixed_order;
       DiagnosedRun run{{}, estimate.times};
@@ -133,6 +134,8 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
           run.poses.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
         }
       }
+      run.notes.insert(run.notes.begin(), estimate.notes.begin(), estimate.notes.end());
+      if (k == 0) run.notes.insert(run.notes.begin(), truth.notes.begin(), truth.notes.end());
       if (estimate.stated_convention) {
         run.notes.insert(run.notes.begin(), fmt::format("{} states {}", estimate.covariance_source,
                                                         conventionName(*estimate.stated_convention, false)));

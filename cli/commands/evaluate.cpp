@@ -9,15 +9,17 @@
 #include <fusion/evaluate.hpp>
 #include <report/describe.hpp>
 #include <report/publish.hpp>
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -26,7 +28,7 @@ namespace {
 constexpr const char* evaluate_name = "liestat evaluate";
 
 struct EvaluateOptions {
-  std::string reference, cov_from, cov_ref, json, report, save_results, save_rpe;
+  std::string reference, cov_from, cov_ref, json, table, report, save_results, save_rpe;
   std::vector<std::string> estimates, fail_if;
   TrajectoryInputOptions input;
   bool align = false, correct_scale = false, align_origin = false;
@@ -46,24 +48,77 @@ struct EvaluateOptions {
   }
 };
 
-std::string fileOf(const std::string& path) {
-  return path == "-" ? sourceName(path) : printable(std::filesystem::path(path).filename().string(), 200);
+/// The names of files, with as much of their paths as tells them apart; a file that is given twice has a number as well.
+std::vector<std::string> namesOf(const std::vector<std::string>& paths) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    const std::string path = "/" + paths[k];
+    std::size_t begin = path.rfind('/');
+    const auto alone = [&] {
+      const std::string_view end = std::string_view(path).substr(begin);
+      return std::count_if(paths.begin(), paths.end(), [&](const auto& p) { return ("/" + p).ends_with(end); }) == 1;
+    };
+    while (begin > 0 && !alone()) begin = path.rfind('/', begin - 1);
+    names.push_back(paths[k] == "-" ? sourceName(paths[k]) : printable(path.substr(begin + 1), 200));
+    if (std::count(paths.begin(), paths.end(), paths[k]) < 2) continue;
+    const auto before = paths.begin() + static_cast<std::ptrdiff_t>(k);
+    names.back() += fmt::format(" ({})", 1 + std::count(paths.begin(), before, paths[k]));
+  }
+  return names;
 }
 
-/// A file as the library takes it, with the convention of its covariances if the file does not state it.
-PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention, std::string_view option) {
-  PoseTrajectory p{.times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = t.lines};
+/// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too long
+/// for three to eight of them.
+std::vector<SegmentErrors> segmentErrors(const TrajectoryEvaluation& e) {
+  double path = 0;
+  for (std::size_t i = 1; i < e.matched.size(); ++i) {
+    path += (e.matched[i].reference.mean.translation() - e.matched[i - 1].reference.mean.translation()).norm();
+  }
+  std::vector<SegmentErrors> segments;
+  if (!(path > 1e-6) || !(path < 1e12)) return segments;
+  double step = 0;
+  for (int k = -8; k < 12 && step == 0; ++k) {
+    for (const double factor : {8.0, 16.0, 40.0}) {
+      if (step == 0 && 9 * factor * std::pow(10, k) > 0.8 * path) step = factor * std::pow(10, k);
+    }
+  }
+  if (step < 8 && 3 * 8 <= 0.8 * path) step = 8;
+  for (double length = step; length <= 0.8 * path && segments.size() < 8; length += step) {
+    auto pairs =
+        posePairs(e.matched, e.alignment,
+                  {.delta = length, .unit = DeltaUnit::meters, .all_pairs = true, .pairs_from_reference = true});
+    SegmentErrors s{.length = length, .pairs = pairs.size()};
+    if (pairs.empty()) continue;
+    const auto fill = [&](PoseRelation relation, ErrorStatistics& statistics, std::array<double, 5>& quantiles) {
+      const std::vector<double> errors = relativeErrors(e.matched, e.alignment, pairs, relation);
+      statistics = errorStatistics(errors);
+      constexpr std::array shares{0.05, 0.25, 0.5, 0.75, 0.95};
+      for (std::size_t q = 0; q < shares.size(); ++q) quantiles[q] = quantile(errors, shares[q]);
+    };
+    fill(PoseRelation::trans_part, s.translation, s.translation_quantiles);
+    fill(PoseRelation::angle_deg, s.rotation, s.rotation_quantiles);
+    segments.push_back(s);
+  }
+  return segments;
+}
+
+/// A file as the library takes it, with the convention of its covariances if the file does not state it. The file's poses
+/// are given up, of which millions would stand in memory twice.
+PoseTrajectory poseTrajectory(Trajectory& t, const std::string& convention, std::string_view option) {
+  PoseTrajectory p{
+      .times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = std::move(t.lines)};
   for (std::size_t i = 0; i < p.lines.size(); ++i) {
     if (p.lines[i] == 0) p.lines[i] = i + 1;
   }
   if (!t.hasCovariances()) {
-    p.poses = exactPoses(t.poses);
+    p.poses = exactPoses(std::exchange(t.poses, {}));
     return p;
   }
   const auto given = convention.empty() ? std::nullopt : std::optional(conventionNamed(convention, option));
   const Convention c = conventionOf(t, given, option);
   p.covariance_convention = describe(c);
   p.poses = gaussiansOf(t, c);
+  t.poses = {}, t.covariances = {};
   return p;
 }
 
@@ -85,16 +140,20 @@ PoseTrajectory poseTrajectory(const Trajectory& t, const std::string& convention
 }
 
 EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& reference,
-                              const PoseTrajectory& reference_poses, const std::string& path) {
-  const Trajectory estimate = readTimedTrajectory(path, o.input.estimate);
+                              const PoseTrajectory& reference_poses, const std::string& path,
+                              const std::string& shown_name) {
+  Trajectory estimate = readTimedTrajectory(path, o.input.estimate, o.input.duplicates);
+  requireSameVertices(reference, estimate);
   if (!o.cov_from.empty() && !estimate.hasCovariances()) {
     throw InputError(estimate.name, 0, "the file has no covariances, and --cov-from is given",
                      "covariances (a file of its name with .cov after it, or a format that has them)");
   }
   EvaluatedEstimate e{
-      .name = fileOf(path),
+      .name = shown_name,
       .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how)};
   if (!e.evaluation.ok()) refuse(o, e.evaluation, reference, estimate);
+  e.evaluation.notes.insert(e.evaluation.notes.begin(), estimate.notes.begin(), estimate.notes.end());
+  if (!o.json.empty() || !o.report.empty()) e.segments = segmentErrors(e.evaluation);
   return e;
 }
 
@@ -137,17 +196,20 @@ int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
     throw OptionError(evaluate_name, "several files are standard input", "one");
   }
   EvaluationOutput output;
-  output.reference = fileOf(o.reference);
-  Trajectory reference = readTimedTrajectory(o.reference, o.input.reference);
+  output.reference = namesOf({o.reference})[0];
+  Trajectory reference = readTimedTrajectory(o.reference, o.input.reference, o.input.duplicates);
+  output.reference_notes = reference.notes;
   // A reference is exact unless its covariances are asked for by naming their convention, or it states it.
   if (o.cov_ref.empty() && !reference.stated_convention) reference.covariances.clear();
   output.reference_has_covariances = reference.hasCovariances();
   const PoseTrajectory reference_poses = poseTrajectory(reference, o.cov_ref, "--cov-ref");
-  for (const std::string& path : o.estimates) {
-    output.estimates.push_back(evaluateOne(o, reference, reference_poses, path));
+  const std::vector<std::string> names = namesOf(o.estimates);
+  for (std::size_t k = 0; k < o.estimates.size(); ++k) {
+    output.estimates.push_back(evaluateOne(o, reference, reference_poses, o.estimates[k], names[k]));
   }
   applyConditions(o, output);
   publishResult(o.json, formatEvaluation(output), invocation.command_line, std::nullopt, output);
+  if (!o.table.empty()) writeOutput(o.table, evaluationCsv(output));
   const EvaluatedEstimate& first = output.estimates[0];
   const auto save = [&](const std::string& path, EvoErrors errors) {
     if (path.empty()) return;
@@ -208,7 +270,8 @@ void addEvaluateCommand(const CommandList& program) {
   command.option("--save_results,--save-results", o->save_results, "Write APE as a result file of evo (.zip)");
   command.option("--save_rpe,--save-rpe", o->save_rpe, "Write RPE as a result file of evo (.zip)");
   command.option("--json", o->json, "Write the result to a JSON file ('-': standard output)");
-  command.option("--report", o->report, "Directory for a page with trajectories, errors and NEES over time");
+  command.option("--table", o->table, "Write a CSV file with a row for each estimate ('-': standard output)");
+  command.option("--report", o->report, "Directory for a page with errors over time, paths, segments and NEES");
   command.run([o](const Invocation& invocation) { return runEvaluate(*o, invocation); });
 }
 

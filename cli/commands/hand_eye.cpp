@@ -1,4 +1,5 @@
 #include <cli/commands/commands.hpp>
+#include <cli/commands/reading_options.hpp>
 #include <formats/features.hpp>
 #include <formats/input_error.hpp>
 #include <formats/pose_pairs.hpp>
@@ -250,18 +251,10 @@ void addHandEyeCommand(const CommandList& program) {
   command.option("--seed", options->estimate.seed, "Seed of starts and samples (default 1)");
   command.option("--format", options->pairs.reading.format, "Format of both files (default auto: by their first lines)")
       .oneOf(formatNames());
-  command
-      .option("--columns", options->pairs.reading.columns,
-              "Names of CSV columns that are not ours: tx=px,ty=py (ours=the files')")
-      .list();
-  command.flag("--ignore-unknown", options->pairs.reading.ignore_unknown, "Pass over CSV columns without a meaning");
+  declareReading(command, options->pairs.reading);
   const Option in_degrees = command.flag("--degrees", options->in_degrees, "Rotation vectors are in degrees");
   command.flag("--radians", options->in_radians, "Rotation vectors are in radians, those beyond a turn too")
       .excludes(in_degrees);
-  command
-      .option("--norm-tolerance", options->pairs.reading.norm_tolerance,
-              "Quaternions and matrices that are off by less are normalised (default 0.001)")
-      .range(0.0, 0.5);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Directory for a page with residuals, excitations and covariances");
   command.run([options](const Invocation& invocation) { return runCommand(*options, invocation); });

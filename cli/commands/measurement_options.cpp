@@ -1,5 +1,7 @@
 #include <cli/commands/measurement_options.hpp>
 
+#include <cli/commands/reading_options.hpp>
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,9 +11,8 @@ namespace liestat::cli {
 void MeasurementInput::declare(const Command& app, bool file_required) {
   const Option path = app.option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path.required();
-  app.option("--format", format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
-  app.option("--columns", columns, "Names of CSV columns that are not ours: r00=R00,tx=cx (ours=the file's)").list();
-  app.flag("--ignore-unknown", ignore_unknown, "Pass over CSV columns without a meaning");
+  app.option("--format", reading.format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
+  declareReading(app, reading);
   std::vector<std::pair<std::string, Feature>> features;
   for (const FeatureInfo& row : feature_rows) features.emplace_back(row.name, row.kind);
   app.choice("--feature", options.feature, features, "What the rows are (default: as the file says; poses are frames)");
@@ -25,18 +26,11 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
   app.flag("--likelihood", options.likelihood, "Add the log-determinant of the volume to maha");
   const Option in_degrees = app.flag("--degrees", degrees, "Rotation vectors are in degrees");
   app.flag("--radians", radians, "Rotation vectors are in radians, those beyond a turn too").excludes(in_degrees);
-  app.option("--norm-tolerance", norm_tolerance,
-             "Quaternions, directions and matrices that are off by less are normalised (default 0.001)")
-      .range(0.0, 0.5);
 }
 
 Measurements MeasurementInput::read(const std::string& command) const {
-  ReadingOptions how;
-  if (!format.empty()) how.format = format;
-  how.norm_tolerance = norm_tolerance;
+  ReadingOptions how = reading;
   how.angles = degrees ? AngleUnit::degrees : radians ? AngleUnit::radians : AngleUnit::unsaid;
-  how.ignore_unknown = ignore_unknown;
-  how.columns = columns;
   return chooseMeasurements(readFeatureFile(file, how), options, command);
 }
 

@@ -2,10 +2,11 @@
 
 #include <formats/input_error.hpp>
 #include <formats/text.hpp>
-#include <stats/convention_presets.hpp>
+#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,7 +18,6 @@ void TrajectoryInputOptions::declare(const Command& command) {
       .oneOf(trajectoryFormatNames());
   command.option("--cov-file", estimate.covariance_file,
                  "Side file with the covariances of the estimate (default: its name with .cov after it)");
-  command.option("--cov-layout", layout, "Layout of the numbers after TUM's eight: full36, upper21, lower21 …");
   command.choice(
       "--association", association.rule,
       "interpolate: the reference at the times of the estimate (default); nearest: the nearest stamps, as evo");
@@ -34,39 +34,60 @@ void TrajectoryInputOptions::declare(const Command& command) {
   command.option("--t_offset,--t-offset", association.offset, "Offset that is added to the estimate's times, s");
   command.option("--t_start,--t-start", association.start, "Poses of the reference from this time on");
   command.option("--t_end,--t-end", association.end, "Poses of the reference up to this time");
-  command
-      .option("--norm-tolerance", estimate.reading.norm_tolerance,
-              "Quaternions that are off by less are normalised (default 0.001)")
-      .range(0.0, 0.5);
+  declareReading(command, estimate, duplicates);
+  command.option("--ref-columns", reference.reading.columns, "The same as --columns for the reference").list();
+  command.choice("--ref-time-unit", reference.time_unit, "The same as --time-unit for the reference");
 }
 
 void TrajectoryInputOptions::settle() {
-  reference.reading = estimate.reading;
-  if (!layout.empty()) {
-    Convention c;
-    if (!setConventionField(c, "layout", layout)) {
-      throw OptionError("--cov-layout", "'" + printable(layout) + "'", "full36, upper21, lower21, blocks12 or diag6");
-    }
-    estimate.layout = c.layout;
-  }
+  std::vector<std::string> columns = std::move(reference.reading.columns);
+  reference.reading = estimate.reading, reference.reading.columns = std::move(columns);
+  reference.unmeasured = estimate.unmeasured;
   for (const double value : {association.offset, association.start.value_or(0), association.end.value_or(0)}) {
     if (!std::isfinite(value)) throw OptionError("liestat", "a time that is not finite", "seconds");
   }
 }
 
-Trajectory readTimedTrajectory(const std::string& path, const TrajectoryOptions& options) {
-  Trajectory t = readTrajectory(path, options);
-  for (std::size_t i = 1; i < t.times.size(); ++i) {
-    if (t.times[i] > t.times[i - 1]) continue;
-    const bool same = t.times[i] == t.times[i - 1];
-    throw InputError(
-        t.name, t.lines[i],
-        same ? fmt::format("the time {} stands in line {} too", t.time_texts[i], t.lines[i - 1])
-             : fmt::format("the time {} is before {} of line {}", t.time_texts[i], t.time_texts[i - 1], t.lines[i - 1]),
-        "times that ascend, each once");
-  }
+Trajectory readTimedTrajectory(const std::string& path, const TrajectoryOptions& options,
+                               std::optional<DuplicateRule> duplicates) {
+  return readTimedTrajectory(path, loadText(path, options.reading.largest_file), options, duplicates);
+}
+
+Trajectory readTimedTrajectory(const std::string& path, const TextFile& file, const TrajectoryOptions& options,
+                               std::optional<DuplicateRule> duplicates) {
+  Trajectory t = readTrajectory(path, file, options);
+  orderInTime(t, duplicates);
+  // Quaternions of six digits are off by as much; a matrix of few digits is worth a word.
+  if (t.largest_norm_error <= 1e-6 && t.format != "kitti" && t.format != "matrix") t.n_normalised = 0;
+  t.notes = notesOf(t, options);
   return t;
 }
+
+void requireSameVertices(const Trajectory& reference, const Trajectory& estimate) {
+  if (reference.ids.empty() || estimate.ids.empty() || reference.ids == estimate.ids) return;
+  const auto [a, b] =
+      std::mismatch(reference.ids.begin(), reference.ids.end(), estimate.ids.begin(), estimate.ids.end());
+  const bool lacks = b == estimate.ids.end() || (a != reference.ids.end() && *a < *b);
+  throw InputError(lacks ? estimate.name : reference.name, 0, fmt::format("there is no vertex {}", lacks ? *a : *b),
+                   "the same vertices in both graphs");
+}
+
+namespace {
+
+/// A way out where the stamps of two files have steps that differ by powers of 1000; empty otherwise.
+std::string hintAtUnits(const Trajectory& reference, const Trajectory& estimate) {
+  if (reference.times.size() < 3 || estimate.times.size() < 3) return {};
+  const double a = medianStep(reference.times), b = medianStep(estimate.times);
+  const bool of_estimate = b > a;
+  const double ratio = of_estimate ? b / a : a / b;
+  const auto power = static_cast<int>(std::lround(std::log10(ratio) / 3));
+  if (!std::isfinite(ratio) || power < 1 || power > 3) return {};
+  return fmt::format(", or {} {}: the step is {:.3g} s in the median in {} and {:.3g} s in {}",
+                     of_estimate ? "--time-unit" : "--ref-time-unit", name(static_cast<StampUnit>(power)), a,
+                     reference.name, b, estimate.name);
+}
+
+}  // namespace
 
 void refuse(EvaluationStatus status, const std::string& reason, const Trajectory& reference, const Trajectory& estimate,
             const TrajectoryInputOptions& options) {
@@ -84,13 +105,15 @@ void refuse(EvaluationStatus status, const std::string& reason, const Trajectory
       throw InputError(reference.name, 0, "no pose between --t_start and --t_end",
                        fmt::format("times from {} to {} s", reference.time_texts.front(), reference.time_texts.back()));
     case EvaluationStatus::no_overlap:
-      throw InputError(estimate.name, 0, reason, "times of one clock, or --t_offset");
+      throw InputError(estimate.name, 0, reason,
+                       "times of one clock, or --t_offset" + hintAtUnits(reference, estimate));
     case EvaluationStatus::no_match:
       throw InputError(estimate.name, 0, reason,
-                       times.rule == AssociationRule::nearest ? "a larger --t_max_diff, or --association interpolate"
-                                                              : "a larger --max-gap");
+                       (times.rule == AssociationRule::nearest ? "a larger --t_max_diff, or --association interpolate"
+                                                               : "a larger --max-gap") +
+                           hintAtUnits(reference, estimate));
     case EvaluationStatus::too_few:
-      throw InputError(estimate.name, 0, reason, "at least two");
+      throw InputError(estimate.name, 0, reason, "at least two" + hintAtUnits(reference, estimate));
     case EvaluationStatus::not_aligned:
       throw InputError(estimate.name, 0, reason, "another --alignment");
     default:

@@ -179,8 +179,6 @@ void showHypotheses(Report& report, const ConventionDiagnosis& d) {
                   "nats below the "
                   "best; the calibration index is NEES over its degrees of freedom, 1 if the covariances are right.",
                   d.fits.size(), number(d.margin, 3)));
-  report.table({"--cov-from", "calibration index", "nats below the best", "explains", "in words", "remark"}, rows,
-               rows.size() < d.fits.size() ? fmt::format("The likeliest {} of them.", rows.size()) : std::string());
   Panel panel{
       .x = {.label = "nats below the best, plus one", .logarithmic = true},
       .y = {.label = "calibration index (NEES/dof)", .logarithmic = true},
@@ -195,6 +193,8 @@ void showHypotheses(Report& report, const ConventionDiagnosis& d) {
                                                            indefinite)
                                              : std::string()),
        .panels = {panel}});
+  report.table({"--cov-from", "calibration index", "nats below the best", "explains", "in words", "remark"}, rows,
+               rows.size() < d.fits.size() ? fmt::format("The likeliest {} of them.", rows.size()) : std::string());
 }
 
 void showChain(Report& report, const ChainDiagnosis& c) {
@@ -261,16 +261,19 @@ void showCalibration(Report& report, const TimesOfPoses& times, const std::vecto
     nees.series.push_back(neesSeries(nameOf(r), c.errors, times));
     nees.series.back().colour = colour;
   }
-  report.table(
-      {"read as", "poses", "calibration index", "p", "position", "rotation", "within 95 %, %"}, rows,
-      "NEES over its degrees of freedom, of poses, of positions and of rotations (1 expected), and the share of "
-      "poses within the ellipsoid of 95 %.");
+  const auto table = [&] {
+    report.table(
+        {"read as", "poses", "calibration index", "p", "position", "rotation", "within 95 %, %"}, rows,
+        "NEES over its degrees of freedom, of poses, of positions and of rotations (1 expected), and the share of "
+        "poses within the ellipsoid of 95 %.");
+  };
   report.plot(
       {.name = "calibration",
        .caption = "Left: a curve above the diagonal is that of covariances that are too large, below it of those "
                   "that are too small. Right: NEES of each pose; " +
                   neesBounds(),
        .panels = {coverage, nees}});
+  table();
 }
 
 /// Errors over the times with the bands of the best reading, and of the assumed one.
@@ -344,11 +347,6 @@ void writeDiagnosisReport(const std::string& directory, const std::string& comma
   const CovarianceDiagnosis& r = output.result;
   report.verdict(r.verdict());
   report.code(command_line);
-  if (r.diagnosis) showHypotheses(report, *r.diagnosis);
-  if (r.mode == DiagnosisMode::plan) showPlan(report, r.plan);
-  if (r.chain) showChain(report, *r.chain);
-  if (r.diagnosis && r.diagnosis->chain) showChain(report, *r.diagnosis->chain);
-
   const bool has_truth = r.diagnosis.has_value();
   const TimesOfPoses times = timesOf(r);
   std::vector<const ConventionReading*> shown;
@@ -366,6 +364,10 @@ void writeDiagnosisReport(const std::string& directory, const std::string& comma
     showCalibration(report, times, shown);
     showErrors(report, times, *shown.back(), shown.size() > 1 ? shown.front() : nullptr);
   }
+  if (r.diagnosis) showHypotheses(report, *r.diagnosis);
+  if (r.mode == DiagnosisMode::plan) showPlan(report, r.plan);
+  if (r.chain) showChain(report, *r.chain);
+  if (r.diagnosis && r.diagnosis->chain) showChain(report, *r.diagnosis->chain);
   report.section("Result");
   report.code(formatDiagnosis(output));
   report.write();

@@ -3,26 +3,45 @@
 #include <report/json.hpp>
 #include <fusion/evaluate_types.hpp>
 
+#include <array>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 namespace liestat::cli {
 
+/// Errors of the relative motion over all segments of a length, measured along the reference.
+struct SegmentErrors {
+  double length = 0;                                ///< m
+  std::size_t pairs = 0;                            ///< segments, which overlap
+  ErrorStatistics translation = {}, rotation = {};  ///< m, deg
+  /// Quantiles at 5, 25, 50, 75 and 95 %.
+  std::array<double, 5> translation_quantiles = {}, rotation_quantiles = {};
+};
+template <class V>
+void describe(V& v, const SegmentErrors& s) {
+  v("length", s.length, "along the reference", "m")("pairs", s.pairs, "segments");
+  v("translation", s.translation, "", "m")("rotation", s.rotation, "", "deg");
+}
+
 /// One estimate as `liestat evaluate` shows it.
 struct EvaluatedEstimate {
-  std::string name;  ///< name of the file
+  std::string name;  ///< name of the file, with as much of its path as tells it from the others
   TrajectoryEvaluation evaluation;
+  std::vector<SegmentErrors> segments = {};  ///< by ascending length, if a page or JSON shows them
 };
 template <class V>
 void describe(V& v, const EvaluatedEstimate& e) {
   v("file", e.name);
   describe(v, e.evaluation);
+  v("segments", e.segments, "errors by the length of a segment");
 }
 
 /// The result of `liestat evaluate`: at least one estimate.
 struct EvaluationOutput {
   std::string reference;
   bool reference_has_covariances = false;
+  std::vector<std::string> reference_notes;  ///< on its reading
   std::vector<EvaluatedEstimate> estimates;
   std::vector<std::string> failed;  ///< conditions of --fail-if that hold
 
@@ -31,12 +50,14 @@ struct EvaluationOutput {
 };
 template <class V>
 void describe(V& v, const EvaluationOutput& output) {
-  v("reference", output.reference);
+  v("reference", output.reference)("reference_notes", output.reference_notes, "on its reading");
   describeSetting(v, output.setting());
   v("estimates", output.estimates)("failed", output.failed);
 }
 
 std::string formatEvaluation(const EvaluationOutput& output);
+/// A row for each estimate with the figures that --fail-if compares, as CSV.
+std::string evaluationCsv(const EvaluationOutput& output);
 void writeEvaluationReport(const std::string& directory, const std::string& command_line,
                            const EvaluationOutput& output);
 

@@ -4,18 +4,26 @@
 #include <report/page.hpp>
 #include <fusion/trajectories_types.hpp>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace liestat::cli {
 
-/// The times of poses, s, or the numbers of their rows.
+/// The times of poses from a start, s, or the numbers of their rows.
 struct TimesOfPoses {
   std::vector<double> values;
   bool by_time = true;
 
-  const char* label() const { return by_time ? "time, s" : "row"; }
+  /// Of times on a clock; the start is the first of them unless it is given.
+  TimesOfPoses(std::vector<double> times, bool are_times, std::optional<double> start = {})
+      : values(std::move(times)), by_time(are_times) {
+    if (!by_time || values.empty()) return;
+    const double first = start.value_or(values.front());
+    for (double& t : values) t -= first;
+  }
+  const char* label() const { return by_time ? "time from the start, s" : "row"; }
 };
 
 /// The name of a coordinate of an error, with its unit, and how many of the unit make a metre or radian.

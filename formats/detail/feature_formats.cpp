@@ -100,6 +100,7 @@ RowLayout readEuroc(const LineReader& reader, const std::string& file, const Rea
   if (fields.size() < columns.size()) {
     throwWrongWidth(fields.size(), columns.size(), "or more (timestamp, p x y z, q w x y z)", file, reader.number());
   }
+  if (fields.size() > most_columns) throwWrongWidth(fields.size(), most_columns, "at most", file, reader.number());
   // Velocities and biases follow; they have no name here and are passed over.
   columns.resize(fields.size());
   return {std::move(columns), Separator::comma, "as in the first row", 1e-9};
@@ -149,11 +150,40 @@ void rename(RowLayout& layout, const std::vector<std::string>& wishes, const std
   }
   // The file may have a column of that name already.
   for (std::size_t i = 0; i < theirs.size(); ++i) {
-    const auto others = std::count(layout.columns.begin(), layout.columns.end(), layout.columns[i]);
-    if (renamed[i] && others > 1) {
+    if (renamed[i] && std::count(layout.columns.begin(), layout.columns.end(), layout.columns[i]) > 1) {
       throw InputError(file, line, "two columns are '" + layout.columns[i] + "' after --columns", "one");
     }
   }
+}
+
+/// Columns by their numbers from 1, which the user gives as "ours=1"; the others are passed over.
+RowLayout readNumberedColumns(const LineReader& reader, const std::string& file, const ReadingOptions& options) {
+  std::vector<std::string_view> fields;
+  splitFields(reader.line(), Separator::comma_or_blanks, fields);
+  if (fields.size() > most_columns) {
+    throw InputError(file, reader.number(), fmt::format("{} columns", fields.size()),
+                     fmt::format("at most {}", most_columns));
+  }
+  RowLayout layout{.columns = std::vector<std::string>(fields.size()),
+                   .separator = Separator::comma_or_blanks,
+                   .description = "as in the first row",
+                   .has_header = !looksNumeric(fields)};
+  for (const std::string& wish : options.columns) {
+    const std::size_t sign = wish.find('='), number = std::stoul(wish.substr(sign + 1));
+    const std::string ours = wish.substr(0, sign);
+    const auto complain = [&](const std::string& what, const std::string& expected) {
+      throw InputError(file, reader.number(), "--columns " + printable(wish) + ": " + what, expected);
+    };
+    if (!isKnown(ours))
+      complain("there is no column '" + printable(ours) + "' of features", std::string(known_columns_text));
+    if (number < 1 || number > fields.size()) {
+      complain(fmt::format("the row has {} columns", fields.size()), fmt::format("1 to {}", fields.size()));
+    }
+    const bool twice = std::find(layout.columns.begin(), layout.columns.end(), ours) != layout.columns.end();
+    if (twice || !layout.columns[number - 1].empty()) complain("it is there already", "each name and each column once");
+    layout.columns[number - 1] = ours;
+  }
+  return layout;
 }
 
 /// The names of a header that is parted by blanks, if it is one: each of them known. Otherwise empty.
@@ -165,6 +195,7 @@ std::vector<std::string> namesBetweenBlanks(const std::vector<std::string_view>&
 }
 
 RowLayout readCsv(const LineReader& reader, const std::string& file, const ReadingOptions& options) {
+  if (columnsByNumber(options.columns)) return readNumberedColumns(reader, file, options);
   const std::size_t line = reader.number();
   std::vector<std::string_view> fields;
   splitFields(reader.line(), Separator::blanks, fields);
@@ -182,7 +213,8 @@ RowLayout readCsv(const LineReader& reader, const std::string& file, const Readi
     throw InputError(file, line, "numbers where the header should be",
                      std::count_if(hidden.begin(), hidden.end(), isKnown) >= 3
                          ? "the header without a '#' before it"
-                         : fmt::format("a line that names the columns: {}", feature_columns_text));
+                         : fmt::format("a line that names the columns: {}; or --columns tx=1,ty=2,... by their numbers",
+                                       feature_columns_text));
   }
   RowLayout layout{.columns = readHeader(fields, file, line), .description = "as in the header", .has_header = true};
   // With a column w beside them x, y and z are a quaternion's, whichever comes first.
@@ -212,9 +244,20 @@ constexpr std::array formats{
 
 }  // namespace
 
+bool columnsByNumber(const std::vector<std::string>& wishes) {
+  const auto is_number = [](const std::string& wish) {
+    const std::size_t sign = wish.find('=');
+    const std::string_view theirs = sign == std::string::npos ? "" : std::string_view(wish).substr(sign + 1);
+    return !theirs.empty() && theirs.size() < 6 && theirs.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  return !wishes.empty() && std::all_of(wishes.begin(), wishes.end(), is_number);
+}
+
 std::span<const FeatureFormat> featureFormats() { return formats; }
 
-const FeatureFormat& featureFormat(std::string_view name, const LineReader& reader, const std::string& file) {
+const FeatureFormat& featureFormat(const ReadingOptions& options, const LineReader& reader, const std::string& file) {
+  const bool by_number = columnsByNumber(options.columns);
+  const std::string_view name = by_number && options.format == "auto" ? "csv" : std::string_view(options.format);
   FirstLine first{.comment = reader.comment(), .words = {}, .commas = {}, .numbers = {}};
   splitFields(reader.line(), Separator::comma, first.commas);
   if (reader.line().find_first_of(",;") == std::string_view::npos) {
@@ -228,7 +271,7 @@ const FeatureFormat& featureFormat(std::string_view name, const LineReader& read
   }
   if (name != "auto") throw std::invalid_argument("there is no format of files called " + std::string(name));
   throw InputError(file, reader.number(), fmt::format("{} numbers without a header", first.numbers.size()),
-                   joined(without_header, ", ") + ", or a CSV header that names the columns");
+                   joined(without_header, ", ") + ", a CSV header that names the columns, or --columns tx=1,ty=2,...");
 }
 
 }  // namespace liestat::detail

@@ -30,12 +30,18 @@ class Inflation {
 
 }  // namespace
 
-std::string decompressed(std::string_view bytes, const std::string& file) {
+std::optional<std::string> decompressed(std::string_view bytes, const std::string& file, std::size_t limit) {
   Inflation inflation;
   if (!inflation.ready()) throw InputError(file, 0, "zlib refused to start", "a gzip file and memory to read it");
   z_stream& stream = inflation.stream();
   std::vector<unsigned char> input(std::size_t{1} << 16), output(std::size_t{1} << 18);
   std::string text;
+  // The last four bytes say how long the last member is, modulo 2^32; memory that is only reserved costs nothing.
+  std::size_t stated = 0;
+  for (std::size_t k = 0; k < 4 && bytes.size() > 18; ++k) {
+    stated |= std::size_t{static_cast<unsigned char>(bytes[bytes.size() - 4 + k])} << 8 * k;
+  }
+  text.reserve(std::min(stated, limit) + output.size());
   while (!bytes.empty()) {
     // zlib before 1.3 takes no pointer to constant bytes; what is passed is a copy.
     const std::size_t count = std::min(bytes.size(), input.size());
@@ -48,6 +54,7 @@ std::string decompressed(std::string_view bytes, const std::string& file) {
       stream.avail_out = static_cast<uInt>(output.size());
       code = inflate(&stream, Z_NO_FLUSH);
       text.append(reinterpret_cast<const char*>(output.data()), output.size() - stream.avail_out);
+      if (text.size() > limit) return std::nullopt;
     } while (code == Z_OK && stream.avail_out == 0);
     bytes.remove_prefix(count - stream.avail_in);
     if (code == Z_STREAM_END) {

@@ -9,7 +9,7 @@
 namespace liestat::detail {
 
 NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance, const std::string& file,
-                                std::size_t line) {
+                                std::size_t line, std::string_view remedy) {
   const double determinant = matrix.determinant();
   if (determinant < 0) {
     throw InputError(file, line,
@@ -19,7 +19,7 @@ NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance,
   const double error = 0.5 * (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).norm();
   if (!(error <= tolerance && determinant > 0)) {
     throw InputError(file, line, fmt::format("the rotation matrix is not orthogonal (error {:.6g})", error),
-                     fmt::format("an error within {:g}", tolerance));
+                     fmt::format("an error within {:g}{}", tolerance, remedy));
   }
   return {SO3d::fitToSO3(matrix), error};
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace liestat::detail {
 
@@ -18,8 +19,11 @@ struct NearestRotation {
 };
 
 /// The rotation matrix that a file means: the nearest one. Throws InputError where the matrix is a reflection or off by
-/// more than the tolerance.
+/// more than the tolerance; `remedy` ends its message.
 NearestRotation nearestRotation(const Eigen::Matrix3d& matrix, double tolerance, const std::string& file,
-                                std::size_t line);
+                                std::size_t line, std::string_view remedy = {});
+
+/// The way out where a norm is off by more than the tolerance, for messages.
+inline constexpr std::string_view norm_remedy = ", or a larger --norm-tolerance";
 
 }  // namespace liestat::detail

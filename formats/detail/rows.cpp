@@ -9,6 +9,11 @@
 
 namespace liestat::detail {
 
+std::size_t mostRows(std::string_view text, std::size_t columns) {
+  const auto newlines = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  return std::min(newlines + 1, text.size() / (2 * columns) + 1);
+}
+
 bool looksNumeric(const std::vector<std::string_view>& fields) {
   double value = 0;
   return !fields.empty() && std::all_of(fields.begin(), fields.end(), [&](std::string_view field) {

@@ -14,6 +14,9 @@
 
 namespace liestat::detail {
 
+/// At most that many rows of so many columns fit into a text: a row has a digit and a separator for each field.
+std::size_t mostRows(std::string_view text, std::size_t columns);
+
 /// True if all fields are numbers or empty, so that they cannot be a header.
 bool looksNumeric(const std::vector<std::string_view>& fields);
 

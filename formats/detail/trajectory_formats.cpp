@@ -3,6 +3,7 @@
 #include <formats/detail/rows.hpp>
 #include <formats/detail/trajectory_rows.hpp>
 #include <formats/input_error.hpp>
+#include <formats/pose_graph.hpp>
 #include <formats/text.hpp>
 #include <stats/convention_layouts.hpp>
 
@@ -17,6 +18,7 @@ namespace liestat::detail {
 // Each pair is in a source of its own, formats/detail/trajectory_*.cpp.
 TrajectoryReader readTum, readOpenVins, readKitti, readEuroc, readCsv;
 TrajectoryWriter writeTum, writeOpenVins, writeKitti, writeEuroc, writeCsv;
+TrajectoryReader readMatrices, readColmap, readVertices;
 TrajectoryReader readRosCsv, readRosJson, readRosYaml, readMavlinkCsv, readMavlinkJson;
 TrajectoryWriter writeRosCsv, writeRosJson, writeRosYaml, writeMavlinkCsv, writeMavlinkJson;
 
@@ -91,10 +93,37 @@ constexpr TrajectoryFormat trajectory_formats[] = {
      .covariances = CovariancePlace::side_file},
     {.name = "euroc",
      .recognises =
-         [](const Beginning& b) { return contains(b.line, ",") && isNanoseconds(b.line.substr(0, b.line.find(','))); },
+         [](const Beginning& b) {
+           return contains(b.line, ",") && (isNanoseconds(b.line.substr(0, b.line.find(','))) ||
+                                            (b.numbers >= 8 && contains(b.comment, "[ns]")));
+         },
      .read = readEuroc,
      .write = writeEuroc,
      .time_decimals = 9,
+     .covariances = CovariancePlace::side_file},
+    {.name = "matrix",
+     .recognises = [](const Beginning& b) { return b.numbers == 16 || b.numbers == 17 || looksLikeBlocks(b.text); },
+     .read = readMatrices,
+     .write = nullptr,
+     .times = TrajectoryTimes::optional,
+     .covariances = CovariancePlace::side_file},
+    {.name = "colmap",
+     .recognises = [](const Beginning& b) { return looksLikeColmap(b.line); },
+     .read = readColmap,
+     .write = nullptr,
+     .times = TrajectoryTimes::optional,
+     .covariances = CovariancePlace::side_file},
+    {.name = "g2o",
+     .recognises = [](const Beginning& b) { return graphFormatOf(b.text) == GraphFormat::g2o; },
+     .read = readVertices,
+     .write = nullptr,
+     .times = TrajectoryTimes::none,
+     .covariances = CovariancePlace::side_file},
+    {.name = "toro",
+     .recognises = [](const Beginning& b) { return graphFormatOf(b.text) == GraphFormat::toro; },
+     .read = readVertices,
+     .write = nullptr,
+     .times = TrajectoryTimes::none,
      .covariances = CovariancePlace::side_file},
     // Whatever has a header; the reader of features names what it cannot read.
     {.name = "csv",
@@ -127,7 +156,7 @@ Eigen::Vector4d TrajectorySink::wxyz(std::size_t i) const {
 }
 
 std::string TrajectorySink::ticks(std::size_t i) {
-  const std::string& time = seconds(i);
+  const std::string time = seconds(i);
   if (trajectory_.times[i] < 0) {
     throw InputError(trajectory_.name, trajectory_.lines[i], fmt::format("the time is {}", time),
                      fmt::format("0 or more, for the format {}", format_.name));

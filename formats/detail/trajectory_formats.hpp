@@ -19,7 +19,8 @@ struct TrajectoryFormat;
 struct TrajectoryBeginning {
   std::string_view line;  ///< the first with content
   std::string_view text;
-  std::size_t numbers = 0;  ///< fields of that line, if all are numbers
+  std::size_t numbers = 0;        ///< fields of that line, if all are numbers
+  std::string_view comment = {};  ///< the comment above it
 };
 
 /// A text that is read.
@@ -49,7 +50,7 @@ class TrajectorySink {
   Eigen::Vector4d wxyz(std::size_t i) const;
   SE3d pose(std::size_t i) const { return trajectory_.poses[i]; }
   /// The time of pose i: seconds as they were read, whole units of the format, or seconds and nanoseconds.
-  const std::string& seconds(std::size_t i) const { return trajectory_.time_texts[i]; }
+  std::string seconds(std::size_t i) const { return trajectory_.time_texts[i]; }
   std::string ticks(std::size_t i);
   std::pair<std::string, std::string> stamp(std::size_t i);
   /// The numbers of covariance i in the layout. A message has no word for a single unknown entry: a component that is
@@ -94,7 +95,7 @@ struct TrajectoryFormat {
   std::string_view name;
   bool (*recognises)(const TrajectoryBeginning& beginning);
   TrajectoryReader* read;
-  TrajectoryWriter* write;
+  TrajectoryWriter* write;  ///< null: the format is only read
   TrajectoryTimes times = TrajectoryTimes::required;
   std::size_t time_decimals = 0;  ///< times are whole units of 10^-time_decimals s; 0: seconds with a point
   CovariancePlace covariances = CovariancePlace::rows;
@@ -110,6 +111,11 @@ struct TrajectoryFormat {
 /// Reads poses as features (formats/features.hpp), in the format of that name; times and, where a header names columns,
 /// covariances.
 void readAsFeatures(const TrajectorySource& source, Trajectory& trajectory);
+
+/// True if a line is one of COLMAP's images.txt: a number, a unit quaternion, a translation, a camera, a name.
+bool looksLikeColmap(std::string_view line);
+/// True if a text begins with a matrix of four lines of four numbers, or with one below a line of three whole numbers.
+bool looksLikeBlocks(std::string_view text);
 
 /// All formats, in the order in which they are tried.
 std::span<const TrajectoryFormat> trajectoryFormats();

@@ -5,6 +5,7 @@
 #include <formats/text.hpp>
 #include <formats/detail/trajectory_formats.hpp>
 #include <formats/detail/trajectory_rows.hpp>
+#include <formats/detail/yaml_values.hpp>
 #include <lie/euler.hpp>
 
 #include <fmt/format.h>
@@ -296,6 +297,7 @@ void readRosYaml(const TrajectorySource& source, Trajectory& trajectory) {
     if (document.find_first_not_of(" \t\r\n") != std::string::npos) {
       Json json;
       try {
+        refuseAliases(document, trajectory.name, begin_line);
         json = jsonOf(YAML::Load(document));
       } catch (const YAML::Exception& error) {
         throw InputError(trajectory.name, begin_line + static_cast<std::size_t>(std::max(error.mark.line, 0)),

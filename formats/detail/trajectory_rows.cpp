@@ -1,5 +1,6 @@
 #include <formats/detail/trajectory_rows.hpp>
 
+#include <formats/detail/rotation_matrix.hpp>
 #include <formats/input_error.hpp>
 #include <formats/numeric_table.hpp>
 #include <formats/text.hpp>
@@ -9,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <unordered_map>
 #include <utility>
@@ -50,7 +52,7 @@ SE3d poseOf(const Eigen::Vector3d& position, const Eigen::Vector4d& xyzw, double
   if (norm == 0) throw InputError(trajectory.name, line, "the quaternion is zero", "a unit quaternion");
   if (!(error <= norm_tolerance)) {
     throw InputError(trajectory.name, line, fmt::format("the norm of the quaternion is {:.6g}", norm),
-                     fmt::format("1 within {:g}", norm_tolerance));
+                     fmt::format("1 within {:g}{}", norm_tolerance, norm_remedy));
   }
   if (error > 1e-12) {
     ++trajectory.n_normalised;
@@ -114,14 +116,29 @@ void applySentinels(std::vector<double>& numbers, CovarianceLayout layout, doubl
 
 void appendTime(Trajectory& trajectory, std::string_view seconds, std::size_t line) {
   trajectory.times.push_back(numberField(seconds, "the time", trajectory.name, line));
-  trajectory.time_texts.emplace_back(seconds);
+  trajectory.time_texts.push_back(seconds);
 }
 
 std::string secondsOfTicks(std::string_view ticks, std::size_t decimals) {
-  std::string digits(withoutLeadingZeros(ticks));
-  if (digits.size() <= decimals) digits.insert(0, decimals + 1 - digits.size(), '0');
-  digits.insert(digits.size() - decimals, 1, '.');
-  return digits;
+  const std::string sign = !ticks.empty() && ticks[0] == '-' ? "-" : "";
+  if (!ticks.empty() && (ticks[0] == '-' || ticks[0] == '+')) ticks.remove_prefix(1);
+  const std::size_t e = ticks.find_first_of("eE");
+  int exponent = 0;
+  if (e != std::string_view::npos) {
+    const std::size_t begin = e + (ticks.substr(e + 1, 1) == "+" ? 2 : 1);
+    std::from_chars(ticks.data() + begin, ticks.data() + ticks.size(), exponent);
+  }
+  std::string digits(ticks.substr(0, e));
+  const std::size_t point = std::min(digits.find('.'), digits.size());
+  if (point < digits.size()) digits.erase(point, 1);
+  // Digits before the point of the seconds. A double has no more than 309 of them, and below 1e-40 s there is nothing.
+  const auto before = static_cast<std::ptrdiff_t>(point) + exponent - static_cast<std::ptrdiff_t>(decimals);
+  if (before < -40) return "0";
+  if (before <= 0) digits.insert(0, static_cast<std::size_t>(1 - before), '0');
+  const auto place = static_cast<std::size_t>(std::max<std::ptrdiff_t>(before, 1));
+  if (place > digits.size()) digits.append(place - digits.size(), '0');
+  const std::string fraction = digits.substr(place);
+  return sign + std::string(withoutLeadingZeros(digits.substr(0, place))) + (fraction.empty() ? "" : ".") + fraction;
 }
 
 std::string ticksOfSeconds(std::string_view seconds, std::size_t decimals, bool& exact) {
@@ -198,8 +215,8 @@ std::string conventionHeader(const Convention& c) {
                      name(c.layout));
 }
 
-void readSideFile(const std::string& path, Trajectory& trajectory) {
-  const TextFile file = loadText(path);
+void readSideFile(const std::string& path, Trajectory& trajectory, const TrajectoryOptions& options) {
+  const TextFile file = loadText(path, options.reading.largest_file);
   requireText(file.text, file.name);
   const std::optional<Convention> convention = statedConvention(file.text, file.name);
   if (!convention) {
@@ -227,19 +244,37 @@ void readSideFile(const std::string& path, Trajectory& trajectory) {
     }
     appendCovariance(rows, *convention, numbers, reader.number());
     const auto [place, fresh] = by_time.emplace(fields[0], rows.covariances.size() - 1);
-    if (!fresh) {
+    if (fresh) continue;
+    // Files whose poses repeat a stamp repeat its matrix.
+    const Matrix6d &C = rows.covariances[place->second], &D = rows.covariances.back();
+    if (((C.array() == D.array()) || (C.array().isNaN() && D.array().isNaN())).all()) {
+      rows.covariances.pop_back();
+    } else {
       throw InputError(file.name, reader.number(), fmt::format("the time {} appears twice", printable(fields[0])),
                        "each time once");
     }
   }
-  std::size_t matched = 0;
+  std::vector<bool> used(rows.covariances.size(), false);
   trajectory.covariances.assign(trajectory.size(), Matrix6d::Constant(unknown_entry));
-  for (std::size_t i = 0; i < trajectory.size(); ++i) {
-    const std::string key = trajectory.hasTimes() ? trajectory.time_texts[i] : std::to_string(i);
-    if (const auto row = by_time.find(key); row != by_time.end()) {
-      trajectory.covariances[i] = rows.covariances[row->second];
-      ++matched;
+  const auto match = [&] {
+    for (std::size_t i = 0; i < trajectory.size(); ++i) {
+      const std::string key = trajectory.hasTimes()    ? trajectory.time_texts[i]
+                              : trajectory.ids.empty() ? std::to_string(i)
+                                                       : std::to_string(trajectory.ids[i]);
+      if (const auto row = by_time.find(key); row != by_time.end()) {
+        trajectory.covariances[i] = rows.covariances[row->second];
+        used[row->second] = true;
+      }
     }
+    return static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
+  };
+  std::size_t matched = match();
+  if (matched == 0 && trajectory.stamp_decimals > 0) {
+    // In the unit of the file of the poses.
+    std::unordered_map<std::string, std::size_t> in_seconds;
+    for (const auto& [stamp, row] : by_time) in_seconds.emplace(secondsOfTicks(stamp, trajectory.stamp_decimals), row);
+    by_time = std::move(in_seconds);
+    matched = match();
   }
   if (matched == 0) {
     throw InputError(

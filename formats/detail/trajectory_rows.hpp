@@ -28,8 +28,8 @@ void applySentinels(std::vector<double>& numbers, CovarianceLayout layout, doubl
 /// Adds a time, in seconds as text. Throws InputError if it is no finite number.
 void appendTime(Trajectory& trajectory, std::string_view seconds, std::size_t line);
 
-/// Seconds as text from whole units of 10^-decimals s as text (nanoseconds: 9), and the other way round, digit by digit.
-/// The latter cuts off what is smaller than the unit and says so by `exact`.
+/// Seconds as text from units of 10^-decimals s as text (nanoseconds: 9), and the other way round to whole units, digit by
+/// digit. The latter cuts off what is smaller than the unit and says so by `exact`.
 std::string secondsOfTicks(std::string_view ticks, std::size_t decimals);
 std::string ticksOfSeconds(std::string_view seconds, std::size_t decimals, bool& exact);
 /// True if a field is a whole number of zero or more.
@@ -46,6 +46,6 @@ std::string conventionHeader(const Convention& convention);
 
 /// Reads the side file of a trajectory into it: rows are matched by identical times, or by their number where the
 /// trajectory has no times. Throws InputError.
-void readSideFile(const std::string& path, Trajectory& trajectory);
+void readSideFile(const std::string& path, Trajectory& trajectory, const TrajectoryOptions& options);
 
 }  // namespace liestat::detail

@@ -2,15 +2,53 @@
 
 #include <fmt/format.h>
 
+#include <yaml-cpp/eventhandler.h>
+
+#include <algorithm>
 #include <cmath>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include <formats/detail/rotation_matrix.hpp>
 #include <formats/text.hpp>
 
 namespace liestat::detail {
-namespace {}  // namespace
+namespace {
+
+/// Passes over all of a text but its aliases.
+class AliasFinder : public YAML::EventHandler {
+ public:
+  AliasFinder(const std::string& file, std::size_t first_line) : file_(file), first_line_(first_line) {}
+
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    throw InputError(file_, first_line_ + static_cast<std::size_t>(std::max(mark.line, 0)), "an alias of YAML (*name)",
+                     "each value where it belongs");
+  }
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  const std::string& file_;
+  std::size_t first_line_;
+};
+
+}  // namespace
+
+void refuseAliases(const std::string& yaml, const std::string& file, std::size_t first_line) {
+  if (yaml.find('*') == std::string::npos) return;
+  std::istringstream text(yaml);
+  YAML::Parser parser(text);
+  AliasFinder finder(file, first_line);
+  // One document, as YAML::Load; on a document that it cannot end, yaml-cpp would be asked for the next one for ever.
+  parser.HandleNextDocument(finder);
+}
 
 std::string shown(const YAML::Node& node) {
   if (node.IsScalar()) return "'" + printable(node.Scalar()) + "'";

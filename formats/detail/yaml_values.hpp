@@ -56,6 +56,10 @@ std::vector<double> numbers(const NamedNode& list, const std::string& expected);
 /// A rigid motion as rows (4x4, or 3x4), as 16 or 12 numbers in a row, or as OpenCV's map of rows, cols and data.
 SE3d rigidMotion(const NamedNode& matrix);
 
+/// Throws InputError where a YAML text has an alias: a few bytes of them stand for gigabytes, and no file here needs one.
+/// Throws YAML::Exception where it is no YAML. The text begins in that line of the file.
+void refuseAliases(const std::string& yaml, const std::string& file, std::size_t first_line = 1);
+
 /// The size of a calibration, bytes; yaml-cpp would take minutes for what is larger.
 inline constexpr std::size_t max_yaml = 1000000;
 
@@ -70,6 +74,7 @@ auto withRoot(std::string_view text, const std::string& name, Function&& functio
   std::string yaml(text);
   if (yaml.rfind("%YAML:", 0) == 0) yaml[0] = '#';
   try {
+    refuseAliases(yaml, name);
     const YAML::Node root = YAML::Load(yaml);
     if (!root.IsMap()) throw InputError(name, 0, "this is no YAML file of named values");
     return function(Section(root, name, ""));

@@ -1410,6 +1410,9 @@ def read_trajectory(
     columns: dict[str, str] | None = None,
     ignore_unknown: bool = False,
     norm_tolerance: float = 1e-3,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    duplicates: Literal["drop", "mean"] | None = None,
+    largest_file: float = 1.0,
 ) -> Result: ...
 def read_pose_graph(path: Any, *, ignore_unknown: bool = False, norm_tolerance: float = 1e-3) -> Result: ...
 def write_trajectory(

@@ -52,6 +52,9 @@ def read_trajectory(
     columns=None,
     ignore_unknown=False,
     norm_tolerance=1e-3,
+    time_unit=None,
+    duplicates=None,
+    largest_file=1.0,
 ):
     """Poses, times and covariances from a file of any format that the program reads (docs/formats.md).
 
@@ -63,7 +66,7 @@ def read_trajectory(
         file or its format states. 'unknown' leaves the matrices as they are: `covariances` is None.
     format : str
         'auto' looks at the first lines; tum, kitti, euroc, csv, openvins, ros-json, ros-yaml, ros-csv, mavlink-json,
-        mavlink-csv.
+        mavlink-csv, matrix, colmap, g2o, toro.
     covariance_file : str or path, optional
         A side file; by default the file's name with .cov after it, if there is one.
     layout : {'full36', 'upper21', 'lower21', 'blocks12', 'diag6'}, optional
@@ -72,6 +75,13 @@ def read_trajectory(
         Variances in messages from which on a component was not measured (m² or rad²).
     columns, ignore_unknown, norm_tolerance
         As in `read_features`.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Of stamps that are no seconds; stamps since 1970 are recognised.
+    duplicates : {'drop', 'mean'}, optional
+        Puts the rows in the order of their times, each time once; of a stamp with several poses the first is taken, or
+        their mean. By default the rows are those of the file.
+    largest_file : float
+        Size of a text that is read, expanded, GB.
 
     Returns
     -------
@@ -88,6 +98,10 @@ def read_trajectory(
     """
     caller = "read_trajectory"
     _choice(caller, "layout", layout, _LAYOUTS)
+    _choice(caller, "time_unit", time_unit, (None, "s", "ms", "us", "ns"))
+    _choice(caller, "duplicates", duplicates, (None, "drop", "mean"))
+    if not 0 < largest_file < float("inf"):
+        raise ValueError(f"{caller}: largest_file: expected a finite positive number, got {largest_file!r}")
     read = _reader(caller)
     _choice(caller, "format", format, _core.TRAJECTORY_FORMATS)
     d = read(
@@ -100,6 +114,9 @@ def read_trajectory(
         [f"{ours}={theirs}" for ours, theirs in (columns or {}).items()],
         bool(ignore_unknown),
         float(norm_tolerance),
+        time_unit or "",
+        duplicates or "",
+        float(largest_file),
     )
     return Result("trajectory of a file", poses=SE3._of(d.pop("poses")), **d)
 
@@ -153,7 +170,7 @@ def write_trajectory(
     caller = "write_trajectory"
     params = _poses(caller, "poses", poses)
     write = _reader("format_trajectory")
-    _choice(caller, "format", format, _core.TRAJECTORY_FORMATS[1:])
+    _choice(caller, "format", format, _core.WRITTEN_TRAJECTORY_FORMATS[1:])
     texts = [t if isinstance(t, str) else repr(float(t)) for t in (() if times is None else times)]
     if texts and len(texts) != len(params):
         raise ValueError(f"{caller}: {len(texts)} times of {len(params)} poses")

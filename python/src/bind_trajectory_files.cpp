@@ -34,11 +34,13 @@ py::object nameOf(const std::optional<Convention>& c) {
 
 TrajectoryOptions readingOptions(const std::string& format, const std::string& covariance_file,
                                  const std::string& layout, double unmeasured, const std::vector<std::string>& columns,
-                                 bool ignore_unknown, double norm_tolerance) {
+                                 bool ignore_unknown, double norm_tolerance, const std::string& time_unit,
+                                 double largest_file) {
   TrajectoryOptions options;
   options.format = format, options.covariance_file = covariance_file, options.unmeasured = unmeasured;
   options.reading.columns = columns, options.reading.ignore_unknown = ignore_unknown;
-  options.reading.norm_tolerance = norm_tolerance;
+  options.reading.norm_tolerance = norm_tolerance, options.reading.largest_file = largest_file;
+  options.time_unit = named<StampUnit>(time_unit);
   Convention c;
   if (!layout.empty() && setConventionField(c, "layout", layout)) options.layout = c.layout;
   return options;
@@ -46,17 +48,22 @@ TrajectoryOptions readingOptions(const std::string& format, const std::string& c
 
 py::dict readTrajectory(const std::string& path, const std::string& convention, const std::string& format,
                         const std::string& covariance_file, const std::string& layout, double unmeasured,
-                        const std::vector<std::string>& columns, bool ignore_unknown, double norm_tolerance) {
-  const TrajectoryOptions options =
-      readingOptions(format, covariance_file, layout, unmeasured, columns, ignore_unknown, norm_tolerance);
+                        const std::vector<std::string>& columns, bool ignore_unknown, double norm_tolerance,
+                        const std::string& time_unit, const std::string& duplicates, double largest_file) {
+  const TrajectoryOptions options = readingOptions(format, covariance_file, layout, unmeasured, columns, ignore_unknown,
+                                                   norm_tolerance, time_unit, largest_file);
   const Trajectory t = [&] {
     const py::gil_scoped_release released;
-    return liestat::readTrajectory(path, options);
+    Trajectory read = liestat::readTrajectory(path, options);
+    if (!duplicates.empty()) orderInTime(read, named<DuplicateRule>(duplicates));
+    return read;
   }();
   py::dict d;
   d["poses"] = arrayOfPoses(t.poses);
   d["times"] = t.hasTimes() ? py::object(arrayOf(t.times, {static_cast<py::ssize_t>(t.times.size())})) : py::none();
-  d["time_texts"] = t.hasTimes() ? py::cast(t.time_texts) : py::none();
+  py::list texts;
+  for (std::size_t i = 0; i < t.time_texts.size(); ++i) texts.append(t.time_texts[i]);
+  d["time_texts"] = t.hasTimes() ? py::object(texts) : py::none();
   for (const char* part : {"covariances", "matrices", "convention"}) d[part] = py::none();
   if (t.hasCovariances()) {
     d["matrices"] = arrayOfMatrices(t.covariances, [](const Matrix6d& m) -> const Matrix6d& { return m; });
@@ -110,8 +117,9 @@ py::tuple formatTrajectory(const DoubleArray& poses, const std::optional<DoubleA
                            const std::vector<std::string>& times, const std::string& format,
                            const std::string& convention, const std::vector<std::string>& frames) {
   Trajectory t;
-  t.name = "write_trajectory", t.format = format, t.frames = frames, t.time_texts = times;
+  t.name = "write_trajectory", t.format = format, t.frames = frames;
   for (const std::string& time : times) {
+    t.time_texts.push_back(time);
     double value = 0;
     if (parseNumber(time, value) != NumberKind::finite) {
       throw InputError(t.name, 0, "the time '" + printable(time) + "'", "a finite number of seconds");
@@ -136,6 +144,7 @@ void bindTrajectoryFiles(py::module_& module) {
   module.def("convention_to_write", &conventionToWrite);
   module.def("format_trajectory", &formatTrajectory);
   module.attr("TRAJECTORY_FORMATS") = py::tuple(py::cast(trajectoryFormatNames()));
+  module.attr("WRITTEN_TRAJECTORY_FORMATS") = py::tuple(py::cast(trajectoryFormatNames(false)));
 }
 
 }  // namespace liestat::python

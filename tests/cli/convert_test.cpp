@@ -102,9 +102,9 @@ TEST_F(Convert, everyFormatGivesBackWhatItWasGiven) {
   const std::string given = write("given.csv", csvOf(12));
   const Trajectory before = readTrajectory(given);
   std::string times;
-  for (const std::string& t : before.time_texts) times += t + "\n";
+  for (std::size_t i = 0; i < before.time_texts.size(); ++i) times += before.time_texts[i] + "\n";
   const std::string times_file = write("times.txt", times);
-  for (const std::string& format : trajectoryFormatNames()) {
+  for (const std::string& format : trajectoryFormatNames(false)) {
     if (format == "auto") continue;
     for (const char* convention : {"ros-fixed", "right,unit=deg", "mrpt-ypr", "left,order=rt,content=sigmas"}) {
       if (format == "openvins" && contains(convention, "left")) continue;  // mixes the blocks, of which one is lost
@@ -406,7 +406,7 @@ TEST_F(Convert, badFilesAreNamedWithLineValueAndExpectation) {
       {"mavlink-json", "{\"mavpackettype\":\"ODOMETRY\",\"time_usec\":1,\"x\":1,\"y\":2,\"z\":3,\"q\":[1,0,0]}",
        "the message.q has 3 numbers, expected 4, w first"},
       {"g2o", "EDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1 5 5\n", ":1: 12 fields, expected 31 of EDGE_SE3:QUAT"},
-      {"g2o", "EDGE_SE3:QUAT a 1 1 2 3 0 0 0 1\n", ": 10 fields, expected 31"},
+      {"g2o", "EDGE_SE3:QUAT a 1 1 2 3 0 0 0 1\n", ":1: the vertex is 'a', expected a whole number"},
       {"g2o", "VERTEX_SE2 0 0 0 0\nVERTEX_SE3:QUAT 1 1 2 3 0 0 0 1\n", ":2: VERTEX_SE3:QUAT in a file of EDGE_SE2"},
       {"g2o", "LANDMARK 1 2\n", ":1: a line of 'LANDMARK'"},
   };
@@ -434,7 +434,7 @@ TEST_F(Convert, sideFilesThatAreWrong) {
   EXPECT_TRUE(contains(side(header + "1.0 1 1 1 1 1\n"), ":7: 6 fields, expected 7 (time and diag6)"));
   EXPECT_TRUE(contains(side(header + "1 1 1 1 1 1 1\n"), "none of its 1 times is that of a pose"));
   EXPECT_TRUE(contains(side(header + "1.0 1 1 1 1 1 1\n3.0 1 1 1 1 1 1\n"), "1 of its 2 times are those of no pose"));
-  EXPECT_TRUE(contains(side(header + "1.0 1 1 1 1 1 1\n1.0 1 1 1 1 1 1\n"), ":8: the time 1.0 appears twice"));
+  EXPECT_TRUE(contains(side(header + "1.0 1 1 1 1 1 1\n1.0 1 1 1 1 1 2\n"), ":8: the time 1.0 appears twice"));
   // One of two poses: the other has none. A diagonal says nothing of correlations.
   write("p.tum.cov", header + "1.0 1 1 1 1 1 1\n");
   const Trajectory read = readTrajectory(poses);

@@ -173,14 +173,15 @@ TEST(DoctorReport, ShowsTheConventionsAndTheErrorsBeforeAndAfter) {
   const Page page(files.words(), 0);
   EXPECT_TRUE(contains(page.html, "</h1>\n<p class=\"verdict good\">✓ identified: ")) << page.html.substr(0, 3000);
   EXPECT_TRUE(contains(page.html, "<th scope=\"col\">--cov-from</th>"));
-  EXPECT_TRUE(contains(page.html, "<td>ros-fixed</td>"));
+  EXPECT_TRUE(contains(page.html, ">ros-fixed</td>"));
   const std::string errors = page.csv("errors");
   EXPECT_TRUE(contains(errors, "3 sd, ros-fixed")) << "after";
   EXPECT_TRUE(contains(errors, "3 sd, right")) << "before";
   EXPECT_TRUE(contains(page.csv("conventions"), "explain the errors"));
   EXPECT_TRUE(page.has("calibration"));
   // In one of the two rows the index is that of the right convention: near one.
-  const std::string row = "<td>ros-fixed</td><td class=\"number\">150</td><td class=\"number\">";
+  const std::string row = "<td data-label=\"read as\">ros-fixed</td><td class=\"number\" data-label=\"poses\">150</td>"
+                          "<td class=\"number\" data-label=\"calibration index\">";
   const std::size_t begin = page.html.find(row);
   ASSERT_NE(begin, std::string::npos);
   const Json found = json(files.words(), 0);

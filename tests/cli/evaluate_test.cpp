@@ -192,7 +192,12 @@ TEST(EvaluateCommand, PageAndSeveralEstimates) {
   const std::string html = contentOf(page + "/index.html");
   EXPECT_TRUE(contains(html, "consistent"));
   EXPECT_TRUE(contains(html, "second.tum"));
-  EXPECT_TRUE(std::filesystem::exists(page + "/trajectories.csv"));
+  for (const char* plot :
+       {"/trajectories.csv", "/errors_over_time.csv", "/path_1.csv", "/path_2.csv", "/segments.csv"}) {
+    EXPECT_TRUE(std::filesystem::exists(page + plot)) << plot;
+  }
+  EXPECT_LT(html.find("<table"), html.find("<figure")) << "numbers first";
+  EXPECT_TRUE(contains(contentOf(page + "/errors_over_time.csv"), ",second.tum,0,")) << "time from the start";
   EXPECT_TRUE(std::filesystem::exists(page + "/errors_1.csv"));
   EXPECT_TRUE(std::filesystem::exists(page + "/nees_1.csv"));
   EXPECT_TRUE(contains(out.output, "second.tum: no verdict: the estimate has no covariances"));
@@ -210,6 +215,47 @@ TEST(EvaluateCommand, PageAndSeveralEstimates) {
   EXPECT_EQ(sign(files, {"-a"}), "yes");
   EXPECT_EQ(sign(Files(60, 0.25), {"-a"}), "no");
   EXPECT_EQ(sign(files, {"-a", "--fail-if", "ape_rmse>0"}), "no");
+}
+
+TEST(EvaluateCommand, EstimatesOfOneNameAreToldApart) {
+  const Files files;
+  const auto& d = files.directory;
+  for (const char* folder : {"a", "b"}) {
+    std::filesystem::create_directory(d.path() / folder);
+    d.write(std::string(folder) + "/est.tum", contentOf(files.estimate));
+  }
+  const std::string table = d / "table.csv";
+  run({"evaluate", files.reference, d / "a/est.tum", d / "b/est.tum", d / "b/est.tum", "-a", "--table", table});
+  const std::string csv = contentOf(table);
+  EXPECT_TRUE(contains(csv, "file,ape_rmse,")) << csv;
+  EXPECT_TRUE(contains(csv, "\n\"a/est.tum\",")) << csv;
+  EXPECT_TRUE(contains(csv, "b/est.tum (1)\",")) << csv;
+  EXPECT_TRUE(contains(csv, "b/est.tum (2)\",")) << csv;
+  // Each file is read once, so that a pipe is as good as a file.
+  const ProgramResult pipes = runProgram(
+      {"bash", "-c", "\"$0\" evaluate <(cat \"$1\") <(cat \"$2\") -a && \"$0\" convert <(cat \"$2\") - --to csv",
+       LIESTAT_PROGRAM, files.reference, files.estimate},
+      ".");
+  EXPECT_EQ(pipes.status, 0) << pipes.errors;
+}
+
+TEST(EvaluateCommand, ErrorsByTheLengthOfASegment) {
+  // A straight line of 100 m that is 2 % too long: each segment is 2 % off.
+  const TemporaryDirectory d;
+  std::string truth, estimate;
+  for (int i = 0; i <= 400; ++i) {
+    truth += fmt::format("{} {} 0 0 0 0 0 1\n", 0.1 * i, 0.25 * i);
+    estimate += fmt::format("{} {} 0 0 0 0 0 1\n", 0.1 * i, 0.255 * i);
+  }
+  const ProgramOutput out = run({"evaluate", d.write("gt.tum", truth), d.write("est.tum", estimate), "--json", "-"});
+  const Json segments = Json::parse(out.output)["estimates"][0]["segments"];
+  ASSERT_EQ(segments.size(), 5U);
+  for (std::size_t k = 0; k < 5; ++k) {
+    const double length = 16 * static_cast<double>(k + 1);
+    EXPECT_EQ(segments[k]["length"], length);
+    EXPECT_NEAR(segments[k]["translation"]["median"].get<double>(), 0.02 * length, 1e-6);
+    EXPECT_NEAR(segments[k]["rotation"]["max"].get<double>(), 0, 1e-6);
+  }
 }
 
 TEST(EvaluateCommand, ScaleAloneIsJudgedBySim3) {
@@ -267,10 +313,21 @@ TEST(EvaluateCommand, BadInputIsSaid) {
   EXPECT_TRUE(contains(error({"evaluate", files.reference, late}), "do not overlap"));
   const std::string one = d.write("one.tum", "0.5 0 0 0 0 0 0 1\n");
   EXPECT_TRUE(contains(error({"evaluate", files.reference, one}), "at least two"));
-  const std::string twice = d.write("twice.tum", "0.5 0 0 0 0 0 0 1\n0.6 0 0 0 0 0 0 1\n0.6 0 0 0 0 0 0 1\n");
+  const std::string twice = d.write("twice.tum", "0.5 0 0 0 0 0 0 1\n0.6 0 0 0 0 0 0 1\n0.6 1 0 0 0 0 0 1\n");
   EXPECT_TRUE(contains(error({"evaluate", files.reference, twice}), "twice.tum:3: the time 0.6 stands in line 2 too"));
-  const std::string back = d.write("back.tum", "0.5 0 0 0 0 0 0 1\n0.4 0 0 0 0 0 0 1\n");
-  EXPECT_TRUE(contains(error({"evaluate", files.reference, back}), "back.tum:2: the time 0.4 is before 0.5"));
+  // A rule for it, rows that are not sorted, another unit: read, and said.
+  const ProgramOutput dropped = run({"evaluate", files.reference, twice, "--duplicates", "drop"});
+  EXPECT_TRUE(contains(dropped.output, "1 stamp has different poses (first line 3): the first is taken"))
+      << dropped.error;
+  const std::string back = d.write("back.tum", "0.6 0 0 0 0 0 0 1\n0.4 0 0 0 0 0 0 1\n");
+  EXPECT_TRUE(contains(run({"evaluate", files.reference, back}).output, "sorted by time"));
+  const std::string ns =
+      d.write("ns.tum", "200000000 0 0 0 0 0 0 1\n300000000 0 0 0 0 0 0 1\n400000000 0 0 0 0 0 0 1\n");
+  EXPECT_TRUE(contains(error({"evaluate", files.reference, ns}), "--time-unit ns"));
+  EXPECT_EQ(run({"evaluate", files.reference, ns, "--time-unit", "ns"}).exit_code, 0);
+  const std::string truth = d.write("truth.g2o", "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n");
+  const std::string graph = d.write("graph.g2o", "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 2 2 0 0\n");
+  EXPECT_TRUE(contains(error({"evaluate", truth, graph}), "graph.g2o: there is no vertex 1"));
   const std::string mixed = d.write("mixed.tum", "0.5 0 0 0 0 0 0 1\n0.6 0 0 0 0 0 0 1 5\n");
   EXPECT_TRUE(contains(error({"evaluate", files.reference, mixed, "--format", "tum"}), "mixed.tum:2"));
   EXPECT_TRUE(contains(error({"evaluate", files.reference, files.estimate, "--change_unit", "deg"}), "--change_unit"));

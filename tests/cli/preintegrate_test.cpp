@@ -112,7 +112,7 @@ TEST(PreintegrateReport, ShowsIncrementsTheirDeviationsAndTheReadings) {
   EXPECT_NE(page.find("<p class=\"verdict good\">✓ ok: all of the 5 windows have an increment.</p>"),
             std::string::npos);
   for (const char* text_of_page : {"<th scope=\"col\" class=\"number\">sd turn deg</th>", "Growth of the standard",
-                                   "median rate, Hz", "<td class=\"number\">20</td>"}) {
+                                   "median rate, Hz", ">20</td>"}) {
     EXPECT_NE(page.find(text_of_page), std::string::npos) << text_of_page;
   }
   for (const char* file : {"increments", "growth", "readings"}) {
@@ -139,7 +139,7 @@ TEST(PreintegrateReport, SaysWhichWindowsHaveNone) {
   ASSERT_EQ(run.status, 0) << run.errors;
   std::string page = contentOf(directory / "page/index.html");
   EXPECT_NE(page.find("<p class=\"verdict bad\">✗ INCOMPLETE: 2 of 5 windows have no increment"), std::string::npos);
-  EXPECT_NE(page.find("<td>gap</td>"), std::string::npos);
+  EXPECT_NE(page.find(">gap</td>"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(directory / "page/growth.csv")) << "the noise is not known";
   run = preintegrate(directory, {"--imu", "f.csv", "--report", "page"});
   EXPECT_EQ(run.status, 3);

@@ -207,16 +207,18 @@ TEST(Reading, QuaternionsNearUnitNormAreNormalisedAndCounted) {
 
 TEST(Reading, QuaternionFarFromUnitNorm) {
   const std::string text = "# c\nqx,qy,qz,qw\n0,0,0,1\n0,0,0,1.1\n";
-  EXPECT_EQ(errorIn(text), "f.csv:4: the norm of the quaternion is 1.1, expected 1 within 0.001");
+  EXPECT_EQ(errorIn(text),
+            "f.csv:4: the norm of the quaternion is 1.1, expected 1 within 0.001, or a larger --norm-tolerance");
   EXPECT_EQ(read(text, {.norm_tolerance = 0.2}).n_normalised, 1U);
   EXPECT_EQ(errorIn("qx,qy,qz,qw\n0,0,0,0\n"), "f.csv:2: the quaternion is zero, expected a unit vector");
   EXPECT_EQ(errorIn("qx,qy,qz,qw\n0,0,1e200,0\n"),
-            "f.csv:2: the norm of the quaternion is 1e+200, expected 1 within 0.001");
+            "f.csv:2: the norm of the quaternion is 1e+200, expected 1 within 0.001, or a larger --norm-tolerance");
 }
 
 TEST(Reading, DirectionFarFromUnitNorm) {
   EXPECT_EQ(errorIn("dx,dy,dz\n1,0,0\n0,0,0\n"), "f.csv:3: the direction is zero, expected a unit vector");
-  EXPECT_EQ(errorIn("dx,dy,dz\n3,4,0\n"), "f.csv:2: the norm of the direction is 5, expected 1 within 0.001");
+  EXPECT_EQ(errorIn("dx,dy,dz\n3,4,0\n"),
+            "f.csv:2: the norm of the direction is 5, expected 1 within 0.001, or a larger --norm-tolerance");
 }
 
 TEST(Reading, MatricesNearARotationAreProjected) {
@@ -232,7 +234,8 @@ TEST(Reading, MatricesThatAreNoRotation) {
   EXPECT_EQ(errorIn(header + "1,0,0,0,1,0,0,0,-1\n"),
             "f.csv:2: the rotation matrix has determinant -1, it is a reflection, expected determinant 1");
   EXPECT_EQ(errorIn(header + "1,0,0,0,1,0,0,0,1\n1,0,0,0,2,0,0,0,1\n"),
-            "f.csv:3: the rotation matrix is not orthogonal (error 1.5), expected an error within 0.001");
+            "f.csv:3: the rotation matrix is not orthogonal (error 1.5), expected an error within 0.001, or a larger "
+            "--norm-tolerance");
   EXPECT_EQ(errorIn(header + "0,0,0,0,0,0,0,0,0\n", {.norm_tolerance = 10}).substr(0, 45),
             "f.csv:2: the rotation matrix is not orthogona");
 }

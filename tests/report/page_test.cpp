@@ -121,17 +121,20 @@ TEST(Report, PageHoldsTextTablesAndPlots) {
   EXPECT_EQ(csv.substr(0, 80), "panel,series,x,y,low,high,width\nIndex,99 % band,5,,2.85,3.15,\nIndex,99 % band,10");
   if (!hasGnuplot()) GTEST_SKIP() << "skipped what follows: gnuplot is not installed";
   EXPECT_TRUE(report.has_gnuplot());
-  EXPECT_EQ(count(page, "<svg"), 2U);
+  // The two drawings, and a view of each of their four panels.
+  EXPECT_EQ(count(page, "<svg"), 10U);
+  EXPECT_EQ(count(page, "<svg viewBox"), 8U);
   EXPECT_EQ(count(page, "class=\"notice\""), 0U);
   EXPECT_TRUE(contains(page, "no finite data"));
   EXPECT_EQ(count(page, "id='every_style_gpPt6'"), 1U) << "identifiers differ between the drawings";
   EXPECT_EQ(count(page, "id='gpPt6'"), 0U);
   // Whoever cannot see a drawing is told what it shows.
-  EXPECT_TRUE(contains(page, "<svg role=\"img\" aria-labelledby=\"every_style_title\""));
+  EXPECT_TRUE(contains(page, "role=\"img\" aria-labelledby=\"every_style_title\""));
   EXPECT_TRUE(contains(page, "<title id=\"every_style_title\">Index; Histogram; Chart; Empty</title>"));
   EXPECT_FALSE(contains(page, "<title>Gnuplot</title>"));
-  // Letters of 12 px stay at 10 px on a narrow screen, where the drawing scrolls.
-  EXPECT_TRUE(contains(page, "min-width:766px"));
+  // A narrow screen has the panels one below the other: the fourth is the right one of the second row.
+  EXPECT_TRUE(contains(page, "<svg viewBox=\"460 360 460 360\" style=\"flex:1 1 383px;max-width:min(460px,100%)\""));
+  EXPECT_TRUE(contains(page, "<use href=\"#every_style_drawing\" width=\"920\" height=\"720\"/>"));
 }
 
 TEST(Report, TheVerdictIsFirstAndManySectionsHaveContents) {
@@ -141,12 +144,16 @@ TEST(Report, TheVerdictIsFirstAndManySectionsHaveContents) {
   EXPECT_FALSE(contains(contentOf(report.write()), "class=\"contents\"")) << "a short page needs none";
   report.section("Five & more");
   report.table({"a", "b"}, {{"1", "x"}});
+  report.table({"a", "b", "c", "d", "<e>"}, {{"1", "x", "y", "z", "v"}});
   report.verdict(false, "FAILED: 1 of 2 rows");
   const std::string page = contentOf(report.write());
   EXPECT_TRUE(contains(page, "</h1>\n<p class=\"verdict bad\">✗ FAILED: 1 of 2 rows</p>\n<nav"));
   EXPECT_TRUE(contains(page, "<li><a href=\"#section-5\">Five &amp; more</a></li>"));
   EXPECT_TRUE(contains(page, "<h2 id=\"section-5\">Five &amp; more</h2>"));
   EXPECT_TRUE(contains(page, "<th scope=\"col\" class=\"number\">a</th><th scope=\"col\">b</th>"));
+  // A wide table's cells know their columns, for screens that have no room for the header.
+  EXPECT_EQ(count(page, "data-label"), 1U + 5U) << "the style sheet and one wide row";
+  EXPECT_TRUE(contains(page, "<td data-label=\"&lt;e&gt;\">v</td>"));
   report.verdict(true, "PASSED");
   EXPECT_TRUE(contains(contentOf(report.write()), "<p class=\"verdict good\">✓ PASSED</p>"));
   report.verdict(Verdict::none("no verdict: not tested"));
