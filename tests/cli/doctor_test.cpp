@@ -180,8 +180,9 @@ TEST(DoctorReport, ShowsTheConventionsAndTheErrorsBeforeAndAfter) {
   EXPECT_TRUE(contains(page.csv("conventions"), "explain the errors"));
   EXPECT_TRUE(page.has("calibration"));
   // In one of the two rows the index is that of the right convention: near one.
-  const std::string row = "<td data-label=\"read as\">ros-fixed</td><td class=\"number\" data-label=\"poses\">150</td>"
-                          "<td class=\"number\" data-label=\"calibration index\">";
+  const std::string row =
+      "<td data-label=\"read as\">ros-fixed</td><td class=\"number\" data-label=\"poses\">150</td>"
+      "<td class=\"number\" data-label=\"calibration index\">";
   const std::size_t begin = page.html.find(row);
   ASSERT_NE(begin, std::string::npos);
   const Json found = json(files.words(), 0);

@@ -247,6 +247,32 @@ TEST(SummarizedMean, SaysWhyThereIsNoCovariance) {
   EXPECT_TRUE(of(half_turns, true).verdict().isNo());
 }
 
+TEST(MeanVerdict, IsTheWorstFinding) {
+  // A mean with a covariance: what is found about it, and the answer.
+  const auto judged = [](auto&& spoil) {
+    MeanSummary m;
+    m.n = 50, m.covariance = Eigen::Matrix3d::Identity();
+    m.farthest = {FarthestMeasurement{.distance = 1}};
+    spoil(m);
+    addMeanNotes(m, 50);
+    return m;
+  };
+  const auto in_rows = [](MeanSummary& m) { m.order.correlation = 0.8, m.order.z = 5; };
+  const auto scatter = [](MeanSummary& m) {
+    m.known_noise = true;
+    m.fit.p = 0.03, m.fit.chi2 = 200, m.fit.degrees_of_freedom = 150;
+  };
+  EXPECT_TRUE(judged([](MeanSummary&) {}).verdict().isYes());
+  const MeanSummary rows = judged(in_rows), doubtful = judged(scatter);
+  EXPECT_TRUE(rows.verdict().isNo());
+  EXPECT_NE(rows.verdict().text.find("about 9 times too small"), std::string::npos) << rows.verdict().text;
+  EXPECT_TRUE(rows.trusted()) << "the mean may be used";
+  EXPECT_TRUE(doubtful.verdict().isNone()) << doubtful.verdict().text;
+  EXPECT_TRUE(judged([&](MeanSummary& m) { scatter(m), in_rows(m); }).verdict().isNo());
+  EXPECT_TRUE(judged([&](MeanSummary& m) { in_rows(m), m.covariance.resize(0, 0); }).verdict().isYes())
+      << "there is no covariance that could be too small";
+}
+
 TEST(FeatureValue, HasThePartsOfTheType) {
   const SE3d pose(SO3d::exp({0.3, 0.2, 0.1}), Point(1, 2, 3));
   const FeatureValue value = featureValue(pose);
