@@ -105,7 +105,8 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options) {
   std::vector<std::string> notes;
   if (trajectory.n_normalised > 0) {
-    notes.push_back(fmt::format("{} rotations were normalised, off by {:.2g} at most", trajectory.n_normalised,
+    notes.push_back(fmt::format("{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
+                                trajectory.format == "kitti" ? "projected from their matrices" : "normalised",
                                 trajectory.largest_norm_error));
   }
   if (trajectory.n_unmeasured > 0) {
