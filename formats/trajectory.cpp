@@ -105,9 +105,10 @@ Trajectory readTrajectory(const std::string& path, const TrajectoryOptions& opti
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options) {
   std::vector<std::string> notes;
   if (trajectory.n_normalised > 0) {
-    notes.push_back(fmt::format("{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
-                                trajectory.format == "kitti" ? "projected from their matrices" : "normalised",
-                                trajectory.largest_norm_error));
+    notes.push_back(fmt::format(
+        "{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
+        trajectory.format == "kitti" || trajectory.format == "matrix" ? "projected from their matrices" : "normalised",
+        trajectory.largest_norm_error));
   }
   if (trajectory.n_unmeasured > 0) {
     notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",

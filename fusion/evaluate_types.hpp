@@ -162,7 +162,7 @@ struct TrajectoryEvaluation {
   std::vector<double> position_errors = {}, rotation_errors = {};  ///< m and rad, whatever the pose relation
   ErrorStatistics ape_statistics = {}, rpe_statistics = {};
   InterpolationError interpolation = {};  ///< of the reference; the verdict allows for it
-  Alignment weighted = {};  ///< alignment for the verdict
+  Alignment weighted = {};                ///< alignment for the verdict
   Consistency consistency = {};
   std::optional<RelativeConsistency> relative = {};
   std::vector<std::string> notes = {};
@@ -193,11 +193,12 @@ inline Verdict TrajectoryEvaluation::verdict() const {
     return Verdict{good ? Verdict::Answer::yes : Verdict::Answer::no, std::move(text), c.tests.causes()};
   };
   const auto share = [](const ResidualTest& t) { return significant(t.ratio(), 3) + " of its expectation"; };
-  const std::string where = c.components.omits() ? " in " + c.components.judged() : "";
+  const std::string where = c.tests.components.omits() ? " in " + c.tests.components.judged() : "";
   if (c.tests.lag.fires() && c.tests.lag.statistic > 0) {
     // Errors of any dependence are not as large as this.
     if (c.tests.gross.fires()) {
-      return judged(false, "OVERCONFIDENT" + where + ": errors are correlated in time, but a fifth of the poses has a NEES above " +
+      return judged(false, "OVERCONFIDENT" + where +
+                               ": errors are correlated in time, but a fifth of the poses has a NEES above " +
                                significant(c.tests.gross.statistic, 3) + " of " + significant(c.tests.gross.dof, 2) +
                                " expected, which no correlation explains (p " + significant(c.tests.gross.p, 2) + ")");
     }
@@ -215,7 +216,8 @@ inline Verdict TrajectoryEvaluation::verdict() const {
   }
   const bool good = c.tests.consistent();
   if (!good && !c.joint.fires()) {
-    return judged(false, "INCONSISTENT" + where + ": NEES is " + share(c.joint) + ", but errors do not follow the covariances");
+    return judged(
+        false, "INCONSISTENT" + where + ": NEES is " + share(c.joint) + ", but errors do not follow the covariances");
   }
   return judged(good, std::string(good                  ? "consistent"
                                   : c.joint.ratio() > 1 ? "OVERCONFIDENT"
@@ -247,8 +249,8 @@ void describe(V& v, const TrajectoryEvaluation& e) {
   v("weighted_alignment", e.weighted, "of the verdict");
   v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt,
     "of the file; null: it has no covariances");
-  v("judged", e.consistency.components.judged(), "components of the errors that carry noise");
-  v("omissions", e.consistency.components.omissions(), "the other components, with the reason");
+  v("judged", e.consistency.tests.components.judged(), "components of the errors that carry noise");
+  v("omissions", e.consistency.tests.components.omissions(), "the other components, with the reason");
   v("tests", e.consistency.tests, "of the whitened errors");
   v("rpe_nees", e.relative ? std::optional(e.relative->joint) : std::nullopt, "of relative motions");
   v("indefinite", e.consistency.indefinite, "matched poses whose covariance is not positive definite");
@@ -276,7 +278,8 @@ void describeSeries(V& v, const TrajectoryEvaluation& e) {
       "pairs_to", to);
   v("position_errors", e.position_errors, "", "m")("rotation_errors", e.rotation_errors, "", "rad");
   v("errors", xi, "after the weighted alignment, translation before rotation, body axes", "m, rad");
-  v("covariances", covariances, "of the errors, row by row", "m, rad")("nees", nees, "chi-squared of 6");
+  v("covariances", covariances, "of the errors, row by row", "m, rad")(
+      "nees", nees, "chi-squared of the number of judged components");
 }
 
 /// The figures that pipelines compare with bounds (`--fail-if`), by their short names; see NamedFigures in

@@ -62,7 +62,7 @@ struct Alignment {
   int iterations = 0;
   double condition =
       1;  ///< condition of the information matrix, in units of its diagonal; large: a direction is hardly determined
-  std::string fault = {};            ///< why it is not ok
+  std::string fault = {};           ///< why it is not ok
   NoiseComponents components = {};  ///< of the errors, that weight it and are to be judged
 
   SE3d operator()(const SE3d& pose) const {
@@ -86,7 +86,7 @@ struct PoseError {
   /// Covariance of the error: of the pose, less what the alignment took from it (poses that were aligned) or with the
   /// alignment's own covariance (others).
   Eigen::Matrix<double, 6, 6> covariance;
-  double nees = 0;      ///< of the judged components: χ²₆ of six; NaN where the alignment leaves less than full rank
+  double nees = 0;  ///< of the judged components: χ²₆ of six; NaN where the alignment leaves less than full rank
   double leverage = 0;  ///< share of the alignment's parameters that this pose determines; their sum is their number
 };
 
@@ -96,10 +96,9 @@ struct Consistency {
   bool ok = false;
   std::string fault;
   std::size_t n = 0;                ///< poses that were tested
-  NoiseComponents components;       ///< of the errors, that are judged
   ResidualTest joint;               ///< exact χ² to first order
   ResidualTest position, rotation;  ///< where all were aligned, χ² scaled to the exact mean and variance, with its dof
-  WhitenedResidualTests tests;      ///< of the errors, whitened jointly where an alignment is shared
+  WhitenedResidualTests tests;      ///< of the errors' judged components, whitened jointly where an alignment is shared
   std::vector<PoseError> errors;    ///< errors of all poses, in their order
   std::vector<std::size_t> indefinite;  ///< poses whose covariance is not positive definite
 };

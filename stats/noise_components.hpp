@@ -19,6 +19,8 @@
 // leave nothing out, nor do errors that are all zero.
 #pragma once
 
+#include <stats/detail/tail_probabilities.hpp>
+#include <stats/noise_fit.hpp>
 #include <stats/words.hpp>
 
 #include <Eigen/Core>
@@ -84,7 +86,9 @@ struct NoiseComponents {
       if (role != ComponentRole::no_error) {
         const std::string values = valuesOf(role);
         why = std::string("the variance is ") + values + " in every row" +
-              (role == ComponentRole::filler ? ", while others vary" : values == "unknown" ? "" : ", which stands for unknown");
+              (role == ComponentRole::filler ? ", while others vary"
+               : values == "unknown"         ? ""
+                                             : ", which stands for unknown");
       }
       sentences.push_back("not judged: " + list + (in_world ? " along the world's axes (" : " (") + why + ")");
     }
@@ -131,6 +135,7 @@ class NoiseComponentScan {
         continue;
       }
       low_[k] = std::min(low_[k], variance), high_[k] = std::max(high_[k], variance);
+      if (variance > 0) nees_[k] += error[k] * error[k] / variance;
       for (int j = 0; j < 6; ++j) {
         if (j == k || std::isnan(covariance(j, j))) continue;
         // Written so that an unknown entry touches.
@@ -166,6 +171,18 @@ class NoiseComponentScan {
     return c.count() > 0 ? c : NoiseComponents{};
   }
 
+  /// Components of which those are judged after all that are left out as fillers, but have errors that exceed the constant:
+  /// it is overconfident. By χ² at the level of every verdict, for errors under the alignment that they are judged under.
+  NoiseComponents withExceededFillers(NoiseComponents c) const {
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (c.roles[k] != ComponentRole::filler) continue;
+      if (detail::chiSquaredTail(nees_[static_cast<Eigen::Index>(k)], n_) < refutation_level) {
+        c.roles[k] = ComponentRole::judged;
+      }
+    }
+    return c;
+  }
+
  private:
   /// The size below which an error is none: a millionth of the largest error of its kind, or the coordinates' rounding.
   double rounding(int k) const {
@@ -186,7 +203,7 @@ class NoiseComponentScan {
   std::size_t n_ = 0;
   double length_ = 0;
   Vector6 low_ = Vector6::Constant(std::numeric_limits<double>::infinity()), high_ = -low_;
-  Vector6 largest_ = Vector6::Zero(), squares_ = Vector6::Zero();
+  Vector6 largest_ = Vector6::Zero(), squares_ = Vector6::Zero(), nees_ = Vector6::Zero();
   std::array<std::size_t, 6> unknown_{};
   std::array<bool, 6> touched_{};
 };

@@ -113,7 +113,8 @@ struct SharedParameters {
   using Jacobian = Eigen::Matrix<double, 6, 7>;
   using Information = Eigen::Matrix<double, 7, 7>;
 
-  std::vector<Jacobian> jacobians = {};  ///< one for each residual, zeros for fixed parameters; empty: nothing is shared
+  std::vector<Jacobian> jacobians =
+      {};  ///< one for each residual, zeros for fixed parameters; empty: nothing is shared
   /// The information of an estimate from data that are not among the residuals. Without it the parameters were estimated from
   /// these residuals, of which they make the sum of squares the smallest.
   std::optional<Information> prior = {};
@@ -122,7 +123,8 @@ struct SharedParameters {
 /// The seven tests of one set of residuals.
 struct WhitenedResidualTests {
   std::size_t n = 0;
-  std::size_t indefinite = 0;  ///< covariances that are not positive definite: any of them leaves all tests NaN
+  std::size_t indefinite = 0;       ///< covariances that are not positive definite: any of them leaves all tests NaN
+  NoiseComponents components = {};  ///< that were tested
   ResidualTest joint, position, rotation, mean, covariance, tail, lag;
   /// Overconfidence that no dependence of the errors explains: the NEES that a fifth of the residuals exceed. With the k-th
   /// smallest p of n single residuals, k = n/5, the probability of p₍k₎ ≤ α k/n is at most α whatever their dependence
@@ -199,16 +201,21 @@ struct DeterminedInverse {
   using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
   Matrix7 inverse = Matrix7::Zero();
+  double log_determinant = 0;  ///< of the information in these directions
   int rank = 0;
 
   DeterminedInverse(const Matrix7& information, double least) {
     Eigen::Matrix<double, 7, 1> unit;
-    for (int k = 0; k < 7; ++k) unit[k] = information(k, k) > 0 ? 1 / std::sqrt(information(k, k)) : 0;
+    for (int k = 0; k < 7; ++k) {
+      unit[k] = information(k, k) > 0 ? 1 / std::sqrt(information(k, k)) : 0;
+      if (unit[k] > 0) log_determinant -= 2 * std::log(unit[k]);
+    }
     const SymmetricEigen eigen(Matrix7(unit.asDiagonal() * information * unit.asDiagonal()));
     for (int k = 0; k < 7; ++k) {
       if (!(eigen.values[k] > least * eigen.values[6])) continue;
       const Eigen::Matrix<double, 7, 1> v = unit.asDiagonal() * eigen.vectors.col(k);
       inverse += v * v.transpose() / eigen.values[k];
+      log_determinant += std::log(eigen.values[k]);
       ++rank;
     }
   }
@@ -293,7 +300,7 @@ inline WhitenedResidualTests testWhitenedResiduals(std::span<const PoseResidual>
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   using Columns = SharedParameters::Jacobian;
   WhitenedResidualTests tests;
-  tests.n = residuals.size();
+  tests.n = residuals.size(), tests.components = components;
   if (tests.n == 0) return tests;
   const auto n = static_cast<double>(tests.n);
   const double least = detail::leastDetermined(components);

@@ -95,11 +95,6 @@ EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& refere
       .name = fileOf(path),
       .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how)};
   if (!e.evaluation.ok()) refuse(o, e.evaluation, reference, estimate);
-  for (const Trajectory* t : {&reference, &estimate}) {
-    // Quaternions are always rounded; a matrix of few digits is no rotation.
-    if (t->format != "kitti") continue;
-    for (const std::string& note : notesOf(*t, o.input.estimate)) e.evaluation.notes.push_back(t->name + ": " + note);
-  }
   return e;
 }
 

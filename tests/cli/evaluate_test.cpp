@@ -298,8 +298,15 @@ TEST(EvaluateCommand, EqualsEvosGoldenResults) {
   ASSERT_EQ(golden["results"].size(), 23U);
   for (const Json& result : golden["results"]) {
     const bool ape = result["command"] == "ape";
-    Words words{"evaluate", folder + "reference.tum", folder + "estimate.tum", "--association", "nearest", "--json", "-",
-                ape ? "--save_results" : "--save_rpe", path};
+    Words words{"evaluate",
+                folder + "reference.tum",
+                folder + "estimate.tum",
+                "--association",
+                "nearest",
+                "--json",
+                "-",
+                ape ? "--save_results" : "--save_rpe",
+                path};
     for (const Json& option : result["options"]) words.push_back(option);
     const std::string what = result["command"].get<std::string>() + " " + result["options"].dump();
     const ProgramOutput out = run(words);
@@ -341,8 +348,7 @@ TEST(EvaluateCommand, CoarseReferencesAreSaid) {
     for (std::size_t i = 0; i < truth.size(); i += every) {
       stamps.push_back(truth.times[i]), poses.push_back(truth.poses[i]);
     }
-    const ProgramOutput out =
-        run({"evaluate", directory.write("gt.tum", tumOf(stamps, poses)), file, "--json", "-"});
+    const ProgramOutput out = run({"evaluate", directory.write("gt.tum", tumOf(stamps, poses)), file, "--json", "-"});
     return Json::parse(out.output)["estimates"][0];
   };
   const auto note = [](const Json& json) { return contains(json["notes"].dump(), "the reference is coarse"); };
@@ -385,17 +391,6 @@ TEST(EvaluateCommand, PlanarRobotsOfRos) {
     EXPECT_TRUE(contains(out.output, "not judged: z, rotation x, rotation y (errors are zero in every row)"))
         << out.output;
   }
-}
-
-TEST(EvaluateCommand, ProjectedMatricesOfKittiAreSaid) {
-  const TemporaryDirectory directory;
-  const std::string exact = directory.write("exact.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 1 1 0 0 2 0 0 1 0\n");
-  const std::string rounded =
-      directory.write("rounded.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0.8775826 -0.4794255 0 1 0.4794255 0.8775826 0 2 0 0 1 0\n");
-  EXPECT_FALSE(contains(run({"evaluate", exact, exact}).output, "projected"));
-  EXPECT_TRUE(contains(run({"evaluate", exact, rounded}).output,
-                       "rounded.txt: 1 rotations were projected from their matrices, off by "))
-      << run({"evaluate", exact, rounded}).output;
 }
 
 TEST(EvaluateCommand, QuaternionsWithWFirstAreSuspected) {

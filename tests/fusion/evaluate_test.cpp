@@ -221,7 +221,8 @@ TEST(EvaluateTrajectory, ThinsOut) {
   EXPECT_EQ(rows(10, {.motion_filter = MotionThinning{1000, 39}}), (std::vector<std::size_t>{0, 4, 8}));
   // Turned to and fro by 30 degrees, the body is never more than 30 from where it was, however far it has turned.
   PoseTrajectory swaying = line(10, 0.5, 0);
-  for (std::size_t i = 1; i < 10; i += 2) swaying.poses[i].mean = swaying.poses[i].mean * SE3d(SO3d::rotZ(0.5), {0, 0, 0});
+  for (std::size_t i = 1; i < 10; i += 2)
+    swaying.poses[i].mean = swaying.poses[i].mean * SE3d(SO3d::rotZ(0.5), {0, 0, 0});
   EXPECT_EQ(evaluateTrajectory(swaying, swaying, {.motion_filter = MotionThinning{1.9, 35}}).rows,
             (std::vector<std::size_t>{0, 4, 8}));
   // The filter follows the path of the poses that are left.
@@ -248,7 +249,8 @@ TEST(EvaluateTrajectory, RobotsAtRestHaveAVerdict) {
   EXPECT_EQ(e.alignment.model, AlignmentModel::origin);
   EXPECT_LT(e.position_errors[0], 1e-12);
   ASSERT_EQ(e.notes.size(), 1u);
-  EXPECT_TRUE(contains(e.notes[0], "APE and RPE are aligned by the first poses: the positions are collinear")) << e.notes[0];
+  EXPECT_TRUE(contains(e.notes[0], "APE and RPE are aligned by the first poses: the positions are collinear"))
+      << e.notes[0];
   estimate.has_covariances = false;
   EXPECT_EQ(evaluateTrajectory(reference, estimate, {.alignment = AlignmentModel::se3}).status,
             EvaluationStatus::not_aligned);
@@ -259,7 +261,9 @@ TEST(EvaluateTrajectory, GrossOverconfidenceHasAVerdict) {
   Scene drift(200, 0.01, 1, true, true);
   const Verdict verdict = drift.evaluate().verdict();
   EXPECT_TRUE(verdict.isNo());
-  EXPECT_EQ(verdict.text.rfind("OVERCONFIDENT: errors are correlated in time, but a fifth of the poses has a NEES above", 0), 0u)
+  EXPECT_EQ(
+      verdict.text.rfind("OVERCONFIDENT: errors are correlated in time, but a fifth of the poses has a NEES above", 0),
+      0u)
       << verdict.text;
   EXPECT_TRUE(Scene(200, 1, 1, true, true).evaluate().verdict().isNone());
 }

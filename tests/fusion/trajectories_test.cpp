@@ -308,15 +308,15 @@ std::vector<MatchedPose> planar(CounterRng& rng, std::size_t n, double factor, b
 }
 
 TEST(Trajectories, PlanarRobotsAreJudgedByWhatCarriesNoise) {
-  for (const AlignmentModel model : {AlignmentModel::none, AlignmentModel::origin, AlignmentModel::posyaw,
-                                     AlignmentModel::se3}) {
+  for (const AlignmentModel model :
+       {AlignmentModel::none, AlignmentModel::origin, AlignmentModel::posyaw, AlignmentModel::se3}) {
     for (const double filler : {0.0, 1e-9, 1e-6, 99999.0, 1e308}) {
       CounterRng rng(33);
       const auto fill = [&](Vector6&, Matrix6& C) { C(2, 2) = C(3, 3) = C(4, 4) = filler; };
       const auto poses = planar(rng, 350, 1, model != AlignmentModel::none, fill);
       const Consistency c = evaluateConsistency(poses, alignWeighted(poses, model));
       ASSERT_TRUE(c.ok) << c.fault;
-      EXPECT_EQ(c.components.judged(), "x, y, rotation z");
+      EXPECT_EQ(c.tests.components.judged(), "x, y, rotation z");
       EXPECT_EQ(c.joint.dof, 3 * 350 - (model == AlignmentModel::none ? 0 : 3)) << name(model);
       EXPECT_TRUE(c.tests.consistent()) << name(model) << ' ' << filler << ' ' << c.joint.ratio();
     }
@@ -385,7 +385,8 @@ TEST(Trajectories, InterpolationErrorOfACoarseReference) {
     return SE3d(SO3d::exp(Eigen::Vector3d(0.5 * std::sin(2 * t), 0.4 * std::cos(2.6 * t), 0.3 * std::sin(1.4 * t))),
                 Eigen::Vector3d(std::sin(1.8 * t), std::cos(2 * t), 0.1 * t));
   };
-  for (const PoseInterpolation rule : {PoseInterpolation::cubic, PoseInterpolation::geodesic, PoseInterpolation::slerp}) {
+  for (const PoseInterpolation rule :
+       {PoseInterpolation::cubic, PoseInterpolation::geodesic, PoseInterpolation::slerp}) {
     for (const double step : {0.5, 0.2, 0.1}) {
       std::vector<double> stamps, times;
       std::vector<SE3d> poses;
@@ -483,7 +484,8 @@ TEST(Trajectories, FourEqualPosesByHand) {
   const Vector6 one = rest.errors[2].error, other = rest.errors[3].error;
   EXPECT_EQ(rest.position.dof, 3 * 2);
   EXPECT_NEAR(rest.position.statistic,
-              one.head<3>().squaredNorm() + other.head<3>().squaredNorm() - (one + other).head<3>().squaredNorm() / 4, eps);
+              one.head<3>().squaredNorm() + other.head<3>().squaredNorm() - (one + other).head<3>().squaredNorm() / 4,
+              eps);
   EXPECT_NEAR(rest.joint.statistic, one.squaredNorm() + other.squaredNorm() - (one + other).squaredNorm() / 4, eps);
 }
 

@@ -20,8 +20,7 @@ using Matrix6 = NoiseComponents::Matrix6;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Rows with errors of varying covariance in all components, as `change` leaves them.
-NoiseComponents componentsOf(const std::function<void(std::size_t, Vector6&, Matrix6&)>& change,
-                             std::size_t n = 20) {
+NoiseComponents componentsOf(const std::function<void(std::size_t, Vector6&, Matrix6&)>& change, std::size_t n = 20) {
   CounterRng rng(5);
   NoiseComponentScan scan;
   for (std::size_t i = 0; i < n; ++i) {
@@ -51,8 +50,8 @@ TEST(NoiseComponents, AllAreJudgedWhereAllCarryNoise) {
   EXPECT_EQ(all.judged(), "x, y, z, rotation x, rotation y, rotation z");
   EXPECT_TRUE(all.omissions().empty());
   // A matrix that is the same in every row keeps all, whatever its numbers; an error that is tiny is an error.
-  EXPECT_FALSE(componentsOf([](std::size_t, Vector6&, Matrix6& C) { C = 0.01 * Matrix6::Identity(), C(2, 2) = 1e-6; })
-                   .omits());
+  EXPECT_FALSE(
+      componentsOf([](std::size_t, Vector6&, Matrix6& C) { C = 0.01 * Matrix6::Identity(), C(2, 2) = 1e-6; }).omits());
   EXPECT_FALSE(componentsOf([](std::size_t, Vector6& e, Matrix6&) { e[2] *= 1e-5; }).omits());
   // Too few rows, or errors that are all zero, decide nothing.
   EXPECT_FALSE(componentsOf(filled(1e-6, 0), 9).omits());
@@ -91,7 +90,8 @@ TEST(NoiseComponents, FillersAreLeftOutAndNamed) {
 
 TEST(NoiseComponents, WhatVariesOrIsTouchedStays) {
   const auto kept = [](const std::function<void(std::size_t, Matrix6&)>& change) {
-    return componentsOf([&](std::size_t i, Vector6& e, Matrix6& C) { filled(1e-3, 1)(i, e, C), change(i, C); }).keeps(2);
+    return componentsOf([&](std::size_t i, Vector6& e, Matrix6& C) { filled(1e-3, 1)(i, e, C), change(i, C); })
+        .keeps(2);
   };
   EXPECT_FALSE(kept([](std::size_t, Matrix6&) {}));
   EXPECT_FALSE(kept([](std::size_t, Matrix6& C) { C(2, 2) *= 1 + 1e-13; }));

@@ -113,7 +113,8 @@ class InterpolationErrors {
         const std::size_t i = std::clamp(m.reference + k, reach + 1, source_.size() - reach) - 1;
         size += derivativeAt(i, nodes.count, stride).segment<3>(from).squaredNorm();
       }
-      result.block<3, 3>(from, from) = shape * (order.gain[from / 3] * product * size / (shape.trace() * (near ? 5 : 1)));
+      result.block<3, 3>(from, from) =
+          shape * (order.gain[from / 3] * product * size / (shape.trace() * (near ? 5 : 1)));
     }
     return result;
   }
@@ -180,7 +181,8 @@ LIESTAT_FUSION_INLINE InterpolationError addInterpolationError(std::span<const T
     if (!between(matches[k])) continue;
     const Eigen::Matrix<double, 6, 6> moment = errors.at(matches[k]);
     poses[k].reference.covariance += factor * moment;
-    result.position += moment.topLeftCorner<3, 3>().trace(), result.rotation += moment.bottomRightCorner<3, 3>().trace();
+    result.position += moment.topLeftCorner<3, 3>().trace(),
+        result.rotation += moment.bottomRightCorner<3, 3>().trace();
   }
   result.position = std::sqrt(result.position / static_cast<double>(matches.size()));
   result.rotation = std::sqrt(result.rotation / static_cast<double>(matches.size()));

@@ -80,8 +80,7 @@ class ThinnedTrajectory {
     std::size_t kept = 0;
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       path += (pose(i).mean.translation() - pose(i - 1).mean.translation()).norm();
-      const double turned =
-          degrees_per_radian * (pose(kept).mean.so3().inverse() * pose(i).mean.so3()).log().norm();
+      const double turned = degrees_per_radian * (pose(kept).mean.so3().inverse() * pose(i).mean.so3()).log().norm();
       if (path < least.distance && turned < least.degrees) continue;
       rows.push_back(rows_[i]);
       path = 0, kept = i;
@@ -172,9 +171,10 @@ inline std::string noteOfCoarseReference(const TrajectoryEvaluation& e) {
   const auto part = [](double error, const std::vector<double>& errors) {
     return significant(std::round(100 * error / errorStatistics(errors).rmse)) + " %";
   };
-  return "the reference is coarse: its interpolation is off by " + significant(e.interpolation.position, 3) + " m and " +
-         significant(e.interpolation.rotation, 3) + " rad (rms, by leaving out every second stamp), " +
-         part(e.interpolation.position, e.position_errors) + " and " + part(e.interpolation.rotation, e.rotation_errors) +
+  return "the reference is coarse: its interpolation is off by " + significant(e.interpolation.position, 3) +
+         " m and " + significant(e.interpolation.rotation, 3) + " rad (rms, by leaving out every second stamp), " +
+         part(e.interpolation.position, e.position_errors) + " and " +
+         part(e.interpolation.rotation, e.rotation_errors) +
          " of the errors; NEES allows for it, APE and RPE contain it";
 }
 
@@ -303,7 +303,8 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
                                            {left.times(), left.poses().size(), estimate_name}, o.association);
   e.by_time = association.by_time;
   if (!association.ok()) return refuse(association.status, association.reason);
-  e.matched = matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation, truth.times());
+  e.matched =
+      matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation, truth.times());
   if (e.matched.size() < 2) {
     return refuse(EvaluationStatus::too_few,
                   std::to_string(e.matched.size()) + " pose has a partner in " + reference_name);
@@ -312,8 +313,8 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     if (!reference.has_covariances) p.reference.covariance.setZero();
     if (!estimate.has_covariances) p.estimate.covariance.setZero();
   }
-  e.interpolation = addInterpolationError(association.matches, truth.poses(), truth.times(),
-                                          o.association.interpolation, e.matched);
+  e.interpolation =
+      addInterpolationError(association.matches, truth.poses(), truth.times(), o.association.interpolation, e.matched);
   for (const TimeMatch& m : association.matches) {
     e.times.push_back(e.by_time ? left.times()[m.estimate] : static_cast<double>(m.estimate));
     e.rows.push_back(left.rowOf(m.estimate));
@@ -376,7 +377,7 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     }
     if (!o.pairs_model || e.pairs.empty()) return;
     e.relative = relativeConsistency(e.matched, e.pairs, *o.pairs_model, e.weighted.ok ? e.weighted.scale : 1,
-                                     e.consistency.components);
+                                     e.consistency.tests.components);
   };
   const auto interpolationTimes = [&](double times) {
     addInterpolationError(association.matches, truth.poses(), truth.times(), o.association.interpolation, e.matched,
@@ -392,7 +393,7 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     }
     if (e.verdict().isNo()) interpolationTimes(1);
   }
-  for (std::string& omission : e.consistency.components.omissions()) e.notes.push_back(std::move(omission));
+  for (std::string& omission : e.consistency.tests.components.omissions()) e.notes.push_back(std::move(omission));
   if (!e.consistency.indefinite.empty()) e.notes.push_back(detail::noteOfIndefinite(e, estimate.lines));
   return e;
 }

@@ -260,33 +260,32 @@ inline NoiseComponents noiseComponents(std::span<const MatchedPose> poses, const
   NoiseComponents body = in_body.components(), world = in_world.components();
   world.in_world = true;
   // Products with unknown entries are unknown: such matrices have their axes only.
-  const bool known = std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.estimate.covariance.allFinite(); });
+  const bool known =
+      std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.estimate.covariance.allFinite(); });
   return known && world.count() < body.count() ? world : body;
 }
 
-/// Judges fillers after all whose errors exceed them: a constant variance that is too small is overconfident.
-inline void keepExceededFillers(std::span<const MatchedPose> used, Alignment& a, const NoiseComponents& found) {
+/// The components found before an alignment, with fillers that the errors after it exceed.
+inline NoiseComponents withExceededFillers(std::span<const MatchedPose> used, const Alignment& a,
+                                           const NoiseComponents& found) {
+  const auto is_filler = [](ComponentRole role) { return role == ComponentRole::filler; };
+  if (std::none_of(found.roles.begin(), found.roles.end(), is_filler)) return found;
   const Eigen::Vector3d centre = centroid(used, a);
-  Eigen::Matrix<double, 6, 1> squares = Eigen::Matrix<double, 6, 1>::Zero();
-  a.components = found;
-  if (std::find(found.roles.begin(), found.roles.end(), ComponentRole::filler) == found.roles.end()) return;
+  NoiseComponentScan scan;
   for (const MatchedPose& p : used) {
     AlignedError e(p, a, centre, freeParameters(a.model));
     if (found.in_world) {
       const Eigen::Matrix<double, 6, 6> B = AlignedError::inWorld(p.estimate.mean.so3());
       e.error = B * e.error, e.covariance = congruence(B, e.covariance);
     }
-    squares += e.error.cwiseAbs2().cwiseQuotient(e.covariance.diagonal());
+    scan.add(e.error, e.covariance);
   }
-  for (std::size_t k = 0; k < 6; ++k) {
-    const double p = chiSquaredSurvival(squares[static_cast<Eigen::Index>(k)], static_cast<double>(used.size()));
-    if (found.roles[k] == ComponentRole::filler && p < residual_test_level) {
-      a.components.roles[k] = ComponentRole::judged;
-    }
-  }
+  return scan.withExceededFillers(found);
 }
 
-inline Alignment weightedAlignment(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align) {
+/// `given`: components that are judged whatever the covariances are.
+inline Alignment weightedAlignment(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align,
+                                   const NoiseComponents* given = nullptr) {
   Alignment a;
   a.model = model;
   a.weighted = true;
@@ -298,8 +297,7 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
     return a;
   }
   if (model == AlignmentModel::none) {
-    const NoiseComponents found = noiseComponents(poses, a);
-    keepExceededFillers(poses, a, found);
+    a.components = withExceededFillers(poses, a, noiseComponents(poses, a));
     a.ok = true;
     return a;
   }
@@ -318,7 +316,7 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
     a.transform =
         SE3d(yaw, Eigen::Vector3d(used[0].reference.mean.translation() - yaw * used[0].estimate.mean.translation()));
   }
-  const NoiseComponents found = noiseComponents(poses, a);
+  const NoiseComponents found = given != nullptr ? *given : noiseComponents(poses, a);
   a.components = found;
   for (ComponentRole& role : a.components.roles) {
     if (role == ComponentRole::filler) role = ComponentRole::judged;
@@ -334,9 +332,10 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
   }
   refine(used, a);
   if (a.ok && found.roles != a.components.roles) {
-    const NoiseComponents judged = a.components;
-    keepExceededFillers(used, a, found);
-    if (a.components.roles != judged.roles) refine(used, a);
+    const NoiseComponents judged = withExceededFillers(used, a, found);
+    const bool fewer = judged.roles != a.components.roles;
+    a.components = judged;
+    if (fewer) refine(used, a);
   }
   return a;
 }
@@ -370,7 +369,7 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
   }
   SharedParameters shared;
   if (sharing && !all_aligned) shared.prior = information;
-  r.components = a.components;
+  r.tests.components = a.components;
   r.errors.reserve(poses.size());
   std::vector<PoseResidual> residuals;
   AlignmentSums seen;
