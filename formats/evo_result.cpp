@@ -36,8 +36,9 @@ const char* wordsOfRelation(PoseRelation relation) {
     case PoseRelation::rot_part:
       return "rotation part";
     case PoseRelation::angle_deg:
+      return "rotation angle in degrees";
     case PoseRelation::angle_rad:
-      return "rotation angle";
+      return "rotation angle in radians";
     case PoseRelation::point_distance:
       return "point distance";
     case PoseRelation::point_distance_error_ratio:
@@ -47,8 +48,7 @@ const char* wordsOfRelation(PoseRelation relation) {
 }
 
 /// evo's words after the title, or others where evo has no such alignment.
-std::string alignmentTitle(const EvaluationOptions& how) {
-  const AlignmentModel model = how.alignment;
+std::string alignmentTitle(const EvaluationOptions& how, AlignmentModel model) {
   std::string title = model == AlignmentModel::se3      ? "\n(with SE(3) Umeyama alignment)"
                       : model == AlignmentModel::sim3   ? "\n(with Sim(3) Umeyama alignment)"
                       : model == AlignmentModel::scale  ? "\n(scale corrected)"
@@ -86,10 +86,10 @@ const char* deltaWord(DeltaUnit unit) {
 /// The title, which names the unit in which the errors are first computed.
 std::string titleOf(const TrajectoryEvaluation& e, const EvaluationOptions& how, bool relative) {
   const char* const part = wordsOfRelation(how.pose_relation);
-  if (!relative) return fmt::format("APE w.r.t. {} ({}){}", part, e.ape_unit, alignmentTitle(how));
+  if (!relative) return fmt::format("APE w.r.t. {} ({}){}", part, e.ape_unit, alignmentTitle(how, e.alignment.model));
   return fmt::format("RPE w.r.t. {} ({})\nfor delta = {} ({}) using {} pairs{}", part, e.rpe_unit,
                      deltaOf(how.relative), deltaWord(how.relative.unit),
-                     how.relative.all_pairs ? "all" : "consecutive", alignmentTitle(how));
+                     how.relative.all_pairs ? "all" : "consecutive", alignmentTitle(how, e.alignment.model));
 }
 
 std::vector<double> distancesAlong(const std::vector<SE3d>& poses) {

@@ -251,8 +251,10 @@ void orderInTime(Trajectory& t, std::optional<DuplicateRule> duplicates) {
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options) {
   std::vector<std::string> notes = trajectory.notes;
   if (trajectory.n_normalised > 0) {
-    notes.push_back(fmt::format("{} rotations were normalised, off by {:.2g} at most", trajectory.n_normalised,
-                                trajectory.largest_norm_error));
+    notes.push_back(fmt::format(
+        "{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
+        trajectory.format == "kitti" || trajectory.format == "matrix" ? "projected from their matrices" : "normalised",
+        trajectory.largest_norm_error));
   }
   if (trajectory.n_unmeasured > 0) {
     notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",

@@ -41,7 +41,7 @@ constexpr auto words(AssociationRule) { return std::array{"interpolate", "neares
 
 struct AssociationOptions {
   AssociationRule rule = AssociationRule::interpolate;
-  PoseInterpolation interpolation = PoseInterpolation::geodesic;
+  PoseInterpolation interpolation = PoseInterpolation::cubic;
   /// s, between two stamps of the reference; else five times their median distance.
   std::optional<double> max_gap = {};
   double max_difference = 0.01;                ///< s, of nearest stamps
@@ -57,7 +57,8 @@ constexpr auto words(CoordinatePlane) { return std::array{"xy", "xz", "yz"}; }
 enum class ErrorUnit { mm, cm, m, km, deg, rad };
 constexpr auto words(ErrorUnit) { return std::array{"mm", "cm", "m", "km", "deg", "rad"}; }
 
-/// Keeps poses after which the body has moved or turned so far since the last one that was kept, measured along the path.
+/// Keeps poses after which the body has moved so far along its path since the last one that was kept, or is turned so far
+/// against it: as evo.
 struct MotionThinning {
   double distance = 0, degrees = 0;  ///< m, degrees
 };
@@ -160,15 +161,28 @@ struct TrajectoryEvaluation {
   std::vector<std::pair<std::size_t, std::size_t>> pairs = {};     ///< pairs of matched poses for RPE
   std::vector<double> position_errors = {}, rotation_errors = {};  ///< m and rad, whatever the pose relation
   ErrorStatistics ape_statistics = {}, rpe_statistics = {};
-  Alignment weighted = {};  ///< alignment for the verdict
+  InterpolationError interpolation = {};  ///< of the reference; the verdict allows for it
+  Alignment weighted = {};                ///< alignment for the verdict
   Consistency consistency = {};
   std::optional<RelativeConsistency> relative = {};
   std::vector<std::string> notes = {};
 
   bool ok() const { return status == EvaluationStatus::ok; }
+  /// The interpolation's error is more than a tenth of the estimate's errors.
+  bool referenceIsCoarse() const;
   /// Verdict on the covariances of the estimate: are they to be trusted?
   Verdict verdict() const;
 };
+
+inline bool TrajectoryEvaluation::referenceIsCoarse() const {
+  constexpr double share = 0.1;
+  const auto exceeds = [](double error, const std::vector<double>& errors) {
+    double squares = 0;
+    for (const double e : errors) squares += e * e;
+    return error * error * static_cast<double>(errors.size()) > share * share * squares;
+  };
+  return exceeds(interpolation.position, position_errors) || exceeds(interpolation.rotation, rotation_errors);
+}
 
 inline Verdict TrajectoryEvaluation::verdict() const {
   if (!ok()) return Verdict::none("no verdict: " + reason);
@@ -179,10 +193,20 @@ inline Verdict TrajectoryEvaluation::verdict() const {
     return Verdict{good ? Verdict::Answer::yes : Verdict::Answer::no, std::move(text), c.tests.causes()};
   };
   const auto share = [](const ResidualTest& t) { return significant(t.ratio(), 3) + " of its expectation"; };
+  const std::string where = c.tests.components.omits() ? " in " + c.tests.components.judged() : "";
   if (c.tests.lag.fires() && c.tests.lag.statistic > 0) {
+    // Errors of any dependence are not as large as this.
+    if (c.tests.gross.fires()) {
+      return judged(false, "OVERCONFIDENT" + where +
+                               ": errors are correlated in time, but a fifth of the poses has a NEES above " +
+                               significant(c.tests.gross.statistic, 3) + " of " + significant(c.tests.gross.dof, 2) +
+                               " expected, which no correlation explains (p " + significant(c.tests.gross.p, 2) + ")");
+    }
     if (!relative || !relative->joint.applies()) {
       return Verdict::none("no verdict: errors are correlated in time, and NEES of absolute errors (" + share(c.joint) +
-                               ") is no test then; --pairs-model chain tests dead reckoning, doctor looks further",
+                               ") is no test then; " +
+                               (referenceIsCoarse() ? "between the stamps of a coarse reference they always are"
+                                                    : "--pairs-model chain tests dead reckoning, doctor looks further"),
                            c.tests.causes());
     }
     const bool good = !relative->joint.fires();
@@ -192,12 +216,13 @@ inline Verdict TrajectoryEvaluation::verdict() const {
   }
   const bool good = c.tests.consistent();
   if (!good && !c.joint.fires()) {
-    return judged(false, "INCONSISTENT: NEES is " + share(c.joint) + ", but errors do not follow the covariances");
+    return judged(
+        false, "INCONSISTENT" + where + ": NEES is " + share(c.joint) + ", but errors do not follow the covariances");
   }
   return judged(good, std::string(good                  ? "consistent"
                                   : c.joint.ratio() > 1 ? "OVERCONFIDENT"
                                                         : "UNDERCONFIDENT") +
-                          ": NEES is " + share(c.joint) + " (p " + significant(c.joint.p, 2) + ", " +
+                          where + ": NEES is " + share(c.joint) + " (p " + significant(c.joint.p, 2) + ", " +
                           significant(c.joint.dof, 17) + " degrees of freedom)");
 }
 
@@ -219,9 +244,13 @@ void describe(V& v, const TrajectoryEvaluation& e) {
   v("by_time", e.by_time, "false: pose i with pose i");
   v("ape", e.ape_statistics, "absolute errors")("rpe", e.rpe_statistics, "relative errors");
   v("rpe_pairs", e.pairs.size(), "pairs of RPE")("alignment", e.alignment, "of APE and RPE");
+  v("interpolation_position", e.interpolation.position, "error of the interpolated reference, rms", "m");
+  v("interpolation_rotation", e.interpolation.rotation, "likewise", "rad");
   v("weighted_alignment", e.weighted, "of the verdict");
   v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt,
     "of the file; null: it has no covariances");
+  v("judged", e.consistency.tests.components.judged(), "components of the errors that carry noise");
+  v("omissions", e.consistency.tests.components.omissions(), "the other components, with the reason");
   v("tests", e.consistency.tests, "of the whitened errors");
   v("rpe_nees", e.relative ? std::optional(e.relative->joint) : std::nullopt, "of relative motions");
   v("indefinite", e.consistency.indefinite, "matched poses whose covariance is not positive definite");
@@ -249,7 +278,8 @@ void describeSeries(V& v, const TrajectoryEvaluation& e) {
       "pairs_to", to);
   v("position_errors", e.position_errors, "", "m")("rotation_errors", e.rotation_errors, "", "rad");
   v("errors", xi, "after the weighted alignment, translation before rotation, body axes", "m, rad");
-  v("covariances", covariances, "of the errors, row by row", "m, rad")("nees", nees, "chi-squared of 6");
+  v("covariances", covariances, "of the errors, row by row", "m, rad")(
+      "nees", nees, "chi-squared of the number of judged components");
 }
 
 /// The figures that pipelines compare with bounds (`--fail-if`), by their short names; see NamedFigures in

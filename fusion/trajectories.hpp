@@ -40,11 +40,21 @@ LIESTAT_TRAJECTORIES_API std::vector<TimeMatch> associateNearest(std::span<const
                                                                  std::span<const double> estimate_times,
                                                                  double max_difference = 0.01, double offset = 0);
 
-/// The pairs of an association. The covariance of an interpolated reference is (1 - s) Σ₀ + s Σ₁, an upper bound whatever the
-/// correlation of the two. Empty `reference` covariances are zeros: see exactPoses.
+/// The pairs of an association. The covariance of an interpolated reference is (1 - s) Σ₀ + s Σ₁, for the geodesic an upper
+/// bound whatever the correlation of the two. Empty `reference` covariances are zeros: see exactPoses. The reference's times
+/// (s, one for each pose) serve the cubic; without them its steps are taken as equal.
 LIESTAT_TRAJECTORIES_API std::vector<MatchedPose> matchedPoses(
     std::span<const TimeMatch> matches, std::span<const Gaussian<SE3d>> reference,
-    std::span<const Gaussian<SE3d>> estimate, PoseInterpolation interpolation = PoseInterpolation::geodesic);
+    std::span<const Gaussian<SE3d>> estimate, PoseInterpolation interpolation = PoseInterpolation::cubic,
+    std::span<const double> reference_times = {});
+
+/// Adds `factor` times the second moment of the interpolation's error to the references of matched poses, gap by gap. It is measured from
+/// the reference itself: with every second stamp left out (docs/theory/trajectories.md, 1.2). Poses at a stamp have none.
+LIESTAT_TRAJECTORIES_API InterpolationError addInterpolationError(std::span<const TimeMatch> matches,
+                                                                  std::span<const Gaussian<SE3d>> reference,
+                                                                  std::span<const double> reference_times,
+                                                                  PoseInterpolation interpolation,
+                                                                  std::span<MatchedPose> poses, double factor = 1);
 
 /// Poses as Gaussians without uncertainty.
 LIESTAT_TRAJECTORIES_API std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses);
@@ -58,13 +68,16 @@ LIESTAT_TRAJECTORIES_API Alignment alignUmeyama(std::span<const MatchedPose> pos
                                                 std::size_t n_to_align = 0);
 
 /// The most likely alignment under the covariances of full poses, from the first n_to_align poses (0: all). Model `origin` is
-/// se3 from one pose; `none` is the identity. The scale is unbiased.
+/// se3 from one pose; `none` is the identity. The scale is unbiased. Components of the errors that carry no noise
+/// (stats/noise_components.hpp) have no weight; what the others leave open, such as the height of a planar robot's world,
+/// stays as the first pose has it. A constant variance among varying ones is judged where errors exceed it.
 LIESTAT_TRAJECTORIES_API Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model,
                                                  std::size_t n_to_align = 0);
 
 // Consistency ------------------------------------------------------------------------------------------------------------
 
-/// Judges errors after a weighted alignment (or none): one from least squares has errors that follow no χ².
+/// Judges the alignment's components of the errors after a weighted alignment (or none): one from least squares has errors
+/// that follow no χ².
 LIESTAT_TRAJECTORIES_API Consistency evaluateConsistency(std::span<const MatchedPose> poses,
                                                          const Alignment& alignment);
 
@@ -89,10 +102,11 @@ LIESTAT_TRAJECTORIES_API std::vector<double> relativeErrors(std::span<const Matc
                                                             std::vector<std::pair<std::size_t, std::size_t>>& pairs,
                                                             PoseRelation relation);
 
-/// NEES of the relative motions of pairs under a model; `scale` is that of the alignment.
+/// NEES of the relative motions of pairs under a model; `scale` is that of the alignment. Components that are left out count
+/// as exact.
 LIESTAT_TRAJECTORIES_API RelativeConsistency
 relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                    PairsModel model, double scale = 1);
+                    PairsModel model, double scale = 1, const NoiseComponents& components = {});
 
 }  // namespace liestat
 

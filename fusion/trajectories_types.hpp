@@ -1,6 +1,7 @@
 // Results and options of fusion/trajectories.hpp. (Needs Boost.Math.)
 #pragma once
 
+#include <fusion/pose_stream.hpp>
 #include <lie/se3.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/whitened_residuals.hpp>
@@ -23,16 +24,17 @@ struct TimeMatch {
   double gap = 0;  ///< s, between the two stamps of the reference, or to the nearest one
 };
 
-/// The curve between two poses of the reference.
-enum class PoseInterpolation {
-  geodesic,  ///< the screw motion T₀ Exp(s Log(T₀⁻¹ T₁))
-  slerp      ///< straight line of the position, SLERP of the rotation
-};
-constexpr auto words(PoseInterpolation) { return std::array{"geodesic", "slerp"}; }
-
 /// An estimated pose and the pose of the reference at its time. A reference without covariances has zeros.
 struct MatchedPose {
   Gaussian<SE3d> reference, estimate;
+};
+
+/// The error of an interpolated reference, root mean squares over all matched poses.
+struct InterpolationError {
+  double position = 0, rotation = 0;  ///< m, rad
+  bool known = true;                  ///< false: the reference has too few stamps to leave some out
+  /// The square of the error is known to a factor of four, or may be far too large: the factor of the verdict.
+  double factor = 1;
 };
 
 /// The transformations that an alignment chooses from.
@@ -55,12 +57,13 @@ struct Alignment {
   SE3d transform = {};    ///< R and t
   double scale = 1;
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
-  int parameters = 0;     ///< that were estimated: 0, 4, 6 or 7
+  int parameters = 0;     ///< that were estimated: 0, 4, 6 or 7, or fewer where components of the errors are left out
   std::size_t poses = 0;  ///< the first poses, from which it was estimated
   int iterations = 0;
   double condition =
       1;  ///< condition of the information matrix, in units of its diagonal; large: a direction is hardly determined
-  std::string fault = {};  ///< why it is not ok
+  std::string fault = {};           ///< why it is not ok
+  NoiseComponents components = {};  ///< of the errors, that weight it and are to be judged
 
   SE3d operator()(const SE3d& pose) const {
     return SE3d(transform.so3() * pose.so3(), scale * (transform.so3() * pose.translation()) + transform.translation());
@@ -83,7 +86,7 @@ struct PoseError {
   /// Covariance of the error: of the pose, less what the alignment took from it (poses that were aligned) or with the
   /// alignment's own covariance (others).
   Eigen::Matrix<double, 6, 6> covariance;
-  double nees = 0;      ///< ξᵀ covariance⁻¹ ξ; χ²₆, or NaN where the alignment leaves less than full rank
+  double nees = 0;  ///< of the judged components: χ²₆ of six; NaN where the alignment leaves less than full rank
   double leverage = 0;  ///< share of the alignment's parameters that this pose determines; their sum is their number
 };
 
@@ -94,8 +97,8 @@ struct Consistency {
   std::string fault;
   std::size_t n = 0;                ///< poses that were tested
   ResidualTest joint;               ///< exact χ² to first order
-  ResidualTest position, rotation;  ///< χ² scaled to the exact mean and variance; `statistic` and `dof` are scaled
-  WhitenedResidualTests tests;      ///< tests of the errors with the covariance above
+  ResidualTest position, rotation;  ///< where all were aligned, χ² scaled to the exact mean and variance, with its dof
+  WhitenedResidualTests tests;      ///< of the errors' judged components, whitened jointly where an alignment is shared
   std::vector<PoseError> errors;    ///< errors of all poses, in their order
   std::vector<std::size_t> indefinite;  ///< poses whose covariance is not positive definite
 };

@@ -22,7 +22,7 @@ void TrajectoryInputOptions::declare(const Command& command) {
       "--association", association.rule,
       "interpolate: the reference at the times of the estimate (default); nearest: the nearest stamps, as evo");
   command.choice("--interpolation", association.interpolation,
-                 "Curve between two poses of the reference (default geodesic)");
+                 "Curve between two poses of the reference (default cubic)");
   command
       .option("--max-gap", association.max_gap,
               "Largest distance of two stamps to interpolate between, s (default: five times the median distance)")

@@ -566,6 +566,7 @@ class _WhitenedResidualTests(Result):
     covariance: _ResidualTest
     tail: _ResidualTest
     lag: _ResidualTest
+    gross: _ResidualTest  # NEES that a fifth of the poses exceed; p holds whatever the dependence of the errors
 
 class _TrajectoryEvaluation(Result):
     reference_poses: int  # their number
@@ -583,8 +584,12 @@ class _TrajectoryEvaluation(Result):
     rpe: _ErrorStatistics  # relative errors
     rpe_pairs: int  # pairs of RPE
     alignment: _Alignment  # of APE and RPE
+    interpolation_position: float  # error of the interpolated reference, rms; m
+    interpolation_rotation: float  # likewise; rad
     weighted_alignment: _Alignment  # of the verdict
     covariance_convention: str | None  # of the file; null: it has no covariances
+    judged: str  # components of the errors that carry noise
+    omissions: list[str]  # the other components, with the reason
     tests: _WhitenedResidualTests  # of the whitened errors
     rpe_nees: _ResidualTest | None  # of relative motions
     indefinite: _Array  # matched poses whose covariance is not positive definite
@@ -599,7 +604,7 @@ class _TrajectoryEvaluation(Result):
     rotation_errors: _Array  # rad
     errors: _Array  # after the weighted alignment, translation before rotation, body axes; m, rad
     covariances: _Array  # of the errors, row by row; m, rad
-    nees: _Array  # chi-squared of 6
+    nees: _Array  # chi-squared of the number of judged components
 
 class _Convention(Result):
     name: str  # as --cov-from takes it
@@ -1263,7 +1268,7 @@ def evaluate_trajectory(
     times: ArrayLike | None = None,
     reference_covariances: ArrayLike | None = None,
     association: Literal["interpolate", "nearest"] = "interpolate",
-    interpolation: Literal["geodesic", "slerp"] = "geodesic",
+    interpolation: Literal["cubic", "geodesic", "slerp"] = "cubic",
     max_gap: float | None = None,
     t_max_diff: float = 0.01,
     t_offset: float = 0.0,
@@ -1459,7 +1464,7 @@ def diagnose_conventions(
     content: Literal["covariance", "information", "sigmas"] | None = None,
     edges: bool = False,
     association: Literal["interpolate", "nearest"] = "interpolate",
-    interpolation: Literal["geodesic", "slerp"] = "geodesic",
+    interpolation: Literal["cubic", "geodesic", "slerp"] = "cubic",
     max_gap: float | None = None,
     max_difference: float = 0.01,
     offset: float = 0.0,

@@ -272,7 +272,7 @@ def diagnose_conventions(
     content=None,
     edges=False,
     association="interpolate",
-    interpolation="geodesic",
+    interpolation="cubic",
     max_gap=None,
     max_difference=0.01,
     offset=0.0,
@@ -308,7 +308,7 @@ def diagnose_conventions(
         The poses are edges of a graph, and the truth their true relative poses.
     association : {'interpolate', 'nearest'}
         The truth at the times of the estimate, or its nearest stamps, at most `max_difference` (s) away.
-    interpolation : {'geodesic', 'slerp'}
+    interpolation : {'cubic', 'geodesic', 'slerp'}
     max_gap : float, optional
         Seconds between two stamps of the truth to interpolate between; five median steps.
     offset : float
@@ -328,7 +328,7 @@ def diagnose_conventions(
     _choice(caller, "order", order, (None, "tr", "rt"))
     _choice(caller, "content", content, (None, "covariance", "information", "sigmas"))
     _choice(caller, "association", association, ("interpolate", "nearest"))
-    _choice(caller, "interpolation", interpolation, ("geodesic", "slerp"))
+    _choice(caller, "interpolation", interpolation, ("cubic", "geodesic", "slerp"))
     if not 1e-12 <= alpha <= 0.5:
         raise ValueError(f"{caller}: alpha: expected 1e-12 to 0.5, got {alpha}")
     if no_truth and plan:

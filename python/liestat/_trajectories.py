@@ -70,7 +70,7 @@ def evaluate_trajectory(
     times=None,
     reference_covariances=None,
     association="interpolate",
-    interpolation="geodesic",
+    interpolation="cubic",
     max_gap=None,
     t_max_diff=0.01,
     t_offset=0.0,
@@ -107,7 +107,7 @@ def evaluate_trajectory(
         The reference is exact by default.
     association : {'interpolate', 'nearest'}
         The reference at the times of the estimate, or its nearest stamps, as evo.
-    interpolation : {'geodesic', 'slerp'}
+    interpolation : {'cubic', 'geodesic', 'slerp'}
     max_gap : float, optional
         Seconds between two stamps of the reference to interpolate between; five times their median distance.
     t_max_diff : float

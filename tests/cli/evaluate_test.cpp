@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -340,6 +342,112 @@ TEST(EvaluateCommand, BadInputIsSaid) {
   EXPECT_EQ(out.exit_code, 3) << out.error;
   EXPECT_TRUE(contains(out.output, "1 of 20 covariances are not positive definite or not known (line 5)"))
       << out.output;
+}
+
+// Golden results of evo 1.36.5 (data/evaluate/README.md): statistics, titles and labels of 23 sets of options.
+TEST(EvaluateCommand, EqualsEvosGoldenResults) {
+  const char* data = std::getenv("LIESTAT_DATA");
+  if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
+  const std::string folder = std::string(data) + "/evaluate/";
+  const TemporaryDirectory directory;
+  const std::string path = directory / "evo.zip";
+  const Json golden = Json::parse(contentOf(folder + "evo.json"));
+  ASSERT_EQ(golden["results"].size(), 23U);
+  for (const Json& result : golden["results"]) {
+    const bool ape = result["command"] == "ape";
+    Words words{"evaluate",
+                folder + "reference.tum",
+                folder + "estimate.tum",
+                "--association",
+                "nearest",
+                "--json",
+                "-",
+                ape ? "--save_results" : "--save_rpe",
+                path};
+    for (const Json& option : result["options"]) words.push_back(option);
+    const std::string what = result["command"].get<std::string>() + " " + result["options"].dump();
+    const ProgramOutput out = run(words);
+    ASSERT_EQ(out.exit_code, 0) << what << out.error;
+    const Json ours = Json::parse(out.output)["estimates"][0][ape ? "ape" : "rpe"];
+    for (const auto& [figure, value] : result["stats"].items()) {
+      const double expected = value;
+      // Thousands of poses' sums are rounded, relative to them.
+      EXPECT_NEAR(ours[figure].get<double>(), expected, 1e-10 * std::max(1., expected)) << what << ' ' << figure;
+    }
+    const std::vector<ZipMember> members = readZipArchive(contentOf(path), path);
+    ASSERT_EQ(members[0].name, "info.json");
+    const Json info = Json::parse(members[0].content);
+    EXPECT_EQ(info["title"], result["title"]) << what;
+    EXPECT_EQ(info["label"], result["label"]) << what;
+  }
+}
+
+// V1_02 with exact covariances, 35 mm: a reference of 200 Hz has no note, one of 5 Hz a note and no false verdict, of 1 Hz no
+// verdict on the covariances at all. 5 Hz was OVERCONFIDENT, and 1 Hz had an APE of 0.104 m without a word.
+TEST(EvaluateCommand, CoarseReferencesAreSaid) {
+  const char* data = std::getenv("LIESTAT_DATA");
+  if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
+  const TemporaryDirectory directory;
+  const Trajectory truth = readTrajectory(std::string(data) + "/vi/euroc/V1_02_medium_gt.csv");
+  CounterRng rng(77);
+  std::vector<double> times;
+  std::vector<Gaussian<SE3d>> estimate;
+  for (std::size_t i = 3; i < truth.size(); i += 37) {
+    const Matrix6d C = experiments::sceneCovariance({.sigma_translation = 0.017, .sigma_rotation = 0.01}, rng);
+    times.push_back(truth.times[i]);
+    estimate.push_back({truth.poses[i] * sample(Gaussian<SE3d>{SE3d(), C}, rng).inverse(), C});
+  }
+  const std::string file = directory.write("est.tum", tumOf(times, posesOf(estimate)));
+  directory.write("est.tum.cov", covarianceFileOf(times, estimate, {}));
+  const auto thinned = [&](std::size_t every) {
+    std::vector<double> stamps;
+    std::vector<SE3d> poses;
+    for (std::size_t i = 0; i < truth.size(); i += every) {
+      stamps.push_back(truth.times[i]), poses.push_back(truth.poses[i]);
+    }
+    const ProgramOutput out = run({"evaluate", directory.write("gt.tum", tumOf(stamps, poses)), file, "--json", "-"});
+    return Json::parse(out.output)["estimates"][0];
+  };
+  const auto note = [](const Json& json) { return contains(json["notes"].dump(), "the reference is coarse"); };
+  const Json fine = thinned(1), coarse = thinned(40), coarsest = thinned(200);
+  EXPECT_EQ(fine["consistent"], true) << fine["verdict"];
+  EXPECT_FALSE(note(fine));
+  EXPECT_EQ(coarse["consistent"], true) << coarse["verdict"];
+  EXPECT_TRUE(note(coarse));
+  EXPECT_NEAR(coarse["interpolation_rotation"].get<double>(), 0.006, 0.003);
+  EXPECT_TRUE(coarsest["consistent"].is_null()) << coarsest["verdict"];
+  EXPECT_TRUE(note(coarsest));
+  EXPECT_GT(coarsest["ape"]["rmse"].get<double>(), 0.06);
+}
+
+// The commonest file of ROS: x, y and yaw are right, the others have fillers.
+TEST(EvaluateCommand, PlanarRobotsOfRos) {
+  for (const double filler : {1e-6, 1e-9, 0., 1e6, 99999., 1e308}) {
+    CounterRng rng(12);
+    const experiments::TrajectoryScene scene =
+        experiments::emptyScene({.motion = experiments::SceneMotion::planar, .n = 100}, rng);
+    std::string rows;
+    for (std::size_t i = 0; i < 100; ++i) {
+      const double sigma = 0.05 * std::exp(rng.uniform() - 0.5);
+      const Eigen::Vector3d e = sigma * rng.normalVector<3>();
+      const SE3d& T = scene.truth[i];
+      const SE3d at(T.so3() * SO3d::rotZ(e[2]), Eigen::Vector3d(T.translation() + Eigen::Vector3d(e[0], e[1], 0)));
+      rows += tumOf({scene.times[i]}, {at});
+      rows.pop_back();
+      for (int k = 0; k < 36; ++k) {
+        const bool in_plane = k / 6 < 2 || k / 6 == 5;
+        rows += fmt::format(" {}", k / 6 != k % 6 ? 0. : in_plane ? sigma * sigma : filler);
+      }
+      rows += "\n";
+    }
+    const TemporaryDirectory directory;
+    const ProgramOutput out =
+        run({"evaluate", directory.write("gt.tum", tumOf(scene.times, scene.truth)), directory.write("e.tum", rows),
+             "--format", "tum", "--cov-layout", "full36", "--cov-from", "ros-fixed"});
+    EXPECT_TRUE(contains(out.output, "consistent in x, y, rotation z: NEES")) << filler << out.error << out.output;
+    EXPECT_TRUE(contains(out.output, "not judged: z, rotation x, rotation y (errors are zero in every row)"))
+        << out.output;
+  }
 }
 
 TEST(EvaluateCommand, QuaternionsWithWFirstAreSuspected) {

@@ -472,5 +472,51 @@ TEST(CovarianceDiagnosis, AReadingShowsTheErrorsOfOneConvention) {
   EXPECT_TRUE(readInConvention(poses, convention(P::right), std::nullopt).poses[0].covariance.allFinite());
 }
 
+// A robot in the plane: its file is right in x, y and yaw, and has fillers in the others. With all six judged none of these was
+// identified: they were called inflated, or indefinite.
+TEST(ConventionDiagnosis, PlanarRobotsAreJudgedByWhatCarriesNoise) {
+  const auto rt = CovarianceOrder::rotation_translation;
+  const auto covariance = CovarianceContent::covariance;
+  for (const AlignmentModel model : {AlignmentModel::none, AlignmentModel::se3}) {
+    const SE3d world = model == AlignmentModel::none ? SE3d() : SE3d(SO3d::rotZ(1.1), Eigen::Vector3d(3, -2, 0));
+    for (const Convention& c : {convention(P::right), convention(P::world_axes), convention(P::left),
+                                convention(P::right, U::half_angle), convention(P::right, U::radian, covariance, rt)}) {
+      for (const double filler : {0.0, 1e-6, 1e6}) {
+        CounterRng rng(91);
+        const TrajectoryScene scene = experiments::emptyScene({.motion = SceneMotion::planar, .n = 300}, rng);
+        std::vector<DiagnosedPose> poses;
+        for (const SE3d& T : scene.truth) {
+          Matrix6 L = Matrix6::Zero();
+          L(0, 0) = 0.05, L(1, 0) = 0.01, L(1, 1) = 0.03, L(5, 0) = 0.002, L(5, 1) = 0.004, L(5, 5) = 0.01;
+          L *= std::exp(rng.uniform() - 0.5);
+          const Eigen::Matrix<double, 6, 1> error = L * rng.normalVector<6>();
+          const SE3d at = world * T * SE3d::exp(error).inverse();
+          const Matrix6 J = conventionJacobian(convention(c.perturbation, c.unit), at);
+          Matrix6 M = J * (L * L.transpose()) * J.transpose();
+          for (const int k : {2, 3, 4}) M(k, k) = filler;
+          if (c.order == rt) {
+            Matrix6 exchanged;
+            for (int k = 0; k < 36; ++k) exchanged(k / 6, k % 6) = M((k / 6 + 3) % 6, (k % 6 + 3) % 6);
+            M = exchanged;
+          }
+          poses.push_back({at, M, T});
+        }
+        const ConventionDiagnosis d = diagnoseConventions(poses, {.alignment = model});
+        const std::string what = conventionName(c, false) + ", filler " + std::to_string(filler) + ": " + d.reason;
+        EXPECT_TRUE(contains(d.accepted, c)) << what;
+        // Fixed axes, body orientation and roll-pitch-yaw are one in the plane.
+        EXPECT_EQ(d.verdict,
+                  c.perturbation == P::world_axes ? DiagnosisVerdict::undecidable : DiagnosisVerdict::identified)
+            << what;
+        EXPECT_TRUE(d.tests.consistent()) << what;
+        EXPECT_NE(std::find(d.notes.begin(), d.notes.end(),
+                            "not judged: z, rotation x, rotation y (errors are zero in every row)"),
+                  d.notes.end())
+            << what;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace liestat

@@ -143,7 +143,7 @@ TEST(EvaluateTrajectory, AssociationByTime) {
   const TrajectoryEvaluation e = evaluateTrajectory(reference, estimate);
   EXPECT_EQ(e.rows, (std::vector<std::size_t>{0, 1}));
   EXPECT_TRUE(e.by_time);
-  EXPECT_EQ(e.association, "reference interpolated (geodesic)");
+  EXPECT_EQ(e.association, "reference interpolated (cubic)");
   EXPECT_EQ(evaluateTrajectory(reference, estimate, {.association = {.max_gap = 6}}).matched.size(), 3u);
   const AssociationOptions late{.offset = 0.5, .start = 3, .end = 8};
   const TrajectoryEvaluation part = evaluateTrajectory(line(20), line(20), {.association = late});
@@ -208,8 +208,8 @@ TEST(EvaluateTrajectory, WhatTheDataDoNotAllow) {
             EvaluationStatus::overlapping_pairs);
 }
 
-// The even spacing is evo's: numpy.linspace(0, n - 1, count, dtype=int). Path and angle are summed from pose to pose since
-// the last one that was kept; about one axis, as here, the angle is evo's.
+// The even spacing is evo's: numpy.linspace(0, n - 1, count, dtype=int). The path is summed from pose to pose since the last
+// one that was kept, the angle is that to its pose.
 TEST(EvaluateTrajectory, ThinsOut) {
   const auto rows = [](std::size_t n, const EvaluationOptions& options) {
     return evaluateTrajectory(line(n), line(n), options).rows;
@@ -219,12 +219,53 @@ TEST(EvaluateTrajectory, ThinsOut) {
   EXPECT_EQ(rows(3, {.downsample = 4}), (std::vector<std::size_t>{0, 1, 2}));
   EXPECT_EQ(rows(10, {.motion_filter = MotionThinning{1.4, 1000}}), (std::vector<std::size_t>{0, 3, 6, 9}));
   EXPECT_EQ(rows(10, {.motion_filter = MotionThinning{1000, 39}}), (std::vector<std::size_t>{0, 4, 8}));
+  // Turned to and fro by 30 degrees, the body is never more than 30 from where it was, however far it has turned.
+  PoseTrajectory swaying = line(10, 0.5, 0);
+  for (std::size_t i = 1; i < 10; i += 2)
+    swaying.poses[i].mean = swaying.poses[i].mean * SE3d(SO3d::rotZ(0.5), {0, 0, 0});
+  EXPECT_EQ(evaluateTrajectory(swaying, swaying, {.motion_filter = MotionThinning{1.9, 35}}).rows,
+            (std::vector<std::size_t>{0, 4, 8}));
   // The filter follows the path of the poses that are left.
   EXPECT_EQ(rows(11, {.downsample = 6, .motion_filter = MotionThinning{1.9, 1000}}),
             (std::vector<std::size_t>{0, 4, 8}));
   const TrajectoryEvaluation e = evaluateTrajectory(line(10), line(10), {.downsample = 4});
   EXPECT_EQ(e.poses, 10u);
   EXPECT_EQ(e.times, (std::vector<double>{0, 3, 6, 9}));
+}
+
+// Positions at rest do not determine a rotation, poses with covariances do: the verdict stands, APE says what it is of.
+TEST(EvaluateTrajectory, RobotsAtRestHaveAVerdict) {
+  CounterRng rng(14);
+  PoseTrajectory reference = line(60, 0, 0), estimate = reference;
+  estimate.has_covariances = true;
+  const SE3d world(SO3d::rotZ(0.7), Eigen::Vector3d(3, -2, 1));
+  for (Gaussian<SE3d>& g : estimate.poses) {
+    g.covariance = experiments::sceneCovariance({}, rng);
+    g.mean = world * g.mean * sample(Gaussian<SE3d>{SE3d(), g.covariance}, rng).inverse();
+  }
+  const TrajectoryEvaluation e = evaluateTrajectory(reference, estimate, {.alignment = AlignmentModel::se3});
+  ASSERT_TRUE(e.ok()) << e.reason;
+  EXPECT_TRUE(e.verdict().isYes()) << e.verdict().text;
+  EXPECT_EQ(e.alignment.model, AlignmentModel::origin);
+  EXPECT_LT(e.position_errors[0], 1e-12);
+  ASSERT_EQ(e.notes.size(), 1u);
+  EXPECT_TRUE(contains(e.notes[0], "APE and RPE are aligned by the first poses: the positions are collinear"))
+      << e.notes[0];
+  estimate.has_covariances = false;
+  EXPECT_EQ(evaluateTrajectory(reference, estimate, {.alignment = AlignmentModel::se3}).status,
+            EvaluationStatus::not_aligned);
+}
+
+// Correlated errors ten times too large are overconfident whatever their correlation; right ones have no verdict.
+TEST(EvaluateTrajectory, GrossOverconfidenceHasAVerdict) {
+  Scene drift(200, 0.01, 1, true, true);
+  const Verdict verdict = drift.evaluate().verdict();
+  EXPECT_TRUE(verdict.isNo());
+  EXPECT_EQ(
+      verdict.text.rfind("OVERCONFIDENT: errors are correlated in time, but a fifth of the poses has a NEES above", 0),
+      0u)
+      << verdict.text;
+  EXPECT_TRUE(Scene(200, 1, 1, true, true).evaluate().verdict().isNone());
 }
 
 TEST(EvaluateTrajectory, ProjectsIntoAPlane) {

@@ -95,6 +95,7 @@ LIESTAT_FUSION_INLINE ConventionDiagnosis diagnoseConventions(std::span<const Di
   rank(data, fits, options);
   const bool usable = !fits.empty() && !std::isinf(fits.front().log_likelihood);
   if (usable) d.tests = testsUnder(data, fits.front(), options);
+  for (std::string& omission : d.tests.components.omissions()) d.notes.push_back(std::move(omission));
 
   // Correlated errors: absolute errors decide nothing.
   if (usable && options.ordered && d.tests.lag.fires() && d.tests.lag.statistic > 0) {

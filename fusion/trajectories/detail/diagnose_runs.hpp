@@ -99,7 +99,7 @@ LIESTAT_FUSION_INLINE RunAgainstTruth runAgainstTruth(const PoseTrajectory& trut
   r.status = associated.status, r.reason = associated.reason;
   if (!r.ok()) return r;
   const std::vector<MatchedPose> matched =
-      matchedPoses(associated.matches, poses, estimate.poses, options.interpolation);
+      matchedPoses(associated.matches, poses, estimate.poses, options.interpolation, times);
   for (std::size_t k = 0; k < matched.size(); ++k) {
     r.run.poses.push_back({matched[k].estimate.mean, matched[k].estimate.covariance, matched[k].reference.mean});
     if (!estimate.times.empty()) r.run.times.push_back(estimate.times[associated.matches[k].estimate]);

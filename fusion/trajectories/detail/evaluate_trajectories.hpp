@@ -48,27 +48,145 @@ LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateNearest(std::span<const do
   return matches;
 }
 
+namespace detail {
+
+/// A reference as PoseCurve takes it. Without times its poses are a second apart.
+struct ReferenceSource {
+  std::span<const Gaussian<SE3d>> poses;
+  std::span<const double> times;
+
+  std::size_t size() const { return poses.size(); }
+  double time(std::size_t i) const { return times.empty() ? static_cast<double>(i) : times[i]; }
+  const SE3d& pose(std::size_t i) const { return poses[i].mean; }
+  double timeOf(const TimeMatch& m) const {
+    return time(m.reference) + m.fraction * (time(m.reference + 1) - time(m.reference));
+  }
+};
+
+/// The error of interpolation between any two stamps, as a second moment. Stamps that are left out show it, scaled by the
+/// polynomial of the nodes: the four about the gap its size, all of the reference its shape (four vectors have none) and a
+/// fifth of its size, without which a gap between four good stamps would be too good.
+class InterpolationErrors {
+ public:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+  InterpolationErrors(const ReferenceSource& source, PoseInterpolation rule) : source_(source), curve_(source, rule) {
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < source.size(); ++i) steps.push_back(source.time(i) - source.time(i - 1));
+    const auto half = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    if (!steps.empty()) std::nth_element(steps.begin(), half, steps.end()), step_ = *half;
+    for (const std::size_t count : {std::size_t{2}, std::size_t{4}}) {
+      Order& order = orders_[count / 4];
+      double n = 0;
+      const std::size_t every = source.size() / 1000 + 1;
+      for (std::size_t i = 0; i < source.size(); i += every) {
+        if (!curve_.leftOut(i, count, 1)) continue;
+        const Vector6& derivative = derivativeAt(i, count, 1);
+        order.moment += derivative * derivative.transpose(), ++n;
+      }
+      if (n > 0) order.moment /= n;
+      for (const int from : {0, 3}) {
+        const double gain = curve_.lostGain(count, from);
+        order.gain[from / 3] = gain * gain;
+      }
+    }
+  }
+
+  /// False where there are too few stamps to leave some out.
+  bool known() const { return curve_.leftOut(source_.size() / 2, 4, 1).has_value(); }
+  Matrix6 at(const TimeMatch& m) {
+    const double time = source_.timeOf(m), gap = source_.time(m.reference + 1) - source_.time(m.reference);
+    const auto nodes = curve_.nodes(m.reference);
+    const Order& order = orders_[nodes.count / 4];
+    constexpr double max_stride = 50;
+    const auto stride = static_cast<std::size_t>(std::clamp(std::round(gap / step_), 1., max_stride));
+    const std::size_t reach = (nodes.count - 1) * stride;
+    const bool near = source_.size() >= 2 * reach + 1;
+    const double product = std::pow(curve_.polynomial(nodes, time), 2);
+    Matrix6 result = Matrix6::Zero();
+    for (const int from : {0, 3}) {
+      const Eigen::Matrix3d shape = order.moment.block<3, 3>(from, from);
+      double size = shape.trace();
+      if (!(size > 0)) continue;
+      for (std::size_t k = 0; k < 4 && near; ++k) {
+        const std::size_t i = std::clamp(m.reference + k, reach + 1, source_.size() - reach) - 1;
+        size += derivativeAt(i, nodes.count, stride).segment<3>(from).squaredNorm();
+      }
+      result.block<3, 3>(from, from) =
+          shape * (order.gain[from / 3] * product * size / (shape.trace() * (near ? 5 : 1)));
+    }
+    return result;
+  }
+
+ private:
+  struct Kept {
+    std::size_t i = 0, count = 0, stride = 0;
+    Vector6 derivative = Vector6::Zero();
+  };
+  struct Order {
+    Matrix6 moment = Matrix6::Zero();
+    std::array<double, 2> gain{};
+  };
+
+  const Vector6& derivativeAt(std::size_t i, std::size_t count, std::size_t stride) {
+    Kept& kept = kept_[i % kept_.size()];
+    if (kept.i != i || kept.count != count || kept.stride != stride) {
+      const auto nodes = *curve_.leftOut(i, count, stride);
+      kept = {i, count, stride, curve_.error(i, nodes) / curve_.polynomial(nodes, source_.time(i))};
+    }
+    return kept.derivative;
+  }
+
+  ReferenceSource source_;
+  PoseCurve<ReferenceSource> curve_;
+  double step_ = 0;
+  std::array<Order, 2> orders_{};
+  std::array<Kept, 8> kept_{};
+};
+
+}  // namespace detail
+
 LIESTAT_FUSION_INLINE std::vector<MatchedPose> matchedPoses(std::span<const TimeMatch> matches,
                                                             std::span<const Gaussian<SE3d>> reference,
                                                             std::span<const Gaussian<SE3d>> estimate,
-                                                            PoseInterpolation interpolation) {
+                                                            PoseInterpolation interpolation,
+                                                            std::span<const double> reference_times) {
   std::vector<MatchedPose> poses;
   poses.reserve(matches.size());
+  const detail::ReferenceSource source{reference, reference_times};
+  const detail::PoseCurve<detail::ReferenceSource> curve(source, interpolation);
   for (const TimeMatch& m : matches) {
     poses.push_back({reference[m.reference], estimate[m.estimate]});
     if (m.fraction == 0) continue;
     Gaussian<SE3d>& at = poses.back().reference;
-    const Gaussian<SE3d>& next = reference[m.reference + 1];
-    if (interpolation == PoseInterpolation::geodesic) {
-      at.mean = interpolate(at.mean, next.mean, m.fraction);
-    } else {
-      const Eigen::Vector3d t = (1 - m.fraction) * at.mean.translation() + m.fraction * next.mean.translation();
-      const SO3d R = at.mean.so3() * SO3d::exp(m.fraction * (at.mean.so3().inverse() * next.mean.so3()).log());
-      at.mean = SE3d(R, t);
-    }
-    at.covariance = (1 - m.fraction) * at.covariance + m.fraction * next.covariance;
+    at.mean = curve.at(m.reference, source.timeOf(m));
+    at.covariance = (1 - m.fraction) * at.covariance + m.fraction * reference[m.reference + 1].covariance;
   }
   return poses;
+}
+
+LIESTAT_FUSION_INLINE InterpolationError addInterpolationError(std::span<const TimeMatch> matches,
+                                                               std::span<const Gaussian<SE3d>> reference,
+                                                               std::span<const double> reference_times,
+                                                               PoseInterpolation interpolation,
+                                                               std::span<MatchedPose> poses, double factor) {
+  InterpolationError result;
+  const auto between = [](const TimeMatch& m) { return m.fraction != 0; };
+  if (std::none_of(matches.begin(), matches.end(), between)) return result;
+  detail::InterpolationErrors errors({reference, reference_times}, interpolation);
+  result.known = errors.known();
+  if (!result.known) return result;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    if (!between(matches[k])) continue;
+    const Eigen::Matrix<double, 6, 6> moment = errors.at(matches[k]);
+    poses[k].reference.covariance += factor * moment;
+    result.position += moment.topLeftCorner<3, 3>().trace(),
+        result.rotation += moment.bottomRightCorner<3, 3>().trace();
+  }
+  result.position = std::sqrt(result.position / static_cast<double>(matches.size()));
+  result.rotation = std::sqrt(result.rotation / static_cast<double>(matches.size()));
+  return result;
 }
 
 LIESTAT_FUSION_INLINE std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses) {
@@ -317,12 +435,24 @@ LIESTAT_FUSION_INLINE std::vector<double> relativeErrors(std::span<const Matched
 
 LIESTAT_FUSION_INLINE RelativeConsistency
 relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                    PairsModel model, double scale) {
+                    PairsModel model, double scale, const NoiseComponents& components) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   RelativeConsistency result;
   double sum = 0;
-  const auto scaled = [scale](const Gaussian<SE3d>& g) {
+  const auto axes = [&](const SE3d& pose, const Matrix6& covariance, bool back) {
+    if (!components.in_world) return covariance;
+    const Matrix6 B = detail::AlignedError::inWorld(pose.so3());
+    return detail::congruence(back ? Matrix6(B.transpose()) : B, covariance);
+  };
+  const auto scaled = [&](const Gaussian<SE3d>& g) {
     Gaussian<SE3d> s{SE3d(g.mean.so3(), Eigen::Vector3d(scale * g.mean.translation())), g.covariance};
+    if (components.omits()) {
+      s.covariance = axes(g.mean, s.covariance, false);
+      for (int k = 0; k < 6; ++k) {
+        if (!components.keeps(k)) s.covariance.row(k).setZero(), s.covariance.col(k).setZero();
+      }
+      s.covariance = axes(g.mean, s.covariance, true);
+    }
     s.covariance.topRows<3>() *= scale, s.covariance.leftCols<3>() *= scale;
     return s;
   };
@@ -330,12 +460,15 @@ relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pai
     const Gaussian<SE3d> from = scaled(poses[i].estimate), to = scaled(poses[j].estimate);
     const SE3d relative = from.mean.inverse() * to.mean;
     const SE3d reference = poses[i].reference.mean.inverse() * poses[j].reference.mean;
-    const Eigen::Matrix<double, 6, 1> eta = (relative.inverse() * reference).log();
+    Eigen::Matrix<double, 6, 1> eta = (relative.inverse() * reference).log();
     const Matrix6 A = relative.inverse().Adj();
     const Matrix6 carried = detail::congruence(A, from.covariance);
     Matrix6 covariance =
         model == PairsModel::independent ? Matrix6(to.covariance + carried) : Matrix6(to.covariance - carried);
     covariance += poses[j].reference.covariance + detail::congruence(A, poses[i].reference.covariance);
+    if (components.in_world) eta = detail::AlignedError::inWorld(to.mean.so3()) * eta;
+    covariance = axes(to.mean, covariance, false);
+    components.reduce(eta, covariance);
     const double squared = mahalanobisSquared<double, 6>(eta, covariance);
     if (squared == squared) {
       sum += squared, ++result.n;
@@ -343,7 +476,7 @@ relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pai
       ++result.indefinite;
     }
   }
-  if (result.n > 0) result.joint = detail::neesTest(sum, 6. * static_cast<double>(result.n));
+  if (result.n > 0) result.joint = detail::neesTest(sum, components.count() * static_cast<double>(result.n));
   return result;
 }
 

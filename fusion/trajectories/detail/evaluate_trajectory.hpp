@@ -73,15 +73,17 @@ class ThinnedTrajectory {
     rows_ = std::move(rows);
   }
 
+  /// evo's rows: the path is summed from pose to pose, the angle is that from the last pose that was kept.
   void keepMoved(const MotionThinning& least) {
     std::vector<std::size_t> rows{rows_[0]};
-    double path = 0, turned = 0;
+    double path = 0;
+    std::size_t kept = 0;
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       path += (pose(i).mean.translation() - pose(i - 1).mean.translation()).norm();
-      turned += degrees_per_radian * (pose(i - 1).mean.so3().inverse() * pose(i).mean.so3()).log().norm();
+      const double turned = degrees_per_radian * (pose(kept).mean.so3().inverse() * pose(i).mean.so3()).log().norm();
       if (path < least.distance && turned < least.degrees) continue;
       rows.push_back(rows_[i]);
-      path = turned = 0;
+      path = 0, kept = i;
     }
     rows_ = std::move(rows);
   }
@@ -163,6 +165,17 @@ inline double rotationDisagreement(std::span<const MatchedPose> poses, bool swap
   if (angles.empty()) return not_a_number;
   std::sort(angles.begin(), angles.end());
   return angles[angles.size() / 2];
+}
+
+inline std::string noteOfCoarseReference(const TrajectoryEvaluation& e) {
+  const auto part = [](double error, const std::vector<double>& errors) {
+    return significant(std::round(100 * error / errorStatistics(errors).rmse)) + " %";
+  };
+  return "the reference is coarse: its interpolation is off by " + significant(e.interpolation.position, 3) +
+         " m and " + significant(e.interpolation.rotation, 3) + " rad (rms, by leaving out every second stamp), " +
+         part(e.interpolation.position, e.position_errors) + " and " +
+         part(e.interpolation.rotation, e.rotation_errors) +
+         " of the errors; NEES allows for it, APE and RPE contain it";
 }
 
 inline std::string noteOfIndefinite(const TrajectoryEvaluation& e, const std::vector<std::size_t>& lines) {
@@ -290,7 +303,8 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
                                            {left.times(), left.poses().size(), estimate_name}, o.association);
   e.by_time = association.by_time;
   if (!association.ok()) return refuse(association.status, association.reason);
-  e.matched = matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation);
+  e.matched =
+      matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation, truth.times());
   if (e.matched.size() < 2) {
     return refuse(EvaluationStatus::too_few,
                   std::to_string(e.matched.size()) + " pose has a partner in " + reference_name);
@@ -299,6 +313,8 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     if (!reference.has_covariances) p.reference.covariance.setZero();
     if (!estimate.has_covariances) p.estimate.covariance.setZero();
   }
+  e.interpolation =
+      addInterpolationError(association.matches, truth.poses(), truth.times(), o.association.interpolation, e.matched);
   for (const TimeMatch& m : association.matches) {
     e.times.push_back(e.by_time ? left.times()[m.estimate] : static_cast<double>(m.estimate));
     e.rows.push_back(left.rowOf(m.estimate));
@@ -307,6 +323,11 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
   if (!suspicion.empty()) e.notes.push_back(suspicion);
 
   e.alignment = alignUmeyama(e.matched, o.alignment, o.n_to_align);
+  if (!e.alignment.ok && e.has_covariances && alignWeighted(e.matched, o.verdictAlignment(), o.n_to_align).ok) {
+    e.notes.push_back("APE and RPE are aligned by the first poses: " + e.alignment.fault +
+                      ", but the verdict's alignment is determined by the poses and their covariances");
+    e.alignment = alignUmeyama(e.matched, AlignmentModel::origin);
+  }
   if (!e.alignment.ok) {
     return refuse(EvaluationStatus::not_aligned,
                   std::string("no ") + name(o.alignment) + " alignment: " + e.alignment.fault);
@@ -335,23 +356,45 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     }
     e.ape_unit = name(*o.change_unit);
   }
+  if (!e.interpolation.known) {
+    e.notes.push_back("the error of the interpolated reference is not known: it has too few stamps to leave some out");
+  } else if (e.referenceIsCoarse()) {
+    e.notes.push_back(detail::noteOfCoarseReference(e));
+  }
   e.ape_statistics = errorStatistics(e.ape), e.rpe_statistics = errorStatistics(e.rpe);
   if (!e.has_covariances) return e;
 
-  e.weighted = alignWeighted(e.matched, o.verdictAlignment(), o.n_to_align);
-  e.consistency = evaluateConsistency(e.matched, e.weighted.ok ? e.weighted : Alignment{.ok = true});
-  if (!e.weighted.ok) {
-    e.consistency.ok = false;
-    e.consistency.fault = "no weighted alignment: " + e.weighted.fault;
+  if (o.pairs_model && o.relative.all_pairs) {
+    return refuse(EvaluationStatus::overlapping_pairs,
+                  "the motions of all pairs overlap: they fit no model of the pairs");
   }
-  if (!e.consistency.indefinite.empty()) e.notes.push_back(detail::noteOfIndefinite(e, estimate.lines));
-  if (o.pairs_model && !e.pairs.empty()) {
-    if (o.relative.all_pairs) {
-      return refuse(EvaluationStatus::overlapping_pairs,
-                    "the motions of all pairs overlap: they fit no model of the pairs");
+  const auto judge = [&] {
+    e.weighted = alignWeighted(e.matched, o.verdictAlignment(), o.n_to_align);
+    e.consistency = evaluateConsistency(e.matched, e.weighted.ok ? e.weighted : Alignment{.ok = true});
+    if (!e.weighted.ok) {
+      e.consistency.ok = false;
+      e.consistency.fault = "no weighted alignment: " + e.weighted.fault;
     }
-    e.relative = relativeConsistency(e.matched, e.pairs, *o.pairs_model, e.weighted.ok ? e.weighted.scale : 1);
+    if (!o.pairs_model || e.pairs.empty()) return;
+    e.relative = relativeConsistency(e.matched, e.pairs, *o.pairs_model, e.weighted.ok ? e.weighted.scale : 1,
+                                     e.consistency.tests.components);
+  };
+  const auto interpolationTimes = [&](double times) {
+    addInterpolationError(association.matches, truth.poses(), truth.times(), o.association.interpolation, e.matched,
+                          times - e.interpolation.factor);
+    e.interpolation.factor = times;
+    judge();
+  };
+  judge();
+  // What a factor within the error's own uncertainty explains is no fault of the covariances.
+  if (e.referenceIsCoarse()) {
+    for (const double times : {0.25, 0., 4.}) {
+      if (e.verdict().isNo()) interpolationTimes(times);
+    }
+    if (e.verdict().isNo()) interpolationTimes(1);
   }
+  for (std::string& omission : e.consistency.tests.components.omissions()) e.notes.push_back(std::move(omission));
+  if (!e.consistency.indefinite.empty()) e.notes.push_back(detail::noteOfIndefinite(e, estimate.lines));
   return e;
 }
 

@@ -34,7 +34,7 @@ inline std::array<bool, 7> freeParameters(AlignmentModel model) {
   }
 }
 
-/// The error of one aligned pose in the estimate's units, its covariance before alignment, and its derivative by the
+/// The error of one aligned pose in the estimate's units and along the body's axes, its covariance before alignment, and its derivative by the
 /// parameters, ξ(δ) = ξ - J δ. The translation is divided by the scale, so that the covariance does not depend on it: with
 /// weights that follow the scale its estimate would be biased.
 struct AlignedError {
@@ -61,6 +61,27 @@ struct AlignedError {
     covariance = p.reference.covariance;
     if (s != 1) covariance.topRows<3>() /= s, covariance.leftCols<3>() /= s;
     covariance += p.estimate.covariance;
+  }
+
+  /// What the judged components are reduced to, along their axes.
+  AlignedError reduced(const NoiseComponents& components, const SO3d& rotation) const {
+    AlignedError r = *this;
+    if (!components.omits()) return r;
+    if (components.in_world) {
+      const Eigen::Matrix<double, 6, 6> B = inWorld(rotation);
+      r.error = B * error, r.covariance = congruence(B, covariance), r.jacobian = product(B, jacobian);
+    }
+    components.reduce(r.error, r.covariance);
+    for (int k = 0; k < 6; ++k) {
+      if (!components.keeps(k)) r.jacobian.row(k).setZero();
+    }
+    return r;
+  }
+  /// From the body's axes to those of its world.
+  static Eigen::Matrix<double, 6, 6> inWorld(const SO3d& rotation) {
+    Eigen::Matrix<double, 6, 6> B = Eigen::Matrix<double, 6, 6>::Zero();
+    B.topLeftCorner<3, 3>() = B.bottomRightCorner<3, 3>() = rotation.matrix();
+    return B;
   }
 };
 
@@ -110,7 +131,9 @@ inline Eigen::Vector3d centroid(std::span<const MatchedPose> poses, const Alignm
 inline AlignmentSums alignmentSums(std::span<const MatchedPose> poses, const Alignment& a,
                                    const Eigen::Vector3d& centre, const std::array<bool, 7>& is_free) {
   AlignmentSums sums;
-  for (const MatchedPose& p : poses) sums.add(AlignedError(p, a, centre, is_free));
+  for (const MatchedPose& p : poses) {
+    sums.add(AlignedError(p, a, centre, is_free).reduced(a.components, p.estimate.mean.so3()));
+  }
   sums.finish(is_free);
   return sums;
 }
@@ -175,63 +198,32 @@ inline Matrix7 umeyamaCovariance(std::span<const MatchedPose> poses, const Align
   return aboutOrigin(covariance, a.transform.translation() - centre);
 }
 
-/// Gauss-Newton from the better of two starts: the positions' least squares and the first pose.
-inline Alignment weightedAlignment(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align) {
-  Alignment a;
-  a.model = model;
-  a.weighted = true;
-  if (model == AlignmentModel::none) {
-    a.ok = true;
-    return a;
-  }
-  const std::array<bool, 7> is_free = freeParameters(model);
-  a.parameters = static_cast<int>(std::count(is_free.begin(), is_free.end(), true));
-  a.covariance.setConstant(not_a_number);
-  if (a.parameters == 0) {
-    a.fault = "a scale alone has no weighted alignment; use sim3";
-    return a;
-  }
-  a.poses = model == AlignmentModel::origin ? 1 : n_to_align == 0 ? poses.size() : std::min(n_to_align, poses.size());
-  if (poses.empty() || (model == AlignmentModel::sim3 && a.poses < 2)) {
-    a.fault = poses.empty() ? "no poses" : "one pose does not determine a scale";
-    return a;
-  }
-  const std::span<const MatchedPose> used = poses.first(std::min(a.poses, poses.size()));
-  a.poses = used.size();
-
-  Alignment start = a;
-  const SE3d first = used[0].reference.mean * used[0].estimate.mean.inverse();
-  if (model == AlignmentModel::posyaw) {
-    const Eigen::Matrix3d R = first.rotationMatrix();
-    const SO3d yaw = SO3d::rotZ(std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1)));
-    start.transform =
-        SE3d(yaw, Eigen::Vector3d(used[0].reference.mean.translation() - yaw * used[0].estimate.mean.translation()));
-  } else {
-    start.transform = first;
-  }
-  a.transform = start.transform;
-  if (used.size() >= 3 && model != AlignmentModel::origin) {
-    Alignment positions = alignUmeyama(used, model);
-    if (positions.ok && positions.scale > 0) {
-      const auto cost = [&](const Alignment& x) { return alignmentSums(used, x, centroid(used, x), is_free).cost; };
-      if (cost(positions) < cost(start)) a.transform = positions.transform, a.scale = positions.scale;
-    }
-  }
+/// Gauss-Newton in the directions that the judged components determine, from the better of two starts: the positions'
+/// least squares and the alignment that is given.
+inline void refine(std::span<const MatchedPose> used, Alignment& a) {
+  const std::array<bool, 7> is_free = freeParameters(a.model);
+  const int fixed = static_cast<int>(std::count(is_free.begin(), is_free.end(), false));
+  a.ok = false, a.iterations = 0;
   bool converged = false;
   for (; a.iterations < 50 && !converged; ++a.iterations) {
     const Eigen::Vector3d centre = centroid(used, a);
-    const AlignmentSums sums = alignmentSums(used, a, centre, is_free);
+    AlignmentSums sums = alignmentSums(used, a, centre, is_free);
     if (sums.indefinite > 0) {
       a.fault = "covariances that are not positive definite";
-      return a;
+      return;
     }
     a.condition = scaledCondition(sums.information);
-    if (!(a.condition < worst_condition)) {
+    // Of a robot in the plane the height of the world is not determined where heights are not judged: it stays as it is.
+    const double least = leastDetermined(a.components);
+    const bool whole = a.condition < (a.components.omits() ? 1 / least : worst_condition);
+    if (!whole && !a.components.omits()) {
       a.fault = "the poses do not determine all parameters of the alignment";
-      return a;
+      return;
     }
-    const Cholesky<double, 7> root(sums.information);
-    Vector7 step = root.solve<1>(sums.gradient);
+    const DeterminedInverse determined(sums.information, least);
+    const Matrix7 inverse = whole ? Cholesky<double, 7>(sums.information).inverse() : determined.inverse;
+    a.parameters = (whole ? 7 : determined.rank) - fixed;
+    Vector7 step = inverse * sums.gradient;
     step[6] = std::clamp(step[6], -1., 1.);  // a scale far off is approached in factors of e
     converged = step.dot(sums.information * step) < 1e-12;
     const SO3d turn = SO3d::exp(step.segment<3>(3));
@@ -240,7 +232,7 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
     a.transform = SE3d(turn * a.transform.so3(), Eigen::Vector3d(centre + step.head<3>() + growth * (turn * arm)));
     a.scale *= growth;
     if (converged) {
-      a.covariance = root.inverse();
+      a.covariance = inverse;
       clearFixed(a.covariance, is_free);
       a.covariance = aboutOrigin(a.covariance, a.transform.translation() - centre);
     }
@@ -251,22 +243,101 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
     a.ok = false;
     a.fault = "the positions of the estimate do not determine the scale";
   }
-  return a;
 }
 
-/// A sum of squares ξᵀ P ξ of one part of the errors with the exact mean and variance that the alignment leaves, scaled to χ²
-/// of the same two moments. `sign`: -1 for errors that were aligned, +1 for others.
-inline ResidualTest scaledPart(double sum, double n, const Matrix7& C, const Matrix7& G, int sign) {
-  const Matrix7 CG = product(C, G);
-  double trace = 0, squared = 0;
-  for (int i = 0; i < 7; ++i) {
-    trace += CG(i, i);
-    for (int k = 0; k < 7; ++k) squared += CG(i, k) * CG(k, i);
+/// The components that carry noise, by the errors under an alignment that has no errors in the others: along the axes of the
+/// body or, where more are left out so (matrices of ROS), along those of the world.
+inline NoiseComponents noiseComponents(std::span<const MatchedPose> poses, const Alignment& a) {
+  NoiseComponentScan in_body, in_world;
+  for (const MatchedPose& p : poses) {
+    const SE3d moved = a(p.estimate.mean);
+    const Eigen::Matrix<double, 6, 1> error = (moved.inverse() * p.reference.mean).log();
+    const double length = moved.translation().norm() + p.estimate.mean.translation().norm();
+    in_body.add(error, p.estimate.covariance, length);
+    const Eigen::Matrix<double, 6, 6> B = AlignedError::inWorld(p.estimate.mean.so3());
+    in_world.add(B * error, congruence(B, p.estimate.covariance), length);
   }
-  const double mean = 3 * n + sign * trace, half_variance = 3 * n + 2 * sign * trace + squared;
-  if (!(mean > 0) || !(half_variance > 1e-9 * mean)) return {};
-  const double unit = half_variance / mean;
-  return neesTest(sum / unit, mean / unit);
+  NoiseComponents body = in_body.components(), world = in_world.components();
+  world.in_world = true;
+  // Products with unknown entries are unknown: such matrices have their axes only.
+  const bool known =
+      std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.estimate.covariance.allFinite(); });
+  return known && world.count() < body.count() ? world : body;
+}
+
+/// The components found before an alignment, with fillers that the errors after it exceed.
+inline NoiseComponents withExceededFillers(std::span<const MatchedPose> used, const Alignment& a,
+                                           const NoiseComponents& found) {
+  const auto is_filler = [](ComponentRole role) { return role == ComponentRole::filler; };
+  if (std::none_of(found.roles.begin(), found.roles.end(), is_filler)) return found;
+  const Eigen::Vector3d centre = centroid(used, a);
+  NoiseComponentScan scan;
+  for (const MatchedPose& p : used) {
+    AlignedError e(p, a, centre, freeParameters(a.model));
+    if (found.in_world) {
+      const Eigen::Matrix<double, 6, 6> B = AlignedError::inWorld(p.estimate.mean.so3());
+      e.error = B * e.error, e.covariance = congruence(B, e.covariance);
+    }
+    scan.add(e.error, e.covariance);
+  }
+  return scan.withExceededFillers(found);
+}
+
+/// `given`: components that are judged whatever the covariances are.
+inline Alignment weightedAlignment(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align,
+                                   const NoiseComponents* given = nullptr) {
+  Alignment a;
+  a.model = model;
+  a.weighted = true;
+  const std::array<bool, 7> is_free = freeParameters(model);
+  a.parameters = static_cast<int>(std::count(is_free.begin(), is_free.end(), true));
+  if (a.parameters == 0 && model != AlignmentModel::none) {
+    a.covariance.setConstant(not_a_number);
+    a.fault = "a scale alone has no weighted alignment; use sim3";
+    return a;
+  }
+  if (model == AlignmentModel::none) {
+    a.components = withExceededFillers(poses, a, noiseComponents(poses, a));
+    a.ok = true;
+    return a;
+  }
+  a.covariance.setConstant(not_a_number);
+  a.poses = model == AlignmentModel::origin ? 1 : n_to_align == 0 ? poses.size() : std::min(n_to_align, poses.size());
+  if (poses.empty() || (model == AlignmentModel::sim3 && a.poses < 2)) {
+    a.fault = poses.empty() ? "no poses" : "one pose does not determine a scale";
+    return a;
+  }
+  const std::span<const MatchedPose> used = poses.first(a.poses);
+  const SE3d first = used[0].reference.mean * used[0].estimate.mean.inverse();
+  a.transform = first;
+  if (model == AlignmentModel::posyaw) {
+    const Eigen::Matrix3d R = first.rotationMatrix();
+    const SO3d yaw = SO3d::rotZ(std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1)));
+    a.transform =
+        SE3d(yaw, Eigen::Vector3d(used[0].reference.mean.translation() - yaw * used[0].estimate.mean.translation()));
+  }
+  const NoiseComponents found = given != nullptr ? *given : noiseComponents(poses, a);
+  a.components = found;
+  for (ComponentRole& role : a.components.roles) {
+    if (role == ComponentRole::filler) role = ComponentRole::judged;
+  }
+  if (used.size() >= 3 && model != AlignmentModel::origin) {
+    Alignment positions = alignUmeyama(used, model);
+    if (positions.ok && positions.scale > 0) {
+      Alignment other = a;
+      other.transform = positions.transform, other.scale = positions.scale;
+      const auto cost = [&](const Alignment& x) { return alignmentSums(used, x, centroid(used, x), is_free).cost; };
+      if (cost(other) < cost(a)) a = other;
+    }
+  }
+  refine(used, a);
+  if (a.ok && found.roles != a.components.roles) {
+    const NoiseComponents judged = withExceededFillers(used, a, found);
+    const bool fewer = judged.roles != a.components.roles;
+    a.components = judged;
+    if (fewer) refine(used, a);
+  }
+  return a;
 }
 
 inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Alignment& a) {
@@ -287,24 +358,29 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
   const std::array<bool, 7> is_free = freeParameters(a.model);
   const std::span<const MatchedPose> used = poses.first(a.poses);
   const Eigen::Vector3d centre = centroid(used, a);
-  Matrix7 C = Matrix7::Zero(), prior = Matrix7::Zero();
-  if (a.parameters > 0) {
-    prior = alignmentSums(used, a, centre, is_free).information;
-    const Cholesky<double, 7> root(prior);
-    C = root.inverse();
-    clearFixed(C, is_free);
+  const bool sharing = a.parameters > 0, all_aligned = a.poses == poses.size();
+  Matrix7 C = Matrix7::Zero(), information = Matrix7::Zero();
+  if (sharing) {
+    information = alignmentSums(used, a, centre, is_free).information;
+    for (int k = 0; k < 7; ++k) {
+      if (!is_free[static_cast<std::size_t>(k)]) information(k, k) = 0;
+    }
+    C = DeterminedInverse(information, leastDetermined(a.components)).inverse;
   }
-  const bool all_aligned = a.poses == poses.size();
-  const int sign = all_aligned ? -1 : 1;
-  AlignmentSums tested;
-  Matrix7 G_position = Matrix7::Zero(), G_rotation = Matrix7::Zero();
-  double position = 0, rotation = 0;
+  SharedParameters shared;
+  if (sharing && !all_aligned) shared.prior = information;
+  r.tests.components = a.components;
   r.errors.reserve(poses.size());
   std::vector<PoseResidual> residuals;
+  AlignmentSums seen;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const AlignedError e(poses[i], a, centre, is_free);
+    const AlignedError whole(poses[i], a, centre, is_free);
+    const AlignedError e = whole.reduced(a.components, poses[i].estimate.mean.so3());
+    const bool aligned = i < a.poses;
+    const double sign = aligned ? -1 : 1;
     PoseError out;
-    out.error = e.error;
+    out.error = whole.error;
+    out.covariance = whole.covariance + sign * productTransposed(product(whole.jacobian, C), whole.jacobian);
     const Cholesky<double, 6> root(e.covariance);
     if (!root.ok()) {
       r.indefinite.push_back(i);
@@ -313,33 +389,16 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
       continue;
     }
     const Eigen::Matrix<double, 6, 7> JC = product(e.jacobian, C);
-    const Matrix6 taken = productTransposed(JC, e.jacobian);
-    const bool aligned = i < a.poses;
-    out.covariance = aligned ? Matrix6(e.covariance - taken) : Matrix6(e.covariance + taken);
-    out.leverage = 0;
-    if (aligned && a.parameters > 0) {
-      // tr(Σ⁻¹ J C Jᵀ) by the whitened halves of both sides.
-      out.leverage = root.halfSolve<7>(e.jacobian).cwiseProduct(root.halfSolve<7>(JC)).sum();
-    }
-    const Cholesky<double, 6> left(out.covariance);
+    const Cholesky<double, 6> left(Matrix6(e.covariance + sign * productTransposed(JC, e.jacobian)));
+    // tr(Σ⁻¹ J C Jᵀ) by the whitened halves of both sides.
+    out.leverage = aligned ? root.halfSolve<7>(e.jacobian).cwiseProduct(root.halfSolve<7>(JC)).sum() : 0;
     // A direction of the pose that the alignment explains entirely leaves nothing to test; rounding decides near it.
-    const bool regular = left.ok() && out.leverage < 6 - 1e-6;
+    const bool regular = left.ok() && out.leverage < a.components.count() - 1e-6;
     out.nees = regular ? left.halfSolve<1>(e.error).squaredNorm() : not_a_number;
     r.errors.push_back(out);
     if (aligned && !all_aligned) continue;
-    residuals.push_back({e.error, regular ? out.covariance : e.covariance});
-    tested.add(e);
-    for (const int from : {0, 3}) {
-      const Cholesky<double, 3> part(Eigen::Matrix3d(e.covariance.block<3, 3>(from, from)));
-      const double squared = part.halfSolve<1>(Eigen::Vector3d(e.error.segment<3>(from))).squaredNorm();
-      (from == 0 ? position : rotation) += squared;
-      const Eigen::Matrix<double, 3, 7> J =
-          part.halfSolve<7>(Eigen::Matrix<double, 3, 7>(e.jacobian.middleRows<3>(from)));
-      Matrix7& G = from == 0 ? G_position : G_rotation;
-      for (int k = 0; k < 7; ++k) {
-        for (int l = 0; l < 7; ++l) G(k, l) += J(0, k) * J(0, l) + J(1, k) * J(1, l) + J(2, k) * J(2, l);
-      }
-    }
+    residuals.push_back({e.error, e.covariance});
+    if (sharing) shared.jacobians.push_back(e.jacobian), seen.add(e);
   }
   r.n = residuals.size();
   if (!r.indefinite.empty()) {
@@ -350,21 +409,16 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
     r.fault = "no poses beside those that were aligned";
     return r;
   }
-  const auto n = static_cast<double>(r.n);
-  if (all_aligned) {
-    r.joint = neesTest(tested.cost, 6 * n - a.parameters);
-  } else if (a.parameters == 0) {
-    r.joint = neesTest(tested.cost, 6 * n);
-  } else {
-    tested.finish(is_free);
-    Matrix7 information = prior + tested.information;
-    const Vector7 b = tested.gradient;
-    r.joint = neesTest(tested.cost - b.dot(Cholesky<double, 7>(information).solve<1>(b)), 6 * n);
+  if (shared.prior && a.components.omits()) {
+    seen.finish(freeParameters(AlignmentModel::sim3));
+    const double least = leastDetermined(a.components);
+    if (DeterminedInverse(information + seen.information, least).rank > DeterminedInverse(information, least).rank) {
+      r.fault = "the aligned poses do not determine the alignment by the components that are judged";
+      return r;
+    }
   }
-  r.position = scaledPart(position, n, C, G_position, sign);
-  r.rotation = scaledPart(rotation, n, C, G_rotation, sign);
-  r.tests = testWhitenedResiduals(residuals);
-  r.tests.joint = r.joint, r.tests.position = r.position, r.tests.rotation = r.rotation;
+  r.tests = testWhitenedResiduals(residuals, a.components, shared);
+  r.joint = r.tests.joint, r.position = r.tests.position, r.rotation = r.tests.rotation;
   r.ok = r.joint.applies();
   if (!r.ok) r.fault = "too few poses for the parameters of the alignment";
   return r;

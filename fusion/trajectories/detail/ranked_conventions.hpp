@@ -12,7 +12,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 namespace liestat {
@@ -44,20 +46,23 @@ class DiagnosisData {
  public:
   DiagnosisData(std::span<const DiagnosedPose> given, bool may_use_charts) {
     for (const DiagnosedPose& p : given) {
-      if (!blocksFinite(p.matrix) || !p.estimate.params().allFinite() || !p.truth.params().allFinite()) {
-        ++skipped;
-        continue;
-      }
-      poses.push_back(p);
-      blocks_only = blocks_only || crossUnknown(p.matrix);
-      errors.push_back((p.estimate.inverse() * p.truth).log());
+      if (p.estimate.params().allFinite() && p.truth.params().allFinite()) poses.push_back(p);
     }
-    double sum = 0;
-    for (const Vector6d& e : errors) sum += e.tail<3>().squaredNorm();
-    // First-order coordinates are within 1 % of a sigma below 0.03 rad; one rule for all hypotheses, so that they stay
-    // comparable.
-    charts =
-        may_use_charts && std::sqrt(sum / (3 * static_cast<double>(std::max<std::size_t>(1, errors.size())))) > 0.03;
+    for (const DiagnosedPose& p : poses) errors.push_back((p.estimate.inverse() * p.truth).log());
+    chooseCharts(may_use_charts);
+    findComponents(!may_use_charts);
+    // Where components without errors are left out, a matrix may be unknown in whole coordinates.
+    std::vector<DiagnosedPose> usable;
+    for (const DiagnosedPose& p : poses) {
+      if (blocksFinite(p.matrix) || (omits() && knownCoordinates(p.matrix))) usable.push_back(p);
+    }
+    skipped = given.size() - usable.size();
+    if (usable.size() < poses.size()) {
+      poses = std::move(usable), errors.clear();
+      for (const DiagnosedPose& p : poses) errors.push_back((p.estimate.inverse() * p.truth).log());
+      chooseCharts(may_use_charts);
+    }
+    for (const DiagnosedPose& p : poses) blocks_only = blocks_only || !knownCoordinates(p.matrix);
   }
 
   std::size_t size() const { return poses.size(); }
@@ -75,6 +80,23 @@ class DiagnosisData {
   Vector6d coordinates(std::size_t i, const Convention& c, const Matrix6d& J) const {
     return charts ? conventionLog(c, poses[i].estimate, poses[i].truth) : Vector6d(J * errors[i]);
   }
+  /// The components of the errors that carry noise, in the coordinates of a hypothesis: of a robot in the plane three, for
+  /// every hypothesis.
+  const NoiseComponents& components(const Convention& c) const {
+    return components_[static_cast<std::size_t>(c.perturbation)];
+  }
+  bool omits() const { return components_[0].omits(); }
+  /// log |det J| of these components.
+  double logDeterminant(std::size_t i, const Convention& c, Matrix6d J) const {
+    if (!omits()) return conventionLogDeterminant(c, poses[i].estimate);
+    for (int k = 0; k < 6; ++k) {
+      if (!components_[0].keeps(k)) J.col(k).setZero();
+    }
+    Matrix6d squared = productTransposed(J, J);
+    Vector6d none = Vector6d::Zero();
+    components(c).reduce(none, squared);
+    return 0.5 * Cholesky<double, 6>(squared).logDeterminant();
+  }
   bool decidable(const Convention& c) const {
     return !blocks_only || (c.perturbation != Perturbation::left && c.content != CovarianceContent::information);
   }
@@ -83,6 +105,48 @@ class DiagnosisData {
   std::vector<Vector6d> errors;
   std::size_t skipped = 0;
   bool blocks_only = false, charts = false;
+
+ private:
+  void chooseCharts(bool may_use_charts) {
+    double sum = 0;
+    for (const Vector6d& e : errors) sum += e.tail<3>().squaredNorm();
+    // First-order coordinates are within 1 % of a sigma below 0.03 rad; one rule for all hypotheses, so that they stay
+    // comparable.
+    charts =
+        may_use_charts && std::sqrt(sum / (3 * static_cast<double>(std::max<std::size_t>(1, errors.size())))) > 0.03;
+  }
+  /// NaN in whole rows and columns only.
+  static bool knownCoordinates(const Matrix6d& M) {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        if (std::isnan(M(i, j)) && !std::isnan(M(i, i)) && !std::isnan(M(j, j))) return false;
+      }
+    }
+    return true;
+  }
+  /// Components whose errors are zero in every row, if they are as many in the coordinates of all perturbations; errors in
+  /// another world are seen from the first pose.
+  void findComponents(bool in_another_world) {
+    if (poses.empty()) return;
+    const SE3d world = in_another_world ? poses[0].truth * poses[0].estimate.inverse() : SE3d();
+    std::array<NoiseComponents, std::size(all_perturbations)> found;
+    for (const Perturbation perturbation : all_perturbations) {
+      Convention c;
+      c.perturbation = perturbation;
+      NoiseComponentScan scan;
+      for (const DiagnosedPose& p : poses) {
+        const SE3d at = world * p.estimate;
+        const Vector6d x = charts ? conventionLog(c, at, p.truth)
+                                  : Vector6d(conventionJacobian(c, at) * (at.inverse() * p.truth).log());
+        scan.add(x, Matrix6d::Identity(), at.translation().norm());
+      }
+      found[static_cast<std::size_t>(perturbation)] = scan.components();
+      if (!found[0].omits() || scan.components().count() != found[0].count()) return;
+    }
+    components_ = found;
+  }
+
+  std::array<NoiseComponents, std::size(all_perturbations)> components_;
 };
 
 inline Convention translationFirst(Convention c) {
@@ -97,22 +161,27 @@ inline void rankPlain(const DiagnosisData& data, std::span<HypothesisFit> fits) 
   std::vector<double> nees(fits.size(), 0), likelihood(fits.size(), 0);
   for (std::size_t i = 0; i < n; ++i) {
     const Matrix6d C = data.content(i, fits[0].convention, fits[0].fault);
-    const Cholesky<double, 6> root(C);
-    if (!root.ok() || !C.allFinite()) {
-      for (HypothesisFit& f : fits) ++f.indefinite;
-      continue;
-    }
-    const double log_det = root.logDeterminant();
+    std::optional<Cholesky<double, 6>> root;
     for (std::size_t h = 0; h < fits.size(); ++h) {
       const Convention c = translationFirst(fits[h].convention);
       const Matrix6d J = conventionJacobian(c, data.poses[i].estimate);
-      const double d2 = root.halfSolve<1>(data.coordinates(i, c, J)).squaredNorm();
+      Vector6d x = data.coordinates(i, c, J);
+      if (h == 0 || data.omits()) {
+        Matrix6d judged = C;
+        data.components(c).reduce(x, judged);
+        root.emplace(judged.allFinite() ? judged : Matrix6d(Matrix6d::Zero()));
+      }
+      if (!root->ok()) {
+        ++fits[h].indefinite;
+        continue;
+      }
+      const double d2 = root->halfSolve<1>(x).squaredNorm();
       nees[h] += d2;
-      likelihood[h] += -0.5 * d2 - 0.5 * log_det + conventionLogDeterminant(c, data.poses[i].estimate);
+      likelihood[h] += -0.5 * d2 - 0.5 * root->logDeterminant() + data.logDeterminant(i, c, J);
     }
   }
   for (std::size_t h = 0; h < fits.size(); ++h) {
-    fits[h].nees_ratio = nees[h] / (6 * static_cast<double>(n));
+    fits[h].nees_ratio = nees[h] / (data.components(fits[h].convention).count() * static_cast<double>(n));
     fits[h].log_likelihood = fits[h].indefinite > 0 || std::isnan(likelihood[h]) ? -infinity : likelihood[h];
   }
 }
@@ -137,20 +206,26 @@ inline std::vector<MatchedPose> matchedUnder(const DiagnosisData& data, const Hy
 /// The likelihood with the best alignment of a hypothesis, which its covariance allows for.
 inline void rankAligned(const DiagnosisData& data, HypothesisFit& h, const DiagnosisOptions& options) {
   const std::vector<MatchedPose> matched = matchedUnder(data, h, options.max_aligned);
+  // All hypotheses are read along the body's axes, and judged by the same components of the errors.
+  const NoiseComponents& components = data.components(Convention{});
   double log_det = 0;
   for (const MatchedPose& p : matched) {
-    const Cholesky<double, 6> root(p.estimate.covariance);
+    Matrix6d C = p.estimate.covariance;
+    Vector6d none = Vector6d::Zero();
+    components.reduce(none, C);
+    const Cholesky<double, 6> root(C);
     if (!root.ok()) ++h.indefinite;
     log_det += root.ok() ? root.logDeterminant() : 0;
   }
   h.log_likelihood = -infinity;
   if (h.indefinite > 0) return;
-  const Alignment a = alignWeighted(matched, options.alignment);
+  const Alignment a = weightedAlignment(matched, options.alignment, 0, &components);
   if (!a.ok) return;
   const std::array<bool, 7> is_free = freeParameters(a.model);
   const AlignmentSums sums = alignmentSums(matched, a, centroid(matched, a), is_free);
-  h.nees_ratio = sums.cost / (6 * static_cast<double>(matched.size()) - a.parameters);
-  h.log_likelihood = -0.5 * sums.cost - 0.5 * log_det - 0.5 * Cholesky<double, 7>(sums.information).logDeterminant();
+  const DeterminedInverse determined(sums.information, leastDetermined(components));
+  h.nees_ratio = sums.cost / (components.count() * static_cast<double>(matched.size()) - a.parameters);
+  h.log_likelihood = -0.5 * sums.cost - 0.5 * log_det - 0.5 * determined.log_determinant;
 }
 
 inline void rank(const DiagnosisData& data, std::vector<HypothesisFit>& fits, const DiagnosisOptions& options) {
@@ -175,6 +250,13 @@ inline void rank(const DiagnosisData& data, std::vector<HypothesisFit>& fits, co
   for (HypothesisFit& f : fits) f.log_likelihood = std::isinf(f.log_likelihood) ? -infinity : f.log_likelihood - best;
 }
 
+/// The components of residuals that carry noise; a filler that errors exceed is judged.
+inline NoiseComponents judgedComponents(std::span<const PoseResidual> residuals) {
+  NoiseComponentScan scan;
+  for (const PoseResidual& r : residuals) scan.add(r.error, r.covariance);
+  return scan.withExceededFillers(scan.components());
+}
+
 /// The tests of the errors under a hypothesis, aligned where asked for.
 inline WhitenedResidualTests testsUnder(const DiagnosisData& data, const HypothesisFit& h,
                                         const DiagnosisOptions& options) {
@@ -190,7 +272,7 @@ inline WhitenedResidualTests testsUnder(const DiagnosisData& data, const Hypothe
     const Matrix6d J = conventionJacobian(c, data.poses[i].estimate);
     residuals.push_back({data.coordinates(i, c, J), data.content(i, h.convention, h.fault)});
   }
-  return testWhitenedResiduals(residuals);
+  return testWhitenedResiduals(residuals, judgedComponents(residuals));
 }
 
 inline double leastEigenvalue(const Matrix6d& M) { return SymmetricEigen(M).values[0]; }
@@ -246,7 +328,7 @@ inline ScaleProfile profileScale(const DiagnosisData& data, const DiagnosisOptio
     C.topRows<3>() *= a, C.leftCols<3>() *= a, C.bottomRows<3>() *= b, C.rightCols<3>() *= b;
     residuals.push_back({data.coordinates(i, own, conventionJacobian(own, data.poses[i].estimate)), C});
   }
-  profile.tests = testWhitenedResiduals(residuals);
+  profile.tests = testWhitenedResiduals(residuals, judgedComponents(residuals));
   return profile;
 }
 
