@@ -3,6 +3,7 @@
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/refinement.hpp>
+#include <fusion/init/window_fusion.hpp>
 #include <experiments/scene_readings.hpp>
 #include <lie/se23.hpp>
 
@@ -80,6 +81,9 @@ RefinementOutcome trial(const ViInitWindow& size, double noise, const ImuNoise<d
           .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
           .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
           .nees_at_last = neesOnSphere<17>(at_last, covariance_at_last, r.gravity),
+          .nees_filter_start = neesOfFilterStart(
+              windowStates(r).last, false, scene, end,
+              {gyroscope + walked.gyroscope, accelerometer + walked.accelerometer}, rng),
           .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
           .errors = viErrors(r.velocity(), r.gravity, scene),
           .scale_of_features = scaleOfFeatures(r.features, scene)};

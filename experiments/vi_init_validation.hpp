@@ -64,6 +64,7 @@ enum class ViInitQuantity {
   nees_last_state,  ///< the same for the state at the last image, 9
   nees_at_last,     ///< the same for that state, gravity and the biases there, 17
   nees_at_rest,     ///< the same for gravity and both biases, 8
+  nees_filter_start,  ///< the same for the start of a filter at the last image, 15
   chi2_per_dof,     ///< cost of the bearings, motions and priors
   speed,            ///< length of the error of V
   gravity,          ///< angle to the true one

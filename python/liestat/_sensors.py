@@ -540,6 +540,11 @@ def vi_init(
     accelerometer_sigma=0.15,
     seed=1,
     truth=None,
+    calibrate_noise=True,
+    inflate=False,
+    filter_convention="liestat",
+    position_sigma=1e-3,
+    heading_sigma=1e-3,
 ):
     """Velocity, gravity, scale and biases of a visual-inertial recording, window by window, without a first guess.
 
@@ -571,6 +576,15 @@ def vi_init(
         Priors of the biases, rad/s and m/s².
     truth : (times, states) or (times, states, biases), optional
         As in `preintegrate`: windows and stretches are compared with it.
+    calibrate_noise : bool
+        Test the densities where windows meet, and multiply them by the factors at which windows agree if they refute
+        them (`noise_calibration`).
+    inflate : bool
+        Multiply the covariance of a stretch whose windows contradict each other by the factor at which they would not.
+    filter_convention : {"liestat", "openvins", "gtsam", "basalt"}
+        Order and errors of the covariance of `filter_start`, from which a filter starts.
+    position_sigma, heading_sigma : float
+        m and rad: standard deviations of position and heading of `filter_start`, which are free.
 
     Returns
     -------
@@ -614,6 +628,11 @@ def vi_init(
         float(accelerometer_sigma),
         int(seed),
         _truth("vi_init", truth),
+        bool(calibrate_noise),
+        bool(inflate),
+        str(filter_convention),
+        float(position_sigma),
+        float(heading_sigma),
     )
     for one in d["windows"]:
         one["states"] = SE23._of(one["states"])

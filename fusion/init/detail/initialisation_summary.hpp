@@ -44,6 +44,30 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
   return Verdict::yes(text + ".");
 }
 
+LIESTAT_FUSION_INLINE std::vector<std::string> ComparedRecording::notes() const {
+  std::vector<std::string> notes;
+  if (noiseIsVerified() || okWindows() == 0) return notes;
+  const auto of = [](std::size_t n) { return std::to_string(n) + (n == 1 ? " meeting" : " meetings") + " of windows "; };
+  std::string note = "unverified_noise: the covariances rest on the given densities of the inertial sensor's noise, which ";
+  if (!noise_calibration) {
+    note += "were not tested";
+  } else if (noise_calibration->meetings == 0) {
+    note += "no meeting of windows could contradict";
+  } else if (noise_calibration->calibrated_chi2 == noise_calibration->chi2) {
+    note += of(noise_calibration->meetings) + "do not tell";
+  } else {
+    note = "unverified_noise: " + of(noise_calibration->meetings) +
+           "refute the given densities of the inertial sensor's noise, and do not tell by how much: the covariances rest on "
+           "the most likely ones";
+  }
+  if (noise_calibration && std::isfinite(noise_calibration->common.high)) {
+    const NoiseFactor& common = noise_calibration->common;
+    note += " (95 %: factors from " + significant(common.low, 2) + " to " + significant(common.high, 2) + ")";
+  }
+  notes.push_back(note);
+  return notes;
+}
+
 namespace detail {
 
 /// The mean of these NEES with a part, where it is known.
