@@ -39,7 +39,7 @@ inline ViErrors viErrors(const ClosedFormResult& result, const InertialScene& tr
 }
 
 /// What a filter's start of the trials says of what is free.
-inline constexpr FilterStartOptions vi_init_filter_start{.position = {1, -2, 0.5},
+inline const FilterStartOptions vi_init_filter_start{.position = {1, -2, 0.5},
                                                          .heading = 0.7,
                                                          .position_sigma = 0.1,
                                                          .heading_sigma = 0.02};

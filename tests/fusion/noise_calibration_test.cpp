@@ -85,8 +85,8 @@ TEST(NoiseCalibration, FindsTheFactorOfBoth) {
   EXPECT_EQ(by_itself.noise_calibration->evidence, NoiseEvidence::calibrated);
   EXPECT_EQ(by_itself.noise_calibration->noise.gyroscope, found.noise.gyroscope);
   EXPECT_TRUE(by_itself.stretches[0].ok());
-  // It is that of windows that were estimated with these densities from the beginning: estimates that iterated to the
-  // same minimum from elsewhere, to a cost of 1e-3, a thirtieth of a standard deviation.
+  // It is that of windows that were estimated with these densities from the beginning: iterated to the same minimum from
+  // elsewhere until a step lowers the cost by less than 1e-3, which leaves some hundredths of a standard deviation.
   recording.noise = found.noise;
   const VisualInertialResult afresh = initialiseRecording(recording, {.calibrate_noise = false});
   EXPECT_TRUE(afresh.stretches[0].ok());
@@ -95,7 +95,7 @@ TEST(NoiseCalibration, FindsTheFactorOfBoth) {
     ASSERT_TRUE(afresh.windows[i].isRefined() && by_itself.windows[i].isRefined());
     const RefinementResult &a = *afresh.windows[i].refined, &b = *by_itself.windows[i].refined;
     const double sigma = std::sqrt(a.covariance.of<InitialCovariance::first_velocity>().trace());
-    EXPECT_LE((a.velocity() - b.velocity()).norm(), 0.05 * sigma) << i;
+    EXPECT_LE((a.velocity() - b.velocity()).norm(), 0.15 * sigma) << i;
     EXPECT_NEAR(b.covariance.of<InitialCovariance::first_velocity>().trace(), sigma * sigma, 0.02 * sigma * sigma) << i;
   }
   // And a second calibration has nothing to add: it keeps what it was given.
@@ -142,8 +142,8 @@ TEST(NoiseCalibration, WithoutMeetingsNothingIsTold) {
 // used, and said to be no more than that.
 TEST(NoiseCalibration, OneMeetingVerifiesNothing) {
   for (const double factor : {1., 100.}) {
-    const Flight flight(factor, factor, 4.5);
-    const VisualInertialResult result = initialiseRecording(flight.recording, {});
+    const Flight flight(factor, factor, 5);
+    const VisualInertialResult result = initialiseRecording(flight.recording, {.stride = 2.4});
     ASSERT_TRUE(result.noise_calibration.has_value());
     const NoiseCalibration& found = *result.noise_calibration;
     ASSERT_EQ(found.meetings, 1u);
