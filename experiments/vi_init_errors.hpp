@@ -39,15 +39,13 @@ inline ViErrors viErrors(const ClosedFormResult& result, const InertialScene& tr
 }
 
 /// What a filter's start of the trials says of what is free.
-inline const FilterStartOptions vi_init_filter_start{.position = {1, -2, 0.5},
-                                                         .heading = 0.7,
-                                                         .position_sigma = 0.1,
-                                                         .heading_sigma = 0.02};
+inline const FilterStartOptions vi_init_filter_start{
+    .position = {1, -2, 0.5}, .heading = 0.7, .position_sigma = 0.1, .heading_sigma = 0.02};
 
 /// NEES of a filter's start at the scene's time t, 15 degrees of freedom. The filter's world is free: position and heading
 /// in it are drawn with the standard deviations of the options, and from rest what the body shakes.
-inline double neesOfFilterStart(const Gaussian<InertialState>& state, bool from_rest, const InertialScene& scene, double t,
-                                const ImuBias<double>& bias, CounterRng& rng) {
+inline double neesOfFilterStart(const Gaussian<InertialState>& state, bool from_rest, const InertialScene& scene,
+                                double t, const ImuBias<double>& bias, CounterRng& rng) {
   const FilterStartOptions& options = vi_init_filter_start;
   Gaussian<InertialState> at_start = state;
   Eigen::Vector3d velocity = scene.speed(t);

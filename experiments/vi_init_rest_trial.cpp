@@ -56,8 +56,8 @@ RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   covariance.leftCols<3>().setZero();
   covariance.topLeftCorner<3, 3>().setIdentity();
   outcome.nees = neesOnSphere<11>(error, covariance, rest.gravity);
-  outcome.nees_filter_start = neesOfFilterStart(windowStates(rest).last, true, measured.scene,
-                                                measured.scene.times.back(), measured.bias, rng);
+  outcome.nees_filter_start =
+      neesOfFilterStart(windowStates(rest).last, true, measured.scene, measured.scene.times.back(), measured.bias, rng);
   return outcome;
 }
 

@@ -18,6 +18,8 @@ struct NoiseFactor {
 
   /// True if the interval is narrower than a factor of six.
   bool isTold() const { return high < 6 * low; }
+  /// True if densities three times as large are outside of the interval: no covariance is far too small.
+  bool excludesLarger() const { return high < 3; }
   /// True if the densities as they were given are outside of the interval.
   bool refutesOne() const { return low > 1 || high < 1; }
 };
@@ -25,7 +27,7 @@ struct NoiseFactor {
 /// What a recording says of the densities of its inertial sensor's noise.
 enum class NoiseEvidence {
   unverified_noise,  ///< too few windows meet to tell the densities, which are hardly more than a claim, or a guess
-  confirmed,         ///< the windows tell the densities, and agree with those that were given, which are used
+  confirmed,         ///< the windows agree with those that were given, and would not with three times as large ones
   calibrated         ///< the windows refute those that were given: the densities that the windows tell are used
 };
 constexpr auto words(NoiseEvidence) { return std::array{"unverified_noise", "confirmed", "calibrated"}; }

@@ -340,7 +340,8 @@ void describe(V& v, const ComparedRecording& r) {
   v("ok", verdict.isYes(), "the result is to be trusted")("in_words", verdict.text, "the verdict");
   v("causes", verdict.causes, "with a truth: tests that speak against it, each with its likely cause");
   v("notes", r.notes(), "on what the covariances rest on: unverified_noise");
-  v("noise_calibration", r.noise_calibration, "what the windows say of the densities; null: not asked for, or could "
+  v("noise_calibration", r.noise_calibration,
+    "what the windows say of the densities; null: not asked for, or could "
     "not be");
   v("images_outside", r.images_outside, "that the readings do not cover");
   v("bearing_noise", r.bearing_noise, "standard deviation of the bearings", "rad");

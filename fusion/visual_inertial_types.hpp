@@ -77,7 +77,7 @@ struct VisualInertialOptions {
   /// The densities of the sensor's noise are tested, and calibrated where the windows refute them, by all meetings of
   /// windows of the recording (fusion/noise_calibration.hpp). Not without refinement, stretches or unknown biases.
   bool calibrate_noise = true;
-  bool inflate = false;                        ///< multiply the covariance of a stretch that is not ok by its inflation
+  bool inflate = false;  ///< multiply the covariance of a stretch that is not ok by its inflation
   ImuScheme scheme = ImuScheme::averaged;
   double max_gap = 0.1;             ///< s, between readings
   std::size_t max_windows = 20000;  ///< more are bad_option
@@ -164,10 +164,10 @@ struct VisualInertialResult {
   std::vector<InitialisedWindow> windows;
   std::vector<FusedStretch> stretches;
   std::optional<NoiseCalibration> noise_calibration;  ///< none: it was not asked for, or could not be
-  FilterStart filter_start;        ///< as of filterStart() (fusion/visual_inertial.hpp)
-  double bearing_noise = 0;        ///< rad, the median of the observations
-  std::size_t images_outside = 0;  ///< that the readings do not cover
-  std::size_t windows_left = 0;    ///< that were not estimated, because of options.stop
+  FilterStart filter_start;                           ///< as of filterStart() (fusion/visual_inertial.hpp)
+  double bearing_noise = 0;                           ///< rad, the median of the observations
+  std::size_t images_outside = 0;                     ///< that the readings do not cover
+  std::size_t windows_left = 0;                       ///< that were not estimated, because of options.stop
 };
 
 }  // namespace liestat

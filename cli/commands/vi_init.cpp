@@ -204,9 +204,10 @@ void addViInitCommand(const CommandList& app) {
   command.option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
   command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's").list(4, 4);
   command.option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)").range(1e-3, 1e6);
-  command.flag("--calibrate-noise,!--no-calibrate-noise", how.calibrate_noise,
-               "Test these densities where windows meet, and multiply them by the factors at which windows agree if they "
-               "refute them (default); --no-calibrate-noise: use them as they are");
+  command.flag(
+      "--calibrate-noise,!--no-calibrate-noise", how.calibrate_noise,
+      "Test these densities where windows meet, and multiply them by the factors at which windows agree if they "
+      "refute them (default); --no-calibrate-noise: use them as they are");
   command.option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
       .range(1e-6, 1e3);
   command.option("--window", how.window, "s (default 2)").range(0.1, 60.);
@@ -233,10 +234,12 @@ void addViInitCommand(const CommandList& app) {
       .range(0., 1e6);
   command.flag("--inflate", how.inflate,
                "Multiply the covariance of windows together by the factor by which they disagree, where p < 0.001");
-  command.choice("--filter-start", options->filter_start,
-                 "liestat, openvins, gtsam, basalt: print the start of a filter, covariance in that library's convention");
-  command.option("--heading-sigma", how.filter_start.heading_sigma,
-                 "rad, of a filter's start, whose heading is free (default 0.001)")
+  command.choice(
+      "--filter-start", options->filter_start,
+      "liestat, openvins, gtsam, basalt: print the start of a filter, covariance in that library's convention");
+  command
+      .option("--heading-sigma", how.filter_start.heading_sigma,
+              "rad, of a filter's start, whose heading is free (default 0.001)")
       .range(1e-9, 10.);
   command.option("--position-sigma", how.filter_start.position_sigma, "m, likewise (default 0.001)").range(1e-9, 1e6);
   command.option("--begin", how.begin, "s since the first reading, or the file's seconds (default: the first image)");

@@ -30,7 +30,7 @@ void describe(V& v, const ViRecording& r) {
 struct ViInitResult : ComparedRecording {
   bool biases_given = false;             ///< and not estimated
   bool show_filter_start = false;        ///< in the table; JSON always has it
-  std::size_t observations_outside = 0;   ///< pixels that the lens' model can't explain
+  std::size_t observations_outside = 0;  ///< pixels that the lens' model can't explain
 };
 template <class V>
 void describe(V& v, const ViInitResult& r) {

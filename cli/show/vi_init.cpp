@@ -89,7 +89,8 @@ std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions, b
       contradict, with_state, largest_p, least, largest,
       inflated > 0 ? ", which the fused states' were multiplied by"
       : noise_is_verified
-          ? ", and the stretches are not ok. There the errors are larger than in the rest of the recording: see --inflate"
+          ? ", and the stretches are not ok. There the errors are larger than in the rest of the recording: see "
+            "--inflate"
           : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
             "--noise-factor, or --inflate");
 }
@@ -113,19 +114,23 @@ std::string inWords(const NoiseFactor& factor) {
 std::string noiseInWords(const NoiseCalibration& found) {
   if (found.evidence == NoiseEvidence::unverified_noise) return {};  // a note
   const double dof = static_cast<double>(found.degrees_of_freedom);
-  const auto ends = [](const NoiseFactor& factor) { return factor.isTold() ? "" : ", not told"; };
   const bool calibrated = found.evidence == NoiseEvidence::calibrated;
-  std::string text = fmt::format("noise {} by {} meetings of windows: ", calibrated ? "calibrated" : "confirmed",
-                                 found.meetings);
-  if (found.hasTwoFactors()) {
-    text += fmt::format("gyroscope's densities times {}{}, accelerometer's {}{}", inWords(found.gyroscope),
-                        ends(found.gyroscope), inWords(found.accelerometer), ends(found.accelerometer));
-  } else {
-    text += fmt::format("all densities times {}{}; gyroscope and accelerometer cannot be told apart",
-                        inWords(found.common), ends(found.common));
+  const auto factorOf = [&](const NoiseFactor& factor) {
+    return inWords(factor) + (calibrated && !factor.isTold() ? ", not told" : "");
+  };
+  const std::string factors =
+      found.hasTwoFactors() ? fmt::format("gyroscope's densities times {}, accelerometer's {}",
+                                          factorOf(found.gyroscope), factorOf(found.accelerometer))
+                            : fmt::format("all densities times {}; gyroscope and accelerometer cannot be told apart",
+                                          factorOf(found.common));
+  if (!calibrated) {
+    return fmt::format(
+        "noise confirmed by {} meetings of windows, whose chi2 per degree of freedom is {:.2f}. They tell: {}\n",
+        found.meetings, found.chi2 / dof, factors);
   }
-  text += fmt::format(". Their chi2 per degree of freedom is {:.2f}", found.calibrated_chi2 / dof);
-  return text + (calibrated ? fmt::format(", was {:.2f}\n", found.chi2 / dof) : "; the densities are as given\n");
+  return fmt::format(
+      "noise calibrated by {} meetings of windows: {}. Their chi2 per degree of freedom is {:.2f}, was {:.2f}\n",
+      found.meetings, factors, found.calibrated_chi2 / dof, found.chi2 / dof);
 }
 
 /// The start of a filter with its standard deviations, in the order of its convention.
@@ -133,18 +138,21 @@ std::string filterStartInWords(const FilterStart& start) {
   if (!start.hasState()) return fmt::format("filter start: none ({})\n", start.word());
   const auto list = [](const auto& values, const char* format) {
     std::string text;
-    for (Eigen::Index i = 0; i < values.size(); ++i) text += (i > 0 ? " " : "") + fmt::format(fmt::runtime(format), values[i]);
+    for (Eigen::Index i = 0; i < values.size(); ++i)
+      text += (i > 0 ? " " : "") + fmt::format(fmt::runtime(format), values[i]);
     return text;
   };
   const Eigen::Matrix<double, 15, 1> sigmas = start.covarianceAs(start.convention).diagonal().cwiseSqrt();
   return fmt::format(
-      "filter start at {:.3f} s{}, {}; the world's z axis is up\n  quaternion xyzw {}\n  position {} m, velocity {} m/s\n"
+      "filter start at {:.3f} s{}, {}; the world's z axis is up\n  quaternion xyzw {}\n  position {} m, velocity {} "
+      "m/s\n"
       "  biases: gyroscope {} rad/s, accelerometer {} m/s2\n  standard deviations ({}: {})\n   {}\n",
       start.time, start.from_rest ? " from rest" : "", start.word(),
       list(Eigen::Vector4d(start.state.so3().params()), "{:.6f}"),
       list(Eigen::Vector3d(start.state.translation()), "{:.4f}"),
       list(Eigen::Vector3d(start.state.velocity()), "{:.4f}"), list(start.bias.gyroscope, "{:.5f}"),
-      list(start.bias.accelerometer, "{:.4f}"), name(start.convention), orderOf(start.convention), list(sigmas, "{:.2g}"));
+      list(start.bias.accelerometer, "{:.4f}"), name(start.convention), orderOf(start.convention),
+      list(sigmas, "{:.2g}"));
 }
 
 }  // namespace

@@ -43,9 +43,11 @@ constexpr auto words(FilterConvention) { return std::array{"liestat", "openvins"
 inline const char* orderOf(FilterConvention convention) {
   constexpr const char* orders[] = {
       "position rotation velocity gyroscope_bias accelerometer_bias; of an SE_2(3) on its right, axes of the body",
-      "rotation position velocity gyroscope_bias accelerometer_bias; rotation in the body, position and velocity in the "
+      "rotation position velocity gyroscope_bias accelerometer_bias; rotation in the body, position and velocity in "
+      "the "
       "world",
-      "rotation position velocity accelerometer_bias gyroscope_bias; rotation and position in the body, velocity in the "
+      "rotation position velocity accelerometer_bias gyroscope_bias; rotation and position in the body, velocity in "
+      "the "
       "world",
       "position rotation velocity gyroscope_bias accelerometer_bias; all in the world"};
   return orders[static_cast<std::size_t>(convention)];
@@ -70,9 +72,9 @@ struct FilterStart {
   /// inconsistent: windows contradict each other, there is no covariance. no_state: no window is ok, or at rest.
   enum class Status { ok, untested, inconsistent, no_state };
   Status status = Status::no_state;
-  bool from_rest = false;   ///< the body rests
-  double time = 0;          ///< s, of the state
-  SE23d state = {};         ///< of the body in the world
+  bool from_rest = false;     ///< the body rests
+  double time = 0;            ///< s, of the state
+  SE23d state = {};           ///< of the body in the world
   ImuBias<double> bias = {};  ///< true = measured - bias
   /// In the library's convention; positive definite where the options' standard deviations are positive; NaN without.
   Covariance covariance = Covariance::Constant(std::numeric_limits<double>::quiet_NaN());

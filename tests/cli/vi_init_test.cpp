@@ -227,8 +227,9 @@ TEST(ViInitData, RealReadings) {
   }
   // Densities of the data sheet: χ² of a refinement sees nothing, NEES and the meeting of windows do.
   const auto factor = [&](const char* noise) {
-    return initialise(directory, {"--truth", "r/truth.csv", "--window", "3", "--noise-factor", noise,
-                                  "--no-calibrate-noise"}).json;
+    return initialise(directory,
+                      {"--truth", "r/truth.csv", "--window", "3", "--noise-factor", noise, "--no-calibrate-noise"})
+        .json;
   };
   const auto compatibility = [](const Json& json) {
     double chi2 = 0, dof = 0;

@@ -103,8 +103,8 @@ Errant withError(const FilterStart& start, FilterConvention convention, const Ve
 // its covariance is the one that the start was made of.
 TEST(FilterStart, ItsCovarianceIsThatOfTheErrorsOfEachConvention) {
   CounterRng random(2);
-  for (const FilterConvention convention : {FilterConvention::liestat, FilterConvention::openvins,
-                                            FilterConvention::gtsam, FilterConvention::basalt}) {
+  for (const FilterConvention convention :
+       {FilterConvention::liestat, FilterConvention::openvins, FilterConvention::gtsam, FilterConvention::basalt}) {
     EXPECT_EQ(named<FilterConvention>(name(convention)), convention);
     const Gaussian<InertialState> state = someState(random, 0.01);
     const FilterStart start = filterStart(state, gravity, 0, {.position_sigma = 0.2, .heading_sigma = 0.3});

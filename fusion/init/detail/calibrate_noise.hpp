@@ -214,7 +214,8 @@ class RecordingMeetings {
       for (const std::size_t i : stretch.windows) windows_[i].measured = windows_[i].measured.withNoise(noise);
       const std::vector<std::size_t> of = stretch.windows;
       // Estimates to a tenth of a standard deviation.
-      const auto estimates = run.estimates(windows_, stretch, estimate ? 0.01 : std::numeric_limits<double>::infinity());
+      const auto estimates =
+          run.estimates(windows_, stretch, estimate ? 0.01 : std::numeric_limits<double>::infinity());
       const auto meetings = run.fuse(windows_, estimates, stretch);
       for (std::size_t k = 0; estimate && k < of.size(); ++k) {
         if (estimates[k] && estimates[k]->converged()) windows_[of[k]].refined = estimates[k];
@@ -313,8 +314,14 @@ LIESTAT_FUSION_INLINE NoiseCalibration calibrateWindows(const VisualInertialReco
     factors = {x, x};
   }
   result.status = FusionStatus::ok;
-  if (told) result.evidence = refuted ? NoiseEvidence::calibrated : NoiseEvidence::confirmed;
-  if (!refuted) return result;
+  if (!refuted) {
+    const bool bounded = result.hasTwoFactors()
+                             ? result.gyroscope.excludesLarger() && result.accelerometer.excludesLarger()
+                             : result.common.excludesLarger();
+    if (bounded) result.evidence = NoiseEvidence::confirmed;
+    return result;
+  }
+  if (told) result.evidence = NoiseEvidence::calibrated;
   recorded.at(factors);
   result.calibrated_chi2 = recorded.chi2();
   result.noise = factors.of(recording.noise);

@@ -47,8 +47,11 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
 LIESTAT_FUSION_INLINE std::vector<std::string> ComparedRecording::notes() const {
   std::vector<std::string> notes;
   if (noiseIsVerified() || okWindows() == 0) return notes;
-  const auto of = [](std::size_t n) { return std::to_string(n) + (n == 1 ? " meeting" : " meetings") + " of windows "; };
-  std::string note = "unverified_noise: the covariances rest on the given densities of the inertial sensor's noise, which ";
+  const auto of = [](std::size_t n) {
+    return std::to_string(n) + (n == 1 ? " meeting" : " meetings") + " of windows ";
+  };
+  std::string note =
+      "unverified_noise: the covariances rest on the given densities of the inertial sensor's noise, which ";
   if (!noise_calibration) {
     note += "were not tested";
   } else if (noise_calibration->meetings == 0) {
@@ -57,7 +60,8 @@ LIESTAT_FUSION_INLINE std::vector<std::string> ComparedRecording::notes() const 
     note += of(noise_calibration->meetings) + "do not tell";
   } else {
     note = "unverified_noise: " + of(noise_calibration->meetings) +
-           "refute the given densities of the inertial sensor's noise, and do not tell by how much: the covariances rest on "
+           "refute the given densities of the inertial sensor's noise, and do not tell by how much: the covariances "
+           "rest on "
            "the most likely ones";
   }
   if (noise_calibration && std::isfinite(noise_calibration->common.high)) {

@@ -97,7 +97,8 @@ LIESTAT_FUSION_INLINE FilterStart filterStart(const VisualInertialResult& result
     return w.verdict() == FusionStatus::stationary && w.isRefined() && w.refined->status == FusionStatus::stationary;
   });
   const FusedStretch* stretch = last(result.stretches, [](const FusedStretch& s) { return s.ok(); });
-  const InitialisedWindow* window = last(result.windows, [](const InitialisedWindow& w) { return w.ok() && w.refined; });
+  const InitialisedWindow* window =
+      last(result.windows, [](const InitialisedWindow& w) { return w.ok() && w.refined; });
   const auto startOf = [&](const InitialisedWindow& w) {
     Gaussian<InertialState> state = windowStates(*w.refined).last;
     if (&w == rest) {

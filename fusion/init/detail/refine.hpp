@@ -195,8 +195,7 @@ LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const Close
 
 LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const RefinementResult& former,
                                               const InitialisationOptions& options) {
-  const ClosedFormSolution start{
-      .velocity = former.velocity(), .gravity = former.gravity, .features = former.features};
+  const ClosedFormSolution start{.velocity = former.velocity(), .gravity = former.gravity, .features = former.features};
   return detail::refineFrom(std::move(window), start, former.bias, options, false, &former);
 }
 
