@@ -111,8 +111,8 @@ std::string inWords(const NoiseFactor& factor) {
   return fmt::format("{:.3g} (95 %: {})", factor.factor, range);
 }
 
+/// What the windows tell; noise that is not verified is a note.
 std::string noiseInWords(const NoiseCalibration& found) {
-  if (found.evidence == NoiseEvidence::unverified_noise) return {};  // a note
   const double dof = static_cast<double>(found.degrees_of_freedom);
   const bool calibrated = found.evidence == NoiseEvidence::calibrated;
   const auto factorOf = [&](const NoiseFactor& factor) {
@@ -200,7 +200,7 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
     text += fusionTable(result, with_truth);
     text += contradictionsInWords(result.stretches, result.noiseIsVerified());
   }
-  if (result.noise_calibration) text += "\n" + noiseInWords(*result.noise_calibration);
+  if (result.noise_calibration && result.noiseIsVerified()) text += "\n" + noiseInWords(*result.noise_calibration);
   if (result.show_filter_start) text += "\n" + filterStartInWords(result.filter_start);
   for (const std::string& note : result.notes()) text += "note: " + note + "\n";
   std::vector<std::string> notes;

@@ -47,22 +47,18 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
 LIESTAT_FUSION_INLINE std::vector<std::string> ComparedRecording::notes() const {
   std::vector<std::string> notes;
   if (noiseIsVerified() || okWindows() == 0) return notes;
-  const auto of = [](std::size_t n) {
-    return std::to_string(n) + (n == 1 ? " meeting" : " meetings") + " of windows ";
-  };
-  std::string note =
-      "unverified_noise: the covariances rest on the given densities of the inertial sensor's noise, which ";
+  std::string note = "unverified_noise: the given densities of the inertial sensor's noise ";
   if (!noise_calibration) {
-    note += "were not tested";
+    note += "were not tested, and the covariances rest on them";
   } else if (noise_calibration->meetings == 0) {
-    note += "no meeting of windows could contradict";
-  } else if (noise_calibration->calibrated_chi2 == noise_calibration->chi2) {
-    note += of(noise_calibration->meetings) + "do not tell";
+    note += "were not contradicted, because no windows met, and the covariances rest on them";
   } else {
-    note = "unverified_noise: " + of(noise_calibration->meetings) +
-           "refute the given densities of the inertial sensor's noise, and do not tell by how much: the covariances "
-           "rest on "
-           "the most likely ones";
+    const std::size_t n = noise_calibration->meetings;
+    const bool refuted = noise_calibration->calibrated_chi2 != noise_calibration->chi2;
+    note += std::string(refuted ? "are refuted by " : "are not told by ") + std::to_string(n) +
+            (n == 1 ? " meeting" : " meetings") + " of windows" +
+            (refuted ? ", but not by how much: the covariances rest on the most likely ones"
+                     : ", and the covariances rest on them");
   }
   if (noise_calibration && std::isfinite(noise_calibration->common.high)) {
     const NoiseFactor& common = noise_calibration->common;
