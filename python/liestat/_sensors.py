@@ -311,14 +311,16 @@ class Camera:
     ----------
     fu, fv, cu, cv : float
         Focal lengths and principal point, pixels.
-    distortion : {'none', 'radtan', 'equidistant'}
+    distortion : {'none', 'radtan', 'equidistant', 'omni', 'double_sphere', 'eucm'}
     coefficients : sequence of 4 floats
-        k1 k2 p1 p2 of 'radtan', k1 k2 k3 k4 of 'equidistant'.
+        k1 k2 p1 p2 of 'radtan', k1 k2 k3 k4 of 'equidistant', xi k1 k2 p1 p2 of 'omni', xi alpha of 'double_sphere',
+        alpha beta of 'eucm'.
     width, height : int
         Pixels; 0 where they are not known.
     """
 
-    _names = ("none", "radtan", "equidistant")
+    _names = ("none", "radtan", "equidistant", "omni", "double_sphere", "eucm")
+    _counts = {"omni": 5, "double_sphere": 2, "eucm": 2}
 
     def __init__(self, fu, fv, cu, cv, distortion="none", coefficients=(0, 0, 0, 0), width=0, height=0):
         if distortion not in self._names:
@@ -328,15 +330,17 @@ class Camera:
         self.fu, self.fv, self.cu, self.cv = float(fu), float(fv), float(cu), float(cv)
         self.distortion = distortion
         self.coefficients = tuple(float(c) for c in _vector(coefficients, "Camera: coefficients"))
-        if len(self.coefficients) != 4:
-            raise ValueError(f"Camera: coefficients: expected 4 numbers, got {len(self.coefficients)}")
+        expected = self._counts.get(distortion, 4)
+        if len(self.coefficients) != expected:
+            raise ValueError(f"Camera: coefficients: expected {expected} numbers, got {len(self.coefficients)}")
         self.width, self.height = int(width), int(height)
 
     def _list(self):
         distortion = float(self._names.index(self.distortion))
-        return np.array(
-            [self.fu, self.fv, self.cu, self.cv, distortion, *self.coefficients, self.width, self.height], dtype=float
-        )
+        mirror, own = (self.coefficients[0], self.coefficients[1:]) if self.distortion == "omni" else (0, self.coefficients)
+        own = (*own, 0, 0)[:4]
+        numbers = [self.fu, self.fv, self.cu, self.cv, distortion, *own, self.width, self.height, mirror]
+        return np.array(numbers, dtype=float)
 
     def __repr__(self):
         return f"Camera({self.fu:g}, {self.fv:g}, {self.cu:g}, {self.cv:g}, {self.distortion!r})"
