@@ -5,8 +5,8 @@
 // biases with a covariance; what disjoint windows say together is a Mahalanobis mean, carried from one to the next by
 // the inertial sensor. Their distance from each other is χ² if the covariances are true, and that is the only thing to
 // look at on a real recording, where the truth is not known: a sensor five times as noisy as its data sheet says is not
-// seen in the cost of any window, which is ruled by its bearings. What the noise is, the windows' distances tell.
-#include <fusion/noise_calibration.hpp>
+// seen in the cost of any window, which is ruled by its bearings. What the noise is, the windows' distances tell. At last
+// a filter starts there.
 #include <fusion/visual_inertial.hpp>
 #include <stats/random.hpp>
 
@@ -68,7 +68,7 @@ void fly(double noise_factor) {
     }
   }
 
-  const VisualInertialResult result = initialiseRecording(recording, {.stride = 2.5});
+  const VisualInertialResult result = initialiseRecording(recording, {.stride = 2.5, .calibrate_noise = false});
   std::printf("a sensor with %g times the noise of its data sheet\n", noise_factor);
   std::printf("  window       chi2/dof   gravity deg   gyroscope rad/s   accelerometer m/s2\n");
   const auto off = [&](double t, const Vector3d& down, const ImuBias<double>& b) {
@@ -92,11 +92,17 @@ void fly(double noise_factor) {
     const InertialState& x = s.state.mean;
     off(s.end, x.get<0>().unit_vector(), {x.get<2>(), accelerometerBias(x, s.gravity)});
   }
-  // The densities with which the windows would agree.
-  const NoiseCalibration noise = calibrateNoise(recording, {.stride = 2.5});
-  if (noise.status == FusionStatus::ok) {
-    std::printf("  they agree with the densities times %.1f (95 %%: %.1f to %.1f)\n", noise.common.factor,
-                noise.common.low, noise.common.high);
+  // Unless it is told not to, the library tests the densities by these distances, and uses those with which windows agree.
+  const VisualInertialResult tested = initialiseRecording(recording, {.stride = 2.5});
+  const NoiseCalibration& noise = *tested.noise_calibration;
+  std::printf("  the data sheet is %s: densities times %.1f (95 %%: %.1f to %.1f)\n", name(noise.evidence),
+              noise.common.factor, noise.common.low, noise.common.high);
+  // A filter starts at the end of the last stretch that is ok, in a world with z upwards. Position and heading are free.
+  if (const FilterStart& start = tested.filter_start; start.ok()) {
+    const auto sigma = start.covarianceAs(FilterConvention::openvins).diagonal().cwiseSqrt().eval();
+    std::printf("  a filter starts at %.1f s, standard deviations in OpenVINS' order:\n ", start.time);
+    for (const double x : sigma) std::printf(" %.2g", x);
+    std::printf("\n");
   }
   std::printf("\n");
 }

@@ -44,11 +44,19 @@ std::string calibrationText(const CameraCalibration& sensor, const std::optional
   const Eigen::Matrix4d T = sensor.imu_T_cam.matrix();
   for (int i = 0; i < 4; ++i) text += fmt::format("    - [{}, {}, {}, {}]\n", T(i, 0), T(i, 1), T(i, 2), T(i, 3));
   const Eigen::Vector4d& c = camera.coefficients;
-  const char* models[] = {"none", "radtan", "equidistant"};
-  text += "  camera_model: pinhole\n";
-  text += fmt::format("  distortion_model: {}\n", models[static_cast<int>(camera.distortion)]);
-  text += fmt::format("  distortion_coeffs: [{}, {}, {}, {}]\n", c[0], c[1], c[2], c[3]);
-  text += fmt::format("  intrinsics: [{}, {}, {}, {}] # fu, fv, cu, cv\n", camera.fu, camera.fv, camera.cu, camera.cv);
+  // In the order of Distortion; the models without distortion have their coefficients among the intrinsics.
+  const char* lenses[] = {"pinhole", "pinhole", "pinhole", "omni", "ds", "eucm"};
+  const char* models[] = {"none", "radtan", "equidistant", "radtan", "none", "none"};
+  const auto lens = static_cast<std::size_t>(camera.distortion);
+  const bool own = camera.distortion == Distortion::double_sphere || camera.distortion == Distortion::eucm;
+  const std::string before = own                                     ? fmt::format("{}, {}, ", c[0], c[1])
+                             : camera.distortion == Distortion::omni ? fmt::format("{}, ", camera.mirror)
+                                                                     : "";
+  text += fmt::format("  camera_model: {}\n  distortion_model: {}\n", lenses[lens], models[lens]);
+  text += own ? "  distortion_coeffs: []\n"
+              : fmt::format("  distortion_coeffs: [{}, {}, {}, {}]\n", c[0], c[1], c[2], c[3]);
+  text += fmt::format("  intrinsics: [{}{}, {}, {}, {}] # {}fu, fv, cu, cv\n", before, camera.fu, camera.fv, camera.cu,
+                      camera.cv, before.empty() ? "" : "those of the model, ");
   text += fmt::format("  resolution: [{}, {}]\n", camera.width, camera.height);
   text += fmt::format("  timeshift_cam_imu: {} # t_imu = t_cam + this\n", sensor.timeshift_cam_imu);
   if (!noise) return text;

@@ -3,6 +3,7 @@
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/closed_form.hpp>
 #include <fusion/init/refinement.hpp>
+#include <fusion/init/window_fusion.hpp>
 #include <experiments/scene_readings.hpp>
 #include <lie/se23.hpp>
 
@@ -74,15 +75,18 @@ RefinementOutcome trial(const ViInitWindow& size, double noise, const ImuNoise<d
   const Eigen::Matrix<double, 18, 18> covariance_at_last =
       r.covariance.of<Block::last_velocity, Block::gravity, Block::last_position, Block::last_rotation,
                       Block::last_gyroscope_bias, Block::last_accelerometer_bias>();
-  return {.nees_v = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
-                                                  r.covariance.of<InitialCovariance::first_velocity>()),
-          .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
-          .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
-          .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
-          .nees_at_last = neesOnSphere<17>(at_last, covariance_at_last, r.gravity),
-          .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
-          .errors = viErrors(r.velocity(), r.gravity, scene),
-          .scale_of_features = scaleOfFeatures(r.features, scene)};
+  return {
+      .nees_v = mahalanobisSquared<double, 3>(Eigen::Vector3d(error.head<3>()),
+                                              r.covariance.of<InitialCovariance::first_velocity>()),
+      .nees_v_g = neesOnSphere<5>(Eigen::Matrix<double, 6, 1>(error.head<6>()), r.covariance.atFirst(), r.gravity),
+      .nees_all = neesOnSphere<11>(error, r.covariance.atFirst(), r.gravity),
+      .nees_last_state = mahalanobisSquared<double, 9>(last_error, last_covariance),
+      .nees_at_last = neesOnSphere<17>(at_last, covariance_at_last, r.gravity),
+      .nees_filter_start = neesOfFilterStart(windowStates(r).last, false, scene, end,
+                                             {gyroscope + walked.gyroscope, accelerometer + walked.accelerometer}, rng),
+      .chi2 = {r.cost, static_cast<double>(r.degrees_of_freedom)},
+      .errors = viErrors(r.velocity(), r.gravity, scene),
+      .scale_of_features = scaleOfFeatures(r.features, scene)};
 }
 
 }  // namespace

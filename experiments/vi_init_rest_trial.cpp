@@ -2,6 +2,7 @@
 #include <experiments/vi_init_errors.hpp>
 #include <experiments/vi_init_trials.hpp>
 #include <fusion/init/robust_initialisation.hpp>
+#include <fusion/init/window_fusion.hpp>
 
 namespace liestat::experiments {
 namespace {
@@ -55,6 +56,8 @@ RestOutcome restTrial(const ViInitWindow& size, double noise, CounterRng& rng) {
   covariance.leftCols<3>().setZero();
   covariance.topLeftCorner<3, 3>().setIdentity();
   outcome.nees = neesOnSphere<11>(error, covariance, rest.gravity);
+  outcome.nees_filter_start =
+      neesOfFilterStart(windowStates(rest).last, true, measured.scene, measured.scene.times.back(), measured.bias, rng);
   return outcome;
 }
 

@@ -46,6 +46,7 @@ struct RefinementOutcome {
   double nees_all = std::numeric_limits<double>::quiet_NaN();         ///< V, gravity and both biases, 11
   double nees_last_state = std::numeric_limits<double>::quiet_NaN();  ///< state at the last image, 9
   double nees_at_last = std::numeric_limits<double>::quiet_NaN();     ///< that state, gravity and the biases there, 17
+  double nees_filter_start = std::numeric_limits<double>::quiet_NaN();  ///< the start of a filter there, 15
   ViChiSquared chi2;
   ViErrors errors;
   double scale_of_features = std::numeric_limits<double>::infinity();  ///< %: median of their distances, off 1
@@ -83,6 +84,7 @@ GyroscopeBiasOutcome gyroscopeBiasTrial(const ViInitWindow& window, double noise
 struct RestOutcome {
   bool stationary = false;                                 ///< verdict of the estimator: right
   double nees = std::numeric_limits<double>::quiet_NaN();  ///< gravity and both biases, 8 degrees of freedom
+  double nees_filter_start = std::numeric_limits<double>::quiet_NaN();  ///< the start of a filter, 15
 };
 RestOutcome restTrial(const ViInitWindow& window, double noise, CounterRng& rng);
 /// A uniform motion, which to an inertial sensor is rest.

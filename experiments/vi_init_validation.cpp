@@ -22,13 +22,14 @@ struct QuantityEntry {
   const char* unit;
   ViInitStatistic statistic;
 };
-constexpr std::array<QuantityEntry, 18> quantities = {{
+constexpr std::array<QuantityEntry, 19> quantities = {{
     {"nees_v", "", ViInitStatistic::distance},
     {"nees_v_g", "", ViInitStatistic::distance},
     {"nees_all", "", ViInitStatistic::distance},
     {"nees_last_state", "", ViInitStatistic::distance},
     {"nees_at_last", "", ViInitStatistic::distance},
     {"nees_at_rest", "", ViInitStatistic::distance},
+    {"nees_filter_start", "", ViInitStatistic::distance},
     {"chi2_per_dof", "", ViInitStatistic::chi_squared},
     {"speed", "m/s", ViInitStatistic::error},
     {"gravity", "deg", ViInitStatistic::error},
@@ -146,6 +147,7 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
   addDistance<&R::nees_v_g>(refined, Estimator::refinement, Quantity::nees_v_g, 5);
   addDistance<&R::nees_all>(refined, Estimator::refinement, Quantity::nees_all, 11);
   addDistance<&R::nees_last_state>(refined, Estimator::refinement, Quantity::nees_last_state, 9);
+  addDistance<&R::nees_filter_start>(refined, Estimator::refinement, Quantity::nees_filter_start, 15);
   addChiSquared(refined, Estimator::refinement);
   addErrors<&R::errors>(refined, Estimator::refinement);
   refined.push_back(
@@ -160,6 +162,7 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
   addDistance<&R::nees_all>(walking, Estimator::refinement, Quantity::nees_all, 11);
   addDistance<&R::nees_last_state>(walking, Estimator::refinement, Quantity::nees_last_state, 9);
   addDistance<&R::nees_at_last>(walking, Estimator::refinement, Quantity::nees_at_last, 17);
+  addDistance<&R::nees_filter_start>(walking, Estimator::refinement, Quantity::nees_filter_start, 15);
   addChiSquared(walking, Estimator::refinement);
   for (const ViInitWindow& window : {ViInitWindow{2, 11, 20}, ViInitWindow{3, 16, 20}, ViInitWindow{4, 21, 20}}) {
     list.push_back(experiment(Check::walk, walkTrial, window, walking));
@@ -218,6 +221,7 @@ std::vector<Experiment> experiments(const ViInitValidation& validation) {
     std::vector<Column<Rest>> rest{
         {Estimator::at_rest, Quantity::told, [](const Rest& o) { return o.stationary ? 1. : 0.; }}};
     addDistance<&Rest::nees>(rest, Estimator::at_rest, Quantity::nees_at_rest, 8);
+    addDistance<&Rest::nees_filter_start>(rest, Estimator::at_rest, Quantity::nees_filter_start, 15);
     list.push_back(experiment(Check::rest, restTrial, window, rest));
   }
   const auto addSlow = [&](Estimator estimator, ViInitTrial<Slow> trial) {

@@ -58,16 +58,17 @@ std::string name(ViInitEstimator estimator);
 
 /// The quantity that a row is about.
 enum class ViInitQuantity {
-  nees_v,           ///< squared Mahalanobis distance of V, 3 degrees of freedom
-  nees_v_g,         ///< the same for V and gravity, 5
-  nees_all,         ///< the same for V, gravity and the biases that are estimated: 11, 8 in closed form
-  nees_last_state,  ///< the same for the state at the last image, 9
-  nees_at_last,     ///< the same for that state, gravity and the biases there, 17
-  nees_at_rest,     ///< the same for gravity and both biases, 8
-  chi2_per_dof,     ///< cost of the bearings, motions and priors
-  speed,            ///< length of the error of V
-  gravity,          ///< angle to the true one
-  scale,            ///< length of V over the true one, off 1
+  nees_v,             ///< squared Mahalanobis distance of V, 3 degrees of freedom
+  nees_v_g,           ///< the same for V and gravity, 5
+  nees_all,           ///< the same for V, gravity and the biases that are estimated: 11, 8 in closed form
+  nees_last_state,    ///< the same for the state at the last image, 9
+  nees_at_last,       ///< the same for that state, gravity and the biases there, 17
+  nees_at_rest,       ///< the same for gravity and both biases, 8
+  nees_filter_start,  ///< the same for the start of a filter at the last image, 15
+  chi2_per_dof,       ///< cost of the bearings, motions and priors
+  speed,              ///< length of the error of V
+  gravity,            ///< angle to the true one
+  scale,              ///< length of V over the true one, off 1
   scale_of_features,
   bias,       ///< length of the error of the gyroscope's bias
   selection,  ///< fraction of the windows in which exactly the right tracks were kept

@@ -71,22 +71,63 @@ Eigen::Vector4d coefficientsOf(const detail::Section& section, Distortion distor
   return Eigen::Vector4d(values[0], values[1], values[2], values[3]);
 }
 
+/// Kalibr's camera models: the lens that goes before the distortion, and its numbers before fu fv cu cv.
+struct CameraModel {
+  const char* name;
+  Distortion lens;
+  const char* expected;  ///< of the intrinsics
+  std::size_t own;       ///< numbers
+};
+constexpr CameraModel camera_models[] = {{"pinhole", Distortion::none, "four numbers, fu fv cu cv in pixels", 0},
+                                         {"omni", Distortion::omni, "five numbers, xi fu fv cu cv", 1},
+                                         {"ds", Distortion::double_sphere, "six numbers, xi alpha fu fv cu cv", 2},
+                                         {"eucm", Distortion::eucm, "six numbers, alpha beta fu fv cu cv", 2}};
+
+CameraModel modelOf(const detail::Section& section) {
+  const auto model = section.find("camera_model");
+  if (!model) return camera_models[0];
+  for (const CameraModel& known : camera_models) {
+    if (model->node.IsScalar() && model->node.Scalar() == known.name) return known;
+  }
+  model->complain("is " + detail::shown(model->node), "pinhole, omni, ds or eucm; others are not supported");
+}
+
 Camera cameraOf(const detail::Section& section) {
   Camera camera;
-  if (const auto model = section.find("camera_model");
-      model && !(model->node.IsScalar() && model->node.Scalar() == "pinhole"))
-    model->complain("is " + detail::shown(model->node), "pinhole; others are not supported");
-  const char* expected = "four numbers, fu fv cu cv in pixels";
+  const CameraModel model = modelOf(section);
   const auto intrinsics = section.find("intrinsics");
-  if (!intrinsics) section.complainMissing("intrinsics", expected);
-  const std::vector<double> values = numbers(*intrinsics, expected);
-  if (values.size() != 4) intrinsics->complain(fmt::format("are {}", values.size()), expected);
+  if (!intrinsics) section.complainMissing("intrinsics", model.expected);
+  std::vector<double> values = numbers(*intrinsics, model.expected);
+  if (values.size() != 4 + model.own) intrinsics->complain(fmt::format("are {}", values.size()), model.expected);
+  const std::vector<double> own(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(model.own));
+  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(model.own));
   for (const std::size_t i : {0U, 1U}) {
     if (!(values[i] > 0)) intrinsics->complain(fmt::format("have the focal length {}", values[i]), "a positive one");
+  }
+  // Beyond these the models are none: alpha is a share, and beta and the mirror stretch.
+  const bool eucm = model.lens == Distortion::eucm, spheres = model.lens == Distortion::double_sphere;
+  if ((eucm && !(own[0] >= 0 && own[0] <= 1 && own[1] > 0)) || (spheres && !(own[1] >= 0 && own[1] <= 1)) ||
+      (model.lens == Distortion::omni && !(own[0] >= 0))) {
+    intrinsics->complain(fmt::format("begin with {}", fmt::join(own, " ")),
+                         "alpha from 0 to 1, a positive beta, and no negative xi of omni");
   }
   camera.fu = values[0], camera.fv = values[1], camera.cu = values[2], camera.cv = values[3];
   camera.distortion = distortionOf(section);
   camera.coefficients = coefficientsOf(section, camera.distortion);
+  if (model.lens != Distortion::none) {
+    const bool bends = camera.distortion != Distortion::none;
+    if (bends && (model.lens != Distortion::omni || camera.distortion == Distortion::equidistant)) {
+      section.find("distortion_model")
+          ->complain("does not go with the camera_model " + std::string(model.name),
+                     model.lens == Distortion::omni ? "radtan or none" : "none");
+    }
+    camera.distortion = model.lens;
+    if (model.lens == Distortion::omni) {
+      camera.mirror = own[0];
+    } else {
+      camera.coefficients = Eigen::Vector4d(own[0], own[1], 0, 0);
+    }
+  }
   if (const auto resolution = section.find("resolution")) {
     const char* size = "two whole numbers, width and height in pixels";
     const std::vector<double> pixels = numbers(*resolution, size);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <fusion/detail/lens_distortion.hpp>
+#include <fusion/detail/sphere_lens.hpp>
 
 #include <Eigen/Core>
 #include <cmath>
@@ -18,6 +19,9 @@
 //                lenses, 1966; the model of Kalibr's radtan, OpenCV's first four coefficients and EuRoC
 //   equidistant  m = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) along (x, y), θ the angle off the axis: J. Kannala and
 //                S. Brandt, 2006; Kalibr's equidistant, OpenCV's fisheye, TUM-VI
+//   omni         m = (x, y) / (z + ξ |p|), bent as by radtan: C. Mei and P. Rives, ICRA 2007; Kalibr's omni
+//   double_sphere, eucm   two spheres (ξ, α), V. Usenko et al., 3DV 2018; the extended unified model (α, β), B. Khomutenko
+//                et al., RA-L 2016; without distortion: Kalibr's ds and eucm
 //
 // A distortion polynomial is fitted to the image. Outside, it may fold over and map two directions to one pixel. There
 // these functions give none: whatever bearing() returns is the one direction on the sheet around the axis that
@@ -27,9 +31,12 @@ namespace liestat {
 
 /// The distortion of a lens; what the four coefficients of a Camera mean.
 enum class Distortion {
-  none,         ///< pinhole; the coefficients are ignored
-  radtan,       ///< k1, k2, p1, p2
-  equidistant,  ///< k1, k2, k3, k4
+  none,           ///< pinhole; the coefficients are ignored
+  radtan,         ///< k1, k2, p1, p2
+  equidistant,    ///< k1, k2, k3, k4
+  omni,           ///< k1, k2, p1, p2 behind a mirror, Camera::mirror
+  double_sphere,  ///< xi, alpha; the other two are ignored
+  eucm            ///< alpha, beta; the other two are ignored
 };
 
 /// A bearing and how far noise in the pixel turns it.
@@ -47,10 +54,11 @@ struct Camera {
   Distortion distortion = Distortion::none;
   Eigen::Vector4d coefficients = Eigen::Vector4d::Zero();  ///< see Distortion
   int width = 0, height = 0;                               ///< image size in pixels; 0: unknown
+  double mirror = 0;                                       ///< ξ of omni
 
   /// The pixel (u, v) that sees a point in the camera's axes (any unit of length), whether the image reaches that far
-  /// or not. None for a point behind the camera (an equidistant lens sees beyond 90 degrees, up to where its polynomial
-  /// ends), none beyond the fold of the distortion, none for NaN.
+  /// or not. None for a point behind the camera (fisheye lenses see beyond 90 degrees, up to where their image folds
+  /// over), none beyond the fold of the distortion, none for NaN.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_in_camera) const;
 
   /// The unit vector in the camera's axes that project() takes to this pixel, to 1e-9 of its coordinates; none where no
@@ -66,8 +74,16 @@ struct Camera {
 
  private:
   detail::RadialPolynomial radial() const {
-    return {coefficients, distortion == Distortion::none ? 0 : distortion == Distortion::radtan ? 2 : 4};
+    return {coefficients, distortion == Distortion::none ? 0 : distortion == Distortion::equidistant ? 4 : 2};
   }
+  bool hasSphere() const { return distortion > Distortion::equidistant; }
+  detail::SphereLens sphere() const {
+    using Lens = detail::SphereLens;
+    return distortion == Distortion::omni ? Lens{Lens::unified, mirror}
+                                          : Lens{distortion == Distortion::eucm ? Lens::extended : Lens::double_sphere,
+                                                 coefficients[0], coefficients[1]};
+  }
+  bool isBentOnPlane() const { return distortion == Distortion::radtan || distortion == Distortion::omni; }
   /// |d(pixel)/d(direction)|: the area in the image, in pixels², of one steradian around a bearing.
   double pixelsPerSteradian(const Eigen::Vector3d& bearing) const;
 };
@@ -82,10 +98,18 @@ inline std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p) 
     if (!(angle < EIGEN_PI) || (across == 0 && !(p.z() > 0)) || !polynomial.ascendsTo(angle)) return std::nullopt;
     m = across > 0 ? Eigen::Vector2d(polynomial.value(angle) / across * p.head<2>()) : Eigen::Vector2d(0, 0);
   } else {
-    if (!(p.z() > 0)) return std::nullopt;
-    m = p.head<2>() / p.z();
+    if (hasSphere()) {
+      const Eigen::Vector3d e = p.normalized();
+      const double s = std::hypot(e.x(), e.y());
+      const detail::SphereLens lens = sphere();
+      if (!lens.reaches(s, e.z())) return std::nullopt;
+      m = e.head<2>() / lens.divisor(s, e.z()).value;
+    } else {
+      if (!(p.z() > 0)) return std::nullopt;
+      m = p.head<2>() / p.z();
+    }
     if (!(m.norm() <= detail::farthest_on_plane)) return std::nullopt;
-    if (distortion == Distortion::radtan) {
+    if (isBentOnPlane()) {
       const detail::DistortedPoint distorted = detail::distortRadtan(coefficients, m);
       if (!(distorted.determinant() > 0) || !radial().ascendsTo(m.norm())) return std::nullopt;
       m = distorted.point;
@@ -106,10 +130,15 @@ inline std::optional<Eigen::Vector3d> Camera::bearing(const Eigen::Vector2d& pix
     if (!angle) return std::nullopt;
     const double scale = distance > 0 ? std::sin(*angle) / distance : 0;
     ray = {scale * m.x(), scale * m.y(), std::cos(*angle)};
-  } else if (distortion == Distortion::radtan) {
+  } else if (isBentOnPlane()) {
     const auto plane = detail::undistortRadtan(coefficients, m);
     if (!plane) return std::nullopt;
     ray.head<2>() = *plane;
+  }
+  if (hasSphere()) {
+    const auto direction = sphere().inverse(ray.head<2>());
+    if (!direction) return std::nullopt;
+    ray = *direction;
   }
   ray.normalize();
   // Whatever the iterations did: only a direction that is seen at this very pixel is its bearing.
@@ -126,10 +155,12 @@ inline double Camera::pixelsPerSteradian(const Eigen::Vector3d& bearing) const {
     const detail::RadialPolynomial polynomial = radial();
     if (angle > 1e-8) area *= polynomial.value(angle) * polynomial.slope(angle) / std::sin(angle);
   } else {
-    const double z = bearing.z();
-    area /= z * z * z;
-    if (distortion == Distortion::radtan)
-      area *= detail::distortRadtan(coefficients, bearing.head<2>() / z).determinant();
+    const double s = bearing.head<2>().norm(), z = bearing.z();
+    // r = s / D turns a ring of solid angle s dθ into one of area r dr.
+    const detail::SphereLens lens = sphere();
+    const double divisor = hasSphere() ? lens.divisor(s, z).value : z;
+    area *= (hasSphere() ? lens.growth(s, z) : 1) / (divisor * divisor * divisor);
+    if (isBentOnPlane()) area *= detail::distortRadtan(coefficients, bearing.head<2>() / divisor).determinant();
   }
   return area;
 }

@@ -12,7 +12,8 @@
 //   … result.stretches: the state at the end of each, with its covariance
 //
 // Windows slide over the recording. Each is initialised by itself (robust_initialisation.hpp), refined (refinement.hpp)
-// and, where windows are disjoint, fused with its neighbours (window_fusion.hpp). Nothing throws: what is wrong with
+// and, where windows are disjoint, fused with its neighbours (window_fusion.hpp). Where these meet, they test the noise
+// densities, which are calibrated where they are refuted (noise_calibration.hpp). Nothing throws: what is wrong with
 // the input is a fault of the result or of a window. Derivation: docs/theory/visual_inertial.md.
 #pragma once
 
@@ -28,6 +29,11 @@ namespace liestat {
 LIESTAT_FUSION_API VisualInertialResult
 initialiseRecording(const VisualInertialRecording& recording, const VisualInertialOptions& options,
                     const std::function<void(std::size_t done, std::size_t all)>& progress = {});
+
+/// The start of a filter (fusion/init/filter_start.hpp) from a recording: the state at the end of the last stretch that
+/// is ok, or from rest, at the end of the last window that is stationary, whichever is later. untested: without them,
+/// that of the last window that is ok. inconsistent: all stretches that were tested are.
+LIESTAT_FUSION_API FilterStart filterStart(const VisualInertialResult& result, const FilterStartOptions& options = {});
 
 }  // namespace liestat
 

@@ -104,6 +104,8 @@ struct InitialisationTest {
 struct ComparedRecording {
   std::vector<ComparedWindow> windows;
   std::vector<ComparedStretch> stretches;
+  std::optional<NoiseCalibration> noise_calibration;  ///< as of VisualInertialResult, as is the next
+  FilterStart filter_start;
   std::optional<double> gravity;   ///< |G| that was given, m/s²
   double bearing_noise = 0;        ///< rad
   std::size_t images_outside = 0;  ///< that the readings do not cover
@@ -119,6 +121,12 @@ struct ComparedRecording {
   /// Verdict on the result: trusted if nothing was interrupted, a window is ok, those of a stretch of two and more
   /// agree, and with a truth the errors follow the covariances. Windows that were not fused are not tested.
   Verdict verdict() const;
+  /// True if the recording's windows tell the densities of its sensor's noise.
+  bool noiseIsVerified() const {
+    return noise_calibration && noise_calibration->evidence != NoiseEvidence::unverified_noise;
+  }
+  /// Notes on what the covariances rest on, each beginning with its name: unverified_noise.
+  std::vector<std::string> notes() const;
   /// Summary of all windows that claim a scale, not only of those that came out well.
   InitialisationSummary summary() const;
 };
@@ -331,6 +339,10 @@ void describe(V& v, const ComparedRecording& r) {
   const Verdict verdict = r.verdict();
   v("ok", verdict.isYes(), "the result is to be trusted")("in_words", verdict.text, "the verdict");
   v("causes", verdict.causes, "with a truth: tests that speak against it, each with its likely cause");
+  v("notes", r.notes(), "on what the covariances rest on: unverified_noise");
+  v("noise_calibration", r.noise_calibration,
+    "what the windows say of the densities; null: not asked for, or could "
+    "not be");
   v("images_outside", r.images_outside, "that the readings do not cover");
   v("bearing_noise", r.bearing_noise, "standard deviation of the bearings", "rad");
   if (shown(v, r.windows_left > 0)) {
@@ -351,6 +363,7 @@ void describe(V& v, const ComparedRecording& r) {
   if (shown(v, summary.degrees_of_freedom > 0)) {
     v("refined_chi2_per_degree", summary.cost / static_cast<double>(summary.degrees_of_freedom), "1 expected");
   }
+  v("filter_start", r.filter_start, "state and covariance from which a filter starts");
   v("frame", "axes of the body at the first image of each window; gravity points down", "in words");
   v("windows", r.windows)("fusions", r.stretches, "of disjoint windows, for each stretch");
 }

@@ -6,8 +6,10 @@
 #include <fusion/imu/preintegrate.hpp>
 #include <fusion/imu/window.hpp>
 #include <fusion/init/options.hpp>
+#include <fusion/init/filter_start.hpp>
 #include <fusion/init/inertial_state.hpp>
 #include <fusion/init/results.hpp>
+#include <fusion/noise_calibration_types.hpp>
 #include <fusion/status.hpp>
 
 #include <Eigen/Core>
@@ -72,7 +74,10 @@ struct VisualInertialOptions {
   bool consensus = true;                       ///< tracks may be wrong
   bool refinement = true;                      ///< else the closed form alone
   double stretch = 12;                         ///< s: windows that are fused; 0: none
-  bool inflate = false;                        ///< multiply the covariance of a stretch that is not ok by its inflation
+  /// The densities of the sensor's noise are tested, and calibrated where the windows refute them, by all meetings of
+  /// windows of the recording (fusion/noise_calibration.hpp). Not without refinement, stretches or unknown biases.
+  bool calibrate_noise = true;
+  bool inflate = false;  ///< multiply the covariance of a stretch that is not ok by its inflation
   ImuScheme scheme = ImuScheme::averaged;
   double max_gap = 0.1;             ///< s, between readings
   std::size_t max_windows = 20000;  ///< more are bad_option
@@ -82,6 +87,7 @@ struct VisualInertialOptions {
   /// observations; the accelerometer's bias is estimated in closed form in windows of two seconds and more, because it
   /// is not told in less (docs/theory/visual_inertial.md, section 3.5).
   InitialisationOptions initialisation = {};
+  FilterStartOptions filter_start = {};  ///< what is free of a filter's start, and how it is shown
   /// Asked before each window; once it says true, no further window is estimated.
   std::function<bool()> stop = {};
 };
@@ -157,9 +163,11 @@ struct VisualInertialResult {
   Fault fault;
   std::vector<InitialisedWindow> windows;
   std::vector<FusedStretch> stretches;
-  double bearing_noise = 0;        ///< rad, the median of the observations
-  std::size_t images_outside = 0;  ///< that the readings do not cover
-  std::size_t windows_left = 0;    ///< that were not estimated, because of options.stop
+  std::optional<NoiseCalibration> noise_calibration;  ///< none: it was not asked for, or could not be
+  FilterStart filter_start;                           ///< as of filterStart() (fusion/visual_inertial.hpp)
+  double bearing_noise = 0;                           ///< rad, the median of the observations
+  std::size_t images_outside = 0;                     ///< that the readings do not cover
+  std::size_t windows_left = 0;                       ///< that were not estimated, because of options.stop
 };
 
 }  // namespace liestat

@@ -8,7 +8,6 @@
 #include <cli/commands/vi_init_result.hpp>
 #include <cli/show/vi_init.hpp>
 #include <experiments/interruption.hpp>
-#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
 #include <fusion/visual_inertial_truth.hpp>
 
@@ -33,8 +32,8 @@ struct Options {
   std::string tracks, image_times, truth, json, report, camera;
   std::vector<std::string> calibration;
   std::vector<double> intrinsics;
+  std::optional<FilterConvention> filter_start;
   bool free_gravity = false, no_consensus = false, no_refinement = false, known_biases = false, true_biases = false;
-  bool calibrate_noise = false;
   double gravity = 9.81, noise_factor = 1, pixel_noise = 1;
   VisualInertialOptions how;
 };
@@ -106,6 +105,7 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
   InitialisationOptions& steps = how.initialisation;
   steps.gravity = options.free_gravity ? std::nullopt : std::optional(options.gravity);
   steps.prior.mean = options.imu.bias();
+  how.filter_start.convention = options.filter_start.value_or(FilterConvention::liestat);
   how.scheme = options.imu.scheme;
   how.max_gap = options.imu.largest_gap;
   how.consensus = !options.no_consensus;
@@ -120,12 +120,6 @@ VisualInertialOptions optionsOf(const ViRecording& recording, const Options& opt
     how.known_bias = [bias = steps.prior.mean](double) { return std::optional(bias); };
   }
   return how;
-}
-
-NoiseCalibration calibrate(const VisualInertialRecording& measured, const VisualInertialOptions& how) {
-  return withProgressBar("noise", [&](const auto& progress) {
-    return calibrateNoise(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
-  });
 }
 
 /// Throws an InputError in the command's name for the fault of a recording as a whole.
@@ -165,13 +159,8 @@ void refuseFault(const VisualInertialResult& found, const VisualInertialRecordin
 
 int runCommand(const Options& options, const Invocation& invocation) {
   const ViRecording recording = recordingOf(options);
-  VisualInertialRecording measured = measurementsOf(recording, options);
+  const VisualInertialRecording measured = measurementsOf(recording, options);
   VisualInertialOptions how = optionsOf(recording, options);
-  std::optional<NoiseCalibration> noise;
-  if (options.calibrate_noise) {
-    noise = calibrate(measured, how);
-    measured.noise = noise->noise;
-  }
   how.stop = experiments::runStopped;
   VisualInertialResult found = runTrials("vi-init", [&](const auto& progress) {
     return initialiseRecording(measured, how, [&](std::size_t done, std::size_t all) { progress(done, all); });
@@ -188,8 +177,8 @@ int runCommand(const Options& options, const Invocation& invocation) {
   for (ComparedWindow& w : result.windows) {
     for (std::uint64_t& track : w.track_names) track = recording.tracks.track_ids[track];
   }
+  result.show_filter_start = options.filter_start.has_value();
   result.biases_given = options.known_biases || options.true_biases;
-  result.noise = noise;
   result.observations_outside = recording.tracks.observations.size() - measured.observations.size();
   publishResult(options.json, viInitTable(recording, result), invocation.command_line,
                 how.initialisation.consensus.seed,
@@ -215,8 +204,10 @@ void addViInitCommand(const CommandList& app) {
   command.option("--camera", options->camera, "Which of the calibration's cameras (default: the first)");
   command.option("--intrinsics", options->intrinsics, "fu,fv,cu,cv: go before the calibration's").list(4, 4);
   command.option("--noise-factor", options->noise_factor, "Multiplies these densities (default 1)").range(1e-3, 1e6);
-  command.flag("--calibrate-noise", options->calibrate_noise,
-               "Find the factor of these densities at which windows agree, and use it");
+  command.flag(
+      "--calibrate-noise,!--no-calibrate-noise", how.calibrate_noise,
+      "Test these densities where windows meet, and multiply them by the factors at which windows agree if they "
+      "refute them (default); --no-calibrate-noise: use them as they are");
   command.option("--pixel-noise", options->pixel_noise, "Standard deviation of u and of v, pixels (default 1)")
       .range(1e-6, 1e3);
   command.option("--window", how.window, "s (default 2)").range(0.1, 60.);
@@ -243,6 +234,14 @@ void addViInitCommand(const CommandList& app) {
       .range(0., 1e6);
   command.flag("--inflate", how.inflate,
                "Multiply the covariance of windows together by the factor by which they disagree, where p < 0.001");
+  command.choice(
+      "--filter-start", options->filter_start,
+      "liestat, openvins, gtsam, basalt: print the start of a filter, covariance in that library's convention");
+  command
+      .option("--heading-sigma", how.filter_start.heading_sigma,
+              "rad, of a filter's start, whose heading is free (default 0.001)")
+      .range(1e-9, 10.);
+  command.option("--position-sigma", how.filter_start.position_sigma, "m, likewise (default 0.001)").range(1e-9, 1e6);
   command.option("--begin", how.begin, "s since the first reading, or the file's seconds (default: the first image)");
   command.option("--end", how.end, "The same (default: the last image)");
   command.option("--truth", options->truth, "EuRoC's ground truth, to compare with");

@@ -3,11 +3,9 @@
 #include <formats/calibration.hpp>
 #include <formats/tracks.hpp>
 #include <formats/imu.hpp>
-#include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial_truth_types.hpp>
 
 #include <cstddef>
-#include <optional>
 #include <vector>
 
 namespace liestat::cli {
@@ -30,13 +28,13 @@ void describe(V& v, const ViRecording& r) {
 
 /// The result that the command shows.
 struct ViInitResult : ComparedRecording {
-  bool biases_given = false;              ///< and not estimated
-  std::optional<NoiseCalibration> noise;  ///< where it was asked for
-  std::size_t observations_outside = 0;   ///< pixels that the lens' model can't explain
+  bool biases_given = false;             ///< and not estimated
+  bool show_filter_start = false;        ///< in the table; JSON always has it
+  std::size_t observations_outside = 0;  ///< pixels that the lens' model can't explain
 };
 template <class V>
 void describe(V& v, const ViInitResult& r) {
-  v("observations_outside", r.observations_outside, "pixels without a direction")("noise_calibration", r.noise);
+  v("observations_outside", r.observations_outside, "pixels without a direction");
   describe(v, static_cast<const ComparedRecording&>(r));
 }
 

@@ -71,7 +71,7 @@ std::string fusionTable(const ViInitResult& result, bool with_truth) {
 }
 
 /// Stretches whose windows contradict each other.
-std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions) {
+std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions, bool noise_is_verified) {
   std::size_t with_state = 0, contradict = 0, inflated = 0;
   double largest_p = 0, least = std::numeric_limits<double>::infinity(), largest = 0;
   for (const ComparedStretch& f : fusions) {
@@ -88,8 +88,11 @@ std::string contradictionsInWords(const std::vector<ComparedStretch>& fusions) {
       "factors of {:.3g} to {:.3g}{}\n",
       contradict, with_state, largest_p, least, largest,
       inflated > 0 ? ", which the fused states' were multiplied by"
-                   : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
-                     "--calibrate-noise and --noise-factor, or --inflate");
+      : noise_is_verified
+          ? ", and the stretches are not ok. There the errors are larger than in the rest of the recording: see "
+            "--inflate"
+          : ", and the stretches are not ok. The sensor's noise in motion is larger than its densities: see "
+            "--noise-factor, or --inflate");
 }
 
 /// Medians and 95 %.
@@ -108,25 +111,48 @@ std::string inWords(const NoiseFactor& factor) {
   return fmt::format("{:.3g} (95 %: {})", factor.factor, range);
 }
 
+/// What the windows tell; noise that is not verified is a note.
 std::string noiseInWords(const NoiseCalibration& found) {
-  if (found.status != FusionStatus::ok) {
-    return fmt::format("the sensor's noise was not calibrated, and its densities are as given: {}\n",
-                       found.status == FusionStatus::undetermined
-                           ? fmt::format("{} meetings of windows do not tell it", found.meetings)
-                           : describe(found.status));
-  }
   const double dof = static_cast<double>(found.degrees_of_freedom);
-  const auto ends = [](const NoiseFactor& factor) { return factor.isTold() ? "" : ", not told"; };
-  std::string text = fmt::format("noise calibrated by {} meetings of windows: ", found.meetings);
-  if (found.separable || found.common_p < 0.05) {
-    text += fmt::format("gyroscope's densities times {}{}, accelerometer's {}{}", inWords(found.gyroscope),
-                        ends(found.gyroscope), inWords(found.accelerometer), ends(found.accelerometer));
-  } else {
-    text += fmt::format("all densities times {}{}; gyroscope and accelerometer cannot be told apart",
-                        inWords(found.common), ends(found.common));
+  const bool calibrated = found.evidence == NoiseEvidence::calibrated;
+  const auto factorOf = [&](const NoiseFactor& factor) {
+    return inWords(factor) + (calibrated && !factor.isTold() ? ", not told" : "");
+  };
+  const std::string factors =
+      found.hasTwoFactors() ? fmt::format("gyroscope's densities times {}, accelerometer's {}",
+                                          factorOf(found.gyroscope), factorOf(found.accelerometer))
+                            : fmt::format("all densities times {}; gyroscope and accelerometer cannot be told apart",
+                                          factorOf(found.common));
+  if (!calibrated) {
+    return fmt::format(
+        "noise confirmed by {} meetings of windows, whose chi2 per degree of freedom is {:.2f}. They tell: {}\n",
+        found.meetings, found.chi2 / dof, factors);
   }
-  return text + fmt::format(". Their chi2 per degree of freedom is {:.2f}, was {:.2f}\n", found.calibrated_chi2 / dof,
-                            found.chi2 / dof);
+  return fmt::format(
+      "noise calibrated by {} meetings of windows: {}. Their chi2 per degree of freedom is {:.2f}, was {:.2f}\n",
+      found.meetings, factors, found.calibrated_chi2 / dof, found.chi2 / dof);
+}
+
+/// The start of a filter with its standard deviations, in the order of its convention.
+std::string filterStartInWords(const FilterStart& start) {
+  if (!start.hasState()) return fmt::format("filter start: none ({})\n", start.word());
+  const auto list = [](const auto& values, const char* format) {
+    std::string text;
+    for (Eigen::Index i = 0; i < values.size(); ++i)
+      text += (i > 0 ? " " : "") + fmt::format(fmt::runtime(format), values[i]);
+    return text;
+  };
+  const Eigen::Matrix<double, 15, 1> sigmas = start.covarianceAs(start.convention).diagonal().cwiseSqrt();
+  return fmt::format(
+      "filter start at {:.3f} s{}, {}; the world's z axis is up\n  quaternion xyzw {}\n  position {} m, velocity {} "
+      "m/s\n"
+      "  biases: gyroscope {} rad/s, accelerometer {} m/s2\n  standard deviations ({}: {})\n   {}\n",
+      start.time, start.from_rest ? " from rest" : "", start.word(),
+      list(Eigen::Vector4d(start.state.so3().params()), "{:.6f}"),
+      list(Eigen::Vector3d(start.state.translation()), "{:.4f}"),
+      list(Eigen::Vector3d(start.state.velocity()), "{:.4f}"), list(start.bias.gyroscope, "{:.5f}"),
+      list(start.bias.accelerometer, "{:.4f}"), name(start.convention), orderOf(start.convention),
+      list(sigmas, "{:.2g}"));
 }
 
 }  // namespace
@@ -172,9 +198,11 @@ std::string viInitTable(const ViRecording& recording, const ViInitResult& result
         "standard deviations of gravity and of the biases";
     text += with_truth ? ",\nand what is off:\n" : ":\n";
     text += fusionTable(result, with_truth);
-    text += contradictionsInWords(result.stretches);
+    text += contradictionsInWords(result.stretches, result.noiseIsVerified());
   }
-  if (result.noise) text += "\n" + noiseInWords(*result.noise);
+  if (result.noise_calibration && result.noiseIsVerified()) text += "\n" + noiseInWords(*result.noise_calibration);
+  if (result.show_filter_start) text += "\n" + filterStartInWords(result.filter_start);
+  for (const std::string& note : result.notes()) text += "note: " + note + "\n";
   std::vector<std::string> notes;
   if (recording.tracks.seen_once > 0) {
     notes.push_back(fmt::format("{} tracks were seen once", recording.tracks.seen_once));

@@ -69,6 +69,7 @@ Columns<Group> distanceColumns(Check check) {
   columns.push_back(columnOf(refined ? "all (11)" : "with bias (8)", index, Quantity::nees_all));
   if (refined) columns.push_back(columnOf("last (9)", index, Quantity::nees_last_state));
   if (walks) columns.push_back(columnOf("last, G, biases (17)", index, Quantity::nees_at_last));
+  if (refined) columns.push_back(columnOf("start (15)", index, Quantity::nees_filter_start));
   columns.push_back(columnOf("χ²/dof", ratio, Quantity::chi2_per_dof));
   columns.push_back(columnOf("95 %", covered, Quantity::nees_v_g));
   columns.push_back({"lost", [](const Group& g) { return g.of(Quantity::nees_v_g)->failures; }});
@@ -111,6 +112,7 @@ const Columns<Group> rest_columns{{"", estimatorOf},
                                   columnOf("told right", ratio, Quantity::told),
                                   columnOf("moves", ratio, Quantity::moving),
                                   columnOf("gravity, biases (8)", index, Quantity::nees_at_rest),
+                                  columnOf("start (15)", index, Quantity::nees_filter_start),
                                   columnOf("95 %", covered, Quantity::nees_at_rest),
                                   {"verdict", verdictOf}};
 /// How often intervals held the factors.

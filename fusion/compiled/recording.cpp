@@ -1,4 +1,5 @@
-// Refinement, the fusion of windows and the run over a recording, compiled once; see initialisation.cpp.
+// Refinement, the fusion of windows, the run over a recording and a filter's start, compiled once; see
+// initialisation.cpp.
 #ifndef LIESTAT_COMPILED_FUSION
 #define LIESTAT_COMPILED_FUSION
 #endif
@@ -7,3 +8,4 @@
 #include <fusion/init/detail/fuse_windows.hpp>
 #include <fusion/init/detail/initialise_recording.hpp>
 #include <fusion/init/detail/refine.hpp>
+#include <fusion/init/detail/start_filter.hpp>

@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-// The two distortion models of fusion/camera.hpp and their inverses. No allocation, no exceptions; NaN has no inverse.
+// The two polynomial distortion models of fusion/camera.hpp and their inverses. No allocation, no exceptions; NaN has no inverse.
 
 namespace liestat::detail {
 

@@ -77,7 +77,7 @@ struct GyroscopeBiasOptions {
 
 /// fusion/init/refinement.hpp
 struct RefinementOptions {
-  int max_iterations = 50;
+  int max_iterations = 50;     ///< 0: no estimate, but the covariance at the start
   double min_decrease = 1e-3;  ///< converged when the cost (χ²) decreases by less
   int max_integrations = 3;    ///< how often the readings are integrated anew for biases that have gone too far
 };

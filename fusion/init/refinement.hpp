@@ -23,6 +23,10 @@ namespace liestat {
 LIESTAT_FUSION_API RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
                                            const ImuBias<double>& start_bias, const InitialisationOptions& options);
 
+/// On from a former result for the same window, whose prior or noise may have been another.
+LIESTAT_FUSION_API RefinementResult refine(InertialWindow window, const RefinementResult& former,
+                                           const InitialisationOptions& options);
+
 /// The most probable gravity and biases of a window in which the body stays where it is (it may turn), from a first guess
 /// of gravity: `states` have no velocity and position, there are no `features`, and `covariance` says how far the
 /// accelerometer's bias and the tilt stand for each other. stationary: the readings scatter as their noise says

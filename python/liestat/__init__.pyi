@@ -865,35 +865,6 @@ class _ComparedStretch(Result):
     accelerometer_bias_error: float | None  # likewise; m/s²
     nees: float | None  # 11 expected
 
-class _InitialisationErrors(Result):
-    windows: int  # that were compared
-    speed_median: float  # m/s
-    speed_95: float  # 95 % quantile; m/s
-    gravity_deg_median: float  # deg
-    gravity_deg_95: float  # deg
-    scale_percent_median: float  # %
-    scale_percent_95: float  # %
-
-class _ComparedRecording(Result):
-    ok: bool  # the result is to be trusted
-    in_words: str  # the verdict
-    causes: list[str]  # with a truth: tests that speak against it, each with its likely cause
-    images_outside: int  # that the readings do not cover
-    bearing_noise: float  # standard deviation of the bearings; rad
-    interrupted: bool  # only then
-    windows_left: int  # not estimated, because of an interrupt
-    gravity: float | None  # that was given; null: it was free; m/s²
-    statuses: Result  # number of windows of each status
-    closed_form_errors: _InitialisationErrors  # with a truth
-    refined_errors: _InitialisationErrors  # with a truth
-    gyroscope_bias_error_median: float  # with a truth; rad/s
-    gyroscope_bias_error_95: float  # with a truth: 95 % quantile; rad/s
-    nees_mean: float  # with a truth: 5 expected
-    refined_chi2_per_degree: float  # 1 expected
-    frame: str  # in words
-    windows: list[InitialisedWindow]
-    fusions: list[_FusedWindows]  # of disjoint windows, for each stretch
-
 class _NoiseFactor(Result):
     factor: float  # of the densities
     low: float  # lower end of its 95 % interval; null: no bound
@@ -907,10 +878,12 @@ class _ImuNoise(Result):
 
 class _NoiseCalibration(Result):
     status: str
+    # confirmed: the windows agree with the given densities; calibrated: they refute them; unverified_noise: they tell neither
+    evidence: str
     windows: int  # that were refined
     meetings: int  # of windows, whose states must agree
     chi2: float  # with the given densities
-    calibrated_chi2: float  # with the calibrated ones
+    calibrated_chi2: float  # with those that were used
     degrees_of_freedom: int  # of both
     common: _NoiseFactor  # one factor for both sensors
     common_p: float  # probability that two factors explain so much more than one, if they are one
@@ -918,6 +891,52 @@ class _NoiseCalibration(Result):
     gyroscope: _NoiseFactor
     accelerometer: _NoiseFactor
     noise: _ImuNoise  # the densities that were used
+
+class _InitialisationErrors(Result):
+    windows: int  # that were compared
+    speed_median: float  # m/s
+    speed_95: float  # 95 % quantile; m/s
+    gravity_deg_median: float  # deg
+    gravity_deg_95: float  # deg
+    scale_percent_median: float  # %
+    scale_percent_95: float  # %
+
+class _FilterStart(Result):
+    status: str  # ok, untested (of a single window), inconsistent or no_state
+    convention: str  # of the covariance: liestat, openvins, gtsam or basalt
+    t: float  # s
+    from_rest: bool  # the body rests
+    quaternion_xyzw: _Array  # body in the world, z upwards
+    position: _Array  # in the world; m
+    velocity: _Array  # in the world; m/s
+    gyroscope_bias: _Array  # rad/s
+    accelerometer_bias: _Array  # m/s²
+    covariance: _Array  # position and heading are free: as the options say
+    covariance_order: str  # in words
+
+class _ComparedRecording(Result):
+    ok: bool  # the result is to be trusted
+    in_words: str  # the verdict
+    causes: list[str]  # with a truth: tests that speak against it, each with its likely cause
+    notes: list[str]  # on what the covariances rest on: unverified_noise
+    # what the windows say of the densities; null: not asked for, or could not be
+    noise_calibration: _NoiseCalibration | None
+    images_outside: int  # that the readings do not cover
+    bearing_noise: float  # standard deviation of the bearings; rad
+    interrupted: bool  # only then
+    windows_left: int  # not estimated, because of an interrupt
+    gravity: float | None  # that was given; null: it was free; m/s²
+    statuses: Result  # number of windows of each status
+    closed_form_errors: _InitialisationErrors  # with a truth
+    refined_errors: _InitialisationErrors  # with a truth
+    gyroscope_bias_error_median: float  # with a truth; rad/s
+    gyroscope_bias_error_95: float  # with a truth: 95 % quantile; rad/s
+    nees_mean: float  # with a truth: 5 expected
+    refined_chi2_per_degree: float  # 1 expected
+    filter_start: _FilterStart  # state and covariance from which a filter starts
+    frame: str  # in words
+    windows: list[InitialisedWindow]
+    fusions: list[_FusedWindows]  # of disjoint windows, for each stretch
 
 class _PoseSigmas(Result):
     translation_m: _Array  # m

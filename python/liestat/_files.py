@@ -134,8 +134,10 @@ def read_calibration(*paths):
     d = _reader("read_calibration")([os.fspath(path) for path in paths])
     cameras = []
     for c in d["cameras"]:
-        fu, fv, cu, cv, distortion, coefficients, width, height = c["camera"]
-        camera = Camera(fu, fv, cu, cv, Camera._names[distortion], coefficients, width, height)
+        fu, fv, cu, cv, distortion, coefficients, width, height, mirror = c["camera"]
+        name = Camera._names[distortion]
+        numbers = (mirror, *coefficients) if name == "omni" else coefficients[: Camera._counts.get(name, 4)]
+        camera = Camera(fu, fv, cu, cv, name, numbers, width, height)
         pose = SE3._of(c["imu_T_camera"])
         cameras.append(Result("camera", name=c["name"], camera=camera, imu_T_camera=pose, timeshift=c["timeshift"]))
     return Result("calibration", cameras=cameras, imu_noise=d["imu_noise"])

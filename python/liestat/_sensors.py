@@ -321,14 +321,16 @@ class Camera:
     ----------
     fu, fv, cu, cv : float
         Focal lengths and principal point, pixels.
-    distortion : {'none', 'radtan', 'equidistant'}
+    distortion : {'none', 'radtan', 'equidistant', 'omni', 'double_sphere', 'eucm'}
     coefficients : sequence of 4 floats
-        k1 k2 p1 p2 of 'radtan', k1 k2 k3 k4 of 'equidistant'.
+        k1 k2 p1 p2 of 'radtan', k1 k2 k3 k4 of 'equidistant', xi k1 k2 p1 p2 of 'omni', xi alpha of 'double_sphere',
+        alpha beta of 'eucm'.
     width, height : int
         Pixels; 0 where they are not known.
     """
 
-    _names = ("none", "radtan", "equidistant")
+    _names = ("none", "radtan", "equidistant", "omni", "double_sphere", "eucm")
+    _counts = {"omni": 5, "double_sphere": 2, "eucm": 2}
 
     def __init__(self, fu, fv, cu, cv, distortion="none", coefficients=(0, 0, 0, 0), width=0, height=0):
         if distortion not in self._names:
@@ -338,15 +340,17 @@ class Camera:
         self.fu, self.fv, self.cu, self.cv = float(fu), float(fv), float(cu), float(cv)
         self.distortion = distortion
         self.coefficients = tuple(float(c) for c in _vector(coefficients, "Camera: coefficients"))
-        if len(self.coefficients) != 4:
-            raise ValueError(f"Camera: coefficients: expected 4 numbers, got {len(self.coefficients)}")
+        expected = self._counts.get(distortion, 4)
+        if len(self.coefficients) != expected:
+            raise ValueError(f"Camera: coefficients: expected {expected} numbers, got {len(self.coefficients)}")
         self.width, self.height = int(width), int(height)
 
     def _list(self):
         distortion = float(self._names.index(self.distortion))
-        return np.array(
-            [self.fu, self.fv, self.cu, self.cv, distortion, *self.coefficients, self.width, self.height], dtype=float
-        )
+        mirror, own = (self.coefficients[0], self.coefficients[1:]) if self.distortion == "omni" else (0, self.coefficients)
+        own = (*own, 0, 0)[:4]
+        numbers = [self.fu, self.fv, self.cu, self.cv, distortion, *own, self.width, self.height, mirror]
+        return np.array(numbers, dtype=float)
 
     def __repr__(self):
         return f"Camera({self.fu:g}, {self.fv:g}, {self.cu:g}, {self.cv:g}, {self.distortion!r})"
@@ -550,6 +554,11 @@ def vi_init(
     accelerometer_sigma=0.15,
     seed=1,
     truth=None,
+    calibrate_noise=True,
+    inflate=False,
+    filter_convention="liestat",
+    position_sigma=1e-3,
+    heading_sigma=1e-3,
 ):
     """Velocity, gravity, scale and biases of a visual-inertial recording, window by window, without a first guess.
 
@@ -581,6 +590,15 @@ def vi_init(
         Priors of the biases, rad/s and m/s².
     truth : (times, states) or (times, states, biases), optional
         As in `preintegrate`: windows and stretches are compared with it.
+    calibrate_noise : bool
+        Test the densities where windows meet, and multiply them by the factors at which windows agree if they refute
+        them (`noise_calibration`).
+    inflate : bool
+        Multiply the covariance of a stretch whose windows contradict each other by the factor at which they would not.
+    filter_convention : {"liestat", "openvins", "gtsam", "basalt"}
+        Order and errors of the covariance of `filter_start`, from which a filter starts.
+    position_sigma, heading_sigma : float
+        m and rad: standard deviations of position and heading of `filter_start`, which are free.
 
     Returns
     -------
@@ -624,6 +642,11 @@ def vi_init(
         float(accelerometer_sigma),
         int(seed),
         _truth("vi_init", truth),
+        bool(calibrate_noise),
+        bool(inflate),
+        str(filter_convention),
+        float(position_sigma),
+        float(heading_sigma),
     )
     for one in d["windows"]:
         one["states"] = SE23._of(one["states"])

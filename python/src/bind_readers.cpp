@@ -128,7 +128,7 @@ py::dict readCalibrationFiles(const std::vector<std::string>& paths) {
     d["name"] = c.name;
     d["camera"] =
         py::make_tuple(c.camera.fu, c.camera.fv, c.camera.cu, c.camera.cv, static_cast<int>(c.camera.distortion),
-                       DictView::of(c.camera.coefficients), c.camera.width, c.camera.height);
+                       DictView::of(c.camera.coefficients), c.camera.width, c.camera.height, c.camera.mirror);
     d["imu_T_camera"] = DictView::of(c.imu_T_cam.params());
     d["timeshift"] = c.timeshift_cam_imu;
     cameras.append(d);

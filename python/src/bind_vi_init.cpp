@@ -33,7 +33,8 @@ py::dict initialise(const DoubleArray& readings, const DoubleArray& noise, const
                     const DoubleArray& cameras, const py::array_t<std::int64_t, py::array::c_style>& indices,
                     const DoubleArray& bearings, double window, double stride, double image_rate, bool consensus,
                     bool refinement, double stretch, double gravity, double gyroscope_sigma, double accelerometer_sigma,
-                    std::uint64_t seed, const DoubleArray& truth_rows) {
+                    std::uint64_t seed, const DoubleArray& truth_rows, bool calibrate_noise, bool inflate,
+                    const std::string& filter_convention, double position_sigma, double heading_sigma) {
   struct Input {
     std::vector<ImuSample<double>> readings;
     VisualInertialRecording recording;
@@ -66,6 +67,16 @@ py::dict initialise(const DoubleArray& readings, const DoubleArray& noise, const
   options.initialisation.prior.gyroscope_sigma = gyroscope_sigma;
   options.initialisation.prior.accelerometer_sigma = accelerometer_sigma;
   options.initialisation.consensus.seed = seed;
+  options.calibrate_noise = calibrate_noise;
+  options.inflate = inflate;
+  options.filter_start.position_sigma = position_sigma;
+  options.filter_start.heading_sigma = heading_sigma;
+  const std::optional<FilterConvention> convention = named<FilterConvention>(filter_convention);
+  if (!convention) {
+    throw py::value_error("vi_init: filter_convention: no '" + filter_convention +
+                          "', expected liestat, openvins, gtsam or basalt");
+  }
+  options.filter_start.convention = *convention;
   const std::vector<double> times = input.recording.image_times;
   const std::vector<GroundTruth> truth = truthOf(truth_rows);
   VisualInertialResult found;

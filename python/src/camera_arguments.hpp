@@ -1,4 +1,5 @@
-// A camera's numbers from Python: fu, fv, cu, cv, the number of the distortion, its four coefficients, width, height.
+// A camera's numbers from Python: fu, fv, cu, cv, the number of the distortion, its four coefficients, width, height,
+// the mirror.
 #pragma once
 
 #include <fusion/camera.hpp>
@@ -15,6 +16,7 @@ inline Camera cameraOf(const double* p) {
   camera.coefficients = vector<4>(p + 5);
   camera.width = static_cast<int>(p[9]);
   camera.height = static_cast<int>(p[10]);
+  camera.mirror = p[11];
   return camera;
 }
 /// None for an empty array.

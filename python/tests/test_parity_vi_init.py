@@ -32,7 +32,7 @@ imu0:
 NOISE = (0.00016968, 0.002, 1.9393e-05, 0.003)
 # Fields that describe the files.
 OF_FILES = ("readings", "start_ns", "images", "tracks", "camera_pose_assumed", "tracks_seen_once")
-OF_FILES += ("observations_outside", "noise_calibration")
+OF_FILES += ("observations_outside",)
 WINDOW_SERIES = ("reason", "velocity", "gravity", "best_gyroscope_bias", "accelerometer_bias", "joint_covariance")
 WINDOW_SERIES += ("scale_sigma", "tilt_sigma", "chi2", "image_indices", "track_names", "inliers", "states")
 
@@ -122,6 +122,29 @@ class ViInitParity(parity.ParityTest):
             self.assertIn(sentence, said)
         right = self.run_both("--truth", self.truth_file, truth=self.truth)
         self.assertEqual(right.causes, [])
+
+    def test_noise_as_it_is_given(self):
+        given = self.run_both("--no-calibrate-noise", calibrate_noise=False)
+        self.assertIsNone(given.noise_calibration)
+        self.assertTrue(given.notes[0].startswith("unverified_noise: "), given.notes)
+        tested = self.run_both()
+        self.assertEqual(tested.noise_calibration.meetings, len(tested.windows) - 1)
+        self.assertIn(tested.noise_calibration.evidence, ("confirmed", "calibrated", "unverified_noise"))
+
+    def test_start_of_a_filter(self):
+        start = self.run_both().filter_start
+        self.assertEqual((start.status, start.convention, start.from_rest), ("ok", "liestat", False))
+        # Of the library's coordinates (position, rotation, velocity, biases) Basalt turns the first three into the world.
+        basalt = self.run_both("--filter-start", "basalt", filter_convention="basalt").filter_start
+        turn = np.eye(15)
+        for k in (0, 3, 6):
+            turn[k : k + 3, k : k + 3] = liestat.SO3(start.quaternion_xyzw).as_matrix()
+        np.testing.assert_allclose(basalt.covariance, turn @ start.covariance @ turn.T, rtol=0, atol=1e-12)
+        free = ("--filter-start", "gtsam", "--position-sigma", 2, "--heading-sigma", 0.5)
+        gtsam = self.run_both(*free, filter_convention="gtsam", position_sigma=2, heading_sigma=0.5).filter_start
+        np.testing.assert_allclose(np.diag(gtsam.covariance)[3:6], 4)
+        with self.assertRaisesRegex(ValueError, "filter_convention: no 'msckf'"):
+            liestat.vi_init(*self.measured, filter_convention="msckf")
 
     def test_former_names(self):
         result = self.run_both()

@@ -43,6 +43,10 @@ CameraCalibration someCamera(Distortion distortion = Distortion::radtan) {
     camera.camera = {.fu = 190, .fv = 191, .cu = 255, .cv = 257, .distortion = distortion, .width = 512, .height = 512};
     camera.camera.coefficients = {3e-3, 7e-4, -2e-3, 2e-4};
   }
+  if (distortion == Distortion::omni)
+    camera.camera.coefficients = {-0.1, 0.02, 1e-4, -2e-4}, camera.camera.mirror = 0.9;
+  if (distortion == Distortion::double_sphere) camera.camera.coefficients = {-0.2, 0.6, 0, 0};
+  if (distortion == Distortion::eucm) camera.camera.coefficients = {0.6, 1.1, 0, 0};
   camera.imu_T_cam = SE3d(SO3d::exp(Vector3d(1.2, -1.1, 1.3)), Vector3d(0.05, -0.02, 0.01));
   camera.timeshift_cam_imu = 0.0131;
   return camera;
@@ -109,7 +113,8 @@ TEST(SimulateVi, ExactReadingsAreThoseOfTheTruth) {
 }
 
 TEST(SimulateVi, TracksPointAtTheirLandmarks) {
-  for (const Distortion distortion : {Distortion::none, Distortion::radtan, Distortion::equidistant}) {
+  for (const Distortion distortion : {Distortion::none, Distortion::radtan, Distortion::equidistant, Distortion::omni,
+                                      Distortion::double_sphere, Distortion::eucm}) {
     const TemporaryDirectory directory;
     ViSceneOptions scene;
     scene.pixel_noise = 0;
@@ -124,6 +129,8 @@ TEST(SimulateVi, TracksPointAtTheirLandmarks) {
     const Files files(directory / "out");
 
     EXPECT_EQ(files.camera().camera.distortion, distortion);
+    EXPECT_EQ(files.camera().camera.coefficients, camera.camera.coefficients);
+    EXPECT_EQ(files.camera().camera.mirror, camera.camera.mirror);
     EXPECT_EQ(files.camera().timeshift_cam_imu, camera.timeshift_cam_imu);
     EXPECT_LT((files.camera().imu_T_cam.inverse() * camera.imu_T_cam).log().norm(), 1e-14);
     EXPECT_EQ(files.calibration.imu->gyroscope_walk, adis.gyroscope_walk);

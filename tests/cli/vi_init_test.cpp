@@ -227,7 +227,9 @@ TEST(ViInitData, RealReadings) {
   }
   // Densities of the data sheet: χ² of a refinement sees nothing, NEES and the meeting of windows do.
   const auto factor = [&](const char* noise) {
-    return initialise(directory, {"--truth", "r/truth.csv", "--window", "3", "--noise-factor", noise}).json;
+    return initialise(directory,
+                      {"--truth", "r/truth.csv", "--window", "3", "--noise-factor", noise, "--no-calibrate-noise"})
+        .json;
   };
   const auto compatibility = [](const Json& json) {
     double chi2 = 0, dof = 0;
@@ -242,6 +244,13 @@ TEST(ViInitData, RealReadings) {
   EXPECT_GT(compatibility(sheet), 5);
   EXPECT_LT(value(enlarged, "nees_mean"), 15);
   EXPECT_LT(compatibility(enlarged), 3);
+  // Unless it is told not to, the program finds that factor by itself, without the truth.
+  const Outcome calibrated = initialise(directory, {"--truth", "r/truth.csv", "--window", "3"});
+  EXPECT_EQ(calibrated.status, 0);
+  EXPECT_EQ(calibrated.json.at("noise_calibration").at("evidence"), "calibrated");
+  EXPECT_LT(value(calibrated.json, "nees_mean"), 10);
+  EXPECT_LT(compatibility(calibrated.json), 1.5);
+  EXPECT_EQ(calibrated.json.at("filter_start").at("status"), "ok");
 }
 
 }  // namespace

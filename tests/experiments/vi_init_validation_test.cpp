@@ -39,12 +39,12 @@ bool allPassed(const std::vector<ViInitRow>& rows) {
 }
 
 TEST(ValidateViInit, eachCheckRunsAndKeepsItsPromises) {
-  // Rows a kind of window: 9 of the refinement, 5 with walks; 2, and 3 with the bias; 6 of each accuracy; 5; 2 at
-  // rest, and of slow motion; 10; 2 intervals, and where factors are equal 3.
+  // Rows a kind of window: 10 of the refinement, 6 with walks; 2, and 3 with the bias; 6 of each accuracy; 5; 3 at
+  // rest, and 2 of slow motion; 10; 2 intervals, and where factors are equal 3.
   const std::pair<ViInitCheck, std::size_t> expected[] = {
-      {ViInitCheck::consistency, 5 * 9}, {ViInitCheck::walk, 3 * 5},         {ViInitCheck::closed_form, 3 * 2 + 3 * 3},
-      {ViInitCheck::accuracy, 4 * 6},    {ViInitCheck::gyroscope_bias, 5},   {ViInitCheck::rest, 2 * 2 + 12 * 2},
-      {ViInitCheck::drift, 10},          {ViInitCheck::noise, 3 * 3 + 4 * 2}};
+      {ViInitCheck::consistency, 5 * 10}, {ViInitCheck::walk, 3 * 6},         {ViInitCheck::closed_form, 3 * 2 + 3 * 3},
+      {ViInitCheck::accuracy, 4 * 6},     {ViInitCheck::gyroscope_bias, 5},   {ViInitCheck::rest, 2 * 3 + 12 * 2},
+      {ViInitCheck::drift, 10},           {ViInitCheck::noise, 3 * 3 + 4 * 2}};
   for (const auto& [check, count] : expected) {
     const auto rows = validateViInit(small({check}, 24));
     EXPECT_EQ(rows.size(), count) << name(check);
@@ -119,7 +119,7 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
   for (const ViInitTrial<RefinementOutcome> trial : {refinementTrial, walkTrial}) {
     const RefinementOutcome refined = trial(two_images, 1, rng);
     expectNone({refined.nees_v, refined.nees_v_g, refined.nees_all, refined.nees_last_state, refined.nees_at_last,
-                refined.chi2.cost, refined.chi2.degrees_of_freedom});
+                refined.nees_filter_start, refined.chi2.cost, refined.chi2.degrees_of_freedom});
     expectLost(refined.errors);
     EXPECT_EQ(refined.scale_of_features, infinite);
   }
@@ -132,7 +132,7 @@ TEST(ValidateViInit, lostWindowsAreMarked) {
   expectLost(gyroscope.ignored);
   const RestOutcome rest = restTrial(two_images, 1, rng);
   EXPECT_FALSE(rest.stationary);
-  expectNone({rest.nees});
+  expectNone({rest.nees, rest.nees_filter_start});
   EXPECT_FALSE(slowTrial<20>(two_images, 1, rng).stationary);
   const DriftOutcome drift = driftTrial(two_images, 1, rng);
   EXPECT_FALSE(drift.exact_selection);

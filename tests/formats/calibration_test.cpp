@@ -78,6 +78,38 @@ TEST(CalibrationFiles, Distortions) {
   EXPECT_EQ(lensOf("none", "").distortion, Distortion::none);
 }
 
+TEST(CalibrationFiles, KalibrsCameraModels) {
+  const auto cameraOf = [](const std::string& lines) {
+    return parseCalibration("cam0:\n  T_imu_cam: " + pose + "\n" + lines, "f").cameras.at(0).camera;
+  };
+  const Camera omni = cameraOf(
+      "  camera_model: omni\n  intrinsics: [1.5, 800, 801, 376, 240]\n  distortion_model: radtan\n"
+      "  distortion_coeffs: [1, 2, 3, 4]\n");
+  EXPECT_EQ(omni.distortion, Distortion::omni);
+  EXPECT_EQ(omni.mirror, 1.5);
+  EXPECT_EQ(omni.fv, 801);
+  EXPECT_EQ(omni.coefficients, Eigen::Vector4d(1, 2, 3, 4));
+  const std::string none = "  distortion_model: none\n  distortion_coeffs: []\n";
+  const Camera spheres = cameraOf("  camera_model: ds\n  intrinsics: [-0.2, 0.6, 158, 159, 255, 256]\n" + none);
+  EXPECT_EQ(spheres.distortion, Distortion::double_sphere);
+  EXPECT_EQ(spheres.coefficients, Eigen::Vector4d(-0.2, 0.6, 0, 0));
+  EXPECT_EQ(spheres.cu, 255);
+  const Camera eucm = cameraOf("  camera_model: eucm\n  intrinsics: [0.6, 1.1, 158, 159, 255, 256]\n" + none);
+  EXPECT_EQ(eucm.distortion, Distortion::eucm);
+  EXPECT_EQ(eucm.coefficients, Eigen::Vector4d(0.6, 1.1, 0, 0));
+  for (const std::string& wrong :
+       {"  camera_model: ds\n  intrinsics: [158, 159, 255, 256]\n" + none,
+        "  camera_model: ds\n  intrinsics: [0, 1.1, 158, 159, 255, 256]\n" + none,
+        "  camera_model: eucm\n  intrinsics: [0.5, 0, 158, 159, 255, 256]\n" + none,
+        "  camera_model: omni\n  intrinsics: [-1, 158, 159, 255, 256]\n" + none,
+        "  camera_model: ds\n  intrinsics: [0, 0.5, 158, 159, 255, 256]\n  distortion_model: radtan\n"
+        "  distortion_coeffs: [1, 2, 3, 4]\n" +
+            std::string(),
+        "  camera_model: sphere\n  intrinsics: [158, 159, 255, 256]\n" + none}) {
+    EXPECT_THROW(cameraOf(wrong), InputError) << wrong;
+  }
+}
+
 TEST(CalibrationFiles, FilesThatBelongTogether) {
   const TemporaryDirectory directory;
   const std::string densities =
@@ -166,8 +198,9 @@ TEST(CalibrationFiles, BadOnesAreNamed) {
   EXPECT_EQ(changed("[458,", "[0,"), "f:6: cam0's intrinsics have the focal length 0, expected a positive one");
   EXPECT_EQ(changed("[458,", "[nan,"), "f:6: cam0's intrinsics is 'nan', expected four numbers, fu fv cu cv in pixels");
   EXPECT_EQ(changed(", 248]", "]"), "f:6: cam0's intrinsics are 3, expected four numbers, fu fv cu cv in pixels");
-  EXPECT_EQ(changed("pinhole", "omni"),
-            "f:3: cam0's camera_model is 'omni', expected pinhole; others are not supported");
+  EXPECT_EQ(changed("pinhole", "scaramuzza"),
+            "f:3: cam0's camera_model is 'scaramuzza', expected pinhole, omni, ds or eucm; others are not supported");
+  EXPECT_EQ(changed("pinhole", "omni"), "f:6: cam0's intrinsics are 4, expected five numbers, xi fu fv cu cv");
   EXPECT_EQ(
       changed("radtan", "fov"),
       "f:5: cam0's distortion_model is 'fov', expected radtan (radial-tangential), equidistant or none; others are "

@@ -40,7 +40,40 @@ Camera fisheye() {
 
 Camera pinhole() { return {.fu = 450, .fv = 440, .cu = 376, .cv = 240, .width = 752, .height = 480}; }
 
-std::vector<Camera> cameras() { return {pinhole(), euroc(), fisheye()}; }
+/// Fisheye lenses with the numbers of calibrations of TUM-VI's camera, and a mirror.
+Camera doubleSphere() {
+  return {.fu = 158.28,
+          .fv = 158.27,
+          .cu = 254.96,
+          .cv = 256.86,
+          .distortion = Distortion::double_sphere,
+          .coefficients = {-0.172, 0.593, 0, 0},
+          .width = 512,
+          .height = 512};
+}
+Camera extended() {
+  return {.fu = 191.1,
+          .fv = 191.1,
+          .cu = 254.9,
+          .cv = 256.9,
+          .distortion = Distortion::eucm,
+          .coefficients = {0.63, 1.04, 0, 0},
+          .width = 512,
+          .height = 512};
+}
+Camera mirror() {
+  return {.fu = 800,
+          .fv = 800,
+          .cu = 376,
+          .cv = 240,
+          .distortion = Distortion::omni,
+          .coefficients = {-0.1, 0.02, 1e-4, -2e-4},
+          .width = 752,
+          .height = 480,
+          .mirror = 1.4};
+}
+
+std::vector<Camera> cameras() { return {pinhole(), euroc(), fisheye(), doubleSphere(), extended(), mirror()}; }
 
 // In double only: bearings enter the estimators of fusion/init, which work in double.
 static_assert(std::is_aggregate_v<Camera> && std::is_trivially_destructible_v<Camera>);
@@ -154,7 +187,11 @@ TEST(Cameras, NoiseOfABearingIsThatOfAPixelThroughTheDerivative) {
         EXPECT_NEAR(camera.bearingWithSigma({u, v}, 0.3)->sigma, 0.3 * seen->sigma, 1e-16);
       }
     }
-    EXPECT_NEAR(camera.bearingWithSigma({camera.cu, camera.cv})->sigma, 1 / std::sqrt(camera.fu * camera.fv), 1e-15);
+    // On the axis a mirror and the first sphere shrink the image by 1 + ξ.
+    const double shrinks =
+        camera.distortion == Distortion::double_sphere ? 1 + camera.coefficients[0] : 1 + camera.mirror;
+    EXPECT_NEAR(camera.bearingWithSigma({camera.cu, camera.cv})->sigma, shrinks / std::sqrt(camera.fu * camera.fv),
+                1e-15);
   }
 }
 
@@ -188,10 +225,45 @@ TEST(Cameras, AnEquidistantLensSeesBehind) {
   EXPECT_FALSE(folds.bearing({66.7, 0}));
 }
 
+// The formulas of the papers, with numbers by hand: a point one metre to the right and one ahead.
+TEST(Cameras, SphereModelsProjectAsTheirPapersSay) {
+  const double root = std::sqrt(2.);
+  const auto u = [](Camera camera, const Eigen::Vector3d& p) {
+    camera.fu = camera.fv = 1, camera.cu = camera.cv = 0;
+    const auto pixel = camera.project(p);
+    return pixel ? pixel->x() : std::numeric_limits<double>::quiet_NaN();
+  };
+  Camera spheres = doubleSphere();
+  spheres.coefficients = {0.5, 0.25, 0, 0};
+  // d1 = √2, ξ d1 + z = 1.7071, d2 = √(1 + 1.7071²).
+  const double k = 0.5 * root + 1;
+  EXPECT_NEAR(u(spheres, {1, 0, 1}), 1 / (0.25 * std::sqrt(1 + k * k) + 0.75 * k), 1e-14);
+  Camera eucm = extended();
+  eucm.coefficients = {0.25, 2, 0, 0};
+  EXPECT_NEAR(u(eucm, {1, 0, 1}), 1 / (0.25 * std::sqrt(3.) + 0.75), 1e-14);
+  Camera omni = mirror();
+  omni.coefficients.setZero();
+  EXPECT_NEAR(u(omni, {1, 0, 1}), 1 / (1 + 1.4 * root), 1e-14);
+  // A mirror of 0, spheres of (0, 0) and an α of 0 are a pinhole.
+  omni.mirror = 0, spheres.coefficients.setZero(), eucm.coefficients = {0, 1, 0, 0};
+  for (const Camera& camera : {omni, spheres, eucm}) EXPECT_NEAR(u(camera, {1, 0, 2}), 0.5, 1e-15);
+  // Where the images fold: z = -d1/ξ of a mirror; for the double sphere where the second sphere's image is largest, at
+  // the cosine -w, w = (1 - α)/α: (ξ + z)² = w² (1 + 2 ξ z + ξ²) for d1 = 1.
+  omni.mirror = 1.4, spheres.coefficients = {-0.172, 0.593, 0, 0};
+  const double w = (1 - 0.593) / 0.593, xi = -0.172, rest = 1 - w * w;
+  const double fold = -xi * rest - w * std::sqrt(1 - xi * xi * rest);
+  for (const auto& [camera, z] : {std::pair(omni, -1 / 1.4), std::pair(spheres, fold)}) {
+    const auto at = [](double cosine) { return Eigen::Vector3d(std::sqrt(1 - cosine * cosine), 0, cosine); };
+    EXPECT_TRUE(std::isfinite(u(camera, at(z + 1e-3)))) << z;
+    EXPECT_FALSE(std::isfinite(u(camera, at(z - 1e-3)))) << z;
+  }
+}
+
 TEST(Cameras, WithoutFocalLengthsNothingIsSeen) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double focal : {0.0, -300.0, nan}) {
-    for (const Distortion distortion : {Distortion::none, Distortion::radtan, Distortion::equidistant}) {
+    for (const Distortion distortion : {Distortion::none, Distortion::radtan, Distortion::equidistant, Distortion::omni,
+                                        Distortion::double_sphere, Distortion::eucm}) {
       const Camera camera{.fu = 300, .fv = focal, .distortion = distortion};
       EXPECT_FALSE(camera.project({0.1, 0.2, 1}));
       EXPECT_FALSE(camera.bearing({10, 20}));
@@ -201,7 +273,7 @@ TEST(Cameras, WithoutFocalLengthsNothingIsSeen) {
 }
 
 TEST(Cameras, ACoefficientThatIsNoNumberGivesNothing) {
-  for (Camera camera : {euroc(), fisheye()}) {
+  for (Camera camera : {euroc(), fisheye(), doubleSphere(), extended(), mirror()}) {
     camera.coefficients[1] = std::numeric_limits<double>::quiet_NaN();
     EXPECT_FALSE(camera.project({0.1, 0.2, 1}));
     EXPECT_FALSE(camera.bearing({10, 20}));

@@ -3,6 +3,7 @@
 
 #include <fusion/noise_calibration.hpp>
 #include <fusion/visual_inertial.hpp>
+#include <fusion/visual_inertial_truth.hpp>
 #include <support/vi_measurements.hpp>
 #include <support/vi_scene.hpp>
 
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace {
@@ -73,16 +75,36 @@ TEST(NoiseCalibration, FindsTheFactorOfBoth) {
   EXPECT_GE(found.chi2, 2 * found.calibrated_chi2);
   EXPECT_NEAR(std::log(found.noise.gyroscope / nominal.gyroscope), std::log(8), std::log(3));
 
-  // With them windows agree.
+  EXPECT_EQ(found.evidence, NoiseEvidence::calibrated);
+
+  // With them windows agree, which initialiseRecording() finds out by itself.
   VisualInertialRecording recording = flight.recording;
-  EXPECT_LT(initialiseRecording(recording, {}).stretches[0].p, 1e-6);
+  EXPECT_LT(initialiseRecording(recording, {.calibrate_noise = false}).stretches[0].p, 1e-6);
+  const VisualInertialResult by_itself = initialiseRecording(recording, {});
+  ASSERT_TRUE(by_itself.noise_calibration.has_value());
+  EXPECT_EQ(by_itself.noise_calibration->evidence, NoiseEvidence::calibrated);
+  EXPECT_EQ(by_itself.noise_calibration->noise.gyroscope, found.noise.gyroscope);
+  EXPECT_TRUE(by_itself.stretches[0].ok());
+  // It is that of windows that were estimated with these densities from the beginning: iterated to the same minimum from
+  // elsewhere until a step lowers the cost by less than 1e-3, which leaves some hundredths of a standard deviation.
   recording.noise = found.noise;
-  EXPECT_TRUE(initialiseRecording(recording, {}).stretches[0].ok());
-  // And a second calibration has nothing to add.
+  const VisualInertialResult afresh = initialiseRecording(recording, {.calibrate_noise = false});
+  EXPECT_TRUE(afresh.stretches[0].ok());
+  ASSERT_EQ(afresh.windows.size(), by_itself.windows.size());
+  for (std::size_t i = 0; i < afresh.windows.size(); ++i) {
+    ASSERT_TRUE(afresh.windows[i].isRefined() && by_itself.windows[i].isRefined());
+    const RefinementResult &a = *afresh.windows[i].refined, &b = *by_itself.windows[i].refined;
+    const double sigma = std::sqrt(a.covariance.of<InitialCovariance::first_velocity>().trace());
+    EXPECT_LE((a.velocity() - b.velocity()).norm(), 0.15 * sigma) << i;
+    EXPECT_NEAR(b.covariance.of<InitialCovariance::first_velocity>().trace(), sigma * sigma, 0.02 * sigma * sigma) << i;
+  }
+  // And a second calibration has nothing to add: it keeps what it was given.
   const NoiseCalibration again = calibrateNoise(recording, {});
   ASSERT_EQ(again.status, FusionStatus::ok);
   EXPECT_LE(again.common.low, 1);
   EXPECT_GE(again.common.high, 1);
+  EXPECT_EQ(again.evidence, NoiseEvidence::confirmed);
+  EXPECT_EQ(again.noise.gyroscope, recording.noise.gyroscope);
 }
 
 TEST(NoiseCalibration, TellsAGyroscopeFromAnAccelerometer) {
@@ -111,8 +133,50 @@ TEST(NoiseCalibration, WithoutMeetingsNothingIsTold) {
   const NoiseCalibration found = calibrateNoise(flight.recording, {.window = 2});
   EXPECT_EQ(found.status, FusionStatus::undetermined);
   EXPECT_EQ(found.meetings, 0u);
+  EXPECT_EQ(found.evidence, NoiseEvidence::unverified_noise);
   EXPECT_EQ(found.noise.gyroscope, nominal.gyroscope);
   EXPECT_EQ(found.noise.accelerometer, nominal.accelerometer);
+}
+
+// One meeting refutes densities that are a hundred times too small, but does not tell the factor: the most likely one is
+// used, and said to be no more than that.
+TEST(NoiseCalibration, OneMeetingVerifiesNothing) {
+  for (const double factor : {1., 100.}) {
+    const Flight flight(factor, factor, 5);
+    const VisualInertialResult result = initialiseRecording(flight.recording, {.stride = 2.4});
+    ASSERT_TRUE(result.noise_calibration.has_value());
+    const NoiseCalibration& found = *result.noise_calibration;
+    ASSERT_EQ(found.meetings, 1u);
+    EXPECT_EQ(found.evidence, NoiseEvidence::unverified_noise);
+    if (factor == 1) {
+      EXPECT_EQ(found.noise.gyroscope, nominal.gyroscope);
+    } else {
+      // Eleven degrees of freedom tell a common factor to a fifth; five times that.
+      EXPECT_NEAR(std::log(found.common.factor), std::log(factor), std::log(2.5));
+      EXPECT_LT(found.calibrated_chi2, 40);
+    }
+    const ComparedRecording compared = compareWithTruth(result, flight.scene.times, {}, 9.81);
+    if (compared.okWindows() == 0) continue;
+    ASSERT_EQ(compared.notes().size(), 1u);
+    EXPECT_EQ(compared.notes()[0].find("unverified_noise: "), 0u) << compared.notes()[0];
+  }
+}
+
+// Nothing to test where biases are given, nothing was refined, or no stretch is wanted.
+TEST(NoiseCalibration, IsLeftOutWhereNothingCanMeet) {
+  const Flight flight(1, 1, 4.5);
+  EXPECT_FALSE(initialiseRecording(flight.recording, {.refinement = false}).noise_calibration.has_value());
+  EXPECT_FALSE(initialiseRecording(flight.recording, {.stretch = 0}).noise_calibration.has_value());
+  VisualInertialOptions options;
+  options.known_bias = [](double) { return std::optional(ImuBias<double>{}); };
+  EXPECT_FALSE(initialiseRecording(flight.recording, options).noise_calibration.has_value());
+  options = {};
+  std::size_t asked = 0;
+  options.stop = [&] { return ++asked > 2; };  // the windows are estimated, the calibration is not
+  const VisualInertialResult stopped = initialiseRecording(flight.recording, options);
+  EXPECT_EQ(stopped.windows_left, 0u);
+  ASSERT_TRUE(stopped.noise_calibration.has_value());
+  EXPECT_EQ(stopped.noise_calibration->evidence, NoiseEvidence::unverified_noise);
 }
 
 TEST(NoiseCalibration, RefusesWhatInitialiseRecordingRefuses) {

@@ -8,6 +8,7 @@
 #include <fusion/visual_inertial.hpp>
 #include <lie/detail/small_matrix.hpp>
 #include <stats/detail/tail_probabilities.hpp>
+#include <stats/noise_fit.hpp>
 
 #include <Eigen/Core>
 
@@ -173,12 +174,12 @@ class MeetingModel {
 /// The meetings of a recording's windows, as functions of the densities.
 class RecordingMeetings {
  public:
-  /// The windows are those of initialiseRecording().
+  /// The windows are those of initialiseRecording(), and are left with their last estimates.
   RecordingMeetings(const VisualInertialRecording& recording, const RecordingRun& run,
-                    const std::vector<InitialisedWindow>& windows, std::function<void()> advance)
-      : recording_(recording), run_(run), windows_(windows), advance_(std::move(advance)) {
+                    std::vector<InitialisedWindow>& windows)
+      : recording_(recording), run_(run), windows_(windows) {
     // Not those that are ok: with densities that are too small, windows are refused which the calibration would mend.
-    for (FusedStretch& stretch : run.stretchesOf(windows, [](const InitialisedWindow& w) {
+    for (FusedStretch& stretch : run.stretchesOf(windows_, [](const InitialisedWindow& w) {
            return w.closedForm().status == FusionStatus::ok && !w.found.second && w.isRefined();
          })) {
       if (stretch.windows.size() > 1) stretches_.push_back(std::move(stretch));
@@ -191,79 +192,66 @@ class RecordingMeetings {
   double chi2() const { return chi2_; }
   std::size_t degrees_of_freedom() const { return degrees_of_freedom_; }
 
-  MeetingModel::Meetings at(const LogFactors& factors) {
-    const ImuNoise<double> noise = factors.of(recording_.noise);
-    const RecordingRun run = run_.withNoise(noise);
-    std::vector<InitialisedWindow> windows = windows_;
-    MeetingModel::Meetings all;
-    chi2_ = 0, degrees_of_freedom_ = 0, fused_ = 0;
-    for (FusedStretch stretch : stretches_) {
-      for (const std::size_t i : stretch.windows) windows[i].measured = windows_[i].measured.withNoise(noise);
-      const auto meetings = run.fuse(windows, stretch);
-      all.insert(all.end(), meetings.begin(), meetings.end());
-      chi2_ += stretch.chi2;
-      degrees_of_freedom_ += stretch.degrees_of_freedom;
-      fused_ += stretch.windows.size();
-    }
-    if (advance_) advance_();
-    return all;
-  }
+  /// Windows estimated anew, on from the last estimates.
+  MeetingModel::Meetings at(const LogFactors& factors) { return meetings(factors, true); }
   MeetingModel modelAt(const LogFactors& factors) {
     constexpr double step = 0.1;
-    const auto gyroscope = at({factors.gyroscope + step, factors.accelerometer});
-    const auto accelerometer = at({factors.gyroscope, factors.accelerometer + step});
-    return {factors, step, at(factors), gyroscope, accelerometer};
+    const auto here = at(factors);
+    // Estimates hardly move by a step: their covariances there are enough.
+    const auto gyroscope = meetings({factors.gyroscope + step, factors.accelerometer}, false);
+    const auto accelerometer = meetings({factors.gyroscope, factors.accelerometer + step}, false);
+    return {factors, step, here, gyroscope, accelerometer};
   }
 
  private:
+  MeetingModel::Meetings meetings(const LogFactors& factors, bool estimate) {
+    const ImuNoise<double> noise = factors.of(recording_.noise);
+    const RecordingRun run = run_.withNoise(noise);
+    MeetingModel::Meetings all;
+    double chi2 = 0;
+    std::size_t dof = 0, fused = 0;
+    for (FusedStretch stretch : stretches_) {
+      for (const std::size_t i : stretch.windows) windows_[i].measured = windows_[i].measured.withNoise(noise);
+      const std::vector<std::size_t> of = stretch.windows;
+      // Estimates to a tenth of a standard deviation.
+      const auto estimates =
+          run.estimates(windows_, stretch, estimate ? 0.01 : std::numeric_limits<double>::infinity());
+      const auto meetings = run.fuse(windows_, estimates, stretch);
+      for (std::size_t k = 0; estimate && k < of.size(); ++k) {
+        if (estimates[k] && estimates[k]->converged()) windows_[of[k]].refined = estimates[k];
+      }
+      all.insert(all.end(), meetings.begin(), meetings.end());
+      chi2 += stretch.chi2;
+      dof += stretch.degrees_of_freedom;
+      fused += stretch.windows.size();
+    }
+    if (estimate) chi2_ = chi2, degrees_of_freedom_ = dof, fused_ = fused;
+    return all;
+  }
+
   const VisualInertialRecording& recording_;
   const RecordingRun& run_;
-  const std::vector<InitialisedWindow>& windows_;
-  std::function<void()> advance_;
+  std::vector<InitialisedWindow>& windows_;
   std::vector<FusedStretch> stretches_;
   std::size_t fused_ = 0, degrees_of_freedom_ = 0;
   double chi2_ = 0;
 };
 
-}  // namespace detail
-
-LIESTAT_FUSION_INLINE NoiseCalibration
-calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,
-               const std::function<void(std::size_t done, std::size_t all)>& progress) {
-  using detail::LogFactors;
-  constexpr int max_passes = 10;
+LIESTAT_FUSION_INLINE NoiseCalibration calibrateWindows(const VisualInertialRecording& recording,
+                                                        const RecordingRun& run,
+                                                        std::vector<InitialisedWindow>& windows,
+                                                        const std::function<bool()>& goesOn) {
   NoiseCalibration result;
   result.noise = recording.noise;
-  VisualInertialOptions how = options;
-  how.refinement = true;
-  if (!(how.stretch > 0)) how.stretch = VisualInertialOptions{}.stretch;
-  VisualInertialResult initial;
-  std::size_t windows = 0, done = 0;
-  constexpr std::size_t passes = 3 * max_passes + 1;
-  {
-    VisualInertialOptions alone = how;
-    alone.stretch = 0;
-    initial = initialiseRecording(recording, alone, [&](std::size_t k, std::size_t all) {
-      windows = all;
-      if (progress) progress(k, all + passes);
-    });
-  }
-  result.fault = initial.fault;
-  if (result.fault) return result;
-  VisualInertialResult unused;
-  const detail::RecordingRun run(recording, how, unused);
-  detail::RecordingMeetings recorded(recording, run, initial.windows, [&] {
-    done = std::min(done + 1, passes);
-    if (progress) progress(windows + done, windows + passes);
-  });
   result.status = FusionStatus::undetermined;
+  RecordingMeetings recorded(recording, run, windows);
   if (recorded.stretches() == 0) return result;
 
   LogFactors factors;
-  std::optional<detail::MeetingModel> model;
-  for (int pass = 0;; ++pass) {
+  std::optional<MeetingModel> model;
+  for (std::size_t pass = 1;; ++pass) {
     model = recorded.modelAt(factors);
-    if (pass == 0) {
+    if (pass == 1) {
       result.chi2 = result.calibrated_chi2 = recorded.chi2();
       result.degrees_of_freedom = recorded.degrees_of_freedom();
       result.windows = recorded.windows();
@@ -274,32 +262,41 @@ calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOpt
     // Meetings are computed where each density has a share in them that can be told: below, the model says as much.
     const LogFactors next{std::max({best.gyroscope, factors.gyroscope - 1, -1.}),
                           std::max({best.accelerometer, factors.accelerometer - 1, -1.})};
-    if ((*model)(factors) - (*model)(next) < 0.05) break;
-    if (pass + 1 == max_passes) {
+    // Over less than a standard deviation the model holds: its best factors are better than these.
+    if ((*model)(factors) - (*model)(next) < 0.5) break;
+    if (!goesOn() || pass + 1 == max_noise_passes) {
       result.status = FusionStatus::not_converged;
       return result;
     }
     // Differences move with the factors, so that full steps may go to and fro.
-    const double length = pass < 3 ? 1 : 0.5;
+    const double length = pass < 4 ? 1 : 0.5;
     factors.gyroscope += length * (next.gyroscope - factors.gyroscope);
     factors.accelerometer += length * (next.accelerometer - factors.accelerometer);
   }
 
   const LogFactors best = model->best();
   const double least = (*model)(best);
-  result.gyroscope = detail::intervalOf([&](double x) { return model->gyroscopeProfile(x); }, {best.gyroscope, least},
-                                        result.meetings);
-  result.accelerometer = detail::intervalOf([&](double x) { return model->accelerometerProfile(x); },
-                                            {best.accelerometer, least}, result.meetings);
+  result.gyroscope =
+      intervalOf([&](double x) { return model->gyroscopeProfile(x); }, {best.gyroscope, least}, result.meetings);
+  result.accelerometer = intervalOf([&](double x) { return model->accelerometerProfile(x); },
+                                    {best.accelerometer, least}, result.meetings);
   const auto common = [&](double x) { return model->common(x); };
-  const auto best_common = detail::minimumOf(common, LogFactors::least, LogFactors::most);
-  result.common = detail::intervalOf(common, best_common, result.meetings);
-  result.common_p = detail::probabilityOfRise(best_common.second - least, result.meetings);
+  const auto best_common = minimumOf(common, LogFactors::least, LogFactors::most);
+  result.common = intervalOf(common, best_common, result.meetings);
+  result.common_p = probabilityOfRise(best_common.second - least, result.meetings);
   result.separable = result.gyroscope.isTold() && result.accelerometer.isTold();
-  if (std::isinf(result.common.high)) return result;
-  // A factor that the recording does not determine stays as close to 1 as its interval permits.
-  const auto held = [](const NoiseFactor& factor) { return std::log(std::clamp(1., factor.low, factor.high)); };
-  if (result.separable || result.common_p < 0.05) {
+  // Few meetings may refute the densities by their χ², and not tell the factors.
+  const bool contradicted = chiSquaredTail(result.chi2, result.degrees_of_freedom) < refutation_level;
+  if (std::isinf(result.common.high) && !contradicted) return result;
+  bool told = result.common.isTold(), refuted = contradicted || result.common.refutesOne();
+  // A factor that the recording does not determine stays as close to 1 as its interval permits; where none is determined,
+  // and the densities are refuted, it is the most likely one.
+  const auto held = [&](const NoiseFactor& factor) {
+    return std::log(told || !contradicted ? std::clamp(1., factor.low, factor.high) : factor.factor);
+  };
+  if (result.hasTwoFactors()) {
+    told = result.gyroscope.isTold() || result.accelerometer.isTold();
+    refuted = contradicted || result.gyroscope.refutesOne() || result.accelerometer.refutesOne();
     // The other one goes with it.
     if (!result.gyroscope.isTold()) {
       const double x = held(result.gyroscope);
@@ -312,15 +309,56 @@ calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOpt
     }
     factors = {std::log(result.gyroscope.factor), std::log(result.accelerometer.factor)};
   } else {
-    const double x = result.common.isTold() ? best_common.first : held(result.common);
+    const double x = told ? best_common.first : held(result.common);
     result.common.factor = std::exp(x);
     factors = {x, x};
   }
+  result.status = FusionStatus::ok;
+  if (!refuted) {
+    const bool bounded = result.hasTwoFactors()
+                             ? result.gyroscope.excludesLarger() && result.accelerometer.excludesLarger()
+                             : result.common.excludesLarger();
+    if (bounded) result.evidence = NoiseEvidence::confirmed;
+    return result;
+  }
+  if (told) result.evidence = NoiseEvidence::calibrated;
   recorded.at(factors);
   result.calibrated_chi2 = recorded.chi2();
   result.noise = factors.of(recording.noise);
-  result.status = FusionStatus::ok;
   return result;
+}
+
+}  // namespace detail
+
+LIESTAT_FUSION_INLINE NoiseCalibration
+calibrateNoise(const VisualInertialRecording& recording, const VisualInertialOptions& options,
+               const std::function<void(std::size_t done, std::size_t all)>& progress) {
+  VisualInertialOptions how = options;
+  how.refinement = true;
+  how.calibrate_noise = false;
+  if (!(how.stretch > 0)) how.stretch = VisualInertialOptions{}.stretch;
+  std::size_t windows = 0, done = 0;
+  VisualInertialResult initial;
+  {
+    VisualInertialOptions alone = how;
+    alone.stretch = 0;
+    initial = initialiseRecording(recording, alone, [&](std::size_t k, std::size_t all) {
+      windows = all;
+      if (progress) progress(k, all + detail::max_noise_passes);
+    });
+  }
+  if (initial.fault) {
+    NoiseCalibration refused;
+    refused.noise = recording.noise;
+    refused.fault = initial.fault;
+    return refused;
+  }
+  VisualInertialResult unused;
+  const detail::RecordingRun run(recording, how, unused);
+  return detail::calibrateWindows(recording, run, initial.windows, [&] {
+    if (progress) progress(windows + ++done, windows + detail::max_noise_passes);
+    return true;
+  });
 }
 
 }  // namespace liestat

@@ -99,6 +99,8 @@ LIESTAT_FUSION_INLINE ComparedRecording compareWithTruth(VisualInertialResult fo
                                                          std::optional<double> gravity) {
   ComparedRecording result;
   result.gravity = gravity;
+  result.noise_calibration = found.noise_calibration;
+  result.filter_start = found.filter_start;
   result.bearing_noise = found.bearing_noise;
   result.images_outside = found.images_outside;
   result.windows_left = found.windows_left;

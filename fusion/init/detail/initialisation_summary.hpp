@@ -44,6 +44,30 @@ LIESTAT_FUSION_INLINE Verdict ComparedRecording::verdict() const {
   return Verdict::yes(text + ".");
 }
 
+LIESTAT_FUSION_INLINE std::vector<std::string> ComparedRecording::notes() const {
+  std::vector<std::string> notes;
+  if (noiseIsVerified() || okWindows() == 0) return notes;
+  std::string note = "unverified_noise: the given densities of the inertial sensor's noise ";
+  if (!noise_calibration) {
+    note += "were not tested, and the covariances rest on them";
+  } else if (noise_calibration->meetings == 0) {
+    note += "were not contradicted, because no windows met, and the covariances rest on them";
+  } else {
+    const std::size_t n = noise_calibration->meetings;
+    const bool refuted = noise_calibration->calibrated_chi2 != noise_calibration->chi2;
+    note += std::string(refuted ? "are refuted by " : "are not told by ") + std::to_string(n) +
+            (n == 1 ? " meeting" : " meetings") + " of windows" +
+            (refuted ? ", but not by how much: the covariances rest on the most likely ones"
+                     : ", and the covariances rest on them");
+  }
+  if (noise_calibration && std::isfinite(noise_calibration->common.high)) {
+    const NoiseFactor& common = noise_calibration->common;
+    note += " (95 %: factors from " + significant(common.low, 2) + " to " + significant(common.high, 2) + ")";
+  }
+  notes.push_back(note);
+  return notes;
+}
+
 namespace detail {
 
 /// The mean of these NEES with a part, where it is known.

@@ -92,9 +92,11 @@ inline void judge(RefinementResult& result, const InitialisationOptions& options
   }
 }
 
-/// One refinement with the motions as they are; at rest: with velocities and displacements of zero.
+/// One refinement with the motions as they are; at rest: with velocities and displacements of zero. `former`, if there
+/// is one, has the states to start from.
 inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFormSolution& start,
-                                   const ImuBias<double>& bias, const InitialisationOptions& options, bool at_rest) {
+                                   const ImuBias<double>& bias, const InitialisationOptions& options, bool at_rest,
+                                   const RefinementResult* former) {
   RefinementResult result;
   RefinementProblem problem(window, options);
   if (at_rest) problem.holdStill();
@@ -102,7 +104,7 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
     result.status = FusionStatus::bad_motion;
     return result;
   }
-  problem.start(start, bias);
+  problem.start(start, bias, former);
   if (problem.features().empty()) {
     result.status = FusionStatus::no_start;
     return result;
@@ -133,7 +135,8 @@ inline RefinementResult refineOnce(const InertialWindow& window, const ClosedFor
     result.status = FusionStatus::undetermined;
     return result;
   }
-  result.status = summary.status;
+  // Without iterations the start is the answer.
+  result.status = options.refinement.max_iterations == 0 ? FusionStatus::ok : summary.status;
   result.covariance.joint = jointCovariance(problem, system);
   if (!at_rest) result.scale_sigma = scaleSigma(problem, system);
   judge(result, options, at_rest);
@@ -151,7 +154,7 @@ namespace detail {
 
 inline RefinementResult refineFrom(InertialWindow window, const ClosedFormSolution& start,
                                    const ImuBias<double>& start_bias, const InitialisationOptions& options,
-                                   bool at_rest) {
+                                   bool at_rest, const RefinementResult* former = nullptr) {
   RefinementResult result;
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
   const BiasPrior& prior = options.prior;
@@ -171,8 +174,9 @@ inline RefinementResult refineFrom(InertialWindow window, const ClosedFormSoluti
   ClosedFormSolution from = start;
   int integrations = window.integrateIfFar(bias);
   for (;;) {
-    result = detail::refineOnce(window, from, bias, options, at_rest);
+    result = detail::refineOnce(window, from, bias, options, at_rest, former);
     result.integrations = integrations;
+    former = nullptr;
     if (!result.must_reintegrate || integrations >= options.refinement.max_integrations) return result;
     // Too far for a first-order update: the readings again with these biases, and on from there.
     if (!window.integrateIfFar(result.bias)) return result;
@@ -187,6 +191,12 @@ inline RefinementResult refineFrom(InertialWindow window, const ClosedFormSoluti
 LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const ClosedFormSolution& start,
                                               const ImuBias<double>& start_bias, const InitialisationOptions& options) {
   return detail::refineFrom(std::move(window), start, start_bias, options, false);
+}
+
+LIESTAT_FUSION_INLINE RefinementResult refine(InertialWindow window, const RefinementResult& former,
+                                              const InitialisationOptions& options) {
+  const ClosedFormSolution start{.velocity = former.velocity(), .gravity = former.gravity, .features = former.features};
+  return detail::refineFrom(std::move(window), start, former.bias, options, false, &former);
 }
 
 LIESTAT_FUSION_INLINE RefinementResult refineAtRest(InertialWindow window, const Eigen::Vector3d& gravity,

@@ -140,16 +140,25 @@ class RefinementProblem {
     }
     return true;
   }
-  /// Starts at a solution; features that are not in front of all their cameras are left out.
-  void start(const ClosedFormSolution& s, const ImuBias<double>& bias) {
+  /// Starts at a solution, or at the states and biases of a former result for the same images; features that are not in
+  /// front of all their cameras are left out.
+  void start(const ClosedFormSolution& s, const ImuBias<double>& bias, const RefinementResult* former) {
     state_.bias.assign(window_.size(), bias);
     state_.gravity = s.gravity;
     if (options_.gravity) state_.gravity *= *options_.gravity / s.gravity.norm();
-    for (const BiasedImage& b : biasedImages(window_.motions(), bias)) {
-      const double t = b.image.time;
-      state_.X.emplace_back(SO3d(b.image.rotation),
-                            Eigen::Vector3d(t * s.velocity + (0.5 * t * t) * state_.gravity + b.image.displacement),
-                            Eigen::Vector3d(s.velocity + t * state_.gravity + b.speed));
+    if (former != nullptr && former->states.size() == window_.size()) {
+      state_.X = former->states;
+      for (std::size_t j = 1; j < state_.bias.size(); ++j) {
+        const double part = static_cast<double>(j) / static_cast<double>(state_.bias.size() - 1);
+        if (walks_.gyroscope) {
+          state_.bias[j].gyroscope += part * (former->last_bias.gyroscope - former->bias.gyroscope);
+        }
+        if (walks_.accelerometer) {
+          state_.bias[j].accelerometer += part * (former->last_bias.accelerometer - former->bias.accelerometer);
+        }
+      }
+    } else {
+      startFromReadings(s, bias);
     }
     for (std::size_t i = 0; i < window_.features.size() && i < s.features.size(); ++i) {
       const FeatureTrack& track = window_.features[i];
@@ -207,6 +216,15 @@ class RefinementProblem {
   void accept() { std::swap(state_, next_); }
 
  private:
+  /// The states that velocity, gravity and readings predict.
+  void startFromReadings(const ClosedFormSolution& s, const ImuBias<double>& bias) {
+    for (const BiasedImage& b : biasedImages(window_.motions(), bias)) {
+      const double t = b.image.time;
+      state_.X.emplace_back(SO3d(b.image.rotation),
+                            Eigen::Vector3d(t * s.velocity + (0.5 * t * t) * state_.gravity + b.image.displacement),
+                            Eigen::Vector3d(s.velocity + t * state_.gravity + b.speed));
+    }
+  }
   /// Images but the first.
   int moved() const { return static_cast<int>(state_.X.size()) - 1; }
   /// Blocks of each moved image that precede all poses.

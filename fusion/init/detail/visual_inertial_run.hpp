@@ -1,6 +1,7 @@
 // How fusion/visual_inertial.hpp slides windows over a recording and fuses them.
 #pragma once
 
+#include <fusion/detail/compiled.hpp>
 #include <fusion/detail/median.hpp>
 #include <fusion/init/detail/second_motion.hpp>
 #include <fusion/init/closed_form.hpp>
@@ -17,6 +18,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -99,10 +101,14 @@ class RecordingRun {
   }
 
   /// A window refined with the n-th part of the information of the prior of the biases; empty: nothing to start from.
-  std::optional<RefinementResult> refined(const InitialisedWindow& w, std::size_t n) const {
+  /// Converged where the cost decreases by less than min_decrease; where that is infinite only the covariance is new.
+  std::optional<RefinementResult> refined(const InitialisedWindow& w, std::size_t n,
+                                          std::optional<double> min_decrease = {}) const {
     const bool at_rest = w.closedForm().status == FusionStatus::stationary && !w.closedForm().solutions.empty();
     if (!at_rest && !w.closedForm().hasMotion()) return std::nullopt;
     InitialisationOptions options = optionsOf(w);
+    if (min_decrease) options.refinement.min_decrease = *min_decrease;
+    if (std::isinf(options.refinement.min_decrease)) options.refinement.max_iterations = 0;
     if (w.known_biases) options.prior = {w.measured.bias(), 1e-6, 1e-6};  // as good as exact
     if (at_rest) {
       if (n == 1 && w.found.rest) return w.found.rest;
@@ -113,17 +119,15 @@ class RecordingRun {
     if (!w.isRefined()) {
       return refine(w.measured.without(w.found.outliers), closed, w.measured.bias(), withSharedPrior(options, n));
     }
-    // Again, with another noise or prior: on from the first result.
-    const ClosedFormSolution start{
-        .velocity = w.refined->velocity(), .gravity = w.refined->gravity, .features = w.refined->features};
-    return refine(w.measured.without(w.found.outliers), start, w.refined->bias, withSharedPrior(options, n));
+    // Again, with another noise or prior.
+    return refine(w.measured.without(w.found.outliers), *w.refined, withSharedPrior(options, n));
   }
 
   /// Disjoint windows that are ok, in stretches, each as one.
   std::vector<FusedStretch> fuse(const std::vector<InitialisedWindow>& windows) const {
     std::vector<FusedStretch> stretches =
         stretchesOf(windows, [](const InitialisedWindow& w) { return w.ok() && w.refined; });
-    for (FusedStretch& stretch : stretches) fuse(windows, stretch);
+    for (FusedStretch& stretch : stretches) fuse(windows, estimates(windows, stretch), stretch);
     return stretches;
   }
 
@@ -151,24 +155,49 @@ class RecordingRun {
     other.noise_ = noise;
     return other;
   }
+  /// A window of a run with another noise. Which tracks agree and where the motion starts are questions of the bearings;
+  /// a window that has no motion is estimated anew, because rest is a question of the readings.
+  InitialisedWindow withThisNoise(const InitialisedWindow& window, std::size_t number) const {
+    if (window.fault) return window;
+    if (window.closedForm().status != FusionStatus::ok || !window.isRefined()) {
+      return estimate(window.images, window.bias(), number);
+    }
+    InitialisedWindow w = window;
+    w.measured = w.measured.withNoise(noise_);
+    w.refined = refined(w, 1);
+    return w;
+  }
 
   /// A window's meeting with those before it.
   struct Meeting {
     std::size_t window;  ///< index in the result's windows
     WindowFusion::Meeting outcome;
   };
-  /// Fuses a stretch; returns its meetings.
-  std::vector<Meeting> fuse(const std::vector<InitialisedWindow>& windows, FusedStretch& stretch) const {
+  /// The windows of a stretch, each with its part of the prior.
+  std::vector<std::optional<RefinementResult>> estimates(const std::vector<InitialisedWindow>& windows,
+                                                         const FusedStretch& stretch,
+                                                         std::optional<double> min_decrease = {}) const {
     const std::size_t n = stretch.windows.size();
+    std::vector<std::optional<RefinementResult>> all;
+    for (const std::size_t i : stretch.windows) {
+      all.push_back(n == 1 && !min_decrease ? windows[i].refined : refined(windows[i], n, min_decrease));
+    }
+    return all;
+  }
+  /// Fuses a stretch of such estimates; returns its meetings.
+  std::vector<Meeting> fuse(const std::vector<InitialisedWindow>& windows,
+                            const std::vector<std::optional<RefinementResult>>& estimates,
+                            FusedStretch& stretch) const {
     stretch.gravity =
         options_.initialisation.gravity.value_or(windows[stretch.windows.front()].refined->gravity.norm());
     WindowFusion fusion(stretch.gravity);
     double end = 0;
     std::vector<std::size_t> used;
     std::vector<Meeting> meetings;
-    for (const std::size_t i : stretch.windows) {
+    for (std::size_t k = 0; k < stretch.windows.size(); ++k) {
+      const std::size_t i = stretch.windows[k];
       const InitialisedWindow& w = windows[i];
-      const std::optional<RefinementResult> estimate = n == 1 ? w.refined : refined(w, n);
+      const std::optional<RefinementResult>& estimate = estimates[k];
       if (!estimate) continue;
       const auto meeting = fusion.add(windowStates(*estimate), [&](const ImuBias<double>& bias) {
         const auto between = motion(end, w.begin, bias);
@@ -284,5 +313,13 @@ class RecordingRun {
   std::size_t tracks_ = 0;
   double bearing_noise_ = 0;
 };
+
+/// The calibration of a recording's noise by its windows (fusion/noise_calibration.hpp). goesOn() is asked after each of at
+/// most `max_noise_passes` passes over all of them; once it says no, the status is not_converged. Windows are left as the
+/// last pass has estimated them: starts for an estimate with the calibrated noise.
+inline constexpr std::size_t max_noise_passes = 11;
+LIESTAT_FUSION_API NoiseCalibration calibrateWindows(const VisualInertialRecording& recording, const RecordingRun& run,
+                                                     std::vector<InitialisedWindow>& windows,
+                                                     const std::function<bool()>& goesOn);
 
 }  // namespace liestat::detail
