@@ -380,6 +380,17 @@ class Hierarchy {
     return best;
   }
 
+  /// A local optimum that so many starts reach ends the search for others.
+  static constexpr std::size_t agreeing_starts = 3;
+  /// The samples of a local optimum's own inliers that may confirm it.
+  static constexpr std::size_t own_samples = 5;
+  /// Passes from a hypothesis to a local optimum: the first ones within a multiple of the threshold, whose optima are
+  /// few, the others with few steps of the estimate each, because the inliers still change.
+  static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 5;
+  static constexpr double wide_threshold = 9;
+  /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half a
+  /// measurement: a choice between these is one between accidents.
+  static constexpr std::int64_t same_optimum = std::int64_t{1} << 20, equal_scores = std::int64_t{1} << 31;
   /// The share of right measurements among those off a dominant model that its completion reckons with.
   static constexpr double min_completing_share = 0.15;
   static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
@@ -388,6 +399,7 @@ class Hierarchy {
   struct Refined {
     std::uint64_t key = 0;
     ModelEstimate<Parameter> estimate;
+    bool is_rough = false;
   };
 
   /// Looks parents up, and what contains what.
@@ -532,50 +544,60 @@ class Hierarchy {
     std::vector<double> errors;
     double threshold = 0;
     std::int64_t score = 0;
+    bool is_rough = false;    ///< the steps of the estimate were counted
+    std::size_t reached = 1;  ///< by so many starts
+    bool set_aside = false;   ///< no other start confirms it
+
+    bool isBetterThan(const Candidate& other) const {
+      if (set_aside != other.set_aside) return other.set_aside;
+      const bool usable = estimate.usable();
+      return usable != other.estimate.usable() ? usable : score > other.score;
+    }
   };
-  /// The estimate from a hypothesis: from its inliers, and once again from those of that estimate. To go on until
-  /// nothing changes makes a threshold that follows the errors collapse. None if `stop` ended it.
+  /// The local optimum that a hypothesis leads to: the estimate from the measurements within a wide threshold, and then
+  /// from the inliers until these repeat. None if `stop` ended it.
   std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
-                                  const StopRequest& stop) const {
+                                  int passes, const StopRequest& stop) const {
     std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
     for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
-    return refine(m, draws_[m].at(place).parameter, key, made, stop);
+    return refine(m, draws_[m].at(place).parameter, key, made, passes, stop);
   }
   std::optional<Candidate> refine(std::size_t m, Parameter parameter, std::uint64_t key, std::vector<Refined>& made,
-                                  const StopRequest& stop) const {
+                                  int passes, const StopRequest& stop) const {
     Candidate candidate;
     candidate.errors = errorsOf(m, parameter);
     candidate.threshold = thresholdOf(m, candidate.errors);
     std::uint64_t last = 0;
-    for (int pass = 0; pass < 2; ++pass) {
+    int steps = 0;
+    const StopRequest few_steps = [&] { return ++steps >= rough_steps || (stop && stop()); };
+    for (int pass = 0; pass < passes; ++pass) {
       std::vector<Measurement> inliers;
-      std::uint64_t set = 0;
-      for (std::size_t i = 0; i < size(); ++i) {
-        if (!(candidate.errors[i] < limitOf(m, candidate.threshold, i))) continue;
-        inliers.push_back(measurements_[i]);
-        set = detail::mixBits(set, measurements_.key(i));
+      const std::uint64_t set = inliersOf(m, candidate, pass < wide_passes ? wide_threshold : 1, key, inliers);
+      if (set == last && pass > 0) {
+        if (pass < wide_passes) continue;
+        break;
       }
-      const std::uint64_t pass_key = detail::mixBits(key, set);
-      if (pass > 0 && pass_key == last) break;  // the same inliers
-      last = pass_key;
-      const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == pass_key; });
+      last = set;
+      const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == set; });
       ModelEstimate<Parameter> found;
+      bool is_rough = false;
       if (known != made.end()) {
-        found = known->estimate;
+        found = known->estimate, is_rough = known->is_rough;
       } else {
-        found = models_[m]->estimate(parameter, inliers, stop);
+        steps = 0;
+        found = models_[m]->estimate(parameter, inliers, few_steps);
         if (stop && stop()) return std::nullopt;
-        made.push_back({pass_key, found});
+        is_rough = steps >= rough_steps;
+        made.push_back({set, found, is_rough});
       }
       if (!found.usable()) break;
+      candidate.is_rough = is_rough;
       candidate.estimate = std::move(found);
       parameter = candidate.estimate.parameter;
       candidate.errors = errorsOf(m, parameter);
       candidate.threshold = thresholdOf(m, candidate.errors);
     }
-    for (std::size_t i = 0; i < size(); ++i) {
-      candidate.score += detail::scoreOf(options_.score, candidate.errors[i], limitOf(m, candidate.threshold, i));
-    }
+    candidate.score = scoreOf(m, candidate.errors, candidate.threshold);
     return candidate;
   }
   /// Hypotheses of a model from the estimate of another one that dominates its inliers, and measurements off that.
@@ -612,11 +634,7 @@ class Hierarchy {
       model.complete(*models_[other], states_[other].estimate.parameter, sampled, solutions);
       for (const Parameter& solution : solutions) {
         model.errors(solution, measurements_.all(), errors);
-        std::int64_t score = 0;
-        for (std::size_t i = 0; i < size(); ++i) {
-          score += detail::scoreOf(options_.score, errors[i], limitOf(m, knownThreshold(model.equations()), i));
-        }
-        scored.emplace_back(score, solution);
+        scored.emplace_back(scoreOf(m, errors, knownThreshold(model.equations())), solution);
       }
     }
     std::stable_sort(scored.begin(), scored.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -645,33 +663,112 @@ class Hierarchy {
                                          model.equations(), std::max(shown, model.chance(candidate.threshold)));
   }
 
-  /// The best of the estimates from the best hypotheses: samples of few measurements are noisy, and one outlier far from the
-  /// others may hold an estimate that begins with it. False if `stop` ended it.
-  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
+  /// The measurements within a multiple of the candidate's threshold, and their key.
+  std::uint64_t inliersOf(std::size_t m, const Candidate& candidate, double wide, std::uint64_t key,
+                          std::vector<Measurement>& inliers) const {
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (!(candidate.errors[i] < wide * limitOf(m, candidate.threshold, i))) continue;
+      inliers.push_back(measurements_[i]);
+      key = detail::mixBits(key, measurements_.key(i));
+    }
+    return key;
+  }
+  /// The same from the best solution of a sample of an estimate's own inliers.
+  std::optional<Candidate> refineOwnSample(std::size_t m, const Candidate& of, std::size_t draw,
+                                           const StopRequest& stop) const {
+    const Model& model = *models_[m];
+    std::vector<std::size_t> sample;
+    detail::keyedSample(measurements_, detail::mixBits(draw), model.sampleSize(), sample,
+                        [&](std::size_t i) { return of.errors[i] < limitOf(m, of.threshold, i); });
+    std::vector<Measurement> sampled;
+    for (const std::size_t i : sample) sampled.push_back(measurements_[i]);
+    std::vector<Parameter> solutions;
+    if (sample.size() == model.sampleSize()) model.solve(sampled, solutions);
     std::optional<Candidate> best;
-    const auto take = [&](std::optional<Candidate> candidate) {
-      const bool better = !best || (candidate->estimate.usable() && !best->estimate.usable()) ||
-                          (candidate->estimate.usable() == best->estimate.usable() && candidate->score > best->score);
-      if (better) best = std::move(candidate);
+    for (const Parameter& solution : solutions) {
+      Candidate one;
+      one.errors = errorsOf(m, solution);
+      one.score = scoreOf(m, one.errors, knownThreshold(model.equations()));
+      if (best && best->score >= one.score) continue;
+      best = std::move(one), best->estimate.parameter = solution;
+    }
+    if (!best) return Candidate{};
+    std::vector<Refined> made;
+    return refine(m, best->estimate.parameter, 0, made, max_passes, stop);
+  }
+  std::int64_t scoreOf(std::size_t m, std::span<const double> errors, double threshold) const {
+    std::int64_t score = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      score += detail::scoreOf(options_.score, errors[i], limitOf(m, threshold, i));
+    }
+    return score;
+  }
+  /// The best of the local optima that the best hypotheses lead to. One that a single start reaches may be an accident of
+  /// the draws: with `last` it stands if samples of its own inliers, which do not depend on the seed, lead to it again.
+  /// False if `stop` ended it.
+  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
+    std::vector<Candidate> optima;
+    const std::int64_t same = same_optimum * static_cast<std::int64_t>(std::max<std::size_t>(size(), 64));
+    const auto visit = [&](std::optional<Candidate> found) {
+      for (Candidate& known : optima) {
+        if (std::abs(known.score - found->score) > same) continue;
+        if (known.estimate.usable() == found->estimate.usable()) return void(++known.reached);
+      }
+      optima.push_back(std::move(*found));
+    };
+    // Of those with the best score, or one as good, the one that most starts reach.
+    const auto best = [&] {
+      std::size_t first = 0;
+      for (std::size_t k = 1; k < optima.size(); ++k) first = optima[k].isBetterThan(optima[first]) ? k : first;
+      std::size_t most = first;
+      for (std::size_t k = 0; k < optima.size(); ++k) {
+        const bool equal = !optima[k].set_aside && optima[k].estimate.usable() == optima[first].estimate.usable() &&
+                           optima[first].score - optima[k].score < equal_scores;
+        if (equal && optima[k].reached > optima[most].reached) most = k;
+      }
+      return most;
     };
     for (const auto& place : draws_[m].ranked(count)) {
-      std::optional<Candidate> candidate = refine(m, place, refined_[m], stop);
+      std::optional<Candidate> candidate = refine(m, place, refined_[m], last ? max_passes : wide_passes + 1, stop);
       if (!candidate) return false;
-      take(std::move(candidate));
+      visit(std::move(candidate));
+      if (optima[best()].reached >= agreeing_starts) break;
     }
     for (std::size_t other = 0; last && other < models_.size(); ++other) {
       const Completions completions = completionsBy(other, m, count);
       for (const Parameter& parameter : completions.best) {
         std::vector<Refined> made;  // no key of measurements names where these begin: nothing is kept
-        std::optional<Candidate> candidate = refine(m, parameter, 0, made, stop);
+        std::optional<Candidate> candidate = refine(m, parameter, 0, made, max_passes, stop);
         if (!candidate) return false;
-        if (isBeyondChance(m, other, completions, *candidate)) take(std::move(candidate));
+        if (isBeyondChance(m, other, completions, *candidate)) visit(std::move(candidate));
+      }
+    }
+    for (std::size_t draw = 0; last && models_[m]->sampleSize() > 0 && draw < own_samples;) {
+      const std::size_t now = best();
+      if (optima[now].set_aside || optima[now].reached > 1) break;
+      for (; draw < own_samples && best() == now && optima[now].reached == 1; ++draw) {
+        std::optional<Candidate> candidate = refineOwnSample(m, optima[now], draw, stop);
+        if (!candidate) return false;
+        if (!candidate->errors.empty()) visit(std::move(candidate));
+      }
+      optima[now].set_aside = best() == now && optima[now].reached == 1;
+    }
+    Candidate& found = optima[best()];
+    if (last && found.is_rough) {
+      std::vector<Measurement> inliers;
+      inliersOf(m, found, 1, 0, inliers);
+      ModelEstimate<Parameter> whole = models_[m]->estimate(found.estimate.parameter, inliers, stop);
+      if (stop && stop()) return false;
+      if (whole.usable()) {
+        found.estimate = std::move(whole);
+        found.errors = errorsOf(m, found.estimate.parameter);
+        found.threshold = thresholdOf(m, found.errors);
       }
     }
     State& state = states_[m];
-    state.estimate = std::move(best->estimate);
-    state.threshold = best->threshold;
-    state.errors = std::move(best->errors);
+    state.estimate = std::move(found.estimate);
+    state.threshold = found.threshold;
+    state.errors = std::move(found.errors);
     state.outdated = false;
     classify(m);
     decide();
@@ -715,7 +812,7 @@ class Hierarchy {
     state.progress = State::Progress::evaluated;
     state.draws = draws_[m].looked();
     // Those that may be asked for again.
-    const std::size_t most = 4 * std::max<std::size_t>(options_.refined_hypotheses, 1);
+    const std::size_t most = max_passes * std::max<std::size_t>(options_.refined_hypotheses, 1);
     auto& made = refined_[m];
     if (made.size() > most) made.erase(made.begin(), made.end() - static_cast<std::ptrdiff_t>(most));
     decide();

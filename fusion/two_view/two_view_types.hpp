@@ -88,7 +88,8 @@ struct TwoViewImageFrame {
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
-  /// are the same one; contested: the matches do not tell the chosen model from the rivals.
+  /// are the same one; contested: the matches do not tell the chosen model from the rivals, or those that do not move
+  /// are a motion of their own, the rival `none`, beside the chosen one.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;
@@ -97,7 +98,7 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
   double threshold = 0;  ///< threshold of the chosen model, on squared errors
-  /// Where the status is contested: the other models of the set of which one is right.
+  /// Where the status is contested: the other models of the set of which one is right, or the matches that stand still.
   std::vector<TwoViewRival> rivals;
   /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the
   /// mean over the set of the models' own covariances and the squares of their differences from these values, so that

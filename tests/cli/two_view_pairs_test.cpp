@@ -4,7 +4,9 @@
 #include <formats/two_view_pairs.hpp>
 #include <cli/show/validations.hpp>
 #include <experiments/plane_scene.hpp>
+#include <formats/tracks.hpp>
 #include <fusion/two_view/contradictions.hpp>
+#include <fusion/two_view/two_view.hpp>
 
 #include <gtest/gtest.h>
 
@@ -239,6 +241,55 @@ TEST(RealPairs, PlanesAndDepthAreToldApart) {
   EXPECT_LE(beyond[1], 2);
   std::istringstream lines(viewOf(result).text());
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+}
+
+/// The model and the status of all matches of a file, for several seeds.
+std::vector<std::pair<std::string, Status>> answersOf(const std::vector<Eigen::Vector4d>& matches) {
+  std::vector<std::pair<std::string, Status>> answers;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    TwoViewMotionOptions options;
+    options.search.seed = seed;
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(matches, options);
+    answers.emplace_back(found.chosenModel().name, found.status);
+  }
+  return answers;
+}
+
+TEST(RealPairs, TheSeedDoesNotDecide) {
+  // Pairs of which one model or another was found, or one estimate or another of it.
+  const std::vector<std::string> names = {"Boston", "BruggeSquare", "LePoint1", "graf",
+                                          "corr",   "graff",        "kampa",    "shout"};
+  std::size_t seen = 0;
+  for (const TwoViewPair& pair : realPairs({PairFamily::homogr, PairFamily::kusvod2})) {
+    if (std::find(names.begin(), names.end(), pair.name) == names.end()) continue;
+    ++seen;
+    const auto answers = answersOf(pair.matches);
+    for (const auto& [model, status] : answers) {
+      EXPECT_EQ(model, answers[0].first) << pair.name;
+      EXPECT_TRUE(status == Status::ok || status == Status::contested) << pair.name << " " << name(status);
+    }
+  }
+  if (seen == 0) GTEST_SKIP() << "LIESTAT_DATA has no two-view";
+  EXPECT_EQ(seen, names.size());
+}
+
+TEST(InputsThatFail, OverlaysAndZoomsOfOneAreMarked) {
+  const char* data = std::getenv("LIESTAT_DATA");
+  if (data == nullptr || !fs::is_directory(fs::path(data) / "inputs-that-fail")) {
+    GTEST_SKIP() << "LIESTAT_DATA has no inputs-that-fail";
+  }
+  const std::string directory = std::string(data) + "/inputs-that-fail/";
+  // A third does not move, the rest follows a loose translation.
+  for (const auto& [model, status] : answersOf(readMatches(directory + "zoom_or_none.csv"))) {
+    EXPECT_NE(model, "zoom");
+    EXPECT_NE(status, Status::ok) << model;
+  }
+  const auto found = estimateTwoViewMotion(readMatches(directory + "static_overlay.csv"), {});
+  EXPECT_EQ(found.status, Status::contested);
+  ASSERT_EQ(found.rivals.size(), 1u);
+  EXPECT_EQ(found.rivals[0].model, "none");
+  EXPECT_NEAR(static_cast<double>(found.rivals[0].inliers), 150, 5) << "60 % of 250";
+  EXPECT_NEAR(static_cast<double>(found.inliers), 99, 5) << "the others";
 }
 
 TEST(RealPairs, LabelsOfSinglePlanes) {

@@ -497,6 +497,42 @@ TEST(TwoViewMotion, onlyTheWinnerRejects) {
   }
 }
 
+TEST(TwoViewMotion, matchesThatDoNotMoveAreAMotionOfTheirOwn) {
+  for (const double overlay : {0.2, 0.6}) {
+    for (const TwoViewMotion motion : {TwoViewMotion::essential, TwoViewMotion::rotation}) {
+      TwoViewScene scene({.motion = motion, .matches = 80, .outliers = 0.1}, 11);
+      const TwoViewSceneOptions& o = scene.options;
+      std::vector<Eigen::Vector4d> matches = scene.pixels;
+      CounterRng random(7);
+      const auto still = static_cast<std::size_t>(overlay / (1 - overlay) * 80);
+      for (std::size_t i = 0; i < still; ++i) {
+        const double x = o.width * random.uniform(), y = o.height * random.uniform();
+        Eigen::Vector4d& m = matches.emplace_back(x, y, x, y);
+        for (int k = 0; k < 4; ++k) m[k] += 0.1 * o.sigma * random.normal();
+      }
+      const auto found = estimateTwoViewMotion(matches, optionsOf(scene));
+      EXPECT_EQ(found.status, Status::contested) << overlay;
+      EXPECT_EQ(found.chosenModel().name, nameOf(motion)) << overlay;
+      ASSERT_EQ(found.rivals.size(), 1u) << found.reason;
+      EXPECT_EQ(found.rivals[0].model, "none");
+      EXPECT_GE(found.rivals[0].inliers, still);
+      EXPECT_EQ(std::count(found.inlier.begin() + 80, found.inlier.end(), true), 0);
+      EXPECT_EQ(found.reason.find("two motions: "), 0u) << found.reason;
+    }
+  }
+  // Points that hardly move because the camera moves ahead, toward them, are of the scene.
+  std::vector<Eigen::Vector4d> ahead;
+  CounterRng random(9);
+  for (int i = 0; i < 150; ++i) {
+    const Eigen::Vector3d x(random.uniform(-1, 1), random.uniform(-0.7, 0.7), random.uniform(3, 9));
+    const Eigen::Vector2d first = 600 * x.hnormalized(), second = 600 * (x - Eigen::Vector3d(0, 0, 0.2)).hnormalized();
+    Eigen::Vector4d& m = ahead.emplace_back(first.x(), first.y(), second.x(), second.y());
+    for (int k = 0; k < 4; ++k) m[k] += 0.5 * random.normal() + (k % 2 == 0 ? 320 : 240);
+  }
+  const auto one = estimateTwoViewMotion(ahead, {.sigma = 0.5});
+  EXPECT_NE(one.reason.find("two motions"), 0u) << one.reason;
+}
+
 TEST(TwoViewMotion, coordinatesHaveTheUnitOfTheFocalLengths) {
   const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0}, 1);
   TwoViewMotionOptions options = optionsOf(scene);

@@ -110,6 +110,53 @@ inline HierarchyOptions searchOptions(const TwoViewMotionOptions& options) {
   return search;
 }
 
+using TwoViewSearch = Hierarchy<Eigen::Vector4d, TwoViewMotionModel>;
+
+/// A search to its end, or to that of `stop`.
+inline TwoViewSearch searched(const TwoViewModels& models, const std::vector<Eigen::Vector4d>& matches,
+                              const TwoViewMotionOptions& options) {
+  TwoViewSearch search(models, searchOptions(options));
+  search.add(matches);
+  while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
+  }
+  return search;
+}
+
+/// The search over the matches that move, where those that do not move are a motion of their own, as an overlay of the
+/// image is: what is found without them explains less than half of them within the largest noise that is believed. An
+/// epipolar geometry through both would be a mixture. `moving` are those that are left. Nothing where all matches are of
+/// one motion.
+inline std::optional<TwoViewSearch> besideStillMatches(const TwoViewSearch& all,
+                                                       const std::vector<Eigen::Vector4d>& matches,
+                                                       const TwoViewMotionOptions& options,
+                                                       std::vector<Eigen::Vector4d>& moving) {
+  const std::size_t none = all.nullModel();
+  const auto& still_state = all.state(none);
+  if (all.best() == none || !still_state.hasEstimate() || still_state.unsupported) return std::nullopt;
+  std::vector<double> errors(matches.size());
+  all.models()[none]->errors(still_state.estimate.parameter, matches, errors);
+  std::vector<Eigen::Vector4d> still;
+  moving.clear();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    (errors[i] < still_state.threshold ? still : moving).push_back(matches[i]);
+  }
+  TwoViewSearch search = searched(all.models(), moving, options);
+  const auto& state = search.state(search.best());
+  if (search.best() == none || !state.hasEstimate() || state.unsupported) return std::nullopt;
+  errors.resize(still.size());
+  search.models()[search.best()]->errors(state.estimate.parameter, still, errors);
+  const auto explained =
+      std::count_if(errors.begin(), errors.end(), [&](double e) { return e < max_excess_noise * state.threshold; });
+  if (2 * static_cast<std::size_t>(explained) >= still.size()) return std::nullopt;
+  return search;
+}
+
+/// A part of several matches in words.
+inline std::string shareInWords(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all) + " matches (" +
+         std::to_string((200 * part + all) / (2 * all)) + " %)";
+}
+
 /// An estimate at the noise that the data show, where this exceeds the stated one: from the matches within the
 /// threshold of that noise, with its covariance. Inliers of the stated noise would be a third of the right ones less at
 /// twice the noise, of which the covariance knows nothing.
@@ -118,17 +165,27 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
                                                       std::span<const Eigen::Vector4d> matches,
                                                       const TwoViewMotionOptions& options) {
   ModelEstimate<TwoViewMotionModel> estimate = state.estimate;
+  std::vector<double> errors(matches.size());
+  const auto estimateWithin = [&](double threshold) {
+    model.errors(estimate.parameter, matches, errors);
+    std::vector<Eigen::Vector4d> within;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (errors[i] < threshold) within.push_back(matches[i]);
+    }
+    return model.estimate(estimate.parameter, within, options.stop);
+  };
+  // Where a plane dominates the steps are many; the search does not wait for them.
+  for (int more = 0; more < 5 && estimate.status == Status::not_converged; ++more) {
+    if (options.stop && options.stop()) break;
+    ModelEstimate<TwoViewMotionModel> next = estimateWithin(state.threshold);
+    if (!next.usable()) break;
+    estimate = std::move(next);
+  }
   if (options.noise_is_known || !(state.excess_noise > 1)) return estimate;
   // Within this the stated threshold cuts off hardly more than it is meant to.
   constexpr double estimated_again = 1.3;
   if (state.excess_noise > estimated_again) {
-    std::vector<double> errors(matches.size());
-    model.errors(estimate.parameter, matches, errors);
-    std::vector<Eigen::Vector4d> within;
-    for (std::size_t i = 0; i < matches.size(); ++i) {
-      if (errors[i] < state.excess_noise * state.threshold) within.push_back(matches[i]);
-    }
-    ModelEstimate<TwoViewMotionModel> again = model.estimate(estimate.parameter, within, options.stop);
+    ModelEstimate<TwoViewMotionModel> again = estimateWithin(state.excess_noise * state.threshold);
     if (again.status == estimate.status) estimate = std::move(again);
   }
   estimate.covariance *= state.excess_noise, estimate.information /= state.excess_noise;
@@ -327,13 +384,14 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   result.status = input.status, result.reason = input.reason;
   result.errors.assign(matches.size(), std::numeric_limits<double>::quiet_NaN());
   result.inlier.assign(matches.size(), false);
-  Hierarchy<Eigen::Vector4d, TwoViewMotionModel> search(
-      input.models, input.ok() ? detail::searchOptions(options) : HierarchyOptions{});
-  if (result.ok()) {
-    search.add(input.usedMatches());
-    while (!(options.stop && options.stop()) && search.iterate(options.stop)) {
-    }
-  }
+  std::vector<Eigen::Vector4d> taking_part = result.ok() ? input.usedMatches() : std::vector<Eigen::Vector4d>{};
+  detail::TwoViewSearch search = result.ok() ? detail::searched(input.models, taking_part, options)
+                                             : detail::TwoViewSearch(input.models, HierarchyOptions{});
+  std::vector<Eigen::Vector4d> moving;
+  std::optional<detail::TwoViewSearch> beside_still =
+      result.ok() ? detail::besideStillMatches(search, taking_part, options, moving) : std::nullopt;
+  const bool is_two_motions = beside_still.has_value();
+  if (is_two_motions) search = std::move(*beside_still), taking_part = std::move(moving);
   for (std::size_t m = 0; m < search.models().size(); ++m) {
     result.lattice.push_back(detail::rowOf(search, m, options.sigma));
   }
@@ -349,15 +407,23 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   }
   // Errors in the order of the matches; inliers are those of the threshold.
   model.errors(state.estimate.parameter, input.normalised, result.errors);
+  std::vector<double> still_errors(matches.size(), std::numeric_limits<double>::infinity());
+  const std::size_t none = search.nullModel();
+  if (is_two_motions) search.models()[none]->errors({}, input.normalised, still_errors);
+  const double still_threshold = search.state(none).threshold;
+  std::size_t still = 0;
   std::vector<Eigen::Vector4d> agreeing;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    result.inlier[i] = result.errors[i] < state.threshold;
+    const bool is_still = still_errors[i] < still_threshold;
+    still += is_still;
+    result.inlier[i] = !is_still && result.errors[i] < state.threshold;
     if (result.inlier[i]) agreeing.push_back(input.normalised[i]);
   }
   result.inliers = agreeing.size(), result.threshold = state.threshold;
-  input.describe(model, detail::atShownNoise(model, state, input.usedMatches(), options), agreeing, result);
+  const ModelEstimate<TwoViewMotionModel> estimate = detail::atShownNoise(model, state, taking_part, options);
+  input.describe(model, estimate, agreeing, result);
 
-  result.status = state.estimate.status;
+  result.status = estimate.status;
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!result.ok()) {
@@ -367,6 +433,14 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   } else if (state.unsupported) {
     result.status = Status::ill_defined;
     result.reason = "no model is supported: the inliers of the chosen one could be chance";
+  } else if (is_two_motions) {
+    result.status = Status::contested;
+    result.reason = "two motions: " + detail::shareInWords(still, matches.size()) + " do not move, " +
+                    detail::shareInWords(result.inliers, matches.size()) + " follow " + model.name();
+    TwoViewRival& rival = result.rivals.emplace_back();
+    rival.model = search.models()[none]->name(), rival.inliers = still, rival.equations = 2;
+    ModelEstimate<TwoViewMotionModel> at_rest;
+    input.describe(*search.models()[none], at_rest, {}, rival);
   } else if (const std::vector<std::size_t> set = search.contested(); set.size() > 1) {
     result.status = Status::contested, result.reason = "the matches do not tell apart " + model.name();
     for (auto m = set.begin() + 1; m != set.end(); ++m) {
@@ -380,7 +454,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
       }
       TwoViewRival& rival = result.rivals.emplace_back();
       rival.model = other.name(), rival.inliers = inliers.size(), rival.equations = other.equations();
-      input.describe(other, detail::atShownNoise(other, its, input.usedMatches(), options), inliers, rival);
+      input.describe(other, detail::atShownNoise(other, its, taking_part, options), inliers, rival);
       result.reason += (m + 1 == set.end() ? " and " : ", ") + other.name();
     }
     result.shared = detail::sharedParameters(result, result.rivals);
