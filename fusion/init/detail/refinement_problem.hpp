@@ -3,6 +3,7 @@
 
 #include <fusion/init/detail/bearing_rows.hpp>
 #include <fusion/init/detail/reduced_system.hpp>
+#include <fusion/init/results.hpp>
 #include <fusion/imu/factor.hpp>
 #include <fusion/imu/window.hpp>
 #include <lie/detail/small_matrix.hpp>
