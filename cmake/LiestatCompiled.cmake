@@ -16,7 +16,7 @@ set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
     robust_two_view two_view hand_eye motion)
 set(LIESTAT_COMPILED_SOURCES_trajectories
-    trajectories evaluate convention_diagnosis trajectory_conversion recording_windows)
+    trajectories evaluate trajectory_misfit convention_diagnosis trajectory_conversion recording_windows)
 set(LIESTAT_COMPILED_NEEDS_fusion random123)
 set(LIESTAT_COMPILED_NEEDS_trajectories boost random123)
 set(LIESTAT_COMPILED_NEEDS_formats boost fmt json yaml zlib)

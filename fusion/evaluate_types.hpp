@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fusion/trajectories_types.hpp>
+#include <fusion/trajectory_misfit_types.hpp>
 #include <stats/verdict.hpp>
 
 #include <Eigen/Core>
@@ -76,6 +77,7 @@ struct EvaluationOptions {
   std::optional<MotionThinning> motion_filter = {};      ///< applied to both, after downsample
   RelativeOptions relative = {};                         ///< pairs of RPE
   std::optional<PairsModel> pairs_model = {};            ///< NEES of relative motions; else there is none
+  bool misfit = false;                                   ///< looks for faults of the whole run (findMisfit)
 
   /// The model of the weighted alignment. A scale alone has none: positions that need a scale are aligned by sim3.
   AlignmentModel verdictAlignment() const {
@@ -103,7 +105,7 @@ void describe(V& v, const EvaluationOptions& o) {
     "", "m, deg");
   v("delta", o.relative.delta)("delta_unit", name(o.relative.unit))("delta_tol", o.relative.relative_tolerance);
   v("all_pairs", o.relative.all_pairs)("pairs_from_reference", o.relative.pairs_from_reference);
-  v("pairs_model", word(o.pairs_model));
+  v("pairs_model", word(o.pairs_model))("misfit", o.misfit);
 }
 
 // Result -----------------------------------------------------------------------------------------------------------------
@@ -165,6 +167,7 @@ struct TrajectoryEvaluation {
   Alignment weighted = {};                ///< alignment for the verdict
   Consistency consistency = {};
   std::optional<RelativeConsistency> relative = {};
+  MisfitSearch misfit = {};  ///< faults of the whole run, where they were asked for
   std::vector<std::string> notes = {};
 
   bool ok() const { return status == EvaluationStatus::ok; }
@@ -249,6 +252,7 @@ void describe(V& v, const TrajectoryEvaluation& e) {
   v("weighted_alignment", e.weighted, "of the verdict");
   v("covariance_convention", e.has_covariances ? std::optional(e.covariance_convention) : std::nullopt,
     "of the file; null: it has no covariances");
+  v("misfit", e.misfit, "faults of the whole run that are no noise");
   v("judged", e.consistency.tests.components.judged(), "components of the errors that carry noise");
   v("omissions", e.consistency.tests.components.omissions(), "the other components, with the reason");
   v("tests", e.consistency.tests, "of the whitened errors");

@@ -253,6 +253,8 @@ void addEvaluateCommand(const CommandList& program) {
               "Keep poses after which the body moved: DISTANCE,DEGREES (m, deg)")
       .list(2, 2)
       .notNegative();
+  command.flag("--misfit", o->how.misfit,
+               "Look for faults of the whole run: clock, scale, frame, inverses, order of quaternions, axes");
   RelativeOptions& relative = o->how.relative;
   command.option("-d,--delta", relative.delta, "Distance of the poses of a pair (default 1)").positive();
   command.choice("-u,--delta_unit,--delta-unit", relative.unit, "Its unit: frames, deg, rad, m (default f)");

@@ -470,7 +470,8 @@ class _MeanSummary:
     independence: float | _Several  # number; probability that the errors are independent in time; null: untested
     correlated_share: float | _Several  # number; of the variance, where they are not
     correlation_time: float | _Several  # number; s
-    correlation_factor: float | _Several  # number; mean factor of the variances that the dependence asks for
+    unequal_axes: bool | _Several  # bool; the errors' sizes are not in the stated ratios
+    correlation_factor: float | _Several  # number; mean factor of the variances that dependence and sizes ask for
     inflated: bool | _Several  # bool; whether the covariance is widened by the dependence on time
     notes: list[str] | _Several  # list of text; what is remarkable, in sentences
 
@@ -552,6 +553,29 @@ class _Alignment(Result):
     covariance: _Array  # m, rad, 1
     covariance_order: str  # in words
 
+class _MisfitExplanation(Result):
+    faults: list[str]  # that hold together
+    text: str  # in words, with what undoes them
+    explained: float  # share of the squared errors
+    delay: float  # to be added to the estimate's times; s
+    delay_sigma: float  # its sd; s
+    scale: float  # of the estimate's positions
+    scale_sigma: float  # its sd
+    body_translation: _Array  # estimate's body to the reference's; m
+    body_quaternion_xyzw: _Array  # likewise
+    world_translation: _Array  # the estimate's world in the reference's; m
+    world_quaternion_xyzw: _Array  # likewise
+    position_rmse: float  # that remains; m
+    rotation_rmse: float  # that remains; rad
+
+class _MisfitSearch(Result):
+    searched: bool  # faults of the whole trajectory were looked for
+    reason: str  # why not
+    sentence: str  # what explains the errors; empty: nothing
+    position_rmse: float  # before; m
+    rotation_rmse: float  # before; rad
+    explanations: list[_MisfitExplanation]  # several cannot be told apart by the motion
+
 class _ResidualTest(Result):
     statistic: float
     degrees_of_freedom: float
@@ -588,6 +612,7 @@ class _TrajectoryEvaluation(Result):
     interpolation_rotation: float  # likewise; rad
     weighted_alignment: _Alignment  # of the verdict
     covariance_convention: str | None  # of the file; null: it has no covariances
+    misfit: _MisfitSearch  # faults of the whole run that are no noise
     judged: str  # components of the errors that carry noise
     omissions: list[str]  # the other components, with the reason
     tests: _WhitenedResidualTests  # of the whitened errors
@@ -956,6 +981,11 @@ class _CalibratedPose(Result):
     standard_deviations: _PoseSigmas
     standard_deviations_local: _LocalPoseSigmas  # of the local errors, likewise
 
+class _HandEyeInterpolation(Result):
+    in_gaps: int  # pairs that keep the row nearby
+    rms_translation: float  # of the error; m
+    rms_rotation: float  # rad
+
 class _OpenDirection(Result):
     excitation: float  # as in excitations
     weak: bool  # excited, but not enough to be trusted
@@ -1007,7 +1037,9 @@ class _HandEyeResult(Result):
     independence: float  # probability that the errors are independent in time; null: untested
     correlated_share: float  # of the variance, where they are not
     correlation_time: float  # s
-    correlation_factor: float  # mean factor of the variances that the dependence asks for
+    unequal_axes: bool  # the errors' sizes are not in the stated ratios
+    correlation_factor: float  # mean factor of the variances that dependence and sizes ask for
+    interpolation: _HandEyeInterpolation | None  # of A at the times of B; null: rows nearby
     excitations: _Array  # of the six directions, ascending
     open_directions: list[_OpenDirection]  # that the motions leave open
     suspects: list[_HandEyeSuspectTest]  # what the equations take for known
@@ -1307,6 +1339,7 @@ def evaluate_trajectory(
     all_pairs: bool = False,
     pairs_from_reference: bool = False,
     pairs_model: Literal["independent", "chain"] | None = None,
+    misfit: bool = False,
 ) -> TrajectoryEvaluation: ...
 def hand_eye(
     a: SE3,

@@ -90,6 +90,7 @@ def evaluate_trajectory(
     all_pairs=False,
     pairs_from_reference=False,
     pairs_model=None,
+    misfit=False,
 ):
     """A trajectory against a reference: errors as evo defines them, and a verdict on the covariances.
 
@@ -140,6 +141,8 @@ def evaluate_trajectory(
         All pairs instead of consecutive ones; the distance is measured along the reference.
     pairs_model : {'independent', 'chain'}, optional
         NEES of relative motions, if errors of a pair are independent, or a chain (dead reckoning).
+    misfit : bool
+        Looks for faults of the whole run: clock, scale, frame of the body or world, inverses, order of quaternions, axes.
 
     Returns
     -------

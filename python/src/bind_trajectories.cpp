@@ -71,7 +71,7 @@ EvaluationOptions optionsOf(const py::dict& given) {
   if (motion) o.motion_filter = {motion->first, motion->second};
   take("delta", o.relative.delta)("delta_unit", o.relative.unit)("delta_tol", o.relative.relative_tolerance);
   take("all_pairs", o.relative.all_pairs)("pairs_from_reference", o.relative.pairs_from_reference);
-  take("pairs_model", o.pairs_model);
+  take("pairs_model", o.pairs_model)("misfit", o.misfit);
   return o;
 }
 

@@ -235,7 +235,7 @@ TEST(Refinement, StepsWithWalkingBiasesLeaveLittle) {
   const InertialWindow window = windowOf(recorded.scene, recorded.readings, {.preintegration = {.noise = noise}});
   detail::RefinementProblem problem(window, options);
   ASSERT_TRUE(problem.setWeights());
-  problem.start(recorded.start.solutions[0], {});
+  problem.start(recorded.start.solutions[0], {}, nullptr);
   detail::ReducedSystem system(problem.blocks(), problem.features().size());
   std::vector<double> costs;
   for (int k = 0; k < 8; ++k) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <fusion/evaluate.hpp>
+#include <fusion/trajectories/detail/quaternion_order.hpp>
+#include <fusion/trajectory_misfit.hpp>
 #include <lie/euler.hpp>
 #include <lie/units.hpp>
 #include <stats/quantile.hpp>
@@ -142,12 +144,6 @@ inline double unitFactor(std::string_view from, ErrorUnit to) {
   return a.is_angle == b.is_angle ? b.per_base / a.per_base : not_a_number;
 }
 
-/// The rotation that the four numbers of the quaternion mean if w comes first.
-inline SO3d wFirst(const SO3d& R) {
-  const Eigen::Vector4d& q = R.params();  // x y z w as read, that is w x y z of the file
-  return SO3d(Eigen::Quaterniond(q[0], q[1], q[2], q[3]));
-}
-
 /// Median angle between the relative rotations of both trajectories over a fifth of the run.
 inline double rotationDisagreement(std::span<const MatchedPose> poses, bool swap_reference, bool swap_estimate) {
   std::vector<double> angles;
@@ -176,6 +172,21 @@ inline std::string noteOfCoarseReference(const TrajectoryEvaluation& e) {
          part(e.interpolation.position, e.position_errors) + " and " +
          part(e.interpolation.rotation, e.rotation_errors) +
          " of the errors; NEES allows for it, APE and RPE contain it";
+}
+
+inline MisfitSearch misfitOf(const TrajectoryEvaluation& e, std::span<const double> truth_times,
+                             std::span<const Gaussian<SE3d>> truth, const EvaluationOptions& o) {
+  std::vector<SE3d> estimate, reference;
+  for (const MatchedPose& p : e.matched) {
+    estimate.push_back(p.estimate.mean), reference.push_back(p.reference.mean);
+  }
+  std::vector<double> times;
+  std::vector<TimedPose> stream;
+  if (e.by_time) {
+    for (const double t : e.times) times.push_back(t + o.association.offset);
+    for (std::size_t i = 0; i < truth_times.size(); ++i) stream.push_back({truth_times[i], truth[i].mean});
+  }
+  return findMisfit(estimate, reference, times, PoseStream(stream), o.alignment, o.association.offset);
 }
 
 inline std::string noteOfIndefinite(const TrajectoryEvaluation& e, const std::vector<std::size_t>& lines) {
@@ -321,6 +332,10 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
   }
   const std::string suspicion = suspectQuaternionOrder(e.matched, reference_name, estimate_name);
   if (!suspicion.empty()) e.notes.push_back(suspicion);
+  if (o.misfit) {
+    e.misfit = detail::misfitOf(e, truth.times(), truth.poses(), o);
+    if (e.misfit.found()) e.notes.push_back(e.misfit.sentence());
+  }
 
   e.alignment = alignUmeyama(e.matched, o.alignment, o.n_to_align);
   if (!e.alignment.ok && e.has_covariances && alignWeighted(e.matched, o.verdictAlignment(), o.n_to_align).ok) {

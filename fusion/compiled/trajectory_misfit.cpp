@@ -1,0 +1,6 @@
+// Faults of whole trajectories, compiled once; see initialisation.cpp.
+#ifndef LIESTAT_COMPILED_TRAJECTORIES
+#define LIESTAT_COMPILED_TRAJECTORIES
+#endif
+
+#include <fusion/trajectories/detail/find_misfit.hpp>
