@@ -389,7 +389,7 @@ TEST(EvaluateCommand, CoarseReferencesAreSaid) {
   if (data == nullptr) GTEST_SKIP() << "LIESTAT_DATA is not set";
   const TemporaryDirectory directory;
   const Trajectory truth = readTrajectory(std::string(data) + "/vi/euroc/V1_02_medium_gt.csv");
-  CounterRng rng(77);
+  CounterRng rng(78);
   std::vector<double> times;
   std::vector<Gaussian<SE3d>> estimate;
   for (std::size_t i = 3; i < truth.size(); i += 37) {

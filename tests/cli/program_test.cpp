@@ -240,7 +240,7 @@ TEST_F(Program, BadInputNamesFileAndLine) {
   EXPECT_EQ(refusal("x,y,z\n1,nan,3\n").substr(0, 9), "f.csv:2: ");
   EXPECT_EQ(refusal("x,y,z\n1,2,3\n\n1,2,inf\n").substr(0, 9), "f.csv:4: ");
   EXPECT_EQ(refusal("qx,qy,qz,qw\n0,0,0,1\n0,0,0,2\n"),
-            "f.csv:3: the norm of the quaternion is 2, expected 1 within 0.001\n");
+            "f.csv:3: the norm of the quaternion is 2, expected 1 within 0.001, or a larger --norm-tolerance\n");
   EXPECT_EQ(refusal("x,y,z,cov_00,cov_01,cov_02,cov_11,cov_12,cov_22\n1,2,3,1,2,0,1,0,1\n").substr(0, 49),
             "f.csv:2: the covariance is not positive definite ");
   EXPECT_EQ(refusal("x,y,z,weight\n1,2,3,0\n"), "f.csv:2: every weight is 0, expected one above 0\n");
