@@ -1431,6 +1431,11 @@ def vi_init(
     accelerometer_sigma: float = 0.15,
     seed: int = 1,
     truth: tuple[ArrayLike, SE23] | tuple[ArrayLike, SE23, ArrayLike] | None = None,
+    calibrate_noise: bool = True,
+    inflate: bool = False,
+    filter_convention: Literal["liestat", "openvins", "gtsam", "basalt"] = "liestat",
+    position_sigma: float = 1e-3,
+    heading_sigma: float = 1e-3,
 ) -> _ComparedRecording: ...
 def columns(x: Manifold) -> dict[str, _Array]: ...
 def from_columns(kind: type[_M], table: Any) -> _M: ...

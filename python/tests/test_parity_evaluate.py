@@ -133,7 +133,8 @@ class Evaluate(ParityTest):
         self.assertIs(run["estimates"][0]["consistent"], result.consistent, path)
         for name in SETTING:
             self.assertEqual(run[name], plain(result[name]), f"{path}: {name}")
-        self.assert_equal_results(run["estimates"][0], result, SETTING + SERIES, path)
+        estimate = {name: value for name, value in run["estimates"][0].items() if name != "segments"}  # of the page
+        self.assert_equal_results(estimate, result, SETTING + SERIES, path)
 
     def test_settings(self):
         verdicts = set()
@@ -142,7 +143,7 @@ class Evaluate(ParityTest):
                 result = self.run_module(**options)
                 verdicts.add(result.consistent)
                 self.compare(self.run_program(*arguments), result, " ".join(arguments))
-        self.assertEqual(verdicts, {True, False, None})
+        self.assertEqual(verdicts, {True, False})
 
     def test_scale_correction(self):
         # Lengths are off by a tenth: with its scale the estimate is consistent, without it NEES is many times too large.
