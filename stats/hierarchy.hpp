@@ -386,7 +386,7 @@ class Hierarchy {
   static constexpr std::size_t own_samples = 5;
   /// Passes from a hypothesis to a local optimum: the first ones within a multiple of the threshold, whose optima are
   /// few, the others with few steps of the estimate each, because the inliers still change.
-  static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 20;
+  static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 5;
   static constexpr double wide_threshold = 9;
   /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half a
   /// measurement: a choice between these is one between accidents.

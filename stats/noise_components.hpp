@@ -31,6 +31,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -90,7 +91,9 @@ struct NoiseComponents {
                : values == "unknown"         ? ""
                                              : ", which stands for unknown");
       }
-      sentences.push_back("not judged: " + list + (in_world ? " along the world's axes (" : " (") + why + ")");
+      std::string sentence = "not judged: ";
+      sentence.append(list).append(in_world ? " along the world's axes (" : " (").append(why).append(")");
+      sentences.push_back(std::move(sentence));
     }
     return sentences;
   }

@@ -641,6 +641,7 @@ inline std::pair<double, MisfitNoise> MisfitFinder::noiseOf(const std::vector<Mi
 /// The covariance of the innovations that a fit has left, outliers down-weighted, for the noise; -2 log likelihood.
 inline double MisfitFinder::scatter(MisfitNoise& noise, const std::vector<MisfitRow>& rows) const {
   std::vector<Eigen::Matrix<double, 6, 1>> e;
+  e.reserve(rows.size());
   for (const MisfitRow& row : rows) e.push_back(row.col(misfit_parameters));
   noise.innovate(e);
   noise.weights.assign(e.size(), 1);
