@@ -38,7 +38,7 @@ inline ViErrors viErrors(const ClosedFormResult& result, const InertialScene& tr
   return viErrors(result.solutions[0].velocity, result.solutions[0].gravity, truth);
 }
 
-/// What a filter's start of the trials says of what is free.
+/// The heading and position, which are free, of the filters' starts in the trials.
 inline const FilterStartOptions vi_init_filter_start{
     .position = {1, -2, 0.5}, .heading = 0.7, .position_sigma = 0.1, .heading_sigma = 0.02};
 

@@ -24,7 +24,7 @@ struct NoiseFactor {
   bool refutesOne() const { return low > 1 || high < 1; }
 };
 
-/// What a recording says of the densities of its inertial sensor's noise.
+/// A recording's evidence on the densities of its inertial sensor's noise.
 enum class NoiseEvidence {
   unverified_noise,  ///< too few windows meet to tell the densities, which are hardly more than a claim, or a guess
   confirmed,         ///< the windows agree with those that were given, and would not with three times as large ones

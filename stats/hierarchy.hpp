@@ -716,7 +716,7 @@ class Hierarchy {
       }
       optima.push_back(std::move(*found));
     };
-    // Of those with the best score, or one as good, the one that most starts reach.
+    // The optimum that most starts reach, among those with the best score or one as good.
     const auto best = [&] {
       std::size_t first = 0;
       for (std::size_t k = 1; k < optima.size(); ++k) first = optima[k].isBetterThan(optima[first]) ? k : first;

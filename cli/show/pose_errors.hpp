@@ -16,7 +16,7 @@ struct TimesOfPoses {
   std::vector<double> values;
   bool by_time = true;
 
-  /// Of times on a clock; the start is the first of them unless it is given.
+  /// Times on a clock; the start is the first of them unless it is given.
   TimesOfPoses(std::vector<double> times, bool are_times, std::optional<double> start = {})
       : values(std::move(times)), by_time(are_times) {
     if (!by_time || values.empty()) return;

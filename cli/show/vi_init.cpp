@@ -111,7 +111,7 @@ std::string inWords(const NoiseFactor& factor) {
   return fmt::format("{:.3g} (95 %: {})", factor.factor, range);
 }
 
-/// What the windows tell; noise that is not verified is a note.
+/// The windows' findings; noise that is not verified is a note.
 std::string noiseInWords(const NoiseCalibration& found) {
   const double dof = static_cast<double>(found.degrees_of_freedom);
   const bool calibrated = found.evidence == NoiseEvidence::calibrated;

@@ -34,7 +34,7 @@ struct SphereLens {
     const Divisor D = divisor(s, c);
     return c * D.value - s * D.slope;
   }
-  /// Whether a direction is on the sheet around the axis: in front of the fold, with a positive divisor.
+  /// True if a direction is on the sheet around the axis: in front of the fold, with a positive divisor.
   bool reaches(double s, double c) const { return divisor(s, c).value > 0 && growth(s, c) > 0; }
   /// The direction of an undistorted point, of any length; none beyond the image's edge.
   std::optional<Eigen::Vector3d> inverse(const Eigen::Vector2d& m) const {

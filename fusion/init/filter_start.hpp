@@ -68,7 +68,7 @@ struct FilterStartOptions {
 struct FilterStart {
   using Covariance = Eigen::Matrix<double, 15, 15>;
 
-  /// Whether the state may be used. untested: it is that of a single window, which nothing could contradict.
+  /// The state may be used if this is ok. untested: it is that of a single window, which nothing could contradict.
   /// inconsistent: windows contradict each other, there is no covariance. no_state: no window is ok, or at rest.
   enum class Status { ok, untested, inconsistent, no_state };
   Status status = Status::no_state;

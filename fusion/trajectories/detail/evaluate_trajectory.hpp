@@ -401,7 +401,7 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     judge();
   };
   judge();
-  // What a factor within the error's own uncertainty explains is no fault of the covariances.
+  // A misfit that a factor within the error's own uncertainty explains is no fault of the covariances.
   if (e.referenceIsCoarse()) {
     for (const double times : {0.25, 0., 4.}) {
       if (e.verdict().isNo()) interpolationTimes(times);

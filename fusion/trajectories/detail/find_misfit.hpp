@@ -825,7 +825,7 @@ inline MisfitSearch MisfitFinder::find() {
   double lowest = infinity;
   for (const auto& [of, groups] : tries) {
     const Candidate& c = *of;
-    // What costs more than the best explanation is not better, and not simpler.
+    // An explanation that costs more than the best one is not better, and not simpler.
     if (c.cost + penaltyOf(c, groups) > lowest + 1) continue;
     const MisfitMask mask = maskOf(groups);
     MisfitFit start;

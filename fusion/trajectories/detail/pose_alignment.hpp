@@ -63,7 +63,7 @@ struct AlignedError {
     covariance += p.estimate.covariance;
   }
 
-  /// What the judged components are reduced to, along their axes.
+  /// The reduction to the judged components, along their axes.
   AlignedError reduced(const NoiseComponents& components, const SO3d& rotation) const {
     AlignedError r = *this;
     if (!components.omits()) return r;
@@ -213,7 +213,7 @@ inline void refine(std::span<const MatchedPose> used, Alignment& a) {
       return;
     }
     a.condition = scaledCondition(sums.information);
-    // Of a robot in the plane the height of the world is not determined where heights are not judged: it stays as it is.
+    // The height of the world of a robot in the plane stays as it is where heights are not judged: nothing determines it.
     const double least = leastDetermined(a.components);
     const bool whole = a.condition < (a.components.omits() ? 1 / least : worst_condition);
     if (!whole && !a.components.omits()) {
