@@ -134,7 +134,7 @@ class ViInitParity(parity.ParityTest):
     def test_start_of_a_filter(self):
         start = self.run_both().filter_start
         self.assertEqual((start.status, start.convention, start.from_rest), ("ok", "liestat", False))
-        # Basalt turns the first three of the library's coordinates (position, rotation, velocity, biases) into the world.
+        # Basalt turns the first three of our coordinates (position, rotation, velocity, biases) into the world.
         basalt = self.run_both("--filter-start", "basalt", filter_convention="basalt").filter_start
         turn = np.eye(15)
         for k in (0, 3, 6):

@@ -213,7 +213,7 @@ inline void refine(std::span<const MatchedPose> used, Alignment& a) {
       return;
     }
     a.condition = scaledCondition(sums.information);
-    // The height of the world of a robot in the plane stays as it is where heights are not judged: nothing determines it.
+    // A planar robot's height of the world stays as it is where heights are not judged: nothing determines it.
     const double least = leastDetermined(a.components);
     const bool whole = a.condition < (a.components.omits() ? 1 / least : worst_condition);
     if (!whole && !a.components.omits()) {
