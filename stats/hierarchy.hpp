@@ -128,10 +128,12 @@ class Hierarchy {
     return true;
   }
 
-  /// One hypothesis or one estimate; true while there is more to do. What `stop` ends is begun again by the next call.
+  /// One hypothesis or one local optimum; true while there is more to do. What `stop` ends is taken up by the next call,
+  /// estimates that are made already are kept.
   bool iterate(const StopRequest& stop = {}) {
     const std::size_t m = next();
     if (m == none) return false;
+    if (ending_) return end(stop);
     Draws& draws = draws_[m];
     State& state = states_[m];
     bool gained = false, made = false;
@@ -149,13 +151,14 @@ class Hierarchy {
     if (draws.looked() < drawsNeeded(m)) {
       // An early look at what has been found, ever more seldom.
       const bool due = state.draws >= 4 && std::has_single_bit(state.draws) && draws.lastGain() > state.draws / 2;
-      if (due && draws.hasBest()) refine(m, 1, stop);
+      if (!due || !draws.hasBest()) return true;
+      std::optional<Candidate> early = refine(m, draws.ranked(1).front(), refined_[m], wide_passes + 1, stop);
+      if (early) take(m, std::move(*early));
       return true;
     }
-    if (draws.hasBest() && !refine(m, std::max<std::size_t>(options_.refined_hypotheses, 1), stop, true)) return true;
-    finish(m);
-    if (next() == none) terminate();
-    return next() != none;
+    if (!draws.hasBest()) return finish(m);
+    ending_.emplace(m, draws.ranked(std::max<std::size_t>(options_.refined_hypotheses, 1)));
+    return end(stop);
   }
 
   HierarchyState progress() const {
@@ -385,8 +388,8 @@ class Hierarchy {
   /// The samples of a local optimum's own inliers that may confirm it.
   static constexpr std::size_t own_samples = 5;
   /// Passes from a hypothesis to a local optimum: the first ones within a multiple of the threshold, whose optima are
-  /// few, the others with few steps of the estimate each, because the inliers still change.
-  static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 5;
+  /// few, with few steps of the estimate, which would lead away to what that multiple includes.
+  static constexpr int max_passes = 6, wide_passes = 2, wide_steps = 5;
   static constexpr double wide_threshold = 9;
   /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half a
   /// measurement: a choice between these is one between accidents.
@@ -399,7 +402,6 @@ class Hierarchy {
   struct Refined {
     std::uint64_t key = 0;
     ModelEstimate<Parameter> estimate;
-    bool is_rough = false;
   };
 
   /// Looks parents up, and what contains what.
@@ -474,6 +476,7 @@ class Hierarchy {
   /// Begins again with the null model; estimates stay until there are others.
   void restart() {
     if (states_.empty()) states_.resize(models_.size());
+    ending_.reset();
     for (std::size_t m = 0; m < models_.size(); ++m) {
       draws_[m].restart();
       states_[m].progress = State::Progress::idle;
@@ -489,6 +492,7 @@ class Hierarchy {
   std::size_t next() const {
     std::size_t best = none;
     if (!valid()) return best;
+    if (ending_) return ending_->model;
     for (std::size_t m = 0; m < models_.size(); ++m) {
       if (states_[m].progress != State::Progress::candidate) continue;
       if (best == none || rank_[m] < rank_[best] ||
@@ -544,7 +548,6 @@ class Hierarchy {
     std::vector<double> errors;
     double threshold = 0;
     std::int64_t score = 0;
-    bool is_rough = false;    ///< the steps of the estimate were counted
     std::size_t reached = 1;  ///< by so many starts
     bool set_aside = false;   ///< no other start confirms it
 
@@ -569,29 +572,27 @@ class Hierarchy {
     candidate.threshold = thresholdOf(m, candidate.errors);
     std::uint64_t last = 0;
     int steps = 0;
-    const StopRequest few_steps = [&] { return ++steps >= rough_steps || (stop && stop()); };
+    const StopRequest few_steps = [&] { return ++steps >= wide_steps || (stop && stop()); };
     for (int pass = 0; pass < passes; ++pass) {
+      const bool is_wide = pass < wide_passes;
       std::vector<Measurement> inliers;
-      const std::uint64_t set = inliersOf(m, candidate, pass < wide_passes ? wide_threshold : 1, key, inliers);
-      if (set == last && pass > 0) {
-        if (pass < wide_passes) continue;
-        break;
-      }
+      const std::uint64_t set =
+          inliersOf(m, candidate, is_wide ? wide_threshold : 1, detail::mixBits(key, is_wide), inliers);
+      if (set == last && is_wide) continue;
+      if (set == last) break;
       last = set;
       const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == set; });
       ModelEstimate<Parameter> found;
-      bool is_rough = false;
       if (known != made.end()) {
-        found = known->estimate, is_rough = known->is_rough;
+        found = known->estimate;
       } else {
         steps = 0;
-        found = models_[m]->estimate(parameter, inliers, few_steps);
+        found = models_[m]->estimate(parameter, inliers, is_wide ? few_steps : stop);
         if (stop && stop()) return std::nullopt;
-        is_rough = steps >= rough_steps;
-        made.push_back({set, found, is_rough});
+        made.push_back({set, found});
       }
+      if (!found.usable() && is_wide) continue;
       if (!found.usable()) break;
-      candidate.is_rough = is_rough;
       candidate.estimate = std::move(found);
       parameter = candidate.estimate.parameter;
       candidate.errors = errorsOf(m, parameter);
@@ -675,7 +676,7 @@ class Hierarchy {
   }
   /// The same from the best solution of a sample of an estimate's own inliers.
   std::optional<Candidate> refineOwnSample(std::size_t m, const Candidate& of, std::size_t draw,
-                                           const StopRequest& stop) const {
+                                           std::vector<Refined>& made, const StopRequest& stop) const {
     const Model& model = *models_[m];
     std::vector<std::size_t> sample;
     detail::keyedSample(measurements_, detail::mixBits(draw), model.sampleSize(), sample,
@@ -693,8 +694,8 @@ class Hierarchy {
       best = std::move(one), best->estimate.parameter = solution;
     }
     if (!best) return Candidate{};
-    std::vector<Refined> made;
-    return refine(m, best->estimate.parameter, 0, made, max_passes, stop);
+    const std::uint64_t key = detail::mixBits(static_cast<std::uint64_t>(of.score), draw);
+    return refine(m, best->estimate.parameter, key, made, max_passes, stop);
   }
   std::int64_t scoreOf(std::size_t m, std::span<const double> errors, double threshold) const {
     std::int64_t score = 0;
@@ -703,21 +704,29 @@ class Hierarchy {
     }
     return score;
   }
-  /// The best of the local optima that the best hypotheses lead to. One that a single start reaches may be an accident of
-  /// the draws: with `last` it stands if samples of its own inliers, which do not depend on the seed, lead to it again.
-  /// False if `stop` ended it.
-  bool refine(std::size_t m, std::size_t count, const StopRequest& stop, bool last = false) {
-    std::vector<Candidate> optima;
-    const std::int64_t same = same_optimum * static_cast<std::int64_t>(std::max<std::size_t>(size(), 64));
-    const auto visit = [&](std::optional<Candidate> found) {
+  /// The end of a model: the local optima that its best hypotheses and its completions lead to. One that a single start
+  /// reaches may be an accident of the draws: it stands if samples of its own inliers, which do not depend on the seed,
+  /// lead to it again.
+  struct Ending {
+    std::size_t model;
+    std::vector<typename Draws::Place> places;  ///< of the hypotheses
+    std::size_t place = 0;                      ///< the next one
+    std::size_t other = 0, completion = 0;      ///< the next completion
+    std::optional<Completions> completions = {};
+    std::size_t own_sample = 0;
+    std::vector<Candidate> optima = {};
+    std::vector<Refined> made = {};  ///< from completions and own samples
+
+    Ending(std::size_t m, std::vector<typename Draws::Place> from) : model(m), places(std::move(from)) {}
+    void visit(Candidate found, std::int64_t same) {
       for (Candidate& known : optima) {
-        if (std::abs(known.score - found->score) > same) continue;
-        if (known.estimate.usable() == found->estimate.usable()) return void(++known.reached);
+        if (std::abs(known.score - found.score) > same) continue;
+        if (known.estimate.usable() == found.estimate.usable()) return void(++known.reached);
       }
-      optima.push_back(std::move(*found));
-    };
-    // The optimum that most starts reach, among those with the best score or one as good.
-    const auto best = [&] {
+      optima.push_back(std::move(found));
+    }
+    /// The optimum that most starts reach, among those with the best score or one as good.
+    Candidate& best() {
       std::size_t first = 0;
       for (std::size_t k = 1; k < optima.size(); ++k) first = optima[k].isBetterThan(optima[first]) ? k : first;
       std::size_t most = first;
@@ -726,45 +735,53 @@ class Hierarchy {
                            optima[first].score - optima[k].score < equal_scores;
         if (equal && optima[k].reached > optima[most].reached) most = k;
       }
-      return most;
+      return optima[most];
+    }
+  };
+  /// One start of the model that ends; true while there is more to do.
+  bool end(const StopRequest& stop) {
+    Ending& ending = *ending_;
+    const std::size_t m = ending.model;
+    const std::int64_t same = same_optimum * static_cast<std::int64_t>(std::max<std::size_t>(size(), 64));
+    const bool agreed = !ending.optima.empty() && ending.best().reached >= agreeing_starts;
+    if (ending.place < ending.places.size() && !agreed) {
+      std::optional<Candidate> found = refine(m, ending.places[ending.place], refined_[m], max_passes, stop);
+      if (!found) return true;
+      ++ending.place;
+      ending.visit(std::move(*found), same);
+      if (!states_[m].hasEstimate()) take(m, ending.best());
+      return true;
+    }
+    ending.place = ending.places.size();
+    for (; ending.other < models_.size(); ++ending.other, ending.completion = 0, ending.completions.reset()) {
+      if (!ending.completions)
+        ending.completions = completionsBy(ending.other, m, std::max<std::size_t>(options_.refined_hypotheses, 1));
+      if (ending.completion == ending.completions->best.size()) continue;
+      std::optional<Candidate> found =
+          refine(m, ending.completions->best[ending.completion], detail::mixBits(ending.other, ending.completion),
+                 ending.made, max_passes, stop);
+      if (!found) return true;
+      ++ending.completion;
+      if (isBeyondChance(m, ending.other, *ending.completions, *found)) ending.visit(std::move(*found), same);
+      return true;
+    }
+    const std::int64_t score = ending.best().score;
+    const auto is_open = [&](const Candidate& one) {
+      return models_[m]->sampleSize() > 0 && !one.set_aside && one.reached == 1;
     };
-    for (const auto& place : draws_[m].ranked(count)) {
-      std::optional<Candidate> candidate = refine(m, place, refined_[m], last ? max_passes : wide_passes + 1, stop);
-      if (!candidate) return false;
-      visit(std::move(candidate));
-      if (optima[best()].reached >= agreeing_starts) break;
+    if (ending.own_sample < own_samples && is_open(ending.best())) {
+      std::optional<Candidate> found = refineOwnSample(m, ending.best(), ending.own_sample, ending.made, stop);
+      if (!found) return true;
+      if (!found->errors.empty()) ending.visit(std::move(*found), same);
+      Candidate& best = ending.best();
+      if (++ending.own_sample == own_samples && best.score == score) best.set_aside = is_open(best);
+      return true;
     }
-    for (std::size_t other = 0; last && other < models_.size(); ++other) {
-      const Completions completions = completionsBy(other, m, count);
-      for (const Parameter& parameter : completions.best) {
-        std::vector<Refined> made;  // no key of measurements names where these begin: nothing is kept
-        std::optional<Candidate> candidate = refine(m, parameter, 0, made, max_passes, stop);
-        if (!candidate) return false;
-        if (isBeyondChance(m, other, completions, *candidate)) visit(std::move(candidate));
-      }
-    }
-    for (std::size_t draw = 0; last && models_[m]->sampleSize() > 0 && draw < own_samples;) {
-      const std::size_t now = best();
-      if (optima[now].set_aside || optima[now].reached > 1) break;
-      for (; draw < own_samples && best() == now && optima[now].reached == 1; ++draw) {
-        std::optional<Candidate> candidate = refineOwnSample(m, optima[now], draw, stop);
-        if (!candidate) return false;
-        if (!candidate->errors.empty()) visit(std::move(candidate));
-      }
-      optima[now].set_aside = best() == now && optima[now].reached == 1;
-    }
-    Candidate& found = optima[best()];
-    if (last && found.is_rough) {
-      std::vector<Measurement> inliers;
-      inliersOf(m, found, 1, 0, inliers);
-      ModelEstimate<Parameter> whole = models_[m]->estimate(found.estimate.parameter, inliers, stop);
-      if (stop && stop()) return false;
-      if (whole.usable()) {
-        found.estimate = std::move(whole);
-        found.errors = errorsOf(m, found.estimate.parameter);
-        found.threshold = thresholdOf(m, found.errors);
-      }
-    }
+    take(m, ending.best());
+    ending_.reset();
+    return finish(m);
+  }
+  void take(std::size_t m, Candidate found) {
     State& state = states_[m];
     state.estimate = std::move(found.estimate);
     state.threshold = found.threshold;
@@ -772,7 +789,6 @@ class Hierarchy {
     state.outdated = false;
     classify(m);
     decide();
-    return true;
   }
   std::vector<std::size_t> sampleOf(std::size_t m, std::size_t draw) const {
     std::vector<std::size_t> sample;
@@ -805,8 +821,8 @@ class Hierarchy {
     }
     state.excess_noise = excessNoise(errors, model.freeParameters(), model.chance(max_excess_noise * state.threshold));
   }
-  /// Draws of the model have ended: what comes next.
-  void finish(std::size_t m) {
+  /// The model has ended: what comes next; true if there is something.
+  bool finish(std::size_t m) {
     State& state = states_[m];
     if (!draws_[m].hasBest()) state = State{};
     state.progress = State::Progress::evaluated;
@@ -825,6 +841,8 @@ class Hierarchy {
       if (states_[child].progress != State::Progress::idle) continue;
       if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
+    if (next() == none) terminate();
+    return next() != none;
   }
   /// True if a general model, which was not estimated, could reject a specific one by its support or cost: there are
   /// enough measurements that the specific one is far from, or it has more equations.
@@ -882,6 +900,7 @@ class Hierarchy {
   std::vector<Draws> draws_;
   std::vector<State> states_;
   std::vector<std::vector<Refined>> refined_;
+  std::optional<Ending> ending_;
   std::vector<double> thresholds_;  // for known noise, by the number of equations
 };
 
