@@ -15,6 +15,7 @@
 #include <fusion/detail/compiled.hpp>
 #include <fusion/imu/readings.hpp>
 #include <fusion/init/inertial_state.hpp>
+#include <lie/detail/small_products.hpp>
 #include <lie/se23.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/shown.hpp>
@@ -43,12 +44,10 @@ constexpr auto words(FilterConvention) { return std::array{"liestat", "openvins"
 inline const char* orderOf(FilterConvention convention) {
   constexpr const char* orders[] = {
       "position rotation velocity gyroscope_bias accelerometer_bias; of an SE_2(3) on its right, axes of the body",
-      "rotation position velocity gyroscope_bias accelerometer_bias; rotation in the body, position and velocity in "
-      "the "
-      "world",
-      "rotation position velocity accelerometer_bias gyroscope_bias; rotation and position in the body, velocity in "
-      "the "
-      "world",
+      "rotation position velocity gyroscope_bias accelerometer_bias; rotation in the body, position and velocity "
+      "in the world",
+      "rotation position velocity accelerometer_bias gyroscope_bias; rotation and position in the body, velocity "
+      "in the world",
       "position rotation velocity gyroscope_bias accelerometer_bias; all in the world"};
   return orders[static_cast<std::size_t>(convention)];
 }
@@ -87,8 +86,27 @@ struct FilterStart {
     return words[static_cast<std::size_t>(status)];
   }
   /// The covariance of the errors of another library, to first order.
-  LIESTAT_FUSION_API Covariance covarianceAs(FilterConvention of) const;
+  Covariance covarianceAs(FilterConvention of) const;
 };
+
+inline FilterStart::Covariance FilterStart::covarianceAs(FilterConvention of) const {
+  if (of == FilterConvention::liestat) return covariance;
+  constexpr int position = 0, rotation = 3, velocity = 6, gyroscope = 9, accelerometer = 12;
+  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity(), to_world = state.so3().matrix();
+  Covariance by = Covariance::Zero();
+  const auto set = [&](int row, int column, const Eigen::Matrix3d& block) { by.block<3, 3>(row, column) = block; };
+  if (of == FilterConvention::basalt) {
+    set(0, position, to_world), set(3, rotation, to_world);
+  } else {
+    set(0, rotation, same), set(3, position, of == FilterConvention::gtsam ? same : to_world);
+  }
+  set(6, velocity, to_world);
+  const bool accelerometer_first = of == FilterConvention::gtsam;
+  set(9, accelerometer_first ? accelerometer : gyroscope, same);
+  set(12, accelerometer_first ? gyroscope : accelerometer, same);
+  const Covariance other = detail::congruence(by, covariance);
+  return 0.5 * (other + other.transpose());
+}
 
 /// The start from what is known without a map (fusion/init/inertial_state.hpp), at `time`; gravity's length in m/s². Its
 /// status is ok if the covariance is finite.

@@ -40,23 +40,4 @@ LIESTAT_FUSION_INLINE FilterStart filterStart(const Gaussian<InertialState>& sta
   return start;
 }
 
-LIESTAT_FUSION_INLINE FilterStart::Covariance FilterStart::covarianceAs(FilterConvention of) const {
-  if (of == FilterConvention::liestat) return covariance;
-  constexpr int position = 0, rotation = 3, velocity = 6, gyroscope = 9, accelerometer = 12;
-  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity(), to_world = state.so3().matrix();
-  Covariance by = Covariance::Zero();
-  const auto set = [&](int row, int column, const Eigen::Matrix3d& block) { by.block<3, 3>(row, column) = block; };
-  if (of == FilterConvention::basalt) {
-    set(0, position, to_world), set(3, rotation, to_world);
-  } else {
-    set(0, rotation, same), set(3, position, of == FilterConvention::gtsam ? same : to_world);
-  }
-  set(6, velocity, to_world);
-  const bool accelerometer_first = of == FilterConvention::gtsam;
-  set(9, accelerometer_first ? accelerometer : gyroscope, same);
-  set(12, accelerometer_first ? gyroscope : accelerometer, same);
-  const Covariance other = detail::congruence(by, covariance);
-  return 0.5 * (other + other.transpose());
-}
-
 }  // namespace liestat
