@@ -152,7 +152,7 @@ class Hierarchy {
       // An early look at what has been found, ever more seldom.
       const bool due = state.draws >= 4 && std::has_single_bit(state.draws) && draws.lastGain() > state.draws / 2;
       if (!due || !draws.hasBest()) return true;
-      std::optional<Candidate> early = refine(m, draws.ranked(1).front(), refined_[m], wide_passes + 1, stop);
+      std::optional<Candidate> early = refine(m, draws.ranked(1).front(), refined_[m], {}, wide_passes + 1, stop);
       if (early) take(m, std::move(*early));
       return true;
     }
@@ -387,9 +387,9 @@ class Hierarchy {
   static constexpr std::size_t agreeing_starts = 3;
   /// The samples of a local optimum's own inliers that may confirm it.
   static constexpr std::size_t own_samples = 5;
-  /// Passes from a hypothesis to a local optimum: the first ones within a multiple of the threshold, whose optima are
-  /// few, with few steps of the estimate, which would lead away to what that multiple includes.
-  static constexpr int max_passes = 6, wide_passes = 2, wide_steps = 5;
+  /// Passes from a hypothesis to a local optimum, with few steps of the estimate each, because the inliers still change:
+  /// the first ones within a multiple of the threshold, whose optima are few.
+  static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 5;
   static constexpr double wide_threshold = 9;
   /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half a
   /// measurement: a choice between these is one between accidents.
@@ -402,6 +402,7 @@ class Hierarchy {
   struct Refined {
     std::uint64_t key = 0;
     ModelEstimate<Parameter> estimate;
+    bool is_rough = false;  ///< it ended before it converged
   };
 
   /// Looks parents up, and what contains what.
@@ -477,6 +478,7 @@ class Hierarchy {
   void restart() {
     if (states_.empty()) states_.resize(models_.size());
     ending_.reset();
+    unconfirmed_.assign(models_.size(), std::nullopt);
     for (std::size_t m = 0; m < models_.size(); ++m) {
       draws_[m].restart();
       states_[m].progress = State::Progress::idle;
@@ -548,6 +550,8 @@ class Hierarchy {
     std::vector<double> errors;
     double threshold = 0;
     std::int64_t score = 0;
+    bool is_rough = false;
+    std::uint64_t set = 0;    ///< the key of its inliers
     std::size_t reached = 1;  ///< by so many starts
     bool set_aside = false;   ///< no other start confirms it
 
@@ -558,42 +562,54 @@ class Hierarchy {
     }
   };
   /// The local optimum that a hypothesis leads to: the estimate from the measurements within a wide threshold, and then
-  /// from the inliers until these repeat. None if `stop` ended it.
+  /// from the inliers until these repeat, or are those of an optimum that is known already. None if `stop` ended it.
   std::optional<Candidate> refine(std::size_t m, const typename Draws::Place& place, std::vector<Refined>& made,
-                                  int passes, const StopRequest& stop) const {
+                                  std::span<const Candidate> known_optima, int passes, const StopRequest& stop) const {
     std::uint64_t key = detail::mixBits(draws_[m].drawKey(place.draw), place.solution);
     for (const std::size_t i : sampleOf(m, place.draw)) key = detail::mixBits(key, measurements_.key(i));
-    return refine(m, draws_[m].at(place).parameter, key, made, passes, stop);
+    return refine(m, draws_[m].at(place).parameter, key, made, known_optima, passes, stop);
   }
   std::optional<Candidate> refine(std::size_t m, Parameter parameter, std::uint64_t key, std::vector<Refined>& made,
-                                  int passes, const StopRequest& stop) const {
+                                  std::span<const Candidate> known_optima, int passes, const StopRequest& stop) const {
     Candidate candidate;
     candidate.errors = errorsOf(m, parameter);
     candidate.threshold = thresholdOf(m, candidate.errors);
     std::uint64_t last = 0;
     int steps = 0;
-    const StopRequest few_steps = [&] { return ++steps >= wide_steps || (stop && stop()); };
+    const StopRequest few_steps = [&] { return ++steps >= rough_steps || (stop && stop()); };
     for (int pass = 0; pass < passes; ++pass) {
       const bool is_wide = pass < wide_passes;
       std::vector<Measurement> inliers;
-      const std::uint64_t set =
-          inliersOf(m, candidate, is_wide ? wide_threshold : 1, detail::mixBits(key, is_wide), inliers);
+      const std::uint64_t set = inliersOf(m, candidate, is_wide ? wide_threshold : 1, is_wide, inliers);
       if (set == last && is_wide) continue;
-      if (set == last) break;
-      last = set;
-      const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == set; });
-      ModelEstimate<Parameter> found;
+      if (set == last && !candidate.is_rough) break;
+      if (!is_wide) {
+        const auto same = std::find_if(known_optima.begin(), known_optima.end(), [&](const Candidate& optimum) {
+          return optimum.set == set && optimum.estimate.usable();
+        });
+        if (same != known_optima.end()) return *same;
+        candidate.set = set;
+      }
+      last = set, key = detail::mixBits(key, set);
+      const auto known = std::find_if(made.begin(), made.end(), [&](const Refined& r) { return r.key == key; });
+      Refined found{key, {}, false};
       if (known != made.end()) {
-        found = known->estimate;
+        found = *known;
       } else {
         steps = 0;
-        found = models_[m]->estimate(parameter, inliers, is_wide ? few_steps : stop);
+        found.estimate = models_[m]->estimate(parameter, inliers, few_steps);
         if (stop && stop()) return std::nullopt;
-        made.push_back({set, found});
+        found.is_rough = steps >= rough_steps;
+        // A model need not have a usable estimate before its end.
+        if (found.is_rough && !found.estimate.usable() && !is_wide) {
+          found = {key, models_[m]->estimate(parameter, inliers, stop), false};
+          if (stop && stop()) return std::nullopt;
+        }
+        made.push_back(found);
       }
-      if (!found.usable() && is_wide) continue;
-      if (!found.usable()) break;
-      candidate.estimate = std::move(found);
+      if (!found.estimate.usable() && is_wide) continue;
+      if (!found.estimate.usable()) break;
+      candidate.estimate = std::move(found.estimate), candidate.is_rough = found.is_rough;
       parameter = candidate.estimate.parameter;
       candidate.errors = errorsOf(m, parameter);
       candidate.threshold = thresholdOf(m, candidate.errors);
@@ -674,12 +690,55 @@ class Hierarchy {
     }
     return key;
   }
-  /// The same from the best solution of a sample of an estimate's own inliers.
-  std::optional<Candidate> refineOwnSample(std::size_t m, const Candidate& of, std::size_t draw,
-                                           std::vector<Refined>& made, const StopRequest& stop) const {
+  std::int64_t scoreOf(std::size_t m, std::span<const double> errors, double threshold) const {
+    std::int64_t score = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      score += detail::scoreOf(options_.score, errors[i], limitOf(m, threshold, i));
+    }
+    return score;
+  }
+  /// The end of a model: the local optima that its best hypotheses and its completions lead to. One that a single start
+  /// reaches may be an accident of the draws: it stands if samples of its own inliers, which do not depend on the seed,
+  /// lead to it again. This is tried when all models have ended, of those that count.
+  struct Ending {
+    std::size_t model;
+    std::vector<typename Draws::Place> places;  ///< of the hypotheses
+    std::size_t place = 0;                      ///< the next one
+    std::size_t other = 0, completion = 0;      ///< the next completion
+    std::optional<Completions> completions = {};
+    std::size_t own_sample = 0;
+    std::vector<Candidate> optima = {};
+    std::optional<std::size_t> taken = {};  ///< the optimum that is the model's estimate
+    std::vector<Refined> made = {};         ///< from completions and own samples
+
+    Ending(std::size_t m, std::vector<typename Draws::Place> from) : model(m), places(std::move(from)) {}
+    void visit(Candidate found, std::int64_t same) {
+      for (Candidate& known : optima) {
+        if (std::abs(known.score - found.score) > same) continue;
+        if (known.estimate.usable() == found.estimate.usable()) return void(++known.reached);
+      }
+      optima.push_back(std::move(found));
+    }
+    /// The optimum that most starts reach, among those with the best score or one as good.
+    std::size_t best() const {
+      std::size_t first = 0;
+      for (std::size_t k = 1; k < optima.size(); ++k) first = optima[k].isBetterThan(optima[first]) ? k : first;
+      std::size_t most = first;
+      for (std::size_t k = 0; k < optima.size(); ++k) {
+        const bool equal = !optima[k].set_aside && optima[k].estimate.usable() == optima[first].estimate.usable() &&
+                           optima[first].score - optima[k].score < equal_scores;
+        if (equal && optima[k].reached > optima[most].reached) most = k;
+      }
+      return most;
+    }
+  };
+  /// The local optimum that the best solution of a sample of an optimum's own inliers leads to.
+  std::optional<Candidate> refineOwnSample(Ending& ending, std::size_t optimum, const StopRequest& stop) const {
+    const std::size_t m = ending.model;
+    const Candidate& of = ending.optima[optimum];
     const Model& model = *models_[m];
     std::vector<std::size_t> sample;
-    detail::keyedSample(measurements_, detail::mixBits(draw), model.sampleSize(), sample,
+    detail::keyedSample(measurements_, detail::mixBits(ending.own_sample), model.sampleSize(), sample,
                         [&](std::size_t i) { return of.errors[i] < limitOf(m, of.threshold, i); });
     std::vector<Measurement> sampled;
     for (const std::size_t i : sample) sampled.push_back(measurements_[i]);
@@ -694,92 +753,89 @@ class Hierarchy {
       best = std::move(one), best->estimate.parameter = solution;
     }
     if (!best) return Candidate{};
-    const std::uint64_t key = detail::mixBits(static_cast<std::uint64_t>(of.score), draw);
-    return refine(m, best->estimate.parameter, key, made, max_passes, stop);
+    const std::uint64_t key = detail::mixBits(static_cast<std::uint64_t>(of.score), ending.own_sample);
+    return refine(m, best->estimate.parameter, key, ending.made, ending.optima, max_passes, stop);
   }
-  std::int64_t scoreOf(std::size_t m, std::span<const double> errors, double threshold) const {
-    std::int64_t score = 0;
-    for (std::size_t i = 0; i < size(); ++i) {
-      score += detail::scoreOf(options_.score, errors[i], limitOf(m, threshold, i));
-    }
-    return score;
-  }
-  /// The end of a model: the local optima that its best hypotheses and its completions lead to. One that a single start
-  /// reaches may be an accident of the draws: it stands if samples of its own inliers, which do not depend on the seed,
-  /// lead to it again.
-  struct Ending {
-    std::size_t model;
-    std::vector<typename Draws::Place> places;  ///< of the hypotheses
-    std::size_t place = 0;                      ///< the next one
-    std::size_t other = 0, completion = 0;      ///< the next completion
-    std::optional<Completions> completions = {};
-    std::size_t own_sample = 0;
-    std::vector<Candidate> optima = {};
-    std::vector<Refined> made = {};  ///< from completions and own samples
-
-    Ending(std::size_t m, std::vector<typename Draws::Place> from) : model(m), places(std::move(from)) {}
-    void visit(Candidate found, std::int64_t same) {
-      for (Candidate& known : optima) {
-        if (std::abs(known.score - found.score) > same) continue;
-        if (known.estimate.usable() == found.estimate.usable()) return void(++known.reached);
-      }
-      optima.push_back(std::move(found));
-    }
-    /// The optimum that most starts reach, among those with the best score or one as good.
-    Candidate& best() {
-      std::size_t first = 0;
-      for (std::size_t k = 1; k < optima.size(); ++k) first = optima[k].isBetterThan(optima[first]) ? k : first;
-      std::size_t most = first;
-      for (std::size_t k = 0; k < optima.size(); ++k) {
-        const bool equal = !optima[k].set_aside && optima[k].estimate.usable() == optima[first].estimate.usable() &&
-                           optima[first].score - optima[k].score < equal_scores;
-        if (equal && optima[k].reached > optima[most].reached) most = k;
-      }
-      return optima[most];
-    }
-  };
   /// One start of the model that ends; true while there is more to do.
   bool end(const StopRequest& stop) {
     Ending& ending = *ending_;
     const std::size_t m = ending.model;
     const std::int64_t same = same_optimum * static_cast<std::int64_t>(std::max<std::size_t>(size(), 64));
-    const bool agreed = !ending.optima.empty() && ending.best().reached >= agreeing_starts;
-    if (ending.place < ending.places.size() && !agreed) {
-      std::optional<Candidate> found = refine(m, ending.places[ending.place], refined_[m], max_passes, stop);
+    const auto agree = [&] {
+      return !ending.optima.empty() && ending.optima[ending.best()].reached >= agreeing_starts;
+    };
+    if (ending.place < ending.places.size() && !agree()) {
+      std::optional<Candidate> found =
+          refine(m, ending.places[ending.place], refined_[m], ending.optima, max_passes, stop);
       if (!found) return true;
       ++ending.place;
       ending.visit(std::move(*found), same);
-      if (!states_[m].hasEstimate()) take(m, ending.best());
+      if (!states_[m].hasEstimate()) take(m, ending.optima[ending.best()]);
       return true;
     }
     ending.place = ending.places.size();
     for (; ending.other < models_.size(); ++ending.other, ending.completion = 0, ending.completions.reset()) {
-      if (!ending.completions)
+      if (!ending.completions) {
         ending.completions = completionsBy(ending.other, m, std::max<std::size_t>(options_.refined_hypotheses, 1));
+      }
       if (ending.completion == ending.completions->best.size()) continue;
       std::optional<Candidate> found =
           refine(m, ending.completions->best[ending.completion], detail::mixBits(ending.other, ending.completion),
-                 ending.made, max_passes, stop);
+                 ending.made, ending.optima, max_passes, stop);
       if (!found) return true;
       ++ending.completion;
       if (isBeyondChance(m, ending.other, *ending.completions, *found)) ending.visit(std::move(*found), same);
       return true;
     }
-    const std::int64_t score = ending.best().score;
+    const std::size_t best = ending.best();
     const auto is_open = [&](const Candidate& one) {
       return models_[m]->sampleSize() > 0 && !one.set_aside && one.reached == 1;
     };
-    if (ending.own_sample < own_samples && is_open(ending.best())) {
-      std::optional<Candidate> found = refineOwnSample(m, ending.best(), ending.own_sample, ending.made, stop);
+    if (ending.taken && ending.own_sample < own_samples && is_open(ending.optima[best])) {
+      std::optional<Candidate> found = refineOwnSample(ending, best, stop);
       if (!found) return true;
       if (!found->errors.empty()) ending.visit(std::move(*found), same);
-      Candidate& best = ending.best();
-      if (++ending.own_sample == own_samples && best.score == score) best.set_aside = is_open(best);
+      const bool is_last = ++ending.own_sample == own_samples;
+      if (is_last && ending.best() == best) ending.optima[best].set_aside = is_open(ending.optima[best]);
       return true;
     }
-    take(m, ending.best());
+    if (ending.taken != best) {
+      std::optional<Candidate> whole = converged(m, ending.optima[best], stop);
+      if (!whole) return true;
+      take(m, std::move(*whole));
+      const bool is_first = !ending.taken;
+      ending.taken = best;
+      if (is_first && is_open(ending.optima[best])) unconfirmed_[m] = std::move(ending);
+    }
     ending_.reset();
     return finish(m);
+  }
+  /// An optimum with an estimate that has converged. None if `stop` ended it.
+  std::optional<Candidate> converged(std::size_t m, Candidate of, const StopRequest& stop) const {
+    if (!of.is_rough) return of;
+    std::vector<Measurement> inliers;
+    inliersOf(m, of, 1, 0, inliers);
+    ModelEstimate<Parameter> whole = models_[m]->estimate(of.estimate.parameter, inliers, stop);
+    if (stop && stop()) return std::nullopt;
+    if (!whole.usable()) return of;
+    of.estimate = std::move(whole);
+    of.errors = errorsOf(m, of.estimate.parameter);
+    of.threshold = thresholdOf(m, of.errors);
+    return of;
+  }
+  /// Takes up a model whose optimum is not confirmed and counts: it is chosen or contested, or rejects another one.
+  bool confirm() {
+    std::vector<std::size_t> all = contested();
+    for (const State& state : states_) {
+      if (state.rejected_by && survives(*state.rejected_by)) all.push_back(*state.rejected_by);
+    }
+    for (const std::size_t m : all) {
+      if (!unconfirmed_[m]) continue;
+      ending_ = std::move(unconfirmed_[m]);
+      unconfirmed_[m].reset();
+      return true;
+    }
+    return false;
   }
   void take(std::size_t m, Candidate found) {
     State& state = states_[m];
@@ -841,8 +897,9 @@ class Hierarchy {
       if (states_[child].progress != State::Progress::idle) continue;
       if (all || mayReject(child, m)) states_[child].progress = State::Progress::candidate;
     }
-    if (next() == none) terminate();
-    return next() != none;
+    if (next() != none || confirm()) return true;
+    terminate();
+    return false;
   }
   /// True if a general model, which was not estimated, could reject a specific one by its support or cost: there are
   /// enough measurements that the specific one is far from, or it has more equations.
@@ -901,6 +958,7 @@ class Hierarchy {
   std::vector<State> states_;
   std::vector<std::vector<Refined>> refined_;
   std::optional<Ending> ending_;
+  std::vector<std::optional<Ending>> unconfirmed_;
   std::vector<double> thresholds_;  // for known noise, by the number of equations
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <stats/model_choice.hpp>
+#include <stats/relative_curvature.hpp>
 #include <stats/status.hpp>
 
 #include <Eigen/Core>
@@ -32,6 +33,8 @@ struct ModelEstimate {
   double equation_error = std::numeric_limits<double>::quiet_NaN();  ///< E², the squared error of the equations
   int degrees_of_freedom = 0;
   std::size_t measurements = 0;  ///< number of measurements used
+  /// Of a final estimate; untested: first order is all that is known.
+  RelativeCurvature relative_curvature = {};
 
   /// True if the parameter may be used; an iteration that was stopped early has a usable one, too.
   bool usable() const {
@@ -80,6 +83,12 @@ class HierarchyModel {
   /// status not_converged.
   virtual ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                             const StopRequest& stop) const = 0;
+  /// The same with what is too dear for each estimate of a search: its relative curvature, which widens the covariance, or
+  /// makes the status ill_defined, without one.
+  virtual ModelEstimate<Parameter> finalEstimate(const Parameter& start, std::span<const Measurement> inliers,
+                                                 const StopRequest& stop) const {
+    return estimate(start, inliers, stop);
+  }
   /// The fraction of random measurements whose squared error under a true parameter is below a threshold.
   virtual double chance(double threshold) const = 0;
 };

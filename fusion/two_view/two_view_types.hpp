@@ -6,6 +6,7 @@
 #include <lie/essential.hpp>
 #include <stats/gaussian.hpp>
 #include <stats/hierarchy_types.hpp>
+#include <stats/relative_curvature.hpp>
 #include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
@@ -65,6 +66,8 @@ struct TwoViewMotionResult {
   /// Pose of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, with covariance
   /// in the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
+  /// Of the model at the noise that the matches show: it has widened the covariances, or withheld them.
+  RelativeCurvature relative_curvature = {};
 };
 
 /// A motion that explains the matches as well as the chosen one.
@@ -88,7 +91,7 @@ struct TwoViewImageFrame {
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
-  /// are the same one; contested: the matches do not tell the chosen model from the rivals, or those that do not move
+  /// are the same one, or its model is curved on the scale of the noise (no covariance); contested: the matches do not tell the chosen model from the rivals, or those that do not move
   /// are a motion of their own, the rival `none`, beside the chosen one.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
@@ -186,6 +189,8 @@ void describe(V& v, const TwoViewMotionResult& x) {
     "physical ones of the model; two sets for the two poses of a plane, otherwise one or none");
   v("second_T_first", x.relative_pose ? std::optional(RelativePose{*x.relative_pose}) : std::nullopt,
     "of the models with a pose");
+  v("curvature", x.relative_curvature.word(),
+    "of the model on the scale of the noise: untested, small, widened or large");
 }
 
 template <class V>

@@ -187,22 +187,22 @@ struct SmallSvd {
   }
   /// The image of a null vector says nothing: the unit vector that is furthest from the rows before, made orthogonal.
   void complete(int i) {
-    SmallList<Most> best(n);
-    double longest = -1;
+    int furthest = 0;
+    double least = std::numeric_limits<double>::infinity();
     for (int unit = 0; unit < n; ++unit) {
-      for (int j = 0; j < n; ++j) u(i, j) = j == unit;
-      for (int pass = 0; pass < 2; ++pass) {
-        for (int k = 0; k < i; ++k) {
-          const double along = dot(i, k);
-          for (int j = 0; j < n; ++j) u(i, j) -= along * u(k, j);
-        }
-      }
-      const double length = std::sqrt(dot(i, i));
-      if (length <= longest) continue;
-      longest = length;
-      for (int j = 0; j < n; ++j) best[static_cast<std::size_t>(j)] = u(i, j) / length;
+      double within = 0;
+      for (int k = 0; k < i; ++k) within += u(k, unit) * u(k, unit);
+      if (within < least) least = within, furthest = unit;
     }
-    for (int j = 0; j < n; ++j) u(i, j) = best[static_cast<std::size_t>(j)];
+    for (int j = 0; j < n; ++j) u(i, j) = j == furthest;
+    for (int pass = 0; pass < 2; ++pass) {
+      for (int k = 0; k < i; ++k) {
+        const double along = dot(i, k);
+        for (int j = 0; j < n; ++j) u(i, j) -= along * u(k, j);
+      }
+    }
+    const double length = std::sqrt(dot(i, i));
+    for (int j = 0; j < n; ++j) u(i, j) /= length;
   }
 
   SmallList<Most> rounding_;  // squares: what the rotations left in each column

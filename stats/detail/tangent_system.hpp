@@ -37,24 +37,25 @@ inline void ConstraintBasis::compute(const Rows& C) {
   const int size = std::max(n_, p_);
   Z_.setZero();
   rank_ = 0;
-  // Filled up to a square; the zeros that fill it up are never mixed with the rest.
-  BasicSmallMatrix<Eigen::Dynamic> rows(size, size);
+  // Transposed: its columns, which are rotated, are the constraints, fewer than the coordinates. Filled up to a square;
+  // the zeros that fill it up are never mixed with the rest.
+  BasicSmallMatrix<Eigen::Dynamic> columns(size, size);
   for (int k = 0; k < p_; ++k) {
     const double length = norm(C[k], n_);
     scale_[number(k)] = length > 0 && std::isfinite(length) ? 1 / length : 0;
-    for (int j = 0; j < n_; ++j) rows(k, j) = scale_[number(k)] * C[k][j];
+    for (int j = 0; j < n_; ++j) columns(j, k) = scale_[number(k)] * C[k][j];
   }
-  const SmallSvd svd(rows);
+  const SmallSvd svd(columns);
   int free = 0;
   for (int k = 0; k < size; ++k) {
-    const double* v = svd.v.row(k);
+    const double* direction = svd.u.row(k);
     if (svd.value(k) > 5e-8) {
       values_[number(rank_)] = svd.value(k);
-      std::copy(v, v + n_, Y_[rank_]);
-      std::copy(svd.u.row(k), svd.u.row(k) + p_, U_[rank_]);
+      std::copy(direction, direction + n_, Y_[rank_]);
+      std::copy(svd.v.row(k), svd.v.row(k) + p_, U_[rank_]);
       ++rank_;
-    } else if (dot(v, v, n_) > 0.5) {
-      std::copy(v, v + n_, Z_[free++]);
+    } else if (dot(direction, direction, n_) > 0.5) {
+      std::copy(direction, direction + n_, Z_[free++]);
     }
   }
 }

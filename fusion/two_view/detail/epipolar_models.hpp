@@ -74,11 +74,11 @@ class EpipolarModel : public EpipolarTypeModel {
                 std::vector<Parameter>& solutions) const override {
     planeAndParallax(plane.matrix, off, solutions);
   }
-  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
-                                    const StopRequest& stop) const override {
+  ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers, const StopRequest& stop,
+                               bool is_final) const override {
     const Entries q = entriesFrom(start.matrix) * (std::sqrt(2.0) / start.matrix.norm());
     return estimateTwoView<Entries, EpipolarConstraint, EpipolarEquation>(
-        q, constraint_, inliers, images_.noise, stop,
+        q, constraint_, inliers, images_.noise, stop, is_final,
         [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixFrom(found); });
   }
 
@@ -99,10 +99,10 @@ class EssentialModel : public EpipolarTypeModel {
                 std::vector<Parameter>& solutions) const override {
     planeAndParallax(plane.matrix, off, solutions);
   }
-  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
-                                    const StopRequest& stop) const override {
+  ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers, const StopRequest& stop,
+                               bool is_final) const override {
     return estimateTwoView<Essentiald, NoConstraint, PoseEquation>(
-        toEssential(poseByCheirality(start.matrix, inliers).pose), {}, inliers, images_.noise, stop,
+        toEssential(poseByCheirality(start.matrix, inliers).pose), {}, inliers, images_.noise, stop, is_final,
         [](const Essentiald& found, Parameter& parameter) {
           parameter.pose = found;
           parameter.matrix = found.essentialMatrix();

@@ -47,21 +47,16 @@ struct PoseEquation {
   }
 };
 
-/// The parts that models of epipolar geometries have in common.
-class EpipolarTypeModel : public TwoViewModel {
+/// The further parts of models of epipolar geometries.
+class EpipolarTypeModel : public CardModel {
  public:
-  EpipolarTypeModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
-  std::string name() const override { return card_.name; }
-  std::vector<std::string> parents() const override { return card_.parents; }
-  int freeParameters() const override { return card_.free_parameters; }
+  using CardModel::CardModel;
   int equations() const override { return 1; }
-  int measurementDimension() const override { return 4; }
   /// Matches of a homography H satisfy [e']× H for any epipole e': two freedoms.
   int freedomBeyond(const TwoViewModel& specific) const override {
     const int more = std::max(0, freeParameters() - specific.freeParameters());
     return specific.equations() == 2 && freeParameters() > 2 ? 2 : more;
   }
-  std::size_t sampleSize() const override { return card_.sample_size; }
   void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
     epipolarErrors(q.matrix, matches, images_.noise, squared);
   }
@@ -71,10 +66,6 @@ class EpipolarTypeModel : public TwoViewModel {
     const double height = std::min(images_.size.x(), images_.size.y());
     return std::min(1.0, 2 * 1.3 * std::sqrt(2 * threshold * variance) / height);
   }
-
- protected:
-  TwoViewModelCard card_;
-  TwoViewImages images_;
 };
 
 }  // namespace liestat::detail

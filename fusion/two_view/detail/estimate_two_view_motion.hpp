@@ -166,29 +166,39 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
                                                       const TwoViewMotionOptions& options) {
   ModelEstimate<TwoViewMotionModel> estimate = state.estimate;
   std::vector<double> errors(matches.size());
-  const auto estimateWithin = [&](double threshold) {
+  const auto estimateWithin = [&](double threshold, bool is_final) {
     model.errors(estimate.parameter, matches, errors);
     std::vector<Eigen::Vector4d> within;
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (errors[i] < threshold) within.push_back(matches[i]);
     }
-    return model.estimate(estimate.parameter, within, options.stop);
+    return is_final ? model.finalEstimate(estimate.parameter, within, options.stop)
+                    : model.estimate(estimate.parameter, within, options.stop);
   };
   // Where a plane dominates the steps are many; the search does not wait for them.
   for (int more = 0; more < 5 && estimate.status == Status::not_converged; ++more) {
     if (options.stop && options.stop()) break;
-    ModelEstimate<TwoViewMotionModel> next = estimateWithin(state.threshold);
+    ModelEstimate<TwoViewMotionModel> next = estimateWithin(state.threshold, false);
     if (!next.usable()) break;
     estimate = std::move(next);
   }
-  if (options.noise_is_known || !(state.excess_noise > 1)) return estimate;
+  const double noise = options.noise_is_known ? 1 : std::max(state.excess_noise, 1.0);
   // Within this the stated threshold cuts off hardly more than it is meant to.
   constexpr double estimated_again = 1.3;
-  if (state.excess_noise > estimated_again) {
-    ModelEstimate<TwoViewMotionModel> again = estimateWithin(state.excess_noise * state.threshold);
-    if (again.status == estimate.status) estimate = std::move(again);
+  if (estimate.status == Status::ok) {
+    ModelEstimate<TwoViewMotionModel> last =
+        estimateWithin(noise > estimated_again ? noise * state.threshold : state.threshold, true);
+    if (last.usable()) {
+      estimate = std::move(last);
+    } else {
+      estimate.status = last.status;
+    }
   }
-  estimate.covariance *= state.excess_noise, estimate.information /= state.excess_noise;
+  const RelativeCurvature shown = estimate.relative_curvature.at(std::sqrt(noise));
+  estimate.covariance *= noise * shown.widening() / estimate.relative_curvature.widening();
+  estimate.information /= noise;
+  estimate.relative_curvature = shown;
+  if (estimate.status == Status::ok && shown.large()) estimate.status = Status::ill_defined;
   return estimate;
 }
 
@@ -368,6 +378,7 @@ struct TwoViewInput {
     result.matrix_covariance = covarianceInPixels(estimate, to_second, to_first);
     result.physical =
         physicalParameters(model.name(), estimate, agreeing, calibration, {first.focalLength(), second.focalLength()});
+    result.relative_curvature = estimate.relative_curvature;
     if (estimate.covariance.rows() == 5) {
       result.relative_pose = Gaussian<Essentiald>{estimate.parameter.pose, estimate.covariance};
     }
@@ -427,7 +438,9 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
   } else if (!result.ok()) {
-    result.reason = "the estimate of the chosen model did not converge";
+    result.reason = result.status == Status::ill_defined
+                        ? model.name() + " is curved on the scale of the noise: no covariance of the matches would hold"
+                        : "the estimate of the chosen model did not converge";
   } else if (!input.fault().empty()) {
     result.status = Status::ill_defined, result.reason = input.fault();
   } else if (state.unsupported) {
@@ -496,9 +509,11 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
                        own.size() * static_cast<std::size_t>(model.equations()), model.freeParameters()};
     TwoViewStructure& structure = result.structures.emplace_back();
     structure.model = found.name, structure.equations = model.equations();
-    structure.status = found.estimate.status, structure.inliers = std::move(places);
+    const ModelEstimate<TwoViewMotionModel> last = model.finalEstimate(found.estimate.parameter, own, options.stop);
+    const ModelEstimate<TwoViewMotionModel>& estimate = last.usable() ? last : found.estimate;
+    structure.status = last.status, structure.inliers = std::move(places);
     structure.rms = options.sigma * std::sqrt(fit.normalised());
-    input.describe(model, found.estimate, own, structure);
+    input.describe(model, estimate, own, structure);
   }
   for (std::size_t i = 0; i < taken.size(); ++i) {
     if (taken[i] == 0) result.rest.push_back(i);

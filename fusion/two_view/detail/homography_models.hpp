@@ -52,15 +52,10 @@ struct HomographyEquation {
 };
 
 /// The parts that models of homographies have in common.
-class HomographyTypeModel : public TwoViewModel {
+class HomographyTypeModel : public CardModel {
  public:
-  HomographyTypeModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
-  std::string name() const override { return card_.name; }
-  std::vector<std::string> parents() const override { return card_.parents; }
-  int freeParameters() const override { return card_.free_parameters; }
+  using CardModel::CardModel;
   int equations() const override { return 2; }
-  int measurementDimension() const override { return 4; }
-  std::size_t sampleSize() const override { return card_.sample_size; }
   void errors(const Parameter& q, std::span<const Measurement> matches, std::span<double> squared) const override {
     homographyErrors(q.matrix, matches, images_.noise, squared);
   }
@@ -69,10 +64,6 @@ class HomographyTypeModel : public TwoViewModel {
     const double variance = 0.5 * (std::pow(images_.noise.first, 2) + std::pow(images_.noise.second, 2));
     return std::min(1.0, 2 * std::numbers::pi * threshold * variance / (images_.size.x() * images_.size.y()));
   }
-
- protected:
-  TwoViewModelCard card_;
-  TwoViewImages images_;
 };
 
 /// Nothing moves.
@@ -82,8 +73,8 @@ class NoMotionModel : public HomographyTypeModel {
   void solve(std::span<const Measurement>, std::vector<Parameter>& solutions) const override {
     solutions.emplace_back();
   }
-  ModelEstimate<Parameter> estimate(const Parameter&, std::span<const Measurement> inliers,
-                                    const StopRequest&) const override {
+  ModelEstimate<Parameter> fit(const Parameter&, std::span<const Measurement> inliers, const StopRequest&,
+                               bool) const override {
     ModelEstimate<Parameter> result;
     result.status = Status::ok;
     result.chi2 = 0, result.equation_error = 0;
@@ -101,11 +92,11 @@ class HomographyModel : public HomographyTypeModel {
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
     solver_(sample, solutions);
   }
-  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
-                                    const StopRequest& stop) const override {
+  ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers, const StopRequest& stop,
+                               bool is_final) const override {
     const Entries q = entriesFrom(start.matrix);
     return estimateTwoView<Entries, HomographyConstraint, HomographyEquation>(
-        q, constraint_, inliers, images_.noise, stop,
+        q, constraint_, inliers, images_.noise, stop, is_final,
         [](const Entries& found, Parameter& parameter) { parameter.matrix = matrixFrom(found); });
   }
 

@@ -42,10 +42,10 @@ class UprightModel : public EpipolarTypeModel {
       solutions.emplace_back().matrix = E;
     }
   }
-  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
-                                    const StopRequest& stop) const override {
+  ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers, const StopRequest& stop,
+                               bool is_final) const override {
     return estimateTwoView<Essentiald, UprightConstraint, PoseEquation>(
-        poseOf(start.matrix, inliers), constraint_, inliers, images_.noise, stop,
+        poseOf(start.matrix, inliers), constraint_, inliers, images_.noise, stop, is_final,
         [](const Essentiald& found, Parameter& parameter) {
           parameter.pose = found;
           parameter.matrix = found.essentialMatrix();
@@ -93,16 +93,17 @@ class SharedFocalModel : public EpipolarTypeModel {
   void solve(std::span<const Measurement> sample, std::vector<Parameter>& solutions) const override {
     for (const SharedFocalMotion& motion : solveSharedFocal(sample)) solutions.push_back(parameterOf(motion));
   }
-  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
-                                    const StopRequest& stop) const override {
+  ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers, const StopRequest& stop,
+                               bool is_final) const override {
     const double f = start.focal_length;
     const Eigen::Vector3d k(f, f, 1);
     const Eigen::Matrix3d E = k.asDiagonal() * start.matrix * k.asDiagonal();
     const CheiralPose chosen = poseByCheirality(E, inliers, 1e-12, {f, f});
     const PoseAndFocal q(toEssential(chosen.pose), Eigen::Matrix<double, 1, 1>(std::log(f)));
     ModelEstimate<Parameter> result = estimateTwoView<PoseAndFocal, NoConstraint, SharedFocalEquation>(
-        q, {}, inliers, images_.noise, stop,
+        q, {}, inliers, images_.noise, stop, is_final,
         [](const PoseAndFocal& found, Parameter& parameter) { parameter = parameterOf(motionFrom(found)); });
+    if (result.status == Status::ill_defined) return result;
     if (result.status != Status::ok || !isTold(result, inliers)) {
       result = {};
       result.status = Status::not_applicable;

@@ -26,18 +26,19 @@ namespace liestat::detail {
 /// the estimate by many of its standard deviations. Where all matches are few, three times their mean is the bound.
 inline constexpr double max_leverage = 0.5;
 
-/// The projection estimate; `finish` takes the parameter that was found into the result.
+/// The projection estimate, with its curvature if `is_final`; `finish` takes the parameter that was found into the
+/// result.
 template <class Q, class Constraint, class Equation, class Finish>
 ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constraint& constraint,
                                                   std::span<const Eigen::Vector4d> inliers, const MatchNoise& noise,
-                                                  const StopRequest& stop, const Finish& finish) {
+                                                  const StopRequest& stop, bool is_final, const Finish& finish) {
   using Noise = DiagonalNoise<4>;
   using Channel = MeasurementChannel<Eigen::Vector4d, Noise, Equation>;
   const Noise sigma(Eigen::Vector4d(noise.first, noise.first, noise.second, noise.second));
   ConstrainedOptions<Q> options;
   options.max_iterations = 20;
   options.tolerance = 1e-4;              // standard deviations
-  options.curvature = false;             // residuals are small
+  options.curvature = is_final;          // residuals are small: the search needs none
   options.noise = StatedNoise::trusted;  // models are compared by their χ²
   Channel matches{{inliers.begin(), inliers.end()}, {sigma}, {Equation{}}};
   ConstrainedResult<Q> found;
@@ -47,9 +48,10 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
       if (stop && stop()) estimator.stop();
     }
     const ConstrainedResult<Q>& next = estimator.result();
-    if (pass > 0 && !next.ok()) break;
+    const bool ended = next.ok() || next.end == ConstrainedEnd::curved;
+    if (pass > 0 && !ended) break;
     found = next;
-    if (!found.ok()) break;
+    if (!ended) break;
     const double mean = static_cast<double>(found.free_parameters) / found.equations;
     Channel vouched_for{{}, {sigma}, {Equation{}}};
     for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -68,6 +70,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   result.equation_error = found.equation_error;
   result.degrees_of_freedom = found.degrees_of_freedom;
   result.measurements = found.measurements;
+  result.relative_curvature = found.relative_curvature;
   return result;
 }
 
@@ -94,6 +97,33 @@ struct TwoViewModelCard {
   std::vector<std::string> parents;
   int free_parameters = 0;
   std::size_t sample_size = 0;
+};
+
+/// The parts that all models have in common.
+class CardModel : public TwoViewModel {
+ public:
+  CardModel(TwoViewModelCard card, const TwoViewImages& images) : card_(std::move(card)), images_(images) {}
+  std::string name() const override { return card_.name; }
+  std::vector<std::string> parents() const override { return card_.parents; }
+  int freeParameters() const override { return card_.free_parameters; }
+  int measurementDimension() const override { return 4; }
+  std::size_t sampleSize() const override { return card_.sample_size; }
+  ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
+                                    const StopRequest& stop) const override {
+    return fit(start, inliers, stop, false);
+  }
+  ModelEstimate<Parameter> finalEstimate(const Parameter& start, std::span<const Measurement> inliers,
+                                         const StopRequest& stop) const override {
+    return fit(start, inliers, stop, true);
+  }
+
+ protected:
+  /// estimate() or finalEstimate().
+  virtual ModelEstimate<Parameter> fit(const Parameter& start, std::span<const Measurement> inliers,
+                                       const StopRequest& stop, bool is_final) const = 0;
+
+  TwoViewModelCard card_;
+  TwoViewImages images_;
 };
 
 /// The matrices that a closed-form solver finds, as parameters.
