@@ -37,7 +37,7 @@ class CrystalOrientation {
   static CrystalOrientation fromBunge(double phi1, double capital_phi, double phi2, PointGroup group) {
     return {fromEuler<double>(EulerAxes::zxz, {phi1, capital_phi, phi2}), group};
   }
-  /// Of the trivial group.
+  /// The rotation of a quaternion, modulo the trivial group.
   static CrystalOrientation fromParams(const Params& q) { return {SO3d::fromParams(q), {}}; }
 
   const SO3d& rotation() const { return rotation_; }
@@ -83,7 +83,7 @@ struct ManifoldTraits<CrystalOrientation> : TrivialIsotropy<CrystalOrientation, 
     const double best = 2 * std::atan2(copy.head<3>().norm(), std::abs(copy[3]));
     return {group.index[nearest.slot], best, nearest.second < 0 ? 2 * pi - best : angle(nearest.second)};
   }
-  /// Its index alone.
+  /// The index of that copy.
   static int nearestIndex(const M& x) {
     const detail::RotationGroup& group = x.group().rotations();
     const Eigen::Vector4d& q = x.params();

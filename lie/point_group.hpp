@@ -19,7 +19,7 @@
 
 namespace liestat {
 
-/// What the x axis of a hexagonal or trigonal crystal's trihedron is along: its direct axis a, so that y is b*; or the
+/// The axis that x is along in a hexagonal or trigonal crystal's trihedron: the direct axis a, so that y is b*; or the
 /// reciprocal a*, so that y is b. Files and programs differ, and orientations of 32 and 3 then differ by 30 degrees.
 enum class HexagonalAxes { x_along_a, x_along_a_star };
 
@@ -71,7 +71,7 @@ struct RotationGroup {
   alignas(32) std::array<double, 24> x{}, y{}, z{}, w{};
   double least_angle = 0;  ///< of its rotations but the identity, rad; 2 pi of the trivial group
 
-  /// Of the rotations whose bits are set. They must be a group.
+  /// The group of the rotations whose bits are set, which must be one.
   static constexpr RotationGroup of(std::uint32_t elements) {
     RotationGroup group;
     double largest = -1;

@@ -109,7 +109,7 @@ M meanOfCopies(const E& executor, const R& samples, const W& weights, const M& y
       },
       [](int&, int) {});
   const auto found = frechetMean<Rotation>(executor, asSamples(copies), weights, MeanOptions<Rotation>{});
-  // Of the copies the one of least rotation, whatever copies the data are.
+  // The copy of least rotation, whatever copies the data are.
   const M mean = converged(found.status) ? M(found.mean, y.group()) : y;
   return {mean.nearestTo(Rotation()), y.group()};
 }
