@@ -205,6 +205,7 @@ class Uniqueness(str):
 
 class MeanResult(_MeanSummary):
     law: Law
+    labels: NDArray[Any]
     near_tie_z: _Array | _Several
     cost: float | _Several
     shape: tuple[int, ...]
@@ -297,6 +298,7 @@ def mean(
     symmetry: str | None = None,
     hexagonal_axes: Literal["a", "a*"] = "a",
     keepdims: bool = False,
+    by: ArrayLike | None = None,
 ) -> MeanResult: ...
 class _Split(_SplitSummary):
     verdict: str

@@ -112,6 +112,7 @@ def mean(
     symmetry=None,
     hexagonal_axes="a",
     keepdims=False,
+    by=None,
 ):
     """The mean of features, with its covariance and a certificate that it is the only one.
 
@@ -179,6 +180,9 @@ def mean(
         What the x axis of hexagonal and trigonal crystals is along; z is along c.
     keepdims : bool
         Leave the axes that are reduced in the result's shape, with length one.
+    by : array_like, optional
+        Labels of the features, of the shape of `x`: one mean for each of them, in the order of ``result.labels``, the
+        sorted labels. Indices in `farthest` count the features of a label. Not with `axis`.
 
     Returns
     -------
@@ -201,6 +205,8 @@ def mean(
     """
     if symmetry is not None and criterion is None:
         criterion = "lsq"
+    if by is not None and (axis is not None or keepdims):
+        raise ValueError("mean: by: labels reduce all axes; no axis or keepdims")
     kind, criterion, groups, lead = _requests(
         "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times, factors, deviations
     )
@@ -220,6 +226,10 @@ def mean(
         raise ValueError(f"mean: {'birge' if birge else 'refuted'} needs covariances")
     if refuted == "residuals" and criterion == "maha":
         raise ValueError("mean: refuted='residuals': the weights of 'maha' are the refuted covariances; criterion 'lsq'")
+    labels = None
+    if by is not None:
+        labels, groups = _by_label(groups[0], np.asarray(by), np.shape(require_manifold(x, "mean").params)[:-1])
+        lead = labels.shape
     if symmetry is not None:
         if kind is not SO3:
             raise TypeError(f"mean: symmetry is that of rotations, SO3, not of {kind.__name__}")
@@ -258,11 +268,28 @@ def mean(
         reduced = _axes(axis, max(x.ndim, 1), "mean")
         lead = tuple(1 if i in reduced else n for i, n in enumerate(x.shape or (1,)))
     result = MeanResult(kind, criterion, answers, lead)
+    if labels is not None:
+        result.labels = labels
     withheld = [a for a in answers if a["covariance"] is None]
     if withheld:
         which = "" if lead == () else f" for {len(withheld)} of {len(answers)} means"
         warnings.warn(f"liestat.mean: no covariance{which}: {withheld[0]['reason']}", UserWarning, stacklevel=2)
     return result
+
+
+def _by_label(group, by, shape):
+    """The sorted labels, and the arguments of the extension for the features of each."""
+    if by.shape != shape:
+        raise ValueError(f"mean: by, shape {by.shape}: expected that of x, {shape}")
+    labels, number, counts = np.unique(by, return_inverse=True, return_counts=True)
+    order = np.argsort(np.ravel(number), kind="stable")
+    ends = np.cumsum(counts)
+    # Lists that are empty, and a covariance that all features share, are not sliced.
+    lists = ("features", "weights", "covariances", "times")
+    sliced = {name: group[name][order] for name in lists if len(group[name]) == len(order)}
+    return labels, [
+        dict(group, **{name: values[end - n : end] for name, values in sliced.items()}) for n, end in zip(counts, ends)
+    ]
 
 
 def _requests(

@@ -158,6 +158,28 @@ class Means(unittest.TestCase):
             with self.subTest(message), self.assertRaisesRegex(error, message):
                 call()
 
+    def test_by_label(self):
+        """Each label's mean is that of its features, with their weights, covariances and symmetry."""
+        x = support.features("SO3", 24)
+        labels = np.array(["b", "a", "c"] * 8)
+        weights, noise = np.linspace(1, 3, 24), np.eye(3) * np.linspace(0.5, 1, 24)[:, None, None]
+        for options in ({}, {"weights": weights}, {"covariances": noise}, {"symmetry": "2"}, {"covariances": noise[0]}):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                several = liestat.mean(x, by=labels, **options)
+                self.assertEqual(list(several.labels), ["a", "b", "c"])
+                for i, label in enumerate("abc"):
+                    of = {k: v[labels == label] if np.shape(v)[:1] == (24,) else v for k, v in options.items()}
+                    one = liestat.mean(x[labels == label], **of)
+                    self.assertTrue(several.mean[i] == one.mean, (options, label))
+                    self.assertEqual(several.status[i], one.status)
+        np.testing.assert_array_equal(
+            liestat.mean(x.reshape(2, 12), by=np.repeat([[5], [3]], 12, axis=1)).labels, [3, 5]
+        )
+        for wrong in ({"by": labels[:3]}, {"by": labels, "axis": 0}):
+            with self.assertRaisesRegex(ValueError, "by"):
+                liestat.mean(x, **wrong)
+
     def test_lists_and_keepdims(self):
         """Lists of elements, SciPy's rotations and lists of them are arrays; keepdims keeps the reduced axes."""
         x = support.features("SO3", 6)
