@@ -2,6 +2,7 @@
 
 #include <experiments/means_experiment.hpp>
 #include <experiments/scattered_features.hpp>
+#include <lie/crystal_orientation.hpp>
 #include <lie/units.hpp>
 #include <stats/certified_mean.hpp>
 #include <stats/laws.hpp>
@@ -155,14 +156,38 @@ class Sampler {
   std::vector<M> truths_{ManifoldTraits<M>::origin()};
 };
 
+/// Orientations of crystals about one of them, each as any of its copies.
+class CrystalSampler {
+ public:
+  explicit CrystalSampler(const VerdictCell& cell)
+      : cell_(cell), truths_{CrystalOrientation(SO3d::exp({0.4, -0.2, 0.7}), *cell.symmetry)} {}
+
+  std::vector<Eigen::Matrix3d> statedNoise() const { return {}; }
+  bool isBootstrapped() const { return false; }
+  const std::vector<CrystalOrientation>& truths() const { return truths_; }
+  CrystalOrientation draw(std::size_t, CounterRng& rng) const {
+    using T = ManifoldTraits<CrystalOrientation>;
+    const double sd = cell_.parameter * T::injectivityRadius(truths_[0]);
+    const CrystalOrientation x = exp(truths_[0], Eigen::Vector3d(sd * rng.normalVector<3>()));
+    const Eigen::Vector4d q = rng.unitVector<4>();
+    if (cell_.law == VerdictLaw::fisher) return {SO3d::fromParams(q), *cell_.symmetry};
+    const auto copies = T::representativesOf(x);
+    return T::representative(x, copies[static_cast<std::size_t>(rng.uniform() * static_cast<double>(copies.size()))]);
+  }
+
+ private:
+  VerdictCell cell_;
+  std::vector<CrystalOrientation> truths_;
+};
+
 /// The outcomes of one trial: counts of 0 and 1.
 struct Outcome {
   bool ok = false, ambiguous = false, ill_defined = false, outside = false, wrong = false, plain_outside = false;
   bool widened = false, inconsistent = false;
 };
 
-template <class M>
-Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, CounterRng& rng) {
+template <class M, class Draws>
+Outcome judgeTrial(const Draws& sampler, double quantile, std::size_t n, CounterRng& rng) {
   std::vector<M> samples;
   samples.reserve(n);
   for (std::size_t i = 0; i < n; ++i) samples.push_back(sampler.draw(i, rng));
@@ -193,9 +218,9 @@ Outcome judgeTrial(const Sampler<M>& sampler, double quantile, std::size_t n, Co
   return outcome;
 }
 
-template <Metric M>
+template <Metric M, class Draws = Sampler<M>>
 VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
-  const Sampler<M> sampler(cell);
+  const Draws sampler(cell);
   constexpr int k = ManifoldTraits<M>::DoF;
   const ReferenceLaw law = sampler.statedNoise().empty() ? ReferenceLaw::hotelling(k, static_cast<int>(cell.n))
                                                          : ReferenceLaw::chiSquared(k);
@@ -206,7 +231,7 @@ VerdictRow judge(const VerdictCell& cell, std::uint64_t seed, CellRun& run) {
   for (const Outcome& o : run.outcomes(
            [&](std::uint64_t number) {
              CounterRng rng(seed, number, 7);
-             return judgeTrial(sampler, quantile, cell.n, rng);
+             return judgeTrial<M>(sampler, quantile, cell.n, rng);
            },
            true)) {
     row.ok += o.ok, row.ambiguous += o.ambiguous, row.ill_defined += o.ill_defined;
@@ -309,6 +334,7 @@ VerdictPromise promiseOf(const VerdictCell& cell) {
     // Beyond any expansion: few are kept, and their coverage is not promised.
     promise.min_coverage = std::nullopt;
   }
+  if (cell.symmetry && cell.law == VerdictLaw::isotropic && x <= 0.2 && cell.n >= 10) promise.min_kept = 0.95;
   if (cell.law == VerdictLaw::isotropic && quotient && x <= 0.5 && cell.n >= 30) promise.min_kept = 0.90;
   return promise;
 }
@@ -317,6 +343,10 @@ std::vector<VerdictCell> verdictCells(bool full) {
   std::vector<VerdictCell> cells;
   const auto add_cell = [&](Feature feature, VerdictLaw law, double parameter, std::size_t n, std::size_t trials) {
     if (n > static_cast<std::size_t>(degreesOfFreedom(feature))) cells.push_back({feature, law, parameter, n, trials});
+  };
+  const auto add_crystals = [&](const char* group, VerdictLaw law, double parameter, std::size_t n,
+                                std::size_t trials) {
+    cells.push_back({Feature::rotation, law, parameter, n, trials, PointGroup::fromName(group)});
   };
   if (!full) {
     for (const Feature feature : {Feature::direction, Feature::rotation}) {
@@ -348,6 +378,11 @@ std::vector<VerdictCell> verdictCells(bool full) {
     cells.push_back({Feature::rotation, VerdictLaw::stated_clouds, 179, 40, 200});
     add_cell(Feature::direction, VerdictLaw::exponential, 0, 20, 400);
     add_cell(Feature::rotation, VerdictLaw::log_normal, 1, 50, 400);
+    for (const char* group : {"432", "622"}) {
+      add_crystals(group, VerdictLaw::fisher, 0, 10, 200);
+      add_crystals(group, VerdictLaw::isotropic, 0.2, 10, 400);
+      add_crystals(group, VerdictLaw::isotropic, 0.4, 30, 200);
+    }
     return cells;
   }
   for (const Feature feature : {Feature::point, Feature::direction, Feature::rotation, Feature::frame}) {
@@ -355,6 +390,14 @@ std::vector<VerdictCell> verdictCells(bool full) {
       add_cell(feature, VerdictLaw::normal, 0, n, 2000);
       add_cell(feature, VerdictLaw::exponential, 0, n, 2000);
       for (const double s : {0.5, 1.0}) add_cell(feature, VerdictLaw::log_normal, s, n, 2000);
+    }
+  }
+  for (const char* group : {"2", "222", "3", "32", "4", "422", "6", "622", "23", "432"}) {
+    for (const std::size_t n : {5, 10, 30, 100}) {
+      add_crystals(group, VerdictLaw::fisher, 0, n, 1000);
+      for (const double part : {0.1, 0.2, 0.3, 0.4, 0.5, 0.7}) {
+        add_crystals(group, VerdictLaw::isotropic, part, n, 1000);
+      }
     }
   }
   for (const Feature feature : all_features) {
@@ -414,13 +457,14 @@ std::vector<VerdictRow> judgeVerdicts(const std::vector<VerdictCell>& cells, std
   CellRun run({.seed = seed, .threads = threads}, sizes, progress);
   std::vector<VerdictRow> rows;
   for (const VerdictCell& cell : cells) {
-    VerdictRow row = withFeature(cell.feature, [&]<class M>() -> VerdictRow {
-      if constexpr (Metric<M>) {
-        return judge<M>(cell, seed, run);
-      } else {
-        return {};
-      }
-    });
+    VerdictRow row = cell.symmetry ? judge<CrystalOrientation, CrystalSampler>(cell, seed, run)
+                                   : withFeature(cell.feature, [&]<class M>() -> VerdictRow {
+                                       if constexpr (Metric<M>) {
+                                         return judge<M>(cell, seed, run);
+                                       } else {
+                                         return {};
+                                       }
+                                     });
     if (run.ended()) break;
     row.promise = promiseOf(cell);
     giveVerdict(row);

@@ -2,6 +2,7 @@
 
 #include <experiments/cell_run.hpp>
 #include <formats/feature.hpp>
+#include <lie/point_group.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -44,6 +45,12 @@ struct VerdictCell {
   VerdictLaw law = VerdictLaw::fisher;
   double parameter = 0;
   std::size_t n = 10, trials = 400;
+  /// Rotations are orientations of crystals of this group: the parameter is then in units of the injectivity radius, half of the
+  /// group's least angle. Fisher's law with 0, or isotropic.
+  std::optional<PointGroup> symmetry = {};
+
+  /// The feature, or the point group.
+  std::string what() const { return symmetry ? "crystal_" + std::string(symmetry->name()) : liestat::name(feature); }
 };
 
 /// Bounds promised for a cell's rates; absent bounds are not judged.
@@ -76,7 +83,7 @@ struct VerdictRow {
 
 template <class V>
 void describe(V& v, const VerdictRow& row) {
-  v("feature", name(row.cell.feature))("law", name(row.cell.law))("parameter", row.cell.parameter);
+  v("feature", row.cell.what())("law", name(row.cell.law))("parameter", row.cell.parameter);
   v("n", row.cell.n)("trials", row.cell.trials)("ok", row.rate(row.ok), "fraction of the trials");
   v("ambiguous", row.rate(row.ambiguous))("ill_defined", row.rate(row.ill_defined));
   v("inconsistent", row.rate(row.inconsistent), "the covariances that are stated are refuted");

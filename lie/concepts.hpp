@@ -83,11 +83,11 @@ concept Metric = Homogeneous<M> && requires(const typename ManifoldTraits<M>::Ta
   ManifoldTraits<M>::maxSectionalCurvature();
 };
 
-/// A Metric manifold that is a finite quotient: several representatives, of which logOrigin uses the nearest.
+/// A Metric manifold that is a finite quotient: several representatives, of which logOrigin uses the nearest. Their
+/// indices are `representatives`, or representativesOf(x) if points differ in them.
 template <class M>
 concept Quotient = Homogeneous<M> && requires(const M& x) {
   ManifoldTraits<M>::nearestRepresentative(x);
-  ManifoldTraits<M>::representatives[0];
   { ManifoldTraits<M>::representative(x, 0) } -> std::convertible_to<M>;
   { ManifoldTraits<M>::representativeJacobian(0) } -> std::convertible_to<typename ManifoldTraits<M>::Square>;
 };
@@ -117,7 +117,7 @@ enum class CompactFactor {
   none,      ///< the manifold is flat: a mean is always unique
   circle,    ///< SO(2)
   sphere,    ///< S²
-  rotation,  ///< SO(3), or its quotient by half-turns where the manifold is a Quotient
+  rotation,  ///< SO(3), or where the manifold is a Quotient, its quotient by a group of crystal_rotations
   unknown    ///< nothing is known: the default
 };
 

@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <concepts>
+#include <span>
 #include <type_traits>
 
 namespace liestat {
@@ -105,17 +106,44 @@ concept HasTrivialIsotropy = requires {
 
 }  // namespace detail
 
+/// The indices of the representatives of a quotient feature: those of its type, or its own if features differ in them.
+template <Quotient M>
+std::span<const int> representativesOf(const M& x) {
+  using T = ManifoldTraits<M>;
+  if constexpr (requires { T::representativesOf(x); }) {
+    return T::representativesOf(x);
+  } else {
+    return T::representatives;
+  }
+}
+
+/// The injectivity radius at x: that of the type, but where its points differ.
+template <Metric M>
+auto injectivityRadiusAt(const M& x) {
+  using T = ManifoldTraits<M>;
+  if constexpr (requires { T::injectivityRadius(x); }) {
+    return T::injectivityRadius(x);
+  } else {
+    return T::injectivityRadius();
+  }
+}
+
 /// f⋆x
 template <Homogeneous M>
 M act(const typename ManifoldTraits<M>::Group& f, const M& x) {
   return ManifoldTraits<M>::act(f, x);
 }
 
-/// The point reached from x by the tangent vector v: placement(x)⋆expOrigin(v) (Pennec 1998, section 2.2).
+/// The point reached from x by the tangent vector v: placement(x)⋆expOrigin(v) (Pennec 1998, section 2.2). A type whose
+/// points carry more than their coordinates, which the origin cannot know, says exp(x, v) in its traits.
 template <Homogeneous M>
 M exp(const M& x, const TangentOf<M>& v) {
   using T = ManifoldTraits<M>;
-  return T::act(T::placement(x), T::expOrigin(v));
+  if constexpr (requires { T::exp(x, v); }) {
+    return T::exp(x, v);
+  } else {
+    return T::act(T::placement(x), T::expOrigin(v));
+  }
 }
 
 /// y in the frame of x: placement(x)⁻¹⋆y.

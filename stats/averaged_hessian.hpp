@@ -37,13 +37,20 @@ struct AveragedHessian {
 
 namespace detail {
 
+/// The least standard deviation to average over, rad: in a space of short injectivity radius (below that of the frames'
+/// quotients) in proportion.
+template <Metric M>
+double minRegionSigma(const M& mean) {
+  return min_region_sigma * std::min(1.0, 2 / pi * static_cast<double>(injectivityRadiusAt(mean)));
+}
+
 /// The lower Cholesky factor of the region's covariance in the coordinates that are averaged over; NaN if it has none.
 template <Metric M>
-auto regionFactor(const SquareOf<M>& covariance) {
+auto regionFactor(const SquareOf<M>& covariance, double least_sigma) {
   constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
   using Matrix = Eigen::Matrix<double, K, K>;
   Matrix region = covariance.template block<K, K>(begin, begin).template cast<double>();
-  region.diagonal().array() += min_region_sigma * min_region_sigma;
+  region.diagonal().array() += least_sigma * least_sigma;
   return Cholesky<double, K>(region).lower();
 }
 
@@ -55,8 +62,9 @@ bool isHessianSettledBySums(const MeanResult<M>& mean, const SquareOf<M>& covari
   } else if constexpr (compactFactor<M>() != CompactFactor::none) {
     // The Frobenius norm of the factor is the root of the trace. If there is no factor, the trace is too large or NaN.
     constexpr int K = averaged_dimension<M>, begin = averagedBegin<M>();
+    const double least_sigma = minRegionSigma(mean.mean);
     const double squares = width * width * static_cast<double>(covariance.template block<K, K>(begin, begin).trace()) +
-                           K * min_region_sigma * min_region_sigma;
+                           K * least_sigma * least_sigma;
     return leastDistanceToCutLocus(mean) > cut_locus_margin * std::sqrt(squares) * NormalNodes<K>::instance().longest();
   } else {
     return true;
@@ -87,7 +95,7 @@ AveragedHessian<M> findAveragedHessian(const R& samples, const W& weights, const
     using Vector = Eigen::Matrix<double, K, 1>;
     using Matrix = Eigen::Matrix<double, K, K>;
     result.averaged = true;
-    const Matrix L = regionFactor<M>(covariance);
+    const Matrix L = regionFactor<M>(covariance, minRegionSigma(mean.mean));
     if (!L.allFinite()) {
       result.change = std::numeric_limits<double>::quiet_NaN();
       return result;

@@ -175,8 +175,8 @@ CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W&
   bool known = !options.known_noise.empty();
   // If the noise is known and both noise and scatter are small, the test for the existence of a mean is skipped.
   const auto isScattered = [&](const Concentration& concentration) {
-    const bool modest =
-        known && (result.mean.n == 1 || (concentration.isModest() && isModestNoise<M>(options.known_noise)));
+    const bool modest = known && (result.mean.n == 1 ||
+                                  (concentration.isModest() && isModestNoise(result.mean.mean, options.known_noise)));
     return !concentration.concentrated && !modest;
   };
   const auto search = [&](std::size_t budget_part) {

@@ -52,7 +52,7 @@ Eigen::Matrix<double, N, 1> jumpAcrossCutLocus(const M& x, const Eigen::Matrix<d
   if constexpr (Quotient<M> && N == 3) {
     using T = ManifoldTraits<M>;
     const int nearest = T::nearestRepresentative(x).index;
-    for (const int k : T::representatives) {
+    for (const int k : representativesOf(x)) {
       if (k == nearest) continue;
       const auto q = T::compactCoordinates(T::representative(x, k));
       const Eigen::Vector3d other = RotationSpace{}.toChart(Eigen::Vector4d(q.template cast<double>()).normalized());

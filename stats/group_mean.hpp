@@ -125,7 +125,7 @@ bool poseBarycentre(const E& executor, const R& samples, const W& weights, const
   angles.sum =
       static_cast<double>(sums.scatter.template block<rotation_dof, rotation_dof>(angles_begin, angles_begin).trace());
   angles.plain = sums.squared_angle, angles.n = static_cast<double>(result.n);
-  result.concentration.worsen(angles.judge(rotation_dof == 1 ? circleLaw() : rotationLaw(0)));
+  result.concentration.worsen(angles.judge(rotation_dof == 1 ? circleLaw() : rotationLaw()));
   return true;
 }
 

@@ -90,6 +90,30 @@ double automaticTolerance(double scale) {
   return std::max(1e-12, 4 * static_cast<double>(std::numeric_limits<S>::epsilon()) * scale);
 }
 
+template <Metric M, Executor E, class R, class W>
+MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights, const MeanOptions<M>& options);
+
+/// The mean of the rotations by which orientations modulo a group (CrystalOrientation) are nearest to y: a start from
+/// which most means need no step more, by the kernels of rotations.
+template <class M, Executor E, class R, class W>
+M meanOfCopies(const E& executor, const R& samples, const W& weights, const M& y) {
+  using Rotation = typename ManifoldTraits<M>::Group;
+  const std::size_t n = std::ranges::size(samples), chunks = chunkCount(n);
+  std::vector<Rotation> copies(n);
+  executor.reduce(
+      chunks,
+      [&](std::size_t chunk) {
+        const ChunkRange range = chunkRange(n, chunks, chunk);
+        for (std::size_t i = range.begin; i < range.end; ++i) copies[i] = M(samples[i]).nearestTo(y.rotation());
+        return 0;
+      },
+      [](int&, int) {});
+  const auto found = frechetMean<Rotation>(executor, asSamples(copies), weights, MeanOptions<Rotation>{});
+  // The copy of least rotation, whatever copies the data are.
+  const M mean = converged(found.status) ? M(found.mean, y.group()) : y;
+  return {mean.nearestTo(Rotation()), y.group()};
+}
+
 /// Never inlined: a program has one of it, and its results the same bits, whatever flags its units have.
 template <Metric M, Executor E, class R, class W>
 LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples, const W& weights,
@@ -114,6 +138,9 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
   M y = options.start ? *options.start : startOfMean<M>(executor, samples, weights);
   // In a flat space the start is the mean already.
   bool with_scatter = !options.start && starts_at_mean<M>;
+  if constexpr (requires { y.group(); }) {
+    if (!options.start) y = meanOfCopies(executor, samples, weights, y), with_scatter = true;
+  }
   // If the last step was Newton's: where it began, the step of eq. (4) from there times the weights, and the cost that it
   // may reach.
   bool newton = false;
@@ -139,7 +166,7 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
       if (newton) {
         residual = norm(step);
         // Outside the injectivity radius a Newton step has lost its meaning.
-        newton = std::isfinite(residual) && residual < static_cast<double>(T::injectivityRadius());
+        newton = std::isfinite(residual) && residual < static_cast<double>(injectivityRadiusAt(y));
       }
       if (!newton) {
         step = sums.gradient.cwiseQuotient(metric) / S(sums.weight);

@@ -84,6 +84,8 @@ void describe(V& v, const FarthestMeasurement& x) {
 /// A mean with its certificates and its covariance, whatever the type. Matrices are empty where there are none.
 struct MeanSummary {
   std::string feature = {};  ///< the type's name
+  /// Orientations of crystals: the point group of rotations, on the crystal's side; else empty.
+  std::string symmetry = {};
   std::span<const TangentBlock> parts = {};
   bool group = false;  ///< the type has no invariant metric (SE3)
   Criterion criterion = Criterion::lsq;
@@ -183,6 +185,10 @@ void describe(V& v, const MeanSummary& m) {
   const auto where = [](bool there, auto value) { return there ? std::optional(std::move(value)) : std::nullopt; };
   const bool has = m.hasCovariance(), fits = m.fit.tested();
   v("feature", m.feature, "the type of the measurements");
+  if (shown(v, !m.symmetry.empty())) {
+    v("symmetry", m.symmetry,
+      "orientations of crystals: the proper point group that they are modulo; R and R k are equal");
+  }
   v("criterion", name(m.criterion), "lsq, wlsq, maha or barycentre");
   v("covariance_at", where(m.covariance_at.has_value(), std::string(name(m.covariance_at.value_or(CovarianceAt{})))),
     "frame of the measurements' covariances; null where it does not matter");

@@ -101,13 +101,13 @@ struct Part {
 /// Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it: their
 /// cut loci are this far from the mean, rad.
 template <Metric M>
-double farFromRivals() {
-  return 2.0 / 3 * static_cast<double>(ManifoldTraits<M>::injectivityRadius());
+double farFromRivals(const M& mean) {
+  return 2.0 / 3 * static_cast<double>(injectivityRadiusAt(mean));
 }
 /// True if no cut locus is nearer to the mean than that, by what its last pass has seen.
 template <Metric M>
 bool isFarFromRivals(const MeanResult<M>& mean) {
-  return leastDistanceToCutLocus(mean) >= farFromRivals<M>();
+  return leastDistanceToCutLocus(mean) >= farFromRivals(mean.mean);
 }
 
 /// The noise of the data where it is not known.
@@ -162,7 +162,7 @@ std::vector<NearTie<M>> findNearTies(const E& executor, const R& samples, const 
     if constexpr (has_compact_factor<M> && !known_noise) {
       if (haveNoNearTiesBySums(mean, weightSums(weights, n), options.significance)) return ties;
     }
-    if (!(distanceToCutLocus(samples, mean.mean) < farFromRivals<M>())) return ties;
+    if (!(distanceToCutLocus(samples, mean.mean) < farFromRivals(mean.mean))) return ties;
     const auto squaredAngle = [](const typename T::Group& to_y, const M& x) {
       const TangentOf<M> z = T::logOrigin(T::act(to_y, x));
       return static_cast<double>(z.dot(T::metricWeights().cwiseProduct(z)));

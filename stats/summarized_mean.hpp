@@ -5,6 +5,7 @@
 //   const MeanSummary mean = summarizedMean(SerialExecutor{}, input);
 #pragma once
 
+#include <lie/crystal_orientation.hpp>
 #include <lie/s2.hpp>
 #include <stats/certified_group_mean.hpp>
 #include <stats/certified_maha.hpp>
@@ -68,6 +69,11 @@ struct MeanInput {
     const auto finite = [](double t) { return std::isfinite(t); };
     if (!std::all_of(times.begin(), times.end(), finite)) return "times that are not finite";
     if (criterion == Criterion::maha && covariances.empty()) return "a Mahalanobis mean without covariances";
+    if constexpr (std::is_same_v<M, CrystalOrientation>) {
+      if (criterion == Criterion::maha) return "a Mahalanobis mean of orientations of crystals, which have none";
+      const auto differs = [&](const M& x) { return !(x.group() == features.front().group()); };
+      if (std::any_of(features.begin(), features.end(), differs)) return "orientations of several point groups";
+    }
     return {};
   }
   bool weighted() const {
@@ -341,7 +347,10 @@ MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const M
     mean.status = mean.covariance_status = Status::not_applicable;
     return mean;
   }
-  if (input.criterion == Criterion::maha) {
+  if constexpr (std::is_same_v<M, CrystalOrientation>) {
+    if (!input.features.empty()) mean.symmetry = input.features.front().group().name();
+    detail::setLeastSquares(mean, any, input, options);
+  } else if (input.criterion == Criterion::maha) {
     detail::setMahalanobis(mean, any, input, options);
   } else if constexpr (Metric<M>) {
     detail::setLeastSquares(mean, any, input, options);

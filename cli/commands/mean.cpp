@@ -1,3 +1,4 @@
+#include <formats/ebsd.hpp>
 #include <formats/input_error.hpp>
 #include <report/publish.hpp>
 #include <cli/commands/commands.hpp>
@@ -10,6 +11,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <cli/commands/measurement_options.hpp>
 
@@ -20,12 +24,65 @@ struct Options {
   MeasurementInput input;
   AnalysisOptions analysis;
   bool no_certify = false;
+  std::string symmetry, phase;
+  std::optional<HexagonalAxes> axes;
   std::string json, report;
 };
 
+/// The group, and how the file's rotations are taken.
+std::string symmetryInWords(PointGroup group, const std::string& asked, const char* axis) {
+  const bool hexagonal = group.name().find_first_of("36") == 0;
+  return std::string(group.name()) + (asked == group.name() ? "" : ", the rotations of " + asked) +
+         ": each orientation R, from the crystal's axes to the sample's, has " + std::to_string(group.order()) +
+         (group.order() == 1 ? " copy" : " copies") + " R k" +
+         (hexagonal ? std::string("; x along ") + axis + ", z along c" : "");
+}
+
+/// The points of one phase of a map as rotations; the group and the axes are the map's unless they are given.
+Measurements readMap(const Options& options, std::string& symmetry, HexagonalAxes& axes) {
+  const EbsdFile map = readEbsdFile(options.input.file, options.input.reading.largest_file);
+  std::vector<const EbsdPhase*> chosen;
+  std::string list;
+  for (const EbsdPhase& phase : map.phases) {
+    if (phase.n == 0) continue;
+    const bool asked = options.phase == std::to_string(phase.number) || options.phase == phase.name;
+    if (options.phase.empty() || asked) chosen.push_back(&phase);
+    list += (list.empty() ? "" : ", ") + std::to_string(phase.number) + " (" + phase.name + ", " + phase.symmetry +
+            ", " + std::to_string(phase.n) + " points)";
+  }
+  if (chosen.size() != 1) throw OptionError("liestat mean", "--phase is to name one of the map's phases", list);
+  const EbsdPhase& phase = *chosen.front();
+  axes = options.axes.value_or(map.axes());
+  if (symmetry.empty()) {
+    if (!phase.group) {
+      throw OptionError("liestat mean", "the symmetry of the phase is unknown: " + phase.symmetry, "--symmetry");
+    }
+    symmetry = phase.symmetry;
+  }
+  FeatureFile file;
+  file.kind = Feature::rotation;
+  file.format = map.format;
+  for (std::size_t i = 0; i < map.rotations.size(); ++i) {
+    if (map.phase[i] != phase.number) continue;
+    file.rotations.push_back(map.rotations[i].unit_quaternion());
+    file.lines.push_back(map.lines[i]);
+  }
+  Measurements measurements = chooseMeasurements(std::move(file), options.input.options, "liestat mean");
+  measurements.notes.push_back("phase " + std::to_string(phase.number) + ", " + phase.name + ": " +
+                               std::to_string(phase.n) + " of the " + std::to_string(map.rotations.size()) +
+                               " points that were indexed; " + std::to_string(map.n_unindexed) + " were not");
+  return measurements;
+}
+
 int runCommand(const Options& options, const Invocation& invocation) {
-  const Measurements measurements = options.input.read("liestat mean");
   AnalysisOptions how = options.analysis;
+  std::string symmetry = options.symmetry;
+  HexagonalAxes axes = options.axes.value_or(HexagonalAxes::x_along_a);
+  const bool is_map = isEbsdName(options.input.file);
+  if (!options.phase.empty() && !is_map) {
+    throw OptionError("liestat mean", "--phase with a file that is no map", "a file *.ang or *.ctf");
+  }
+  const Measurements measurements = is_map ? readMap(options, symmetry, axes) : options.input.read("liestat mean");
   const bool residuals = how.refuted_noise == RefutedNoise::residuals;
   if ((how.birge || residuals) && !measurements.known_noise) {
     throw OptionError(
@@ -40,6 +97,21 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (how.region == MeanRegion::bootstrap && measurements.known_noise) {
     throw OptionError("liestat mean", "--region bootstrap with the measurements' noise, whose region is chi-squared's",
                       "measurements whose covariances the mean does not use");
+  }
+  if (!symmetry.empty()) {
+    how.symmetry = PointGroup::fromName(symmetry, axes);
+    if (!how.symmetry) {
+      throw OptionError("liestat mean", "--symmetry " + symmetry + ": no such point group",
+                        "1, 2, 222, 3, 32, 4, 422, 6, 622, 23, 432, another of the 32 point groups or a Laue class");
+    }
+    if (measurements.feature != Feature::rotation) {
+      throw OptionError("liestat mean", "--symmetry with " + std::string(info(measurements.feature).plural),
+                        "rotations, or --feature rotation to take those of poses");
+    }
+    if (measurements.criterion == Criterion::maha) {
+      throw OptionError("liestat mean", "--symmetry with maha, which orientations of crystals do not have",
+                        "--criterion lsq or wlsq");
+    }
   }
   how.certify = !options.no_certify;
   how.charts = !options.report.empty();
@@ -59,6 +131,10 @@ int runCommand(const Options& options, const Invocation& invocation) {
   if (how.inflate && !analysis.dependence.tested) {
     throw OptionError("liestat mean", "--inflate, but the dependence of errors on time cannot be tested",
                       "rows with times (a column t), from 20 to 200000, and a mean with a covariance");
+  }
+  if (how.symmetry) {
+    analysis.symmetry_in_words =
+        symmetryInWords(*how.symmetry, symmetry, axes == HexagonalAxes::x_along_a ? "a" : "a*");
   }
   publishResult(options.json, formatMean(options.input.file, measurements, analysis), invocation.command_line,
                 std::nullopt, [&](JsonObject& object) {
@@ -90,6 +166,12 @@ void addMeanCommand(const CommandList& app) {
       .option("--budget", options->analysis.budget,
               "Looks of branch and bound at measurements or bins of them, some 30 ns each (default 100000000)")
       .range(std::size_t{1}, std::size_t{1000000000000});
+  command.option("--symmetry", options->symmetry,
+                 "Rotations are orientations of crystals of this point group or Laue class (432, m-3m, 6/mmm ...)");
+  command.choice<HexagonalAxes>(
+      "--hexagonal-axes", options->axes, {{"a", HexagonalAxes::x_along_a}, {"a*", HexagonalAxes::x_along_a_star}},
+      "What the x axis of hexagonal and trigonal crystals is along: a (default; .ang) or a* (.ctf)");
+  command.option("--phase", options->phase, "The phase of a map (*.ang, *.ctf) of several: its number or name");
   command.choice("--weights-are", options->analysis.weights_are,
                  {{"precision", ResidualNoise::precision},
                   {"importance", ResidualNoise::importance},

@@ -2,6 +2,7 @@
 
 #include <cli/commands/mean_input.hpp>
 #include <experiments/parallel.hpp>
+#include <lie/crystal_orientation.hpp>
 #include <stats/summarized_mean.hpp>
 
 #include <optional>
@@ -18,12 +19,11 @@ using ChartOf = std::conditional_t<Metric<M>, M, Frame3d>;
 
 /// The measurements in the charts of the report, with rivals and near ties.
 template <class M>
-void setCharts(const Measurements& measurements, MeanAnalysis& analysis) {
+void setCharts(const Measurements& measurements, const std::vector<M>& features, MeanAnalysis& analysis) {
   const M y = featureOf<M>(analysis.mean);
   std::optional<SquareOf<M>> covariance;
   if (analysis.hasCovariance()) covariance = analysis.covariance;
-  analysis.charts = chartScatter(featuresOf<M>(measurements.file), measurements.weights, y,
-                                 SquareOf<M>(analysis.dispersion), covariance);
+  analysis.charts = chartScatter(features, measurements.weights, y, SquareOf<M>(analysis.dispersion), covariance);
   std::vector<M> rivals;
   for (const FeatureValue& rival : analysis.rivals) rivals.push_back(featureOf<M>(rival));
   for (const NearRival& tie : analysis.near_ties) rivals.push_back(featureOf<M>(tie.feature));
@@ -34,8 +34,7 @@ void setCharts(const Measurements& measurements, MeanAnalysis& analysis) {
 }
 
 template <class M>
-MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& options) {
-  const std::vector<M> features = featuresOf<M>(measurements.file);
+MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& options, const std::vector<M>& features) {
   MeanSummaryOptions how;
   how.uniqueness.progress = options.progress;
   how.uniqueness.stop = options.stop;
@@ -51,14 +50,35 @@ MeanAnalysis analyse(const Measurements& measurements, const AnalysisOptions& op
   MeanAnalysis analysis{summarizedMean(experiments::ProgramExecutor{options.threads}, input, how)};
   analysis.feature = name(measurements.feature);
   for (FarthestMeasurement& f : analysis.farthest) f.line = measurements.file.lines[f.index];
-  if (options.charts) setCharts<ChartOf<M>>(measurements, analysis);
+  return analysis;
+}
+
+/// Rotations as orientations of crystals. Charts show the copies that are nearest to the mean.
+MeanAnalysis analyseCrystals(const Measurements& measurements, const AnalysisOptions& options) {
+  std::vector<CrystalOrientation> features;
+  for (const SO3d& rotation : featuresOf<SO3d>(measurements.file)) features.emplace_back(rotation, *options.symmetry);
+  MeanAnalysis analysis = analyse(measurements, options, features);
+  analysis.feature = "crystal_orientation";
+  if (options.charts) {
+    std::vector<SO3d> copies;
+    for (const CrystalOrientation& x : features) copies.push_back(x.nearestTo(featureOf<SO3d>(analysis.mean)));
+    setCharts(measurements, copies, analysis);
+  }
   return analysis;
 }
 
 }  // namespace
 
 MeanAnalysis estimateMean(const Measurements& measurements, const AnalysisOptions& options) {
-  return withFeature(measurements.feature, [&]<class M>() { return analyse<M>(measurements, options); });
+  if (options.symmetry) return analyseCrystals(measurements, options);
+  return withFeature(measurements.feature, [&]<class M>() {
+    MeanAnalysis analysis = analyse(measurements, options, featuresOf<M>(measurements.file));
+    if (options.charts) {
+      using Shown = ChartOf<M>;
+      setCharts(measurements, featuresOf<Shown>(measurements.file), analysis);
+    }
+    return analysis;
+  });
 }
 
 }  // namespace liestat::cli

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cli/commands/measurements.hpp>
+#include <lie/point_group.hpp>
 #include <stats/charts.hpp>
 #include <stats/mean_summary.hpp>
 
@@ -8,6 +9,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <string>
 
 namespace liestat::cli {
 
@@ -16,6 +18,7 @@ struct MeanAnalysis : MeanSummary {
   std::optional<ChartScatter> charts = {};
   /// Rivals and near ties in the two charts, columns; or empty.
   Eigen::MatrixXd rivals_principal = {}, rivals_centred = {};
+  std::string symmetry_in_words = {};  ///< of orientations of crystals
 };
 
 /// Options of analyseMean().
@@ -31,6 +34,7 @@ struct AnalysisOptions {
   MeanRegion region = MeanRegion::law;                   ///< of a covariance from residuals
   bool birge = false;                                    ///< multiply the covariance by fit_factor
   bool inflate = false;                                  ///< widen the covariance by the dependence of errors on time
+  std::optional<PointGroup> symmetry = {};               ///< rotations are orientations of crystals of this group
 };
 
 /// Mean, covariance, dispersion and uniqueness of the measurements, with notes. The same bits for any number of threads.

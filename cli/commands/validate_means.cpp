@@ -27,12 +27,11 @@ std::string verdictTable(const std::vector<VerdictRow>& verdicts) {
   Table table({"feature, law", "n", "ok", "ambig", "ill", "miss", "wrong", "cover", "plain", ""});
   for (const VerdictRow& row : verdicts) {
     const auto percent = [&](double rate) { return fmt::format("{:.1f}", 100 * rate); };
-    table.row(
-        {fmt::format("{} {} {:.3g}", name(row.cell.feature).substr(0, 13), name(row.cell.law), row.cell.parameter),
-         fmt::format("{}", row.cell.n), percent(row.rate(row.ok)), percent(row.rate(row.ambiguous)),
-         percent(row.rate(row.ill_defined)), percent(row.rate(row.outside)), percent(row.rate(row.wrong)),
-         row.ok > 0 ? percent(row.coverage()) : "-", percent(1 - row.rate(row.plain_outside)),
-         verdictCell(row.passed)});
+    table.row({fmt::format("{} {} {:.3g}", row.cell.what().substr(0, 13), name(row.cell.law), row.cell.parameter),
+               fmt::format("{}", row.cell.n), percent(row.rate(row.ok)), percent(row.rate(row.ambiguous)),
+               percent(row.rate(row.ill_defined)), percent(row.rate(row.outside)), percent(row.rate(row.wrong)),
+               row.ok > 0 ? percent(row.coverage()) : "-", percent(1 - row.rate(row.plain_outside)),
+               verdictCell(row.passed)});
   }
   return text + table.str();
 }

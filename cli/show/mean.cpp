@@ -163,6 +163,7 @@ std::string formatMean(const std::string& source, const Measurements& measuremen
     text +=
         fmt::format("quaternion x y z w  {0:.{4}f} {1:.{4}f} {2:.{4}f} {3:.{4}f}\n", q[0], q[1], q[2], q[3], decimals);
   }
+  if (!analysis.symmetry_in_words.empty()) text += "symmetry     " + analysis.symmetry_in_words + "\n";
   text += "uniqueness   " + analysis.uniquenessInWords() + "\n";
   for (const FeatureValue& rival : analysis.rivals) text += "  rival      " + oneLine(rival) + "\n";
   if (analysis.more_rivals) text += "  rival      and others: these are not all\n";

@@ -49,6 +49,9 @@ class Manifold:
     @property
     def single(self) -> bool: ...
     def __len__(self) -> int: ...
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> _Array: ...
+    def __eq__(self, other: object) -> Any: ...
+    def __ne__(self, other: object) -> Any: ...
     def __getitem__(self: _M, index: Any) -> _M: ...
     def __setitem__(self: _M, index: Any, value: _M) -> None: ...
     def __iter__(self: _M) -> Iterator[_M]: ...
@@ -202,6 +205,7 @@ class Uniqueness(str):
 
 class MeanResult(_MeanSummary):
     law: Law
+    labels: NDArray[Any]
     near_tie_z: _Array | _Several
     cost: float | _Several
     shape: tuple[int, ...]
@@ -272,7 +276,7 @@ class ValidationReport:
     def __init__(self, fields: dict[str, Any], distances: _Array, law: Law) -> None: ...
 
 def mean(
-    x: Manifold,
+    x: Any,
     weights: ArrayLike | None = None,
     covariances: ArrayLike | None = None,
     axis: _Axis = None,
@@ -291,6 +295,10 @@ def mean(
     inflate: bool = False,
     budget: int | None = None,
     threads: int = 0,
+    symmetry: str | None = None,
+    hexagonal_axes: Literal["a", "a*"] = "a",
+    keepdims: bool = False,
+    by: ArrayLike | None = None,
 ) -> MeanResult: ...
 class _Split(_SplitSummary):
     verdict: str
@@ -394,6 +402,8 @@ class Result:
 # fields of results, written by ./run generate
 class _MeanSummary:
     feature: str | _Several  # text; the type of the measurements
+    # text; orientations of crystals: the proper point group that they are modulo; R and R k are equal
+    symmetry: str | _Several
     criterion: str | _Several  # text; lsq, wlsq, maha or barycentre
     # text or null; frame of the measurements' covariances; null where it does not matter
     covariance_at: str | _Several | None

@@ -59,6 +59,9 @@ class Manifold:
                 raise TypeError(f"{type(self).__name__}: cannot be made of {type(params).__name__}")
             self._data = params._data
             return
+        if isinstance(params, (list, tuple)) and params and isinstance(params[0], Manifold):
+            self._data = type(self).stack(params)._data
+            return
         caller = f"{type(self).__name__}: params"
         data = require_finite(as_numbers(params, caller, (self.parameters,)), caller)
         if self._unit.stop > 0 and data.size > 0:
@@ -149,6 +152,35 @@ class Manifold:
         if self._data.ndim == 1 and index != () and index is not Ellipsis and index is not None:
             raise TypeError(f"a single {type(self).__name__} is not subscriptable")
         return type(self)._of(self._data[self._index(index)])
+
+    def __array__(self, dtype=None, copy=None):
+        """The parameters, for ``np.asarray``: a view where nothing asks for another type or a copy."""
+        data = self._data if dtype is None else self._data.astype(dtype, copy=False)
+        if copy is False and data is not self._data:
+            raise ValueError(f"{type(self).__name__}: another dtype needs a copy")
+        return data.copy() if copy and data is self._data else data
+
+    def __eq__(self, other):
+        """Whether parameters are equal to the bit, element by element; q and -q are one rotation. `allclose` has a
+        tolerance."""
+        if not isinstance(other, Manifold):
+            return NotImplemented
+        if type(other) is not type(self):
+            return False
+        a, b = np.broadcast_arrays(self._data, other._data)
+        equal = (a == b).all(axis=-1)
+        unit = self._unit
+        if unit.stop - unit.start == 4:
+            equal |= (a[..., unit] == -b[..., unit]).all(axis=-1) & (
+                np.delete(a, unit, axis=-1) == np.delete(b, unit, axis=-1)
+            ).all(axis=-1)
+        return equal if equal.shape else bool(equal)
+
+    def __ne__(self, other):
+        equal = self.__eq__(other)
+        return equal if equal is NotImplemented else not equal if isinstance(equal, bool) else ~equal
+
+    __hash__ = None
 
     def __setitem__(self, index, value):
         if not isinstance(value, type(self)):

@@ -245,6 +245,8 @@ class MeanResult:
         The covariance is widened by that.
     notes : list of str
         What is remarkable about the result.
+    labels : ndarray
+        With `by`: the label of each mean.
     cost, residual, tolerance, r_star : float
         As in C++.
     """

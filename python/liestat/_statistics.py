@@ -16,7 +16,19 @@ _METRIC = ("R3", "S2", "SO3", "Frame3", "SemiOrientedFrame3", "NonOrientedFrame3
 _FRAMES: tuple = (Frame3, SemiOrientedFrame3, NonOrientedFrame3)
 
 
+def _elements(x):
+    """A SciPy Rotation, and lists of those or of elements, as one array of a type; other values as they are."""
+    if type(x).__name__ == "Rotation" and type(x).__module__.startswith("scipy."):
+        return SO3.from_scipy(x)
+    if isinstance(x, (list, tuple)) and x:
+        parts = [_elements(part) for part in x]
+        if isinstance(parts[0], Manifold):
+            return type(parts[0]).stack(parts)
+    return x
+
+
 def require_manifold(x, caller):
+    x = _elements(x)
     if not isinstance(x, Manifold):
         kind = f"an ndarray of shape {x.shape}" if isinstance(x, np.ndarray) else type(x).__name__
         raise TypeError(f"{caller}: x is {kind}; wrap parameters in their type, liestat.SO3(x) for quaternions")
@@ -97,13 +109,18 @@ def mean(
     inflate=False,
     budget=None,
     threads=0,
+    symmetry=None,
+    hexagonal_axes="a",
+    keepdims=False,
+    by=None,
 ):
     """The mean of features, with its covariance and a certificate that it is the only one.
 
     Parameters
     ----------
     x : SO3, SE3, SE2, SE23, S2, R3, Frame3, SemiOrientedFrame3 or NonOrientedFrame3
-        An array of features.
+        An array of features, or a list of single ones or of arrays of one shape. A
+        ``scipy.spatial.transform.Rotation``, or a list of them, stands for SO3.
     weights : array_like, optional
         Relative weights, zero or more, inversely proportional to variances; broadcast to ``x.shape``.
     covariances : array_like, shape (..., k, k), optional
@@ -154,6 +171,18 @@ def mean(
         Of the global search: looks at a datum from a cell, some 30 ns each. Default: 1e8, for 'maha' 1e7 at most.
     threads : int
         0 for as many as the machine has. The result has the same bits for any number.
+    symmetry : str, optional
+        Rotations are orientations of crystals of this point group or Laue class ('432', 'm-3m', '6/mmm' …), whose
+        proper group the result names. A rotation takes coordinates along the crystal's axes to the sample's; R and R k
+        are the same for every k of the group. The mean is one of its copies, and `covariance` is along the crystal's
+        axes there.
+    hexagonal_axes : {'a', 'a*'}
+        What the x axis of hexagonal and trigonal crystals is along; z is along c.
+    keepdims : bool
+        Leave the axes that are reduced in the result's shape, with length one.
+    by : array_like, optional
+        Labels of the features, of the shape of `x`: one mean for each of them, in the order of ``result.labels``, the
+        sorted labels. Indices in `farthest` count the features of a label. Not with `axis`.
 
     Returns
     -------
@@ -174,6 +203,10 @@ def mean(
     >>> result.mean.log().round(4)
     array([ 0.305,  0.03 , -0.11 ])
     """
+    if symmetry is not None and criterion is None:
+        criterion = "lsq"
+    if by is not None and (axis is not None or keepdims):
+        raise ValueError("mean: by: labels reduce all axes; no axis or keepdims")
     kind, criterion, groups, lead = _requests(
         "mean", x, weights, covariances, axis, criterion, covariance_at, likelihood, times, factors, deviations
     )
@@ -193,6 +226,24 @@ def mean(
         raise ValueError(f"mean: {'birge' if birge else 'refuted'} needs covariances")
     if refuted == "residuals" and criterion == "maha":
         raise ValueError("mean: refuted='residuals': the weights of 'maha' are the refuted covariances; criterion 'lsq'")
+    labels = None
+    if by is not None:
+        labels, groups = _by_label(groups[0], np.asarray(by), np.shape(require_manifold(x, "mean").params)[:-1])
+        lead = labels.shape
+    if symmetry is not None:
+        if kind is not SO3:
+            raise TypeError(f"mean: symmetry is that of rotations, SO3, not of {kind.__name__}")
+        if criterion not in (None, "lsq", "wlsq"):
+            raise ValueError(f"mean: symmetry: criterion 'lsq', got {criterion!r}")
+        if hexagonal_axes not in ("a", "a*"):
+            raise ValueError(f"mean: hexagonal_axes: expected 'a' or 'a*', got {hexagonal_axes!r}")
+        proper = _core.point_group(str(symmetry), hexagonal_axes == "a")
+        if proper is None:
+            raise ValueError(
+                f"mean: symmetry: no point group {symmetry!r}; 1, 2, 222, 3, 32, 4, 422, 6, 622, 23, 432, another of "
+                "the 32 point groups or a Laue class"
+            )
+        groups = [dict(group, type="CrystalOrientation", symmetry=proper) for group in groups]
     answers = [
         _core.mean(
             **group,
@@ -212,12 +263,33 @@ def mean(
             "mean: inflate, but the dependence of errors on time cannot be tested: that needs 20 to 200000 features "
             "with times, and a mean with a covariance"
         )
+    if keepdims:
+        x = require_manifold(x, "mean")
+        reduced = _axes(axis, max(x.ndim, 1), "mean")
+        lead = tuple(1 if i in reduced else n for i, n in enumerate(x.shape or (1,)))
     result = MeanResult(kind, criterion, answers, lead)
+    if labels is not None:
+        result.labels = labels
     withheld = [a for a in answers if a["covariance"] is None]
     if withheld:
         which = "" if lead == () else f" for {len(withheld)} of {len(answers)} means"
         warnings.warn(f"liestat.mean: no covariance{which}: {withheld[0]['reason']}", UserWarning, stacklevel=2)
     return result
+
+
+def _by_label(group, by, shape):
+    """The sorted labels, and the arguments of the extension for the features of each."""
+    if by.shape != shape:
+        raise ValueError(f"mean: by, shape {by.shape}: expected that of x, {shape}")
+    labels, number, counts = np.unique(by, return_inverse=True, return_counts=True)
+    order = np.argsort(np.ravel(number), kind="stable")
+    ends = np.cumsum(counts)
+    # Lists that are empty, and a covariance that all features share, are not sliced.
+    lists = ("features", "weights", "covariances", "times")
+    sliced = {name: group[name][order] for name in lists if len(group[name]) == len(order)}
+    return labels, [
+        dict(group, **{name: values[end - n : end] for name, values in sliced.items()}) for n, end in zip(counts, ends)
+    ]
 
 
 def _requests(

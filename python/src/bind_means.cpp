@@ -13,7 +13,7 @@ namespace liestat::python {
 namespace {
 
 const MeanType& typeOf(const std::string& name) {
-  for (const auto find : {commonMeans, planarMeans, extendedPoseMeans}) {
+  for (const auto find : {commonMeans, planarMeans, extendedPoseMeans, crystalMeans}) {
     if (const MeanType* type = find(name)) return *type;
   }
   throw py::type_error("no means of " + name);
@@ -44,6 +44,12 @@ py::dict answerOf(const MeanSummary& mean) {
   return d;
 }
 
+/// The name of the rotations of a point group or Laue class, None for an unknown name.
+py::object pointGroup(const std::string& name, bool x_along_a) {
+  const auto group = PointGroup::fromName(name, x_along_a ? HexagonalAxes::x_along_a : HexagonalAxes::x_along_a_star);
+  return group ? py::object(text(std::string(group->name()))) : py::none();
+}
+
 Criterion criterionOf(const std::string& text) {
   for (const Criterion c : {Criterion::lsq, Criterion::wlsq, Criterion::maha, Criterion::barycentre}) {
     if (name(c) == text) return c;
@@ -69,7 +75,7 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
               const DoubleArray& weights, const DoubleArray& covariances, bool factored, const DoubleArray& times,
               bool covariances_at_measurement, bool likelihood, bool residuals_if_refuted, bool birge,
               const std::string& weights_are, bool bootstrap, bool certify, bool inflate, std::size_t budget,
-              int threads) {
+              int threads, const std::string& symmetry) {
   const MeanType& means = typeOf(type);
   MeanRequest request = requestOf(criterion, features, weights, covariances, factored, times,
                                   covariances_at_measurement, likelihood, threads);
@@ -80,6 +86,7 @@ py::dict mean(const std::string& type, const std::string& criterion, const Doubl
   }
   request.region = bootstrap ? MeanRegion::bootstrap : MeanRegion::law;
   request.certify = certify;
+  request.symmetry = PointGroup::fromName(symmetry).value_or(PointGroup());
   request.inflate = inflate;
   request.budget = budget;
   MeanSummary answer;
@@ -170,7 +177,8 @@ void bindMeans(py::module_& module) {
   using namespace py::literals;
   module.def("mean", &mean, "type"_a, "criterion"_a, "features"_a, "weights"_a, "covariances"_a, "factored"_a,
              "times"_a, "covariances_at_measurement"_a, "likelihood"_a, "residuals_if_refuted"_a, "birge"_a,
-             "weights_are"_a, "bootstrap"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a);
+             "weights_are"_a, "bootstrap"_a, "certify"_a, "inflate"_a, "budget"_a, "threads"_a, "symmetry"_a = "1");
+  module.def("point_group", &pointGroup, "name"_a, "x_along_a"_a);
   py::list fields;
   for (const auto& [name, value] : dictOf(MeanSummary{})) fields.append(name);
   module.attr("mean_fields") = fields;

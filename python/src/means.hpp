@@ -2,6 +2,7 @@
 #pragma once
 
 #include <python/src/executor.hpp>
+#include <lie/point_group.hpp>
 #include <stats/mean_summary.hpp>
 
 #include <cstddef>
@@ -31,7 +32,8 @@ struct MeanRequest {
   MeanRegion region = MeanRegion::law;
   bool inflate = false;  ///< by the dependence of errors on the times
   bool certify = true;
-  std::size_t budget = 0;  ///< limit of the search; 0: the library's
+  PointGroup symmetry = {};  ///< of orientations of crystals
+  std::size_t budget = 0;    ///< limit of the search; 0: the library's
   int threads = 0;
 };
 
@@ -61,6 +63,8 @@ struct MeanType {
 const MeanType* commonMeans(std::string_view name);
 const MeanType* planarMeans(std::string_view name);
 const MeanType* extendedPoseMeans(std::string_view name);
+/// Orientations of crystals have means alone.
+const MeanType* crystalMeans(std::string_view name);
 /// The splits of the common means, which are compiled apart.
 template <class M>
 SplitSummary splitOf(const MeanRequest& request, SignalWatch& signals, const SplitOptions& options);

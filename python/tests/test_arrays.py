@@ -223,6 +223,39 @@ class Arrays(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, r"SO3.product: shapes of self \(4, 1, 5\) and other \(3,\)"):
             x * SO3.identity(3)
 
+    def test_equality(self):
+        """Element by element, to the bit; a quaternion of either sign is one rotation, a vector is not its negative."""
+        for name in support.TYPES:
+            with self.subTest(name):
+                x = support.features(name, 4)
+                np.testing.assert_array_equal(x == x.copy(), [True] * 4)
+                np.testing.assert_array_equal(x != x[0], [False, True, True, True])
+                self.assertIs(x[0] == x[1], False)
+                self.assertIs(x[1] == x[1].copy(), True)
+                self.assertIs(x[1] != x[1].copy(), False)
+                moved = x.copy()
+                moved.params[2, -1] = np.nextafter(moved.params[2, -1], 9)
+                np.testing.assert_array_equal(x == moved, [True, True, False, True])
+                with self.assertRaises(TypeError):
+                    hash(x)
+        pose = support.features("SE3", 2)
+        other = pose.params.copy()
+        other[:, :4] *= -1
+        np.testing.assert_array_equal(pose == SE3(other), [True, True])
+        other[0, 4] *= -1
+        np.testing.assert_array_equal(pose == SE3(other), [False, True])
+        direction = support.features("S2", 1)
+        self.assertFalse((direction == liestat.S2(-direction.params)).any())
+        self.assertFalse(SO3.identity() == 3)
+        self.assertIs(SO3.identity() == Frame3.identity(), False)
+
+    def test_numpy_array(self):
+        x = support.features("Frame3", 3)
+        self.assertIs(np.asarray(x), x.params)
+        self.assertEqual(np.asarray(x, dtype=np.float32).dtype, np.float32)
+        self.assertFalse(np.shares_memory(np.array(x), x.params))
+        np.testing.assert_array_equal(Frame3(list(x)).params, x.params)
+
     def test_single(self):
         x = SO3.exp([0.1, 0.2, 0.3])
         self.assertTrue(x.single)

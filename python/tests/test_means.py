@@ -158,6 +158,74 @@ class Means(unittest.TestCase):
             with self.subTest(message), self.assertRaisesRegex(error, message):
                 call()
 
+    def test_by_label(self):
+        """Each label's mean is that of its features, with their weights, covariances and symmetry."""
+        x = support.features("SO3", 24)
+        labels = np.array(["b", "a", "c"] * 8)
+        weights, noise = np.linspace(1, 3, 24), np.eye(3) * np.linspace(0.5, 1, 24)[:, None, None]
+        for options in ({}, {"weights": weights}, {"covariances": noise}, {"symmetry": "2"}, {"covariances": noise[0]}):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                several = liestat.mean(x, by=labels, **options)
+                self.assertEqual(list(several.labels), ["a", "b", "c"])
+                for i, label in enumerate("abc"):
+                    of = {k: v[labels == label] if np.shape(v)[:1] == (24,) else v for k, v in options.items()}
+                    one = liestat.mean(x[labels == label], **of)
+                    self.assertTrue(several.mean[i] == one.mean, (options, label))
+                    self.assertEqual(several.status[i], one.status)
+        np.testing.assert_array_equal(
+            liestat.mean(x.reshape(2, 12), by=np.repeat([[5], [3]], 12, axis=1)).labels, [3, 5]
+        )
+        for wrong in ({"by": labels[:3]}, {"by": labels, "axis": 0}):
+            with self.assertRaisesRegex(ValueError, "by"):
+                liestat.mean(x, **wrong)
+
+    def test_lists_and_keepdims(self):
+        """Lists of elements, SciPy's rotations and lists of them are arrays; keepdims keeps the reduced axes."""
+        x = support.features("SO3", 6)
+        rotations = Rotation.from_quat(x.params)
+        expected = liestat.mean(x)
+        for same in (list(x), rotations, list(rotations), [x[:3], x[3:]]):
+            result = liestat.mean(same)
+            self.assertTrue(result.mean.allclose(expected.mean, 1e-12))
+            np.testing.assert_allclose(result.covariance, expected.covariance, rtol=1e-9)
+        with self.assertRaisesRegex(TypeError, "x is list"):
+            liestat.mean([1.0, 2.0])
+        with self.assertRaisesRegex(TypeError, "R3"):
+            liestat.mean([x[0], liestat.R3(np.zeros(3))])
+        table = SO3.stack([x, x, x])
+        for axis, shape in ((1, (3, 1)), (0, (1, 6)), (None, (1, 1)), ((0, 1), (1, 1))):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                kept = liestat.mean(table, axis=axis, keepdims=True)
+                plain = liestat.mean(table, axis=axis)
+            self.assertEqual((kept.shape, kept.mean.shape), (shape, shape))
+            np.testing.assert_array_equal(kept.mean.params.ravel(), plain.mean.params.ravel())
+
+    def test_crystals(self):
+        """Copies of noisy orientations: the mean of the copies nearest to it, whatever copies are given."""
+        rng = np.random.default_rng(1)
+        cubic = Rotation.create_group("O")
+        grain = Rotation.from_rotvec([0.2, -0.4, 0.3])
+        noisy = grain * Rotation.from_rotvec(0.02 * rng.normal(size=(30, 3)))
+        copies = noisy * cubic[rng.integers(24, size=30)]
+        result = liestat.mean(SO3(copies.as_quat()), symmetry="m-3m")
+        self.assertEqual((result.status, result.symmetry), ("ok", "432"))
+        expected = liestat.mean(SO3(noisy.as_quat()))
+        turn = (Rotation.from_quat(expected.mean.params).inv() * Rotation.from_quat(result.mean.params)).reduce(cubic)
+        self.assertLess(turn.magnitude(), 1e-7)
+        np.testing.assert_allclose(
+            np.linalg.eigvalsh(result.covariance), np.linalg.eigvalsh(expected.covariance), rtol=1e-6
+        )
+        with self.assertWarnsRegex(UserWarning, "no covariance"):
+            trigonal = liestat.mean(SO3(copies.as_quat()), symmetry="32", hexagonal_axes="a*")
+        self.assertEqual((trigonal.symmetry, trigonal.status), ("312", "ill_defined"))
+        for wrong, error in (({"symmetry": "5"}, "no point group"), ({"symmetry": "432", "criterion": "maha"}, "maha")):
+            with self.assertRaisesRegex(ValueError, error):
+                liestat.mean(SO3(copies.as_quat()), **wrong)
+        with self.assertRaisesRegex(TypeError, "rotations"):
+            liestat.mean(liestat.R3(np.eye(3)), symmetry="432")
+
     def test_group_mean(self):
         x, g = support.features("SE3", 30), support.features("SE3", 1, seed=9)[0]
         a, b = liestat.group_mean(x), liestat.group_mean(g * x.inv() * g)

@@ -56,6 +56,11 @@ class MeanParity(ParityTest):
         self.assertIs(result.unique == True, True)  # noqa: E712: as it was a bool
         self.assertTrue(result.unique)
 
+    def test_crystals(self):
+        path = os.path.join(DATA, "rotations.csv")
+        json, result = self.assert_equal_means(path, ["--symmetry", "m-3m"], symmetry="m-3m")
+        self.assertEqual((json["symmetry"], json["feature"], result.symmetry), ("432", "crystal_orientation", "432"))
+
     def test_times(self):
         """Poses of a camera at rest: the errors of successive rows depend on each other."""
         path = os.path.join(DATA, "camera_at_rest.tum")

@@ -77,7 +77,7 @@ double largestAngle(const M& from, const M& to) {
 
 /// The uniform law of an angular part.
 inline UniformLaw lawOf(const TangentBlock& part) {
-  return part.size == 1 ? circleLaw() : part.size == 2 ? sphereLaw() : rotationLaw(0);
+  return part.size == 1 ? circleLaw() : part.size == 2 ? sphereLaw() : rotationLaw();
 }
 
 /// How far an estimate may turn before it meets the cut locus of a feature, rad.
@@ -153,7 +153,7 @@ Concentration angularConcentration(const R& samples, const W& weights, const M& 
 template <Homogeneous M>
 bool isModestAngularNoise(const SquareOf<M>& noise) {
   if constexpr (Metric<M>) {
-    return isModestNoise<M>(noise);
+    return isModestNoise(ManifoldTraits<M>::origin(), noise);
   } else if constexpr (HasTangentParts<M>) {
     for (const TangentBlock& part : ManifoldTraits<M>::tangent_parts) {
       if (!isAngular(part.part)) continue;

@@ -134,7 +134,7 @@ double leastDistanceToCutLocus(const MeanResult<M>& mean) {
     return 0.5 * static_cast<double>(mean.smallest_gap);
   } else {
     const auto farthest = has_compact_factor<M> ? mean.largest_angle : mean.largest_distance;
-    return static_cast<double>(ManifoldTraits<M>::injectivityRadius()) - static_cast<double>(farthest);
+    return static_cast<double>(injectivityRadiusAt(mean.mean)) - static_cast<double>(farthest);
   }
 }
 
@@ -149,7 +149,7 @@ double distanceToCutLocus(const R& samples, const M& mean) {
     });
     return least;
   } else {
-    const double radius = static_cast<double>(T::injectivityRadius());
+    const double radius = static_cast<double>(injectivityRadiusAt(mean));
     const auto to_mean = T::placement(mean).inverse();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < std::ranges::size(samples); ++i) {

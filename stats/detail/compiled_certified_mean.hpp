@@ -19,5 +19,6 @@
 namespace liestat::detail {
 
 LIESTAT_FOR_EACH_MEAN(LIESTAT_INSTANTIATE_CERTIFIED_MEAN, extern template);
+LIESTAT_INSTANTIATE_CERTIFIED_MEAN(extern template, CrystalOrientation);
 
 }  // namespace liestat::detail

@@ -5,6 +5,7 @@
 #include <stats/detail/any_executor.hpp>
 #include <stats/mean.hpp>
 
+#include <lie/crystal_orientation.hpp>
 #include <lie/frame3.hpp>
 #include <lie/non_oriented_frame3.hpp>
 #include <lie/rn.hpp>
@@ -20,7 +21,8 @@
   instantiate MeanResult<M> frechetMean<M>(const AnyExecutor&, const Samples<M>&, const Samples<double>&, \
                                            const MeanOptions<M>&)
 
-/// `apply`, a macro of the two arguments above, for each feature whose mean is compiled.
+/// `apply`, a macro of the two arguments above, for each feature whose mean by any criterion is compiled. Orientations
+/// of crystals have no Mahalanobis mean, and a unit of their own.
 #define LIESTAT_FOR_EACH_MEAN(apply, instantiate) \
   apply(instantiate, Eigen::Vector3d);            \
   apply(instantiate, SO3d);                       \
@@ -32,5 +34,6 @@
 namespace liestat::detail {
 
 LIESTAT_FOR_EACH_MEAN(LIESTAT_INSTANTIATE_MEAN, extern template);
+LIESTAT_INSTANTIATE_MEAN(extern template, CrystalOrientation);
 
 }  // namespace liestat::detail

@@ -116,14 +116,14 @@ UniquenessResult<M> findUniqueness(const E& executor, const R& samples, const W&
     return circleUniqueness(executor, samples, weights, mean, options);
   } else if constexpr (compactFactor<M>() == CompactFactor::unknown) {
     // A user's manifold: the theorem holds for its whole distance.
-    if (converged(mean.status) && static_cast<double>(mean.largest_distance) < aPrioriRadius<M>() * (1 - 1e-9)) {
+    if (converged(mean.status) && static_cast<double>(mean.largest_distance) < aPrioriRadius(mean.mean) * (1 - 1e-9)) {
       result.unique = Uniqueness::unique;
       result.proof = "the data lie in a ball about the mean that is small enough";
     }
     return result;
   } else {
     if (isUniqueBySums(mean, options.tie_tolerance, result)) return result;
-    using Space = decltype(searchSpace<M>());
+    using Space = decltype(searchSpace(mean.mean));
     return SearchedManifold<M, Space, E, R, W>(executor, samples, weights, mean).certify(options);
   }
 }
@@ -150,8 +150,8 @@ double findLocalRadius(const R& samples, const W& weights, const M& mean) {
   } else {
     static_assert(compactFactor<M>() != CompactFactor::unknown,
                   "localRadius asks the traits of the manifold for their compact_factor");
-    const auto space = searchSpace<M>();
-    using Space = decltype(searchSpace<M>());
+    const auto space = searchSpace(mean);
+    using Space = decltype(searchSpace(mean));
     return convexityRadius<Space>(profile(pack(space, samples, weights, mean), Space::fromChart(Space::Chart::Zero())));
   }
 }

@@ -57,14 +57,14 @@ inline constexpr double possible_cost_tail_of_few = 0.02;
 
 /// The part of a compact space that is nearer than an angle.
 template <Metric M>
-double partOfSpace(double angle) {
+double partOfSpace(const M& mean, double angle) {
   if constexpr (compact_dimension<M> == 1) {
     return angle / pi;
   } else if constexpr (compact_dimension<M> == 2) {
     return 0.5 * (1 - std::cos(angle));
   } else {
     double representatives = 1;
-    if constexpr (Quotient<M>) representatives = static_cast<double>(std::size(ManifoldTraits<M>::representatives));
+    if constexpr (Quotient<M>) representatives = static_cast<double>(representativesOf(mean).size());
     return representatives * (angle - std::sin(angle)) / pi;
   }
 }
@@ -343,7 +343,7 @@ GrownRegion<M> growRegion(const E& executor, const R& samples, const W& weights,
       last = search.farthest(shell * edge);
       result.factor = shell;
       result.open =
-          !few && (shell > largest_region_factor || partOfSpace<M>(last->first.norm()) > largest_part_of_space);
+          !few && (shell > largest_region_factor || partOfSpace(mean.mean, last->first.norm()) > largest_part_of_space);
     }
     if (last && !few && !result.open) {
       test.judgeScoresAt(grown_score_tail);

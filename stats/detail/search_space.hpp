@@ -1,9 +1,10 @@
-// The spaces that the certificates of stats/uniqueness.hpp search: SO(3), its quotients by half-turns and the sphere, as
-// unit vectors in double, and how a manifold whose traits say its compact factor is mapped to them.
+// The spaces that the certificates of stats/uniqueness.hpp search: SO(3), its quotients by finite groups and the sphere,
+// as unit vectors in double, and how a manifold whose traits say its compact factor is mapped to them.
 #pragma once
 
 #include <lie/detail/arccosine.hpp>
 #include <lie/manifold.hpp>
+#include <lie/point_group.hpp>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 namespace liestat::detail {
@@ -25,7 +27,7 @@ struct Sighting {
   double gap() const { return second - angle; }
 };
 
-/// SO(3), or its quotient by half-turns about some of the axes. Points are unit quaternions x y z w, chart and error
+/// SO(3), or its quotient by a finite group. Points are unit quaternions x y z w, chart and error
 /// vectors are rotation vectors.
 struct RotationSpace {
   static constexpr int dimension = 3;
@@ -33,9 +35,9 @@ struct RotationSpace {
   using Point = Eigen::Vector4d;
   using Chart = Eigen::Vector3d;
 
-  std::array<bool, 3> half_turns{};  ///< the axes whose half-turns are divided out
+  PointGroup group{};  ///< divided out, from the right
 
-  bool isQuotient() const { return half_turns[0] || half_turns[1] || half_turns[2]; }
+  bool isQuotient() const { return group.order() > 1; }
 
   static Point exp(const Eigen::Vector3d& v) {
     const double t = v.norm();
@@ -62,47 +64,24 @@ struct RotationSpace {
   }
   Sighting see(const Point& from, const Point& datum) const {
     const Point r = relative(from, datum);
-    int best = 3;
-    double c = std::abs(r[3]), c2 = -1;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!half_turns[static_cast<std::size_t>(axis)]) continue;
-      const double candidate = std::abs(r[axis]);
-      if (candidate > c) {
-        c2 = c, c = candidate, best = axis;
-      } else {
-        c2 = std::max(c2, candidate);
-      }
-    }
+    const RotationGroup& elements = group.rotations();
+    const RotationGroup::Nearest nearest = elements.nearest(r[0], r[1], r[2], r[3]);
+    const std::size_t k = nearest.slot;
+    const double x = elements.x[k], y = elements.y[k], z = elements.z[k], w = elements.w[k];
     Sighting s;
-    // The vector part of r times the unit quaternion of the axis.
-    switch (best) {
-      case 0:
-        s.z = Eigen::Vector3d(r[3], r[2], -r[1]);
-        break;
-      case 1:
-        s.z = Eigen::Vector3d(-r[2], r[3], r[0]);
-        break;
-      case 2:
-        s.z = Eigen::Vector3d(r[1], -r[0], r[3]);
-        break;
-      default:
-        s.z = r.head<3>();
-    }
-    // The scalar part of the representative is r[3], or minus the component that became it.
-    const bool negative = best == 3 ? r[3] < 0 : r[best] > 0;
-    const double ratio = arccosineRatio(c);
+    // The vector part of r times the element.
+    s.z = Eigen::Vector3d(r[3] * x + r[0] * w + r[1] * z - r[2] * y, r[3] * y + r[1] * w + r[2] * x - r[0] * z,
+                          r[3] * z + r[2] * w + r[0] * y - r[1] * x);
+    const double ratio = arccosineRatio(std::abs(nearest.w));
     s.angle = ratio * s.z.norm();
-    s.second = c2 >= 0 ? 2 * std::acos(std::min(c2, 1.0)) : 2 * pi - s.angle;
-    s.z *= negative ? -ratio : ratio;
+    s.second = nearest.second >= 0 ? 2 * std::acos(std::min(nearest.second, 1.0)) : 2 * pi - s.angle;
+    s.z *= nearest.w < 0 ? -ratio : ratio;
     return s;
   }
   /// True if every point within ρ of p is nearer to the base by another representative.
   bool isOutsideDomain(const Point& p, double rho) const {
-    double other = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (half_turns[static_cast<std::size_t>(axis)]) other = std::max(other, std::abs(p[axis]));
-    }
     const double own = std::abs(p[3]);
+    const double other = std::abs(group.rotations().nearest(p[0], p[1], p[2], p[3]).w);
     return other > own && 2 * (std::acos(std::min(own, 1.0)) - std::acos(std::min(other, 1.0))) > 2 * rho;
   }
   /// (θ/2)cot(θ/2)
@@ -165,22 +144,37 @@ class TransverseTable {
   std::array<double, size + 1> values_;
 };
 
-/// The space that the compact factor of a manifold is searched in. The half-turns of a quotient of rotations are those
-/// of its representatives of the origin.
+/// The group that a quotient of rotations is by: that of the feature, or for all features of a type the rotations that
+/// its representatives of the origin are, which is trivial unless they are one of the point groups.
 template <Metric M>
-auto searchSpace() {
+PointGroup rotationGroup(const M& x) {
   using T = ManifoldTraits<M>;
-  if constexpr (compactFactor<M>() == CompactFactor::rotation) {
-    RotationSpace space;
-    if constexpr (Quotient<M>) {
+  if constexpr (requires { x.group(); }) {
+    return x.group();
+  } else if constexpr (Quotient<M>) {
+    static const PointGroup group = [] {
+      std::uint32_t elements = 0;
       for (const int index : T::representatives) {
-        const auto q = T::compactCoordinates(T::representative(T::origin(), index));
-        for (int axis = 0; axis < 3; ++axis) {
-          if (std::abs(static_cast<double>(q[axis])) > 0.5) space.half_turns[static_cast<std::size_t>(axis)] = true;
+        const Eigen::Vector4d q = T::compactCoordinates(T::representative(T::origin(), index)).template cast<double>();
+        for (std::size_t k = 0; k < crystal_rotations.size(); ++k) {
+          if (std::abs(q.dot(Eigen::Map<const Eigen::Vector4d>(crystal_rotations[k].data()))) > 1 - 1e-5) {
+            elements |= std::uint32_t{1} << k;
+          }
         }
       }
-    }
-    return space;
+      return PointGroup::ofElements(elements).value_or(PointGroup());
+    }();
+    return group;
+  } else {
+    return {};
+  }
+}
+
+/// The space that the compact factor of a manifold is searched in, with the group of the features.
+template <Metric M>
+auto searchSpace(const M& mean) {
+  if constexpr (compactFactor<M>() == CompactFactor::rotation) {
+    return RotationSpace{rotationGroup(mean)};
   } else {
     return SphereSpace{};
   }
@@ -213,10 +207,9 @@ double relativeAngle(const typename ManifoldTraits<M>::Group& to_y, const M& x) 
 
 /// ½ min(injectivity radius, π/√Δ)
 template <Metric M>
-double aPrioriRadius() {
-  using T = ManifoldTraits<M>;
-  const double injectivity = static_cast<double>(T::injectivityRadius());
-  const double curvature = static_cast<double>(T::maxSectionalCurvature());
+double aPrioriRadius(const M& mean) {
+  const double injectivity = static_cast<double>(injectivityRadiusAt(mean));
+  const double curvature = static_cast<double>(ManifoldTraits<M>::maxSectionalCurvature());
   return 0.5 * (curvature > 0 ? std::min(injectivity, pi / std::sqrt(curvature)) : injectivity);
 }
 

@@ -21,7 +21,7 @@ class SearchedManifold final : public SearchedMean<Space> {
   using typename SearchedMean<Space>::Found;
 
   SearchedManifold(const E& executor, const R& samples, const W& weights, const MeanResult<M>& mean)
-      : executor_(executor), samples_(samples), weights_(weights), space_(searchSpace<M>()), base_(mean) {}
+      : executor_(executor), samples_(samples), weights_(weights), space_(searchSpace(mean.mean)), base_(mean) {}
 
   UniquenessResult<M> certify(const UniquenessOptions& options) {
     if (!converged(base_.status)) {
@@ -32,7 +32,7 @@ class SearchedManifold final : public SearchedMean<Space> {
     const double eps = static_cast<double>(std::numeric_limits<ScalarOf<M>>::epsilon());
     const SearchVerdict verdict = UniquenessSearch<Space, E>(executor_, *this,
                                                              {.tie = std::max(options.tie_tolerance, 64 * eps),
-                                                              .a_priori_radius = aPrioriRadius<M>(),
+                                                              .a_priori_radius = aPrioriRadius(base_.mean),
                                                               .base_converged = converged(base_.status),
                                                               .branch_and_bound = options.branch_and_bound,
                                                               .budget = options.budget,

@@ -121,9 +121,9 @@ AngleSums angleSums(const MeanResult<M>& mean) {
   a.fourth = mean.angle_fourth_moment / mean.sum_of_weights;
   a.shift = mean.residual;
   a.largest = static_cast<double>(mean.largest_angle) + a.shift;
-  a.injectivity = static_cast<double>(ManifoldTraits<M>::injectivityRadius());
+  a.injectivity = static_cast<double>(injectivityRadiusAt(mean.mean));
   a.sphere = compactFactor<M>() == CompactFactor::sphere;
-  const double small = aPrioriRadius<M>() * (1 - angle_margin<ScalarOf<M>>);
+  const double small = aPrioriRadius(mean.mean) * (1 - angle_margin<ScalarOf<M>>);
   a.small_ball = a.largest < small;
   a.convex = leastDistanceToCutLocus(mean) - a.shift;
   if (a.sphere && a.convex > 0) a.convex = convexRadiusOnSphere(a.largest, std::sqrt(a.mean_square) + a.shift);

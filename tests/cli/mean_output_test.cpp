@@ -192,5 +192,28 @@ TEST(InputsThatFailed, haveTheRightAnswer) {
   EXPECT_NEAR(eigenvalues[1], 1.8e-12, 1e-13);
 }
 
+/// Copies of one orientation by the rotations of 432: unlike rotations, equal as orientations.
+TEST(MeanOutput, OrientationsOfCrystals) {
+  std::string text = "rx,ry,rz\n";
+  std::uint64_t state = 5;
+  const SO3d grain = SO3d::exp({0.2, -0.3, 0.1});
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Vector3d error(0.01 * noise(state), 0.01 * noise(state), 0.01 * noise(state));
+    const SO3d copy = grain * SO3d::exp(error) * SO3d::rotZ(i * M_PI / 2) * SO3d::rotX((i / 4) * M_PI / 2);
+    text += fmt::format("{},{},{}\n", copy.log()[0], copy.log()[1], copy.log()[2]);
+  }
+  AnalysisOptions options;
+  options.symmetry = PointGroup::fromName("m-3m");
+  options.charts = true;
+  const Analysed crystals(text, options);
+  EXPECT_EQ(crystals.analysis.status, Status::ok);
+  EXPECT_EQ(crystals.json().at("symmetry"), "432");
+  EXPECT_LT((featureOf<SO3d>(crystals.analysis.mean).inverse() * grain).log().norm(), 0.02);
+  EXPECT_LT(crystals.analysis.charts->centred.colwise().norm().maxCoeff(), 0.06);
+  const Analysed rotations(text);
+  EXPECT_FALSE(rotations.json().contains("symmetry"));
+  EXPECT_GT(rotations.analysis.dispersion.trace(), 0.5);
+}
+
 }  // namespace
 }  // namespace liestat::cli

@@ -110,10 +110,13 @@ TEST(Concentration, ofTheUniformLawByHand) {
   // ∫ θ² over the density of the angle: 1/π on the circle, sin θ/2 on the sphere, (1 - cos θ)/π on SO(3).
   EXPECT_DOUBLE_EQ(detail::circleLaw().expectation, pi * pi / 3);
   EXPECT_DOUBLE_EQ(detail::sphereLaw().expectation, (pi * pi - 4) / 2);
-  EXPECT_DOUBLE_EQ(detail::rotationLaw(0).expectation, pi * pi / 3 + 2);
+  EXPECT_DOUBLE_EQ(detail::rotationLaw().expectation, pi * pi / 3 + 2);
   // A mean adapts to its data: they scatter less about it than about any other point, and the less the fewer they are.
-  for (const auto& law : {detail::circleLaw(), detail::sphereLaw(), detail::rotationLaw(0), detail::rotationLaw(1),
-                          detail::rotationLaw(3)}) {
+  std::vector<detail::UniformLaw> laws{detail::circleLaw(), detail::sphereLaw()};
+  for (const auto& row : detail::proper_point_groups) {
+    laws.push_back(detail::rotationLaw(*PointGroup::fromName(row.name)));
+  }
+  for (const auto& law : laws) {
     double before = 0;
     for (const double n : {2.0, 3.0, 10.0, 100.0, 1e6}) {
       EXPECT_GT(law.limit(n), before) << n;

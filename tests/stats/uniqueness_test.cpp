@@ -152,14 +152,16 @@ void boundsHold(const Space& space, std::uint64_t seed) {
 
 TEST(BranchAndBound, lowerBoundsAreBelowTheCriterionInTheirBalls) {
   boundsHold(detail::RotationSpace{}, 1);
-  boundsHold(detail::RotationSpace{{false, false, true}}, 2);
-  boundsHold(detail::RotationSpace{{true, true, true}}, 3);
+  boundsHold(detail::RotationSpace{*PointGroup::fromName("112")}, 2);
+  boundsHold(detail::RotationSpace{*PointGroup::fromName("222")}, 3);
+  boundsHold(detail::RotationSpace{*PointGroup::fromName("432")}, 5);
+  boundsHold(detail::RotationSpace{*PointGroup::fromName("6")}, 6);
   boundsHold(detail::SphereSpace{}, 4);
 }
 
 template <class M>
 void sightingsAgree() {
-  const auto space = detail::searchSpace<M>();
+  const auto space = detail::searchSpace(ManifoldTraits<M>::origin());
   CounterRng rng(11);
   for (int k = 0; k < 1000; ++k) {
     const M x = sampleInCube<M>(rng), y = sampleInCube<M>(rng);
