@@ -257,6 +257,15 @@ std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryO
                                 of_matrices ? "projected from their matrices" : "normalised",
                                 trajectory.largest_norm_error));
   }
+  const auto diagonal = std::count_if(trajectory.covariances.begin(), trajectory.covariances.end(), [](const auto& C) {
+    return C.diagonal().allFinite() && C.array().isNaN().count() == 30;
+  });
+  if (diagonal > 0) {
+    notes.push_back(
+        fmt::format("{} matrices are known on their diagonals alone (layout diag6); the other entries are "
+                    "unknown, not zero: convert --assume-uncorrelated makes them zero",
+                    diagonal));
+  }
   if (trajectory.n_unmeasured > 0) {
     notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",
                                 trajectory.n_unmeasured, options.unmeasured));

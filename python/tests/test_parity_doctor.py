@@ -185,7 +185,7 @@ class DoctorParity(ParityTest):
         for flags, options in ([], {}), (["--all-units"], {"all_units": True}):
             ours = liestat.diagnose_conventions(read.poses, read.matrices, plan=True, **options)
             self.compare([estimate, "--plan", *flags, *words], ours)
-            self.assertEqual(len(ours.plan), 56 if flags else 14)
+            self.assertEqual(len(ours.plan), 72 if flags else 18)
             self.assertIn(f"of {len(ours.plan)} conventions", ours.sentence)
 
     def test_several_runs(self):
