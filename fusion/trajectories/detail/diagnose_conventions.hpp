@@ -149,7 +149,11 @@ inline void nameCause(const DiagnosisData& data, const std::vector<Convention>& 
       const std::vector<std::string> words = d.scale->words();
       std::string scales;
       for (std::size_t k = 0; k < words.size(); ++k) scales += (k > 0 ? "; " : "") + words[k];
-      if (!scales.empty()) like = describe(d.scale->convention) + ", but " + scales;
+      if (!scales.empty()) {
+        const std::size_t others = d.scale->accepted.size() - 1;
+        like = describe(d.scale->convention) +
+               (others > 0 ? " (or " + std::to_string(others) + " others that fit alike)" : "") + ", but " + scales;
+      }
       // Wrong shapes look like scales near one, and other contents with scales like powers of the matrices.
       const auto near_one = [](double k) { return std::abs(std::log(k)) < std::log(least_factor); };
       const bool large = !near_one(d.scale->translation) || !near_one(d.scale->rotation);

@@ -369,10 +369,17 @@ inline ScaleProfile profileScale(const DiagnosisData& data, std::span<const Conv
   const auto posterior = [](const Row& r) {
     return r.likelihood - std::log1p(std::pow(std::log(r.k_t), 2)) - std::log1p(std::pow(std::log(r.k_r), 2));
   };
-  std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) { return posterior(a) > posterior(b); });
+  // Of those that are as likely the first of the list stands for all: the library's own, if it is among them.
+  const auto likeliest = std::max_element(rows.begin(), rows.end(),
+                                          [&](const Row& a, const Row& b) { return posterior(a) < posterior(b); });
+  constexpr double alike = 2;
+  const double most = posterior(*likeliest);
+  std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) {
+    return std::min(posterior(a), most - alike) > std::min(posterior(b), most - alike);
+  });
   const double margin = std::log(static_cast<double>(rows.size()) / alpha) * (data.blocks_only ? 2 : 1);
   for (const Row& r : rows) {
-    if (posterior(r) > posterior(rows[0]) - margin) profile.accepted.push_back(r.convention);
+    if (posterior(r) > most - margin) profile.accepted.push_back(r.convention);
   }
   profile.convention = rows[0].convention, profile.log_likelihood = rows[0].likelihood;
   profile.translation = rows[0].k_t, profile.rotation = rows[0].k_r;
