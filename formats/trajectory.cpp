@@ -250,11 +250,21 @@ void orderInTime(Trajectory& t, std::optional<DuplicateRule> duplicates) {
 
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options) {
   std::vector<std::string> notes = trajectory.notes;
-  if (trajectory.n_normalised > 0) {
-    notes.push_back(fmt::format(
-        "{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
-        trajectory.format == "kitti" || trajectory.format == "matrix" ? "projected from their matrices" : "normalised",
-        trajectory.largest_norm_error));
+  const bool of_matrices = trajectory.format == "kitti" || trajectory.format == "matrix";
+  // Quaternions of six digits are off by as much; a matrix of few digits is worth a word.
+  if (trajectory.n_normalised > 0 && (of_matrices || trajectory.largest_norm_error > 1e-6)) {
+    notes.push_back(fmt::format("{} rotations were {}, off by {:.2g} at most", trajectory.n_normalised,
+                                of_matrices ? "projected from their matrices" : "normalised",
+                                trajectory.largest_norm_error));
+  }
+  const auto diagonal = std::count_if(trajectory.covariances.begin(), trajectory.covariances.end(), [](const auto& C) {
+    return C.diagonal().allFinite() && C.array().isNaN().count() == 30;
+  });
+  if (diagonal > 0) {
+    notes.push_back(
+        fmt::format("{} matrices are known on their diagonals alone (layout diag6); the other entries are "
+                    "unknown, not zero: convert --assume-uncorrelated makes them zero",
+                    diagonal));
   }
   if (trajectory.n_unmeasured > 0) {
     notes.push_back(fmt::format("{} rows have components with a variance of {:g} or more: not measured",

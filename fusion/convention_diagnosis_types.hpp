@@ -52,6 +52,8 @@ enum class MatrixFault {
   adjoint_transposed,  ///< the transposed adjoint
   previous_row,        ///< each row has the matrix of the row before
   next_row,            ///< each row has the matrix of the row after
+  diagonal_alone,      ///< generic, never named: off-diagonals have nothing to do with the errors
+  blocks_alone,        ///< the same of the cross block
 };
 /// In words.
 const char* describe(MatrixFault fault);
@@ -88,8 +90,10 @@ struct ScaleProfile {
   double relative_sigma = 0;             ///< relative standard deviation of each
   bool identified = false;               ///< no other order and perturbation fits as well, scales free
   std::vector<Convention> accepted;
-  WhitenedResidualTests tests;  ///< with the scales removed
-  /// Each scale by its name: "rotation sigmas are half as large as they should be, or half angles", …
+  double log_likelihood = -detail::infinity;  ///< of the errors, absolute
+  WhitenedResidualTests tests;                ///< with the scales removed
+  double generic_p = detail::not_a_number;    ///< likewise; see ConventionDiagnosis
+  /// Each scale that is not right by its name: "rotation block: in degrees", …
   std::vector<std::string> words() const;
 };
 
@@ -129,6 +133,9 @@ struct ConventionDiagnosis {
   std::vector<Convention> accepted;
   MatrixFault fault = MatrixFault::none;
   WhitenedResidualTests tests;  ///< under the best hypothesis
+  /// Probability that the best hypothesis looks so wrong against alternatives outside of the list (constant and pose-dependent
+  /// congruences, other scales of off-diagonals, rows) if it is right; NaN: there is none, or errors are correlated.
+  double generic_p = detail::not_a_number;
   std::optional<ScaleProfile> scale;
   std::optional<ChainDiagnosis> chain;
   bool increments_as_absolute = false;   ///< the matrices are those of single steps
@@ -240,6 +247,7 @@ void describe(V& v, const ConventionDiagnosis& d) {
   v("increments_as_absolute", d.increments_as_absolute, "the matrices are those of single steps");
   v("growth", d.growth, "NEES of the second half over the first");
   v("tests", d.tests, "under the best hypothesis");
+  v("generic_p", d.generic_p, "of the best hypothesis against alternatives outside of the list");
   v("scale", d.scale, "scales of the blocks, where they are free");
   if (shown(v, d.chain.has_value())) v("chain", d.chain.value_or(ChainDiagnosis{}), "whether it is dead reckoning");
   v("hypotheses", d.fits, "the best first; empty if correlated");

@@ -41,6 +41,13 @@ Trajectory readWithCovariances(const std::string& path, const TextFile& file, co
   return t;
 }
 
+/// Notes on a file with its name, for they stand among those of others.
+std::vector<std::string> notesOfReading(const Trajectory& t) {
+  std::vector<std::string> notes = t.notes;
+  for (std::string& note : notes) note.insert(0, t.name + ": ");
+  return notes;
+}
+
 /// The poses of a file with their matrices as they stand there, unless it is a truth.
 PoseTrajectory posesOf(const Trajectory& t, bool with_matrices) {
   PoseTrajectory poses{
@@ -134,8 +141,9 @@ int runDoctor(DoctorOptions o, const Invocation& invocation) {
           run.poses.push_back({estimate.poses[i], estimate.covariances[i], estimate.poses[i]});
         }
       }
-      run.notes.insert(run.notes.begin(), estimate.notes.begin(), estimate.notes.end());
-      if (k == 0) run.notes.insert(run.notes.begin(), truth.notes.begin(), truth.notes.end());
+      std::vector<std::string> notes = k == 0 ? notesOfReading(truth) : std::vector<std::string>();
+      for (std::string& note : notesOfReading(estimate)) notes.push_back(std::move(note));
+      run.notes.insert(run.notes.begin(), notes.begin(), notes.end());
       if (estimate.stated_convention) {
         run.notes.insert(run.notes.begin(), fmt::format("{} states {}", estimate.covariance_source,
                                                         conventionName(*estimate.stated_convention, false)));

@@ -57,8 +57,6 @@ Trajectory readTimedTrajectory(const std::string& path, const TextFile& file, co
                                std::optional<DuplicateRule> duplicates) {
   Trajectory t = readTrajectory(path, file, options);
   orderInTime(t, duplicates);
-  // Quaternions of six digits are off by as much; a matrix of few digits is worth a word.
-  if (t.largest_norm_error <= 1e-6 && t.format != "kitti" && t.format != "matrix") t.n_normalised = 0;
   t.notes = notesOf(t, options);
   return t;
 }

@@ -21,9 +21,12 @@ namespace {
 std::string optionOf(const Convention& c) { return conventionName(c, false); }
 std::string nameOf(const ConventionReading& reading) { return optionOf(reading.convention); }
 
-std::string acceptedInWords(const std::vector<Convention>& accepted) {
+/// Options to copy, of conventions in which the matrices can be used as they are: not those behind faults and wrong scales.
+std::string acceptedInWords(const CovarianceDiagnosis& r) {
   constexpr std::size_t most = 12;
   std::string text;
+  if (r.verdict().isNo()) return text;
+  const std::vector<Convention> accepted = r.accepted();
   for (std::size_t k = 0; k < std::min(most, accepted.size()); ++k) {
     text += fmt::format("  --cov-from {}: {}\n", optionOf(accepted[k]), describe(accepted[k]));
   }
@@ -74,8 +77,8 @@ std::string planInWords(const std::vector<PlanRow>& plan) {
 
 std::string formatDiagnosis(const DiagnosisOutput& output) {
   const CovarianceDiagnosis& r = output.result;
-  std::string text = r.mode == DiagnosisMode::plan ? planInWords(r.plan)
-                                                   : r.verdict().text + "\n" + acceptedInWords(r.accepted()) + "\n";
+  std::string text =
+      r.mode == DiagnosisMode::plan ? planInWords(r.plan) : r.verdict().text + "\n" + acceptedInWords(r) + "\n";
   text += fmt::format("{}: {} {}{}\n", joined(output.files, ", "), r.structure.n, r.what,
                       output.reference.empty() ? "" : ", truth " + output.reference);
   for (const std::string& note : r.file_notes) text += note + "\n";
@@ -141,6 +144,12 @@ std::vector<double> neesOf(const ConventionReading& reading) {
   return values;
 }
 
+/// True if the likelihood of a hypothesis comes with errors that follow its covariances.
+bool areExplained(const ConventionDiagnosis& d) {
+  return d.verdict == DiagnosisVerdict::identified || d.verdict == DiagnosisVerdict::undecidable ||
+         d.fault != MatrixFault::none || d.increments_as_absolute;
+}
+
 bool explains(const std::vector<Convention>& accepted, const Convention& c) {
   return std::find(accepted.begin(), accepted.end(), c) != accepted.end();
 }
@@ -158,7 +167,7 @@ void showHypotheses(Report& report, const ConventionDiagnosis& d) {
   Series wrong{.name = "do not", .style = Style::points, .colour = 0};
   std::size_t indefinite = 0;
   for (const HypothesisFit& f : d.fits) {
-    const bool is_right = explains(d.accepted, f.convention) && f.fault == d.fault;
+    const bool is_right = areExplained(d) && explains(d.accepted, f.convention) && f.fault == d.fault;
     const double below = 0 - f.log_likelihood;
     if (rows.size() < most_shown) {
       const std::string remark = f.indefinite > 0 ? fmt::format("{} matrices not positive definite", f.indefinite)
@@ -231,20 +240,22 @@ void showPlan(Report& report, const std::vector<PlanRow>& plan) {
 /// The calibration of readings: their indices, the distribution of NEES, NEES over the times.
 void showCalibration(Report& report, const TimesOfPoses& times, const std::vector<const ConventionReading*>& readings) {
   report.section("Calibration");
-  const double bound = chiSquaredThreshold(0.05, 6);
   std::vector<std::vector<std::string>> rows;
   Panel coverage{.title = "Share of poses within an error ellipsoid",
                  .x = {.label = "probability of the ellipsoid, %", .low = 0.0, .high = 100.0},
                  .y = {.label = "share of poses, %", .low = 0.0, .high = 100.0}};
   coverage.series.push_back(
       {.name = "as it should be", .style = Style::lines, .x = {0, 100}, .y = {0, 100}, .colour = 6, .dashed = true});
-  Panel nees = neesPanel(times);
+  const int judged = readings.back()->consistency.tests.components.count();
+  Panel nees = neesPanel(times, judged);
   nees.title = "NEES of each pose";
   for (std::size_t k = 0; k < readings.size(); ++k) {
     const ConventionReading& r = *readings[k];
     std::vector<double> values = neesOf(r);
     std::sort(values.begin(), values.end());
     const auto n = static_cast<double>(values.size());
+    const int dof = r.consistency.tests.components.count();
+    const double bound = chiSquaredThreshold(0.05, dof);
     const auto inside = static_cast<double>(std::upper_bound(values.begin(), values.end(), bound) - values.begin());
     const Consistency& c = r.consistency;
     rows.push_back({nameOf(r), fmt::format("{}", values.size()), number(c.joint.ratio(), 3), number(c.joint.p, 2),
@@ -254,7 +265,7 @@ void showCalibration(Report& report, const TimesOfPoses& times, const std::vecto
     Series curve{.name = nameOf(r), .style = Style::lines, .x = {0}, .y = {0}, .colour = colour};
     const std::size_t step = std::max<std::size_t>(1, values.size() / 500);
     for (std::size_t i = step - 1; i < values.size(); i += step) {
-      curve.add(100 * (1 - chiSquaredSurvival(values[i], 6)), 100 * static_cast<double>(i + 1) / n);
+      curve.add(100 * (1 - chiSquaredSurvival(values[i], dof)), 100 * static_cast<double>(i + 1) / n);
     }
     curve.add(100, 100);
     coverage.series.push_back(curve);
@@ -271,7 +282,7 @@ void showCalibration(Report& report, const TimesOfPoses& times, const std::vecto
       {.name = "calibration",
        .caption = "Left: a curve above the diagonal is that of covariances that are too large, below it of those "
                   "that are too small. Right: NEES of each pose; " +
-                  neesBounds(),
+                  neesBounds(judged),
        .panels = {coverage, nees}});
   table();
 }

@@ -266,10 +266,11 @@ Plot errorPlot(const EvaluatedEstimate& e, std::size_t number_of) {
 
 Plot neesPlot(const EvaluatedEstimate& e, std::size_t number_of) {
   const TimesOfPoses times{e.evaluation.times, e.evaluation.by_time};
-  Panel panel = neesPanel(times);
+  const int dof = e.evaluation.consistency.tests.components.count();
+  Panel panel = neesPanel(times, dof);
   panel.series = {neesSeries("NEES", e.evaluation.consistency.errors, times)};
   return {.name = fmt::format("nees_{}", number_of),
-          .caption = fmt::format("NEES of each pose of {}; {}", e.name, neesBounds()),
+          .caption = fmt::format("NEES of each pose of {}; {}", e.name, neesBounds(dof)),
           .panels = {panel}};
 }
 

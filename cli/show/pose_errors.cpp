@@ -31,11 +31,11 @@ std::vector<Panel> errorPanels(const std::vector<PoseError>& errors, const Times
   return panels;
 }
 
-Panel neesPanel(const TimesOfPoses& times) {
+Panel neesPanel(const TimesOfPoses& times, int dof) {
   return {.x = {.label = times.label()},
           .y = {.label = "NEES of a pose", .logarithmic = true},
-          .references = {{ReferenceLine::Direction::horizontal, neesInterval(6).low},
-                         {ReferenceLine::Direction::horizontal, neesInterval(6).high}}};
+          .references = {{ReferenceLine::Direction::horizontal, neesInterval(dof).low},
+                         {ReferenceLine::Direction::horizontal, neesInterval(dof).high}}};
 }
 
 Series neesSeries(std::string name, const std::vector<PoseError>& errors, const TimesOfPoses& times) {
@@ -46,9 +46,9 @@ Series neesSeries(std::string name, const std::vector<PoseError>& errors, const 
   return points;
 }
 
-std::string neesBounds() {
+std::string neesBounds(int dof) {
   return fmt::format("95 % of them lie between the dotted lines, {} and {}, if the covariances are right.",
-                     number(neesInterval(6).low, 3), number(neesInterval(6).high, 3));
+                     number(neesInterval(dof).low, 3), number(neesInterval(dof).high, 3));
 }
 
 }  // namespace liestat::cli

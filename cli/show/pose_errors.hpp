@@ -34,10 +34,10 @@ std::pair<std::string, double> coordinateOfError(int k);
 std::vector<Panel> errorPanels(const std::vector<PoseError>& errors, const TimesOfPoses& times);
 
 /// NEES of each pose over the times, with the lines between which 95 % lie if the covariances are right.
-Panel neesPanel(const TimesOfPoses& times);
+Panel neesPanel(const TimesOfPoses& times, int dof);
 /// The series for it.
 Series neesSeries(std::string name, const std::vector<PoseError>& errors, const TimesOfPoses& times);
 /// The sentence about the lines.
-std::string neesBounds();
+std::string neesBounds(int dof);
 
 }  // namespace liestat::cli

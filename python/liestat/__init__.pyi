@@ -729,6 +729,7 @@ class _CovarianceDiagnosis(Result):
     increments_as_absolute: bool  # the matrices are those of single steps
     growth: float  # NEES of the second half over the first
     tests: _WhitenedResidualTests  # under the best hypothesis
+    generic_p: float  # of the best hypothesis against alternatives outside of the list
     scale: _ScaleProfile | None  # scales of the blocks, where they are free
     hypotheses: list[_HypothesisFit]  # the best first; empty if correlated
     plan: list[_PlanRow]  # with --plan: a row for each convention

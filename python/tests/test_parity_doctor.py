@@ -73,10 +73,14 @@ class DoctorParity(ParityTest):
         liestat.write_trajectory(self.path(name), poses, format="tum", times=times)
         return self.path(name), liestat.read_trajectory(self.path(name)).poses
 
-    def compare(self, words, ours, digits=None):
-        """With `digits` numbers are equal to so many."""
+    def compare(self, words, ours, digits=None, read=()):
+        """With `digits` numbers are equal to so many. `read`: files as read_trajectory returns them, whose notes the
+        program says first."""
         decided = ours.decided
         theirs = program("doctor", *words, codes=(EXIT_CODES[decided],))
+        for name, file in read:
+            for note in file.notes:
+                self.assertEqual(theirs["file_notes"].pop(0), f"{name}: {note}")
         # The program's notes name files.
         for names, word in ((theirs.pop("files"), "the estimate"), ([theirs.pop("reference")], "the truth")):
             for name in filter(None, names):
@@ -181,7 +185,7 @@ class DoctorParity(ParityTest):
         for flags, options in ([], {}), (["--all-units"], {"all_units": True}):
             ours = liestat.diagnose_conventions(read.poses, read.matrices, plan=True, **options)
             self.compare([estimate, "--plan", *flags, *words], ours)
-            self.assertEqual(len(ours.plan), 56 if flags else 14)
+            self.assertEqual(len(ours.plan), 72 if flags else 18)
             self.assertIn(f"of {len(ours.plan)} conventions", ours.sentence)
 
     def test_several_runs(self):
@@ -267,8 +271,10 @@ class DoctorParity(ParityTest):
         ours = liestat.diagnose_conventions(
             read.poses, read.matrices, truth.poses, times=read.times, truth_times=truth.times, align="se3"
         )
-        words = [path, os.path.join(folder, "reference.tum"), "--format", "tum", "--cov-layout", "full36"]
-        self.compare([*words, "--align", "se3"], ours)
+        reference = os.path.join(folder, "reference.tum")
+        words = [path, reference, "--format", "tum", "--cov-layout", "full36", "--align", "se3"]
+        self.assertRegex(truth.notes[0], "836 rotations were normalised, off by 1.7e-05")
+        self.compare(words, ours, read=((reference, truth), (path, read)))
 
     def test_wrong_input_is_named(self):
         truth, poses, covariances = scene(20, 19)

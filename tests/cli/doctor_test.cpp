@@ -70,7 +70,7 @@ TEST(DoctorCommand, NamesTheConvention) {
   const Json found = json(files.words(), 0);
   EXPECT_EQ(found["verdict"], "identified") << found["reason"];
   EXPECT_EQ(found["accepted"], Json::array({"ros-fixed"}));
-  EXPECT_EQ(found["hypotheses"].size(), 168U);
+  EXPECT_EQ(found["hypotheses"].size(), 216U);
   const ProgramOutput text = run(files.words());
   EXPECT_EQ(text.output.rfind("identified: ", 0), 0U) << text.output;
   EXPECT_TRUE(contains(text.output, "--cov-from ros-fixed")) << text.output;
@@ -98,7 +98,7 @@ TEST(DoctorCommand, DeadReckoningWithAndWithoutTruth) {
   const Json without = json({"doctor", files.estimate, "--format", "tum", "--cov-layout", "full36", "--no-truth"}, 0);
   EXPECT_EQ(without["chain"]["accepted"], Json::array({"right,unit=half"}));
   const Json plan = json({"doctor", files.estimate, "--format", "tum", "--cov-layout", "full36", "--plan"}, 0);
-  EXPECT_EQ(plan["plan"].size(), 14U);
+  EXPECT_EQ(plan["plan"].size(), 18U);
   EXPECT_GT(plan["plan"][0]["divergence"], 0);
 }
 

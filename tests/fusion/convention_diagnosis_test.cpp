@@ -379,14 +379,14 @@ TEST(CovarianceDiagnosis, ChainAndPlan) {
   // A plan always has an answer; contents are told apart at once.
   const CovarianceDiagnosis plan = diagnosed(run, {.mode = DiagnosisMode::plan});
   EXPECT_TRUE(plan.verdict().isYes());
-  ASSERT_EQ(plan.plan.size(), 14U);
+  ASSERT_EQ(plan.plan.size(), 18U);
   for (const PlanRow& row : plan.plan) EXPECT_EQ(row.convention.unit, U::radian);
-  EXPECT_EQ(diagnosed(run, {.mode = DiagnosisMode::plan, .all_units = true}).plan.size(), 56U);
+  EXPECT_EQ(diagnosed(run, {.mode = DiagnosisMode::plan, .all_units = true}).plan.size(), 72U);
   const auto decided = std::count_if(plan.plan.begin(), plan.plan.end(), [](const PlanRow& row) {
     return row.equal.empty() && row.poses > 0 && row.poses <= 200;
   });
   EXPECT_EQ(plan.verdict().text,
-            "With its 200 poses this file tells " + std::to_string(decided) + " of 14 conventions from all others.");
+            "With its 200 poses this file tells " + std::to_string(decided) + " of 18 conventions from all others.");
 }
 
 TEST(CovarianceDiagnosis, FormatsAndEdgesLeaveFewerHypotheses) {
@@ -397,7 +397,7 @@ TEST(CovarianceDiagnosis, FormatsAndEdgesLeaveFewerHypotheses) {
                          scene.times};
   const CovarianceDiagnosis d = diagnosed(
       run, {.alignment = AlignmentModel::se3, .order = rt, .content = CovarianceContent::information, .edges = true});
-  EXPECT_EQ(d.diagnosis->fits.size(), 28U);
+  EXPECT_EQ(d.diagnosis->fits.size(), 36U);
   EXPECT_EQ(d.accepted(), std::vector{convention(P::right, U::half_angle, CovarianceContent::information, rt)});
   EXPECT_EQ(d.assumed, convention(P::right, U::radian, CovarianceContent::information, rt));
   EXPECT_EQ(d.what, "edges");
@@ -516,6 +516,59 @@ TEST(ConventionDiagnosis, PlanarRobotsAreJudgedByWhatCarriesNoise) {
       }
     }
   }
+}
+
+bool anySays(const std::vector<std::string>& sentences, const std::string& words) {
+  return std::any_of(sentences.begin(), sentences.end(),
+                     [&](const std::string& s) { return s.find(words) != std::string::npos; });
+}
+
+TEST(ConventionDiagnosis, SentencesOnMatricesAreTrue) {
+  CounterRng rng(31);
+  const TrajectoryScene scene = experiments::independentScene({.n = 30}, rng);
+  const double unknown = std::nan("");
+  // Unknown cross blocks: the matrices differ all the same.
+  std::vector<DiagnosedPose> poses = written(scene, convention(P::right));
+  for (DiagnosedPose& p : poses)
+    p.matrix.topRightCorner<3, 3>().fill(unknown), p.matrix.bottomLeftCorner<3, 3>().fill(unknown);
+  EXPECT_FALSE(anySays(matrixStructure(poses).words(), "are the same"));
+  for (DiagnosedPose& p : poses) p.matrix = poses[0].matrix;
+  EXPECT_TRUE(anySays(matrixStructure(poses).words(), "are the same"));
+  // Nothing known is not zero.
+  for (DiagnosedPose& p : poses) p.matrix.fill(unknown);
+  EXPECT_EQ(matrixStructure(poses).unknown, poses.size());
+  EXPECT_TRUE(matrixStructure(poses).words().empty());
+  // Zeros of a robot in the plane make nothing indefinite.
+  poses = written(scene, convention(P::right));
+  for (DiagnosedPose& p : poses) {
+    for (const int k : {2, 3, 4}) p.matrix.row(k).setZero(), p.matrix.col(k).setZero();
+  }
+  EXPECT_EQ(matrixStructure(poses).indefinite, 0U);
+  EXPECT_TRUE(anySays(matrixStructure(poses).words(), "3, 4, 5 are zero in every row"));
+}
+
+TEST(ConventionDiagnosis, AConstantCovarianceIsNoDeadReckoning) {
+  CounterRng rng(32);
+  std::vector<DiagnosedPose> poses = written(experiments::independentScene({.n = 60}, rng), convention(P::right));
+  for (DiagnosedPose& p : poses) p.matrix = poses[0].matrix;
+  EXPECT_FALSE(diagnoseChain(poses).is_chain);
+}
+
+TEST(ConventionDiagnosis, ScalesThatAreRightAreNotListed) {
+  const ScaleProfile of_translation{.translation = 4, .rotation = 1.02, .relative_sigma = 0.05};
+  ASSERT_EQ(of_translation.words().size(), 1U);
+  EXPECT_EQ(of_translation.words()[0].rfind("translation block: inflated", 0), 0U);
+  EXPECT_TRUE((ScaleProfile{.translation = 0.98, .rotation = 1.02, .relative_sigma = 0.05}).words().empty());
+}
+
+TEST(ConventionDiagnosis, NoConventionExplainsErrorsOfAnUnknownCause) {
+  CounterRng rng(33);
+  std::vector<DiagnosedPose> poses = written(experiments::independentScene({.n = 200}, rng), convention(P::right));
+  for (DiagnosedPose& p : poses) p.truth = p.truth * SE3d::trans(0.03, 0, 0);
+  const ConventionDiagnosis d = diagnoseConventions(poses);
+  EXPECT_EQ(d.verdict, DiagnosisVerdict::inconsistent);
+  EXPECT_TRUE(d.accepted.empty());
+  EXPECT_NE(d.reason.find("the cause is unknown"), std::string::npos) << d.reason;
 }
 
 }  // namespace

@@ -16,9 +16,9 @@ LIESTAT_FUSION_INLINE MatrixStructure matrixStructure(std::span<const DiagnosedP
   MatrixStructure s;
   s.n = poses.size();
   if (poses.empty()) return s;
-  s.constant = poses.size() > 1, s.diagonal = s.no_cross = s.isotropic_blocks = s.rank_one = true;
+  s.constant = s.diagonal = s.no_cross = s.isotropic_blocks = s.rank_one = true;
   s.zero_variance.fill(true);
-  const Matrix6d first = poses[0].matrix;
+  const Matrix6d* first = nullptr;
   for (const DiagnosedPose& p : poses) {
     if (!detail::blocksFinite(p.matrix)) {
       ++s.unknown;
@@ -26,9 +26,8 @@ LIESTAT_FUSION_INLINE MatrixStructure matrixStructure(std::span<const DiagnosedP
     }
     const bool no_cross_given = detail::crossUnknown(p.matrix);
     s.blocks_only = s.blocks_only || no_cross_given;
-    const Matrix6d M = no_cross_given ? detail::withoutCross(p.matrix) : p.matrix;
+    Matrix6d M = no_cross_given ? detail::withoutCross(p.matrix) : p.matrix;
     const auto unit = [&](int i, int j) { return std::sqrt(std::abs(M(i, i) * M(j, j))); };
-    s.indefinite += !detail::Cholesky<double, 6>(M).ok();
     bool symmetric = true;
     for (int i = 0; i < 6; ++i) {
       s.zero_variance[static_cast<std::size_t>(i)] = s.zero_variance[static_cast<std::size_t>(i)] && M(i, i) == 0;
@@ -44,8 +43,21 @@ LIESTAT_FUSION_INLINE MatrixStructure matrixStructure(std::span<const DiagnosedP
       }
     }
     s.asymmetric += !symmetric;
-    s.constant = s.constant && (no_cross_given || p.matrix == first);
+    // Unknown entries are alike, too.
+    const auto alike = [&](const Matrix6d& N) {
+      return ((p.matrix.array() == N.array()) || (p.matrix.array().isNaN() && N.array().isNaN())).all();
+    };
+    if (first == nullptr) first = &p.matrix;
+    s.constant = s.constant && alike(*first);
+    // A coordinate that is filled with zeros is said to be so; it makes nothing indefinite.
+    for (int i = 0; i < 6; ++i) {
+      if ((M.row(i).array() == 0).all() && (M.col(i).array() == 0).all()) M(i, i) = 1;
+    }
+    s.indefinite += !detail::Cholesky<double, 6>(M).ok();
   }
+  const std::size_t known = s.n - s.unknown;
+  s.constant = s.constant && known > 1;
+  if (known == 0) s.diagonal = s.no_cross = s.isotropic_blocks = s.rank_one = false, s.zero_variance.fill(false);
   return s;
 }
 
@@ -71,7 +83,8 @@ LIESTAT_FUSION_INLINE ChainDiagnosis diagnoseChain(std::span<const DiagnosedPose
   }
   for (const Convention& c : all) {
     std::size_t indefinite = 0;
-    Matrix6d before = covarianceUnder(data, 0, {.convention = c});
+    const Matrix6d first = covarianceUnder(data, 0, {.convention = c});
+    Matrix6d before = first;
     for (std::size_t i = 1; i < data.size(); ++i) {
       const Matrix6d now = covarianceUnder(data, i, {.convention = c});
       const Matrix6d carried = congruence(A[i], before);
@@ -85,6 +98,15 @@ LIESTAT_FUSION_INLINE ChainDiagnosis diagnoseChain(std::span<const DiagnosedPose
       indefinite += !now.allFinite() || !semidefinite(now - carried, tolerance);
       before = now;
     }
+    // A covariance that only stays as it is is that of no dead reckoning: over the whole run one block has to grow.
+    const Matrix6d start =
+        congruence((data.poses.back().estimate.inverse() * data.poses.front().estimate).Adj(), first);
+    constexpr double least_growth = 1e-3;
+    const auto grows = [&](int k) {
+      const double then = start.block<3, 3>(k, k).trace(), now = before.block<3, 3>(k, k).trace();
+      return now - then > least_growth * now;
+    };
+    if (!grows(0) && !grows(3)) indefinite = d.steps;
     d.fits.push_back({c, static_cast<double>(indefinite) / static_cast<double>(d.steps)});
   }
   std::stable_sort(d.fits.begin(), d.fits.end(),
@@ -107,39 +129,57 @@ LIESTAT_FUSION_INLINE ChainDiagnosis diagnoseChain(std::span<const DiagnosedPose
 
 namespace detail {
 
-/// Independent increments of a chain: η_i = ξ_i - A ξ_{i-1} with Q_i, ranked among the accepted conventions.
-inline void rankIncrements(const DiagnosisData& data, ChainDiagnosis& chain, double alpha) {
-  const std::size_t n = data.size(), h = chain.accepted.size();
-  std::vector<double> likelihood(h, 0), nees(h, 0);
-  std::size_t used = 0;
-  for (std::size_t i = 1; i < n; ++i) {
+/// Increments of a run, η_i = ξ_i - A ξ_{i-1}, with covariances made of two neighbours' matrices.
+template <class Make>
+std::vector<PosedResidual> incrementsOf(const DiagnosisData& data, const Make& covariance) {
+  std::vector<PosedResidual> list;
+  for (std::size_t i = 1; i < data.size(); ++i) {
     const SE3d motion = data.poses[i - 1].estimate.inverse() * data.poses[i].estimate;
     const SE3d truth = data.poses[i - 1].truth.inverse() * data.poses[i].truth;
-    const Vector6d eta = (motion.inverse() * truth).log();
-    const Matrix6d A = motion.inverse().Adj();
-    std::vector<double> d2(h), log_det(h);
-    bool all = true;
-    for (std::size_t k = 0; k < h && all; ++k) {
-      const HypothesisFit f{.convention = chain.accepted[k]};
-      const Matrix6d Q = covarianceUnder(data, i, f) - congruence(A, covarianceUnder(data, i - 1, f));
-      const Cholesky<double, 6> root(Q);
-      all = root.ok();
-      d2[k] = root.halfSolve<1>(eta).squaredNorm(), log_det[k] = root.logDeterminant();
-    }
-    if (!all) continue;
-    ++used;
-    for (std::size_t k = 0; k < h; ++k) nees[k] += d2[k], likelihood[k] += -0.5 * d2[k] - 0.5 * log_det[k];
+    list.push_back(
+        {{(motion.inverse() * truth).log(), covariance(i, Matrix6d(motion.inverse().Adj()))}, data.poses[i].estimate});
   }
-  if (used < 10) return;
+  return list;
+}
+
+/// Ranks the accepted conventions of a chain by the likelihood of its increments, which are independent.
+inline Agreement rankIncrements(const DiagnosisData& data, ChainDiagnosis& chain, double alpha) {
+  const std::size_t h = chain.accepted.size();
+  std::vector<std::vector<PosedResidual>> of;
+  for (const Convention& c : chain.accepted) {
+    of.push_back(incrementsOf(data, [&](std::size_t i, const Matrix6d& A) {
+      const HypothesisFit f{.convention = c};
+      return Matrix6d(covarianceUnder(data, i, f) - congruence(A, covarianceUnder(data, i - 1, f)));
+    }));
+  }
+  // Those that are positive definite in all of the conventions.
+  std::vector<double> likelihood(h, 0);
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < of[0].size(); ++i) {
+    std::vector<double> terms;
+    for (std::size_t k = 0; k < h; ++k) {
+      const Cholesky<double, 6> root(of[k][i].residual.covariance);
+      if (!root.ok()) break;
+      terms.push_back(-0.5 * (root.halfSolve<1>(of[k][i].residual.error).squaredNorm() + root.logDeterminant()));
+    }
+    if (terms.size() < h) continue;
+    for (std::size_t k = 0; k < h; ++k) likelihood[k] += terms[k], of[k][used] = of[k][i];
+    ++used;
+  }
+  Agreement agreement;
+  if (used < 10) return agreement;
   const auto best =
       static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin());
+  of[best].resize(used);
   const double margin = std::log(static_cast<double>(conventionHypotheses().size()) / alpha);
   std::vector<Convention> kept{chain.accepted[best]};
   for (std::size_t k = 0; k < h; ++k) {
     if (k != best && likelihood[k] > likelihood[best] - margin) kept.push_back(chain.accepted[k]);
   }
   chain.accepted = kept;
-  chain.increments = neesTest(nees[best], 6 * static_cast<double>(used));
+  agreement = agreementOf(of[best], {}, false);
+  chain.increments = agreement.tests.joint;
+  return agreement;
 }
 
 }  // namespace detail

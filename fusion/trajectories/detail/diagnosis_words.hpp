@@ -56,7 +56,7 @@ struct FaultText {
   const char *name, *words;
 };
 inline const FaultText& faultText(MatrixFault fault) {
-  static const std::array<FaultText, 22> texts{{
+  static const std::array<FaultText, 24> texts{{
       {"none", "no fault"},
       {"cross_sign", "the cross block has the wrong sign"},
       {"cross_transposed", "the cross block is transposed: the blocks were exchanged without it"},
@@ -79,6 +79,8 @@ inline const FaultText& faultText(MatrixFault fault) {
       {"adjoint_transposed", "the transposed adjoint was applied"},
       {"previous_row", "each pose has the matrix of the row before it"},
       {"next_row", "each pose has the matrix of the row after it"},
+      {"diagonal_alone", "the off-diagonal entries are not those of the errors"},
+      {"blocks_alone", "the cross block is not that of the errors"},
   }};
   return texts[static_cast<std::size_t>(fault)];
 }
@@ -97,7 +99,6 @@ namespace detail {
 inline std::string scaleWord(const char* block, double k, double sigma, bool rotation) {
   const auto near = [&](double value) { return std::abs(std::log(k / value)) < 3 * sigma; };
   const std::string part(block);
-  if (near(1)) return part + " block: scale right (" + significant(k, 3) + ")";
   if (rotation) {
     if (near(0.25)) return part + " block: a quarter of what it should be: half angles, or sigmas twice too small";
     if (near(4)) return part + " block: four times what it should be: double angles, or sigmas twice too large";
@@ -115,14 +116,18 @@ inline std::string scaleWord(const char* block, double k, double sigma, bool rot
 }  // namespace detail
 
 LIESTAT_FUSION_INLINE std::vector<std::string> ScaleProfile::words() const {
+  const double of_t = std::abs(std::log(translation)) / relative_sigma,
+               of_r = std::abs(std::log(rotation)) / relative_sigma;
   if (std::abs(std::log(translation / rotation)) < 3 * std::sqrt(2.) * relative_sigma &&
-      std::abs(std::log(translation)) > 3 * relative_sigma) {
+      std::log(translation) * std::log(rotation) > 0 && std::max(of_t, of_r) > 3) {
     const double k = std::sqrt(translation * rotation);
     return {std::string("both blocks: ") + (k > 1 ? "inflated (underconfident)" : "too small (overconfident)") +
             " by a factor of " + significant(k > 1 ? k : 1 / k, 3) + " in variance"};
   }
-  return {detail::scaleWord("translation", translation, relative_sigma, false),
-          detail::scaleWord("rotation", rotation, relative_sigma, true)};
+  std::vector<std::string> words;
+  if (of_t > 3) words.push_back(detail::scaleWord("translation", translation, relative_sigma, false));
+  if (of_r > 3) words.push_back(detail::scaleWord("rotation", rotation, relative_sigma, true));
+  return words;
 }
 
 LIESTAT_FUSION_INLINE std::vector<std::string> MatrixStructure::words() const {

@@ -5,6 +5,7 @@
 #include <lie/detail/small_eigen.hpp>
 #include <fusion/convention_diagnosis.hpp>
 #include <fusion/trajectories.hpp>  // first: its definitions include the next
+#include <fusion/trajectories/detail/generic_alternatives.hpp>
 #include <fusion/trajectories/detail/pose_alignment.hpp>
 #include <fusion/trajectories/detail/repaired_matrices.hpp>
 #include <stats/convention_charts.hpp>
@@ -24,7 +25,8 @@ LIESTAT_FUSION_INLINE std::vector<Convention> conventionHypotheses() {
   for (const auto order : {CovarianceOrder::translation_rotation, CovarianceOrder::rotation_translation}) {
     for (const auto perturbation :
          {Perturbation::right, Perturbation::left, Perturbation::world_axes, Perturbation::world_body_axes,
-          Perturbation::roll_pitch_yaw, Perturbation::yaw_pitch_roll, Perturbation::transposed_axes}) {
+          Perturbation::roll_pitch_yaw, Perturbation::yaw_pitch_roll, Perturbation::rotation_vector,
+          Perturbation::world_axes_reversed, Perturbation::transposed_axes}) {
       for (const auto unit :
            {RotationUnit::radian, RotationUnit::half_angle, RotationUnit::double_angle, RotationUnit::degree}) {
         for (const auto content :
@@ -186,6 +188,11 @@ inline void rankPlain(const DiagnosisData& data, std::span<HypothesisFit> fits) 
   }
 }
 
+inline double likelihoodOf(const DiagnosisData& data, HypothesisFit h) {
+  rankPlain(data, std::span(&h, 1));
+  return h.log_likelihood;
+}
+
 /// Σ_h of each pose in the library's convention.
 inline Matrix6d covarianceUnder(const DiagnosisData& data, std::size_t i, const HypothesisFit& h) {
   const Matrix6d J = conventionJacobianInverse(translationFirst(h.convention), data.poses[i].estimate);
@@ -257,22 +264,68 @@ inline NoiseComponents judgedComponents(std::span<const PoseResidual> residuals)
   return scan.withExceededFillers(scan.components());
 }
 
-/// The tests of the errors under a hypothesis, aligned where asked for.
-inline WhitenedResidualTests testsUnder(const DiagnosisData& data, const HypothesisFit& h,
-                                        const DiagnosisOptions& options) {
-  if (options.alignment != AlignmentModel::none) {
-    const std::vector<MatchedPose> matched = matchedUnder(data, h, data.size());
-    return evaluateConsistency(matched, alignWeighted(matched, options.alignment)).tests;
+/// How errors agree with covariances: the seven tests, and those against alternatives outside of any list.
+struct Agreement {
+  WhitenedResidualTests tests;
+  double generic_p = not_a_number;
+
+  /// Neither is refuted at a level, each test by itself.
+  bool holds(double level = residual_test_level) const { return tests.consistent(level) && !(generic_p < level); }
+  /// The smallest p-value of all, times their number; NaN without covariances.
+  double p() const {
+    if (!tests.joint.applies()) return not_a_number;
+    double least = std::isnan(generic_p) ? 1 : generic_p;
+    for (const ResidualTest& t : tests.all()) least = t.applies() ? std::min(least, 7 * t.p) : least;
+    return std::min(1., 2 * least);
   }
+};
+
+inline Agreement agreementOf(const std::vector<PosedResidual>& posed, const NoiseComponents& components,
+                             bool blocks_only) {
+  Agreement a;
   std::vector<PoseResidual> residuals;
-  residuals.reserve(data.size());
+  for (const PosedResidual& r : posed) residuals.push_back(r.residual);
+  a.tests = testWhitenedResiduals(residuals, components);
+  if (a.tests.joint.applies()) a.generic_p = genericMisfit(posed, components, blocks_only);
+  return a;
+}
+
+/// The errors in the hypothesis' own coordinates, which are as normal as they can be, with blocks of the covariances divided
+/// by scales.
+inline Agreement agreementUnder(const DiagnosisData& data, const HypothesisFit& h, double translation = 1,
+                                double rotation = 1) {
+  std::vector<PosedResidual> posed;
+  std::vector<PoseResidual> residuals;
   const Convention c = translationFirst(h.convention);
+  const double a = 1 / std::sqrt(translation), b = 1 / std::sqrt(rotation);
   for (std::size_t i = 0; i < data.size(); ++i) {
-    // In the hypothesis' own coordinates, which are as normal as they can be.
-    const Matrix6d J = conventionJacobian(c, data.poses[i].estimate);
-    residuals.push_back({data.coordinates(i, c, J), data.content(i, h.convention, h.fault)});
+    const SE3d& T = data.poses[i].estimate;
+    Matrix6d C = data.content(i, h.convention, h.fault);
+    C.topRows<3>() *= a, C.leftCols<3>() *= a, C.bottomRows<3>() *= b, C.rightCols<3>() *= b;
+    posed.push_back({{data.coordinates(i, c, conventionJacobian(c, T)), C}, data.poses[i].truth});
+    residuals.push_back(posed.back().residual);
   }
-  return testWhitenedResiduals(residuals, judgedComponents(residuals));
+  const NoiseComponents components = judgedComponents(residuals);
+  for (PosedResidual& r : posed) components.reduce(r.residual.error, r.residual.covariance);
+  Agreement agreement = agreementOf(posed, components, data.blocks_only);
+  return agreement;
+}
+
+/// The same, aligned where asked for: then along the body's axes.
+inline Agreement agreementUnder(const DiagnosisData& data, const HypothesisFit& h, const DiagnosisOptions& options) {
+  if (options.alignment == AlignmentModel::none) return agreementUnder(data, h);
+  const std::vector<MatchedPose> matched = matchedUnder(data, h, data.size());
+  const Consistency consistency = evaluateConsistency(matched, alignWeighted(matched, options.alignment));
+  Agreement a;
+  a.tests = consistency.tests;
+  if (!consistency.ok || !a.tests.joint.applies()) return a;
+  std::vector<PosedResidual> posed;
+  for (std::size_t i = 0; i < consistency.errors.size(); ++i) {
+    posed.push_back({{consistency.errors[i].error, consistency.errors[i].covariance}, data.poses[i].truth});
+    a.tests.components.reduce(posed.back().residual.error, posed.back().residual.covariance);
+  }
+  a.generic_p = genericMisfit(posed, a.tests.components, data.blocks_only);
+  return a;
 }
 
 inline double leastEigenvalue(const Matrix6d& M) { return SymmetricEigen(M).values[0]; }
@@ -282,14 +335,15 @@ inline bool semidefinite(Matrix6d M, const Vector6d& tolerance) {
   return Cholesky<double, 6>(M).ok();
 }
 
-inline ScaleProfile profileScale(const DiagnosisData& data, const DiagnosisOptions& options) {
+/// Scales of the blocks under each of some conventions in rad.
+inline ScaleProfile profileScale(const DiagnosisData& data, std::span<const Convention> hypotheses, double alpha) {
   ScaleProfile profile;
   struct Row {
     Convention convention;
     double likelihood, k_t, k_r;
   };
   std::vector<Row> rows;
-  for (const Convention& c : conventionHypotheses()) {
+  for (const Convention& c : hypotheses) {
     if (c.unit != RotationUnit::radian || !data.decidable(c)) continue;
     const Convention own = translationFirst(c);
     double q11 = 0, q12 = 0, q22 = 0, log_det = 0;
@@ -311,24 +365,29 @@ inline ScaleProfile profileScale(const DiagnosisData& data, const DiagnosisOptio
     rows.push_back({c, 1.5 * n * (std::log(k_t) + std::log(k_r)) - 3 * n - 0.5 * log_det, k_t, k_r});
   }
   if (rows.empty()) return profile;
-  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.likelihood > b.likelihood; });
-  const double margin = std::log(static_cast<double>(rows.size()) / options.alpha) * (data.blocks_only ? 2 : 1);
+  // Scales near one are likelier: orders and contents with other scales may fit as well. A law with heavy tails lets units be.
+  const auto posterior = [](const Row& r) {
+    return r.likelihood - std::log1p(std::pow(std::log(r.k_t), 2)) - std::log1p(std::pow(std::log(r.k_r), 2));
+  };
+  // Of those that are as likely the first of the list stands for all: the library's own, if it is among them.
+  const auto likeliest = std::max_element(rows.begin(), rows.end(),
+                                          [&](const Row& a, const Row& b) { return posterior(a) < posterior(b); });
+  constexpr double alike = 2;
+  const double most = posterior(*likeliest);
+  std::stable_sort(rows.begin(), rows.end(), [&](const Row& a, const Row& b) {
+    return std::min(posterior(a), most - alike) > std::min(posterior(b), most - alike);
+  });
+  const double margin = std::log(static_cast<double>(rows.size()) / alpha) * (data.blocks_only ? 2 : 1);
   for (const Row& r : rows) {
-    if (r.likelihood > rows[0].likelihood - margin) profile.accepted.push_back(r.convention);
+    if (posterior(r) > most - margin) profile.accepted.push_back(r.convention);
   }
-  profile.convention = rows[0].convention;
+  profile.convention = rows[0].convention, profile.log_likelihood = rows[0].likelihood;
   profile.translation = rows[0].k_t, profile.rotation = rows[0].k_r;
   profile.relative_sigma = std::sqrt(2 / (3 * static_cast<double>(data.size())));
   profile.identified = profile.accepted.size() == 1;
-  const Convention own = translationFirst(profile.convention);
-  std::vector<PoseResidual> residuals;
-  for (std::size_t i = 0; i < data.size(); ++i) {
-    Matrix6d C = data.content(i, profile.convention);
-    const double a = 1 / std::sqrt(profile.translation), b = 1 / std::sqrt(profile.rotation);
-    C.topRows<3>() *= a, C.leftCols<3>() *= a, C.bottomRows<3>() *= b, C.rightCols<3>() *= b;
-    residuals.push_back({data.coordinates(i, own, conventionJacobian(own, data.poses[i].estimate)), C});
-  }
-  profile.tests = testWhitenedResiduals(residuals, judgedComponents(residuals));
+  const Agreement agreement =
+      agreementUnder(data, {.convention = profile.convention}, profile.translation, profile.rotation);
+  profile.tests = agreement.tests, profile.generic_p = agreement.generic_p;
   return profile;
 }
 

@@ -129,6 +129,10 @@ inline Matrix6d repaired(MatrixFault fault, const Matrix6d& M, const SE3d& T) {
       return ofJacobian(T.inverse().Adj());
     case MatrixFault::adjoint_transposed:
       return ofJacobian(T.Adj().transpose());
+    case MatrixFault::diagonal_alone:
+      return M.diagonal().asDiagonal();
+    case MatrixFault::blocks_alone:
+      return withoutCross(M);
     default:
       return C;
   }
