@@ -1,9 +1,9 @@
 /* liestat_state.h: means that merge, for engines that aggregate rows (SQL, MPI, Dask). C ABI of stats/state.hpp; link
  * liestat_means and the C++ runtime. docs/states.md has the bytes and the passes.
  *
- * A state is plain old data of liestat_state_size() bytes, aligned to 8, that may be copied, stored and sent as it stands
- * (little-endian). Its bytes depend on the rows alone, not on their order, how they were divided, or the processor. No
- * function allocates or throws.
+ * A state is plain old data of liestat_state_size() bytes, aligned to 8, that may be copied, stored and sent as it
+ * stands (little-endian). Its bytes depend on the rows alone, not on their order, how they were divided, or the
+ * processor. No function allocates or throws.
  */
 #ifndef LIESTAT_STATE_H
 #define LIESTAT_STATE_H
@@ -20,7 +20,7 @@ enum { LIESTAT_HEADING = 1, LIESTAT_DIRECTION = 2, LIESTAT_ROTATION = 3 };
 /* Kinds: moments, whose result is the chordal mean, and sums at a reference, for the Frechet mean. */
 enum { LIESTAT_MOMENTS = 1, LIESTAT_SUMS = 2 };
 
-/* What functions return: LIESTAT_STATE_OK, or why nothing was done. */
+/* Results of functions: LIESTAT_STATE_OK, or why nothing was done. */
 enum {
   LIESTAT_STATE_OK = 0,
   LIESTAT_STATE_BAD_ARGUMENT,  /* no such manifold or kind, or a reference that is not of unit norm */
@@ -41,9 +41,9 @@ size_t liestat_state_size(int manifold, int kind);
 /* An empty state. Sums: at a reference, a row, in the given pass (1 for the first). Weights are at most
  * 2^weight_exponent, which is within -1000 and 1000. */
 int liestat_state_init(void* state, int manifold, int kind, const double* reference, int weight_exponent, int pass);
-/* Adds rows, `stride` numbers from one to the next, with weights unless NULL. Rows that are not finite or whose norm is off
- * by more than 1e-3 are counted and left out; others are normalised. Rows of weight zero do not count. A bad weight: nothing
- * is added. */
+/* Adds rows, `stride` numbers from one to the next, with weights unless NULL. Rows that are not finite or whose norm is
+ * off by more than 1e-3 are counted and left out; others are normalised. Rows of weight zero do not count. A bad weight:
+ * nothing is added. */
 int liestat_state_add(void* state, const double* rows, size_t n, size_t stride, const double* weights);
 /* Adds what `other`, a state made by these functions, has seen. */
 int liestat_state_merge(void* state, const void* other);

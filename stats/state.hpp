@@ -6,9 +6,9 @@
 //   sums.add(some), other.add(others), sums.merge(other);
 //   const CertifiedMean<SO3d> mean = sums.finish();
 //
-// Headings (SO2d), directions (S2d) and rotations (SO3d). The sums are exact integers: a state's bytes are the same for any
-// order and partition of the rows, any processor, compiler and engine (docs/states.md). A state is plain data of at most 456
-// bytes; its functions never throw. They are compiled: link liestat::means. In C: stats/liestat_state.h.
+// Headings (SO2d), directions (S2d) and rotations (SO3d). The sums are exact integers: a state's bytes are the same for
+// any order and partition of the rows, any processor, compiler and engine (docs/states.md). A state is plain data of at
+// most 456 bytes; its functions never throw. They are compiled: link liestat::means. In C: stats/liestat_state.h.
 #pragma once
 
 #include <lie/s2.hpp>
@@ -44,16 +44,16 @@ enum class StateError {
 /// The same in a sentence.
 inline const char* message(StateError error) { return liestat_state_error(static_cast<int>(error)); }
 
-/// A mean in the space that the manifold is embedded in: the direction of the summed unit vectors, the rotation nearest to
-/// the mean of the matrices.
+/// A mean in the space that the manifold is embedded in: the direction of the summed unit vectors, the rotation nearest
+/// to the mean of the matrices.
 template <Metric M>
 struct ChordalMean {
   M mean = ManifoldTraits<M>::origin();
   /// Length of the mean unit vector; of rotations the root of the largest eigenvalue of Σ p q qᵀ/Σ p, at least ½.
   double resultant = 0;
   std::size_t n = 0;
-  /// The mean with its covariance from residuals, rad², in the local frame; none unless status is ok. Of rotations an upper
-  /// bound: second moments hold no Σ p cos²(θ/2) u uᵀ, for which Σ p u uᵀ stands (u = n sin(θ/2)).
+  /// The mean with its covariance from residuals, rad², in the local frame; none unless status is ok. Of rotations an
+  /// upper bound: second moments hold no Σ p cos²(θ/2) u uᵀ, for which Σ p u uᵀ stands (u = n sin(θ/2)).
   std::optional<Gaussian<M>> estimate = {};
   Status status = Status::too_few;
   const char* reason = "";  ///< why there is no estimate, in words
@@ -80,7 +80,7 @@ inline constexpr int state_manifold<S2d> = LIESTAT_DIRECTION;
 template <>
 inline constexpr int state_manifold<SO3d> = LIESTAT_ROTATION;
 
-/// What both kinds of states do.
+/// The operations of both kinds of states.
 template <class M, int Kind>
 class State {
  protected:
@@ -93,8 +93,8 @@ class State {
   static constexpr std::size_t row = layout.numbers();     ///< numbers of a row, the feature's parameters
 
   /// A feature, with a weight of its precision. Features that are not finite or whose norm is off by more than 1e-3 are
-  /// counted and left out; others are normalised. A weight of zero is no measurement. Weights are finite, not negative, and
-  /// not above the largest that the state was made for; otherwise nothing is added.
+  /// counted and left out; others are normalised. A weight of zero is no measurement. Weights are finite, not negative,
+  /// and not above the largest that the state was made for; otherwise nothing is added.
   StateError add(const M& x, double weight = 1) { return add(x.data(), 1, row, weight == 1 ? nullptr : &weight); }
   /// Rows of numbers, `stride` of them from one row to the next, with as many weights unless that is null.
   StateError add(const double* rows, std::size_t n, std::size_t stride = row, const double* weights = nullptr) {
@@ -164,13 +164,14 @@ class MomentState : public detail::State<M, LIESTAT_MOMENTS> {
   }
 
   /// The chordal mean with a covariance from the residuals. Without one: too_few (no more rows than dimensions),
-  /// ill_defined (as scattered as uniform features by the test of Rayleigh and Bingham, or a region wider than 0.5 rad).
+  /// ill_defined (as scattered as uniform features by the test of Rayleigh and Bingham, or a region wider than 0.5
+  /// rad).
   ChordalMean<M> finish() const;
 };
 
-/// Sums at a reference: cost, gradient and Hessian of the Fréchet mean, scatter, and what its certificates need. Its result is
-/// Newton's step from the reference; with a step below the tolerance the mean has converged. From the chordal mean that
-/// takes two passes for concentrated features and up to eight for wide ones.
+/// Sums at a reference: cost, gradient and Hessian of the Fréchet mean, scatter, and what its certificates need. Its
+/// result is Newton's step from the reference; with a step below the tolerance the mean has converged. From the chordal
+/// mean that takes two passes for concentrated features and up to eight for wide ones.
 template <Metric M>
 class SumState : public detail::State<M, LIESTAT_SUMS> {
  public:
@@ -195,9 +196,10 @@ class SumState : public detail::State<M, LIESTAT_SUMS> {
   int pass() const { return this->view().pass(); }
 
   /// The mean with all that the sums prove, as certifiedMean has it: status ok only if they prove everything. Without a
-  /// covariance: not_converged (the step, in mean.residual, is too long: another pass at the mean), too_few, ill_defined, or
-  /// not_applicable where only a search over the rows could tell (uniqueness.unique is not_certified then, or the near ties
-  /// are unknown). Of the options those of known noise, bootstrap and other meanings of weights are out of the question.
+  /// covariance: not_converged (the step, in mean.residual, is too long: another pass at the mean), too_few,
+  /// ill_defined, or not_applicable where only a search over the rows could tell (uniqueness.unique is not_certified
+  /// then, or the near ties are unknown). Of the options those of known noise, bootstrap and other meanings of weights
+  /// are out of the question.
   CertifiedMean<M> finish(const CertifiedMeanOptions<M>& options = {}) const;
   /// True if sums at the mean of this result are the next step.
   bool needsPass(const CertifiedMean<M>& result) const {
@@ -206,8 +208,8 @@ class SumState : public detail::State<M, LIESTAT_SUMS> {
   }
 };
 
-/// The Fréchet mean of rows that feed(state) adds to each state that it is given, once for each pass: a MomentState first,
-/// SumStates then. `passes`: how many there were.
+/// The Fréchet mean of rows that feed(state) adds to each state that it is given, once for each pass: a MomentState
+/// first, SumStates then. `passes`: how many there were.
 template <Metric M, class Feed>
 CertifiedMean<M> meanByPasses(const Feed& feed, double largest_weight = 1, const CertifiedMeanOptions<M>& options = {},
                               int* passes = nullptr) {

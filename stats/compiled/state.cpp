@@ -1,7 +1,7 @@
-// Order-free sums of states (stats/liestat_state.h). A number's nearest multiple of a unit is added as an integer, so that a sum
-// does not depend on the order of its terms. The terms themselves have the same bits on every processor and compiler:
-// only additions, products and divisions of IEEE doubles in one order, none of them contracted to a fused one (this file is
-// compiled with -ffp-contract=off), and nothing of the mathematical library.
+// Order-free sums of states (stats/liestat_state.h). A number's nearest multiple of a unit is added as an integer, so
+// that a sum does not depend on the order of its terms. The terms themselves have the same bits on every processor and
+// compiler: only additions, products and divisions of IEEE doubles in one order, none of them contracted to a fused one
+// (this file is compiled with -ffp-contract=off), and nothing of the mathematical library.
 #include <lie/detail/always_inline.hpp>
 #include <lie/detail/kernel.hpp>
 #include <lie/instruction_set.hpp>
@@ -25,8 +25,8 @@ namespace {
 constexpr double norm_tolerance = 1e-3;
 /// A squared norm may be off by as much.
 constexpr double largest_excess = 2 * norm_tolerance;
-/// The transverse curvature of directions diverges at the antipode of the reference. Where it is cut off, within 0.026 rad
-/// of that, no mean is certified by its sums.
+/// The transverse curvature of directions diverges at the antipode of the reference. Where it is cut off, within 0.026
+/// rad of that, no mean is certified by its sums.
 constexpr double largest_curvature = 120;
 constexpr double pi_squared = 9.8696044010893586;
 
@@ -102,10 +102,10 @@ constexpr double power(int exponent) {
   return x;
 }
 
-/// Sums of the numbers of rows, of each row `fine` ones and others. A number goes to multiples of 2^-first, of what that leaves
-/// the nearest multiple of 2^-middle; fine numbers go on to 2^-last. A tie on the way may go up or down, as the sum so far is
-/// odd or even, but the next level makes up for it exactly: the total is that of the numbers' nearest multiples of the last
-/// unit, in any order. Moments have no fine numbers.
+/// Sums of the numbers of rows, of each row `fine` ones and others. A number goes to multiples of 2^-first, of what
+/// that leaves the nearest multiple of 2^-middle; fine numbers go on to 2^-last. A tie on the way may go up or down, as
+/// the sum so far is odd or even, but the next level makes up for it exactly: the total is that of the numbers' nearest
+/// multiples of the last unit, in any order. Moments have no fine numbers.
 template <std::size_t L, int Coarse, int Fine>
 struct Accumulator {
   using V = Lanes<L>;
@@ -186,15 +186,15 @@ struct SingleSums {
   }
 };
 
-/// What the kernel makes of rows at a reference.
+/// The reference of sums, and the largest squared angle from it.
 struct Reference {
   double row[4] = {};
   double axes[2][3] = {};  ///< of directions: the tangent axes of S2's placement
   double largest = 0;
 };
 
-/// Σ c_k x^k, even and odd powers for themselves so that the two chains overlap. g++ 12 makes a vector of D{} + a constant in
-/// memory, of nothing else.
+/// Σ c_k x^k, even and odd powers for themselves so that the two chains overlap. g++ 12 makes a vector of D{} + a
+/// constant in memory, of nothing else.
 template <const double (&coefficients)[22], class D>
 LIESTAT_ALWAYS_INLINE void evaluate(const D& x, D& result) {
   const D square = x * x;
@@ -278,8 +278,8 @@ struct StateKernel {
   static constexpr StateLayout layout{Manifold, Kind};
   static constexpr int numbers = layout.numbers(), k = layout.dof();
   static constexpr bool moments = Kind == LIESTAT_MOMENTS;
-  /// Sums that are made of each row, as the accumulator counts them. The last diagonal product of moments is Σ p without the
-  /// other ones; without weights Σ p and Σ p² are the number of rows, and the last scatter is the first.
+  /// Sums that are made of each row, as the accumulator counts them. The last diagonal product of moments is Σ p
+  /// without the other ones; without weights Σ p and Σ p² are the number of rows, and the last scatter is the first.
   static constexpr int own = moments ? layout.weight() - 1 : layout.weight(), coarse = own + (Weighted ? 2 : 0),
                        fine = moments ? 0 : (Weighted ? 2 : 1) * layout.triangle();
   static constexpr std::size_t block = 256;
@@ -541,7 +541,9 @@ void addToState(StateView state, const double* rows, std::size_t n, std::size_t 
   }
   const Int128 ones = static_cast<Int128>(a.kept) * (Int128{1} << layout.unit());
   for (int i = 0; i < Kernel::own; ++i) state.add(layout, i, a.totals[i]);
-  for (int i = 0; i < 2; ++i) state.add(layout, layout.weight() + i, Weighted ? a.totals[Kernel::coarse - 2 + i] : ones);
+  for (int i = 0; i < 2; ++i) {
+    state.add(layout, layout.weight() + i, Weighted ? a.totals[Kernel::coarse - 2 + i] : ones);
+  }
   if constexpr (Kind == LIESTAT_MOMENTS) {
     Int128 last = Weighted ? a.totals[Kernel::own] : ones;
     for (int c = 0; c + 1 < layout.numbers(); ++c) last -= a.totals[layout.linear() + c * (c + 1) / 2 + c];

@@ -30,7 +30,7 @@ struct Moments {
   }
 };
 
-/// What a chordal mean is about: the estimating function's derivative H and the scatter S of its terms, per unit of weight.
+/// A chordal mean with its estimating function's derivative H and the scatter S of its terms, per unit of weight.
 template <class M>
 struct ChordalTerms {
   M mean;

@@ -12,9 +12,9 @@ namespace liestat::detail {
 
 __extension__ using Int128 = __int128;
 
-/// Words of 8 bytes. 0: "liestat" and the version; 1: manifold, kind, whether weights differ from one, 0, and as 16 bits
-/// each the weights' exponent and the pass; 2: n; 3: rows left out; sums: 4 to 7 the reference, 8 the largest θ². Then sums
-/// of 16 bytes, in units of 2^-60 (moments) and 2^-85.
+/// Words of 8 bytes. 0: "liestat" and the version; 1: manifold, kind, whether weights differ from one, 0, and as 16
+/// bits each the weights' exponent and the pass; 2: n; 3: rows left out; sums: 4 to 7 the reference, 8 the largest θ².
+/// Then sums of 16 bytes, in units of 2^-60 (moments) and 2^-85.
 struct StateLayout {
   static constexpr char magic[] = "liestat";
   static constexpr std::uint8_t version = 1;
