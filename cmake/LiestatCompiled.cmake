@@ -1,7 +1,7 @@
 # The estimators as libraries, compiled once by whoever builds them, with the flags of that build: this project, a project
 # that adds its directory, or one that finds the installed package. A unit that links one reads declarations only.
 #
-#   means          Fréchet, Mahalanobis and certified means of the common features in double
+#   means          Fréchet, Mahalanobis and certified means of the common features in double; states that merge
 #   estimation     the cores of constrained estimation and of the implicit filter
 #   fusion         the estimators of fusion/, but for those of trajectories (Random123)
 #   trajectories   evaluation and conversion of trajectories, diagnosis of conventions, inertial windows against a truth
@@ -10,7 +10,8 @@
 
 set(LIESTAT_COMPILED_PARTS means estimation fusion trajectories formats)
 
-set(LIESTAT_COMPILED_SOURCES_means mean maha crystal_mean certified_mean certified_maha certified_group_mean)
+set(LIESTAT_COMPILED_SOURCES_means
+    mean maha crystal_mean certified_mean certified_maha certified_group_mean state state_finish)
 set(LIESTAT_COMPILED_SOURCES_estimation constrained implicit_ekf fits)
 set(LIESTAT_COMPILED_SOURCES_fusion
     initialisation initialisation_truth recording noise_calibration homography_models epipolar_models pose_models
@@ -77,6 +78,11 @@ function(liestat_compiled part root library)
         set_source_files_properties(${source} PROPERTIES UNITY_GROUP features)
       endif()
     endforeach()
+  endif()
+  if(part STREQUAL "means")
+    # States have the same bytes on any processor: no product and sum of theirs becomes one fused operation. Rounding to
+    # an integer is an instruction where it need not set errno.
+    set_source_files_properties(${root}/stats/compiled/state.cpp PROPERTIES COMPILE_OPTIONS "-ffp-contract=off;-fno-math-errno")
   endif()
   if(part STREQUAL "estimation")
     # Loops whose lengths are run-time numbers, which g++ turns into vector instructions at -O3 alone. Those of the filter

@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 
 foreach(room lie stats fusion)
   install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp"
-          PATTERN "compiled/*.cpp")
+          PATTERN "*.h" PATTERN "compiled/*.cpp")
 endforeach()
 install(DIRECTORY formats DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat FILES_MATCHING PATTERN "*.hpp" PATTERN "*.cpp")
 install(FILES report/describe.hpp DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/liestat/report)

@@ -24,6 +24,8 @@ liestat_dependency(gmock libgmock-dev gmock/gmock.h)
 liestat_dependency(rapidcheck librapidcheck-dev rapidcheck.h)
 liestat_dependency(benchmark libbenchmark-dev benchmark/benchmark.h)
 liestat_dependency(opencv libopencv-calib3d-dev opencv2/calib3d.hpp)
+# What an extension of SQLite is compiled with (engines/sqlite).
+liestat_dependency(sqlite libsqlite3-dev sqlite3ext.h)
 # Compared with: the meaning of a covariance in these. Nothing else uses them.
 liestat_dependency(kdl liborocos-kdl-dev kdl/frames.hpp)
 liestat_dependency(tf2 libtf2-geometry-msgs-dev tf2_geometry_msgs/tf2_geometry_msgs.h)
@@ -62,7 +64,7 @@ macro(liestat_find name)
   # MPI, and what Ceres looks for in its turn, report at length in spite of QUIET.
   set(liestat_log_level ${CMAKE_MESSAGE_LOG_LEVEL})
   set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
-  if("${name}" MATCHES "^(boost|random123|xsimd)$")
+  if("${name}" MATCHES "^(boost|random123|xsimd|sqlite)$")
     # FindBoost would ask for a version of Boost that CMake knows, and Debian's xsimd target links a library which its
     # package lacks: their headers are all that is used.
     liestat_provide_header(${name})

@@ -9,6 +9,7 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
 # from using what it was not granted; the compiler's own list of what it read can.
 set(liestat_path_boost "/boost/")
 set(liestat_path_random123 "/Random123/")
+set(liestat_path_sqlite "/sqlite3")
 set(liestat_path_xsimd "/xsimd/")
 set(liestat_path_tbb "/(tbb|oneapi)/")
 set(liestat_path_mpi "/mpi[.]h")

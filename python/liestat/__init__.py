@@ -71,6 +71,7 @@ from ._sensors import (
     two_view,
     vi_init,
 )
+from ._state import State
 from ._statistics import fit, group_mean, mahalanobis, mean, validate_split
 from ._trajectories import TrajectoryEvaluation, evaluate_trajectory
 

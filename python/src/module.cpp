@@ -4,6 +4,8 @@
 
 namespace liestat::python {
 
+void bindState(py::module_& module);
+
 void raisePendingSignal() {
   const py::gil_scoped_acquire gil;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -21,6 +23,7 @@ PYBIND11_MODULE(_core, module) {
   liestat::python::bindArrays(module);
   liestat::python::bindMeans(module);
   liestat::python::bindLaws(module);
+  liestat::python::bindState(module);
   liestat::python::bindSampling(module);
   liestat::python::bindValidation(module);
   liestat::python::bindPreintegration(module);
