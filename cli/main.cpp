@@ -1,4 +1,5 @@
 #include <cli/commands/commands.hpp>
+#include <cli/commands/states.hpp>
 
 int main(int argc, char** argv) {
   using namespace liestat::cli;
@@ -8,7 +9,7 @@ int main(int argc, char** argv) {
       {{"",
         "",
         {addConvertCommand, addDoctorCommand, addEvaluateCommand, addFitCommand, addHandEyeCommand, addMeanCommand,
-         addMotionCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
+         addMergeCommand, addMotionCommand, addPreintegrateCommand, addTwoViewCommand, addViInitCommand}},
        {"simulate",
         "Files of simulated measurements with their truth",
         {addSimulateHandEyeCommand, addSimulateMotionCommand, addSimulateTwoViewCommand, addSimulateViCommand}},

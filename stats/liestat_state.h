@@ -36,6 +36,14 @@ const char* liestat_state_error(int code);
 
 #define LIESTAT_STATE_LARGEST 456 /* bytes of the largest state */
 
+/* The kind of a state, made or read by these functions. */
+typedef struct liestat_state_kind {
+  int manifold, kind;
+  int weight_exponent, pass; /* pass: of sums, from 1; 0 of moments */
+  size_t size;               /* bytes */
+} liestat_state_kind;
+liestat_state_kind liestat_state_kind_of(const void* state);
+
 /* Bytes of a state; 0 if there is no such one. */
 size_t liestat_state_size(int manifold, int kind);
 /* An empty state. Sums: at a reference, a row, in the given pass (1 for the first). Weights are at most

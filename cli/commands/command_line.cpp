@@ -17,6 +17,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -178,7 +179,23 @@ int complain(const std::string& message) {
   return exit_bad_input;
 }
 
-/// The complaint where the first words of the command line are no command: the word, the nearest command and all of them.
+/// The complaint where mpirun or srun started several tasks, of which each would do all of the work; empty if they did
+/// not. A batch script of Slurm is no such task, and has SLURM_NTASKS alone.
+std::string faultOfTasks() {
+  for (const char* const variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}) {
+    const char* const value = std::getenv(variable);
+    double tasks = 0;
+    if (value == nullptr || parseNumber(value, tasks) != NumberKind::finite || tasks < 2) continue;
+    return fmt::format(
+        "liestat: started as {} tasks of mpirun or srun ({}), each of which would do all of the work: start one; MPI is "
+        "of the headers (env -u {} where each task has work of its own)",
+        printable(value), variable, variable);
+  }
+  return {};
+}
+
+/// The complaint where the first words of the command line are no command: the word, the nearest command and all of
+/// them.
 std::string faultOfCommand(int argc, char** argv, const CLI::App& app) {
   const CLI::App* parent = &app;
   std::string before;
@@ -266,6 +283,7 @@ int runCommandLine(int argc, char** argv, const std::vector<CommandGroup>& group
   } catch (const std::invalid_argument& error) {
     return complain(std::string("liestat: ") + error.what());
   }
+  if (const std::string fault = faultOfTasks(); !fault.empty()) return complain(fault);
   try {
     return parseAndRun(argc, argv, groups);
   } catch (const InputError& error) {

@@ -3,6 +3,7 @@
 #include <report/publish.hpp>
 #include <cli/commands/commands.hpp>
 #include <cli/commands/split.hpp>
+#include <cli/commands/states.hpp>
 #include <cli/show/mean.hpp>
 #include <cli/show/progress.hpp>
 #include <experiments/interruption.hpp>
@@ -27,6 +28,21 @@ struct Options {
   std::string symmetry, phase;
   std::optional<HexagonalAxes> axes;
   std::string json, report;
+  StateOptions states;
+  double memory = 1;
+
+  /// An option that needs the measurements in memory, or nothing.
+  const char* needsMemory() const {
+    if (!report.empty()) return "--report";
+    if (!symmetry.empty()) return "--symmetry";
+    if (isEbsdName(input.file)) return "a map of orientations";
+    if (analysis.inflate) return "--inflate";
+    if (analysis.region == MeanRegion::bootstrap) return "--region bootstrap";
+    if (analysis.weights_are != ResidualNoise::precision) return "--weights-are";
+    if (analysis.birge || analysis.refuted_noise == RefutedNoise::residuals) return "--birge and --refuted";
+    if (input.options.criterion.value_or(Criterion::lsq) != Criterion::lsq) return "--criterion";
+    return nullptr;
+  }
 };
 
 /// The group, and how the file's rotations are taken.
@@ -75,6 +91,19 @@ Measurements readMap(const Options& options, std::string& symmetry, HexagonalAxe
 }
 
 int runCommand(const Options& options, const Invocation& invocation) {
+  const bool with_state = !options.states.state.empty();
+  if (!with_state && !options.states.after.empty()) {
+    throw OptionError("liestat mean", "--after without --state", "--state OUT, where the sums go");
+  }
+  if (with_state || NpyFile::isOne(options.input.file)) {
+    const bool stream = !with_state && static_cast<double>(NpyFile(options.input.file).bytes()) > 1e9 * options.memory;
+    if (const char* const option = options.needsMemory(); option != nullptr && (with_state || stream)) {
+      throw OptionError("liestat mean", std::string(option) + " needs the measurements in memory",
+                        with_state ? "no --state" : "--memory with more GB than the file has");
+    }
+    if (with_state) return writeState(options.input, options.states, options.json, invocation);
+    if (stream) return streamMean(NpyFile(options.input.file), options.input, options.json, invocation);
+  }
   AnalysisOptions how = options.analysis;
   std::string symmetry = options.symmetry;
   HexagonalAxes axes = options.axes.value_or(HexagonalAxes::x_along_a);
@@ -188,6 +217,15 @@ void addMeanCommand(const CommandList& app) {
                "Multiply the covariance by Birge's factor where the measurements scatter more than the file's say");
   command.flag("--inflate", options->analysis.inflate,
                "Widen the covariance by the dependence of the rows' errors on time");
+  command
+      .option("--memory", options->memory,
+              "GB of a .npy file beyond which it is left where it is, and read once a pass (default 1)")
+      .notNegative();
+  command.option("--state", options->states.state,
+                 "Write a state that liestat merge takes, of one pass over rotations or directions");
+  command.option("--after", options->states.after, "The merged state of the pass before, at whose mean sums are taken");
+  command.option("--largest-weight", options->states.largest_weight, "Weights of a state are at most this (default 1)")
+      .positive();
   command.option("--threads", options->analysis.threads, "Threads (default: all)").range(0, 4096);
   command.option("--json", options->json, "Write the result to a JSON file ('-': standard output)");
   command.option("--report", options->report, "Write a page with plots into this directory");

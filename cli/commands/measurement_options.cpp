@@ -1,6 +1,7 @@
 #include <cli/commands/measurement_options.hpp>
 
 #include <cli/commands/reading_options.hpp>
+#include <formats/npy.hpp>
 
 #include <string>
 #include <utility>
@@ -9,7 +10,7 @@
 namespace liestat::cli {
 
 void MeasurementInput::declare(const Command& app, bool file_required) {
-  const Option path = app.option("FILE", file, "Features: CSV, TUM, EuRoC or KITTI poses ('-': standard input)");
+  const Option path = app.option("FILE", file, "Features: CSV, .npy, TUM, EuRoC or KITTI poses ('-': standard input)");
   if (file_required) path.required();
   app.option("--format", reading.format, "The file's format (default auto: by its first lines)").oneOf(formatNames());
   declareReading(app, reading);
@@ -31,6 +32,9 @@ void MeasurementInput::declare(const Command& app, bool file_required) {
 Measurements MeasurementInput::read(const std::string& command) const {
   ReadingOptions how = reading;
   how.angles = degrees ? AngleUnit::degrees : radians ? AngleUnit::radians : AngleUnit::unsaid;
+  if (NpyFile::isOne(file)) {
+    return chooseMeasurements(readNpyFeatures(NpyFile(file), options.feature, how.norm_tolerance), options, command);
+  }
   return chooseMeasurements(readFeatureFile(file, how), options, command);
 }
 

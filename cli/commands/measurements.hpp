@@ -31,7 +31,9 @@ struct Measurements {
   bool known_noise = false;             ///< the file's covariances are used
   std::vector<std::string> notes = {};  ///< for the user, about these choices
 
-  std::size_t size() const { return file.size(); }
+  std::size_t streamed = 0;  ///< rows of a file that is not in memory
+
+  std::size_t size() const { return streamed > 0 ? streamed : file.size(); }
   /// The criterion takes the weights.
   bool usesWeights() const {
     return criterion == Criterion::wlsq || (criterion == Criterion::barycentre && !file.weights.empty());

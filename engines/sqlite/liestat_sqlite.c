@@ -35,21 +35,16 @@ static int readState(sqlite3_value* value, void* state) {
   if (sqlite3_value_type(value) != SQLITE_BLOB) return LIESTAT_STATE_FOREIGN;
   return liestat_state_read(state, sqlite3_value_blob(value), (size_t)sqlite3_value_bytes(value));
 }
-static size_t sizeOf(const void* state) {
-  return liestat_state_size(((const unsigned char*)state)[8], ((const unsigned char*)state)[9]);
-}
-
 /* An empty state: moments, or sums at the mean of the state in the last argument, as the pass after that. */
 static int begin(const Rows* rows, int sums, sqlite3_value* before, void* state) {
   uint64_t previous[LIESTAT_STATE_LARGEST / 8];
   liestat_mean mean;
-  int code, pass = 1;
+  int code;
   if (!sums) return liestat_state_init(state, rows->manifold, LIESTAT_MOMENTS, NULL, 0, 0);
   if ((code = readState(before, previous)) != LIESTAT_STATE_OK) return code;
   if ((code = liestat_state_finish(previous, &mean)) != LIESTAT_STATE_OK) return code;
-  if (((const unsigned char*)previous)[8] != rows->manifold) return LIESTAT_STATE_DIFFERENT;
-  if (((const unsigned char*)previous)[9] == LIESTAT_SUMS) pass += ((const unsigned char*)previous)[14];
-  return liestat_state_init(state, rows->manifold, LIESTAT_SUMS, mean.mean, 0, pass);
+  if (liestat_state_kind_of(previous).manifold != rows->manifold) return LIESTAT_STATE_DIFFERENT;
+  return liestat_state_init(state, rows->manifold, LIESTAT_SUMS, mean.mean, 0, liestat_state_kind_of(previous).pass + 1);
 }
 
 static void step(sqlite3_context* context, int n, sqlite3_value** values, int sums) {
@@ -87,7 +82,7 @@ static void stepMerge(sqlite3_context* context, int n, sqlite3_value** values) {
 static void finalState(sqlite3_context* context) {
   const Memory* memory = (const Memory*)sqlite3_aggregate_context(context, 0);
   if (memory == NULL || memory->state[0] == 0) return sqlite3_result_null(context);
-  sqlite3_result_blob(context, memory->state, (int)sizeOf(memory->state), SQLITE_TRANSIENT);
+  sqlite3_result_blob(context, memory->state, (int)liestat_state_kind_of(memory->state).size, SQLITE_TRANSIENT);
 }
 
 static char* addNumbers(char* at, const char* name, const double* numbers, int n) {
@@ -104,7 +99,7 @@ static double degreesOf(const double* row) {
 }
 /* The mean of a state, as JSON. */
 static void result(sqlite3_context* context, const void* state) {
-  const int manifold = ((const unsigned char*)state)[8];
+  const int manifold = liestat_state_kind_of(state).manifold;
   liestat_mean mean;
   char text[2048], *at = text;
   const int code = liestat_state_finish(state, &mean);

@@ -22,7 +22,7 @@ void require(int code) {
 unsigned char* memoryOf(const py::bytearray& state) {
   return reinterpret_cast<unsigned char*>(PyByteArray_AS_STRING(state.ptr()));
 }
-std::size_t sizeOf(const unsigned char* state) { return liestat_state_size(state[8], state[9]); }
+std::size_t sizeOf(const unsigned char* state) { return liestat_state_kind_of(state).size; }
 
 py::bytearray readState(const py::bytes& bytes) {
   const std::string text = bytes;
@@ -68,7 +68,7 @@ DoubleArray headings(const DoubleArray& degrees) {
 py::dict finishState(const py::bytearray& state) {
   liestat_mean mean;
   require(liestat_state_finish(memoryOf(state), &mean));
-  const py::ssize_t k = memoryOf(state)[8];
+  const py::ssize_t k = liestat_state_kind_of(memoryOf(state)).manifold;
   py::dict result;
   result["mean"] = arrayOf({mean.mean, mean.mean + k + 1}, {k + 1});
   result["covariance"] = arrayOf({mean.covariance, mean.covariance + k * k}, {k, k});

@@ -658,6 +658,14 @@ const char* liestat_state_error(int code) {
   }
 }
 
+liestat_state_kind liestat_state_kind_of(const void* state) {
+  double copy[2];
+  std::memcpy(copy, state, sizeof copy);
+  const StateView view(copy);
+  const StateLayout layout = view.layout();
+  return {layout.manifold, layout.kind, view.exponent(), view.pass(), liestat_state_size(layout.manifold, layout.kind)};
+}
+
 size_t liestat_state_size(int manifold, int kind) {
   const StateLayout layout{manifold, kind};
   return layout.exists() ? 8 * layout.words() : 0;

@@ -147,6 +147,21 @@ TEST_F(Program, BadUsageIsOneLineAndTwo) {
   }
 }
 
+TEST_F(Program, SeveralTasksOfMpiDoNotDoTheSameWork) {
+  for (const std::string variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}) {
+    const auto under = [&](const std::string& tasks) {
+      return runProgram({"env", variable + "=" + tasks, "SLURM_NTASKS=4", LIESTAT_PROGRAM, "--version"}, ".");
+    };
+    const ProgramResult several = under("4");
+    EXPECT_EQ(several.status, 2);
+    EXPECT_TRUE(several.errors.find("started as 4 tasks") != std::string::npos &&
+                several.errors.find(variable) != std::string::npos)
+        << several.errors;
+    EXPECT_EQ(std::count(several.errors.begin(), several.errors.end(), '\n'), 1);
+    EXPECT_EQ(under("1").status, 0);
+  }
+}
+
 TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
   const auto complaint = [this](const Words& arguments) {
     const ProgramRun r = run(arguments);
@@ -154,7 +169,8 @@ TEST_F(Program, AMistypedWordIsNamedWithTheNearest) {
     return r.errors;
   };
   const std::string commands =
-      "Commands: convert, doctor, evaluate, fit, hand-eye, mean, motion, preintegrate, two-view, vi-init, simulate, "
+      "Commands: convert, doctor, evaluate, fit, hand-eye, mean, merge, motion, preintegrate, two-view, vi-init, "
+      "simulate, "
       "validate (liestat --help "
       "explains "
       "the usage)\n";
@@ -184,7 +200,7 @@ TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
   };
   const std::string manual = output("\"$0\" --man"), completion = output("\"$0\" --completion");
   for (const std::string command :
-       {"convert", "fit", "hand-eye", "mean", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
+       {"convert", "fit", "hand-eye", "mean", "merge", "motion", "preintegrate", "two-view", "vi-init", "simulate vi",
         "simulate hand-eye", "validate split", "validate two-view", "validate vi-init"}) {
     EXPECT_NE(manual.find(".SS \"liestat " + command), std::string::npos) << command;
     EXPECT_NE(completion.find('"' + command + "\")\n"), std::string::npos) << command;
@@ -195,7 +211,7 @@ TEST_F(Program, TheManualAndTheCompletionNameEveryCommand) {
     return output("source ./completion.bash; COMP_WORDS=(liestat " + words +
                   "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _liestat; echo \"${COMPREPLY[*]}\"");
   };
-  EXPECT_EQ(completed("me"), "mean\n");
+  EXPECT_EQ(completed("me"), "mean merge\n");
   EXPECT_EQ(completed("validate spl"), "split\n");
   EXPECT_EQ(completed("mean poses.txt --crit"), "--criterion\n");
   EXPECT_EQ(completed("mean poses.txt --criterion ''"), "lsq wlsq maha\n");

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cli/commands/measurement_options.hpp>
+#include <formats/npy.hpp>
+
+#include <string>
+
+namespace liestat::cli {
+
+/// The options of `liestat mean` about states.
+struct StateOptions {
+  std::string state, after;   ///< files, written and read; empty: none
+  double largest_weight = 1;  ///< of a state of moments
+};
+
+/// Adds the features of a file to a state, moments or, after a pass before, sums at its mean, writes it and shows its
+/// mean. Returns the exit code. Throws InputError and OptionError.
+int writeState(const MeasurementInput& input, const StateOptions& options, const std::string& json,
+               const Invocation& invocation);
+
+/// The mean of an array that is left where it is, in as many passes as that takes. Throws InputError for features
+/// without states.
+int streamMean(const NpyFile& file, const MeasurementInput& input, const std::string& json,
+               const Invocation& invocation);
+
+/// `liestat merge`, as the commands of cli/commands/commands.hpp.
+void addMergeCommand(const CommandList& program);
+
+}  // namespace liestat::cli
