@@ -101,8 +101,8 @@ Trajectory parseTrajectory(std::string_view text, std::string name, const Trajec
 /// would take. Without times there is nothing to do.
 void orderInTime(Trajectory& trajectory, std::optional<DuplicateRule> duplicates);
 
-/// Sentences on what reading has changed: rows sorted or dropped, rotations normalised (quaternions that are off by more
-/// than six digits' 1e-6, all matrices), components not measured.
+/// Sentences on what reading has changed: rows sorted or dropped, rotations normalised (quaternions that are off by
+/// more than six digits' 1e-6, all matrices), components not measured.
 std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryOptions& options);
 
 /// Poses and covariances in the library's convention (stats/gaussian.hpp); NaN for what is unknown, throughout if the

@@ -10,11 +10,12 @@
 // is that of `liestat doctor`.
 //
 // 216 hypotheses (order × perturbation × unit × content) are compared by the likelihood of the errors. The margin
-// ln(216/α) is a bound, not a fit: for independent errors the true hypothesis is rejected with probability α at most. Several
-// hypotheses within the margin are "undecidable", which is an answer. The list is closed: the best hypothesis, and any cause
-// that is named, has to hold against alternatives that are in no list, else the cause is unknown. Where neighbouring errors are correlated nothing is
-// decided on absolute errors; the chain condition Σ_i - A Σ_{i-1} Aᵀ ⪰ 0 of dead reckoning takes their place.
-// Derivations: docs/theory/trajectories.md, sections 6 to 8; measured power, and a ledger of bugs: docs/doctor.md.
+// ln(216/α) is a bound, not a fit: for independent errors the true hypothesis is rejected with probability α at most.
+// Several hypotheses within the margin are "undecidable", which is an answer. The list is closed: the best hypothesis,
+// and any cause that is named, has to hold against alternatives that are in no list, else the cause is unknown. Where
+// neighbouring errors are correlated nothing is decided on absolute errors; the chain condition Σ_i - A Σ_{i-1} Aᵀ ⪰ 0
+// of dead reckoning takes their place. Derivations: docs/theory/trajectories.md, sections 6 to 8; measured power, and a
+// ledger of bugs: docs/doctor.md.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -29,7 +30,8 @@
 
 namespace liestat {
 
-/// The 216 hypotheses: two orders, all perturbations but `body_axes`, which is `right` to first order, four units of rotation, three contents.
+/// The 216 hypotheses: two orders, all perturbations but `body_axes`, which is `right` to first order, four units of
+/// rotation, three contents.
 LIESTAT_TRAJECTORIES_API std::vector<Convention> conventionHypotheses();
 
 LIESTAT_TRAJECTORIES_API MatrixStructure matrixStructure(std::span<const DiagnosedPose> poses);

@@ -133,8 +133,9 @@ struct ConventionDiagnosis {
   std::vector<Convention> accepted;
   MatrixFault fault = MatrixFault::none;
   WhitenedResidualTests tests;  ///< under the best hypothesis
-  /// Probability that the best hypothesis looks so wrong against alternatives outside of the list (constant and pose-dependent
-  /// congruences, other scales of off-diagonals, rows) if it is right; NaN: there is none, or errors are correlated.
+  /// Probability that the best hypothesis looks so wrong against alternatives outside of the list (constant and
+  /// pose-dependent congruences, other scales of off-diagonals, rows) if it is right; NaN: there is none, or errors are
+  /// correlated.
   double generic_p = detail::not_a_number;
   std::optional<ScaleProfile> scale;
   std::optional<ChainDiagnosis> chain;

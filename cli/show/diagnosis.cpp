@@ -21,7 +21,8 @@ namespace {
 std::string optionOf(const Convention& c) { return conventionName(c, false); }
 std::string nameOf(const ConventionReading& reading) { return optionOf(reading.convention); }
 
-/// Options to copy, of conventions in which the matrices can be used as they are: not those behind faults and wrong scales.
+/// Options to copy, of conventions in which the matrices can be used as they are: not those behind faults and wrong
+/// scales.
 std::string acceptedInWords(const CovarianceDiagnosis& r) {
   constexpr std::size_t most = 12;
   std::string text;

@@ -320,8 +320,9 @@ def diagnose_conventions(
     -------
     Result
         The fields of ``liestat doctor --json`` (docs/program.md): `file_notes` (what reading has changed is in the
-        `notes` of `read_trajectory`), and those of the diagnosis, or `chain`, or `plan`. The verdict in words is `sentence`; `decided` is True (one convention, and the errors
-        follow it), False (they do not) or None (undecidable).
+        `notes` of `read_trajectory`), and those of the diagnosis, or `chain`, or `plan`. The verdict in words is
+        `sentence`; `decided` is True (one convention, and the errors follow it), False (they do not) or None
+        (undecidable).
     """
     caller = "diagnose_conventions"
     _choice(caller, "align", align, ("none", "posyaw", "se3", "sim3"))

@@ -1,5 +1,6 @@
 // Files whose fault or convention is in no list: the diagnosis may not name it. The generators of covariance_faults.hpp
-// know nothing of the diagnosis; those with an even number tuned it, these here judge it. docs/doctor.md has the figures.
+// know nothing of the diagnosis; those with an even number tuned it, these here judge it. docs/doctor.md has the
+// figures.
 
 #include "covariance_faults.hpp"
 

@@ -4,6 +4,7 @@
 
 #include <fusion/convention_diagnosis_types.hpp>
 #include <lie/se3.hpp>
+#include <stats/convention_presets.hpp>
 #include <stats/conventions.hpp>
 #include <stats/random.hpp>
 
@@ -11,6 +12,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>

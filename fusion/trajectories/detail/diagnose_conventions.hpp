@@ -61,8 +61,8 @@ inline std::vector<MatrixFault> faults() {
   return list;
 }
 
-/// The level at which an explanation has to hold to be named: few poses refute little, so that more is asked of them. Whatever
-/// does not hold is wrong for an unknown reason, which costs nothing but the name.
+/// The level at which an explanation has to hold to be named: few poses refute little, so that more is asked of them.
+/// Whatever does not hold is wrong for an unknown reason, which costs nothing but the name.
 inline constexpr double naming_level = 0.01;
 inline double namingLevel(std::size_t n) {
   constexpr double poses = 300, most = 0.25;
@@ -100,9 +100,9 @@ inline std::vector<HypothesisFit> faultyHypotheses(const std::vector<Convention>
   return faulty;
 }
 
-/// No convention alone explains the errors: a fault that can be undone, or scales, if one of them does it better than the
-/// other, on the half of the poses that did not choose it, and against alternatives that are in no list. Else the cause is
-/// unknown, and the likeliest is said as such.
+/// No convention alone explains the errors: a fault that can be undone, or scales, if one of them does it better than
+/// the other, on the half of the poses that did not choose it, and against alternatives that are in no list. Else the
+/// cause is unknown, and the likeliest is said as such.
 inline void nameCause(const DiagnosisData& data, const std::vector<Convention>& hypotheses,
                       const DiagnosisOptions& options, ConventionDiagnosis& d) {
   const bool usable = !d.fits.empty() && !std::isinf(d.fits.front().log_likelihood);

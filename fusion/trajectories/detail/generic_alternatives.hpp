@@ -1,6 +1,7 @@
-// Score tests of covariances against alternatives that no list of conventions holds: C_i → (I + ε E_i) C_i (I + ε E_i)ᵀ with a
-// constant E, with one that is linear in the pose, and with some of one degree of freedom. A hypothesis that is merely the
-// nearest of a list is refuted by them, while the seven tests of whitened residuals see sums over all poses alone.
+// Score tests of covariances against alternatives that no list of conventions holds: C_i → (I + ε E_i) C_i (I + ε E_i)ᵀ
+// with a constant E, with one that is linear in the pose, and with some of one degree of freedom. A hypothesis that is
+// merely the nearest of a list is refuted by them, while the seven tests of whitened residuals see sums over all poses
+// alone.
 #pragma once
 
 #include <fusion/convention_diagnosis_types.hpp>
@@ -21,15 +22,15 @@
 
 namespace liestat::detail {
 
-/// An independent error with its covariance, and the true pose, of which alternatives are functions: those of an estimate would
-/// go with its error.
+/// An independent error with its covariance, and the true pose, of which alternatives are functions: those of an
+/// estimate would go with its error.
 struct PosedResidual {
   PoseResidual residual;
   SE3d pose;
 };
 
-/// Directions E of one group: scores q_k = zᵀ S_k z - tr S_k with z = L⁻¹x, S_k the symmetric part of L⁻¹ E_k L. They have mean
-/// zero and covariance 2 Σ tr(S_k S_l) if the errors are normal with the covariances C = L Lᵀ.
+/// Directions E of one group: scores q_k = zᵀ S_k z - tr S_k with z = L⁻¹x, S_k the symmetric part of L⁻¹ E_k L. They
+/// have mean zero and covariance 2 Σ tr(S_k S_l) if the errors are normal with the covariances C = L Lᵀ.
 class ScoreGroup {
  public:
   static constexpr int max_size = 27, entries = 21;
@@ -44,8 +45,8 @@ class ScoreGroup {
     information_.selfadjointView<Eigen::Lower>().rankUpdate(S, 2);
     rows_.push_back(S);
   }
-  /// The p-value of sᵀ I⁺ s, whose variance is χ²'s and a sum of fourth cumulants: Σ 48 tr (Σ_k S_k²)² at most, for whitened
-  /// directions. A scaled χ² has both moments. Directions that depend on those before them are left out.
+  /// The p-value of sᵀ I⁺ s, whose variance is χ²'s and a sum of fourth cumulants: Σ 48 tr (Σ_k S_k²)² at most, for
+  /// whitened directions. A scaled χ² has both moments. Directions that depend on those before them are left out.
   double p() const {
     const Eigen::Index size = sum_.size();
     Square L = Square::Zero(size, size);
@@ -116,9 +117,9 @@ class ScoreGroup {
   std::vector<Directions> rows_;
 };
 
-/// The smallest p-value of all groups, times their number: the probability that covariances which are right look so wrong. At
-/// most 2000 poses, evenly spaced, are used. Left-out components are in no direction; without a cross block none joins the
-/// two halves. NaN if a covariance is not positive definite.
+/// The smallest p-value of all groups, times their number: the probability that covariances which are right look so
+/// wrong. At most 2000 poses, evenly spaced, are used. Left-out components are in no direction; without a cross block
+/// none joins the two halves. NaN if a covariance is not positive definite.
 inline double genericMisfit(std::span<const PosedResidual> residuals, const NoiseComponents& components,
                             bool blocks_only) {
   using Scores = ScoreGroup::Scores;

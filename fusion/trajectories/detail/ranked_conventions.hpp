@@ -290,8 +290,8 @@ inline Agreement agreementOf(const std::vector<PosedResidual>& posed, const Nois
   return a;
 }
 
-/// The errors in the hypothesis' own coordinates, which are as normal as they can be, with blocks of the covariances divided
-/// by scales.
+/// The errors in the hypothesis' own coordinates, which are as normal as they can be, with blocks of the covariances
+/// divided by scales.
 inline Agreement agreementUnder(const DiagnosisData& data, const HypothesisFit& h, double translation = 1,
                                 double rotation = 1) {
   std::vector<PosedResidual> posed;
@@ -365,7 +365,8 @@ inline ScaleProfile profileScale(const DiagnosisData& data, std::span<const Conv
     rows.push_back({c, 1.5 * n * (std::log(k_t) + std::log(k_r)) - 3 * n - 0.5 * log_det, k_t, k_r});
   }
   if (rows.empty()) return profile;
-  // Scales near one are likelier: orders and contents with other scales may fit as well. A law with heavy tails lets units be.
+  // Scales near one are likelier: orders and contents with other scales may fit as well. A law with heavy tails lets
+  // units be.
   const auto posterior = [](const Row& r) {
     return r.likelihood - std::log1p(std::pow(std::log(r.k_t), 2)) - std::log1p(std::pow(std::log(r.k_r), 2));
   };
