@@ -128,8 +128,8 @@ std::string evoResult(const TrajectoryEvaluation& e, const EvaluationOptions& ho
   std::vector<SE3d> reference, estimate;
   std::vector<double> times, seconds;
   for (const std::size_t i : rows) {
-    reference.push_back(e.matched[i].reference.mean);
-    estimate.push_back(e.alignment(e.matched[i].estimate.mean));
+    reference.push_back(e.matched.reference.mean(i));
+    estimate.push_back(e.alignment(e.matched.estimate.mean(i)));
     times.push_back(e.times[i]), seconds.push_back(e.times[i] - e.times[rows.front()]);
   }
   const std::vector<double> along_reference = distancesAlong(reference), along_estimate = distancesAlong(estimate);
@@ -166,8 +166,9 @@ std::string evoResult(const TrajectoryEvaluation& e, const EvaluationOptions& ho
     }
     for (std::size_t k = 0; k < e.matched.size(); ++k) {
       csv += fmt::format("\n{}", e.times[k]);
+      const NoisyPoses::Covariance V = e.matched.estimate.covariance(k);
       for (int i = 0; i < 6; ++i) {
-        for (int j = i; j < 6; ++j) csv += fmt::format(",{}", e.matched[k].estimate.covariance(i, j));
+        for (int j = i; j < 6; ++j) csv += fmt::format(",{}", V(i, j));
       }
     }
     members.push_back({"covariances.csv", csv + "\n"});

@@ -24,9 +24,9 @@
 namespace liestat {
 namespace {
 
-constexpr std::string_view blanks = " \t\r\v\f";
-
-bool isBlank(char c) { return blanks.find(c) != std::string_view::npos; }
+// Comparisons, not a search in a list of characters, which takes a quarter of the time of reading a file.
+bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
+bool isMark(char c) { return c == ',' || c == ';'; }
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && isBlank(text.front())) text.remove_prefix(1);
@@ -224,7 +224,7 @@ bool LineReader::next() {
 void splitFields(std::string_view line, Separator separator, std::vector<std::string_view>& fields) {
   fields.clear();
   if (separator == Separator::comma_or_blanks) {
-    separator = line.find_first_of(",;") == std::string_view::npos ? Separator::blanks : Separator::comma;
+    separator = std::none_of(line.begin(), line.end(), isMark) ? Separator::blanks : Separator::comma;
   }
   if (separator == Separator::comma) {
     // Spreadsheets of half of Europe write semicolons, others tabs; a line with either has no commas that part fields.
@@ -240,11 +240,12 @@ void splitFields(std::string_view line, Separator separator, std::vector<std::st
       start = end + 1;
     }
   }
-  std::size_t start = line.find_first_not_of(blanks);
-  while (start != std::string_view::npos) {
-    const std::size_t end = line.find_first_of(blanks, start);
-    fields.push_back(line.substr(start, end == std::string_view::npos ? end : end - start));
-    start = line.find_first_not_of(blanks, end);
+  for (const char *at = line.data(), *const end = at + line.size(); at != end;) {
+    const char* const begin = std::find_if_not(at, end, isBlank);
+    at = std::find_if(begin, end, isBlank);
+    if (begin != end)
+      fields.push_back(
+          line.substr(static_cast<std::size_t>(begin - line.data()), static_cast<std::size_t>(at - begin)));
   }
 }
 

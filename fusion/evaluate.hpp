@@ -34,14 +34,14 @@ LIESTAT_TRAJECTORIES_API std::vector<std::size_t> rowsBetween(std::span<const do
 
 /// A sentence if the quaternions of one of two trajectories look as if w came first: relative rotations over a fifth of the
 /// run then agree five times better. Empty otherwise, and for fewer than ten poses.
-LIESTAT_TRAJECTORIES_API std::string suspectQuaternionOrder(std::span<const MatchedPose> poses,
-                                                            std::string_view reference, std::string_view estimate);
+LIESTAT_TRAJECTORIES_API std::string suspectQuaternionOrder(MatchedRange poses, std::string_view reference,
+                                                            std::string_view estimate);
 
 /// Compares an estimate with a reference. The verdict is that of errors after an alignment which the covariances weight;
 /// those of APE and RPE follow no χ². Never throws: where the data or the options do not allow a comparison, `status` and
 /// `reason` say why, and errors are empty, statistics NaN. O(n).
 LIESTAT_TRAJECTORIES_API TrajectoryEvaluation evaluateTrajectory(const PoseTrajectory& reference,
-                                                                 const PoseTrajectory& estimate,
+                                                                 PoseTrajectory estimate,
                                                                  const EvaluationOptions& options = {});
 
 }  // namespace liestat

@@ -24,7 +24,7 @@ namespace liestat {
 /// Poses with their times. What is in words is for sentences alone.
 struct PoseTrajectory {
   std::vector<double> times = {};          ///< s, strictly ascending; empty: pose i belongs to the other's pose i
-  std::vector<Gaussian<SE3d>> poses = {};  ///< world_T_body; covariances in the library's convention
+  NoisyPoses poses = {};                   ///< world_T_body; covariances in the library's convention
   bool has_covariances = false;            ///< false: those of the poses are taken as zero
   std::string name = {};                   ///< "est.tum"; empty: "the estimate", "the reference"
   std::string covariance_convention = {};  ///< the convention from which the covariances were converted
@@ -77,6 +77,7 @@ struct EvaluationOptions {
   std::optional<MotionThinning> motion_filter = {};      ///< applied to both, after downsample
   RelativeOptions relative = {};                         ///< pairs of RPE
   std::optional<PairsModel> pairs_model = {};            ///< NEES of relative motions; else there is none
+  bool segments = true;                                  ///< errors by the length of a segment
   bool misfit = false;                                   ///< looks for faults of the whole run (findMisfit)
 
   /// The model of the weighted alignment. A scale alone has none: positions that need a scale are aligned by sim3.
@@ -142,6 +143,20 @@ struct Associated {
   bool ok() const { return status == EvaluationStatus::ok; }
 };
 
+/// Errors of the relative motion over all segments of a length, measured along the reference.
+struct SegmentErrors {
+  double length = 0;                                ///< m
+  std::size_t pairs = 0;                            ///< segments, which overlap
+  ErrorStatistics translation = {}, rotation = {};  ///< m, deg
+  /// Quantiles at 5, 25, 50, 75 and 95 %.
+  std::array<double, 5> translation_quantiles = {}, rotation_quantiles = {};
+};
+template <class V>
+void describe(V& v, const SegmentErrors& s) {
+  v("length", s.length, "along the reference", "m")("pairs", s.pairs, "segments");
+  v("translation", s.translation, "", "m")("rotation", s.rotation, "", "deg");
+}
+
 /// A trajectory against a reference. Lists with one entry for each matched pose are in the order of the estimate.
 struct TrajectoryEvaluation {
   EvaluationStatus status = EvaluationStatus::ok;
@@ -157,14 +172,15 @@ struct TrajectoryEvaluation {
   bool by_time = true;
   std::vector<std::size_t> rows = {};  ///< rows of the estimate: the matched poses
   std::vector<double> times = {};      ///< s; without times the numbers of the rows that were not thinned out
-  std::vector<MatchedPose> matched = {};
+  MatchedPoses matched = {};
   Alignment alignment = {};                                        ///< alignment for APE and RPE
   std::vector<double> ape = {}, rpe = {};                          ///< in their units
   std::vector<std::pair<std::size_t, std::size_t>> pairs = {};     ///< pairs of matched poses for RPE
   std::vector<double> position_errors = {}, rotation_errors = {};  ///< m and rad, whatever the pose relation
   ErrorStatistics ape_statistics = {}, rpe_statistics = {};
-  InterpolationError interpolation = {};  ///< of the reference; the verdict allows for it
-  Alignment weighted = {};                ///< alignment for the verdict
+  std::vector<SegmentErrors> segments = {};  ///< by ascending length; empty if they were not asked for
+  InterpolationError interpolation = {};     ///< of the reference; the verdict allows for it
+  Alignment weighted = {};                   ///< alignment for the verdict
   Consistency consistency = {};
   std::optional<RelativeConsistency> relative = {};
   MisfitSearch misfit = {};  ///< faults of the whole run, where they were asked for
@@ -259,6 +275,7 @@ void describe(V& v, const TrajectoryEvaluation& e) {
   v("rpe_nees", e.relative ? std::optional(e.relative->joint) : std::nullopt, "of relative motions");
   v("indefinite", e.consistency.indefinite, "matched poses whose covariance is not positive definite");
   v("notes", e.notes, "what is remarkable, in sentences");
+  v("segments", e.segments, "errors by the length of a segment");
 }
 
 /// One row for each matched pose, or for each pair of RPE.

@@ -31,10 +31,14 @@ namespace liestat {
 /// for each open direction).
 LIESTAT_FUSION_API HandEyeResult estimateRobotWorld(std::span<const PosePair> poses,
                                                     const HandEyeOptions& options = {});
+/// The same in less memory: the list is given up.
+LIESTAT_FUSION_API HandEyeResult estimateRobotWorld(PosePairList poses, HandEyeOptions options);
 
 /// AX = XB from at least two pairs of relative motions with independent errors (degrees of freedom 6 n - 6, one more
 /// for each open direction).
 LIESTAT_FUSION_API HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options = {});
+/// The same in less memory: the list is given up.
+LIESTAT_FUSION_API HandEyeResult estimateHandEye(PosePairList motions, HandEyeOptions options);
 
 }  // namespace liestat
 

@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <utility>
@@ -64,13 +65,34 @@ inline bool asksForExplanation(const HandEyeResult& result) {
          3 * result.outliers.size() > result.pairs.size();
 }
 
+/// The pairs, of n, that an explanation is sought with: not more than are needed, spread over the poses B, `pose(i)`, so
+/// that their order does not matter.
+template <class Pose>
+std::vector<std::size_t> pairsToExplain(std::size_t n, const Pose& pose) {
+  constexpr std::size_t max_pairs = 40;
+  std::vector<std::size_t> all(n), some;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const std::size_t step = (n + max_pairs - 1) / max_pairs;
+  if (step < 2) return all;
+  std::sort(all.begin(), all.end(), [&](std::size_t i, std::size_t k) {
+    const SE3d::Params p = pose(i).params(), q = pose(k).params();
+    return std::lexicographical_compare(p.data(), p.data() + p.size(), q.data(), q.data() + q.size());
+  });
+  for (std::size_t i = 0; i < n; i += step) some.push_back(all[i]);
+  return some;
+}
+
 namespace detail {
 
 /// The fits of other readings of some pairs.
 class HandEyeExplanation {
  public:
   HandEyeExplanation(std::span<const PosePair> given, bool world, const HandEyeHintOptions& options)
-      : given_(some(given)), world_(world), options_(options) {}
+      : given_(some(given)), world_(world), options_(options) {
+    // Some of the pairs are no rows of a stream, and what makes a stream fit is no reading of poses.
+    HandEyeOptions& o = options_.estimate;
+    o.times = {}, o.stream_of_a = {}, o.interpolate = false, o.largest_delay = 0;
+  }
 
   LIESTAT_FUSION_API std::optional<HandEyeHint> best() {
     const HandEyeHint found = fit(options_.reading);
@@ -92,20 +114,12 @@ class HandEyeExplanation {
   }
 
  private:
-  static constexpr std::size_t max_pairs = 40;
-
-  /// Not more than are needed, spread over their contents, so that their order does not matter.
   static std::vector<PosePair> some(std::span<const PosePair> given) {
-    std::vector<PosePair> pairs(given.begin(), given.end());
-    const std::size_t step = (pairs.size() + max_pairs - 1) / max_pairs;
-    if (step < 2) return pairs;
-    std::sort(pairs.begin(), pairs.end(), [](const PosePair& x, const PosePair& y) {
-      const auto p = x.b.mean.params(), q = y.b.mean.params();
-      return std::lexicographical_compare(p.data(), p.data() + p.size(), q.data(), q.data() + q.size());
-    });
-    std::vector<PosePair> spread;
-    for (std::size_t i = 0; i < pairs.size(); i += step) spread.push_back(pairs[i]);
-    return spread;
+    std::vector<PosePair> pairs;
+    for (const std::size_t i : pairsToExplain(given.size(), [&](std::size_t k) { return given[k].b.mean; })) {
+      pairs.push_back(given[i]);
+    }
+    return pairs;
   }
   LIESTAT_FUSION_API HandEyeHint fit(const HandEyeReading& reading) const {
     std::vector<PosePair> pairs;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/noisy_poses.hpp>
 #include <fusion/pose_stream.hpp>
 #include <fusion/status.hpp>
 #include <lie/se3.hpp>
@@ -22,7 +23,9 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -31,6 +34,21 @@ namespace liestat {
 /// if both together have rank six.
 struct PosePair {
   Gaussian<SE3d> a, b;
+};
+
+/// Pairs of poses in little memory.
+struct PosePairList {
+  PackedPoses a, b;
+
+  PosePairList() = default;
+  explicit PosePairList(std::span<const PosePair> pairs) {
+    reserve(pairs.size());
+    for (const PosePair& pair : pairs) push_back(pair);
+  }
+  std::size_t size() const { return a.size(); }
+  void reserve(std::size_t n) { a.reserve(n), b.reserve(n); }
+  void push_back(const PosePair& pair) { a.push_back(pair.a), b.push_back(pair.b); }
+  PosePair operator[](std::size_t i) const { return {a[i], b[i]}; }
 };
 
 /// Quantities that the equations take for known.

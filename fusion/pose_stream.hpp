@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace liestat {
@@ -135,8 +136,9 @@ class PoseStream {
 
   PoseStream() = default;
   /// Poses in any order; of several at one time the first one stays. Times are finite.
-  explicit PoseStream(std::span<const TimedPose> poses) : poses_(poses.begin(), poses.end()) {
-    std::stable_sort(poses_.begin(), poses_.end(), [](const auto& x, const auto& y) { return x.time < y.time; });
+  explicit PoseStream(std::vector<TimedPose> poses) : poses_(std::move(poses)) {
+    const auto earlier = [](const auto& x, const auto& y) { return x.time < y.time; };
+    if (!std::is_sorted(poses_.begin(), poses_.end(), earlier)) std::stable_sort(poses_.begin(), poses_.end(), earlier);
     const auto same = [](const TimedPose& x, const TimedPose& y) { return x.time == y.time; };
     poses_.erase(std::unique(poses_.begin(), poses_.end(), same), poses_.end());
     std::vector<double> gaps;

@@ -43,43 +43,40 @@ LIESTAT_TRAJECTORIES_API std::vector<TimeMatch> associateNearest(std::span<const
 /// The pairs of an association. The covariance of an interpolated reference is (1 - s) Σ₀ + s Σ₁, for the geodesic an upper
 /// bound whatever the correlation of the two. Empty `reference` covariances are zeros: see exactPoses. The reference's times
 /// (s, one for each pose) serve the cubic; without them its steps are taken as equal.
-LIESTAT_TRAJECTORIES_API std::vector<MatchedPose> matchedPoses(
-    std::span<const TimeMatch> matches, std::span<const Gaussian<SE3d>> reference,
-    std::span<const Gaussian<SE3d>> estimate, PoseInterpolation interpolation = PoseInterpolation::cubic,
-    std::span<const double> reference_times = {});
+LIESTAT_TRAJECTORIES_API MatchedPoses matchedPoses(std::span<const TimeMatch> matches, const NoisyPoses& reference,
+                                                   const NoisyPoses& estimate,
+                                                   PoseInterpolation interpolation = PoseInterpolation::cubic,
+                                                   std::span<const double> reference_times = {});
 
 /// Adds `factor` times the second moment of the interpolation's error to the references of matched poses, gap by gap. It is measured from
 /// the reference itself: with every second stamp left out (docs/theory/trajectories.md, 1.2). Poses at a stamp have none.
 LIESTAT_TRAJECTORIES_API InterpolationError addInterpolationError(std::span<const TimeMatch> matches,
-                                                                  std::span<const Gaussian<SE3d>> reference,
+                                                                  const NoisyPoses& reference,
                                                                   std::span<const double> reference_times,
-                                                                  PoseInterpolation interpolation,
-                                                                  std::span<MatchedPose> poses, double factor = 1);
+                                                                  PoseInterpolation interpolation, MatchedPoses& poses,
+                                                                  double factor = 1);
 
 /// Poses as Gaussians without uncertainty.
-LIESTAT_TRAJECTORIES_API std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses);
+LIESTAT_TRAJECTORIES_API NoisyPoses exactPoses(std::vector<SE3d> poses);
 
 // Alignment --------------------------------------------------------------------------------------------------------------
 
 /// Least squares of the positions, estimate to reference, from the first n_to_align poses (0: all) (Umeyama 1991; posyaw: Zhang
 /// and Scaramuzza 2018). As evo: for sim3 the scale is biased by the noise of the estimate. `covariance` is that of the
 /// positions' covariances carried through the solution (se3 and posyaw), NaN for sim3 and scale.
-LIESTAT_TRAJECTORIES_API Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model,
-                                                std::size_t n_to_align = 0);
+LIESTAT_TRAJECTORIES_API Alignment alignUmeyama(MatchedRange poses, AlignmentModel model, std::size_t n_to_align = 0);
 
 /// The most likely alignment under the covariances of full poses, from the first n_to_align poses (0: all). Model `origin` is
 /// se3 from one pose; `none` is the identity. The scale is unbiased. Components of the errors that carry no noise
 /// (stats/noise_components.hpp) have no weight; what the others leave open, such as the height of a planar robot's world,
 /// stays as the first pose has it. A constant variance among varying ones is judged where errors exceed it.
-LIESTAT_TRAJECTORIES_API Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model,
-                                                 std::size_t n_to_align = 0);
+LIESTAT_TRAJECTORIES_API Alignment alignWeighted(MatchedRange poses, AlignmentModel model, std::size_t n_to_align = 0);
 
 // Consistency ------------------------------------------------------------------------------------------------------------
 
 /// Judges the alignment's components of the errors after a weighted alignment (or none): one from least squares has errors
 /// that follow no χ².
-LIESTAT_TRAJECTORIES_API Consistency evaluateConsistency(std::span<const MatchedPose> poses,
-                                                         const Alignment& alignment);
+LIESTAT_TRAJECTORIES_API Consistency evaluateConsistency(MatchedRange poses, const Alignment& alignment);
 
 // Errors as evo has them ---------------------------------------------------------------------------------------------------
 
@@ -87,26 +84,25 @@ LIESTAT_TRAJECTORIES_API Consistency evaluateConsistency(std::span<const Matched
 LIESTAT_TRAJECTORIES_API ErrorStatistics errorStatistics(std::span<const double> errors);
 
 /// APE: the error of each pose, E = (A T̂)⁻¹ T, after an alignment.
-LIESTAT_TRAJECTORIES_API std::vector<double> absoluteErrors(std::span<const MatchedPose> poses,
-                                                            const Alignment& alignment, PoseRelation relation);
+LIESTAT_TRAJECTORIES_API std::vector<double> absoluteErrors(MatchedRange poses, const Alignment& alignment,
+                                                            PoseRelation relation);
 
 /// Indices (i, j) of poses at a distance, by evo's rules. Empty if there are none or delta is not positive.
-LIESTAT_TRAJECTORIES_API std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const MatchedPose> poses,
+LIESTAT_TRAJECTORIES_API std::vector<std::pair<std::size_t, std::size_t>> posePairs(MatchedRange poses,
                                                                                     const Alignment& alignment,
                                                                                     const RelativeOptions& options);
 
 /// RPE: the error of each pair's relative motion, E = (T_i⁻¹ T_j)⁻¹ (T̂_i⁻¹ T̂_j) after alignment. Ratios of pairs at which the
 /// reference did not move are left out, and so are their pairs from `pairs`.
-LIESTAT_TRAJECTORIES_API std::vector<double> relativeErrors(std::span<const MatchedPose> poses,
-                                                            const Alignment& alignment,
+LIESTAT_TRAJECTORIES_API std::vector<double> relativeErrors(MatchedRange poses, const Alignment& alignment,
                                                             std::vector<std::pair<std::size_t, std::size_t>>& pairs,
                                                             PoseRelation relation);
 
 /// NEES of the relative motions of pairs under a model; `scale` is that of the alignment. Components that are left out count
 /// as exact.
 LIESTAT_TRAJECTORIES_API RelativeConsistency
-relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                    PairsModel model, double scale = 1, const NoiseComponents& components = {});
+relativeConsistency(MatchedRange poses, std::span<const std::pair<std::size_t, std::size_t>> pairs, PairsModel model,
+                    double scale = 1, const NoiseComponents& components = {});
 
 }  // namespace liestat
 

@@ -1,6 +1,7 @@
 // Results and options of fusion/trajectories.hpp. (Needs Boost.Math.)
 #pragma once
 
+#include <fusion/noisy_poses.hpp>
 #include <fusion/pose_stream.hpp>
 #include <lie/se3.hpp>
 #include <stats/gaussian.hpp>
@@ -11,6 +12,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,43 @@ struct TimeMatch {
 /// An estimated pose and the pose of the reference at its time. A reference without covariances has zeros.
 struct MatchedPose {
   Gaussian<SE3d> reference, estimate;
+};
+
+/// Matched poses in little memory.
+struct MatchedPoses {
+  NoisyPoses reference, estimate;
+
+  std::size_t size() const { return estimate.size(); }
+  void push_back(const MatchedPose& p) { reference.push_back(p.reference), estimate.push_back(p.estimate); }
+  MatchedPose operator[](std::size_t i) const { return {reference[i], estimate[i]}; }
+  IndexIterator<MatchedPoses> begin() const { return {this, 0}; }
+  IndexIterator<MatchedPoses> end() const { return {this, size()}; }
+};
+
+/// Matched poses of either kind, or the first of them; it refers to them.
+class MatchedRange {
+ public:
+  MatchedRange(std::span<const MatchedPose> poses) : poses_(poses.data()), size_(poses.size()) {}
+  MatchedRange(const std::vector<MatchedPose>& poses) : MatchedRange(std::span<const MatchedPose>(poses)) {}
+  MatchedRange(const MatchedPoses& poses) : list_(&poses), size_(poses.size()) {}
+
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const SE3d& reference(std::size_t i) const { return list_ ? list_->reference.mean(i) : poses_[i].reference.mean; }
+  const SE3d& estimate(std::size_t i) const { return list_ ? list_->estimate.mean(i) : poses_[i].estimate.mean; }
+  MatchedPose operator[](std::size_t i) const { return list_ ? (*list_)[i] : poses_[i]; }
+  MatchedRange first(std::size_t n) const {
+    MatchedRange some = *this;
+    some.size_ = n;
+    return some;
+  }
+  IndexIterator<MatchedRange> begin() const { return {this, 0}; }
+  IndexIterator<MatchedRange> end() const { return {this, size_}; }
+
+ private:
+  const MatchedPose* poses_ = nullptr;
+  const MatchedPoses* list_ = nullptr;
+  std::size_t size_ = 0;
 };
 
 /// The error of an interpolated reference, root mean squares over all matched poses.

@@ -24,6 +24,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -84,7 +85,7 @@ struct SuspectDirection {
 /// Tests G suspects, whose columns stand behind those of P parameters; the residuals are those of a fit. Rows without
 /// times have the same one.
 template <int C, int P, int G>
-ScoreTests<P, G> scoreTests(std::vector<TimedRow<C, P + G>> rows, const ScoreTestOptions<G>& options) {
+ScoreTests<P, G> scoreTests(TimedRows<C, P + G> rows, const ScoreTestOptions<G>& options) {
   constexpr int N = P + G;
   // Less is rounding: the parameters do all that the suspect would.
   constexpr double min_remaining = 1e-9;
@@ -104,10 +105,12 @@ ScoreTests<P, G> scoreTests(std::vector<TimedRow<C, P + G>> rows, const ScoreTes
   }
   Matrix of_rows = Matrix::Zero();
   Vector score = Vector::Zero();
-  for (const TimedRow<C, N>& row : rows) {
-    of_rows += row.columns().transpose() * row.columns();
-    score += row.columns().transpose() * row.residual();
-  }
+  rows.forEachBlock([&](std::size_t, std::span<const TimedRow<C, N>> block) {
+    for (const TimedRow<C, N>& row : block) {
+      of_rows += row.columns().transpose() * row.columns();
+      score += row.columns().transpose() * row.residual();
+    }
+  });
   // Noise and its dependence are what is left when all suspects that can be told apart have been fitted: one that is
   // wrong would pass for an error that lasts.
   std::array<bool, static_cast<std::size_t>(N)> left_out = {};
@@ -124,7 +127,7 @@ ScoreTests<P, G> scoreTests(std::vector<TimedRow<C, P + G>> rows, const ScoreTes
   }
   const Vector step_of_all = detail::Cholesky<double, N>(normal_of_all).template solve<1>(off_of_all);
   const double freedom = static_cast<double>(C) * static_cast<double>(rows.size()) - fitted;
-  for (TimedRow<C, N>& row : rows) row.residual() -= row.columns() * step_of_all;
+  rows.subtract(step_of_all);
   const detail::TimeModel<C, N> model(std::move(rows), options.known_noise, left_out);
   result.dependence = model.dependence();
   const double found = freedom > 0 ? model.power() / freedom : 1;

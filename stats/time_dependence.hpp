@@ -25,6 +25,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -52,32 +54,83 @@ struct TimedCovariance {
   Eigen::Matrix<double, P, P> covariance;  ///< not below the plain one in any direction; that, if nothing was tested
 };
 
+/// Rows that are computed when they are needed, a block at a time: a long list of them takes more memory than all that
+/// they are made of. Few are kept.
+template <int C, int P>
+class TimedRows {
+ public:
+  using Row = TimedRow<C, P>;
+  /// Computes row i but for its time.
+  using Compute = std::function<void(std::size_t i, Row& row)>;
+
+  TimedRows() = default;
+  TimedRows(std::vector<Row> rows) : kept_(std::move(rows)) { sortByTime(); }
+  /// As many rows as times, in any order.
+  TimedRows(std::vector<double> times, Compute compute) : times_(std::move(times)), compute_(std::move(compute)) {
+    if (times_.size() <= block) {
+      for (std::size_t i = 0; i < times_.size(); ++i) {
+        Row& row = kept_.emplace_back();
+        compute_(i, row);
+        row.time = times_[i];
+      }
+      times_.clear(), compute_ = nullptr;
+      sortByTime();
+      return;
+    }
+    order_.resize(times_.size());
+    std::iota(order_.begin(), order_.end(), 0U);
+    std::stable_sort(order_.begin(), order_.end(), [&](auto i, auto k) { return times_[i] < times_[k]; });
+  }
+
+  std::size_t size() const { return compute_ ? times_.size() : kept_.size(); }
+  double time(std::size_t i) const { return compute_ ? times_[order_[i]] : kept_[i].time; }
+  /// Takes the step's effect off the residuals.
+  void subtract(const Eigen::Matrix<double, P, 1>& step) {
+    for (Row& row : kept_) row.residual() -= row.columns() * step;
+    step_ = step;
+  }
+  /// Calls take(first, rows) for blocks of rows, in the order of their times.
+  template <class Take>
+  void forEachBlock(std::size_t begin, std::size_t end, Take&& take) const {
+    if (!compute_) return take(begin, std::span<const Row>(kept_).subspan(begin, end - begin));
+    std::vector<Row> rows(std::min(end - begin, small_block));
+    for (std::size_t first = begin; first < end; first += small_block) {
+      const std::size_t count = std::min(end - first, small_block);
+      for (std::size_t k = 0; k < count; ++k) {
+        Row& row = rows[k];
+        compute_(order_[first + k], row);
+        row.time = time(first + k);
+        row.residual() -= row.columns() * step_;
+      }
+      take(first, std::span<const Row>(rows).first(count));
+    }
+  }
+  template <class Take>
+  void forEachBlock(Take&& take) const {
+    forEachBlock(0, size(), std::forward<Take>(take));
+  }
+
+ private:
+  static constexpr std::size_t block = 4096, small_block = 256;
+
+  /// Equal times keep their order, so that the sums do.
+  void sortByTime() {
+    const auto earlier = [](const Row& x, const Row& y) { return x.time < y.time; };
+    if (!std::is_sorted(kept_.begin(), kept_.end(), earlier)) std::stable_sort(kept_.begin(), kept_.end(), earlier);
+  }
+
+  std::vector<Row> kept_;
+  std::vector<double> times_;  // of rows that are computed, in their own order
+  std::vector<std::uint32_t> order_;
+  Compute compute_;
+  Eigen::Matrix<double, P, 1> step_ = Eigen::Matrix<double, P, 1>::Zero();
+};
+
 namespace detail {
 
 /// The columns and the residuals of rows side by side, [K u].
 template <int C, int P>
 using TimedColumns = Eigen::Matrix<double, C, P + 1>;
-template <int C, int P>
-struct AllChannels {
-  std::span<const TimedRow<C, P>> rows;
-  std::size_t size() const { return rows.size(); }
-  const TimedColumns<C, P>& operator[](std::size_t i) const { return rows[i].values; }
-};
-/// The same of one channel.
-template <int C, int P>
-struct OneChannel {
-  std::span<const TimedRow<C, P>> rows;
-  int channel;
-  std::size_t size() const { return rows.size(); }
-  Eigen::Matrix<double, 1, P + 1> operator[](std::size_t i) const { return rows[i].values.row(channel); }
-};
-
-/// exp(-Δ/τ) between successive rows.
-inline std::vector<double> decays(std::span<const double> gaps, double time_constant) {
-  std::vector<double> list;
-  for (const double gap : gaps) list.push_back(std::exp(-gap / time_constant));
-  return list;
-}
 
 /// A cell of the grid.
 struct TimeCell {
@@ -97,47 +150,56 @@ void holdParameter(Eigen::Matrix<double, N, N>& normal, int k) {
   normal(k, k) = 1;
 }
 
-/// [K u]ᵀ R⁻¹ [K u] and log det R of a cell, by the innovations of a scalar Kalman filter. `decay` is that from the row
-/// before.
-template <int P>
-struct CellSums {
-  Eigen::Matrix<double, P + 1, P + 1> gram = Eigen::Matrix<double, P + 1, P + 1>::Zero();
-  double log_det = 0;
-};
-template <int C, int P, class Rows>
-CellSums<P> cellSums(double f, const Rows& rows, std::span<const double> decay) {
-  CellSums<P> sums;
-  TimedColumns<C, P> state = TimedColumns<C, P>::Zero();
-  double variance = f;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (i > 0) {
-      const double phi = decay[i - 1];
-      state *= phi;
-      variance = phi * phi * variance + f * (1 - phi * phi);
-    }
-    const double total = variance + 1 - f;
-    const TimedColumns<C, P> innovation = rows[i] - state;
-    for (int j = 0; j <= P; ++j) {
-      const Eigen::Matrix<double, C, 1> column = innovation.col(j) * (1 / total);
-      for (int k = 0; k <= j; ++k) sums.gram(k, j) += innovation.col(k).dot(column);
-    }
-    sums.log_det += C * std::log(total);
-    const double gain = variance / total;
-    state += gain * innovation;
-    variance *= 1 - gain;
-  }
-  for (int j = 0; j <= P; ++j) {
-    for (int k = j + 1; k <= P; ++k) sums.gram(k, j) = sums.gram(j, k);
-  }
-  return sums;
-}
+/// Variances and gains of a scalar Kalman filter over rows with the share f of a Gauss–Markov process.
+struct CellGains {
+  double f, variance = f, log_det = 0, gain = 0, total = 1;
+  bool started = false;
 
-/// The likelihoods of a cell, of which the parameters in `held` are known.
-template <int C, int P, class Rows>
-void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay,
+  /// Goes on by a row whose process has faded by `phi` since the row before; the state fades by what is returned.
+  double next(double phi) {
+    if (started) {
+      variance = phi * phi * variance + f * (1 - phi * phi);
+    } else {
+      phi = 0, started = true;
+    }
+    total = variance + 1 - f, gain = variance / total;
+    log_det += std::log(total);
+    variance *= 1 - gain;
+    return phi;
+  }
+};
+
+/// [K u]ᵀ R⁻¹ [K u] and log det R of a cell, by the innovations of a scalar Kalman filter.
+template <int C, int P>
+struct CellSums {
+  CellGains gains;
+  TimedColumns<C, P> state = TimedColumns<C, P>::Zero();
+  Eigen::Matrix<double, P + 1, P + 1> upper = Eigen::Matrix<double, P + 1, P + 1>::Zero();
+
+  void add(const TimedColumns<C, P>& row, double decay) {
+    state *= gains.next(decay);
+    const TimedColumns<C, P> innovation = row - state;
+    for (int j = 0; j <= P; ++j) {
+      const Eigen::Matrix<double, C, 1> column = innovation.col(j) * (1 / gains.total);
+      for (int k = 0; k <= j; ++k) upper(k, j) += innovation.col(k).dot(column);
+    }
+    state += gains.gain * innovation;
+  }
+  Eigen::Matrix<double, P + 1, P + 1> gram() const {
+    Eigen::Matrix<double, P + 1, P + 1> whole = upper;
+    for (int j = 0; j <= P; ++j) {
+      for (int k = j + 1; k <= P; ++k) whole(k, j) = whole(j, k);
+    }
+    return whole;
+  }
+};
+
+/// The likelihoods of a cell after `rows` rows, of which the parameters in `held` are known.
+template <int C, int P>
+void judgeCell(TimeCell& cell, const CellSums<C, P>& sums, std::size_t rows,
                const std::array<bool, static_cast<std::size_t>(P)>& held) {
-  auto [gram, log_det] = cellSums<C, P>(cell.share, rows, decay);
-  double freedom = static_cast<double>(C) * static_cast<double>(rows.size());
+  Eigen::Matrix<double, P + 1, P + 1> gram = sums.gram();
+  double freedom = static_cast<double>(C) * static_cast<double>(rows);
   for (int k = 0; k < P; ++k) {
     if (held[static_cast<std::size_t>(k)]) {
       holdParameter<P + 1>(gram, k);
@@ -150,58 +212,26 @@ void judgeCell(TimeCell& cell, const Rows& rows, std::span<const double> decay,
   const Eigen::Matrix<double, P, 1> right = gram.template topRightCorner<P, 1>();
   const double squares = gram(P, P) - normal.template halfSolve<1>(right).squaredNorm();
   if (!(squares > 0)) return;
-  const auto judged = [&, log_determinant = log_det](double sum, double more) -> TimeCell::Judged {
+  const auto judged = [&](double sum, double more) -> TimeCell::Judged {
     const double s2 = sum / freedom;
-    return {s2, -0.5 * (freedom * std::log(s2) + log_determinant + more) + std::log(cell.prior)};
+    return {s2, -0.5 * (freedom * std::log(s2) + C * sums.gains.log_det + more) + std::log(cell.prior)};
   };
   cell.restricted = judged(squares, normal.logDeterminant());
   cell.profile = judged(gram(P, P), 0);
 }
 
-/// Σ of the innovations' squares of each channel, and log det R, which the channels share.
-template <int C, int P, class Rows>
-std::pair<Eigen::Matrix<double, C, 1>, double> channelSums(double f, const Rows& rows, std::span<const double> decay) {
-  Eigen::Matrix<double, C, 1> squares = Eigen::Matrix<double, C, 1>::Zero(), state = squares;
-  double log_det = 0, variance = f;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (i > 0) {
-      const double phi = decay[i - 1];
-      state *= phi;
-      variance = phi * phi * variance + f * (1 - phi * phi);
-    }
-    const double total = variance + 1 - f, gain = variance / total;
-    const Eigen::Matrix<double, C, 1> innovation = rows[i].col(P) - state;
-    squares += innovation.cwiseAbs2() * (1 / total);
-    log_det += std::log(total);
-    state += gain * innovation;
-    variance *= 1 - gain;
-  }
-  return {squares, log_det};
-}
-
-/// Σ_i K_iᵀ K_i.
-template <int P, class Rows>
-Eigen::Matrix<double, P, P> ownProducts(const Rows& rows) {
-  Eigen::Matrix<double, P, P> sum = Eigen::Matrix<double, P, P>::Zero();
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto K = rows[i].template leftCols<P>().eval();
-    sum += K.transpose() * K;
-  }
-  return sum;
-}
-/// Σ_{i≠j} e^(-|t_i - t_j|/τ) K_iᵀ K_j.
-template <int P, class Rows>
-Eigen::Matrix<double, P, P> pastProducts(const Rows& rows, std::span<const double> decay) {
+/// Σ_{i≠j} e^(-|t_i - t_j|/τ) K_iᵀ K_j of rows with R channels.
+template <int R, int P>
+struct PastProducts {
+  Eigen::Matrix<double, R, P> sum = Eigen::Matrix<double, R, P>::Zero();
   Eigen::Matrix<double, P, P> past = Eigen::Matrix<double, P, P>::Zero();
-  auto sum = rows[0].template leftCols<P>().eval();
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const auto K = rows[i].template leftCols<P>().eval();
-    sum = decay[i - 1] * sum;
+
+  void add(const Eigen::Matrix<double, R, P>& K, double decay) {
+    sum *= decay;
     past += K.transpose() * sum;
     sum += K;
   }
-  return past + past.transpose();
-}
+};
 
 /// A symmetric matrix not below `first`, to which it is equal where the other is below, nor below `second` in any
 /// direction, and the mean factor by which it is larger than the first.
@@ -233,19 +263,22 @@ struct LargerMatrix {
 template <int C, int P>
 class TimeModel {
   using Matrix = Eigen::Matrix<double, P, P>;
+  using Residual = Eigen::Matrix<double, C, 1>;
+  using Square = Eigen::Matrix<double, C, C>;
+  using Rows = std::span<const TimedRow<C, P>>;
 
  public:
-  TimeModel(std::vector<TimedRow<C, P>> rows, bool known_noise,
-            const std::array<bool, static_cast<std::size_t>(P)>& held = {})
+  TimeModel(TimedRows<C, P> rows, bool known_noise, const std::array<bool, static_cast<std::size_t>(P)>& held = {})
       : known_noise_(known_noise), held_(held), rows_(std::move(rows)) {
-    sortByTime();
-    std::vector<double> gaps;
-    for (std::size_t i = 1; i < rows_.size(); ++i) gaps.push_back(rows_[i].time - rows_[i - 1].time);
+    const std::size_t n = rows_.size();
     const auto fitted = static_cast<std::size_t>(std::count(held_.begin(), held_.end(), false));
-    if (rows_.size() < min_rows || C * rows_.size() < 3 * fitted) return;
-    const double duration = rows_.back().time - rows_.front().time;
-    if (duration > 0 && std::isfinite(duration)) findDependence(gaps, duration, fitted);
-    if (!known_noise_ && (!channels_.empty() || !isDependent())) judgeSizes(static_cast<double>(fitted));
+    const double duration = n > 0 ? rows_.time(n - 1) - rows_.time(0) : 0;
+    const bool enough = n >= min_rows && C * n >= 3 * fitted;
+    const bool timed = enough && duration > 0 && std::isfinite(duration);
+    if (timed) makeCells(duration);
+    readRows();
+    if (timed) findDependence(duration, fitted);
+    if (enough && !known_noise_ && (!channels_.empty() || !isDependent())) judgeSizes(static_cast<double>(fitted));
   }
 
   const TimeDependence& dependence() const { return found_; }
@@ -254,71 +287,159 @@ class TimeModel {
   /// True where the sandwich is another than Σ K_iᵀ K_i times a factor.
   bool widens() const { return isDependent() || found_.unequal_axes; }
   /// Σ K_iᵀ K_i.
-  Matrix information() const { return ownProducts<P>(all()); }
+  const Matrix& information() const { return information_; }
   /// Σ u_iᵀ u_i.
-  double power() const {
-    double sum = 0;
-    for (const auto& row : rows_) sum += row.residual().squaredNorm();
-    return sum;
-  }
+  double power() const { return power_; }
   /// Σ_ij c(t_i - t_j) K_iᵀ K_j under the weights of the cells. With channels of their own not below that of all alike,
   /// which has more residuals for each of its numbers.
   Matrix sandwich() const {
-    if (channels_.empty()) return sandwichOf(all(), amounts_);
+    constexpr auto channels = static_cast<std::size_t>(C);
+    Sandwich<C> of_all(amounts_);
+    std::vector<Sandwich<1>> of_each;
+    for (const std::vector<double>& amounts : channels_) of_each.emplace_back(amounts);
+    rows_.forEachBlock([&](std::size_t first, Rows rows) {
+      Decays decays(*this, first, rows.size());
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const Eigen::Matrix<double, C, P> K = rows[i].columns();
+        of_all.add(K, decays, i);
+        if (of_each.empty()) continue;
+        const Eigen::Matrix<double, C, P> turned = axes_ * K;
+        for (std::size_t c = 0; c < channels; ++c) {
+          of_each[c].add(Eigen::Matrix<double, 1, P>(turned.row(static_cast<int>(c))), decays, i);
+        }
+      }
+    });
+    if (of_each.empty()) return of_all.matrix();
     Matrix middle = Matrix::Zero();
-    for (int c = 0; c < C; ++c) {
-      middle += sandwichOf(OneChannel<C, P>{rows_, c}, channels_[static_cast<std::size_t>(c)]);
-    }
-    return amounts_.empty() ? middle : LargerMatrix<P>(middle, sandwichOf(all(), amounts_)).matrix;
+    for (const Sandwich<1>& one : of_each) middle += one.matrix();
+    return amounts_.empty() ? middle : LargerMatrix<P>(middle, of_all.matrix()).matrix;
   }
 
  private:
   static constexpr std::size_t min_rows = 20;
+  static constexpr int steps = 9;
   static constexpr double white_prior = 0.8, min_weight = 1e-5, min_time_constants = 10, max_hidden = 3;
   static constexpr std::array shares{.1, .25, .5, .75, .9, .97, 1 - 1e-6};
 
-  AllChannels<C, P> all() const { return {rows_}; }
-  /// Equal times keep their order, so that the sums do.
-  void sortByTime() {
-    const auto earlier = [](const auto& x, const auto& y) { return x.time < y.time; };
-    if (std::is_sorted(rows_.begin(), rows_.end(), earlier)) return;
-    std::vector<std::size_t> order(rows_.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](auto i, auto k) { return earlier(rows_[i], rows_[k]); });
-    // In place, cycle by cycle: a row is large.
-    for (std::size_t first = 0; first < order.size(); ++first) {
-      const TimedRow<C, P> kept = rows_[first];
-      std::size_t to = first;
-      for (std::size_t from = order[to]; from != first; from = order[to]) {
-        rows_[to] = rows_[from];
-        order[to] = to;
-        to = from;
+  /// The time constant of a cell, by its number: 0 is white noise.
+  static std::size_t timeOf(std::size_t cell) { return cell == 0 ? 0 : 1 + (cell - 1) / shares.size(); }
+  /// exp(-Δ/τ) of the rows of a block from the row before, by the number of a time constant.
+  class Decays {
+   public:
+    Decays(const TimeModel& model, std::size_t first, std::size_t count)
+        : model_(model), first_(first), count_(count), lists_(model.time_constants_.size()) {}
+    double operator()(std::size_t time, std::size_t i) {
+      std::vector<double>& list = lists_[time];
+      if (list.empty()) {
+        const double tau = model_.time_constants_[time];
+        for (std::size_t k = first_; k < first_ + count_; ++k) {
+          const double gap = k > 0 ? model_.rows_.time(k) - model_.rows_.time(k - 1) : 0;
+          list.push_back(tau > 0 ? std::exp(-gap / tau) : 0);
+        }
       }
-      rows_[to] = kept;
-      order[to] = to;
+      return list[i];
     }
-  }
-  const std::vector<double>& decayOf(std::size_t cell) const {
-    return decay_[cell == 0 ? 0 : 1 + (cell - 1) / shares.size()];
-  }
-  void findDependence(const std::vector<double>& gaps, double duration, std::size_t fitted) {
-    std::vector<double> sorted = gaps;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+
+   private:
+    const TimeModel& model_;
+    std::size_t first_, count_;
+    std::vector<std::vector<double>> lists_;
+  };
+
+  /// Σ_ij c(t_i - t_j) K_iᵀ K_j for the variances that the cells add.
+  template <int R>
+  struct Sandwich {
+    explicit Sandwich(const std::vector<double>& amounts)
+        : all(std::accumulate(amounts.begin(), amounts.end(), 0.0)), lasting(1), past(1) {
+      for (std::size_t first = 1; first < amounts.size(); first += shares.size()) {
+        double sum = 0;
+        for (std::size_t k = 0; k < shares.size(); ++k) sum += amounts[first + k] * shares[k];
+        lasting.push_back(sum), past.emplace_back();
+      }
+    }
+    void add(const Eigen::Matrix<double, R, P>& K, Decays& decays, std::size_t i) {
+      if (all == 0) return;
+      own += K.transpose() * K;
+      for (std::size_t time = 1; time < lasting.size(); ++time) {
+        if (lasting[time] > 0) past[time].add(K, decays(time, i));
+      }
+    }
+    Matrix matrix() const {
+      Matrix middle = all * own;
+      for (std::size_t time = 1; time < lasting.size(); ++time) {
+        if (lasting[time] > 0) middle += lasting[time] * Matrix(past[time].past + past[time].past.transpose());
+      }
+      return middle;
+    }
+
+    double all;
+    std::vector<double> lasting;
+    std::vector<PastProducts<R, P>> past;
+    Matrix own = Matrix::Zero();
+  };
+
+  void makeCells(double duration) {
+    std::vector<double> gaps;
+    for (std::size_t i = 1; i < rows_.size(); ++i) gaps.push_back(rows_.time(i) - rows_.time(i - 1));
+    const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+    std::nth_element(gaps.begin(), middle, gaps.end());
     // Many rows may have one time; their median gap is then no scale.
-    const double shortest = std::max(0.7 * sorted[sorted.size() / 2], 1e-6 * duration), longest = 2 * duration;
-    constexpr int steps = 9;
+    const double shortest = std::max(0.7 * *middle, 1e-6 * duration), longest = 2 * duration;
     cells_.push_back({.prior = white_prior});
-    decay_.push_back(std::vector<double>(gaps.size(), 0.0));
+    time_constants_.push_back(0);
     for (int k = 0; k < steps; ++k) {
-      const double time_constant = shortest * std::pow(longest / shortest, k / (steps - 1.0));
-      decay_.push_back(decays(gaps, time_constant));
+      time_constants_.push_back(shortest * std::pow(longest / shortest, k / (steps - 1.0)));
       for (const double share : shares) {
-        cells_.push_back({.time_constant = time_constant,
+        cells_.push_back({.time_constant = time_constants_.back(),
                           .share = share,
                           .prior = (1 - white_prior) / (steps * static_cast<double>(shares.size()))});
       }
     }
-    judgeCells();
+  }
+  /// Sums over all rows, and over those cells that a block in the middle does not rule out where there are many.
+  void readRows() {
+    constexpr std::size_t many = 20000, block = 10000;
+    constexpr double ruled_out = 40;  // of a logarithm of likelihoods
+    std::vector<bool> worth(cells_.size(), true);
+    if (rows_.size() > many) {
+      const std::size_t first = (rows_.size() - block) / 2;
+      judgeCells(first, first + block, worth, [](const TimedRow<C, P>&) {});
+      TimeCell::Judged restricted, profile;
+      for (const TimeCell& cell : cells_) {
+        restricted.log_likelihood = std::max(restricted.log_likelihood, cell.restricted.log_likelihood);
+        profile.log_likelihood = std::max(profile.log_likelihood, cell.profile.log_likelihood);
+      }
+      for (std::size_t k = 0; k < cells_.size(); ++k) {
+        TimeCell& cell = cells_[k];
+        worth[k] = k == 0 || cell.restricted.log_likelihood > restricted.log_likelihood - ruled_out ||
+                   cell.profile.log_likelihood > profile.log_likelihood - ruled_out;
+        cell.restricted = cell.profile = {};
+      }
+    }
+    residuals_.reserve(rows_.size());
+    judgeCells(0, rows_.size(), worth, [this](const TimedRow<C, P>& row) {
+      information_ += row.columns().transpose() * row.columns();
+      power_ += row.residual().squaredNorm();
+      residuals_.push_back(row.residual());
+    });
+  }
+  template <class Take>
+  void judgeCells(std::size_t begin, std::size_t end, const std::vector<bool>& worth, const Take& take) {
+    std::vector<CellSums<C, P>> sums;
+    for (const TimeCell& cell : cells_) sums.push_back({{cell.share}});
+    rows_.forEachBlock(begin, end, [&](std::size_t first, Rows rows) {
+      Decays decays(*this, first, rows.size());
+      for (std::size_t k = 0; k < cells_.size(); ++k) {
+        if (!worth[k]) continue;
+        for (std::size_t i = 0; i < rows.size(); ++i) sums[k].add(rows[i].values, decays(timeOf(k), i));
+      }
+      for (const TimedRow<C, P>& row : rows) take(row);
+    });
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      if (worth[k]) judgeCell<C, P>(cells_[k], sums[k], end - begin, held_);
+    }
+  }
+  void findDependence(double duration, std::size_t fitted) {
     // Over many time constants the residuals show the dependence by themselves. The restricted likelihood, which few of
     // them need, may take an error of the model that a shift of the parameters explains, such as a delay between
     // streams, for a process that drifts without end.
@@ -329,7 +450,7 @@ class TimeModel {
       const auto heaviest = std::max_element(cells_.begin(), cells_.end(),
                                              [](const auto& a, const auto& b) { return a.weight < b.weight; });
       const auto k = static_cast<std::size_t>(heaviest - cells_.begin());
-      if (k != 0 && !isBelievable(*heaviest, decayOf(k))) {
+      if (k != 0 && !isBelievable(*heaviest, timeOf(k))) {
         likelihood_ = &TimeCell::profile;
         weigh();
       }
@@ -338,25 +459,24 @@ class TimeModel {
     amounts_ = amountsOf(likelihood_);
     if (C > 1 && likelihood_ == &TimeCell::profile) judgeChannels(static_cast<double>(fitted));
   }
-  Eigen::Matrix<double, C, C> scatter() const {
-    Eigen::Matrix<double, C, C> sum = Eigen::Matrix<double, C, C>::Zero();
-    for (const auto& row : rows_) sum += row.residual() * row.residual().transpose();
+  Square scatter() const {
+    Square sum = Square::Zero();
+    for (const Residual& u : residuals_) sum += u * u.transpose();
     return sum;
   }
   void turnToPrincipalAxes() {
-    using Square = Eigen::Matrix<double, C, C>;
     const Square all = scatter(), off = all - Square(all.trace() / C * Square::Identity());
     // Axes of the same variance are as good as any others.
     if (!(off.cwiseAbs().maxCoeff() > 1e-8 * all.trace())) return;
-    const Square axes = SymmetricEigen(all).vectors.transpose();
-    for (auto& row : rows_) row.values = (axes * row.values).eval();
+    axes_ = SymmetricEigen(all).vectors.transpose();
+    for (Residual& u : residuals_) u = (axes_ * u).eval();
   }
   /// The likelihood ratio of axes of equal variances (Mauchly, with Bartlett's factor): noise that is known up to a factor
   /// is stated to have them, and the residuals may refute it. Each principal axis then has its own.
   void judgeSizes(double fitted) {
     if (C == 1) return;
     const double freedom = static_cast<double>(rows_.size()) - fitted / C;
-    const Eigen::Matrix<double, C, C> covariance = scatter() / freedom;
+    const Square covariance = scatter() / freedom;
     const Cholesky<double, C> root(covariance);
     if (!root.ok()) return;
     const double ratio = freedom * (C * std::log(covariance.trace() / C) - root.logDeterminant());
@@ -365,19 +485,28 @@ class TimeModel {
     found_.unequal_axes = chiSquaredTail(bartlett * ratio, degrees) < refutation_level;
     if (!found_.unequal_axes || !channels_.empty()) return;
     turnToPrincipalAxes();
-    for (int c = 0; c < C; ++c) channels_.push_back({scatter()(c, c) / freedom});
+    const Square turned = scatter();
+    for (int c = 0; c < C; ++c) channels_.push_back({turned(c, c) / freedom});
   }
-  /// Turns the rows to the principal axes of their residuals, and weighs the cells for each of them.
+  /// Turns the residuals to their principal axes, and weighs the cells for each of them.
   void judgeChannels(double fitted) {
     const double freedom = static_cast<double>(rows_.size()) - fitted / C;
     turnToPrincipalAxes();
     const double of_white = std::pow(white_prior, 1.0 / C);
     const double of_others = (1 - of_white) / (static_cast<double>(cells_.size()) - 1);
-    std::vector<Eigen::Matrix<double, C, 1>> squares;
+    std::vector<Residual> squares;
     std::vector<double> log_dets;
-    for (std::size_t k = 0; k < cells_.size(); ++k) {
-      const auto [sum, log_det] = channelSums<C, P>(cells_[k].share, all(), decayOf(k));
-      squares.push_back(sum), log_dets.push_back(log_det);
+    for (const TimeCell& cell : cells_) {
+      CellGains gains{cell.share};
+      Residual sum = Residual::Zero(), state = sum;
+      const double tau = cell.time_constant;
+      for (std::size_t i = 0; i < residuals_.size(); ++i) {
+        state *= gains.next(tau > 0 && i > 0 ? std::exp((rows_.time(i - 1) - rows_.time(i)) / tau) : 0);
+        const Residual innovation = residuals_[i] - state;
+        sum += innovation.cwiseAbs2() * (1 / gains.total);
+        state += gains.gain * innovation;
+      }
+      squares.push_back(sum), log_dets.push_back(gains.log_det);
     }
     const TimeDependence of_all = found_;
     double white = 1, dependent = 0, share = 0, log_time = 0;
@@ -414,43 +543,6 @@ class TimeModel {
     }
     return list;
   }
-  template <class Rows>
-  Matrix sandwichOf(const Rows& rows, const std::vector<double>& amounts) const {
-    Matrix middle = std::accumulate(amounts.begin(), amounts.end(), 0.0) * ownProducts<P>(rows);
-    for (std::size_t first = 1; first < amounts.size(); first += shares.size()) {
-      double lasting = 0;
-      for (std::size_t k = first; k < first + shares.size(); ++k) lasting += amounts[k] * cells_[k].share;
-      if (lasting > 0) middle += lasting * pastProducts<P>(rows, decayOf(first));
-    }
-    return middle;
-  }
-  /// Judges the cells; where there are many rows, white noise and those cells alone that a block in the middle does not
-  /// rule out.
-  void judgeCells() {
-    constexpr std::size_t many = 20000, block = 10000;
-    constexpr double ruled_out = 40;  // of a logarithm of likelihoods
-    std::vector<bool> worth(cells_.size(), true);
-    if (rows_.size() > many) {
-      const std::size_t first = (rows_.size() - block) / 2;
-      const AllChannels<C, P> some{std::span<const TimedRow<C, P>>(rows_).subspan(first, block)};
-      TimeCell::Judged restricted, profile;
-      for (std::size_t k = 0; k < cells_.size(); ++k) {
-        TimeCell& cell = cells_[k];
-        judgeCell<C, P>(cell, some, std::span<const double>(decayOf(k)).subspan(first, block - 1), held_);
-        restricted.log_likelihood = std::max(restricted.log_likelihood, cell.restricted.log_likelihood);
-        profile.log_likelihood = std::max(profile.log_likelihood, cell.profile.log_likelihood);
-      }
-      for (std::size_t k = 0; k < cells_.size(); ++k) {
-        TimeCell& cell = cells_[k];
-        worth[k] = k == 0 || cell.restricted.log_likelihood > restricted.log_likelihood - ruled_out ||
-                   cell.profile.log_likelihood > profile.log_likelihood - ruled_out;
-        cell.restricted = cell.profile = {};
-      }
-    }
-    for (std::size_t k = 0; k < cells_.size(); ++k) {
-      if (worth[k]) judgeCell<C, P>(cells_[k], all(), decayOf(k), held_);
-    }
-  }
   /// Weights, and what they say, by the likelihood.
   bool weigh() {
     double best = -std::numeric_limits<double>::infinity(), sum = 0;
@@ -471,10 +563,15 @@ class TimeModel {
   }
   /// Residuals have the power s² (N - tr C M) under a cell. False where they have less than a third of it: the cell has
   /// taken what a shift of the parameters explains for a process that drifts, and claims errors that are not there.
-  bool isBelievable(const TimeCell& cell, std::span<const double> decay) const {
+  bool isBelievable(const TimeCell& cell, std::size_t time) const {
     constexpr double min_share = 1 / max_hidden;
+    PastProducts<C, P> past;
+    rows_.forEachBlock([&](std::size_t first, Rows rows) {
+      Decays decays(*this, first, rows.size());
+      for (std::size_t i = 0; i < rows.size(); ++i) past.add(rows[i].columns(), decays(time, i));
+    });
     Matrix normal = information();
-    Matrix sandwich = normal + cell.share * pastProducts<P>(all(), decay);
+    Matrix sandwich = normal + cell.share * Matrix(past.past + past.past.transpose());
     double known = 0;
     for (int k = 0; k < P; ++k) {
       if (!held_[static_cast<std::size_t>(k)]) continue;
@@ -488,10 +585,14 @@ class TimeModel {
 
   bool known_noise_;
   std::array<bool, static_cast<std::size_t>(P)> held_;
-  std::vector<TimedRow<C, P>> rows_;        // sorted by time; residuals along their principal axes, where channels are
-  std::vector<TimeCell> cells_;             // white noise first
-  std::vector<std::vector<double>> decay_;  // of white noise, then of each time constant
-  std::vector<double> amounts_;             // of the cells, in all channels alike
+  TimedRows<C, P> rows_;
+  std::vector<Residual> residuals_;  // in the order of times; along their principal axes, where channels are
+  Square axes_ = Square::Identity();
+  Matrix information_ = Matrix::Zero();
+  double power_ = 0;
+  std::vector<TimeCell> cells_;                // white noise first
+  std::vector<double> time_constants_;         // of white noise, 0, then those of the grid
+  std::vector<double> amounts_;                // of the cells, in all channels alike
   std::vector<std::vector<double>> channels_;  // the same of each channel; else empty
   TimeCell::Judged TimeCell::*likelihood_ = &TimeCell::profile;
   TimeDependence found_;
@@ -521,8 +622,7 @@ struct WidenedCovariance {
 /// units of the whitening if `known_noise`, else that of the residuals. At least 20 rows and three times as many
 /// residuals as parameters are needed; rows of one time alone say nothing.
 template <int C, int P>
-TimedCovariance<P> timedCovariance(std::vector<TimedRow<C, P>> rows, const Eigen::Matrix<double, P, P>& plain,
-                                   bool known_noise) {
+TimedCovariance<P> timedCovariance(TimedRows<C, P> rows, const Eigen::Matrix<double, P, P>& plain, bool known_noise) {
   const detail::TimeModel<C, P> model(std::move(rows), known_noise);
   TimedCovariance<P> result{model.dependence(), plain};
   // Where the rows do not speak for a dependence the covariance is to the last bit what it was.

@@ -52,7 +52,7 @@ std::vector<std::string> notesOfReading(const Trajectory& t) {
 PoseTrajectory posesOf(const Trajectory& t, bool with_matrices) {
   PoseTrajectory poses{
       .times = t.times, .poses = exactPoses(t.poses), .has_covariances = with_matrices, .name = t.name};
-  for (std::size_t i = 0; with_matrices && i < t.size(); ++i) poses.poses[i].covariance = t.covariances[i];
+  for (std::size_t i = 0; with_matrices && i < t.size(); ++i) poses.poses.setCovariance(i, t.covariances[i]);
   return poses;
 }
 

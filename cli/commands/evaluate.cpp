@@ -9,13 +9,10 @@
 #include <fusion/evaluate.hpp>
 #include <report/describe.hpp>
 #include <report/publish.hpp>
-#include <stats/quantile.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -67,53 +64,25 @@ std::vector<std::string> namesOf(const std::vector<std::string>& paths) {
   return names;
 }
 
-/// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too long
-/// for three to eight of them.
-std::vector<SegmentErrors> segmentErrors(const TrajectoryEvaluation& e) {
-  double path = 0;
-  for (std::size_t i = 1; i < e.matched.size(); ++i) {
-    path += (e.matched[i].reference.mean.translation() - e.matched[i - 1].reference.mean.translation()).norm();
-  }
-  std::vector<SegmentErrors> segments;
-  if (!(path > 1e-6) || !(path < 1e12)) return segments;
-  double step = 0;
-  for (int k = -8; k < 12 && step == 0; ++k) {
-    for (const double factor : {8.0, 16.0, 40.0}) {
-      if (step == 0 && 9 * factor * std::pow(10, k) > 0.8 * path) step = factor * std::pow(10, k);
-    }
-  }
-  if (step < 8 && 3 * 8 <= 0.8 * path) step = 8;
-  for (double length = step; length <= 0.8 * path && segments.size() < 8; length += step) {
-    auto pairs =
-        posePairs(e.matched, e.alignment,
-                  {.delta = length, .unit = DeltaUnit::meters, .all_pairs = true, .pairs_from_reference = true});
-    SegmentErrors s{.length = length, .pairs = pairs.size()};
-    if (pairs.empty()) continue;
-    const auto fill = [&](PoseRelation relation, ErrorStatistics& statistics, std::array<double, 5>& quantiles) {
-      const std::vector<double> errors = relativeErrors(e.matched, e.alignment, pairs, relation);
-      statistics = errorStatistics(errors);
-      constexpr std::array shares{0.05, 0.25, 0.5, 0.75, 0.95};
-      for (std::size_t q = 0; q < shares.size(); ++q) quantiles[q] = quantile(errors, shares[q]);
-    };
-    fill(PoseRelation::trans_part, s.translation, s.translation_quantiles);
-    fill(PoseRelation::angle_deg, s.rotation, s.rotation_quantiles);
-    segments.push_back(s);
-  }
-  return segments;
-}
-
 /// A file as the library takes it, with the convention of its covariances if the file does not state it. The file's poses
-/// are given up, of which millions would stand in memory twice.
+/// are given up, of which millions would stand in memory twice, and so are its lines and the digits of its times but
+/// for the first and the last.
 PoseTrajectory poseTrajectory(Trajectory& t, const std::string& convention, std::string_view option) {
-  PoseTrajectory p{
-      .times = t.times, .has_covariances = t.hasCovariances(), .name = t.name, .lines = std::move(t.lines)};
-  for (std::size_t i = 0; i < p.lines.size(); ++i) {
-    if (p.lines[i] == 0) p.lines[i] = i + 1;
+  PoseTrajectory p{.times = t.times, .has_covariances = t.hasCovariances(), .name = t.name};
+  std::vector<std::size_t> lines = std::exchange(t.lines, {});
+  if (t.time_texts.size() > 2) {
+    TextList ends;
+    ends.push_back(t.time_texts.front()), ends.push_back(t.time_texts.back());
+    t.time_texts = std::move(ends);
   }
   if (!t.hasCovariances()) {
     p.poses = exactPoses(std::exchange(t.poses, {}));
     return p;
   }
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i] == 0) lines[i] = i + 1;
+  }
+  p.lines = std::move(lines);
   const auto given = convention.empty() ? std::nullopt : std::optional(conventionNamed(convention, option));
   const Convention c = conventionOf(t, given, option);
   p.covariance_convention = describe(c);
@@ -153,7 +122,6 @@ EvaluatedEstimate evaluateOne(const EvaluateOptions& o, const Trajectory& refere
       .evaluation = evaluateTrajectory(reference_poses, poseTrajectory(estimate, o.cov_from, "--cov-from"), o.how)};
   if (!e.evaluation.ok()) refuse(o, e.evaluation, reference, estimate);
   e.evaluation.notes.insert(e.evaluation.notes.begin(), estimate.notes.begin(), estimate.notes.end());
-  if (!o.json.empty() || !o.report.empty()) e.segments = segmentErrors(e.evaluation);
   return e;
 }
 
@@ -195,6 +163,8 @@ int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
   if (std::count(o.estimates.begin(), o.estimates.end(), "-") + (o.reference == "-" ? 1 : 0) > 1) {
     throw OptionError(evaluate_name, "several files are standard input", "one");
   }
+  // Of millions of poses they take as long as the rest.
+  o.how.segments = !o.json.empty() || !o.report.empty();
   EvaluationOutput output;
   output.reference = namesOf({o.reference})[0];
   Trajectory reference = readTimedTrajectory(o.reference, o.input.reference, o.input.duplicates);

@@ -18,6 +18,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace liestat::cli {
@@ -34,16 +35,6 @@ struct Options {
   std::vector<std::string> unknowns;
   HandEyeOptions estimate;
 };
-
-/// The poses of a file as a stream, read as is meant.
-std::vector<TimedPose> streamOf(const FeatureFile& file, bool inverted) {
-  std::vector<TimedPose> stream;
-  const std::vector<SE3d> poses = featuresOf<SE3d>(file);
-  for (std::size_t i = 0; i < poses.size() && i < file.times.size(); ++i) {
-    stream.push_back({file.times[i], inverted ? poses[i].inverse() : poses[i]});
-  }
-  return stream;
-}
 
 /// The sigmas of a file without covariances: 1 mm and 0.1 degrees, until the residuals tell.
 Eigen::Matrix<double, 6, 1> assumedSigma() {
@@ -89,11 +80,22 @@ HandEyeFile fileOf(const FeatureFile& file, const std::string& path, const std::
   }
   return result;
 }
-std::vector<Gaussian<SE3d>> posesOf(const FeatureFile& file, const HandEyeFile& how) {
-  if (how.noise == PoseNoise::columns) return gaussiansOf<SE3d>(file);
-  std::vector<Gaussian<SE3d>> poses;
-  for (const SE3d& pose : featuresOf<SE3d>(file)) poses.push_back({pose, how.sigma.cwiseAbs2().asDiagonal()});
-  return poses;
+/// A pose as the file has it, with its noise.
+SE3d meanOf(const FeatureFile& file, std::size_t row) {
+  return SE3d::fromParams((SE3d::Params() << file.rotations[row].coeffs(), file.positions[row]).finished());
+}
+Gaussian<SE3d> poseOf(const FeatureFile& file, const HandEyeFile& how, std::size_t row) {
+  if (how.noise == PoseNoise::columns) return {meanOf(file, row), file.covariances[row]};
+  return {meanOf(file, row), how.sigma.cwiseAbs2().asDiagonal()};
+}
+/// The poses of a file as a stream, read as is meant.
+std::vector<TimedPose> streamOf(const FeatureFile& file, bool inverted) {
+  std::vector<TimedPose> stream;
+  stream.reserve(file.size());
+  for (std::size_t i = 0; i < file.size(); ++i) {
+    stream.push_back({file.times[i], inverted ? meanOf(file, i).inverse() : meanOf(file, i)});
+  }
+  return stream;
 }
 void addNotes(std::vector<std::string>& notes, const FeatureFile& file, const std::string& name) {
   if (!file.weights.empty()) notes.push_back(fmt::format("the weights of {} are not used", name));
@@ -103,22 +105,28 @@ void addNotes(std::vector<std::string>& notes, const FeatureFile& file, const st
   }
 }
 
-/// The pairs as the files have them.
-std::vector<PosePair> givenPairs(const PosePairs& pairs, const HandEyeOutput& output) {
-  const std::vector<Gaussian<SE3d>> a = posesOf(pairs.a, output.a), b = posesOf(pairs.b, output.b);
-  std::vector<PosePair> given;
-  for (const PoseRows& rows : pairs.rows) given.push_back({a[rows.a], b[rows.b]});
-  return given;
+/// The poses of a file that belong to pairs, read as is meant. The file's covariances are given up.
+PackedPoses meantPoses(FeatureFile& file, const HandEyeFile& how, const PoseReading& reading,
+                       const std::vector<PoseRows>& rows, std::size_t PoseRows::*row) {
+  PackedPoses poses;
+  poses.reserve(rows.size());
+  for (const PoseRows& pair : rows) {
+    poses.push_back(readPose(poseOf(file, how, pair.*row), reading));
+  }
+  file.covariances = {}, file.factors = {};
+  return poses;
 }
-void requireDifferentPoses(const std::vector<PosePair>& pairs, const HandEyeOutput& output) {
+void requireDifferentPoses(const PosePairs& pairs, const HandEyeOutput& output) {
   for (const bool is_a : {true, false}) {
-    const auto pose = [&](const PosePair& pair) { return (is_a ? pair.a : pair.b).mean.params(); };
-    const auto first = pose(pairs.front());
-    const bool same = std::all_of(pairs.begin(), pairs.end(), [&](const PosePair& pair) {
-      return (pose(pair) - first).cwiseAbs().maxCoeff() < 1e-12 * (1 + first.cwiseAbs().maxCoeff());
+    const FeatureFile& file = is_a ? pairs.a : pairs.b;
+    const auto pose = [&](const PoseRows& rows) { return meanOf(file, is_a ? rows.a : rows.b).params(); };
+    const SE3d::Params first = pose(pairs.rows.front());
+    const bool same = std::all_of(pairs.rows.begin(), pairs.rows.end(), [&](const PoseRows& rows) {
+      return (pose(rows) - first).cwiseAbs().maxCoeff() < 1e-12 * (1 + first.cwiseAbs().maxCoeff());
     });
     if (same) {
-      throw InputError((is_a ? output.a : output.b).path, 0, fmt::format("all {} poses are the same", pairs.size()),
+      throw InputError((is_a ? output.a : output.b).path, 0,
+                       fmt::format("all {} poses are the same", pairs.rows.size()),
                        output.result.world ? "at least three different ones" : "motions that differ");
     }
   }
@@ -136,11 +144,11 @@ HandEyeOutput calibrate(Options options) {
                                                       : AngleUnit::unsaid;
   options.pairs.least = options.relative ? 2 : 3;
   if (!std::isfinite(options.pairs.tolerance)) throw OptionError(command_name, "--tolerance is not finite", "s");
-  const PosePairs pairs = readPosePairs(options.file_a, options.file_b, options.pairs);
+  PosePairs pairs = readPosePairs(options.file_a, options.file_b, options.pairs);
   HandEyeOutput output;
   output.a = fileOf(pairs.a, options.file_a, options.sigma_a, "--sigma-a", options.invert_a, pairs.unmatched_a);
   output.b = fileOf(pairs.b, options.file_b, options.sigma_b, "--sigma-b", options.invert_b, pairs.unmatched_b);
-  output.rows = pairs.rows, output.by_time = pairs.by_time;
+  output.by_time = pairs.by_time;
   output.tolerance = options.pairs.tolerance, output.largest_gap = pairs.largest_gap;
   addNotes(output.notes, pairs.a, output.a.path), addNotes(output.notes, pairs.b, output.b.path);
   output.options = options.estimate;
@@ -153,19 +161,24 @@ HandEyeOutput calibrate(Options options) {
   if (std::all_of(pairs.rows.begin(), pairs.rows.end(), timed)) {
     for (const PoseRows& rows : pairs.rows) output.options.times.push_back(*rows.time);
   }
-  const std::vector<PosePair> given = givenPairs(pairs, output);
-  requireDifferentPoses(given, output);
+  requireDifferentPoses(pairs, output);
   HandEyeHintOptions hints;
   hints.reading.a.inverted = options.invert_a, hints.reading.b.inverted = options.invert_b;
   hints.doubt_a = output.a.noise == PoseNoise::columns, hints.doubt_b = output.b.noise == PoseNoise::columns;
   hints.estimate = output.options;
-  std::vector<PosePair> meant;
-  for (const PosePair& pair : given) meant.push_back(readPair(pair, hints.reading));
+  std::vector<PosePair> to_explain;
+  for (const std::size_t i :
+       pairsToExplain(pairs.rows.size(), [&](std::size_t k) { return meanOf(pairs.b, pairs.rows[k].b); })) {
+    to_explain.push_back({poseOf(pairs.a, output.a, pairs.rows[i].a), poseOf(pairs.b, output.b, pairs.rows[i].b)});
+  }
+  PosePairList meant;
+  meant.a = meantPoses(pairs.a, output.a, hints.reading.a, pairs.rows, &PoseRows::a);
+  meant.b = meantPoses(pairs.b, output.b, hints.reading.b, pairs.rows, &PoseRows::b);
   for (const std::string& unknown : options.unknowns) {
     const auto suspect = static_cast<std::size_t>(*named<HandEyeSuspect>(unknown));
     output.options.suspect_sigmas[suspect] = std::numeric_limits<double>::infinity();
   }
-  HandEyeOptions& estimate = output.options;
+  HandEyeOptions estimate = output.options;
   if (pairs.by_time && !options.relative) {
     estimate.stream_of_a = streamOf(pairs.a, options.invert_a);
     if (estimate.interpolate) {
@@ -176,17 +189,20 @@ HandEyeOutput calibrate(Options options) {
                       "files with times, without --by-row and --relative");
   }
   hints.estimate = output.options;
-  hints.estimate.interpolate = false;  // the stream is read as is meant, the hints are other readings
-  output.result = options.relative ? estimateHandEye(meant, output.options) : estimateRobotWorld(meant, output.options);
+  output.options.times = {};
+  output.rows = std::move(pairs.rows);
+  pairs = {};
+  output.result = options.relative ? estimateHandEye(std::move(meant), std::move(estimate))
+                                   : estimateRobotWorld(std::move(meant), std::move(estimate));
   if (output.result.fault.kind == FaultKind::bad_covariance) {
-    const PoseRows& rows = pairs.rows[output.result.fault.index];
+    const PoseRows& rows = output.rows[output.result.fault.index];
     throw InputError(
         output.a.path, rows.line_a,
         fmt::format("the covariances of this pose and of {}:{} are singular together", output.b.path, rows.line_b),
         "noise in one of them in each direction");
   }
   if (output.result.fault) throw OptionError(command_name, describe(output.result.fault));
-  output.hint = explainHandEye(given, output.result, hints);
+  output.hint = explainHandEye(to_explain, output.result, hints);
   return output;
 }
 

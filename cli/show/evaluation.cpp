@@ -233,12 +233,12 @@ Plot segmentPlot(const EvaluationOutput& output) {
   const auto n = static_cast<double>(output.estimates.size());
   for (std::size_t k = 0; k < output.estimates.size(); ++k) {
     const EvaluatedEstimate& e = output.estimates[k];
-    if (e.segments.empty()) continue;
-    const double step = e.segments.front().length, width = 0.7 * step / n;
+    if (e.evaluation.segments.empty()) continue;
+    const double step = e.evaluation.segments.front().length, width = 0.7 * step / n;
     for (auto& [panel, quantiles] : {std::pair(&translation, &SegmentErrors::translation_quantiles),
                                      std::pair(&rotation, &SegmentErrors::rotation_quantiles)}) {
       Series box{.style = Style::spans, .colour = k}, bar{.name = e.name, .style = Style::errorbars, .colour = k};
-      for (const SegmentErrors& s : e.segments) {
+      for (const SegmentErrors& s : e.evaluation.segments) {
         const std::array<double, 5>& q = s.*quantiles;
         const double at = s.length + width * (static_cast<double>(k) - 0.5 * (n - 1));
         box.add(at, q[2]), box.addBand(at, q[1], q[3]), box.width.push_back(width);
@@ -324,7 +324,7 @@ void writeEvaluationReport(const std::string& directory, const std::string& comm
   for (std::size_t k = 0; k < output.estimates.size(); ++k) report.plot(colouredPath(output.estimates[k], k + 1));
   if (output.estimates.size() > 1) report.plot(trajectoryPlot(output));
   if (std::any_of(output.estimates.begin(), output.estimates.end(),
-                  [](const auto& e) { return !e.segments.empty(); })) {
+                  [](const auto& e) { return !e.evaluation.segments.empty(); })) {
     report.section("Errors by the length of a segment");
     report.plot(segmentPlot(output));
   }

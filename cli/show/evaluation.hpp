@@ -10,31 +10,15 @@
 
 namespace liestat::cli {
 
-/// Errors of the relative motion over all segments of a length, measured along the reference.
-struct SegmentErrors {
-  double length = 0;                                ///< m
-  std::size_t pairs = 0;                            ///< segments, which overlap
-  ErrorStatistics translation = {}, rotation = {};  ///< m, deg
-  /// Quantiles at 5, 25, 50, 75 and 95 %.
-  std::array<double, 5> translation_quantiles = {}, rotation_quantiles = {};
-};
-template <class V>
-void describe(V& v, const SegmentErrors& s) {
-  v("length", s.length, "along the reference", "m")("pairs", s.pairs, "segments");
-  v("translation", s.translation, "", "m")("rotation", s.rotation, "", "deg");
-}
-
 /// One estimate as `liestat evaluate` shows it.
 struct EvaluatedEstimate {
   std::string name;  ///< name of the file, with as much of its path as tells it from the others
   TrajectoryEvaluation evaluation;
-  std::vector<SegmentErrors> segments = {};  ///< by ascending length, if a page or JSON shows them
 };
 template <class V>
 void describe(V& v, const EvaluatedEstimate& e) {
   v("file", e.name);
   describe(v, e.evaluation);
-  v("segments", e.segments, "errors by the length of a segment");
 }
 
 /// The result of `liestat evaluate`: at least one estimate.

@@ -631,6 +631,12 @@ class _WhitenedResidualTests(Result):
     lag: _ResidualTest
     gross: _ResidualTest  # NEES that a fifth of the poses exceed; p holds whatever the dependence of the errors
 
+class _SegmentErrors(Result):
+    length: float  # along the reference; m
+    pairs: int  # segments
+    translation: _ErrorStatistics  # m
+    rotation: _ErrorStatistics  # deg
+
 class _TrajectoryEvaluation(Result):
     reference_poses: int  # their number
     association: str  # in words
@@ -658,6 +664,7 @@ class _TrajectoryEvaluation(Result):
     rpe_nees: _ResidualTest | None  # of relative motions
     indefinite: _Array  # matched poses whose covariance is not positive definite
     notes: list[str]  # what is remarkable, in sentences
+    segments: list[_SegmentErrors]  # errors by the length of a segment
     rows: _Array  # of the estimate
     times: _Array  # s
     ape_errors: _Array  # ape_unit

@@ -76,7 +76,7 @@ DiagnosedRun runOf(const GivenRun& given, const std::optional<PoseTrajectory>& t
   const auto& [poses, matrices, times] = given;
   PoseTrajectory estimate = trajectoryOf(poses, times);
   const std::vector<Matrix6> all = matricesOf(matrices);
-  for (std::size_t i = 0; i < all.size(); ++i) estimate.poses[i].covariance = all[i];
+  for (std::size_t i = 0; i < all.size(); ++i) estimate.poses.setCovariance(i, all[i]);
   if (!truth) {
     DiagnosedRun run{{}, estimate.times};
     for (const Gaussian<SE3d>& pose : estimate.poses) run.poses.push_back({pose.mean, pose.covariance, pose.mean});

@@ -85,10 +85,10 @@ PoseTrajectory trajectoryOf(const DoubleArray& poses, const py::object& times, c
     const auto stamps = times.cast<DoubleArray>();
     t.times.assign(stamps.data(), stamps.data() + stamps.size());
   }
-  t.poses.resize(static_cast<std::size_t>(poses.shape(0)));
-  for (std::size_t i = 0; i < t.poses.size(); ++i) {
-    t.poses[i].mean = point<SE3d>(poses.data() + 7 * i);
-    if (t.has_covariances) t.poses[i].covariance = square<6>(matrices.data() + 36 * i);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(poses.shape(0)); ++i) {
+    Gaussian<SE3d> pose{point<SE3d>(poses.data() + 7 * i), Eigen::Matrix<double, 6, 6>::Zero()};
+    if (t.has_covariances) pose.covariance = square<6>(matrices.data() + 36 * i);
+    t.poses.push_back(pose);
   }
   return t;
 }

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <array>
 #include <vector>
 
 namespace liestat {
@@ -23,6 +24,14 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 
 PoseTrajectory trajectory(std::vector<double> times, std::vector<Gaussian<SE3d>> poses, bool has_covariances = false) {
   return {.times = std::move(times), .poses = std::move(poses), .has_covariances = has_covariances};
+}
+
+/// Calls change(Gaussian<SE3d>&) for each pose.
+template <class Change>
+void changeAll(NoisyPoses& poses, const Change& change) {
+  NoisyPoses changed;
+  for (Gaussian<SE3d> g : poses) change(g), changed.push_back(g);
+  poses = changed;
 }
 
 /// A scene whose estimate is in a world of its own, with covariances times a factor; `scale` of its lengths.
@@ -38,12 +47,12 @@ struct Scene {
         dead_reckoning ? experiments::deadReckoningScene(options, rng) : experiments::independentScene(options, rng);
     reference = trajectory(scene.times, scene.reference());
     estimate = trajectory(scene.times, scene.estimate, true);
-    for (Gaussian<SE3d>& g : estimate.poses) {
+    changeAll(estimate.poses, [&](Gaussian<SE3d>& g) {
       if (turned) g.mean = SE3d(SO3d::rotZ(0.7), Eigen::Vector3d(3, -2, 1)) * g.mean;
       g.mean = SE3d(g.mean.so3(), Eigen::Vector3d(scale * g.mean.translation()));
       g.covariance *= covariance;
       g.covariance.topRows<3>() *= scale, g.covariance.leftCols<3>() *= scale;
-    }
+    });
   }
   TrajectoryEvaluation evaluate(const EvaluationOptions& options = {.alignment = AlignmentModel::se3}) const {
     return evaluateTrajectory(reference, estimate, options);
@@ -85,7 +94,9 @@ TEST(EvaluateTrajectory, VerdictsAreYesNoOrNone) {
   EXPECT_EQ(without.ape_statistics.rmse, right.ape_statistics.rmse);
 
   Scene broken;
-  broken.estimate.poses[7].covariance(0, 0) = -1;
+  NoisyPoses::Covariance bad = broken.estimate.poses.covariance(7);
+  bad(0, 0) = -1;
+  broken.estimate.poses.setCovariance(7, bad);
   const TrajectoryEvaluation none = broken.evaluate();
   EXPECT_TRUE(none.verdict().isNone());
   EXPECT_EQ(none.consistency.indefinite, std::vector<std::size_t>{7});
@@ -222,7 +233,7 @@ TEST(EvaluateTrajectory, ThinsOut) {
   // Turned to and fro by 30 degrees, the body is never more than 30 from where it was, however far it has turned.
   PoseTrajectory swaying = line(10, 0.5, 0);
   for (std::size_t i = 1; i < 10; i += 2)
-    swaying.poses[i].mean = swaying.poses[i].mean * SE3d(SO3d::rotZ(0.5), {0, 0, 0});
+    swaying.poses.mean(i) = swaying.poses.mean(i) * SE3d(SO3d::rotZ(0.5), {0, 0, 0});
   EXPECT_EQ(evaluateTrajectory(swaying, swaying, {.motion_filter = MotionThinning{1.9, 35}}).rows,
             (std::vector<std::size_t>{0, 4, 8}));
   // The filter follows the path of the poses that are left.
@@ -239,10 +250,10 @@ TEST(EvaluateTrajectory, RobotsAtRestHaveAVerdict) {
   PoseTrajectory reference = line(60, 0, 0), estimate = reference;
   estimate.has_covariances = true;
   const SE3d world(SO3d::rotZ(0.7), Eigen::Vector3d(3, -2, 1));
-  for (Gaussian<SE3d>& g : estimate.poses) {
+  changeAll(estimate.poses, [&](Gaussian<SE3d>& g) {
     g.covariance = experiments::sceneCovariance({}, rng);
     g.mean = world * g.mean * sample(Gaussian<SE3d>{SE3d(), g.covariance}, rng).inverse();
-  }
+  });
   const TrajectoryEvaluation e = evaluateTrajectory(reference, estimate, {.alignment = AlignmentModel::se3});
   ASSERT_TRUE(e.ok()) << e.reason;
   EXPECT_TRUE(e.verdict().isYes()) << e.verdict().text;
@@ -271,11 +282,11 @@ TEST(EvaluateTrajectory, GrossOverconfidenceHasAVerdict) {
 TEST(EvaluateTrajectory, ProjectsIntoAPlane) {
   const PoseTrajectory reference = line(10);
   PoseTrajectory estimate = reference;
-  for (Gaussian<SE3d>& g : estimate.poses) {
+  changeAll(estimate.poses, [&](Gaussian<SE3d>& g) {
     g.mean = SE3d(SO3d::rotZ(0.3), Eigen::Vector3d(0, 3, 4)) * g.mean * SE3d(SO3d::rotX(0.2), Eigen::Vector3d::Zero());
-    g.mean = SE3d(g.mean.so3(), Eigen::Vector3d(reference.poses[0].mean.translation() + Eigen::Vector3d(0, 3, 4)));
-  }
-  estimate.poses.resize(1), estimate.times.resize(1);
+    g.mean = SE3d(g.mean.so3(), Eigen::Vector3d(reference.poses.mean(0).translation() + Eigen::Vector3d(0, 3, 4)));
+  });
+  estimate.poses = estimate.poses.rows(std::array<std::size_t, 1>{0}), estimate.times.resize(1);
   estimate.poses.push_back(reference.poses[1]), estimate.times.push_back(1);
   const auto first = [&](std::optional<CoordinatePlane> plane) {
     const TrajectoryEvaluation e = evaluateTrajectory(reference, estimate, {.project_to_plane = plane});

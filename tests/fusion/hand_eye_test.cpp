@@ -72,28 +72,6 @@ TEST(HandEye, JacobiansAgreeWithDifferences) {
   }
 }
 
-TEST(HandEye, HeldDirectionsAgreeWithDifferences) {
-  CounterRng rng(2);
-  for (const double size : {1e-6, 0.3, 1.0}) {
-    const auto pose = [&] { return SE3d(SO3d(rng.unitQuaternion()), rng.normalVector<3>()); };
-    detail::HeldDirections<detail::RobotWorldEquation> held{pose()};
-    for (int k = 0; k < 6; ++k) held.rows.col(k) = rng.normalVector<6>();
-    const SE3d X = pose(), Y = held.reference * SE3d::exp(size * rng.unitVector<6>());
-    const auto at = [&](const SE3d& step) { return detail::RobotWorldEquation::parameter({X, Y * step}); };
-    const auto d = held.linearize(at(SE3d()));
-    const double h = 1e-6;
-    Matrix6 by_y;
-    for (int k = 0; k < 6; ++k) {
-      const SE3d plus = SE3d::exp(h * Vector6::Unit(k));
-      by_y.col(k) = (held(at(plus)) - held(at(plus.inverse()))) / (2 * h);
-    }
-    EXPECT_LT((d.value - held(at(SE3d()))).norm(), 1e-14 * (1 + d.value.norm())) << size;
-    EXPECT_EQ(d.by_parameter.leftCols<6>().norm(), 0);
-    // Second order in h, and rounding over h.
-    EXPECT_LT((d.by_parameter.rightCols<6>() - by_y).norm(), 1e-8 * (1 + by_y.norm())) << size;
-  }
-}
-
 // The step solves the normal equations, whatever is eliminated and whichever basis the directions have.
 TEST(HandEye, StepsSolveTheNormalEquations) {
   CounterRng rng(3);
@@ -216,6 +194,28 @@ TEST(HandEye, TheOrderOfThePairsChangesNoBit) {
 /// The error between estimates, in standard deviations.
 double apart(const Gaussian<SE3d>& x, const SE3d& y) { return std::sqrt(squared(x, y)); }
 Matrix6 carried(const SE3d& f, const Matrix6& covariance) { return f.Adj() * covariance * f.Adj().transpose(); }
+
+// Covariances that differ are kept apart, equal ones once; neither changes the result.
+TEST(HandEye, ListsOfLittleMemoryGiveTheSame) {
+  HandEyeScene scene({.pairs = 30}, 6);
+  for (const bool same : {true, false}) {
+    for (std::size_t i = 0; i < scene.pairs.size(); ++i) {
+      scene.pairs[i].a.covariance = (same ? 1e-6 : 1e-6 * static_cast<double>(1 + i % 3)) * Matrix6::Identity();
+    }
+    const PosePairList list{std::span<const PosePair>(scene.pairs)};
+    EXPECT_EQ(list.a.keepsEach(), !same);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      EXPECT_EQ((list[i].a.covariance - scene.pairs[i].a.covariance).norm(), 0);
+      EXPECT_EQ((list[i].b.covariance - scene.pairs[i].b.covariance).norm(), 0);
+    }
+    const HandEyeResult one = estimateRobotWorld(scene.pairs), two = estimateRobotWorld(list, HandEyeOptions{});
+    EXPECT_EQ((one.X.mean.params() - two.X.mean.params()).norm(), 0);
+    EXPECT_EQ((one.covariance - two.covariance).norm(), 0);
+  }
+  PosePair skew = scene.pairs[0];
+  skew.a.covariance(0, 1) += 1e-6;
+  EXPECT_TRUE(std::isnan(PosePairList(std::vector<PosePair>{skew})[0].a.covariance(0, 0)));
+}
 
 TEST(HandEye, InvariantUnderFramesUnitsAndExchange) {
   CounterRng rng(4);

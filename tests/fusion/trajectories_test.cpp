@@ -689,8 +689,8 @@ TEST(Trajectories, TruthWithCovarianceIsAdded) {
 
 TEST(Trajectories, DegenerateInputIsSaid) {
   CounterRng rng(10);
-  EXPECT_FALSE(alignWeighted({}, AlignmentModel::se3).ok);
-  EXPECT_FALSE(alignUmeyama({}, AlignmentModel::se3).ok);
+  EXPECT_FALSE(alignWeighted(MatchedPoses{}, AlignmentModel::se3).ok);
+  EXPECT_FALSE(alignUmeyama(MatchedPoses{}, AlignmentModel::se3).ok);
   // Collinear positions leave the rotation open in least squares, but not in poses.
   TrajectoryScene scene = experiments::independentScene({.n = 10}, rng);
   for (std::size_t i = 0; i < 10; ++i) {

@@ -162,6 +162,23 @@ TEST(TimeDependence, DoesNotDependOnTheOrderAndMakesNothingSmaller) {
   EXPECT_NEAR(std::log(one.dependence.time_constant / 0.95), 0, std::log(4.0)) << "-0.1/log(0.9) s";
 }
 
+// A long list is computed again in each pass, in blocks; here from its end.
+TEST(TimeDependence, ComputedRowsAreAsGoodAsKeptOnes) {
+  const Drawn d = draw(5000, 0.9, 1, 2);
+  const std::size_t n = d.rows.size();
+  std::vector<double> times;
+  for (std::size_t i = 0; i < n; ++i) times.push_back(d.rows[n - 1 - i].time);
+  for (const bool known : {true, false}) {
+    const TimedCovariance<P> kept = timedCovariance<C, P>(d.rows, d.plain, known);
+    const TimedRows<C, P> computed(times,
+                                   [&](std::size_t i, TimedRow<C, P>& row) { row.values = d.rows[n - 1 - i].values; });
+    const TimedCovariance<P> streamed = timedCovariance<C, P>(computed, d.plain, known);
+    EXPECT_GT(kept.dependence.correlation_factor, 2);
+    EXPECT_LT((streamed.covariance - kept.covariance).norm(), 1e-12 * kept.covariance.norm());
+    EXPECT_NEAR(streamed.dependence.time_constant, kept.dependence.time_constant, 1e-12);
+  }
+}
+
 TEST(TimeDependence, WhatCannotBeTestedIsNot) {
   Drawn d = draw(60, 0, 1);
   const Rows few(d.rows.begin(), d.rows.begin() + 12);

@@ -24,22 +24,20 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace liestat {
 namespace detail {
 
-/// One calibration, from the pairs to the result.
-template <class Equation>
+/// One calibration, from the pairs to the result: AX = YB (`world`) or AX = XB.
+template <bool world>
 class HandEyeRun {
  public:
-  static constexpr bool world = std::is_same_v<Equation, RobotWorldEquation>;
   using Indices = std::vector<std::size_t>;
 
-  HandEyeRun(std::span<const PosePair> pairs, const HandEyeOptions& options)
-      : options_(options), pairs_(pairs.begin(), pairs.end()), order_(pairs.size()) {
+  HandEyeRun(PosePairList pairs, HandEyeOptions options)
+      : options_(std::move(options)), pairs_(std::move(pairs)), order_(pairs_.size()) {
     result_.world = world, result_.known_noise = options_.known_noise;
     std::iota(order_.begin(), order_.end(), std::size_t{0});
   }
@@ -47,12 +45,14 @@ class HandEyeRun {
   HandEyeResult run() {
     result_.fault = fault();
     if (result_.fault) return std::move(result_);
-    stream_ = PoseStream(options_.stream_of_a);
+    stream_ = PoseStream(std::exchange(options_.stream_of_a, {}));
     if (options_.interpolate) interpolate();
     if (!options_.times.empty()) values_[0] = startOfDelay();
     sortByContent();
     const Indices all = allPairs();
-    if (isUnknown() || !values_.isZero(0)) given_ = pairs_;
+    if (isUnknown() || !values_.isZero(0)) {
+      for (std::size_t i = 0; i < pairs_.size(); ++i) given_.push_back({pairs_.a.mean(i), pairs_.b.mean(i)});
+    }
     takeIn();
     fitAll(all);
     estimateSuspects();
@@ -68,6 +68,7 @@ class HandEyeRun {
 
  private:
   static constexpr int parameters = world ? 12 : 6;
+  using Covariance = Eigen::Matrix<double, parameters, parameters>;  // of X and Y, or of X
   /// With fewer, three pairs and one more that agree by chance would be a majority.
   static constexpr std::size_t min_pairs_for_search = 6;
   /// The median of χ²₆.
@@ -92,12 +93,11 @@ class HandEyeRun {
       if (!std::isfinite(time)) return FaultKind::bad_option;
     }
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      const PosePair& pair = pairs_[i];
-      if (!pair.a.mean.params().allFinite() || !pair.b.mean.params().allFinite())
+      if (!pairs_.a.mean(i).params().allFinite() || !pairs_.b.mean(i).params().allFinite())
         return {FaultKind::pose_not_finite, i};
       // Six equations need six errors; whether these are independent shows in the frames of the estimate.
-      const PosePairNoise noise(pair.a.covariance, pair.b.covariance);
-      if (!noise.valid() || !noise.coversAllDirections()) return {FaultKind::bad_covariance, i};
+      if (i > 0 && !pairs_.a.keepsEach() && !pairs_.b.keepsEach()) continue;
+      if (!coverAllDirections(pairs_.a.covariance(i), pairs_.b.covariance(i))) return {FaultKind::bad_covariance, i};
     }
     if (pairs_.size() < (world ? 3 : 2)) return {FaultKind::too_few_poses, pairs_.size()};
     return {};
@@ -108,14 +108,15 @@ class HandEyeRun {
     const Matrix6 error = stream_.interpolationError();
     done.translation = std::sqrt(error.topLeftCorner<3, 3>().trace());
     done.rotation = std::sqrt(error.bottomRightCorner<3, 3>().trace());
+    std::vector<std::size_t> interpolated;
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
       const std::optional<SE3d> pose = stream_.at(options_.times[i]);
-      if (!pose) {
-        ++done.in_gaps;
-        continue;
-      }
-      pairs_[i].a.mean = *pose;
-      if (options_.known_noise) pairs_[i].a.covariance += error;
+      if (pose) pairs_.a.mean(i) = *pose, interpolated.push_back(i);
+    }
+    done.in_gaps = pairs_.size() - interpolated.size();
+    if (options_.known_noise && done.in_gaps == 0) pairs_.a.addCovariance(std::nullopt, error);
+    if (options_.known_noise && done.in_gaps > 0) {
+      for (const std::size_t i : interpolated) pairs_.a.addCovariance(i, error);
     }
     result_.interpolation = done;
   }
@@ -123,34 +124,36 @@ class HandEyeRun {
     if (!(options_.largest_delay > 0)) return options_.delay_start;
     std::vector<TimedPose> of_b;
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      of_b.push_back({options_.times[i] + options_.delay_start, pairs_[i].b.mean});
+      of_b.push_back({options_.times[i] + options_.delay_start, pairs_.b.mean(i)});
     }
-    return options_.delay_start + delayOfSpeeds(stream_, PoseStream(of_b), options_.largest_delay);
+    return options_.delay_start + delayOfSpeeds(stream_, PoseStream(std::move(of_b)), options_.largest_delay);
   }
   /// By the numbers in the pairs, so that sums and samples do not depend on the order of the input.
   void sortByContent() {
-    const auto numbers = [](const PosePair& x) {
-      return std::array{std::span(x.b.mean.params().data(), 7), std::span(x.a.mean.params().data(), 7),
-                        std::span(x.b.covariance.data(), 36), std::span(x.a.covariance.data(), 36)};
+    const auto before = [](std::span<const double> x, std::span<const double> y) {
+      const auto [at, other] = std::mismatch(x.begin(), x.end(), y.begin());
+      return at == x.end() ? 0 : *at < *other ? -1 : 1;
     };
-    const auto before = [&](std::size_t i, std::size_t k) {
-      const auto x = numbers(pairs_[i]), y = numbers(pairs_[k]);
-      for (std::size_t part = 0; part < x.size(); ++part) {
-        const auto [at, other] = std::mismatch(x[part].begin(), x[part].end(), y[part].begin());
-        if (at != x[part].end()) return *at < *other;
+    const auto numbers = [](const auto& list) { return std::span<const double>(list.data(), list.size()); };
+    const auto compared = [&](std::size_t i, std::size_t k) {
+      for (const PackedPoses* poses : {&pairs_.b, &pairs_.a}) {
+        const int sign = before(numbers(poses->mean(i).params()), numbers(poses->mean(k).params()));
+        if (sign != 0) return sign;
       }
-      return i < k;
+      for (const PackedPoses* poses : {&pairs_.b, &pairs_.a}) {
+        if (!poses->keepsEach()) continue;
+        const int sign = before(numbers(poses->covariance(i)), numbers(poses->covariance(k)));
+        if (sign != 0) return sign;
+      }
+      return i < k ? -1 : 1;
     };
-    std::sort(order_.begin(), order_.end(), before);
-    std::vector<PosePair> sorted;
-    sorted.reserve(pairs_.size());
-    for (const std::size_t i : order_) sorted.push_back(pairs_[i]);
-    pairs_ = std::move(sorted);
+    std::sort(order_.begin(), order_.end(), [&](std::size_t i, std::size_t k) { return i != k && compared(i, k) < 0; });
+    pairs_.a = pairs_.a.rows(order_), pairs_.b = pairs_.b.rows(order_);
   }
 
   void rescale(double factor) {
     if (!(factor > 0 && std::isfinite(factor))) return;
-    for (PosePair& pair : pairs_) pair.a.covariance *= factor, pair.b.covariance *= factor;
+    pairs_.a.scaleCovariances(factor), pairs_.b.scaleCovariances(factor);
     for (double& error : errors_) error /= factor;
     for (HandEyeFit& fit : candidates_) fit.cost /= factor;
     result_.variance_factor *= factor;
@@ -191,14 +194,15 @@ class HandEyeRun {
   void take(const std::vector<HandEyeFit>& fits, Indices inliers) {
     candidates_ = fits;
     inliers_ = std::move(inliers);
-    errors_ = errorsAt(fits.front().value);
+    errors_ = errorsAt(fits.front().value, inliers_);
   }
 
   /// The best of all starts, from all pairs. Where the noise is not known its factor follows from the median error, which
   /// a minority of wrong pairs does not move much; what is excited depends on it, so that it is found twice.
   void fitAll(const Indices& all) {
-    const Indices some = spread(all);
-    for (int round = 0; round < (options_.known_noise ? 1 : 3); ++round) {
+    const Indices some = evenly(all);
+    const int rounds = options_.known_noise ? 1 : 3;
+    for (int round = 0; round < rounds; ++round) {
       std::vector<HandEyeFit> fits;
       for (const HandEyeValue& value : handEyeStarts(pairs_, some, world, options_.seed)) {
         const double cost = handEyeCost(value, pairs_, some);
@@ -209,21 +213,14 @@ class HandEyeRun {
       keepBest(fits);
       for (HandEyeFit& fit : fits) fit = refined(fit, some);
       keepBest(fits);
-      if (some.size() < all.size()) refineDifferent(fits, all);
-      take(fits, all);
+      const bool last = round + 1 == rounds;
+      if (some.size() < all.size() && last) refineDifferent(fits, all);
+      take(fits, last ? all : some);
       if (!options_.known_noise) {
         const double share = 1 - static_cast<double>(parameters) / (6 * static_cast<double>(pairs_.size()));
         rescale(median(errors_) / (median_error * share));
       }
     }
-  }
-  /// At most some thousands of the sorted pairs, evenly: enough for starts to part.
-  static Indices spread(const Indices& all) {
-    constexpr std::size_t enough = 2000;
-    const std::size_t step = all.size() / enough + 1;
-    Indices some;
-    for (std::size_t i = 0; i < all.size(); i += step) some.push_back(all[i]);
-    return some;
   }
   /// Refines the fits that are not the same one, which have converged to it, from all pairs.
   void refineDifferent(std::vector<HandEyeFit>& fits, const Indices& all) const {
@@ -253,7 +250,7 @@ class HandEyeRun {
   /// at first.
   void findOutliers() {
     const bool known = options_.known_noise;
-    const Indices all = allPairs(), some = spread(all);
+    const Indices all = allPairs(), some = evenly(all);
     std::vector<HandEyeFit> fits;
     for (int s = 0; s < options_.samples; ++s) {
       CounterRng rng(options_.seed, static_cast<std::uint64_t>(s), 2);
@@ -331,33 +328,32 @@ class HandEyeRun {
       result_.status = FusionStatus::not_converged;
       return;
     }
-    HandEyeExcitation excitation = handEyeExcitation(value, pairs_, inliers_, world);
+    HandEyeExcitation excitation = handEyeExcitation(value, pairs_, evenly(inliers_), world);
     int open = openDirections(excitation, options_.trusted_excitation);
-    ConstrainedResult<typename Equation::Parameter> strict;
+    StrictHandEye strict;
     // Open directions are known at the estimate, and the estimate holds open directions: at most a few rounds.
     for (int round = 0; round < 4; ++round) {
-      strict = strictHandEye<Equation>(value, pairs_, inliers_, excitation, open);
-      if (strict.end != ConstrainedEnd::converged) break;
-      value = Equation::value(strict.parameter);
-      double change = 1;
-      if (!options_.known_noise && strict.degrees_of_freedom > 0) {
-        change = strict.varianceFactor();
+      strict = strictHandEye(value, pairs_, inliers_, world, excitation, open);
+      if (!strict.converged) break;
+      value = strict.value;
+      if (const int freedom = 6 * static_cast<int>(inliers_.size()) - parameters + open;
+          !options_.known_noise && freedom > 0) {
+        const double change = strict.chi2 / freedom;
         rescale(change);
+        strict.chi2 /= change, strict.covariance *= change;
       }
       excitation = handEyeExcitation(value, pairs_, inliers_, world);
       const int now_open = openDirections(excitation, options_.trusted_excitation);
-      const bool same = now_open == open && std::abs(change - 1) < 1e-6;
-      open = now_open;
-      if (same) break;
+      // A factor of all covariances changes neither X nor the corrected poses.
+      if (std::exchange(open, now_open) == now_open) break;
     }
     report(value, strict, excitation, open);
   }
 
-  template <class Strict>
-  void report(const HandEyeValue& value, const Strict& strict, const HandEyeExcitation& excitation, int open) {
+  void report(const HandEyeValue& value, const StrictHandEye& strict, const HandEyeExcitation& excitation, int open) {
     HandEyeResult& r = result_;
     r.X.mean = value.X, r.Y.mean = value.Y;
-    const bool converged = strict.end == ConstrainedEnd::converged;
+    const bool converged = strict.converged;
     // Corrections of thousands of standard deviations have no limit to converge to; the first estimate has their cost.
     const double chi2 = converged ? strict.chi2 : candidates_.front().cost;
     r.chi2 = chi2 * r.variance_factor;
@@ -374,7 +370,7 @@ class HandEyeRun {
     errors_ = errorsAt(value);
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
       PairFit& fit = r.pairs[order_[i]];
-      fit.error = handEyeError(value, pairs_[i].a.mean, pairs_[i].b.mean);
+      fit.error = handEyeError(value, pairs_.a.mean(i), pairs_.b.mean(i));
       fit.chi2 = errors_[i];
     }
     for (const std::size_t i : inliers_) r.pairs[order_[i]].inlier = true;
@@ -383,7 +379,7 @@ class HandEyeRun {
     }
 
     if (converged && !r.rotationIsOpen())
-      setCovariance(open > 0 ? strict.covariance : widened(strict.covariance, value));
+      setCovariance(open > 0 ? ownPart(strict.covariance) : widened(ownPart(strict.covariance), value));
     if (converged && open == 0) testSuspects(value);
     r.status = statusOf(strict, value, open);
   }
@@ -399,13 +395,13 @@ class HandEyeRun {
     if (values_.isZero(0)) return;
     const double delay = values_[0];
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      pairs_[i].a.mean = given_[i].a.mean, pairs_[i].b.mean = given_[i].b.mean;
+      pairs_.a.mean(i) = given_[i].first, pairs_.b.mean(i) = given_[i].second;
       if (delay != 0) {
         const double time = options_.times[order_[i]];
         const std::optional<SE3d> now = stream_.at(time), then = stream_.at(time + delay);
-        if (now && then) pairs_[i].a.mean = given_[i].a.mean * (now->inverse() * *then);
+        if (now && then) pairs_.a.mean(i) = given_[i].first * (now->inverse() * *then);
       }
-      SE3d& B = pairs_[i].b.mean;
+      SE3d& B = pairs_.b.mean(i);
       const Eigen::Vector3d target = -(B.so3().inverse() * B.translation());
       Vector6 step = Vector6::Zero();
       step.head<3>() = -values_[1] * target - Eigen::Vector3d(values_[3], values_[4], values_[2]) * target.z();
@@ -414,11 +410,10 @@ class HandEyeRun {
   }
   /// Whitened errors and their derivatives by X, Y and the suspects, at the corrected poses: at the measured ones noise
   /// is in both.
-  std::vector<TimedRow<6, columns>> suspectRows(const HandEyeValue& value) const {
-    std::vector<TimedRow<6, columns>> rows;
-    rows.reserve(inliers_.size());
-    for (const std::size_t i : inliers_) {
-      const PosePair& pair = pairs_[i];
+  TimedRows<6, columns> suspectRows(const HandEyeValue& value) const {
+    return TimedRows<6, columns>(timesOfInliers(), [this, value](std::size_t j, TimedRow<6, columns>& row) {
+      const std::size_t i = inliers_[j];
+      const PosePair pair = pairs_[i];
       const HandEyeJacobians at(value, pair.a.mean, pair.b.mean);
       const Cholesky<double, 6> S = handEyeErrorFactor(at.A, at.B, pair);
       const Vector6 k = S.solve<1>(at.e);
@@ -426,7 +421,6 @@ class HandEyeRun {
       const Vector6 b = -product(pair.b.covariance, product(at.B.transpose(), k));
       const SE3d B = pair.b.mean * SE3d::exp(b);
       const HandEyeJacobians J(value, pair.a.mean * SE3d::exp(a), B);
-      TimedRow<6, columns>& row = rows.emplace_back();
       row.values.setZero();
       row.residual() = S.halfSolve<1>(at.e);
       if constexpr (world) {
@@ -435,8 +429,7 @@ class HandEyeRun {
         row.values.template leftCols<6>() = S.halfSolve<6>(Matrix6(J.X + J.Y));
       }
       if (!options_.times.empty()) {
-        row.time = options_.times[order_[i]];
-        if (const auto velocity = stream_.velocity(row.time + values_[0])) {
+        if (const auto velocity = stream_.velocity(options_.times[order_[i]] + values_[0])) {
           row.values.col(parameters) = S.halfSolve<1>(product(J.A, *velocity));
         }
       }
@@ -451,8 +444,15 @@ class HandEyeRun {
         by(2, target.z() * Eigen::Vector3d::UnitZ());
         by(3, target.z() * Eigen::Vector3d::UnitX()), by(4, target.z() * Eigen::Vector3d::UnitY());
       }
+    });
+  }
+  /// Zeros where there are none.
+  std::vector<double> timesOfInliers() const {
+    std::vector<double> times(inliers_.size(), 0.0);
+    for (std::size_t k = 0; k < times.size() && !options_.times.empty(); ++k) {
+      times[k] = options_.times[order_[inliers_[k]]];
     }
-    return rows;
+    return times;
   }
   ScoreTests<parameters, suspects> scoresAt(const HandEyeValue& value) const {
     ScoreTestOptions<suspects> options{.prior_sigmas = options_.suspect_sigmas, .known_noise = options_.known_noise};
@@ -507,34 +507,29 @@ class HandEyeRun {
       result_.dependence = scores.dependence;
     }
     if (scores.strongest < 0) return;
-    const SquareOf<typename Equation::Parameter> covariance =
-        result_.covariance.template topLeftCorner<parameters, parameters>();
+    const Covariance covariance = result_.covariance.template topLeftCorner<parameters, parameters>();
     const auto [step, spread] = groupMixture<parameters, suspects>(scores, covariance);
     result_.X_over_suspects = {value.X * SE3d::exp(Vector6(step.template head<6>())),
                                Matrix6(spread.template topLeftCorner<6, 6>())};
   }
   /// The covariance with the dependence in time and the sizes that the whitened errors show.
-  SquareOf<typename Equation::Parameter> widened(const SquareOf<typename Equation::Parameter>& covariance,
-                                                 const HandEyeValue& value) {
-    std::vector<TimedRow<6, parameters>> rows;
-    rows.reserve(inliers_.size());
-    for (const std::size_t i : inliers_) {
-      const HandEyeJacobians J(value, pairs_[i].a.mean, pairs_[i].b.mean);
-      const Cholesky<double, 6> S = handEyeErrorFactor(J.A, J.B, pairs_[i]);
-      TimedRow<6, parameters>& row = rows.emplace_back();
-      if (!options_.times.empty()) row.time = options_.times[order_[i]];
+  Covariance widened(const Covariance& covariance, const HandEyeValue& value) {
+    TimedRows<6, parameters> rows(timesOfInliers(), [this, value](std::size_t j, TimedRow<6, parameters>& row) {
+      const PosePair pair = pairs_[inliers_[j]];
+      const HandEyeJacobians J(value, pair.a.mean, pair.b.mean);
+      const Cholesky<double, 6> S = handEyeErrorFactor(J.A, J.B, pair);
       row.residual() = S.halfSolve<1>(J.e);
       if constexpr (world) {
         row.columns() << S.halfSolve<6>(J.X), S.halfSolve<6>(J.Y);
       } else {
         row.columns() = S.halfSolve<6>(Matrix6(J.X + J.Y));
       }
-    }
+    });
     const auto timed = timedCovariance<6, parameters>(std::move(rows), covariance, options_.known_noise);
     result_.dependence = timed.dependence;
     return timed.covariance;
   }
-  void setCovariance(const SquareOf<typename Equation::Parameter>& covariance) {
+  void setCovariance(const Covariance& covariance) {
     if constexpr (world) {
       result_.covariance = covariance;
     } else {
@@ -543,10 +538,12 @@ class HandEyeRun {
     result_.X.covariance = result_.covariance.topLeftCorner<6, 6>();
     result_.Y.covariance = result_.covariance.bottomRightCorner<6, 6>();
   }
-  template <class Strict>
-  FusionStatus statusOf(const Strict& strict, const HandEyeValue& value, int open) {
+  static Covariance ownPart(const Eigen::Matrix<double, 12, 12>& both) {
+    return both.topLeftCorner<parameters, parameters>();
+  }
+  FusionStatus statusOf(const StrictHandEye& strict, const HandEyeValue& value, int open) {
     if (result_.p < options_.min_p && candidates_.front().converged) return FusionStatus::inconsistent;
-    if (strict.end != ConstrainedEnd::converged) return FusionStatus::not_converged;
+    if (!strict.converged) return FusionStatus::not_converged;
     if (open > 0) return FusionStatus::undetermined;
     // A second minimum whose cost noise may have made larger, and which is another solution.
     for (std::size_t k = 1; k < candidates_.size(); ++k) {
@@ -562,12 +559,12 @@ class HandEyeRun {
   }
 
   HandEyeOptions options_;
-  std::vector<PosePair> pairs_;         // sorted, covariances rescaled
-  std::vector<std::size_t> order_;      // index in the input of each
-  Indices inliers_;                     // ascending, of the sorted pairs
-  std::vector<HandEyeFit> candidates_;  // the best first
-  std::vector<double> errors_;          // squared, at the best
-  std::vector<PosePair> given_;         // the sorted pairs as they were given, where suspects are taken in
+  PosePairList pairs_;                        // sorted, covariances rescaled
+  std::vector<std::size_t> order_;            // index in the input of each
+  Indices inliers_;                           // ascending, of the sorted pairs
+  std::vector<HandEyeFit> candidates_;        // the best first
+  std::vector<double> errors_;                // squared, at the best
+  std::vector<std::pair<SE3d, SE3d>> given_;  // the sorted pairs as they were given, where suspects are taken in
   PoseStream stream_;
   Eigen::Matrix<double, suspects, 1> values_ = Eigen::Matrix<double, suspects, 1>::Zero();
   HandEyeResult result_;
@@ -575,12 +572,18 @@ class HandEyeRun {
 
 }  // namespace detail
 
+LIESTAT_FUSION_INLINE HandEyeResult estimateRobotWorld(PosePairList poses, HandEyeOptions options) {
+  return detail::HandEyeRun<true>(std::move(poses), std::move(options)).run();
+}
 LIESTAT_FUSION_INLINE HandEyeResult estimateRobotWorld(std::span<const PosePair> poses, const HandEyeOptions& options) {
-  return detail::HandEyeRun<detail::RobotWorldEquation>(poses, options).run();
+  return estimateRobotWorld(PosePairList(poses), options);
 }
 
+LIESTAT_FUSION_INLINE HandEyeResult estimateHandEye(PosePairList motions, HandEyeOptions options) {
+  return detail::HandEyeRun<false>(std::move(motions), std::move(options)).run();
+}
 LIESTAT_FUSION_INLINE HandEyeResult estimateHandEye(std::span<const PosePair> motions, const HandEyeOptions& options) {
-  return detail::HandEyeRun<detail::HandEyeEquation>(motions, options).run();
+  return estimateHandEye(PosePairList(motions), options);
 }
 
 }  // namespace liestat

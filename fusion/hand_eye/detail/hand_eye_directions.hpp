@@ -21,17 +21,19 @@ struct GripperMotion {
 
   /// Relative to the first pose, or the motions themselves.
   template <class Indices>
-  GripperMotion(const std::vector<PosePair>& pairs, const Indices& indices, bool world) {
+  GripperMotion(const PosePairList& pairs, const Indices& indices, bool world) {
     Eigen::Matrix3d turns = Eigen::Matrix3d::Zero(), moves = Eigen::Matrix3d::Zero();
     double n = 0, noise = 0, length_noise = 0;
     for (const std::size_t i : indices) {
-      const SE3d motion = world ? pairs[indices.front()].a.mean.inverse() * pairs[i].a.mean : pairs[i].a.mean;
+      const SE3d& A = pairs.a.mean(i);
+      const SE3d motion = world ? pairs.a.mean(indices.front()).inverse() * A : A;
+      const Matrix6 V = pairs.a.covariance(i);
       const Eigen::Vector3d t = motion.translation(), turn = motion.so3().log();
       turns += turn * turn.transpose();
       moves += t * t.transpose();
-      noise += 9 * pairs[i].a.covariance.diagonal().tail<3>().sum();
-      length_noise += 9 * pairs[i].a.covariance.diagonal().head<3>().sum();
-      length += t.squaredNorm() + pairs[i].b.mean.translation().squaredNorm();
+      noise += 9 * V.diagonal().tail<3>().sum();
+      length_noise += 9 * V.diagonal().head<3>().sum();
+      length += t.squaredNorm() + pairs.b.mean(i).translation().squaredNorm();
       ++n;
     }
     length = std::sqrt(length / n);

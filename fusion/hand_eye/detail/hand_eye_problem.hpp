@@ -3,11 +3,9 @@
 #pragma once
 
 #include <fusion/hand_eye.hpp>
-#include <lie/detail/small_matrix.hpp>
 #include <lie/detail/small_orthogonal.hpp>
 #include <lie/detail/small_products.hpp>
-#include <lie/product.hpp>
-#include <stats/constrained_types.hpp>
+#include <lie/detail/small_matrix.hpp>
 #include <stats/measurement_noise.hpp>
 
 #include <Eigen/Core>
@@ -46,110 +44,43 @@ struct HandEyeJacobians {
   }
 };
 
-/// AX = YB for stats/constrained.hpp: the parameter is (X, Y), a measurement (A, B).
-struct RobotWorldEquation {
-  using Parameter = Product<SE3d, SE3d>;
-  using Measurement = Product<SE3d, SE3d>;
-
-  static HandEyeValue value(const Parameter& q) { return {q.get<0>(), q.get<1>()}; }
-  static Parameter parameter(const HandEyeValue& v) { return Parameter(v.X, v.Y); }
-
-  Vector6 operator()(const Parameter& q, const Measurement& m) const {
-    return handEyeError(value(q), m.get<0>(), m.get<1>());
-  }
-  EquationDerivatives<6, 12, 12> linearize(const Parameter& q, const Measurement& m) const {
-    const HandEyeJacobians J(value(q), m.get<0>(), m.get<1>());
-    EquationDerivatives<6, 12, 12> d;
-    d.value = J.e;
-    d.by_parameter << J.X, J.Y;
-    d.by_measurement << J.A, J.B;
-    return d;
-  }
-};
-
-/// AX = XB: the parameter is X.
-struct HandEyeEquation {
-  using Parameter = SE3d;
-  using Measurement = Product<SE3d, SE3d>;
-
-  static HandEyeValue value(const Parameter& q) { return {q, q}; }
-  static Parameter parameter(const HandEyeValue& v) { return v.X; }
-
-  Vector6 operator()(const Parameter& q, const Measurement& m) const {
-    return handEyeError(value(q), m.get<0>(), m.get<1>());
-  }
-  EquationDerivatives<6, 6, 12> linearize(const Parameter& q, const Measurement& m) const {
-    const HandEyeJacobians J(value(q), m.get<0>(), m.get<1>());
-    EquationDerivatives<6, 6, 12> d;
-    d.value = J.e;
-    d.by_parameter = J.X + J.Y;
-    d.by_measurement << J.A, J.B;
-    return d;
-  }
-};
-
-/// The noise of a pair: a block for each pose. A NoiseModel of stats/measurement_noise.hpp.
-class PosePairNoise {
- public:
-  static constexpr int dimension = 12;
-  using Vector = Eigen::Matrix<double, 12, 1>;
-  using Matrix = Eigen::Matrix<double, 12, 12>;
-
-  PosePairNoise(const Matrix6& a, const Matrix6& b) : a_(a), b_(b) {
-    const auto information = [this](const Matrix6& V) -> Matrix6 {
-      if (!V.allFinite() || !(V - V.transpose()).isZero(1e-9 * V.cwiseAbs().maxCoeff())) {
-        valid_ = false;
-        return V;
-      }
-      const Cholesky<double, 6> factor(V);
-      if (factor.ok()) return factor.inverse();
-      const SemidefiniteParts<6> parts(V);
-      valid_ = valid_ && parts.valid;
-      rank_ -= parts.null_dimension;
-      return parts.inverse;
-    };
-    information_a_ = information(a), information_b_ = information(b);
-  }
-
-  bool valid() const { return valid_; }
-  /// True if both covariances together have the ranks that errors of a pose need: six, three of them of the rotation, which
-  /// translations do not move.
-  bool coversAllDirections() const {
-    const auto open = [](const Matrix6& V) {
-      return SemidefiniteParts<3>(Eigen::Matrix3d(V.bottomRightCorner<3, 3>())).null_dimension;
-    };
-    return rank_ >= 6 && (rank_ == 12 || open(a_) + open(b_) <= 3);
-  }
-  template <int P>
-  Eigen::Matrix<double, 12, P> spread(const Eigen::Matrix<double, P, 12>& D) const {
-    Eigen::Matrix<double, 12, P> result;
-    result << productTransposed(a_, Eigen::Matrix<double, P, 6>(D.template leftCols<6>())),
-        productTransposed(b_, Eigen::Matrix<double, P, 6>(D.template rightCols<6>()));
-    return result;
-  }
-  double squaredNorm(const Vector& e) const {
-    const Vector6 a = e.head<6>(), b = e.tail<6>();
-    return a.dot(product(information_a_, a)) + b.dot(product(information_b_, b));
-  }
-  Matrix covariance() const { return blocks(a_, b_); }
-  Matrix information() const { return blocks(information_a_, information_b_); }
-
- private:
-  static Matrix blocks(const Matrix6& a, const Matrix6& b) {
-    Matrix m = Matrix::Zero();
-    m.topLeftCorner<6, 6>() = a, m.bottomRightCorner<6, 6>() = b;
-    return m;
-  }
-  Matrix6 a_, b_, information_a_, information_b_;
-  bool valid_ = true;
-  int rank_ = 12;
-};
+/// True for covariances that are positive semidefinite and together have the ranks that errors of a pose need: six, three
+/// of them of the rotation, which translations do not move.
+inline bool coverAllDirections(const Matrix6& a, const Matrix6& b) {
+  const auto rankOf = [](const Matrix6& V) {
+    if (!V.allFinite()) return -1;
+    if (Cholesky<double, 6>(V).ok()) return 6;
+    const SemidefiniteParts<6> parts(V);
+    return parts.valid ? 6 - parts.null_dimension : -1;
+  };
+  const auto open = [](const Matrix6& V) {
+    return SemidefiniteParts<3>(Eigen::Matrix3d(V.bottomRightCorner<3, 3>())).null_dimension;
+  };
+  const int of_a = rankOf(a), of_b = rankOf(b);
+  if (of_a < 0 || of_b < 0) return false;
+  return of_a + of_b >= 6 && (of_a + of_b == 12 || open(a) + open(b) <= 3);
+}
 
 /// Sums over pairs at one value. Blocks y, y for both kinds of problem; of AX = XB `x` is not used.
 struct HandEyeSums {
   Matrix6 xx = Matrix6::Zero(), xy = Matrix6::Zero(), yy = Matrix6::Zero();
   Vector6 x = Vector6::Zero(), y = Vector6::Zero();
   double cost = 0;  ///< Σ eᵀ S⁻¹ e
+
+  /// Adds a pair with the error e and the factor of S.
+  void add(const HandEyeJacobians& J, const Cholesky<double, 6>& S, const Vector6& error, bool world) {
+    const Vector6 e = S.halfSolve<1>(error);
+    const Matrix6 by_y = S.halfSolve<6>(world ? J.Y : Matrix6(J.X + J.Y));
+    yy += product(by_y.transpose(), by_y);
+    y += product(by_y.transpose(), e);
+    if (world) {
+      const Matrix6 by_x = S.halfSolve<6>(J.X);
+      xx += product(by_x.transpose(), by_x);
+      xy += product(by_x.transpose(), by_y);
+      x += product(by_x.transpose(), e);
+    }
+    cost += e.squaredNorm();
+  }
 };
 
 /// The factor of S, the covariance of the error of a pair.
@@ -165,30 +96,19 @@ inline double handEyeSquaredError(const HandEyeValue& at, const PosePair& pair) 
 
 /// Normal equations of Σ eᵀ S⁻¹ e over the pairs of an index list.
 template <class Indices>
-HandEyeSums handEyeSums(const HandEyeValue& at, const std::vector<PosePair>& pairs, const Indices& indices,
-                        bool world) {
+HandEyeSums handEyeSums(const HandEyeValue& at, const PosePairList& pairs, const Indices& indices, bool world) {
   HandEyeSums sums;
   for (const std::size_t i : indices) {
-    const HandEyeJacobians J(at, pairs[i].a.mean, pairs[i].b.mean);
-    const Cholesky<double, 6> S = handEyeErrorFactor(J.A, J.B, pairs[i]);
-    const Vector6 e = S.halfSolve<1>(J.e);
-    const Matrix6 y = S.halfSolve<6>(world ? J.Y : Matrix6(J.X + J.Y));
-    sums.yy += product(y.transpose(), y);
-    sums.y += product(y.transpose(), e);
-    if (world) {
-      const Matrix6 x = S.halfSolve<6>(J.X);
-      sums.xx += product(x.transpose(), x);
-      sums.xy += product(x.transpose(), y);
-      sums.x += product(x.transpose(), e);
-    }
-    sums.cost += e.squaredNorm();
+    const PosePair pair = pairs[i];
+    const HandEyeJacobians J(at, pair.a.mean, pair.b.mean);
+    sums.add(J, handEyeErrorFactor(J.A, J.B, pair), J.e, world);
   }
   return sums;
 }
 
 /// Σ eᵀ S⁻¹ e.
 template <class Indices>
-double handEyeCost(const HandEyeValue& at, const std::vector<PosePair>& pairs, const Indices& indices) {
+double handEyeCost(const HandEyeValue& at, const PosePairList& pairs, const Indices& indices) {
   double cost = 0;
   for (const std::size_t i : indices) cost += handEyeSquaredError(at, pairs[i]);
   return cost;
@@ -208,13 +128,13 @@ struct HandEyeExcitation {
 /// terms where X is eliminated, which takes a mean off. Without units; no eigenvalue of H says as much, because noise
 /// alone makes H regular.
 template <class Indices>
-HandEyeExcitation handEyeExcitation(const HandEyeValue& at, const std::vector<PosePair>& pairs, const Indices& indices,
+HandEyeExcitation handEyeExcitation(const HandEyeValue& at, const PosePairList& pairs, const Indices& indices,
                                     bool world) {
   Matrix6 L = Matrix6::Zero(), N = Matrix6::Zero(), xx = Matrix6::Zero(), xy = Matrix6::Zero();
   const Matrix6 to_camera = at.X.inverse().Adj();
   double n = 0;
   for (const std::size_t i : indices) {
-    const PosePair& pair = pairs[i];
+    const PosePair pair = pairs[i];
     const Cholesky<double, 6> S = handEyeErrorFactor(to_camera, Matrix6::Identity(), pair);
     const Vector6 e = handEyeError(at, pair.a.mean, pair.b.mean);
     // To first order: B̂ = B·Exp(b), b = -Σ_b S⁻¹ e.

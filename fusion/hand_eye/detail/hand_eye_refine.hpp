@@ -1,10 +1,9 @@
 // Refinement of a hand-eye calibration: Gauss–Newton steps on Σ eᵀ S⁻¹ e along the directions that the motions determine,
-// then the projection estimator of stats/constrained.hpp with the other directions held.
+// then the most likely corrected poses, with the other directions held.
 #pragma once
 
 #include <fusion/hand_eye/detail/hand_eye_problem.hpp>
 #include <fusion/hand_eye/detail/hand_eye_starts.hpp>
-#include <stats/constrained.hpp>
 
 #include <Eigen/Core>
 
@@ -67,18 +66,32 @@ struct HandEyeDescent {
   bool freed = false;  ///< there were fewer on the way: X moved along one that is open
 };
 
+/// At most some thousands of a list, evenly: enough for starts to part, and to tell the excitations.
+template <class Indices>
+std::vector<std::size_t> evenly(const Indices& all) {
+  constexpr std::size_t enough = 2000;
+  const std::size_t step = all.size() / enough + 1;
+  std::vector<std::size_t> some;
+  for (std::size_t i = 0; i < all.size(); i += step) some.push_back(all[i]);
+  return some;
+}
+
 /// Gauss–Newton with halved steps along the directions of at least an excitation. S follows the value, so it ends at a
 /// thousandth of a standard deviation, which is far inside of what the strict estimate starts from.
 template <class Indices>
-HandEyeDescent descendHandEye(HandEyeFit& fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
+HandEyeDescent descendHandEye(HandEyeFit& fit, const PosePairList& pairs, const Indices& indices, bool world,
                               double trusted, int iterations) {
   HandEyeDescent descent;
   HandEyeExcitation excitation;
+  const std::vector<std::size_t> some = evenly(indices);
+  const bool many = some.size() < indices.size();
+  // In squared standard deviations of an estimate from so many pairs.
+  const double small = 1e-6 * static_cast<double>(indices.size()) / static_cast<double>(some.size());
   int fewest = 6;
   for (int k = 0; k < iterations; ++k) {
     const HandEyeSums sums = handEyeSums(fit.value, pairs, indices, world);
     // Where all directions are excited any basis serves.
-    if (k < 2 || descent.open > 0) excitation = handEyeExcitation(fit.value, pairs, indices, world);
+    if (k < 2 || descent.open > 0) excitation = handEyeExcitation(fit.value, pairs, some, world);
     fit.cost = sums.cost;
     descent.open = openDirections(excitation, trusted);
     fewest = std::min(fewest, descent.open);
@@ -86,16 +99,22 @@ HandEyeDescent descendHandEye(HandEyeFit& fit, const std::vector<PosePair>& pair
     const std::pair<Vector6, Vector6> step = handEyeStep(sums, excitation, descent.open, world);
     const double squared = -sums.y.dot(step.second) - (world ? sums.x.dot(step.first) : 0);
     if (!std::isfinite(squared)) return descent;
+    if (many && squared < small) {
+      fit.value = moved(fit.value, step, world);
+      fit.converged = true;
+      break;
+    }
     std::pair<Vector6, Vector6> shortened = step;
     bool better = false;
-    for (int halving = 0; halving < 8 && !better; ++halving) {
+    // Of many pairs S, which follows the value, decides within a standard deviation, and no part of the step is better.
+    for (int halving = 0; halving < (many && squared < 1 ? 1 : 8) && !better; ++halving) {
       const HandEyeValue there = moved(fit.value, shortened, world);
       const double cost = handEyeCost(there, pairs, indices);
       better = cost < fit.cost;
       if (better) fit.value = there, fit.cost = cost;
       shortened.first *= 0.5, shortened.second *= 0.5;
     }
-    fit.converged = squared < 1e-6 || !better;
+    fit.converged = squared < small || !better;
     if (fit.converged) break;
   }
   return descent;
@@ -109,8 +128,8 @@ inline constexpr double doubtful_excitation = 1000;
 /// until the others have settled, from translations that are short along them, and are judged there. `factor` is that by
 /// which the variances of the poses are larger than given.
 template <class Indices>
-HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, const Indices& indices, bool world,
-                         double trusted, int iterations = 30, double factor = 1) {
+HandEyeFit refineHandEye(HandEyeFit fit, const PosePairList& pairs, const Indices& indices, bool world, double trusted,
+                         int iterations = 30, double factor = 1) {
   const double doubtful = factor * std::max(trusted, doubtful_excitation);
   if (descendHandEye(fit, pairs, indices, world, doubtful, iterations).open == 0) return fit;
   const HandEyeMoments moments(pairs, indices, world);
@@ -122,48 +141,71 @@ HandEyeFit refineHandEye(HandEyeFit fit, const std::vector<PosePair>& pairs, con
   return fit;
 }
 
-/// Directions of Y (of X for AX = XB) that stay where they are: rows·Log(reference⁻¹ Y) = 0. Rows of zeros are none.
-template <class Equation>
-struct HeldDirections {
-  using Parameter = typename Equation::Parameter;
-  static constexpr int N = ManifoldTraits<Parameter>::DoF;
-  SE3d reference;
-  Matrix6 rows = Matrix6::Zero();
-
-  Vector6 operator()(const Parameter& q) const {
-    return product(rows, (reference.inverse() * Equation::value(q).Y).log());
-  }
-  ConstraintDerivatives<6, N> linearize(const Parameter& q) const {
-    const Vector6 y = (reference.inverse() * Equation::value(q).Y).log();
-    ConstraintDerivatives<6, N> d;
-    d.value = product(rows, y);
-    d.by_parameter.setZero();
-    d.by_parameter.template rightCols<6>() = product(rows, SE3d::rightJacobianInverse(y));
-    return d;
-  }
+/// The most likely X, Y and corrected poses.
+struct StrictHandEye {
+  HandEyeValue value;
+  /// Of X and Y; of AX = XB the block of Y is that of X.
+  Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
+  double chi2 = 0;  ///< squared distance of the poses from the corrected poses
+  bool converged = false;
 };
 
-/// The strict estimate from the pairs of an index list. The first `open` directions of the excitation are held.
-template <class Equation, class Indices>
-ConstrainedResult<typename Equation::Parameter> strictHandEye(const HandEyeValue& start,
-                                                              const std::vector<PosePair>& pairs,
-                                                              const Indices& indices,
-                                                              const HandEyeExcitation& excitation, int open) {
-  MeasurementChannel<typename Equation::Measurement, PosePairNoise, Equation> channel{{}, {}, {Equation{}}};
-  channel.measurements.reserve(indices.size()), channel.noises.reserve(indices.size());
-  for (const std::size_t i : indices) {
-    channel.measurements.emplace_back(pairs[i].a.mean, pairs[i].b.mean);
-    channel.noises.emplace_back(pairs[i].a.covariance, pairs[i].b.covariance);
+/// The estimate that the projection estimator of stats/constrained.hpp has for these equations, pairs being corrected one
+/// by one: errors ε of A and B under c(X, Y, A Exp(ε_a), B Exp(ε_b)) = 0 are ε = -V Dᵀ S⁻¹ (c - D ε), D the derivative at
+/// ε itself, S = D V Dᵀ. They are iterated with X and Y, and are all that is kept of a pair from pass to pass. Directions
+/// below `open` are held where they are.
+template <class Indices>
+StrictHandEye strictHandEye(const HandEyeValue& start, const PosePairList& pairs, const Indices& indices, bool world,
+                            const HandEyeExcitation& excitation, int open) {
+  constexpr int max_iterations = 30, min_iterations = 3, enough_iterations = 8;
+  constexpr double small = 1e-20, rounding = 1e-8;  // squared standard deviations
+  double before = std::numeric_limits<double>::infinity();
+  StrictHandEye result{start};
+  std::vector<Eigen::Matrix<double, 12, 1>> errors(indices.size(), Eigen::Matrix<double, 12, 1>::Zero());
+  HandEyeSums sums;
+  for (int k = 0; k < max_iterations && !result.converged; ++k) {
+    sums = {};
+    for (std::size_t j = 0; j < indices.size(); ++j) {
+      const PosePair pair = pairs[indices[j]];
+      const Vector6 a = errors[j].head<6>(), b = errors[j].tail<6>();
+      const HandEyeJacobians J(result.value, pair.a.mean * SE3d::exp(a), pair.b.mean * SE3d::exp(b));
+      const Matrix6 by_a = product(J.A, SE3d::rightJacobian(a)), by_b = product(J.B, SE3d::rightJacobian(b));
+      const Cholesky<double, 6> S = handEyeErrorFactor(by_a, by_b, pair);
+      const Vector6 r = J.e - by_a * a - by_b * b;
+      sums.add(J, S, r, world);
+      const Vector6 multiplier = S.solve<1>(r);
+      errors[j].head<6>() = -product(pair.a.covariance, product(by_a.transpose(), multiplier));
+      errors[j].tail<6>() = -product(pair.b.covariance, product(by_b.transpose(), multiplier));
+    }
+    const std::pair<Vector6, Vector6> step = handEyeStep(sums, excitation, open, world);
+    const double squared = -sums.y.dot(step.second) - (world ? sums.x.dot(step.first) : 0);
+    if (!std::isfinite(squared) || !std::isfinite(sums.cost)) return result;
+    result.value = moved(result.value, step, world);
+    // Steps shrink by far more than half until rounding makes them.
+    const bool rounded = k + 1 >= enough_iterations && squared < rounding && squared > 0.25 * before;
+    result.converged = k + 1 >= min_iterations && (squared < small || rounded);
+    before = squared;
   }
-  HeldDirections<Equation> held{start.Y};
-  for (int k = 0; k < open; ++k)
-    held.rows.row(k) = product(excitation.metric, Vector6(excitation.vectors.col(k))).transpose();
-  // It starts within a fraction of a standard deviation of the end.
-  ConstrainedOptions<typename Equation::Parameter> options;
-  options.max_iterations = 30;
-  options.second_order = false;
-  options.noise = StatedNoise::trusted;  // the calibration has a verdict of its own
-  return constrainedEstimate(Equation::parameter(start), channel, held, options);
+  result.chi2 = sums.cost;
+  // (Zᵀ H Z)⁻¹ of the directions Z that are free, X following Y.
+  Matrix6 L = sums.yy, x_by_y = Matrix6::Identity(), own = Matrix6::Zero();
+  if (world) {
+    const Cholesky<double, 6> xx(sums.xx);
+    x_by_y = -xx.solve<6>(sums.xy);
+    own = xx.solve<6>(Matrix6(Matrix6::Identity()));
+    L += product(sums.xy.transpose(), x_by_y);
+  }
+  Matrix6 reduced = congruence(excitation.vectors.transpose(), L), axes = excitation.vectors;
+  for (int k = 0; k < open; ++k) {
+    reduced.row(k).setZero(), reduced.col(k).setZero();
+    reduced(k, k) = 1, axes.col(k).setZero();
+  }
+  const Matrix6 half = Cholesky<double, 6>(reduced).halfSolve<6>(axes.transpose());
+  const Matrix6 of_y = product(half.transpose(), half), of_xy = product(x_by_y, of_y);
+  const Matrix6 of_x = own + productTransposed(of_xy, x_by_y);
+  result.covariance << of_x, of_xy, of_xy.transpose(), of_y;
+  result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
+  return result;
 }
 
 }  // namespace liestat::detail

@@ -27,9 +27,9 @@ struct HandEyeMoments {
   double rotation_variance = 0;  ///< mean variance of an axis, rad²: sum of both poses
 
   template <class Indices>
-  HandEyeMoments(const std::vector<PosePair>& pairs, const Indices& indices, bool world) {
+  HandEyeMoments(const PosePairList& pairs, const Indices& indices, bool world) {
     for (const std::size_t i : indices) {
-      const PosePair& pair = pairs[i];
+      const PosePair pair = pairs[i];
       const Eigen::Matrix3d A = pair.a.mean.rotationMatrix(), B = pair.b.mean.rotationMatrix();
       for (int k = 0; k < 3; ++k) {
         for (int l = 0; l < 3; ++l) rotations.block<3, 3>(3 * k, 3 * l) += B(k, l) * A;
@@ -41,7 +41,7 @@ struct HandEyeMoments {
     }
     mean_rotation /= n, mean_a /= n, mean_b /= n, rotation_variance /= n;
     for (const std::size_t i : indices) {
-      Eigen::Vector3d a = pairs[i].a.mean.translation(), b = pairs[i].b.mean.translation();
+      Eigen::Vector3d a = pairs.a.mean(i).translation(), b = pairs.b.mean(i).translation();
       if (world) a -= mean_a, b -= mean_b;
       translations += a * b.transpose();
     }
@@ -52,8 +52,8 @@ struct HandEyeMoments {
 /// mean; of AX = XB with I for the mean. Directions in which the rotations differ by no more than their noise are left
 /// at zero: an inverse would send them tens of metres away.
 template <class Indices>
-HandEyeValue withTranslations(const SO3d& X, const SO3d& Y, const HandEyeMoments& moments,
-                              const std::vector<PosePair>& pairs, const Indices& indices, bool world) {
+HandEyeValue withTranslations(const SO3d& X, const SO3d& Y, const HandEyeMoments& moments, const PosePairList& pairs,
+                              const Indices& indices, bool world) {
   const Eigen::Matrix3d R = Y.matrix();
   const Eigen::Matrix3d base = world ? moments.mean_rotation : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
@@ -61,9 +61,9 @@ HandEyeValue withTranslations(const SO3d& X, const SO3d& Y, const HandEyeMoments
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const std::size_t i : indices) {
-    const Eigen::Matrix3d D = pairs[i].a.mean.rotationMatrix() - base;
+    const Eigen::Matrix3d D = pairs.a.mean(i).rotationMatrix() - base;
     const Eigen::Vector3d d =
-        product(R, pairs[i].b.mean.translation()) - Eigen::Vector3d(pairs[i].a.mean.translation()) - offset;
+        product(R, pairs.b.mean(i).translation()) - Eigen::Vector3d(pairs.a.mean(i).translation()) - offset;
     normal += product(D.transpose(), D);
     right += product(D.transpose(), d);
   }
@@ -121,7 +121,7 @@ class HandEyeRotations {
 
 /// The start where the rotations determine X.
 template <class Indices>
-HandEyeValue closedFormStart(const HandEyeMoments& moments, const std::vector<PosePair>& pairs, const Indices& indices,
+HandEyeValue closedFormStart(const HandEyeMoments& moments, const PosePairList& pairs, const Indices& indices,
                              bool world) {
   const auto [X, Y] = HandEyeRotations(moments, world).combine(Eigen::Matrix<double, 9, 1>::Unit(0));
   return withTranslations(X, Y, moments, pairs, indices, world);
@@ -130,7 +130,7 @@ HandEyeValue closedFormStart(const HandEyeMoments& moments, const std::vector<Po
 /// All starts: the closed form, fixed combinations of the singular vectors that belong to the largest value where there
 /// are several, and the rotation that the translations alone say (for motions without rotation).
 template <class Indices>
-std::vector<HandEyeValue> handEyeStarts(const std::vector<PosePair>& pairs, const Indices& indices, bool world,
+std::vector<HandEyeValue> handEyeStarts(const PosePairList& pairs, const Indices& indices, bool world,
                                         std::uint64_t seed) {
   const HandEyeMoments moments(pairs, indices, world);
   const HandEyeRotations rotations(moments, world);

@@ -82,7 +82,7 @@ LIESTAT_FUSION_INLINE RunAgainstTruth runAgainstTruth(const PoseTrajectory& trut
   const std::string truth_name = truth.name.empty() ? "the truth" : truth.name;
   const std::string estimate_name = estimate.name.empty() ? "the estimate" : estimate.name;
   std::vector<double> times = truth.times;
-  std::vector<Gaussian<SE3d>> poses = truth.poses;
+  NoisyPoses poses = truth.poses;
   if (options.start || options.end) {
     const std::vector<std::size_t> rows = rowsBetween(truth.times, options.start, options.end);
     if (rows.empty()) {
@@ -91,17 +91,16 @@ LIESTAT_FUSION_INLINE RunAgainstTruth runAgainstTruth(const PoseTrajectory& trut
                                      : "no pose of " + truth_name + " is between the given times";
       return r;
     }
-    times.clear(), poses.clear();
-    for (const std::size_t i : rows) times.push_back(truth.times[i]), poses.push_back(truth.poses[i]);
+    times.clear(), poses = truth.poses.rows(rows);
+    for (const std::size_t i : rows) times.push_back(truth.times[i]);
   }
   const Associated associated =
       associate({times, poses.size(), truth_name}, {estimate.times, estimate.poses.size(), estimate_name}, options);
   r.status = associated.status, r.reason = associated.reason;
   if (!r.ok()) return r;
-  const std::vector<MatchedPose> matched =
-      matchedPoses(associated.matches, poses, estimate.poses, options.interpolation, times);
+  const MatchedPoses matched = matchedPoses(associated.matches, poses, estimate.poses, options.interpolation, times);
   for (std::size_t k = 0; k < matched.size(); ++k) {
-    r.run.poses.push_back({matched[k].estimate.mean, matched[k].estimate.covariance, matched[k].reference.mean});
+    r.run.poses.push_back({matched.estimate.mean(k), matched.estimate.covariance(k), matched.reference.mean(k)});
     if (!estimate.times.empty()) r.run.times.push_back(estimate.times[associated.matches[k].estimate]);
   }
   const std::string suspicion = suspectQuaternionOrder(matched, truth_name, estimate_name);

@@ -16,6 +16,7 @@ LIESTAT_FUSION_INLINE std::vector<TimeMatch> associateByInterpolation(std::span<
                                                                       std::span<const double> estimate_times,
                                                                       double max_gap, double offset) {
   std::vector<TimeMatch> matches;
+  matches.reserve(estimate_times.size());
   std::size_t k = 0;  // the last stamp of the reference that is not later
   for (std::size_t i = 0; i < estimate_times.size(); ++i) {
     const double t = estimate_times[i] + offset;
@@ -52,12 +53,12 @@ namespace detail {
 
 /// A reference as PoseCurve takes it. Without times its poses are a second apart.
 struct ReferenceSource {
-  std::span<const Gaussian<SE3d>> poses;
+  const NoisyPoses* poses;
   std::span<const double> times;
 
-  std::size_t size() const { return poses.size(); }
+  std::size_t size() const { return poses->size(); }
   double time(std::size_t i) const { return times.empty() ? static_cast<double>(i) : times[i]; }
-  const SE3d& pose(std::size_t i) const { return poses[i].mean; }
+  const SE3d& pose(std::size_t i) const { return poses->mean(i); }
   double timeOf(const TimeMatch& m) const {
     return time(m.reference) + m.fraction * (time(m.reference + 1) - time(m.reference));
   }
@@ -147,40 +148,41 @@ class InterpolationErrors {
 
 }  // namespace detail
 
-LIESTAT_FUSION_INLINE std::vector<MatchedPose> matchedPoses(std::span<const TimeMatch> matches,
-                                                            std::span<const Gaussian<SE3d>> reference,
-                                                            std::span<const Gaussian<SE3d>> estimate,
-                                                            PoseInterpolation interpolation,
-                                                            std::span<const double> reference_times) {
-  std::vector<MatchedPose> poses;
-  poses.reserve(matches.size());
-  const detail::ReferenceSource source{reference, reference_times};
+LIESTAT_FUSION_INLINE MatchedPoses matchedPoses(std::span<const TimeMatch> matches, const NoisyPoses& reference,
+                                                const NoisyPoses& estimate, PoseInterpolation interpolation,
+                                                std::span<const double> reference_times) {
+  MatchedPoses poses;
+  poses.reference.reserve(matches.size()), poses.estimate.reserve(matches.size());
+  const detail::ReferenceSource source{&reference, reference_times};
   const detail::PoseCurve<detail::ReferenceSource> curve(source, interpolation);
   for (const TimeMatch& m : matches) {
-    poses.push_back({reference[m.reference], estimate[m.estimate]});
-    if (m.fraction == 0) continue;
-    Gaussian<SE3d>& at = poses.back().reference;
-    at.mean = curve.at(m.reference, source.timeOf(m));
-    at.covariance = (1 - m.fraction) * at.covariance + m.fraction * reference[m.reference + 1].covariance;
+    Gaussian<SE3d> at = reference[m.reference];
+    if (m.fraction != 0) {
+      at.mean = curve.at(m.reference, source.timeOf(m));
+      if (reference.keepsEach()) {
+        at.covariance = (1 - m.fraction) * at.covariance + m.fraction * reference.covariance(m.reference + 1);
+      }
+    }
+    poses.push_back({at, estimate[m.estimate]});
   }
   return poses;
 }
 
 LIESTAT_FUSION_INLINE InterpolationError addInterpolationError(std::span<const TimeMatch> matches,
-                                                               std::span<const Gaussian<SE3d>> reference,
+                                                               const NoisyPoses& reference,
                                                                std::span<const double> reference_times,
-                                                               PoseInterpolation interpolation,
-                                                               std::span<MatchedPose> poses, double factor) {
+                                                               PoseInterpolation interpolation, MatchedPoses& poses,
+                                                               double factor) {
   InterpolationError result;
   const auto between = [](const TimeMatch& m) { return m.fraction != 0; };
   if (std::none_of(matches.begin(), matches.end(), between)) return result;
-  detail::InterpolationErrors errors({reference, reference_times}, interpolation);
+  detail::InterpolationErrors errors({&reference, reference_times}, interpolation);
   result.known = errors.known();
   if (!result.known) return result;
   for (std::size_t k = 0; k < matches.size(); ++k) {
     if (!between(matches[k])) continue;
     const Eigen::Matrix<double, 6, 6> moment = errors.at(matches[k]);
-    poses[k].reference.covariance += factor * moment;
+    if (factor != 0) poses.reference.addCovariance(k, factor * moment);
     result.position += moment.topLeftCorner<3, 3>().trace(),
         result.rotation += moment.bottomRightCorner<3, 3>().trace();
   }
@@ -189,15 +191,9 @@ LIESTAT_FUSION_INLINE InterpolationError addInterpolationError(std::span<const T
   return result;
 }
 
-LIESTAT_FUSION_INLINE std::vector<Gaussian<SE3d>> exactPoses(std::span<const SE3d> poses) {
-  std::vector<Gaussian<SE3d>> exact;
-  exact.reserve(poses.size());
-  for (const SE3d& pose : poses) exact.push_back({pose, Eigen::Matrix<double, 6, 6>::Zero()});
-  return exact;
-}
+LIESTAT_FUSION_INLINE NoisyPoses exactPoses(std::vector<SE3d> poses) { return NoisyPoses::exact(std::move(poses)); }
 
-LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses, AlignmentModel model,
-                                             std::size_t n_to_align) {
+LIESTAT_FUSION_INLINE Alignment alignUmeyama(MatchedRange poses, AlignmentModel model, std::size_t n_to_align) {
   Alignment a;
   a.model = model;
   a.poses = model == AlignmentModel::none     ? 0
@@ -213,21 +209,21 @@ LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses,
     return a;
   }
   if (model == AlignmentModel::origin) {
-    a.transform = poses[0].reference.mean * poses[0].estimate.mean.inverse();
+    a.transform = poses.reference(0) * poses.estimate(0).inverse();
     a.parameters = 6;
     a.ok = true;
     return a;
   }
   const auto n = static_cast<double>(a.poses);
   Eigen::Vector3d x_mean = Eigen::Vector3d::Zero(), y_mean = Eigen::Vector3d::Zero();
-  for (const MatchedPose& p : poses.first(a.poses)) {
-    x_mean += p.estimate.mean.translation(), y_mean += p.reference.mean.translation();
+  for (std::size_t i = 0; i < a.poses; ++i) {
+    x_mean += poses.estimate(i).translation(), y_mean += poses.reference(i).translation();
   }
   x_mean /= n, y_mean /= n;
   Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
   double variance = 0;
-  for (const MatchedPose& p : poses.first(a.poses)) {
-    const Eigen::Vector3d x = p.estimate.mean.translation() - x_mean, y = p.reference.mean.translation() - y_mean;
+  for (std::size_t i = 0; i < a.poses; ++i) {
+    const Eigen::Vector3d x = poses.estimate(i).translation() - x_mean, y = poses.reference(i).translation() - y_mean;
     moment += y * x.transpose();
     variance += x.squaredNorm();
   }
@@ -267,12 +263,11 @@ LIESTAT_FUSION_INLINE Alignment alignUmeyama(std::span<const MatchedPose> poses,
   return a;
 }
 
-LIESTAT_FUSION_INLINE Alignment alignWeighted(std::span<const MatchedPose> poses, AlignmentModel model,
-                                              std::size_t n_to_align) {
+LIESTAT_FUSION_INLINE Alignment alignWeighted(MatchedRange poses, AlignmentModel model, std::size_t n_to_align) {
   return detail::weightedAlignment(poses, model, n_to_align);
 }
 
-LIESTAT_FUSION_INLINE Consistency evaluateConsistency(std::span<const MatchedPose> poses, const Alignment& alignment) {
+LIESTAT_FUSION_INLINE Consistency evaluateConsistency(MatchedRange poses, const Alignment& alignment) {
   return detail::consistencyOf(poses, alignment);
 }
 
@@ -316,38 +311,39 @@ inline double errorNumber(const SE3d& E, PoseRelation relation) {
 
 }  // namespace detail
 
-LIESTAT_FUSION_INLINE std::vector<double> absoluteErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
+LIESTAT_FUSION_INLINE std::vector<double> absoluteErrors(MatchedRange poses, const Alignment& alignment,
                                                          PoseRelation relation) {
   std::vector<double> errors;
   errors.reserve(poses.size());
-  for (const MatchedPose& p : poses) {
-    const SE3d estimate = alignment(p.estimate.mean);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const SE3d estimate = alignment(poses.estimate(i));
     switch (relation) {
       case PoseRelation::trans_part:
       case PoseRelation::point_distance:
       case PoseRelation::point_distance_error_ratio:
-        errors.push_back((estimate.translation() - p.reference.mean.translation()).norm());
+        errors.push_back((estimate.translation() - poses.reference(i).translation()).norm());
         break;
       default:
-        errors.push_back(detail::errorNumber(estimate.inverse() * p.reference.mean, relation));
+        errors.push_back(detail::errorNumber(estimate.inverse() * poses.reference(i), relation));
     }
   }
   return errors;
 }
 
-LIESTAT_FUSION_INLINE std::vector<std::pair<std::size_t, std::size_t>> posePairs(std::span<const MatchedPose> poses,
+LIESTAT_FUSION_INLINE std::vector<std::pair<std::size_t, std::size_t>> posePairs(MatchedRange poses,
                                                                                  const Alignment& alignment,
                                                                                  const RelativeOptions& options) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   const std::size_t n = poses.size();
   const auto pose = [&](std::size_t i) {
-    return options.pairs_from_reference ? poses[i].reference.mean : alignment(poses[i].estimate.mean);
+    return options.pairs_from_reference ? poses.reference(i) : alignment(poses.estimate(i));
   };
   const double tolerance = options.relative_tolerance * options.delta;
   if (!(options.delta > 0) || n < 2) return pairs;
   if (options.unit == DeltaUnit::frames) {
     const auto delta = static_cast<std::size_t>(options.delta);
     if (delta == 0) return pairs;
+    pairs.reserve(options.all_pairs ? n : n / delta + 1);
     for (std::size_t i = 0; i + delta < n; i += options.all_pairs ? 1 : delta) pairs.emplace_back(i, i + delta);
     return pairs;
   }
@@ -404,15 +400,16 @@ LIESTAT_FUSION_INLINE std::vector<std::pair<std::size_t, std::size_t>> posePairs
   return pairs;
 }
 
-LIESTAT_FUSION_INLINE std::vector<double> relativeErrors(std::span<const MatchedPose> poses, const Alignment& alignment,
+LIESTAT_FUSION_INLINE std::vector<double> relativeErrors(MatchedRange poses, const Alignment& alignment,
                                                          std::vector<std::pair<std::size_t, std::size_t>>& pairs,
                                                          PoseRelation relation) {
   std::vector<double> errors;
   std::vector<std::pair<std::size_t, std::size_t>> kept;
+  errors.reserve(pairs.size());
   const bool lengths = relation == PoseRelation::point_distance || relation == PoseRelation::point_distance_error_ratio;
   for (const auto& [i, j] : pairs) {
-    const SE3d &from = poses[i].reference.mean, &to = poses[j].reference.mean;
-    const SE3d est_from = alignment(poses[i].estimate.mean), est_to = alignment(poses[j].estimate.mean);
+    const SE3d &from = poses.reference(i), &to = poses.reference(j);
+    const SE3d est_from = alignment(poses.estimate(i)), est_to = alignment(poses.estimate(j));
     if (lengths) {
       const double length = (from.translation() - to.translation()).norm();
       const double error = std::abs(length - (est_from.translation() - est_to.translation()).norm());
@@ -423,19 +420,19 @@ LIESTAT_FUSION_INLINE std::vector<double> relativeErrors(std::span<const Matched
       } else {
         continue;
       }
+      kept.emplace_back(i, j);
     } else {
       const SE3d E = (from.inverse() * to).inverse() * (est_from.inverse() * est_to);
       errors.push_back(detail::errorNumber(E, relation));
     }
-    kept.emplace_back(i, j);
   }
-  pairs = std::move(kept);
+  if (lengths) pairs = std::move(kept);
   return errors;
 }
 
 LIESTAT_FUSION_INLINE RelativeConsistency
-relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                    PairsModel model, double scale, const NoiseComponents& components) {
+relativeConsistency(MatchedRange poses, std::span<const std::pair<std::size_t, std::size_t>> pairs, PairsModel model,
+                    double scale, const NoiseComponents& components) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   RelativeConsistency result;
   double sum = 0;
@@ -459,7 +456,7 @@ relativeConsistency(std::span<const MatchedPose> poses, std::span<const std::pai
   for (const auto& [i, j] : pairs) {
     const Gaussian<SE3d> from = scaled(poses[i].estimate), to = scaled(poses[j].estimate);
     const SE3d relative = from.mean.inverse() * to.mean;
-    const SE3d reference = poses[i].reference.mean.inverse() * poses[j].reference.mean;
+    const SE3d reference = poses.reference(i).inverse() * poses.reference(j);
     Eigen::Matrix<double, 6, 1> eta = (relative.inverse() * reference).log();
     const Matrix6 A = relative.inverse().Adj();
     const Matrix6 carried = detail::congruence(A, from.covariance);

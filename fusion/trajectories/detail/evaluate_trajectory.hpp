@@ -38,33 +38,29 @@ inline std::string inWords(const AssociationOptions& o) {
 /// A trajectory without the poses that the options leave out. Where they leave out none, nothing is copied.
 class ThinnedTrajectory {
  public:
-  ThinnedTrajectory(const PoseTrajectory& whole, const EvaluationOptions& o)
-      : whole_(whole), rows_(whole.poses.size()) {
-    std::iota(rows_.begin(), rows_.end(), std::size_t{0});
-    if (o.downsample > 0 && rows_.size() > o.downsample) spaceEvenly(o.downsample);
-    if (o.motion_filter && !rows_.empty()) keepMoved(*o.motion_filter);
-    copy();
+  ThinnedTrajectory(const PoseTrajectory& whole, const EvaluationOptions& o) : whole_(whole) {
+    if (o.downsample > 0 && size() > o.downsample) spaceEvenly(o.downsample);
+    if (o.motion_filter && size() > 0) keepMoved(*o.motion_filter);
   }
 
   /// Keeps some of the rows that are left.
   void keep(std::span<const std::size_t> of_left) {
     std::vector<std::size_t> rows;
-    for (const std::size_t i : of_left) rows.push_back(rows_[i]);
-    rows_ = std::move(rows);
-    copy();
+    for (const std::size_t i : of_left) rows.push_back(rowOf(i));
+    take(std::move(rows));
   }
 
-  bool isWhole() const { return rows_.size() == whole_.poses.size(); }
-  std::span<const double> times() const { return isWhole() ? whole_.times : times_; }
-  std::span<const Gaussian<SE3d>> poses() const { return isWhole() ? whole_.poses : poses_; }
-  std::size_t rowOf(std::size_t of_left) const { return rows_[of_left]; }
+  std::span<const double> times() const { return rows_ ? times_ : whole_.times; }
+  const NoisyPoses& poses() const { return rows_ ? poses_ : whole_.poses; }
+  std::size_t rowOf(std::size_t of_left) const { return rows_ ? (*rows_)[of_left] : of_left; }
 
  private:
-  const Gaussian<SE3d>& pose(std::size_t i) const { return whole_.poses[rows_[i]]; }
+  std::size_t size() const { return poses().size(); }
+  const SE3d& pose(std::size_t i) const { return whole_.poses.mean(rowOf(i)); }
 
   /// evo's rows: whole parts of evenly spaced numbers, with the first and the last one.
   void spaceEvenly(std::size_t count) {
-    const std::size_t last = rows_.size() - 1;
+    const std::size_t last = size() - 1;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < count; ++k) {
       const double at =
@@ -72,37 +68,37 @@ class ThinnedTrajectory {
       rows.push_back(std::min(last, static_cast<std::size_t>(at)));
     }
     if (count > 1) rows.back() = last;
-    rows_ = std::move(rows);
+    take(std::move(rows));
   }
 
   /// evo's rows: the path is summed from pose to pose, the angle is that from the last pose that was kept.
   void keepMoved(const MotionThinning& least) {
-    std::vector<std::size_t> rows{rows_[0]};
+    std::vector<std::size_t> rows{rowOf(0)};
     double path = 0;
     std::size_t kept = 0;
-    for (std::size_t i = 1; i < rows_.size(); ++i) {
-      path += (pose(i).mean.translation() - pose(i - 1).mean.translation()).norm();
-      const double turned = degrees_per_radian * (pose(kept).mean.so3().inverse() * pose(i).mean.so3()).log().norm();
+    for (std::size_t i = 1; i < size(); ++i) {
+      path += (pose(i).translation() - pose(i - 1).translation()).norm();
+      const double turned = degrees_per_radian * (pose(kept).so3().inverse() * pose(i).so3()).log().norm();
       if (path < least.distance && turned < least.degrees) continue;
-      rows.push_back(rows_[i]);
+      rows.push_back(rowOf(i));
       path = 0, kept = i;
     }
+    take(std::move(rows));
+  }
+
+  void take(std::vector<std::size_t> rows) {
+    times_.clear();
+    for (const std::size_t i : rows) {
+      if (!whole_.times.empty()) times_.push_back(whole_.times[i]);
+    }
+    poses_ = whole_.poses.rows(rows);
     rows_ = std::move(rows);
   }
 
-  void copy() {
-    times_.clear(), poses_.clear();
-    if (isWhole()) return;
-    for (const std::size_t i : rows_) {
-      if (!whole_.times.empty()) times_.push_back(whole_.times[i]);
-      poses_.push_back(whole_.poses[i]);
-    }
-  }
-
   const PoseTrajectory& whole_;
-  std::vector<std::size_t> rows_;
+  std::optional<std::vector<std::size_t>> rows_;  // that are left, unless all are
   std::vector<double> times_;
-  std::vector<Gaussian<SE3d>> poses_;
+  NoisyPoses poses_;
 };
 
 inline SE3d projected(const SE3d& T, CoordinatePlane plane) {
@@ -145,7 +141,7 @@ inline double unitFactor(std::string_view from, ErrorUnit to) {
 }
 
 /// Median angle between the relative rotations of both trajectories over a fifth of the run.
-inline double rotationDisagreement(std::span<const MatchedPose> poses, bool swap_reference, bool swap_estimate) {
+inline double rotationDisagreement(MatchedRange poses, bool swap_reference, bool swap_estimate) {
   std::vector<double> angles;
   const std::size_t lag = std::max<std::size_t>(1, poses.size() / 5);
   const std::size_t step = std::max<std::size_t>(1, poses.size() / 500);
@@ -154,8 +150,8 @@ inline double rotationDisagreement(std::span<const MatchedPose> poses, bool swap
     return swapped ? SO3d(wFirst(A).inverse() * wFirst(B)) : SO3d(A.inverse() * B);
   };
   for (std::size_t i = 0; i + lag < poses.size(); i += step) {
-    const SO3d reference = relative(poses[i].reference.mean, poses[i + lag].reference.mean, swap_reference);
-    const SO3d estimate = relative(poses[i].estimate.mean, poses[i + lag].estimate.mean, swap_estimate);
+    const SO3d reference = relative(poses.reference(i), poses.reference(i + lag), swap_reference);
+    const SO3d estimate = relative(poses.estimate(i), poses.estimate(i + lag), swap_estimate);
     angles.push_back((reference.inverse() * estimate).log().norm());
   }
   if (angles.empty()) return not_a_number;
@@ -175,18 +171,53 @@ inline std::string noteOfCoarseReference(const TrajectoryEvaluation& e) {
 }
 
 inline MisfitSearch misfitOf(const TrajectoryEvaluation& e, std::span<const double> truth_times,
-                             std::span<const Gaussian<SE3d>> truth, const EvaluationOptions& o) {
+                             const NoisyPoses& truth, const EvaluationOptions& o) {
   std::vector<SE3d> estimate, reference;
-  for (const MatchedPose& p : e.matched) {
-    estimate.push_back(p.estimate.mean), reference.push_back(p.reference.mean);
+  for (std::size_t i = 0; i < e.matched.size(); ++i) {
+    estimate.push_back(e.matched.estimate.mean(i)), reference.push_back(e.matched.reference.mean(i));
   }
   std::vector<double> times;
   std::vector<TimedPose> stream;
   if (e.by_time) {
     for (const double t : e.times) times.push_back(t + o.association.offset);
-    for (std::size_t i = 0; i < truth_times.size(); ++i) stream.push_back({truth_times[i], truth[i].mean});
+    for (std::size_t i = 0; i < truth_times.size(); ++i) stream.push_back({truth_times[i], truth.mean(i)});
   }
   return findMisfit(estimate, reference, times, PoseStream(stream), o.alignment, o.association.offset);
+}
+
+/// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too long
+/// for three to eight of them.
+inline std::vector<SegmentErrors> segmentErrors(const MatchedPoses& poses, const Alignment& alignment) {
+  double path = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    path += (poses.reference.mean(i).translation() - poses.reference.mean(i - 1).translation()).norm();
+  }
+  std::vector<SegmentErrors> segments;
+  if (!(path > 1e-6) || !(path < 1e12)) return segments;
+  double step = 0;
+  for (int k = -8; k < 12 && step == 0; ++k) {
+    for (const double factor : {8.0, 16.0, 40.0}) {
+      if (step == 0 && 9 * factor * std::pow(10, k) > 0.8 * path) step = factor * std::pow(10, k);
+    }
+  }
+  if (step < 8 && 3 * 8 <= 0.8 * path) step = 8;
+  for (double length = step; length <= 0.8 * path && segments.size() < 8; length += step) {
+    auto pairs =
+        posePairs(poses, alignment,
+                  {.delta = length, .unit = DeltaUnit::meters, .all_pairs = true, .pairs_from_reference = true});
+    SegmentErrors s{.length = length, .pairs = pairs.size()};
+    if (pairs.empty()) continue;
+    const auto fill = [&](PoseRelation relation, ErrorStatistics& statistics, std::array<double, 5>& quantiles) {
+      const std::vector<double> errors = relativeErrors(poses, alignment, pairs, relation);
+      statistics = errorStatistics(errors);
+      constexpr std::array shares{0.05, 0.25, 0.5, 0.75, 0.95};
+      for (std::size_t q = 0; q < shares.size(); ++q) quantiles[q] = quantile(errors, shares[q]);
+    };
+    fill(PoseRelation::trans_part, s.translation, s.translation_quantiles);
+    fill(PoseRelation::angle_deg, s.rotation, s.rotation_quantiles);
+    segments.push_back(s);
+  }
+  return segments;
 }
 
 inline std::string noteOfIndefinite(const TrajectoryEvaluation& e, const std::vector<std::size_t>& lines) {
@@ -260,7 +291,7 @@ LIESTAT_FUSION_INLINE std::vector<std::size_t> rowsBetween(std::span<const doubl
   return rows;
 }
 
-LIESTAT_FUSION_INLINE std::string suspectQuaternionOrder(std::span<const MatchedPose> poses, std::string_view reference,
+LIESTAT_FUSION_INLINE std::string suspectQuaternionOrder(MatchedRange poses, std::string_view reference,
                                                          std::string_view estimate) {
   if (poses.size() < 10) return {};
   const double as_read = detail::rotationDisagreement(poses, false, false);
@@ -274,8 +305,7 @@ LIESTAT_FUSION_INLINE std::string suspectQuaternionOrder(std::span<const Matched
          significant(as_read, 3) + " rad as x y z w";
 }
 
-LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajectory& reference,
-                                                              const PoseTrajectory& estimate,
+LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajectory& reference, PoseTrajectory estimate,
                                                               const EvaluationOptions& o) {
   TrajectoryEvaluation e;
   const std::string reference_name = reference.name.empty() ? "the reference" : reference.name;
@@ -310,26 +340,29 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     }
     truth.keep(rows);
   }
-  const Associated association = associate({truth.times(), truth.poses().size(), reference_name},
-                                           {left.times(), left.poses().size(), estimate_name}, o.association);
+  Associated association = associate({truth.times(), truth.poses().size(), reference_name},
+                                     {left.times(), left.poses().size(), estimate_name}, o.association);
   e.by_time = association.by_time;
   if (!association.ok()) return refuse(association.status, association.reason);
   e.matched =
       matchedPoses(association.matches, truth.poses(), left.poses(), o.association.interpolation, truth.times());
+  estimate.poses = {};
   if (e.matched.size() < 2) {
     return refuse(EvaluationStatus::too_few,
                   std::to_string(e.matched.size()) + " pose has a partner in " + reference_name);
   }
-  for (MatchedPose& p : e.matched) {
-    if (!reference.has_covariances) p.reference.covariance.setZero();
-    if (!estimate.has_covariances) p.estimate.covariance.setZero();
-  }
-  e.interpolation =
-      addInterpolationError(association.matches, truth.poses(), truth.times(), o.association.interpolation, e.matched);
+  if (!reference.has_covariances) e.matched.reference.forgetCovariances();
+  if (!estimate.has_covariances) e.matched.estimate.forgetCovariances();
+  // The verdict alone needs the covariances of the error, which would be most of the memory.
+  e.interpolation = addInterpolationError(association.matches, truth.poses(), truth.times(),
+                                          o.association.interpolation, e.matched, e.has_covariances ? 1 : 0);
+  e.times.reserve(e.matched.size()), e.rows.reserve(e.matched.size());
   for (const TimeMatch& m : association.matches) {
     e.times.push_back(e.by_time ? left.times()[m.estimate] : static_cast<double>(m.estimate));
     e.rows.push_back(left.rowOf(m.estimate));
   }
+  estimate.times = {};
+  if (!e.has_covariances) association.matches = {};
   const std::string suspicion = suspectQuaternionOrder(e.matched, reference_name, estimate_name);
   if (!suspicion.empty()) e.notes.push_back(suspicion);
   if (o.misfit) {
@@ -347,15 +380,17 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     return refuse(EvaluationStatus::not_aligned,
                   std::string("no ") + name(o.alignment) + " alignment: " + e.alignment.fault);
   }
-  std::vector<MatchedPose> flat;
+  if (!e.has_covariances && e.alignment.parameters > 0) e.alignment.covariance.setConstant(detail::not_a_number);
+  MatchedPoses flat;
   if (o.project_to_plane) {
     flat = e.matched;
-    for (MatchedPose& p : flat) {
-      p.reference.mean = detail::projected(p.reference.mean, *o.project_to_plane);
-      p.estimate.mean = detail::projected(e.alignment(p.estimate.mean), *o.project_to_plane);
+    for (std::size_t i = 0; i < flat.size(); ++i) {
+      SE3d &of_reference = flat.reference.mean(i), &of_estimate = flat.estimate.mean(i);
+      of_reference = detail::projected(of_reference, *o.project_to_plane);
+      of_estimate = detail::projected(e.alignment(of_estimate), *o.project_to_plane);
     }
   }
-  const std::vector<MatchedPose>& compared = o.project_to_plane ? flat : e.matched;
+  const MatchedPoses& compared = o.project_to_plane ? flat : e.matched;
   const Alignment applied = o.project_to_plane ? Alignment{.ok = true} : e.alignment;
   e.position_errors = absoluteErrors(compared, applied, PoseRelation::trans_part);
   e.rotation_errors = absoluteErrors(compared, applied, PoseRelation::angle_rad);
@@ -377,6 +412,7 @@ LIESTAT_FUSION_INLINE TrajectoryEvaluation evaluateTrajectory(const PoseTrajecto
     e.notes.push_back(detail::noteOfCoarseReference(e));
   }
   e.ape_statistics = errorStatistics(e.ape), e.rpe_statistics = errorStatistics(e.rpe);
+  if (o.segments) e.segments = detail::segmentErrors(compared, applied);
   if (!e.has_covariances) return e;
 
   if (o.pairs_model && o.relative.all_pairs) {

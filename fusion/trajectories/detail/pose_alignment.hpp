@@ -122,14 +122,14 @@ struct AlignmentSums {
 };
 
 /// The centroid of the aligned positions.
-inline Eigen::Vector3d centroid(std::span<const MatchedPose> poses, const Alignment& a) {
+inline Eigen::Vector3d centroid(MatchedRange poses, const Alignment& a) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const MatchedPose& p : poses) sum += a(p.estimate.mean).translation();
+  for (std::size_t i = 0; i < poses.size(); ++i) sum += a(poses.estimate(i)).translation();
   return poses.empty() ? sum : Eigen::Vector3d(sum / static_cast<double>(poses.size()));
 }
 
-inline AlignmentSums alignmentSums(std::span<const MatchedPose> poses, const Alignment& a,
-                                   const Eigen::Vector3d& centre, const std::array<bool, 7>& is_free) {
+inline AlignmentSums alignmentSums(MatchedRange poses, const Alignment& a, const Eigen::Vector3d& centre,
+                                   const std::array<bool, 7>& is_free) {
   AlignmentSums sums;
   for (const MatchedPose& p : poses) {
     sums.add(AlignedError(p, a, centre, is_free).reduced(a.components, p.estimate.mean.so3()));
@@ -170,7 +170,7 @@ inline void clearFixed(Matrix7& covariance, const std::array<bool, 7>& is_free) 
 }
 
 /// The covariance of a least-squares alignment of positions: M (Σ Kᵀ P K) M, M = (Σ Kᵀ K)⁻¹. NaN where the scale is free.
-inline Matrix7 umeyamaCovariance(std::span<const MatchedPose> poses, const Alignment& a) {
+inline Matrix7 umeyamaCovariance(MatchedRange poses, const Alignment& a) {
   const std::array<bool, 7> is_free = freeParameters(a.model);
   Matrix7 unknown = Matrix7::Constant(not_a_number);
   if (is_free[6]) return unknown;
@@ -200,7 +200,7 @@ inline Matrix7 umeyamaCovariance(std::span<const MatchedPose> poses, const Align
 
 /// Gauss-Newton in the directions that the judged components determine, from the better of two starts: the positions'
 /// least squares and the alignment that is given.
-inline void refine(std::span<const MatchedPose> used, Alignment& a) {
+inline void refine(MatchedRange used, Alignment& a) {
   const std::array<bool, 7> is_free = freeParameters(a.model);
   const int fixed = static_cast<int>(std::count(is_free.begin(), is_free.end(), false));
   a.ok = false, a.iterations = 0;
@@ -247,7 +247,7 @@ inline void refine(std::span<const MatchedPose> used, Alignment& a) {
 
 /// The components that carry noise, by the errors under an alignment that has no errors in the others: along the axes of the
 /// body or, where more are left out so (matrices of ROS), along those of the world.
-inline NoiseComponents noiseComponents(std::span<const MatchedPose> poses, const Alignment& a) {
+inline NoiseComponents noiseComponents(MatchedRange poses, const Alignment& a) {
   NoiseComponentScan in_body, in_world;
   for (const MatchedPose& p : poses) {
     const SE3d moved = a(p.estimate.mean);
@@ -260,14 +260,13 @@ inline NoiseComponents noiseComponents(std::span<const MatchedPose> poses, const
   NoiseComponents body = in_body.components(), world = in_world.components();
   world.in_world = true;
   // Products with unknown entries are unknown: such matrices have their axes only.
-  const bool known =
-      std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.estimate.covariance.allFinite(); });
+  bool known = true;
+  for (const MatchedPose& p : poses) known = known && p.estimate.covariance.allFinite();
   return known && world.count() < body.count() ? world : body;
 }
 
 /// The components found before an alignment, with fillers that the errors after it exceed.
-inline NoiseComponents withExceededFillers(std::span<const MatchedPose> used, const Alignment& a,
-                                           const NoiseComponents& found) {
+inline NoiseComponents withExceededFillers(MatchedRange used, const Alignment& a, const NoiseComponents& found) {
   const auto is_filler = [](ComponentRole role) { return role == ComponentRole::filler; };
   if (std::none_of(found.roles.begin(), found.roles.end(), is_filler)) return found;
   const Eigen::Vector3d centre = centroid(used, a);
@@ -284,7 +283,7 @@ inline NoiseComponents withExceededFillers(std::span<const MatchedPose> used, co
 }
 
 /// `given`: components that are judged whatever the covariances are.
-inline Alignment weightedAlignment(std::span<const MatchedPose> poses, AlignmentModel model, std::size_t n_to_align,
+inline Alignment weightedAlignment(MatchedRange poses, AlignmentModel model, std::size_t n_to_align,
                                    const NoiseComponents* given = nullptr) {
   Alignment a;
   a.model = model;
@@ -307,14 +306,13 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
     a.fault = poses.empty() ? "no poses" : "one pose does not determine a scale";
     return a;
   }
-  const std::span<const MatchedPose> used = poses.first(a.poses);
-  const SE3d first = used[0].reference.mean * used[0].estimate.mean.inverse();
+  const MatchedRange used = poses.first(a.poses);
+  const SE3d first = used.reference(0) * used.estimate(0).inverse();
   a.transform = first;
   if (model == AlignmentModel::posyaw) {
     const Eigen::Matrix3d R = first.rotationMatrix();
     const SO3d yaw = SO3d::rotZ(std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1)));
-    a.transform =
-        SE3d(yaw, Eigen::Vector3d(used[0].reference.mean.translation() - yaw * used[0].estimate.mean.translation()));
+    a.transform = SE3d(yaw, Eigen::Vector3d(used.reference(0).translation() - yaw * used.estimate(0).translation()));
   }
   const NoiseComponents found = given != nullptr ? *given : noiseComponents(poses, a);
   a.components = found;
@@ -340,7 +338,7 @@ inline Alignment weightedAlignment(std::span<const MatchedPose> poses, Alignment
   return a;
 }
 
-inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Alignment& a) {
+inline Consistency consistencyOf(MatchedRange poses, const Alignment& a) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   Consistency r;
   if (!a.ok) {
@@ -356,7 +354,7 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
     return r;
   }
   const std::array<bool, 7> is_free = freeParameters(a.model);
-  const std::span<const MatchedPose> used = poses.first(a.poses);
+  const MatchedRange used = poses.first(a.poses);
   const Eigen::Vector3d centre = centroid(used, a);
   const bool sharing = a.parameters > 0, all_aligned = a.poses == poses.size();
   Matrix7 C = Matrix7::Zero(), information = Matrix7::Zero();
@@ -375,7 +373,7 @@ inline Consistency consistencyOf(std::span<const MatchedPose> poses, const Align
   AlignmentSums seen;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const AlignedError whole(poses[i], a, centre, is_free);
-    const AlignedError e = whole.reduced(a.components, poses[i].estimate.mean.so3());
+    const AlignedError e = whole.reduced(a.components, poses.estimate(i).so3());
     const bool aligned = i < a.poses;
     const double sign = aligned ? -1 : 1;
     PoseError out;
