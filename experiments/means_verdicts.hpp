@@ -45,8 +45,8 @@ struct VerdictCell {
   VerdictLaw law = VerdictLaw::fisher;
   double parameter = 0;
   std::size_t n = 10, trials = 400;
-  /// Rotations are orientations of crystals of this group: the parameter is then in units of the injectivity radius, half of the
-  /// group's least angle. Fisher's law with 0, or isotropic.
+  /// Rotations are orientations of crystals of this group: the parameter is then in units of the injectivity radius,
+  /// half of the group's least angle. Fisher's law with 0, or isotropic.
   std::optional<PointGroup> symmetry = {};
 
   /// The feature, or the point group.

@@ -62,8 +62,8 @@ std::string layoutsAfter(std::size_t numbers) {
   return text;
 }
 
-/// Seconds instead of the stamps of a file, whose unit is that of the option, or the one in which all of them lie between
-/// 1973 and 2286. No clock counts so many seconds.
+/// Seconds instead of the stamps of a file, whose unit is that of the option, or the one in which all of them lie
+/// between 1973 and 2286. No clock counts so many seconds.
 void settleStamps(Trajectory& t, const detail::TrajectoryFormat& format, std::optional<StampUnit> unit) {
   if (!t.hasTimes()) return;
   if (format.time_decimals > 0 || t.stamp_decimals > 0) {
@@ -350,7 +350,8 @@ Trajectory trajectoryOf(std::span<const Gaussian<SE3d>> poses, std::span<const d
   return trajectory;
 }
 
-// --- Writing ----------------------------------------------------------------------------------------------------------
+// --- Writing
+// ----------------------------------------------------------------------------------------------------------
 
 Convention conventionToWrite(std::string_view format, const std::string& asked, const std::string& caller,
                              std::string_view option) {

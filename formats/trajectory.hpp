@@ -79,8 +79,8 @@ struct TrajectoryOptions {
   /// The layout of the numbers that follow TUM's eight, which no file says.
   std::optional<CovarianceLayout> layout;
   double unmeasured = unmeasured_variance;  ///< see unmeasured_variance
-  /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year 5000
-  /// and are stamps since 1970 in ms, us or ns.
+  /// The unit of the stamps in formats that leave it open. Nothing: seconds, unless all of them lie beyond the year
+  /// 5000 and are stamps since 1970 in ms, us or ns.
   std::optional<StampUnit> time_unit;
   ReadingOptions reading;  ///< norms, CSV columns, size; its format is not used
 };
@@ -95,10 +95,10 @@ Trajectory readTrajectory(const std::string& path, const TextFile& file, const T
 /// The same from memory, without side file; `name` stands for the file in messages.
 Trajectory parseTrajectory(std::string_view text, std::string name, const TrajectoryOptions& options = {});
 
-/// Puts the rows in the order of their times, each time once, and adds notes on what has changed. A row that repeats stamp,
-/// pose (within 1e-9 m and rad) and covariance of an earlier one is dropped; if the poses differ, the rule decides.
-/// Throws InputError where they do and there is no rule, and for the mean of poses with covariances, whose convention it
-/// would take. Without times there is nothing to do.
+/// Puts the rows in the order of their times, each time once, and adds notes on what has changed. A row that repeats
+/// stamp, pose (within 1e-9 m and rad) and covariance of an earlier one is dropped; if the poses differ, the rule
+/// decides. Throws InputError where they do and there is no rule, and for the mean of poses with covariances, whose
+/// convention it would take. Without times there is nothing to do.
 void orderInTime(Trajectory& trajectory, std::optional<DuplicateRule> duplicates);
 
 /// Sentences on what reading has changed: rows sorted or dropped, rotations normalised (quaternions that are off by
@@ -107,8 +107,8 @@ std::vector<std::string> notesOf(const Trajectory& trajectory, const TrajectoryO
 
 /// Poses and covariances in the library's convention (stats/gaussian.hpp); NaN for what is unknown, throughout if the
 /// trajectory has no covariances. `convention` is the name of that in which the file has them, such as ros-fixed
-/// (stats/convention_presets.hpp); it may be empty if file or format states it. Throws InputError where nothing says it,
-/// where the two contradict each other, and where a matrix is indefinite, which no covariance is.
+/// (stats/convention_presets.hpp); it may be empty if file or format states it. Throws InputError where nothing says
+/// it, where the two contradict each other, and where a matrix is indefinite, which no covariance is.
 std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, std::string_view convention = {});
 /// The same of matrices in a convention, whatever the file states. Only for a trajectory that has covariances.
 std::vector<Gaussian<SE3d>> gaussiansOf(const Trajectory& trajectory, const Convention& convention);
@@ -128,8 +128,8 @@ Convention conventionNamed(const std::string& text, std::string_view option);
 /// Options of writeTrajectory.
 struct TrajectoryWritingOptions {
   std::string format = {};  ///< one of trajectoryFormatNames() but `auto`; empty: the trajectory's
-  /// The convention of the matrices in the file, to which those of the trajectory are converted to first order. Nothing:
-  /// the library's where the file says so, MAVLink's in its messages; other formats need one.
+  /// The convention of the matrices in the file, to which those of the trajectory are converted to first order.
+  /// Nothing: the library's where the file says so, MAVLink's in its messages; other formats need one.
   std::optional<Convention> convention = {};
 };
 

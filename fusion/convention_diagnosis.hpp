@@ -6,8 +6,8 @@
 //   if (diagnosis.verdict == liestat::DiagnosisVerdict::identified) use(diagnosis.accepted.front());
 //   else std::puts(diagnosis.reason.c_str());
 //
-// diagnoseCovariances takes a whole file, with or without a truth, with its runs and what its format fixes. Its verdict()
-// is that of `liestat doctor`.
+// diagnoseCovariances takes a whole file, with or without a truth, with its runs and what its format fixes. Its
+// verdict() is that of `liestat doctor`.
 //
 // 216 hypotheses (order × perturbation × unit × content) are compared by the likelihood of the errors. The margin
 // ln(216/α) is a bound, not a fit: for independent errors the true hypothesis is rejected with probability α at most.
@@ -52,7 +52,8 @@ struct DiagnosisOptions {
 LIESTAT_TRAJECTORIES_API ConventionDiagnosis diagnoseConventions(std::span<const DiagnosedPose> poses,
                                                                  const DiagnosisOptions& options = {});
 
-/// Rows of the convention candidates `of` (empty: all) against all hypotheses. At most 40 poses, evenly spaced, are used.
+/// Rows of the convention candidates `of` (empty: all) against all hypotheses. At most 40 poses, evenly spaced, are
+/// used.
 LIESTAT_TRAJECTORIES_API std::vector<PlanRow> planDiagnosis(std::span<const DiagnosedPose> poses,
                                                             std::span<const Convention> of = {},
                                                             const DiagnosisOptions& options = {});
@@ -91,7 +92,8 @@ struct CovarianceDiagnosisOptions {
 };
 
 /// The diagnosis of a file. Several runs give one residual each, at one time: those are independent of each other,
-/// while neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is decided.
+/// while neighbouring errors of one run may not be; they are not aligned. No run, or runs without poses: nothing is
+/// decided.
 LIESTAT_TRAJECTORIES_API CovarianceDiagnosis diagnoseCovariances(std::span<const DiagnosedRun> runs,
                                                                  const CovarianceDiagnosisOptions& options = {});
 

@@ -17,8 +17,8 @@
 
 namespace liestat {
 
-/// A pose with its matrix as a file has it (layout undone, NaN for unknown entries), and the true pose. For edges of a pose
-/// graph: the measured and the true relative pose.
+/// A pose with its matrix as a file has it (layout undone, NaN for unknown entries), and the true pose. For edges of a
+/// pose graph: the measured and the true relative pose.
 struct DiagnosedPose {
   SE3d estimate;
   Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Identity();
@@ -83,7 +83,8 @@ struct HypothesisFit {
   std::size_t indefinite = 0;                 ///< poses whose covariance is not positive definite: excluded
 };
 
-/// Scales of the blocks under which the errors are most likely: the file's covariance is D Σ D, D = diag(√k_t I, √k_r I).
+/// Scales of the blocks under which the errors are most likely: the file's covariance is D Σ D, D = diag(√k_t I, √k_r
+/// I).
 struct ScaleProfile {
   Convention convention;
   double translation = 1, rotation = 1;  ///< k_t, k_r: above one inflated, below overconfident
@@ -97,7 +98,8 @@ struct ScaleProfile {
   std::vector<std::string> words() const;
 };
 
-/// Dead reckoning, whose covariance only grows: the share of steps in which Σ_i - A Σ_{i-1} Aᵀ is not positive semidefinite.
+/// Dead reckoning, whose covariance only grows: the share of steps in which Σ_i - A Σ_{i-1} Aᵀ is not positive
+/// semidefinite.
 struct ChainFit {
   Convention convention;
   double indefinite = 1;
@@ -180,7 +182,8 @@ struct CovarianceDiagnosis {
   /// The convention that explains the errors, else the likeliest one; nothing if none does.
   std::optional<Convention> best() const;
   /// Yes: one convention is identified, and the errors are consistent with it (of a plan: always). No: the errors do
-  /// not follow the covariances, or no convention explains them. None: several conventions do, or there are too few poses.
+  /// not follow the covariances, or no convention explains them. None: several conventions do, or there are too few
+  /// poses.
   Verdict verdict() const;
 };
 

@@ -19,7 +19,8 @@
 
 namespace liestat {
 
-// Input ------------------------------------------------------------------------------------------------------------------
+// Input
+// ------------------------------------------------------------------------------------------------------------------
 
 /// Poses with their times. What is in words is for sentences alone.
 struct PoseTrajectory {
@@ -31,7 +32,8 @@ struct PoseTrajectory {
   std::vector<std::size_t> lines = {};     ///< line of the file for each pose; empty: there is none
 };
 
-// Options ----------------------------------------------------------------------------------------------------------------
+// Options
+// ----------------------------------------------------------------------------------------------------------------
 
 /// The pose of the reference that an estimated pose is compared with.
 enum class AssociationRule {
@@ -58,8 +60,8 @@ constexpr auto words(CoordinatePlane) { return std::array{"xy", "xz", "yz"}; }
 enum class ErrorUnit { mm, cm, m, km, deg, rad };
 constexpr auto words(ErrorUnit) { return std::array{"mm", "cm", "m", "km", "deg", "rad"}; }
 
-/// Keeps poses after which the body has moved so far along its path since the last one that was kept, or is turned so far
-/// against it: as evo.
+/// Keeps poses after which the body has moved so far along its path since the last one that was kept, or is turned so
+/// far against it: as evo.
 struct MotionThinning {
   double distance = 0, degrees = 0;  ///< m, degrees
 };
@@ -109,7 +111,8 @@ void describe(V& v, const EvaluationOptions& o) {
   v("pairs_model", word(o.pairs_model))("misfit", o.misfit);
 }
 
-// Result -----------------------------------------------------------------------------------------------------------------
+// Result
+// -----------------------------------------------------------------------------------------------------------------
 
 /// How an evaluation ended; what is not `ok` comes with a reason.
 enum class EvaluationStatus {
@@ -245,7 +248,8 @@ inline Verdict TrajectoryEvaluation::verdict() const {
                           significant(c.joint.dof, 17) + " degrees of freedom)");
 }
 
-// Descriptions -----------------------------------------------------------------------------------------------------------
+// Descriptions
+// -----------------------------------------------------------------------------------------------------------
 
 /// Fields that are the same for all estimates of a run.
 template <class V>

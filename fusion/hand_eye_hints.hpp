@@ -4,9 +4,9 @@
 //   const auto result = liestat::estimateRobotWorld(poses);
 //   if (const auto hint = liestat::explainHandEye(poses, result)) use(hint->reading);
 //
-// Nothing is guessed: each reading is fitted. Wrong covariances show themselves by χ² per degree of freedom of 20 to 40;
-// the right reading has one. Not all errors show: where poses of both files are inverses, X and Y are exchanged and fit
-// as well.
+// Nothing is guessed: each reading is fitted. Wrong covariances show themselves by χ² per degree of freedom of 20 to
+// 40; the right reading has one. Not all errors show: where poses of both files are inverses, X and Y are exchanged and
+// fit as well.
 #pragma once
 
 #include <fusion/hand_eye.hpp>
@@ -65,8 +65,8 @@ inline bool asksForExplanation(const HandEyeResult& result) {
          3 * result.outliers.size() > result.pairs.size();
 }
 
-/// The pairs, of n, that an explanation is sought with: not more than are needed, spread over the poses B, `pose(i)`, so
-/// that their order does not matter.
+/// The pairs, of n, that an explanation is sought with: not more than are needed, spread over the poses B, `pose(i)`,
+/// so that their order does not matter.
 template <class Pose>
 std::vector<std::size_t> pairsToExplain(std::size_t n, const Pose& pose) {
   constexpr std::size_t max_pairs = 40;

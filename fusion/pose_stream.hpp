@@ -32,8 +32,8 @@ constexpr auto words(PoseInterpolation) { return std::array{"geodesic", "slerp",
 
 namespace detail {
 
-/// The curve through poses of ascending times, and its error, measured without a truth: with every second stamp left out,
-/// the stamps that are left out show the error of twice the step. Source: size(), time(i), pose(i).
+/// The curve through poses of ascending times, and its error, measured without a truth: with every second stamp left
+/// out, the stamps that are left out show the error of twice the step. Source: size(), time(i), pose(i).
 template <class Source>
 class PoseCurve {
  public:
@@ -91,8 +91,8 @@ class PoseCurve {
     for (std::size_t k = 0; k < nodes.count; ++k) product *= time - source_.time(nodes.at[k]);
     return product;
   }
-  /// Pose i by the stamps that are left if every second of every `stride`-th is left out: i ± stride, i ± 3 stride. Nothing
-  /// near the ends.
+  /// Pose i by the stamps that are left if every second of every `stride`-th is left out: i ± stride, i ± 3 stride.
+  /// Nothing near the ends.
   std::optional<Nodes> leftOut(std::size_t i, std::size_t count, std::size_t stride) const {
     const std::size_t reach = (count - 1) * stride;
     if (i < reach || i + reach >= source_.size()) return std::nullopt;
@@ -104,9 +104,9 @@ class PoseCurve {
     const std::size_t base = nodes.at[nodes.count / 2 - 1];
     return (source_.pose(i).inverse() * between(nodes, base, source_.time(i))).log();
   }
-  /// The factor by which errors at the step itself are larger than those of twice the step divided by 4 (two nodes) or 16
-  /// (four): halving the step gains that much in slow motion only, so no more is taken than halving twice the step has
-  /// shown. Of positions (from 0) or rotations (from 3).
+  /// The factor by which errors at the step itself are larger than those of twice the step divided by 4 (two nodes) or
+  /// 16 (four): halving the step gains that much in slow motion only, so no more is taken than halving twice the step
+  /// has shown. Of positions (from 0) or rotations (from 3).
   double lostGain(std::size_t count, int from) const {
     double fine = 0, coarse = 0;
     const std::size_t every = source_.size() / 1000 + 1;

@@ -87,8 +87,8 @@ enum class AlignmentModel {
 };
 constexpr auto words(AlignmentModel) { return std::array{"none", "origin", "posyaw", "se3", "sim3", "scale"}; }
 
-/// A similarity x ↦ s R x + t of the world: a pose (R̂, p̂) becomes (R R̂, s R p̂ + t). `covariance` is of δ = (δt, δφ, δσ) with
-/// t ← t + δt, R ← Exp(δφ) R, s ← s exp(δσ), along the world's axes; rows of fixed parameters are zero.
+/// A similarity x ↦ s R x + t of the world: a pose (R̂, p̂) becomes (R R̂, s R p̂ + t). `covariance` is of δ = (δt, δφ,
+/// δσ) with t ← t + δt, R ← Exp(δφ) R, s ← s exp(δσ), along the world's axes; rows of fixed parameters are zero.
 struct Alignment {
   AlignmentModel model = AlignmentModel::none;
   bool ok = false;        ///< false: degenerate, not converged, or a covariance that is not positive definite
@@ -129,8 +129,8 @@ struct PoseError {
   double leverage = 0;  ///< share of the alignment's parameters that this pose determines; their sum is their number
 };
 
-/// NEES of aligned poses. With n_to_align the poses after those are tested, under the covariance of the alignment that they
-/// share.
+/// NEES of aligned poses. With n_to_align the poses after those are tested, under the covariance of the alignment that
+/// they share.
 struct Consistency {
   bool ok = false;
   std::string fault;
@@ -179,15 +179,16 @@ struct RelativeOptions {
   bool pairs_from_reference = false;
 };
 
-/// The assumption on the errors of a pair of poses. Files have covariances of single poses only, so it cannot be read off.
+/// The assumption on the errors of a pair of poses. Files have covariances of single poses only, so it cannot be read
+/// off.
 enum class PairsModel {
   independent,  ///< independent errors: Σ_j + A Σ_i Aᵀ
   chain         ///< dead reckoning, the later error contains the earlier: Σ_j - A Σ_i Aᵀ
 };
 constexpr auto words(PairsModel) { return std::array{"independent", "chain"}; }
 
-/// NEES of relative motions η = ξ_j - A ξ_i, A = Ad(T̂_rel⁻¹), under a model of the pairs. Pairs must not share a pose unless
-/// they are neighbours in a chain.
+/// NEES of relative motions η = ξ_j - A ξ_i, A = Ad(T̂_rel⁻¹), under a model of the pairs. Pairs must not share a pose
+/// unless they are neighbours in a chain.
 struct RelativeConsistency {
   ResidualTest joint;
   std::size_t n = 0;

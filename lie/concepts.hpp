@@ -101,8 +101,8 @@ concept Factored = Homogeneous<M> && requires(const M& x) {
   { ManifoldTraits<M>::fromFactors(ManifoldTraits<M>::factors(x)) } -> std::convertible_to<M>;
 };
 
-/// The same with `frames_of_factors = true` in its traits: the frame at x consists of those of the factors at theirs, as
-/// in products, whose placement is made of the factors'. Then the sums of a mean are those of the factors, too.
+/// The same with `frames_of_factors = true` in its traits: the frame at x consists of those of the factors at theirs,
+/// as in products, whose placement is made of the factors'. Then the sums of a mean are those of the factors, too.
 template <class M>
 concept HasFramesOfFactors = Factored<M> && requires {
   requires ManifoldTraits<M>::frames_of_factors;

@@ -23,8 +23,9 @@ template <Homogeneous M>
 using ScalarOf = typename ManifoldTraits<M>::Scalar;
 
 /// The point of a manifold that a value of another type stands for: `type` and `from(value)`. A view (Eigen::Map) or an
-/// expression (a column of a matrix) stands for the owning type, an Eigen::Quaternion for an SO3 (lie/so3.hpp). Estimators
-/// take ranges of such values as they take ranges of points. Specialise it for a type of your own that converts to a manifold.
+/// expression (a column of a matrix) stands for the owning type, an Eigen::Quaternion for an SO3 (lie/so3.hpp).
+/// Estimators take ranges of such values as they take ranges of points. Specialise it for a type of your own that
+/// converts to a manifold.
 template <class V>
 struct PointTraits {};
 

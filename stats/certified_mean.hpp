@@ -124,8 +124,8 @@ SquareOf<M> covarianceFromKnownNoise(const R& samples, const W& weights, const M
   return sandwich(mean, sum);
 }
 
-/// Completes `result`, whose mean is there, as findCertifiedMean does for a covariance from residuals, if the sums of the
-/// mean's last pass prove all of it. False otherwise; the rest of `result` is of no value then.
+/// Completes `result`, whose mean is there, as findCertifiedMean does for a covariance from residuals, if the sums of
+/// the mean's last pass prove all of it. False otherwise; the rest of `result` is of no value then.
 template <Metric M>
 LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedMeanOptions<M>& options,
                                      CertifiedMean<M>& result) {
@@ -158,8 +158,8 @@ LIESTAT_NO_INLINE bool certifyBySums(const WeightSums& weights, const CertifiedM
   return true;
 }
 
-/// `first` is the mean of the same features and weights, by options.mean. Looks at the features again for whatever the sums
-/// of its last pass do not prove.
+/// `first` is the mean of the same features and weights, by options.mean. Looks at the features again for whatever the
+/// sums of its last pass do not prove.
 template <Metric M, Executor E, class R, class W>
 CertifiedMean<M> findCertifiedMean(const E& executor, const R& samples, const W& weights,
                                    const CertifiedMeanOptions<M>& options, const MeanResult<M>& first) {

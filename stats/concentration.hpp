@@ -46,9 +46,9 @@ struct Concentration {
 
 namespace detail {
 
-/// The law of the mean squared distance of n uniform data about their Fréchet mean: expectation about a given point, and
-/// the coefficients of q(n) = Σ c_k n^(-k/2), fitted to 10 000 samples each of n = 2 to 50, 500 to 5000 of n to 2000
-/// (within 0.03, about three standard errors; tests/stats/concentration_test.cpp has the level).
+/// The law of the mean squared distance of n uniform data about their Fréchet mean: expectation about a given point,
+/// and the coefficients of q(n) = Σ c_k n^(-k/2), fitted to 10 000 samples each of n = 2 to 50, 500 to 5000 of n to
+/// 2000 (within 0.03, about three standard errors; tests/stats/concentration_test.cpp has the level).
 struct UniformLaw {
   double expectation;
   std::array<double, 5> quantile;

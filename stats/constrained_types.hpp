@@ -142,8 +142,8 @@ struct ConstrainedResult {
   /// NaN in rows and columns of coordinates that are open, and everywhere of `inconsistent` and `curved` ends. Active
   /// bounds do not make it smaller: the true parameter may be inside of them.
   SquareOf<Q> covariance = SquareOf<Q>::Constant(std::numeric_limits<double>::quiet_NaN());
-  /// D² of section 3.7: 2 L², the squared distance from the measurements and the prior to what was estimated. It follows
-  /// χ² with `degrees_of_freedom`.
+  /// D² of section 3.7: 2 L², the squared distance from the measurements and the prior to what was estimated. It
+  /// follows χ² with `degrees_of_freedom`.
   double chi2 = std::numeric_limits<double>::quiet_NaN();
   int degrees_of_freedom = 0;
   /// The probability of a larger χ² where the stated noise is right; NaN without degrees of freedom: untested.
@@ -158,7 +158,8 @@ struct ConstrainedResult {
   std::size_t measurements = 0, uninformative = 0;  ///< all; those whose free directions take up all their equations
   int iterations = 0;
   bool used_curvature = false;
-  /// A basis of the directions that neither measurements nor constraints determine, in the first `unobservable` columns.
+  /// A basis of the directions that neither measurements nor constraints determine, in the first `unobservable`
+  /// columns.
   int unobservable = 0;
   SquareOf<Q> unobservable_basis = SquareOf<Q>::Zero();
   /// The covariance of the error's part across these directions, whatever its part along them; NaN as `covariance` is

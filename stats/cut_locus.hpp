@@ -137,7 +137,8 @@ double largestEigenvalue(const Eigen::Matrix<double, K, K>& A) {
   }
 }
 
-/// True if the sums of a mean prove that findCutLocusNearby finds no mass; `result` then has the window that it reports.
+/// True if the sums of a mean prove that findCutLocusNearby finds no mass; `result` then has the window that it
+/// reports.
 template <Metric M>
 bool isFarFromCutLocusBySums(const MeanResult<M>& mean, const SquareOf<M>& covariance, CutLocusMass& result) {
   if constexpr (Factored<M>) {

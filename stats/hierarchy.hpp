@@ -8,8 +8,8 @@
 //   const auto& found = search.state(search.best());
 //
 // The search can be interrupted after each hypothesis, and has an answer at any time. Measurements may be added and
-// removed at any time. When it has terminated the answer depends on the measurements alone, not on the order in which they
-// came: draws belong to what a measurement is, not to its place.
+// removed at any time. When it has terminated the answer depends on the measurements alone, not on the order in which
+// they came: draws belong to what a measurement is, not to its place.
 #pragma once
 
 #include <stats/detail/keyed_measurements.hpp>
@@ -128,8 +128,8 @@ class Hierarchy {
     return true;
   }
 
-  /// One hypothesis or one local optimum; true while there is more to do. What `stop` ends is taken up by the next call,
-  /// estimates that are made already are kept.
+  /// One hypothesis or one local optimum; true while there is more to do. What `stop` ends is taken up by the next
+  /// call, estimates that are made already are kept.
   bool iterate(const StopRequest& stop = {}) {
     const std::size_t m = next();
     if (m == none) return false;
@@ -387,12 +387,12 @@ class Hierarchy {
   static constexpr std::size_t agreeing_starts = 3;
   /// The samples of a local optimum's own inliers that may confirm it.
   static constexpr std::size_t own_samples = 5;
-  /// Passes from a hypothesis to a local optimum, with few steps of the estimate each, because the inliers still change:
-  /// the first ones within a multiple of the threshold, whose optima are few.
+  /// Passes from a hypothesis to a local optimum, with few steps of the estimate each, because the inliers still
+  /// change: the first ones within a multiple of the threshold, whose optima are few.
   static constexpr int max_passes = 6, wide_passes = 2, rough_steps = 5;
   static constexpr double wide_threshold = 9;
-  /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half a
-  /// measurement: a choice between these is one between accidents.
+  /// Scores of the same optimum differ by this for each measurement at most, and those of equal ones by less than half
+  /// a measurement: a choice between these is one between accidents.
   static constexpr std::int64_t same_optimum = std::int64_t{1} << 20, equal_scores = std::int64_t{1} << 31;
   /// The share of right measurements among those off a dominant model that its completion reckons with.
   static constexpr double min_completing_share = 0.15;

@@ -83,8 +83,8 @@ class HierarchyModel {
   /// status not_converged.
   virtual ModelEstimate<Parameter> estimate(const Parameter& start, std::span<const Measurement> inliers,
                                             const StopRequest& stop) const = 0;
-  /// The same with what is too dear for each estimate of a search: its relative curvature, which widens the covariance, or
-  /// makes the status ill_defined, without one.
+  /// The same with what is too dear for each estimate of a search: its relative curvature, which widens the covariance,
+  /// or makes the status ill_defined, without one.
   virtual ModelEstimate<Parameter> finalEstimate(const Parameter& start, std::span<const Measurement> inliers,
                                                  const StopRequest& stop) const {
     return estimate(start, inliers, stop);

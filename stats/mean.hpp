@@ -141,8 +141,8 @@ LIESTAT_NO_INLINE MeanResult<M> frechetMean(const E& executor, const R& samples,
   if constexpr (requires { y.group(); }) {
     if (!options.start) y = meanOfCopies(executor, samples, weights, y), with_scatter = true;
   }
-  // If the last step was Newton's: where it began, the step of eq. (4) from there times the weights, and the cost that it
-  // may reach.
+  // If the last step was Newton's: where it began, the step of eq. (4) from there times the weights, and the cost that
+  // it may reach.
   bool newton = false;
   M before = y;
   TangentOf<M> weighted_step;

@@ -1,9 +1,9 @@
-// Features that a sample does not tell from its mean: other minima of the criterion, higher by no more than the noise of
-// the data explains. Needs Eigen alone.
+// Features that a sample does not tell from its mean: other minima of the criterion, higher by no more than the noise
+// of the data explains. Needs Eigen alone.
 //
 // A certificate (stats/uniqueness.hpp) speaks of the sample's criterion. Of two clouds of rotations half a turn apart
-// the mean lies on one side or the other by chance, and the next sample says the opposite. A rival at y is judged by the
-// differences e_i = ½ p_i (d²(y, x_i) - d²(mean, x_i)), whose sum is how much higher it is: paired data, so
+// the mean lies on one side or the other by chance, and the next sample says the opposite. A rival at y is judged by
+// the differences e_i = ½ p_i (d²(y, x_i) - d²(mean, x_i)), whose sum is how much higher it is: paired data, so
 //     z = Σ e_i/(√n sd(e_i))
 // is Student's t with n - 1 degrees of freedom where the truth has no preference. Where the noise is known the sum of
 // e_i/variance is a log-likelihood ratio, and speaks for itself. A minimum within the 99 % region of the mean is no
@@ -98,8 +98,8 @@ struct Part {
   }
 };
 
-/// Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it: their
-/// cut loci are this far from the mean, rad.
+/// Data within a third of the injectivity radius of their mean are twice as far from any place that might rival it:
+/// their cut loci are this far from the mean, rad.
 template <Metric M>
 double farFromRivals(const M& mean) {
   return 2.0 / 3 * static_cast<double>(injectivityRadiusAt(mean));

@@ -1,4 +1,5 @@
-// How far a model is from its linearisation on the scale of the noise, and what this does to a covariance of first order.
+// How far a model is from its linearisation on the scale of the noise, and what this does to a covariance of first
+// order.
 #pragma once
 
 #include <algorithm>

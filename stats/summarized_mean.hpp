@@ -99,8 +99,8 @@ struct MeanInput {
 struct MeanSummaryOptions {
   /// The budget is that of the search; for maha, which cannot certify, a tenth of the default at most.
   UniquenessOptions uniqueness = {};
-  /// False: the iteration and its covariance alone, without a search for other minima; a tenth of the time for a million
-  /// features. The farthest measurements are not looked for either.
+  /// False: the iteration and its covariance alone, without a search for other minima; a tenth of the time for a
+  /// million features. The farthest measurements are not looked for either.
   bool certificates = true;
 };
 
@@ -326,11 +326,10 @@ void setMahalanobis(MeanSummary& mean, const E& executor, const MeanInput<M>& in
 
 }  // namespace detail
 
-/// The mean of the measurements by their criterion, with its covariance if that can be trusted, its certificates and the
-/// dispersion; `feature` and notes are left to the caller (stats/mean_notes.hpp). A
-/// criterion that the type does not have (barycentre of a type with a metric, lsq without) is taken for the one that it
-/// has. The result has the same bits on any executor. Lists of the wrong length give `not_applicable` with the reason, and
-/// nothing else.
+/// The mean of the measurements by their criterion, with its covariance if that can be trusted, its certificates and
+/// the dispersion; `feature` and notes are left to the caller (stats/mean_notes.hpp). A criterion that the type does
+/// not have (barycentre of a type with a metric, lsq without) is taken for the one that it has. The result has the same
+/// bits on any executor. Lists of the wrong length give `not_applicable` with the reason, and nothing else.
 template <Homogeneous M, Executor E>
 MeanSummary summarizedMean(const E& executor, const MeanInput<M>& input, const MeanSummaryOptions& options = {}) {
   decltype(auto) any = detail::erased(executor);

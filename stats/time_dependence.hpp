@@ -471,8 +471,8 @@ class TimeModel {
     axes_ = SymmetricEigen(all).vectors.transpose();
     for (Residual& u : residuals_) u = (axes_ * u).eval();
   }
-  /// The likelihood ratio of axes of equal variances (Mauchly, with Bartlett's factor): noise that is known up to a factor
-  /// is stated to have them, and the residuals may refute it. Each principal axis then has its own.
+  /// The likelihood ratio of axes of equal variances (Mauchly, with Bartlett's factor): noise that is known up to a
+  /// factor is stated to have them, and the residuals may refute it. Each principal axis then has its own.
   void judgeSizes(double fitted) {
     if (C == 1) return;
     const double freedom = static_cast<double>(rows_.size()) - fitted / C;

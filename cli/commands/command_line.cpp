@@ -29,8 +29,8 @@
 namespace liestat::cli {
 namespace {
 
-/// Refuses what the conversion to a number would take and nobody means: NaN, which passes every comparison with a bound,
-/// and a sign before an unsigned number, which wraps.
+/// Refuses what the conversion to a number would take and nobody means: NaN, which passes every comparison with a
+/// bound, and a sign before an unsigned number, which wraps.
 template <class T>
 CLI::Validator meantAsNumber() {
   return CLI::Validator(
@@ -187,7 +187,8 @@ std::string faultOfTasks() {
     double tasks = 0;
     if (value == nullptr || parseNumber(value, tasks) != NumberKind::finite || tasks < 2) continue;
     return fmt::format(
-        "liestat: started as {} tasks of mpirun or srun ({}), each of which would do all of the work: start one; MPI is "
+        "liestat: started as {} tasks of mpirun or srun ({}), each of which would do all of the work: start one; MPI "
+        "is "
         "of the headers (env -u {} where each task has work of its own)",
         printable(value), variable, variable);
   }

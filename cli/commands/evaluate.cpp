@@ -45,7 +45,8 @@ struct EvaluateOptions {
   }
 };
 
-/// The names of files, with as much of their paths as tells them apart; a file that is given twice has a number as well.
+/// The names of files, with as much of their paths as tells them apart; a file that is given twice has a number as
+/// well.
 std::vector<std::string> namesOf(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < paths.size(); ++k) {
@@ -64,9 +65,9 @@ std::vector<std::string> namesOf(const std::vector<std::string>& paths) {
   return names;
 }
 
-/// A file as the library takes it, with the convention of its covariances if the file does not state it. The file's poses
-/// are given up, of which millions would stand in memory twice, and so are its lines and the digits of its times but
-/// for the first and the last.
+/// A file as the library takes it, with the convention of its covariances if the file does not state it. The file's
+/// poses are given up, of which millions would stand in memory twice, and so are its lines and the digits of its times
+/// but for the first and the last.
 PoseTrajectory poseTrajectory(Trajectory& t, const std::string& convention, std::string_view option) {
   PoseTrajectory p{.times = t.times, .has_covariances = t.hasCovariances(), .name = t.name};
   std::vector<std::size_t> lines = std::exchange(t.lines, {});

@@ -13,7 +13,8 @@
 namespace liestat::cli {
 namespace {
 
-/// The type whose charts show a feature: a rigid motion's are those of its frame, which to first order has the same axes.
+/// The type whose charts show a feature: a rigid motion's are those of its frame, which to first order has the same
+/// axes.
 template <class M>
 using ChartOf = std::conditional_t<Metric<M>, M, Frame3d>;
 

@@ -37,7 +37,8 @@ struct AnalysisOptions {
   std::optional<PointGroup> symmetry = {};               ///< rotations are orientations of crystals of this group
 };
 
-/// Mean, covariance, dispersion and uniqueness of the measurements, with notes. The same bits for any number of threads.
+/// Mean, covariance, dispersion and uniqueness of the measurements, with notes. The same bits for any number of
+/// threads.
 MeanAnalysis analyseMean(const Measurements& measurements, const AnalysisOptions& options);
 /// The same without notes.
 MeanAnalysis estimateMean(const Measurements& measurements, const AnalysisOptions& options);

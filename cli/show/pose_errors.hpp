@@ -29,8 +29,8 @@ struct TimesOfPoses {
 /// The name of a coordinate of an error, with its unit, and how many of the unit make a metre or radian.
 std::pair<std::string, double> coordinateOfError(int k);
 
-/// Six panels: each coordinate of the errors over the times, with the band of three standard deviations. Poses without a
-/// covariance are left out.
+/// Six panels: each coordinate of the errors over the times, with the band of three standard deviations. Poses without
+/// a covariance are left out.
 std::vector<Panel> errorPanels(const std::vector<PoseError>& errors, const TimesOfPoses& times);
 
 /// NEES of each pose over the times, with the lines between which 95 % lie if the covariances are right.

@@ -4,12 +4,12 @@
 //   const FilterStart start = liestat::initialiseRecording(recording, options).filter_start;
 //   if (start.ok()) filter.set(start.state, start.bias, start.covarianceAs(liestat::FilterConvention::openvins));
 //
-// A camera and an inertial sensor tell 11 of the 15: the vertical, the velocity and the biases. Position and heading are
-// free, and are therefore what the options say, by default zero: the world's origin is where the body is, and its
+// A camera and an inertial sensor tell 11 of the 15: the vertical, the velocity and the biases. Position and heading
+// are free, and are therefore what the options say, by default zero: the world's origin is where the body is, and its
 // heading the body's. They enter with the standard deviations of the options, independent of all that was estimated.
 // The error of the heading is the turn about the vertical; it turns the velocity, so that the covariance of both is not
-// zero. The defaults (1 mm, 1 mrad) are small and not zero, because a filter has to factor its covariance; whoever has a
-// map or a compass states position, heading and their standard deviations.
+// zero. The defaults (1 mm, 1 mrad) are small and not zero, because a filter has to factor its covariance; whoever has
+// a map or a compass states position, heading and their standard deviations.
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
@@ -108,8 +108,8 @@ inline FilterStart::Covariance FilterStart::covarianceAs(FilterConvention of) co
   return 0.5 * (other + other.transpose());
 }
 
-/// The start from what is known without a map (fusion/init/inertial_state.hpp), at `time`; gravity's length in m/s². Its
-/// status is ok if the covariance is finite.
+/// The start from what is known without a map (fusion/init/inertial_state.hpp), at `time`; gravity's length in m/s².
+/// Its status is ok if the covariance is finite.
 LIESTAT_FUSION_API FilterStart filterStart(const Gaussian<InertialState>& state, double gravity, double time,
                                            const FilterStartOptions& options = {});
 

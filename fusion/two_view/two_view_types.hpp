@@ -91,8 +91,9 @@ struct TwoViewImageFrame {
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
-  /// are the same one, or its model is curved on the scale of the noise (no covariance); contested: the matches do not tell the chosen model from the rivals, or those that do not move
-  /// are a motion of their own, the rival `none`, beside the chosen one.
+  /// are the same one, or its model is curved on the scale of the noise (no covariance); contested: the matches do not
+  /// tell the chosen model from the rivals, or those that do not move are a motion of their own, the rival `none`,
+  /// beside the chosen one.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;

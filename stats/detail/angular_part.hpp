@@ -129,8 +129,8 @@ SquareOf<M> withWidenedAngles(const SquareOf<M>& covariance, double factor) {
   return covariance;
 }
 
-/// The concentration of the angles in features about one of them: by the metric where there is one, else by the parts of
-/// their logarithms, of which the most scattered counts.
+/// The concentration of the angles in features about one of them: by the metric where there is one, else by the parts
+/// of their logarithms, of which the most scattered counts.
 template <Homogeneous M, class R, class W>
 Concentration angularConcentration(const R& samples, const W& weights, const M& y) {
   Concentration result;

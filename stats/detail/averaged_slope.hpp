@@ -35,7 +35,8 @@ constexpr int averagedBegin() {
 }
 
 /// Points that stand for a standard normal law in K dimensions: antipodal pairs ±ξ from a lattice (Roberts 2018, the
-/// generalised golden ratio) by Box and Muller's transform. Their second moments need not be exact: slopes are regressed.
+/// generalised golden ratio) by Box and Muller's transform. Their second moments need not be exact: slopes are
+/// regressed.
 template <int K>
 class NormalNodes {
  public:

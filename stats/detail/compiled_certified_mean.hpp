@@ -1,4 +1,5 @@
-// Declares the compiled certified means of the common features (stats/detail/compiled_mean.hpp). Ends stats/certified_mean.hpp.
+// Declares the compiled certified means of the common features (stats/detail/compiled_mean.hpp). Ends
+// stats/certified_mean.hpp.
 #pragma once
 
 #include <stats/certified_mean.hpp>

@@ -1,5 +1,5 @@
-// The spaces that the certificates of stats/uniqueness.hpp search: SO(3), its quotients by finite groups and the sphere,
-// as unit vectors in double, and how a manifold whose traits say its compact factor is mapped to them.
+// The spaces that the certificates of stats/uniqueness.hpp search: SO(3), its quotients by finite groups and the
+// sphere, as unit vectors in double, and how a manifold whose traits say its compact factor is mapped to them.
 #pragma once
 
 #include <lie/detail/arccosine.hpp>

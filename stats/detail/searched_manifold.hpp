@@ -1,5 +1,5 @@
-// A manifold's side of the search of stats/detail/uniqueness_search.hpp: features to points of the space that is searched,
-// and from those back to means of the features themselves.
+// A manifold's side of the search of stats/detail/uniqueness_search.hpp: features to points of the space that is
+// searched, and from those back to means of the features themselves.
 #pragma once
 
 #include <stats/detail/uniqueness_search.hpp>

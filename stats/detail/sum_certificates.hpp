@@ -80,9 +80,9 @@ struct AngleSums {
   }
 };
 
-/// A lower bound of r* on the sphere from the largest angle and a mean angle that is not below that of the data. θ cot θ
-/// is concave, so its mean over the data is no less than that over data at 0 and at the largest angle alone; secants of
-/// that mean, concave too, are below it, and so are their zeros below its own.
+/// A lower bound of r* on the sphere from the largest angle and a mean angle that is not below that of the data. θ cot
+/// θ is concave, so its mean over the data is no less than that over data at 0 and at the largest angle alone; secants
+/// of that mean, concave too, are below it, and so are their zeros below its own.
 inline double convexRadiusOnSphere(double largest, double mean_angle) {
   if (!(largest > 0)) return 0.5 * pi;
   const double far = std::min(mean_angle / largest, 1.0);
@@ -91,8 +91,8 @@ inline double convexRadiusOnSphere(double largest, double mean_angle) {
   };
   double low = 0, high = 0, at_low = 0, at_high = 0;
   if (largest < 0.5 * pi) {
-    // No term is concave up to `low` if the data lie in a hemisphere. One tangent serves both ends: t cot t vanishes at a
-    // right angle.
+    // No term is concave up to `low` if the data lie in a hemisphere. One tangent serves both ends: t cot t vanishes at
+    // a right angle.
     const double tangent = std::tan(largest);
     low = 0.5 * pi - largest, high = 0.5 * pi;
     at_low = (1 - far) * low * tangent, at_high = -far * (0.5 * pi + largest) * tangent;
@@ -131,8 +131,8 @@ AngleSums angleSums(const MeanResult<M>& mean) {
   return a;
 }
 
-/// The proof of section 5.7 that every minimum but the mean is much higher. With C(y) - C(mean) = Σ p (½ρ² + ρ s), ρ the
-/// distance of y, no |s| exceeds the datum's angle. The excess is the mean of ½ρ + s.
+/// The proof of section 5.7 that every minimum but the mean is much higher. With C(y) - C(mean) = Σ p (½ρ² + ρ s), ρ
+/// the distance of y, no |s| exceeds the datum's angle. The excess is the mean of ½ρ + s.
 class ExcessBound {
  public:
   explicit ExcessBound(const AngleSums& angles)
@@ -196,8 +196,8 @@ bool isUniqueBySums(const MeanResult<M>& mean, double tie_tolerance, UniquenessR
   return true;
 }
 
-/// True if the sums prove that there are no near ties: for any other minimum the differences e_i of its costs from those of
-/// the mean have a sum that is significant by Student's law.
+/// True if the sums prove that there are no near ties: for any other minimum the differences e_i of its costs from
+/// those of the mean have a sum that is significant by Student's law.
 template <Metric M>
 bool haveNoNearTiesBySums(const MeanResult<M>& mean, const WeightSums& weights, double significance) {
   if (!converged(mean.status) || !(mean.residual < largest_shift) || !(weights.n >= 2)) return false;

@@ -1,4 +1,5 @@
-// `liestat doctor`: verdicts and exit codes on files, without truth, the plan, several runs, edges of graphs, bad input.
+// `liestat doctor`: verdicts and exit codes on files, without truth, the plan, several runs, edges of graphs, bad
+// input.
 
 #include <gtest/gtest.h>
 

@@ -340,8 +340,8 @@ TEST_F(Program, AnInterruptEndsTheSearchForOtherMeansAndLeavesTheMean) {
     text += fmt::format("{:.9f},{:.9f},{:.9f},{:.9f},0,0,0\n", x / norm, y / norm, z / norm, w / norm);
   }
   directory_.write("f.csv", text);
-  // An interrupt before the search begins ends the program at once, so a busy machine gets more time. Where the tests run
-  // in the background interrupts are ignored, and the program would heed that.
+  // An interrupt before the search begins ends the program at once, so a busy machine gets more time. Where the tests
+  // run in the background interrupts are ignored, and the program would heed that.
   ProgramResult result;
   for (const char* seconds : {"1", "4", "16", "64"}) {
     result = runProgram({"env", "--default-signal=INT", "timeout", "--foreground", "--preserve-status", "-s", "INT",

@@ -168,7 +168,8 @@ TEST(ConventionDiagnosis, AnUnknownWorldIsAligned) {
     EXPECT_EQ(d.verdict, DiagnosisVerdict::identified) << d.reason;
     EXPECT_TRUE(contains(d.accepted, c)) << describe(c) << ": " << d.reason;
     EXPECT_NE(diagnoseConventions(poses).verdict, DiagnosisVerdict::identified);
-    // The ratio of the best fit is that of its consistency after the same alignment, which takes six degrees of freedom.
+    // The ratio of the best fit is that of its consistency after the same alignment, which takes six degrees of
+    // freedom.
     const auto reading = readInConvention(poses, d.fits.front().convention, AlignmentModel::se3);
     ASSERT_TRUE(reading.consistency.ok);
     EXPECT_EQ(reading.consistency.joint.dof, 6 * 60 - 6);
@@ -472,8 +473,8 @@ TEST(CovarianceDiagnosis, AReadingShowsTheErrorsOfOneConvention) {
   EXPECT_TRUE(readInConvention(poses, convention(P::right), std::nullopt).poses[0].covariance.allFinite());
 }
 
-// A robot in the plane: its file is right in x, y and yaw, and has fillers in the others. With all six judged none of these was
-// identified: they were called inflated, or indefinite.
+// A robot in the plane: its file is right in x, y and yaw, and has fillers in the others. With all six judged none of
+// these was identified: they were called inflated, or indefinite.
 TEST(ConventionDiagnosis, PlanarRobotsAreJudgedByWhatCarriesNoise) {
   const auto rt = CovarianceOrder::rotation_translation;
   const auto covariance = CovarianceContent::covariance;

@@ -121,8 +121,8 @@ TEST(EvaluateTrajectory, SeveralVerdictsTogether) {
   EXPECT_EQ(answerOf({none, no, yes}), Verdict::Answer::no);
 }
 
-// Lengths of the estimate are four fifths of the reference's. A scale has no weighted alignment of its own; judged by se3 the
-// right covariances would be called overconfident.
+// Lengths of the estimate are four fifths of the reference's. A scale has no weighted alignment of its own; judged by
+// se3 the right covariances would be called overconfident.
 TEST(EvaluateTrajectory, ScaleAloneIsJudgedBySim3) {
   const Scene scene(100, 1, 0.8, false);
   const TrajectoryEvaluation e = scene.evaluate({.alignment = AlignmentModel::scale});
@@ -219,8 +219,8 @@ TEST(EvaluateTrajectory, WhatTheDataDoNotAllow) {
             EvaluationStatus::overlapping_pairs);
 }
 
-// The even spacing is evo's: numpy.linspace(0, n - 1, count, dtype=int). The path is summed from pose to pose since the last
-// one that was kept, the angle is that to its pose.
+// The even spacing is evo's: numpy.linspace(0, n - 1, count, dtype=int). The path is summed from pose to pose since the
+// last one that was kept, the angle is that to its pose.
 TEST(EvaluateTrajectory, ThinsOut) {
   const auto rows = [](std::size_t n, const EvaluationOptions& options) {
     return evaluateTrajectory(line(n), line(n), options).rows;

@@ -62,8 +62,8 @@ SE3d poseAt(double t) {
 }
 constexpr std::size_t n = 20000;
 
-// Poses of both sensors are 112 bytes a pair, the stream 64, times 8, the fits of the pairs 64. What is kept of each row
-// is far from what the rows have, 880 bytes.
+// Poses of both sensors are 112 bytes a pair, the stream 64, times 8, the fits of the pairs 64. What is kept of each
+// row is far from what the rows have, 880 bytes.
 TEST(Memory, OfHandEyeCalibration) {
   const SE3d X(SO3d::rotY(0.3), Eigen::Vector3d(0.1, 0.05, -0.02)), Y(SO3d::rotX(0.5), Eigen::Vector3d(1, 0, 0.3));
   Eigen::Matrix<double, 6, 1> sigma;

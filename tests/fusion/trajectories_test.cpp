@@ -1,5 +1,5 @@
-// Trajectories against a reference: association, alignments and their covariance, NEES with the right degrees of freedom,
-// absolute and relative errors beside an independent computation, bad input.
+// Trajectories against a reference: association, alignments and their covariance, NEES with the right degrees of
+// freedom, absolute and relative errors beside an independent computation, bad input.
 
 #include <experiments/trajectory_scene.hpp>
 #include <fusion/nearest_in_time.hpp>
@@ -259,8 +259,9 @@ std::array<int, 8> fired(AlignmentModel model, std::size_t n, std::size_t n_to_a
   return count;
 }
 
-// An alignment from a few poses is an error that all others share. Whitened one by one they fail the tests of mean, covariance
-// and lag in a third to all of clean runs. Rates of 0.001 and 0.007: 5 and 18 of 1000 are four standard errors above.
+// An alignment from a few poses is an error that all others share. Whitened one by one they fail the tests of mean,
+// covariance and lag in a third to all of clean runs. Rates of 0.001 and 0.007: 5 and 18 of 1000 are four standard
+// errors above.
 TEST(Trajectories, SharedAlignmentKeepsTheLevelOfAllSevenTests) {
   const struct {
     AlignmentModel model;
@@ -378,8 +379,8 @@ TEST(Trajectories, GrossOverconfidenceIsProvedUnderAnyDependence) {
   }
 }
 
-// The error of interpolation is measured from the reference alone: not less than half of it, and not more than three times,
-// which at five stamps a period it is.
+// The error of interpolation is measured from the reference alone: not less than half of it, and not more than three
+// times, which at five stamps a period it is.
 TEST(Trajectories, InterpolationErrorOfACoarseReference) {
   const auto curve = [](double t) {
     return SE3d(SO3d::exp(Eigen::Vector3d(0.5 * std::sin(2 * t), 0.4 * std::cos(2.6 * t), 0.3 * std::sin(1.4 * t))),
@@ -475,8 +476,8 @@ TEST(Trajectories, FourEqualPosesByHand) {
   EXPECT_NEAR(all.joint.statistic, 2.5, eps);
   EXPECT_NEAR(all.position.statistic, 2, eps);
   EXPECT_NEAR(all.rotation.statistic, 0.5, eps);
-  // Aligned by the first two, the others have that mean's covariance I/2 besides, and share it: by Woodbury's identity their
-  // sum of squares loses |Σ e|²/(2 + 2), and keeps all of its degrees of freedom.
+  // Aligned by the first two, the others have that mean's covariance I/2 besides, and share it: by Woodbury's identity
+  // their sum of squares loses |Σ e|²/(2 + 2), and keeps all of its degrees of freedom.
   const Consistency rest = evaluateConsistency(poses, alignWeighted(poses, AlignmentModel::se3, 2));
   ASSERT_TRUE(rest.ok) << rest.fault;
   EXPECT_LT((rest.errors[0].covariance - 0.5 * Matrix6::Identity()).norm(), eps);

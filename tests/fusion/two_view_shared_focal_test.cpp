@@ -1,5 +1,5 @@
-// Poses with a focal length that both views share, and poses that keep the vertical: solver, derivatives, and the motions
-// that do not tell the focal length.
+// Poses with a focal length that both views share, and poses that keep the vertical: solver, derivatives, and the
+// motions that do not tell the focal length.
 
 #include <experiments/two_view_lattice.hpp>
 #include <fusion/two_view/detail/two_view_constraints.hpp>

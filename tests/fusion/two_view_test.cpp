@@ -440,8 +440,8 @@ TEST(TwoViewMotion, covariancesAreOfTheNoiseThatIsShown) {
 }
 
 TEST(TwoViewMotion, aCurvedModelHasNoCovariance) {
-  // At 2 px the pose of a short way is curved on the scale of its noise: a first-order region of 95 % holds the truth in
-  // 63 to 78 %. Widened regions are to hold it: of 20 more than four fail with probability 3e-3.
+  // At 2 px the pose of a short way is curved on the scale of its noise: a first-order region of 95 % holds the truth
+  // in 63 to 78 %. Widened regions are to hold it: of 20 more than four fail with probability 3e-3.
   std::size_t curved = 0, ok = 0, outside = 0, widened = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const double sigma = seed % 2 == 0 ? 2 : 1;

@@ -29,8 +29,8 @@ struct Drawn {
   Eigen::Matrix<double, P, 1> estimate;  ///< the truth is zero
 };
 
-/// Rows of slowly moving columns, ten a second, with errors of unit variance and correlation `rho` from row to row; those
-/// of the first `loud` channels are white and five times as large.
+/// Rows of slowly moving columns, ten a second, with errors of unit variance and correlation `rho` from row to row;
+/// those of the first `loud` channels are white and five times as large.
 Drawn draw(int n, double rho, std::uint64_t trial, int loud = 0) {
   CounterRng rng(static_cast<std::uint64_t>(n), trial);
   Drawn drawn;

@@ -197,8 +197,8 @@ class HandEyeRun {
     errors_ = errorsAt(fits.front().value, inliers_);
   }
 
-  /// The best of all starts, from all pairs. Where the noise is not known its factor follows from the median error, which
-  /// a minority of wrong pairs does not move much; what is excited depends on it, so that it is found twice.
+  /// The best of all starts, from all pairs. Where the noise is not known its factor follows from the median error,
+  /// which a minority of wrong pairs does not move much; what is excited depends on it, so that it is found twice.
   void fitAll(const Indices& all) {
     const Indices some = evenly(all);
     const int rounds = options_.known_noise ? 1 : 3;
@@ -245,9 +245,9 @@ class HandEyeRun {
     if (fits.size() > 3) fits.resize(3);
   }
 
-  /// Wrong pairs by consensus: minimal samples of three pairs in closed form, the three best refined from the pairs within
-  /// a gate that closes. A minimal estimate has errors of its own, which inflate those of right pairs; hence the wide gates
-  /// at first.
+  /// Wrong pairs by consensus: minimal samples of three pairs in closed form, the three best refined from the pairs
+  /// within a gate that closes. A minimal estimate has errors of its own, which inflate those of right pairs; hence the
+  /// wide gates at first.
   void findOutliers() {
     const bool known = options_.known_noise;
     const Indices all = allPairs(), some = evenly(all);

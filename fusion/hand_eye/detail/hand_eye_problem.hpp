@@ -44,8 +44,8 @@ struct HandEyeJacobians {
   }
 };
 
-/// True for covariances that are positive semidefinite and together have the ranks that errors of a pose need: six, three
-/// of them of the rotation, which translations do not move.
+/// True for covariances that are positive semidefinite and together have the ranks that errors of a pose need: six,
+/// three of them of the rotation, which translations do not move.
 inline bool coverAllDirections(const Matrix6& a, const Matrix6& b) {
   const auto rankOf = [](const Matrix6& V) {
     if (!V.allFinite()) return -1;
@@ -114,8 +114,8 @@ double handEyeCost(const HandEyeValue& at, const PosePairList& pairs, const Indi
   return cost;
 }
 
-/// Information of the motions on Y (on X for AX = XB) once X is eliminated, against what the noise of B would say if there
-/// were no motion at all.
+/// Information of the motions on Y (on X for AX = XB) once X is eliminated, against what the noise of B would say if
+/// there were no motion at all.
 struct HandEyeExcitation {
   Vector6 values;    ///< ascending, 1 is that of noise
   Matrix6 vectors;   ///< columns v, twists of Y (X for AX = XB), vᵀ N v = 1

@@ -1,5 +1,5 @@
-// Refinement of a hand-eye calibration: Gauss–Newton steps on Σ eᵀ S⁻¹ e along the directions that the motions determine,
-// then the most likely corrected poses, with the other directions held.
+// Refinement of a hand-eye calibration: Gauss–Newton steps on Σ eᵀ S⁻¹ e along the directions that the motions
+// determine, then the most likely corrected poses, with the other directions held.
 #pragma once
 
 #include <fusion/hand_eye/detail/hand_eye_problem.hpp>
@@ -123,10 +123,10 @@ HandEyeDescent descendHandEye(HandEyeFit& fit, const PosePairList& pairs, const 
 /// The excitation below which a direction is looked at twice.
 inline constexpr double doubtful_excitation = 1000;
 
-/// The minimum of Σ eᵀ S⁻¹ e that a start leads to. Excitations mean something at the minimum alone: far from it, or where
-/// X has run metres along a direction that is open, residuals look like motion. So directions of little excitation wait
-/// until the others have settled, from translations that are short along them, and are judged there. `factor` is that by
-/// which the variances of the poses are larger than given.
+/// The minimum of Σ eᵀ S⁻¹ e that a start leads to. Excitations mean something at the minimum alone: far from it, or
+/// where X has run metres along a direction that is open, residuals look like motion. So directions of little
+/// excitation wait until the others have settled, from translations that are short along them, and are judged there.
+/// `factor` is that by which the variances of the poses are larger than given.
 template <class Indices>
 HandEyeFit refineHandEye(HandEyeFit fit, const PosePairList& pairs, const Indices& indices, bool world, double trusted,
                          int iterations = 30, double factor = 1) {
@@ -150,10 +150,10 @@ struct StrictHandEye {
   bool converged = false;
 };
 
-/// The estimate that the projection estimator of stats/constrained.hpp has for these equations, pairs being corrected one
-/// by one: errors ε of A and B under c(X, Y, A Exp(ε_a), B Exp(ε_b)) = 0 are ε = -V Dᵀ S⁻¹ (c - D ε), D the derivative at
-/// ε itself, S = D V Dᵀ. They are iterated with X and Y, and are all that is kept of a pair from pass to pass. Directions
-/// below `open` are held where they are.
+/// The estimate that the projection estimator of stats/constrained.hpp has for these equations, pairs being corrected
+/// one by one: errors ε of A and B under c(X, Y, A Exp(ε_a), B Exp(ε_b)) = 0 are ε = -V Dᵀ S⁻¹ (c - D ε), D the
+/// derivative at ε itself, S = D V Dᵀ. They are iterated with X and Y, and are all that is kept of a pair from pass to
+/// pass. Directions below `open` are held where they are.
 template <class Indices>
 StrictHandEye strictHandEye(const HandEyeValue& start, const PosePairList& pairs, const Indices& indices, bool world,
                             const HandEyeExcitation& excitation, int open) {

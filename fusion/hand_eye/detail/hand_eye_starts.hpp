@@ -48,9 +48,9 @@ struct HandEyeMoments {
   }
 };
 
-/// The translations of X and Y, given their rotations, by linear least squares: (R_A - mean) t_X = R_Y t_B - t_A, less its
-/// mean; of AX = XB with I for the mean. Directions in which the rotations differ by no more than their noise are left
-/// at zero: an inverse would send them tens of metres away.
+/// The translations of X and Y, given their rotations, by linear least squares: (R_A - mean) t_X = R_Y t_B - t_A, less
+/// its mean; of AX = XB with I for the mean. Directions in which the rotations differ by no more than their noise are
+/// left at zero: an inverse would send them tens of metres away.
 template <class Indices>
 HandEyeValue withTranslations(const SO3d& X, const SO3d& Y, const HandEyeMoments& moments, const PosePairList& pairs,
                               const Indices& indices, bool world) {

@@ -20,8 +20,8 @@ LIESTAT_FUSION_INLINE FilterStart filterStart(const Gaussian<InertialState>& sta
   start.state = SE23d(world_R_body, options.position, world_R_body * velocity);
   start.bias = {state.mean.get<2>(), accelerometerBias(state.mean, gravity)};
 
-  // From changes of (down, velocity, biases) in the body. It turns by φ = δdown × down where down changes, and by any turn
-  // about down, which is the heading's error; and R Exp(φ) (V + δV) = R (V + δV + φ × V).
+  // From changes of (down, velocity, biases) in the body. It turns by φ = δdown × down where down changes, and by any
+  // turn about down, which is the heading's error; and R Exp(φ) (V + δV) = R (V + δV + φ × V).
   const Eigen::Matrix3d turn = -detail::skew(down);
   Eigen::Matrix<double, 15, 12> by_body = Eigen::Matrix<double, 15, 12>::Zero();
   by_body.block<3, 3>(3, 0) = turn;

@@ -1,5 +1,5 @@
-// Definitions of fusion/convention_diagnosis.hpp: the matrices of a file by themselves, and trajectories whose matrices grow
-// along a chain; docs/theory/trajectories.md, section 7.
+// Definitions of fusion/convention_diagnosis.hpp: the matrices of a file by themselves, and trajectories whose matrices
+// grow along a chain; docs/theory/trajectories.md, section 7.
 #pragma once
 
 #include <fusion/convention_diagnosis.hpp>

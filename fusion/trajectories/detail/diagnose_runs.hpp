@@ -1,5 +1,5 @@
-// Definitions of fusion/convention_diagnosis.hpp: a diagnosis of runs against their truths, its plan before data are there,
-// and a reading of the poses in a convention; docs/theory/trajectories.md, sections 6 to 8.
+// Definitions of fusion/convention_diagnosis.hpp: a diagnosis of runs against their truths, its plan before data are
+// there, and a reading of the poses in a convention; docs/theory/trajectories.md, sections 6 to 8.
 #pragma once
 
 #include <fusion/convention_diagnosis.hpp>

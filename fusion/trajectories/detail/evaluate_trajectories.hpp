@@ -64,9 +64,9 @@ struct ReferenceSource {
   }
 };
 
-/// The error of interpolation between any two stamps, as a second moment. Stamps that are left out show it, scaled by the
-/// polynomial of the nodes: the four about the gap its size, all of the reference its shape (four vectors have none) and a
-/// fifth of its size, without which a gap between four good stamps would be too good.
+/// The error of interpolation between any two stamps, as a second moment. Stamps that are left out show it, scaled by
+/// the polynomial of the nodes: the four about the gap its size, all of the reference its shape (four vectors have
+/// none) and a fifth of its size, without which a gap between four good stamps would be too good.
 class InterpolationErrors {
  public:
   using Vector6 = Eigen::Matrix<double, 6, 1>;

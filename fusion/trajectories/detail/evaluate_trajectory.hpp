@@ -185,8 +185,8 @@ inline MisfitSearch misfitOf(const TrajectoryEvaluation& e, std::span<const doub
   return findMisfit(estimate, reference, times, PoseStream(stream), o.alignment, o.association.offset);
 }
 
-/// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too long
-/// for three to eight of them.
+/// Errors by the length of a segment: multiples of 8 m, or of 8 times 1, 2, 5 · 10ᵏ m where a path is too short or too
+/// long for three to eight of them.
 inline std::vector<SegmentErrors> segmentErrors(const MatchedPoses& poses, const Alignment& alignment) {
   double path = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {

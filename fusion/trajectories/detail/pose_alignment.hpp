@@ -1,8 +1,8 @@
-// The alignment of a trajectory that its covariances weight, and what it leaves of the errors; docs/theory/trajectories.md,
-// sections 2 and 3.
+// The alignment of a trajectory that its covariances weight, and what it leaves of the errors;
+// docs/theory/trajectories.md, sections 2 and 3.
 //
-// Parameters are taken about the centroid c of the aligned positions, t ← c + δt + exp(δσ) Exp(δφ)(t - c): about a far origin
-// translation and rotation could not be told apart in double precision.
+// Parameters are taken about the centroid c of the aligned positions, t ← c + δt + exp(δσ) Exp(δφ)(t - c): about a far
+// origin translation and rotation could not be told apart in double precision.
 #pragma once
 
 #include <lie/detail/small_eigen.hpp>
@@ -34,9 +34,9 @@ inline std::array<bool, 7> freeParameters(AlignmentModel model) {
   }
 }
 
-/// The error of one aligned pose in the estimate's units and along the body's axes, its covariance before alignment, and its derivative by the
-/// parameters, ξ(δ) = ξ - J δ. The translation is divided by the scale, so that the covariance does not depend on it: with
-/// weights that follow the scale its estimate would be biased.
+/// The error of one aligned pose in the estimate's units and along the body's axes, its covariance before alignment,
+/// and its derivative by the parameters, ξ(δ) = ξ - J δ. The translation is divided by the scale, so that the
+/// covariance does not depend on it: with weights that follow the scale its estimate would be biased.
 struct AlignedError {
   Eigen::Matrix<double, 6, 1> error;
   Eigen::Matrix<double, 6, 6> covariance;
@@ -155,7 +155,8 @@ inline constexpr double worst_condition = 1e12;
 /// A standard deviation of the logarithm of the scale above which noise alone explains the positions.
 inline constexpr double worst_log_scale_sigma = 0.3;
 
-/// The covariance of (δt, δφ, δσ) about the centroid, as one of the parameters of an Alignment: δt there is the motion of t.
+/// The covariance of (δt, δφ, δσ) about the centroid, as one of the parameters of an Alignment: δt there is the motion
+/// of t.
 inline Matrix7 aboutOrigin(const Matrix7& about_centroid, const Eigen::Vector3d& arm) {
   Matrix7 B = Matrix7::Identity();
   B.block<3, 3>(0, 3) = -skew(arm);
@@ -169,7 +170,8 @@ inline void clearFixed(Matrix7& covariance, const std::array<bool, 7>& is_free) 
   }
 }
 
-/// The covariance of a least-squares alignment of positions: M (Σ Kᵀ P K) M, M = (Σ Kᵀ K)⁻¹. NaN where the scale is free.
+/// The covariance of a least-squares alignment of positions: M (Σ Kᵀ P K) M, M = (Σ Kᵀ K)⁻¹. NaN where the scale is
+/// free.
 inline Matrix7 umeyamaCovariance(MatchedRange poses, const Alignment& a) {
   const std::array<bool, 7> is_free = freeParameters(a.model);
   Matrix7 unknown = Matrix7::Constant(not_a_number);
@@ -245,8 +247,8 @@ inline void refine(MatchedRange used, Alignment& a) {
   }
 }
 
-/// The components that carry noise, by the errors under an alignment that has no errors in the others: along the axes of the
-/// body or, where more are left out so (matrices of ROS), along those of the world.
+/// The components that carry noise, by the errors under an alignment that has no errors in the others: along the axes
+/// of the body or, where more are left out so (matrices of ROS), along those of the world.
 inline NoiseComponents noiseComponents(MatchedRange poses, const Alignment& a) {
   NoiseComponentScan in_body, in_world;
   for (const MatchedPose& p : poses) {

@@ -82,8 +82,8 @@ class DiagnosisData {
   Vector6d coordinates(std::size_t i, const Convention& c, const Matrix6d& J) const {
     return charts ? conventionLog(c, poses[i].estimate, poses[i].truth) : Vector6d(J * errors[i]);
   }
-  /// The components of the errors that carry noise, in the coordinates of a hypothesis: of a robot in the plane three, for
-  /// every hypothesis.
+  /// The components of the errors that carry noise, in the coordinates of a hypothesis: of a robot in the plane three,
+  /// for every hypothesis.
   const NoiseComponents& components(const Convention& c) const {
     return components_[static_cast<std::size_t>(c.perturbation)];
   }
@@ -126,8 +126,8 @@ class DiagnosisData {
     }
     return true;
   }
-  /// Components whose errors are zero in every row, if they are as many in the coordinates of all perturbations; errors in
-  /// another world are seen from the first pose.
+  /// Components whose errors are zero in every row, if they are as many in the coordinates of all perturbations; errors
+  /// in another world are seen from the first pose.
   void findComponents(bool in_another_world) {
     if (poses.empty()) return;
     const SE3d world = in_another_world ? poses[0].truth * poses[0].estimate.inverse() : SE3d();

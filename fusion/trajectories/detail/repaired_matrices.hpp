@@ -36,8 +36,8 @@ inline Matrix6d withoutCross(Matrix6d M) {
   return M;
 }
 
-/// The intended matrix behind a faulty one; both in the order translation, rotation, perturbation of the pose T. NaN where
-/// there is none. Faults of rows are the caller's.
+/// The intended matrix behind a faulty one; both in the order translation, rotation, perturbation of the pose T. NaN
+/// where there is none. Faults of rows are the caller's.
 inline Matrix6d repaired(MatrixFault fault, const Matrix6d& M, const SE3d& T) {
   const auto axes = [&](const Eigen::Matrix3d& S) {
     Matrix6d B = Matrix6d::Zero();

@@ -124,8 +124,8 @@ inline TwoViewSearch searched(const TwoViewModels& models, const std::vector<Eig
 
 /// The search over the matches that move, where those that do not move are a motion of their own, as an overlay of the
 /// image is: what is found without them explains less than half of them within the largest noise that is believed. An
-/// epipolar geometry through both would be a mixture. `moving` are those that are left. Nothing where all matches are of
-/// one motion.
+/// epipolar geometry through both would be a mixture. `moving` are those that are left. Nothing where all matches are
+/// of one motion.
 inline std::optional<TwoViewSearch> besideStillMatches(const TwoViewSearch& all,
                                                        const std::vector<Eigen::Vector4d>& matches,
                                                        const TwoViewMotionOptions& options,

@@ -21,9 +21,10 @@
 
 namespace liestat::detail {
 
-/// Matches of which the parameter fits so much by itself (ConstrainedEstimator::leverage) take no part. A wrong match that
-/// lies on its epipolar line by chance has often a parallax that no other one has: it agrees with all others, and moves
-/// the estimate by many of its standard deviations. Where all matches are few, three times their mean is the bound.
+/// Matches of which the parameter fits so much by itself (ConstrainedEstimator::leverage) take no part. A wrong match
+/// that lies on its epipolar line by chance has often a parallax that no other one has: it agrees with all others, and
+/// moves the estimate by many of its standard deviations. Where all matches are few, three times their mean is the
+/// bound.
 inline constexpr double max_leverage = 0.5;
 
 /// The projection estimate, with its curvature if `is_final`; `finish` takes the parameter that was found into the
