@@ -40,13 +40,6 @@ class Lines {
   std::string_view rest_;
 };
 
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
 /// The rest of a line after a keyword and the blanks or the colon behind it; nothing for other lines.
 std::optional<std::string_view> after(std::string_view line, std::string_view keyword) {
   if (line.substr(0, keyword.size()) != keyword) return std::nullopt;

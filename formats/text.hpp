@@ -57,6 +57,9 @@ class LineReader {
 /// The separator of a line's fields. comma: that of CSV files, a semicolon if the line has one, else a comma, else a tab.
 enum class Separator { comma, blanks, comma_or_blanks };
 
+/// Without the blanks at its ends.
+std::string_view trimmed(std::string_view text);
+
 /// Splits a line into fields without the blanks and the double quotes around them. `fields` is overwritten.
 void splitFields(std::string_view line, Separator separator, std::vector<std::string_view>& fields);
 
