@@ -1121,6 +1121,7 @@ class _TwoViewRival(Result):
     # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
     parameters: list[_PhysicalParameters]
     second_T_first: _RelativePose | None  # of the models with a pose
+    curvature: str  # of the model on the scale of the noise: untested, small, widened or large
 
 class _TwoViewModelRow(Result):
     model: str
@@ -1159,6 +1160,7 @@ class _TwoViewMotionEstimate(Result):
     # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
     parameters: list[_PhysicalParameters]
     second_T_first: _RelativePose | None  # of the models with a pose
+    curvature: str  # of the model on the scale of the noise: untested, small, widened or large
     rivals: list[_TwoViewRival]  # where status is contested: the other models of which one may be right
     # where status is contested: those of the chosen model that all rivals have, with a covariance that covers each
     shared_parameters: _PhysicalParameters | None
@@ -1178,6 +1180,7 @@ class _TwoViewStructure(Result):
     # physical ones of the model; two sets for the two poses of a plane, otherwise one or none
     parameters: list[_PhysicalParameters]
     second_T_first: _RelativePose | None  # of the models with a pose
+    curvature: str  # of the model on the scale of the noise: untested, small, widened or large
 
 class _TwoViewMotions(Result):
     matches: int  # all that were given
