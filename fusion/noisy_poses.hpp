@@ -85,6 +85,7 @@ class PosesWith {
   bool empty() const { return means_.empty(); }
   void reserve(std::size_t n) { means_.reserve(n); }
   void push_back(const Gaussian<SE3d>& pose) {
+    if (means_.empty()) covariances_.clear();
     const typename Matrices::Kept V = Matrices::keep(pose.covariance);
     const bool same = !covariances_.empty() && covariances_.front() == V;
     if (!same && !means_.empty()) keepEach();

@@ -128,6 +128,12 @@ std::string answer(const TwoViewMotionOutput& output) {
   if (e.chosenModel().hasEstimate()) text += fmt::format(", rms {} px", number(e.chosenModel().rms, 3));
   text += "\n";
   if (const Verdict verdict = e.verdict(); verdict.isNo()) text += verdict.text + "\n";
+  if (e.relative_curvature.tested() && !e.relative_curvature.small() && !e.relative_curvature.large()) {
+    text += fmt::format(
+        "standard deviations are {} times those of first order: the model is curved on the scale of the "
+        "noise\n",
+        number(std::sqrt(e.relative_curvature.widening()), 2));
+  }
   return text;
 }
 /// Each match as a line from its first to its second point.

@@ -418,9 +418,10 @@ TEST(CovarianceDiagnosis, PosesMeetTheTruthAtTheirTimes) {
   EXPECT_EQ(all.run.times, scene.times);
   EXPECT_TRUE(all.run.notes.empty());
   // A part of the truth; quaternions of the truth with w first.
-  for (Gaussian<SE3d>& pose : truth.poses) {
-    const Eigen::Vector4d q = pose.mean.so3().params();
-    pose.mean = SE3d(SO3d(Eigen::Quaterniond(q[2], q[3], q[0], q[1])), Eigen::Vector3d(pose.mean.translation()));
+  for (std::size_t i = 0; i < truth.poses.size(); ++i) {
+    SE3d& pose = truth.poses.mean(i);
+    const Eigen::Vector4d q = pose.so3().params();
+    pose = SE3d(SO3d(Eigen::Quaterniond(q[2], q[3], q[0], q[1])), Eigen::Vector3d(pose.translation()));
   }
   const RunAgainstTruth part = runAgainstTruth(truth, estimate, {.start = scene.times[10], .end = scene.times[40]});
   ASSERT_EQ(part.run.poses.size(), 31U);
