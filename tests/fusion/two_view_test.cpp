@@ -384,9 +384,9 @@ TEST(TwoViewMotion, parallaxOfAShortBaselineIsNotHiddenByTheNoise) {
 
 TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
   // 3 cm: the matches tell in half of the scenes only. Where they do not, and the truth is one of the set, the shared
-  // rotation is closer to the truth in its own deviations than that of the chosen model by its covariance. First-order
-  // regions of an essential pose are too small at such baselines, so that not all are covered.
-  std::size_t contested = 0, covered = 0, covered_by_own = 0, trials = 0;
+  // rotation is closer to the truth in its own deviations than that of the chosen model by its covariance. Most essential
+  // poses of such baselines are curved on the scale of their noise: then there is no covariance that covers them.
+  std::size_t contested = 0, covered = 0, covered_by_own = 0, trials = 0, withheld = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     TwoViewSceneOptions options{.motion = TwoViewMotion::essential, .outliers = 0};
     options.min_baseline = options.max_baseline = 0.03;
@@ -399,15 +399,24 @@ TEST(TwoViewMotion, aContestedAnswerCoversEachModelOfTheSet) {
     if (!found.shared || !isInSet(found, "essential")) continue;
     ASSERT_EQ(found.shared->names[0], "rotation x");
     const Eigen::VectorXd error = errorOf(*found.shared, SO3d::fitToSO3(scene.R).log()).head<3>();
-    ++trials;
     const Eigen::Matrix3d covariance = found.shared->covariance.topLeftCorner<3, 3>();
+    const bool curved =
+        found.relative_curvature.large() || std::any_of(found.rivals.begin(), found.rivals.end(),
+                                                        [](const auto& r) { return r.relative_curvature.large(); });
+    EXPECT_FALSE(covariance.allFinite() && curved) << seed;
+    if (!covariance.allFinite()) {
+      ++withheld;
+      continue;
+    }
+    ++trials;
     covered += error.dot(covariance.ldlt().solve(error)) < 16.3;
     const Eigen::Matrix3d own = found.physical[0].covariance.topLeftCorner<3, 3>();
     covered_by_own += error.dot(own.ldlt().solve(error)) < 16.3;
   }
   EXPECT_GE(contested, 8u);
-  EXPECT_GE(trials, 4u);
-  EXPECT_GE(2 * covered, trials);
+  EXPECT_GE(trials + withheld, 8u);
+  EXPECT_GE(withheld, 4u);
+  EXPECT_EQ(covered, trials) << "regions of 99.9 %";
   EXPECT_GT(covered, covered_by_own);
 }
 

@@ -185,7 +185,7 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
   const double noise = options.noise_is_known ? 1 : std::max(state.excess_noise, 1.0);
   // Within this the stated threshold cuts off hardly more than it is meant to.
   constexpr double estimated_again = 1.3;
-  if (estimate.status == Status::ok) {
+  if (estimate.usable()) {
     ModelEstimate<TwoViewMotionModel> last =
         estimateWithin(noise > estimated_again ? noise * state.threshold : state.threshold, true);
     if (last.usable()) {
@@ -199,6 +199,7 @@ inline ModelEstimate<TwoViewMotionModel> atShownNoise(const TwoViewModel& model,
   estimate.information /= noise;
   estimate.relative_curvature = shown;
   if (estimate.status == Status::ok && shown.large()) estimate.status = Status::ill_defined;
+  if (estimate.status != Status::ok) estimate.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
   return estimate;
 }
 

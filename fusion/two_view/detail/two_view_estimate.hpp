@@ -37,7 +37,7 @@ ModelEstimate<TwoViewMotionModel> estimateTwoView(const Q& start, const Constrai
   using Channel = MeasurementChannel<Eigen::Vector4d, Noise, Equation>;
   const Noise sigma(Eigen::Vector4d(noise.first, noise.first, noise.second, noise.second));
   ConstrainedOptions<Q> options;
-  options.max_iterations = 20;
+  options.max_iterations = is_final ? 100 : 20;
   options.tolerance = 1e-4;              // standard deviations
   options.curvature = is_final;          // residuals are small: the search needs none
   options.noise = StatedNoise::trusted;  // models are compared by their χ²
