@@ -699,7 +699,8 @@ class Hierarchy {
   }
   /// The end of a model: the local optima that its best hypotheses and its completions lead to. One that a single start
   /// reaches may be an accident of the draws: it stands if samples of its own inliers, which do not depend on the seed,
-  /// lead to it again. This is tried when all models have ended, of those that count.
+  /// lead to it again. This is tried when all models have ended, of those that are
+  /// not rejected.
   struct Ending {
     std::size_t model;
     std::vector<typename Draws::Place> places;  ///< of the hypotheses
@@ -800,9 +801,8 @@ class Hierarchy {
       return true;
     }
     if (ending.taken != best) {
-      std::optional<Candidate> whole = converged(m, ending.optima[best], stop);
-      if (!whole) return true;
-      take(m, std::move(*whole));
+      if (!settle(m, ending.optima[best], stop)) return true;
+      take(m, ending.optima[best]);
       const bool is_first = !ending.taken;
       ending.taken = best;
       if (is_first && is_open(ending.optima[best])) unconfirmed_[m] = std::move(ending);
@@ -810,27 +810,26 @@ class Hierarchy {
     ending_.reset();
     return finish(m);
   }
-  /// An optimum with an estimate that has converged. None if `stop` ended it.
-  std::optional<Candidate> converged(std::size_t m, Candidate of, const StopRequest& stop) const {
-    if (!of.is_rough) return of;
-    std::vector<Measurement> inliers;
-    inliersOf(m, of, 1, 0, inliers);
-    ModelEstimate<Parameter> whole = models_[m]->estimate(of.estimate.parameter, inliers, stop);
-    if (stop && stop()) return std::nullopt;
-    if (!whole.usable()) return of;
-    of.estimate = std::move(whole);
-    of.errors = errorsOf(m, of.estimate.parameter);
-    of.threshold = thresholdOf(m, of.errors);
-    return of;
-  }
-  /// Takes up a model whose optimum is not confirmed and counts: it is chosen or contested, or rejects another one.
-  bool confirm() {
-    std::vector<std::size_t> all = contested();
-    for (const State& state : states_) {
-      if (state.rejected_by && survives(*state.rejected_by)) all.push_back(*state.rejected_by);
+  /// Whole estimates of an optimum until its inliers repeat; false if `stop` ended them.
+  bool settle(std::size_t m, Candidate& optimum, const StopRequest& stop) const {
+    for (int pass = 0; pass < max_passes; ++pass) {
+      std::vector<Measurement> inliers;
+      const std::uint64_t set = inliersOf(m, optimum, 1, 0, inliers);
+      if (set == optimum.set && !optimum.is_rough) return true;
+      ModelEstimate<Parameter> whole = models_[m]->estimate(optimum.estimate.parameter, inliers, stop);
+      if (stop && stop()) return false;
+      optimum.set = set, optimum.is_rough = false;
+      if (!whole.usable()) return true;
+      optimum.estimate = std::move(whole);
+      optimum.errors = errorsOf(m, optimum.estimate.parameter);
+      optimum.threshold = thresholdOf(m, optimum.errors);
     }
-    for (const std::size_t m : all) {
-      if (!unconfirmed_[m]) continue;
+    return true;
+  }
+  /// Takes up a model that is not rejected and whose optimum is not confirmed: it may be chosen, reject or cast doubt.
+  bool confirm() {
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+      if (!unconfirmed_[m] || !survives(m)) continue;
       ending_ = std::move(unconfirmed_[m]);
       unconfirmed_[m].reset();
       return true;
