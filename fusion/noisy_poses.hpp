@@ -76,7 +76,7 @@ class PosesWith {
   /// Poses without uncertainty.
   static PosesWith exact(std::vector<SE3d> means) {
     PosesWith poses;
-    poses.means_ = std::move(means);
+    poses.means_.swap(means);
     poses.forgetCovariances();
     return poses;
   }

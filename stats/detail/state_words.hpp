@@ -40,7 +40,9 @@ struct StateLayout {
   constexpr int squared() const { return scatter() + triangle(); }
   constexpr int sums() const { return kind == LIESTAT_MOMENTS ? weight() + 2 : squared() + triangle(); }
   constexpr int first() const { return kind == LIESTAT_MOMENTS ? 4 : 9; }
-  constexpr std::size_t words() const { return static_cast<std::size_t>(first() + 2 * sums()); }
+  constexpr std::size_t words() const {
+    return static_cast<std::size_t>(first()) + 2 * static_cast<std::size_t>(sums());
+  }
   constexpr int unit() const { return kind == LIESTAT_MOMENTS ? 60 : 85; }
 };
 
