@@ -29,7 +29,7 @@ struct So2Math {
 
   static Params identity() { return Params(S(1), S(0)); }
   static Params product(const Params& a, const Params& b) {
-    const Params z(a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]);
+    Params z(a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]);
     if constexpr (is_single_precision<S>) {
       return z * (S(0.5) * (S(3) - z.dot(z)));
     } else {
