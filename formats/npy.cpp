@@ -77,7 +77,7 @@ NpyFile::NpyFile(const std::string& path) : name_(sourceName(path)) {
   const std::string_view header = all.substr(offset_ - length, length);
 
   const std::string type(headerValue(header, "descr"));
-  if (type.find("O") != std::string::npos) refuse("an array of Python objects", "numbers: array.astype('<f8')");
+  if (type.find('O') != std::string::npos) refuse("an array of Python objects", "numbers: array.astype('<f8')");
   if (type.find('>') != std::string::npos) {
     refuse(fmt::format("big-endian numbers ({})", printable(type)), "little-endian ones: array.astype('<f8')");
   }
