@@ -24,7 +24,7 @@ liestat_dependency(gmock libgmock-dev gmock/gmock.h)
 liestat_dependency(rapidcheck librapidcheck-dev rapidcheck.h)
 liestat_dependency(benchmark libbenchmark-dev benchmark/benchmark.h)
 liestat_dependency(opencv libopencv-calib3d-dev opencv2/calib3d.hpp)
-# What an extension of SQLite is compiled with (engines/sqlite).
+# Headers for an extension of SQLite (engines/sqlite).
 liestat_dependency(sqlite libsqlite3-dev sqlite3ext.h)
 # Compared with: the meaning of a covariance in these. Nothing else uses them.
 liestat_dependency(kdl liborocos-kdl-dev kdl/frames.hpp)

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::string_view npy_magic = "\x93NUMPY";
 
-/// What stands behind a key of the header, a Python dictionary, up to the comma or brace behind it.
+/// The value of a key of the header, a Python dictionary, up to the comma or brace behind it.
 std::string_view headerValue(std::string_view header, std::string_view key) {
   const std::size_t found = header.find(fmt::format("'{}'", key));
   if (found == std::string_view::npos) return {};

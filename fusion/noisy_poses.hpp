@@ -36,8 +36,8 @@ struct WholeMatrices {
   static const Kept& keep(const Matrix& V) { return V; }
   static const Matrix& matrix(const Kept& V) { return V; }
 };
-/// Of covariances the upper triangles are kept. What is not symmetric (by more than 1e-9 of the largest entry) is none:
-/// its first entry becomes NaN.
+/// The upper triangles of covariances are kept. A matrix that is not symmetric, by more than 1e-9 of its largest entry, is
+/// no covariance: its first entry becomes NaN.
 struct UpperTriangles {
   using Matrix = Eigen::Matrix<double, 6, 6>;
   using Kept = Eigen::Matrix<double, 21, 1>;

@@ -33,7 +33,7 @@ struct ModelEstimate {
   double equation_error = std::numeric_limits<double>::quiet_NaN();  ///< E², the squared error of the equations
   int degrees_of_freedom = 0;
   std::size_t measurements = 0;  ///< number of measurements used
-  /// Of a final estimate; untested: first order is all that is known.
+  /// Known of a final estimate only; where it is untested the covariance is of first order.
   RelativeCurvature relative_curvature = {};
 
   /// True if the parameter may be used; an iteration that was stopped early has a usable one, too.

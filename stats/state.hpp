@@ -151,7 +151,7 @@ class State {
 template <Metric M>
 class MomentState : public detail::State<M, LIESTAT_MOMENTS> {
  public:
-  /// Of weights up to a largest one, which is rounded up to a power of two; one that is none leaves it at one.
+  /// The largest weight is rounded up to a power of two; one that is not finite and positive leaves it at one.
   explicit MomentState(double largest_weight = 1) {
     if (this->start(nullptr, largest_weight, 0) != StateError::none) this->start(nullptr, 1, 0);
   }

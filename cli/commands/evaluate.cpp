@@ -164,7 +164,7 @@ int runEvaluate(EvaluateOptions o, const Invocation& invocation) {
   if (std::count(o.estimates.begin(), o.estimates.end(), "-") + (o.reference == "-" ? 1 : 0) > 1) {
     throw OptionError(evaluate_name, "several files are standard input", "one");
   }
-  // Of millions of poses they take as long as the rest.
+  // Segments of millions of poses take as long as everything else.
   o.how.segments = !o.json.empty() || !o.report.empty();
   EvaluationOutput output;
   output.reference = namesOf({o.reference})[0];

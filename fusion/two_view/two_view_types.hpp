@@ -66,7 +66,7 @@ struct TwoViewMotionResult {
   /// Pose of `essential`, and of `upright` with a covariance of rank three: second_T_first up to scale, with covariance
   /// in the tangent (direction, rotation).
   std::optional<Gaussian<Essentiald>> relative_pose;
-  /// Of the model at the noise that the matches show: it has widened the covariances, or withheld them.
+  /// The curvature of the model at the noise that the matches show; covariances are widened by it, or withheld.
   RelativeCurvature relative_curvature = {};
 };
 

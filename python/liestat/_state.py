@@ -95,7 +95,7 @@ class State:
         for name in ("resultant",) if self.kind == "sums" else ("step", "another_pass"):
             del result[name]
         if self.feature == "heading":
-            # Of a tiny negative angle the remainder is 360.
+            # The remainder of a tiny negative angle is 360.
             degrees = np.degrees(np.arctan2(result["mean"][1], result["mean"][0])) % 360.0
             result["degrees"] = float(degrees) if degrees != 360.0 else 0.0
         return result

@@ -36,10 +36,10 @@ class Features {
 
 /// The request as the library takes it; features and request must outlive it.
 template <class M>
-MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
+MeanInput<M> inputOf(const MeanRequest& request, std::span<const M> features) {
   constexpr std::size_t k = ManifoldTraits<M>::DoF;
   MeanInput<M> input{.criterion = request.criterion,
-                     .features = features.list(),
+                     .features = features,
                      .weights = request.weights,
                      .covariance_at = request.covariance_at,
                      .likelihood = request.likelihood,
@@ -59,19 +59,22 @@ MeanInput<M> inputOf(const MeanRequest& request, const Features<M>& features) {
 }
 
 template <class M>
-MeanSummary meanOf(const MeanRequest& request, SignalWatch& signals) {
-  const Features<M> features(request.features);
+MeanSummary meanOfFeatures(const MeanRequest& request, std::span<const M> features, SignalWatch& signals) {
   MeanSummaryOptions how;
   how.certificates = request.certify;
   if (request.budget > 0) how.uniqueness.budget = request.budget;
   how.uniqueness.progress = [&signals](double) { signals.look(); };
   return summarizedMean(PythonExecutor{request.threads, &signals}, inputOf(request, features), how);
 }
+template <class M>
+MeanSummary meanOf(const MeanRequest& request, SignalWatch& signals) {
+  return meanOfFeatures(request, Features<M>(request.features).list(), signals);
+}
 
 template <class M>
 TestedFuse fuseFeatures(const MeanRequest& request, double* mean, double* covariance, double* factor) {
   const Features<M> features(request.features);
-  const MeanInput<M> input = inputOf(request, features);
+  const MeanInput<M> input = inputOf(request, features.list());
   const FuseResult<M> result = request.factored ? testedFuse(input.factoredGaussians(), request.covariance_at)
                                                 : testedFuse(input.gaussians(), request.covariance_at);
   if (request.factored) store(result.factor, factor);

@@ -11,7 +11,7 @@ namespace liestat::python {
 template <class M>
 SplitSummary splitOf(const MeanRequest& request, SignalWatch& signals, const SplitOptions& options) {
   const Features<M> features(request.features);
-  return splitMean(PythonExecutor{request.threads, &signals}, inputOf(request, features),
+  return splitMean(PythonExecutor{request.threads, &signals}, inputOf(request, features.list()),
                    std::vector<double>(request.times.begin(), request.times.end()), options);
 }
 

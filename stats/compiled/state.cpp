@@ -111,7 +111,7 @@ struct Accumulator {
   using V = Lanes<L>;
   using D = typename V::D;
   using U = typename V::U;
-  /// Of this many rows the sums stay in the binade of their magic number: terms are at most 1, or 2^7.
+  /// The rows whose sums stay in the binade of their magic number: terms are at most 1, or 2^7.
   static constexpr std::size_t most = std::size_t{1} << 19;
   static constexpr int first = Fine == 0 ? 30 : 23, middle = Fine == 0 ? 60 : 54, last = Fine == 0 ? 60 : 85;
 

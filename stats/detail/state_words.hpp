@@ -26,7 +26,7 @@ struct StateLayout {
   constexpr int numbers() const { return manifold + 1; }
   constexpr int dof() const { return manifold; }
   constexpr int triangle() const { return dof() * (dof() + 1) / 2; }
-  /// Of the row itself, for headings and directions; products of its numbers, a lower triangle row by row.
+  /// Sums of the row itself, for headings and directions; then of products of its numbers, a lower triangle row by row.
   constexpr int linear() const { return kind == LIESTAT_MOMENTS && manifold != LIESTAT_ROTATION ? numbers() : 0; }
   constexpr int products() const { return kind == LIESTAT_MOMENTS ? numbers() * (numbers() + 1) / 2 : 0; }
   /// Σ p z, Σ p g u uᵀ (the Hessian is Σ p (I - g (|u|² I - u uᵀ)); none of headings), Σ p θ⁴.

@@ -617,8 +617,7 @@ TEST(HandEyeStreams, AreInterpolatedAtTheTimesOfBAndALargeDelayIsFound) {
     const HandEyeResult result = estimateRobotWorld(scene.pairs, scene.options);
     ASSERT_TRUE(result.interpolation.has_value());
     EXPECT_EQ(result.interpolation->in_gaps, 0u);
-    // Of white noise: a pose's difference from the cubic through its neighbours, which halving the step does not
-    // lessen.
+    // White noise makes each pose differ from the cubic through its neighbours, which halving the step does not lessen.
     EXPECT_NEAR(result.interpolation->translation, 5e-4 * std::sqrt(3 * (1 + 2 * (81 + 1) / 256.)), 1e-4);
     EXPECT_LT(std::abs(result.suspects[0].value - delay), 4.5 * result.suspects[0].value_sigma);
     nees += scene.squaredError(result.X) / trials;

@@ -184,7 +184,7 @@ TYPED_TEST(States, giveTheMeanAndCovarianceOfCertifiedMean) {
       }
     }
   }
-  // What the sums do not decide has few rows, or is wide.
+  // The sums leave open only samples of few rows, and wide ones.
   EXPECT_GE(both, 40);
 }
 
@@ -208,7 +208,7 @@ TYPED_TEST(States, giveAChordalMeanWhoseCovarianceHolds) {
       nees += mahalanobisSquared(*mean.estimate, M()), ++count;
     }
     // Hotelling's T² has the mean k (n - 1)/(n - k - 2), and four standard errors of 1500 trials are 15 to 25 % of k.
-    // Of wide rotations the covariance is an upper bound.
+    // The covariance of wide rotations is an upper bound.
     const double expected = k * (n - 1.0) / (n - k - 2.0), ratio = nees / static_cast<double>(count) / expected;
     const double upper = 1 + 4 * std::sqrt(2.6 / k / static_cast<double>(trials));
     EXPECT_LE(ratio, upper) << spread;

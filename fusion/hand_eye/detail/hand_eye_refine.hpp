@@ -106,7 +106,7 @@ HandEyeDescent descendHandEye(HandEyeFit& fit, const PosePairList& pairs, const 
     }
     std::pair<Vector6, Vector6> shortened = step;
     bool better = false;
-    // Of many pairs S, which follows the value, decides within a standard deviation, and no part of the step is better.
+    // S follows the value; with many pairs it decides within a standard deviation, where no part of the step is better.
     for (int halving = 0; halving < (many && squared < 1 ? 1 : 8) && !better; ++halving) {
       const HandEyeValue there = moved(fit.value, shortened, world);
       const double cost = handEyeCost(there, pairs, indices);
@@ -144,7 +144,7 @@ HandEyeFit refineHandEye(HandEyeFit fit, const PosePairList& pairs, const Indice
 /// The most likely X, Y and corrected poses.
 struct StrictHandEye {
   HandEyeValue value;
-  /// Of X and Y; of AX = XB the block of Y is that of X.
+  /// The errors of X and Y; for AX = XB the block of Y is that of X.
   Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
   double chi2 = 0;  ///< squared distance of the poses from the corrected poses
   bool converged = false;

@@ -370,7 +370,7 @@ inline ScaleProfile profileScale(const DiagnosisData& data, std::span<const Conv
   const auto posterior = [](const Row& r) {
     return r.likelihood - std::log1p(std::pow(std::log(r.k_t), 2)) - std::log1p(std::pow(std::log(r.k_r), 2));
   };
-  // Of those that are as likely the first of the list stands for all: the library's own, if it is among them.
+  // The first in the list stands for all that are equally likely: the library's own convention, if it is among them.
   const auto likeliest = std::max_element(rows.begin(), rows.end(),
                                           [&](const Row& a, const Row& b) { return posterior(a) < posterior(b); });
   constexpr double alike = 2;
