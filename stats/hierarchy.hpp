@@ -823,6 +823,7 @@ class Hierarchy {
       optimum.estimate = std::move(whole);
       optimum.errors = errorsOf(m, optimum.estimate.parameter);
       optimum.threshold = thresholdOf(m, optimum.errors);
+      optimum.score = scoreOf(m, optimum.errors, optimum.threshold);
     }
     return true;
   }

@@ -28,6 +28,8 @@ struct RelativeCurvature {
   bool small() const { return parameter <= 0.13 && intrinsic <= 0.08 && noise_share <= 0.05 && bias <= 0.25; }
   /// Widened regions were seen to hold up to these, and are worth little beyond.
   bool large() const { return parameter > 0.8 || intrinsic > 0.6 || noise_share > 0.5 || bias > 0.6; }
+  /// Between the two: covariances are widened.
+  bool widens() const { return tested() && !small() && !large(); }
   /// The factor of a covariance whose region holds between the two. The edge of the region is off by the relative
   /// curvatures of its radius, or all of it by the bias; the curvature at the truth may be larger than at the estimate,
   /// by a multiple of its square; and what is noise of the information is none.

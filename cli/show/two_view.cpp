@@ -128,7 +128,7 @@ std::string answer(const TwoViewMotionOutput& output) {
   if (e.chosenModel().hasEstimate()) text += fmt::format(", rms {} px", number(e.chosenModel().rms, 3));
   text += "\n";
   if (const Verdict verdict = e.verdict(); verdict.isNo()) text += verdict.text + "\n";
-  if (e.relative_curvature.tested() && !e.relative_curvature.small() && !e.relative_curvature.large()) {
+  if (e.relative_curvature.widens()) {
     text += fmt::format(
         "standard deviations are {} times those of first order: the model is curved on the scale of the "
         "noise\n",

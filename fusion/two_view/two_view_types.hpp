@@ -57,8 +57,9 @@ struct TwoViewModelRow {
 struct TwoViewMotionResult {
   /// H or F in pixels without distortion, p̃' ~ H p̃ or p̃'ᵀ F p̃ = 0, of norm one.
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  Eigen::MatrixXd matrix_covariance;  ///< 9×9, of its entries column after column; empty of `none`
-  int equations = 0;                  ///< equations of a match: 2, the matrix is H, or 1, it is F
+  /// 9×9, of its entries column after column; NaN, as all covariances of the motion, where it is withheld; empty of `none`.
+  Eigen::MatrixXd matrix_covariance;
+  int equations = 0;  ///< equations of a match: 2, the matrix is H, or 1, it is F
   /// One description of the motion; a plane seen by calibrated cameras has two, the one with more points in front of
   /// both first. None of `none`, of a homography without cameras, nor of a fundamental matrix that tells no focal
   /// lengths.
