@@ -16,7 +16,7 @@ inline constexpr double suspicion_level = 0.006;
 /// A quantity that the model takes for known, such as a delay, and what the residuals say about it.
 struct SuspectTest {
   std::string name;
-  std::string unit;  ///< of `estimate` and `sigma`; empty for a ratio
+  std::string unit;  ///< of `estimate` and `sigma`; empty for a ratio, "1" for another plain number
   /// The deviation that the residuals ask for, with its standard deviation; of a suspect with a prior that by the
   /// residuals alone. NaN where the estimate's own parameters explain all that it would do.
   double estimate = std::numeric_limits<double>::quiet_NaN(), sigma = estimate;
@@ -27,7 +27,27 @@ struct SuspectTest {
   bool in_group = false;
 
   bool tested() const { return z == z; }
+  /// By how much it is off, with the standard deviation, in words.
+  std::string inWords() const {
+    const bool time = unit == "s", ratio = unit.empty();
+    const double scale = time ? 1e3 : ratio ? 100 : 1;
+    return name + " off by " + liestat::significant(scale * estimate, 3) + " +- " +
+           liestat::significant(scale * sigma, 2) +
+           (time    ? " ms"
+            : ratio ? " %"
+                    : "");
+  }
 };
+
+/// The suspects that cannot be told from the strongest, joined by "or"; empty where none is significant.
+template <class Suspects>
+std::string suspectsInWords(const Suspects& suspects) {
+  std::string group;
+  for (const auto& x : suspects) {
+    if (x.in_group) group += (group.empty() ? "" : " or ") + x.inWords();
+  }
+  return group;
+}
 
 template <class V>
 void describe(V& v, const SuspectTest& x) {

@@ -136,6 +136,17 @@ std::string answer(const TwoViewMotionOutput& output) {
   }
   return text;
 }
+/// What is known of the cameras, as the matches see it.
+TableRows suspectRows(const TwoViewMotionEstimate& estimate) {
+  using Test = TwoViewSuspectTest;
+  const auto told = [](const Test& x, double value) { return x.tested() ? std::optional(value) : std::nullopt; };
+  return tableOf<Test>({{"taken for known", &Test::name},
+                        {"off by", [&](const Test& x) { return told(x, x.estimate); }, 3},
+                        {"sd", [&](const Test& x) { return told(x, x.sigma); }, 2},
+                        {"p", [&](const Test& x) { return told(x, x.p); }, 2},
+                        {"0.01 moves the estimate by, sd", [&](const Test& x) { return told(x, 0.01 * x.shift); }, 2}},
+                       estimate.suspects);
+}
 /// Each match as a line from its first to its second point.
 void addMatch(Series& lines, Series& ends, const Eigen::Vector4d& m) {
   lines.add(m[0], m[1]), lines.add(m[2], m[3]), lines.add(nan, nan);
@@ -253,6 +264,12 @@ void writeTwoViewMotionReport(const std::string& directory, const std::string& c
   const std::vector<HeadedTable> parameters = parameterTables(e);
   if (!parameters.empty()) report.section("Parameters");
   for (const HeadedTable& t : parameters) report.table(t.table, t.heading);
+  if (!e.suspects.empty()) {
+    report.section("Cameras");
+    report.table(suspectRows(e),
+                 "By how much the matches ask for another focal length (relative) or another radial distortion. Where "
+                 "nothing is given the motion itself explains all that it would do.");
+  }
   report.section("Matches");
   report.plot(matchPlot(output));
   if (e.threshold > 0) report.plot(errorPlot(output));

@@ -7,6 +7,7 @@
 #include <stats/gaussian.hpp>
 #include <stats/hierarchy_types.hpp>
 #include <stats/relative_curvature.hpp>
+#include <stats/score_tests_types.hpp>
 #include <stats/shown.hpp>
 #include <stats/status.hpp>
 #include <stats/verdict.hpp>
@@ -14,6 +15,7 @@
 #include <Eigen/Core>
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -88,13 +90,20 @@ struct TwoViewImageFrame {
   std::size_t contradicted = 0;  ///< different ones that take no part, because they contradict each other
 };
 
+/// A quantity of the cameras that a motion takes for known: the focal length, relative, or the radial distortion k1.
+struct TwoViewSuspectTest : SuspectTest {
+  /// The movement of the estimate per unit of the suspect, in its standard deviations (a Mahalanobis distance); NaN if
+  /// the suspect is not tested.
+  double shift = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// The motion between two images.
 struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   /// ok; too_few: no finite match; not_applicable: noise or size are not positive; not_converged: stopped, or the
   /// estimate of the chosen model did not end; ill_defined: the chosen model's inliers could be chance, or all matches
   /// are the same one, or its model is curved on the scale of the noise (no covariance); contested: the matches do not
-  /// tell the chosen model from the rivals, or those that do not move are a motion of their own, the rival `none`,
-  /// beside the chosen one.
+  /// tell the chosen model from the rivals, or others follow a motion of their own beside the chosen one, which
+  /// is the rival: `none` where they do not move; inconsistent: they speak for another focal length or distortion.
   Status status = Status::too_few;
   std::string reason;  ///< in words, unless ok
   std::vector<TwoViewModelRow> lattice;
@@ -103,12 +112,16 @@ struct TwoViewMotionEstimate : TwoViewMotionResult, TwoViewImageFrame {
   std::vector<double> errors;  ///< squared, in units of the noise; NaN of matches that are not finite
   std::size_t inliers = 0;
   double threshold = 0;  ///< threshold of the chosen model, on squared errors
-  /// Where the status is contested: the other models of the set of which one is right, or the matches that stand still.
+  /// Where the status is contested: the other models of the set of which one is right, or the second motion.
   std::vector<TwoViewRival> rivals;
   /// The parameters that the chosen model shares with all rivals, at the chosen one's values. Their covariance is the
   /// mean over the set of the models' own covariances and the squares of their differences from these values, so that
   /// it covers each of them; what only one model has is listed with that model.
   std::optional<PhysicalParameters> shared;
+  /// The focal length and the radial distortion k1 (of the lens model; where that has none, of u (1 + k1 |u|²)) that the
+  /// model takes for known, each tested; a set for each camera where there are two. Focal lengths only where cameras
+  /// are given.
+  std::vector<TwoViewSuspectTest> suspects;
 
   bool ok() const { return status == Status::ok; }
   const TwoViewModelRow& chosenModel() const { return lattice[chosen]; }
@@ -212,9 +225,15 @@ void describe(V& v, const TwoViewImageFrame& x) {
 }
 
 template <class V>
+void describe(V& v, const TwoViewSuspectTest& x) {
+  describe(v, static_cast<const SuspectTest&>(x));
+  v("shift", x.shift, "movement of the estimate per unit of the suspect, in standard deviations");
+}
+
+template <class V>
 void describe(V& v, const TwoViewMotionEstimate& x) {
   describe(v, static_cast<const TwoViewImageFrame&>(x));
-  v("status", name(x.status), "ok, too_few, not_applicable, not_converged, ill_defined or contested");
+  v("status", name(x.status), "ok, too_few, not_applicable, not_converged, ill_defined, contested or inconsistent");
   v("reason", x.reason.empty() ? std::nullopt : std::optional(x.reason), "in words, where status is not ok");
   v("model", x.lattice.empty() ? std::string() : x.chosenModel().name, "the chosen one");
   v("inliers", x.inliers, "their number");
@@ -222,6 +241,7 @@ void describe(V& v, const TwoViewMotionEstimate& x) {
   v("rivals", x.rivals, "where status is contested: the other models of which one may be right");
   v("shared_parameters", x.shared,
     "where status is contested: those of the chosen model that all rivals have, with a covariance that covers each");
+  v("suspects", x.suspects, "what the model takes for known of the cameras");
   v("lattice", x.lattice, "all models")("inlier", x.inlier, "of each match");
   v("squared_errors", x.errors, "of each match, in units of the noise");
 }

@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -698,6 +699,122 @@ TEST(TwoViewMotion, TheVerdictIsThatOfTheStatus) {
   EXPECT_EQ(motions.verdict(), Verdict::Answer::yes);
   motions.status = Status::not_converged;
   EXPECT_EQ(motions.verdict(), Verdict::Answer::no);
+}
+
+/// The scene seen through a lens with this k1, which the options do not know.
+std::vector<Eigen::Vector4d> throughLens(const TwoViewScene& scene, double k1) {
+  const Camera camera = optionsOf(scene).first.value();
+  std::vector<Eigen::Vector4d> pixels = scene.pixels;
+  for (Eigen::Vector4d& m : pixels) {
+    for (const int k : {0, 2}) {
+      const Eigen::Vector2d centre(camera.cu, camera.cv);
+      const Eigen::Vector2d u = (m.segment<2>(k) - centre) / camera.fu;
+      m.segment<2>(k) += camera.fu * k1 * u.squaredNorm() * u;
+    }
+  }
+  return pixels;
+}
+
+// 120 trials with a level of .006 for both suspects: 5 or more in .07 of 100 cases.
+TEST(TwoViewSuspects, AreQuietWhereTheCamerasAreAsGiven) {
+  int tested = 0, significant = 0;
+  double squares = 0;
+  for (const TwoViewMotion motion : {TwoViewMotion::rotation, TwoViewMotion::retinal_displacement}) {
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+      const TwoViewScene scene({.motion = motion}, 88000 + seed);
+      const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+      if (found.suspects.empty()) continue;
+      ASSERT_EQ(found.suspects.size(), 2U);
+      ++tested, significant += !suspectsInWords(found.suspects).empty();
+      squares += std::pow(found.suspects[1].z, 2);
+    }
+  }
+  EXPECT_GE(tested, 115);
+  EXPECT_LE(significant, 4);
+  EXPECT_NEAR(squares / tested, 1, 4 * std::sqrt(2.0 / tested));
+}
+
+TEST(TwoViewSuspects, FindTheDistortion) {
+  double sum = 0, variance = 0;
+  int named = 0;
+  constexpr int trials = 10;
+  constexpr double k1_of_lens = -0.15;
+  for (std::uint64_t seed = 1; seed <= trials; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::retinal_displacement, .matches = 300}, 89000 + seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(throughLens(scene, k1_of_lens), optionsOf(scene));
+    ASSERT_EQ(found.suspects.size(), 2U) << seed;
+    const TwoViewSuspectTest& k1 = found.suspects[1];
+    ASSERT_TRUE(k1.tested()) << seed;
+    sum += k1.estimate, variance += k1.sigma * k1.sigma;
+    // The motion in the image makes up for a focal length; its scale is not told.
+    EXPECT_FALSE(found.suspects[0].tested()) << seed;
+    if (!k1.significant) continue;
+    ++named;
+    EXPECT_FALSE(found.ok()) << seed;
+    if (found.status != Status::inconsistent) continue;
+    EXPECT_NE(found.reason.find("k1 off by"), std::string::npos) << found.reason;
+  }
+  EXPECT_GE(named, 8);
+  // To first order in k1, whose square is left out.
+  EXPECT_NEAR(sum / trials, k1_of_lens, 4 * std::sqrt(variance) / trials + k1_of_lens * k1_of_lens);
+}
+
+TEST(TwoViewSuspects, FindTheFocalLengthOfARotation) {
+  double sum = 0, variance = 0;
+  int rotations = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::rotation}, 90000 + seed);
+    TwoViewMotionOptions options = optionsOf(scene);
+    options.first = cameraOf(scene.options, scene.options.focal_length / 1.02);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, options);
+    if (found.chosenModel().name != "rotation" || found.suspects.empty()) continue;
+    ++rotations, sum += found.suspects[0].estimate, variance += std::pow(found.suspects[0].sigma, 2);
+    EXPECT_GT(found.suspects[0].shift, 0);
+  }
+  ASSERT_GE(rotations, 20);
+  EXPECT_NEAR(sum / rotations, 0.02, 4 * std::sqrt(variance) / rotations);
+}
+
+TEST(TwoViewSuspects, EachCameraHasItsOwn) {
+  const TwoViewScene scene({.motion = TwoViewMotion::essential}, 91001);
+  TwoViewMotionOptions options = optionsOf(scene);
+  options.second = options.first;
+  const TwoViewMotionEstimate two = estimateTwoViewMotion(scene.pixels, options);
+  ASSERT_EQ(two.suspects.size(), 4U);
+  EXPECT_EQ(two.suspects[1].name, "focal length of the second camera");
+  EXPECT_EQ(two.suspects[2].name, "k1 of the first camera");
+  options.first = options.second = std::nullopt;
+  const TwoViewMotionEstimate none = estimateTwoViewMotion(scene.pixels, options);
+  ASSERT_EQ(none.suspects.size(), 2U);
+  EXPECT_FALSE(none.suspects[0].tested());
+  EXPECT_TRUE(none.suspects[1].tested());
+}
+
+// Two objects, or an object and the scene: the answer names both, with their shares.
+TEST(TwoViewMotionEstimate, TwoRigidMotionsAreContested) {
+  int named = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::essential, .matches = 130, .outliers = 0.1}, 92000 + seed);
+    const TwoViewScene object({.motion = TwoViewMotion::essential, .matches = 70, .outliers = 0.1}, 93000 + seed);
+    std::vector<Eigen::Vector4d> pixels = scene.pixels;
+    pixels.insert(pixels.end(), object.pixels.begin(), object.pixels.end());
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(pixels, optionsOf(scene));
+    if (found.status != Status::contested || found.reason.find("two motions") == std::string::npos) continue;
+    ++named;
+    ASSERT_EQ(found.rivals.size(), 1U);
+    EXPECT_GE(found.inliers, 100U);
+    EXPECT_GE(found.rivals[0].inliers, 50U);
+    EXPECT_NE(found.reason.find(std::to_string(found.rivals[0].inliers) + " of 200"), std::string::npos);
+  }
+  EXPECT_GE(named, 7);
+}
+
+TEST(TwoViewMotionEstimate, OutliersAreNoSecondMotion) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const TwoViewScene scene({.motion = TwoViewMotion::essential, .outliers = 0.5}, 94000 + seed);
+    const TwoViewMotionEstimate found = estimateTwoViewMotion(scene.pixels, optionsOf(scene));
+    EXPECT_EQ(found.reason.find("two motions"), std::string::npos) << seed << ": " << found.reason;
+  }
 }
 
 }  // namespace

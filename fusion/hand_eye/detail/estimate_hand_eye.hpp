@@ -134,7 +134,9 @@ class HandEyeRun {
       const auto [at, other] = std::mismatch(x.begin(), x.end(), y.begin());
       return at == x.end() ? 0 : *at < *other ? -1 : 1;
     };
-    const auto numbers = [](const auto& list) { return std::span<const double>(list.data(), static_cast<std::size_t>(list.size())); };
+    const auto numbers = [](const auto& list) {
+      return std::span<const double>(list.data(), static_cast<std::size_t>(list.size()));
+    };
     const auto compared = [&](std::size_t i, std::size_t k) {
       for (const PackedPoses* poses : {&pairs_.b, &pairs_.a}) {
         const int sign = before(numbers(poses->mean(i).params()), numbers(poses->mean(k).params()));

@@ -30,19 +30,12 @@ LIESTAT_FUSION_INLINE std::string describe(const OpenDirection& direction, const
 }
 
 LIESTAT_FUSION_INLINE std::string HandEyeResult::suspectsInWords() const {
-  const auto written = [](const HandEyeSuspectTest& x) {
-    const bool time = !x.unit.empty();
-    const double scale = time ? 1e3 : 100;
-    return x.name + " off by " + significant(scale * x.estimate, 3) + " +- " + significant(scale * x.sigma, 2) +
-           (time ? " ms" : " %");
-  };
-  std::string group, options, refuted;
+  std::string group = liestat::suspectsInWords(suspects), options, refuted;
   for (const HandEyeSuspectTest& x : suspects) {
     if (x.in_group) {
-      group += (group.empty() ? "" : " or ") + written(x);
       options += (options.empty() ? "estimate " : " or ") + x.name;
     } else if (x.significant && x.prior_sigma > 0) {
-      refuted += (refuted.empty() ? "" : ", ") + written(x) + " against its prior";
+      refuted += (refuted.empty() ? "" : ", ") + x.inWords() + " against its prior";
     }
   }
   if (!group.empty()) group = "the residuals speak for " + group + " (" + options + " with X, or state a prior)";

@@ -1,6 +1,7 @@
 // Members shared by the models of epipolar geometries.
 #pragma once
 
+#include <fusion/two_view/detail/two_view_equations.hpp>
 #include <fusion/two_view/detail/two_view_estimate.hpp>
 #include <fusion/two_view/errors.hpp>
 #include <fusion/two_view/models.hpp>
@@ -19,21 +20,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// ũ'ᵀ F ũ = 0 and its derivatives by F's entries and by the match.
-struct EpipolarForm {
-  double value;
-  Eigen::Matrix<double, 1, 9> by_entries;
-  Eigen::Matrix<double, 1, 4> by_match;
-
-  EpipolarForm(const Eigen::Matrix3d& F, const Eigen::Vector4d& m) {
-    const Eigen::Vector3d u(m[0], m[1], 1), v(m[2], m[3], 1);
-    const Eigen::Vector3d Fu = F.col(0) * u[0] + F.col(1) * u[1] + F.col(2);
-    value = v.dot(Fu);
-    for (int k = 0; k < 3; ++k) by_entries.segment<3>(3 * k) = (u[k] * v).transpose();
-    for (int k = 0; k < 2; ++k) by_match[k] = v.dot(F.col(k)), by_match[2 + k] = Fu[k];
-  }
-};
 
 /// The equation of a pose.
 struct PoseEquation {

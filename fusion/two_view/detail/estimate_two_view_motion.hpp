@@ -3,7 +3,9 @@
 
 #include <fusion/detail/compiled.hpp>
 #include <fusion/coordinate_units.hpp>
+#include <fusion/two_view/detail/two_view_coordinates.hpp>
 #include <fusion/two_view/detail/two_view_estimate.hpp>
+#include <fusion/two_view/detail/two_view_suspects.hpp>
 #include <fusion/two_view/contradictions.hpp>
 #include <fusion/two_view/two_view.hpp>
 #include <stats/hierarchy.hpp>
@@ -25,32 +27,6 @@
 
 namespace liestat {
 namespace detail {
-
-/// How the pixels of an image become the coordinates of the models: u = (p - centre)/focal.
-struct TwoViewCoordinates {
-  std::optional<Camera> camera;
-  Eigen::Vector2d focal = Eigen::Vector2d::Ones(), centre = Eigen::Vector2d::Zero();
-
-  double focalLength() const { return std::sqrt(focal.x() * focal.y()); }
-  Eigen::Vector2d operator()(const Eigen::Vector2d& pixel) const {
-    if (!camera || camera->distortion == Distortion::none) return (pixel - centre).cwiseQuotient(focal);
-    const std::optional<Eigen::Vector3d> bearing = camera->bearing(pixel);
-    if (!bearing || !(bearing->z() > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-    return bearing->hnormalized();
-  }
-  /// K: pixels without distortion from the coordinates.
-  Eigen::Matrix3d pixels() const {
-    Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-    K.diagonal().head<2>() = focal, K.topRightCorner<2, 1>() = centre;
-    return K;
-  }
-};
-
-inline TwoViewCoordinates coordinatesOf(const std::optional<Camera>& camera, const Eigen::Vector2d& size,
-                                        const Eigen::Vector2d& corner) {
-  if (camera) return {camera, {camera->fu, camera->fv}, {camera->cu, camera->cv}};
-  return {std::nullopt, Eigen::Vector2d::Constant(0.5 * size.norm()), corner + 0.5 * size};
-}
 
 /// The covariance of A M B/‖A M B‖, entries column after column.
 inline Eigen::MatrixXd covarianceInPixels(const ModelEstimate<TwoViewMotionModel>& estimate, const Eigen::Matrix3d& A,
@@ -148,6 +124,27 @@ inline std::optional<TwoViewSearch> besideStillMatches(const TwoViewSearch& all,
   const auto explained =
       std::count_if(errors.begin(), errors.end(), [&](double e) { return e < max_excess_noise * state.threshold; });
   if (2 * static_cast<std::size_t>(explained) >= still.size()) return std::nullopt;
+  return search;
+}
+
+/// The search over the matches that no noise would bring close to the chosen model, where they are a quarter of all and
+/// half of them follow a motion of their own: as many as that are found in few draws.
+inline std::optional<TwoViewSearch> besideChosen(const TwoViewSearch& all, const std::vector<Eigen::Vector4d>& matches,
+                                                 TwoViewMotionOptions options, std::vector<Eigen::Vector4d>& others) {
+  constexpr std::size_t min_others = 20;
+  const auto& state = all.state(all.best());
+  if (!state.hasEstimate() || state.unsupported) return std::nullopt;
+  std::vector<double> errors(matches.size());
+  all.models()[all.best()]->errors(state.estimate.parameter, matches, errors);
+  others.clear();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (errors[i] >= max_excess_noise * state.threshold) others.push_back(matches[i]);
+  }
+  if (others.size() < std::max(min_others, matches.size() / 4)) return std::nullopt;
+  options.search.min_share = std::max(options.search.min_share, 0.5);
+  TwoViewSearch search = searched(all.models(), others, options);
+  const auto& second = search.state(search.best());
+  if (!second.hasEstimate() || second.unsupported || 2 * second.inliers.size() < others.size()) return std::nullopt;
   return search;
 }
 
@@ -269,6 +266,7 @@ struct TwoViewInput {
   std::string reason;                                ///< why there is nothing to estimate
   bool first_differ = false, second_differ = false;  ///< the points of the first image, and of the second
   TwoViewCoordinates first, second;
+  bool same_camera = true;
   TwoViewCalibration calibration = TwoViewCalibration::uncalibrated;
   TwoViewModels models;
   std::vector<Eigen::Vector4d> normalised;
@@ -278,6 +276,7 @@ struct TwoViewInput {
   TwoViewInput(std::span<const Eigen::Vector4d> matches, const TwoViewMotionOptions& options) {
     frame.matches = matches.size(), frame.sigma = options.sigma;
     frame.calibrated = options.first.has_value();
+    same_camera = !options.second;
     if (frame.calibrated) calibration = TwoViewCalibration::calibrated;
     // The size of the images: it says how likely wrong matches fit a model, and where the centre is.
     const Eigen::Vector4d* one = nullptr;
@@ -354,13 +353,24 @@ struct TwoViewInput {
     }
     used = independentMatches(normalised, noise, options.keep_contradictions);
     first_of_equal = firstOfEqualMatches(normalised);
-    for (std::size_t i = 0; i < matches.size(); ++i) frame.repeated += first_of_equal[i] != i ? 1 : 0;
+    for (std::size_t i = 0; i < matches.size(); ++i) frame.repeated += first_of_equal[i] != i ? 1U : 0U;
     frame.contradicted = matches.size() - frame.repeated - used.size();
     if (std::none_of(used.begin(), used.end(), [&](std::size_t i) { return normalised[i].allFinite(); })) {
       const bool none = std::none_of(normalised.begin(), normalised.end(), [](const auto& u) { return u.allFinite(); });
       refuse(none ? Status::too_few : Status::ill_defined,
              none ? "the cameras see no match" : "all matches contradict each other");
     }
+  }
+  /// The tests of the cameras at an estimate.
+  std::vector<TwoViewSuspectTest> testSuspects(const TwoViewModel& model,
+                                               const ModelEstimate<TwoViewMotionModel>& estimate,
+                                               std::span<const Eigen::Vector4d> pixels) const {
+    const MatchNoise noise{frame.sigma / first.focalLength(), frame.sigma / second.focalLength()};
+    const Eigen::Matrix3d& matrix = estimate.parameter.matrix;
+    return TwoViewSuspects(first, second, same_camera, noise)
+        .test(matrix / matrix.norm(),
+              covarianceInPixels(estimate, Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()),
+              model.freeParameters(), model.equations(), pixels);
   }
   void refuse(Status why, const std::string& in_words) { status = why, reason = in_words; }
   static bool isPinhole(const Camera& camera) {
@@ -402,8 +412,11 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   std::vector<Eigen::Vector4d> moving;
   std::optional<detail::TwoViewSearch> beside_still =
       result.ok() ? detail::besideStillMatches(search, taking_part, options, moving) : std::nullopt;
-  const bool is_two_motions = beside_still.has_value();
-  if (is_two_motions) search = std::move(*beside_still), taking_part = std::move(moving);
+  const bool is_beside_still = beside_still.has_value();
+  if (is_beside_still) search = std::move(*beside_still), taking_part = std::move(moving);
+  std::vector<Eigen::Vector4d> others;
+  const std::optional<detail::TwoViewSearch> beside_chosen =
+      result.ok() && !is_beside_still ? detail::besideChosen(search, taking_part, options, others) : std::nullopt;
   for (std::size_t m = 0; m < search.models().size(); ++m) {
     result.lattice.push_back(detail::rowOf(search, m, options.sigma));
   }
@@ -421,20 +434,39 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   model.errors(state.estimate.parameter, input.normalised, result.errors);
   std::vector<double> still_errors(matches.size(), std::numeric_limits<double>::infinity());
   const std::size_t none = search.nullModel();
-  if (is_two_motions) search.models()[none]->errors({}, input.normalised, still_errors);
+  if (is_beside_still) search.models()[none]->errors({}, input.normalised, still_errors);
   const double still_threshold = search.state(none).threshold;
   std::size_t still = 0;
-  std::vector<Eigen::Vector4d> agreeing;
+  std::vector<Eigen::Vector4d> agreeing, agreeing_pixels;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const bool is_still = still_errors[i] < still_threshold;
     still += is_still;
     result.inlier[i] = !is_still && result.errors[i] < state.threshold;
-    if (result.inlier[i]) agreeing.push_back(input.normalised[i]);
+    if (!result.inlier[i]) continue;
+    agreeing.push_back(input.normalised[i]);
+    if (input.first_of_equal[i] == i) agreeing_pixels.push_back(matches[i]);
   }
   result.inliers = agreeing.size(), result.threshold = state.threshold;
   const ModelEstimate<TwoViewMotionModel> estimate = detail::atShownNoise(model, state, taking_part, options);
   input.describe(model, estimate, agreeing, result);
+  result.suspects = input.testSuspects(model, estimate, agreeing_pixels);
 
+  // The motion of a model of a search over some of the matches.
+  const auto addRival = [&](const detail::TwoViewSearch& of, std::size_t m,
+                            std::span<const Eigen::Vector4d> over) -> const TwoViewRival& {
+    const TwoViewModel& other = *of.models()[m];
+    const ModelState<TwoViewMotionModel>& its = of.state(m);
+    std::vector<double> errors(matches.size());
+    other.errors(its.estimate.parameter, input.normalised, errors);
+    std::vector<Eigen::Vector4d> inliers;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (errors[i] < its.threshold) inliers.push_back(input.normalised[i]);
+    }
+    TwoViewRival& rival = result.rivals.emplace_back();
+    rival.model = other.name(), rival.inliers = inliers.size(), rival.equations = other.equations();
+    input.describe(other, detail::atShownNoise(other, its, over, options), inliers, rival);
+    return rival;
+  };
   result.status = estimate.status;
   if (search.progress() != HierarchyState::terminated) {
     result.status = Status::not_converged, result.reason = "the search was stopped";
@@ -447,7 +479,7 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
   } else if (state.unsupported) {
     result.status = Status::ill_defined;
     result.reason = "no model is supported: the inliers of the chosen one could be chance";
-  } else if (is_two_motions) {
+  } else if (is_beside_still) {
     result.status = Status::contested;
     result.reason = "two motions: " + detail::shareInWords(still, matches.size()) + " do not move, " +
                     detail::shareInWords(result.inliers, matches.size()) + " follow " + model.name();
@@ -455,23 +487,21 @@ LIESTAT_FUSION_INLINE TwoViewMotionEstimate estimateTwoViewMotion(std::span<cons
     rival.model = search.models()[none]->name(), rival.inliers = still, rival.equations = 2;
     ModelEstimate<TwoViewMotionModel> at_rest;
     input.describe(*search.models()[none], at_rest, {}, rival);
+  } else if (beside_chosen) {
+    const TwoViewRival& rival = addRival(*beside_chosen, beside_chosen->best(), others);
+    result.status = Status::contested;
+    result.reason = "two motions: " + detail::shareInWords(result.inliers, matches.size()) + " follow " + model.name() +
+                    ", " + detail::shareInWords(rival.inliers, matches.size()) + " another " + rival.model;
   } else if (const std::vector<std::size_t> set = search.contested(); set.size() > 1) {
     result.status = Status::contested, result.reason = "the matches do not tell apart " + model.name();
     for (auto m = set.begin() + 1; m != set.end(); ++m) {
       const TwoViewModel& other = *search.models()[*m];
-      const ModelState<TwoViewMotionModel>& its = search.state(*m);
-      std::vector<double> errors(matches.size());
-      other.errors(its.estimate.parameter, input.normalised, errors);
-      std::vector<Eigen::Vector4d> inliers;
-      for (std::size_t i = 0; i < matches.size(); ++i) {
-        if (errors[i] < its.threshold) inliers.push_back(input.normalised[i]);
-      }
-      TwoViewRival& rival = result.rivals.emplace_back();
-      rival.model = other.name(), rival.inliers = inliers.size(), rival.equations = other.equations();
-      input.describe(other, detail::atShownNoise(other, its, taking_part, options), inliers, rival);
+      addRival(search, *m, taking_part);
       result.reason += (m + 1 == set.end() ? " and " : ", ") + other.name();
     }
     result.shared = detail::sharedParameters(result, result.rivals);
+  } else if (const std::string suspected = suspectsInWords(result.suspects); !suspected.empty()) {
+    result.status = Status::inconsistent, result.reason = "the matches speak for " + suspected;
   }
   return result;
 }
@@ -510,9 +540,10 @@ LIESTAT_FUSION_INLINE TwoViewMotions estimateTwoViewMotions(std::span<const Eige
                        own.size() * static_cast<std::size_t>(model.equations()), model.freeParameters()};
     TwoViewStructure& structure = result.structures.emplace_back();
     structure.model = found.name, structure.equations = model.equations();
-    const ModelEstimate<TwoViewMotionModel> last = model.finalEstimate(found.estimate.parameter, own, options.stop);
-    const ModelEstimate<TwoViewMotionModel>& estimate = last.usable() ? last : found.estimate;
-    structure.status = last.status, structure.inliers = std::move(places);
+    ModelState<TwoViewMotionModel> state = found.state;
+    state.estimate = found.estimate;
+    const ModelEstimate<TwoViewMotionModel> estimate = detail::atShownNoise(model, state, own, options);
+    structure.status = estimate.status, structure.inliers = std::move(places);
     structure.rms = options.sigma * std::sqrt(fit.normalised());
     input.describe(model, estimate, own, structure);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fusion/detail/compiled.hpp>
+#include <fusion/two_view/detail/two_view_equations.hpp>
 #include <fusion/two_view/detail/two_view_estimate.hpp>
 #include <fusion/two_view/detail/two_view_lattice.hpp>
 #include <fusion/two_view/errors.hpp>
@@ -24,32 +25,6 @@
 #include <vector>
 
 namespace liestat::detail {
-
-/// (h₃·ũ) u' - (h₁·ũ, h₂·ũ) = 0.
-struct HomographyEquation {
-  Eigen::Vector2d operator()(const Entries& q, const Eigen::Vector4d& m) const {
-    const Eigen::Matrix3d H = matrixFrom(q);
-    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
-    return {w * m[2] - (H(0, 0) * m[0] + H(0, 1) * m[1] + H(0, 2)),
-            w * m[3] - (H(1, 0) * m[0] + H(1, 1) * m[1] + H(1, 2))};
-  }
-  EquationDerivatives<2, 9, 4> linearize(const Entries& q, const Eigen::Vector4d& m) const {
-    const Eigen::Matrix3d H = matrixFrom(q);
-    const double w = H(2, 0) * m[0] + H(2, 1) * m[1] + H(2, 2);
-    EquationDerivatives<2, 9, 4> result;
-    result.value = (*this)(q, m);
-    auto& J = result.by_parameter;
-    auto& D = result.by_measurement;
-    J.setZero(), D.setZero();
-    for (int k = 0; k < 2; ++k) {
-      const double u = m[2 + k];
-      J(k, entry(k, 0)) = -m[0], J(k, entry(k, 1)) = -m[1], J(k, entry(k, 2)) = -1;
-      J(k, entry(2, 0)) = u * m[0], J(k, entry(2, 1)) = u * m[1], J(k, entry(2, 2)) = u;
-      D(k, 0) = u * H(2, 0) - H(k, 0), D(k, 1) = u * H(2, 1) - H(k, 1), D(k, 2 + k) = w;
-    }
-    return result;
-  }
-};
 
 /// The parts that models of homographies have in common.
 class HomographyTypeModel : public CardModel {
