@@ -201,7 +201,7 @@ void addEvaluateCommand(const CommandList& program) {
   auto o = std::make_shared<EvaluateOptions>();
   const Command command =
       program.add("evaluate", "Trajectories against a reference: APE, RPE, and are the covariances right?");
-  command.option("REFERENCE", o->reference, "Ground truth: TUM, KITTI, EuRoC, CSV … ('-': standard input)").required();
+  command.option("REFERENCE", o->reference, "Ground truth: TUM, KITTI, EuRoC, CSV, BAG:TOPIC … ('-': standard input)").required();
   command.option("ESTIMATE", o->estimates, "Estimates, any number of them").required();
   command.option("--cov-from", o->cov_from, "Convention of the estimates' covariances: ros-fixed, left,order=rt …");
   command.option("--cov-ref", o->cov_ref,
