@@ -90,7 +90,7 @@ std::uint64_t littleEndian(std::string_view bytes, std::size_t at, std::size_t n
   return value;
 }
 
-// --- ROS 1 and MCAP: records, chunks of records, and after each chunk the index of its messages -----------------------
+// --- ROS 1 and MCAP: records, chunks of records, and after each chunk the index of its messages ----------------------
 
 enum class RecordKind { topic, message, chunk, index, end, other };
 
@@ -164,7 +164,7 @@ bool nextRos1(Bytes& bytes, std::uint64_t& at, std::uint64_t end, Record& record
       break;
     case 3: {
       const std::uint64_t index = littleEndian(fieldOf(fields, "index_pos"), 0, 8);
-      record.unclosed = index == 0 || index > bytes.size();
+      record.unclosed = index == 0 || index >= bytes.size();
       break;
     }
     case 4:
@@ -378,7 +378,7 @@ class ChunkedBag {
   std::string fault_, torn_;
 };
 
-// --- Compression ------------------------------------------------------------------------------------------------------
+// --- Compression -----------------------------------------------------------------------------------------------------
 
 [[noreturn, maybe_unused]] void refuseCompression(const std::string& file, std::string_view what,
                                                   std::string_view package) {
@@ -386,7 +386,7 @@ class ChunkedBag {
                    fmt::format("a build with {} (docs/bags.md)", package));
 }
 
-/// Takes what a decompressor delivers, block by block: step(out, room) returns the bytes written, and says by `done` that
+/// Takes what a decompressor delivers in blocks: step(out, room) returns the bytes written, and says by `done` that
 /// the text has ended, by `fault` why it cannot.
 template <class Step>
 Expanded expandBlocks(std::size_t limit, Step&& step) {
@@ -427,7 +427,8 @@ std::string expandZstdFile(Bytes& bytes, Take&& take) {
 
 }  // namespace
 
-Expanded expanded(std::string_view compression, std::string_view bytes, std::size_t limit, const std::string& file) {
+Expanded expanded(std::string_view compression, [[maybe_unused]] std::string_view bytes,
+                  [[maybe_unused]] std::size_t limit, const std::string& file) {
   if (compression == "bz2") {
 #ifdef LIESTAT_HAS_BZ2
     bz_stream s{};
@@ -564,23 +565,26 @@ class Rosbag2 {
                    }) &&
               whole;
     }
-    for (const auto& [id, topic] : topics) {
+    for (const auto& entry : topics) {
+      const std::size_t topic = entry.second;
       if (pass.counts() || !pass.takes(topic)) continue;
-      const bool read = each("SELECT timestamp, data FROM messages WHERE topic_id=?", id, [&](sqlite3_stmt* s) {
-        if (++rows > most) throw InputError(name_, 0, "its table of messages leads back into itself");
-        const void* data = sqlite3_column_blob(s, 1);
-        std::string_view message(static_cast<const char*>(data), static_cast<std::size_t>(sqlite3_column_bytes(s, 1)));
-        Expanded e;
-        if (message.starts_with(zstd_magic)) {
-          e = expanded("zstd", message, largest_message, name_);
-          message = e.text;
-        }
-        if (message.size() > largest_message || !e.fault.empty()) {
-          ++unread;
-        } else {
-          pass.take(pass.topics[topic], sqlite3_column_int64(s, 0), message);
-        }
-      });
+      const bool read =
+          each("SELECT timestamp, data FROM messages WHERE topic_id=?", entry.first, [&](sqlite3_stmt* s) {
+            if (++rows > most) throw InputError(name_, 0, "its table of messages leads back into itself");
+            const void* data = sqlite3_column_blob(s, 1);
+            std::string_view message(static_cast<const char*>(data),
+                                     static_cast<std::size_t>(sqlite3_column_bytes(s, 1)));
+            Expanded e;
+            if (message.starts_with(zstd_magic)) {
+              e = expanded("zstd", message, largest_message, name_);
+              message = e.text;
+            }
+            if (message.size() > largest_message || !e.fault.empty()) {
+              ++unread;
+            } else {
+              pass.take(pass.topics[topic], sqlite3_column_int64(s, 0), message);
+            }
+          });
       whole = whole && read;
     }
     if (!whole) {
@@ -604,7 +608,7 @@ class Rosbag2 {
 };
 #endif
 
-void readOneFile(const std::string& path, const std::string& name, double largest, BagPass& pass) {
+void readOneFile(const std::string& path, const std::string& name, [[maybe_unused]] double largest, BagPass& pass) {
   Bytes bytes(path, "file");
   const std::string magic(bytes.at(0, 16));
   const std::string_view m = magic;

@@ -328,6 +328,12 @@ TEST(Bag, damagedBags) {
     if (std::string(name).ends_with("db3.zstd") || std::string(name) == "unindexed.mcap") continue;
     EXPECT_GT(readAll(directory.write(name, whole.substr(0, whole.size() * 3 / 4))), 1U);
   }
+  // Wherever a bag ends before its index, a note says so.
+  const std::string small = contentOf(LIESTAT_SOURCE_DIR "/fuzz/corpus/bag/small.bag");
+  EXPECT_TRUE(listBag(directory.write("s.bag", small)).notes.empty());
+  for (std::size_t size = 14; size <= 4649; ++size) {
+    EXPECT_FALSE(listBag(directory.write("s.bag", small.substr(0, size))).notes.empty()) << size;
+  }
   // A bag of a recorder that was killed: what is whole is read.
   const std::string whole = mcap("geometry_msgs/PoseStamped", true, std::vector<std::string>(10, poseOf({}, 1, 1)));
   const Trajectory t = readTrajectory(directory.write("k.mcap", whole.substr(0, whole.size() - 150)));
