@@ -102,7 +102,6 @@ struct Record {
   std::size_t count = 0;             ///< of an index
   std::uint64_t begin = 0, end = 0;  ///< the message, or the chunk's records
   std::uint64_t expanded = 0;        ///< the chunk's size, as it says
-  bool torn = false;                 ///< the file ends within the chunk
   bool unclosed = false;             ///< the file says that it has no index
   std::string compression = {};      ///< none: ""
   BagTopic topic = {};
@@ -148,8 +147,7 @@ bool nextRos1(Bytes& bytes, std::uint64_t& at, std::uint64_t end, Record& record
   if (header.size() < n + 4) return false;
   const std::string_view fields = header.substr(0, n), op = fieldOf(fields, "op");
   record.begin = at + 8 + n, record.end = record.begin + littleEndian(header, n, 4);
-  record.torn = record.end > end;
-  if (op.size() != 1 || (record.torn && op[0] != 5)) return false;
+  if (op.size() != 1 || (record.end > end && op[0] != 5)) return false;
   const auto number = [&](std::string_view name) {
     return static_cast<std::uint32_t>(littleEndian(fieldOf(fields, name), 0, 4));
   };
@@ -191,9 +189,9 @@ class McapRecords {
     const std::string head(bytes.at(at, 9));
     const std::uint64_t n = littleEndian(head, 1, 8);
     if (head.size() < 9 || head[0] == 0 || end - at < 9) return false;
-    record.torn = n > end - at - 9;
-    if (record.torn && head[0] != 6) return false;
-    record.begin = at + 9, record.end = record.torn ? end : record.begin + n;
+    const bool torn = n > end - at - 9;
+    if (torn && head[0] != 6) return false;
+    record.begin = at + 9, record.end = torn ? end : record.begin + n;
     at = record.end;
     // Names beyond this are cut off.
     const std::string_view body = bytes.at(
@@ -338,7 +336,6 @@ class ChunkedBag {
 
   /// False if the records end before their end, which `torn_` then names.
   bool walk(Bytes& bytes, std::uint64_t at, std::uint64_t end, bool in_chunk) {
-    bool torn = false;
     while (at < end) {
       Record r;
       const std::uint64_t before = at;
@@ -349,8 +346,8 @@ class ChunkedBag {
         return false;
       }
       if (r.kind == RecordKind::end) return true;
-      if (r.unclosed) pass_.notes.push_back(file_ + " was not closed, or is cut off: it has no index at its end");
-      torn = torn || r.torn;
+      if (r.unclosed && !std::exchange(unclosed_, true))
+        pass_.notes.push_back(file_ + " was not closed, or is cut off: it has no index at its end");
       if (r.kind == RecordKind::topic) {
         topics_[r.id] = pass_.topic(std::move(r.topic.name), std::move(r.topic.type), std::move(r.topic.encoding));
       } else if (r.kind == RecordKind::message) {
@@ -363,8 +360,8 @@ class ChunkedBag {
     }
     if (!in_chunk) settle(bytes);
     torn_ = fmt::format("at byte {}", end);
-    // A whole file of MCAP has a last record; one of ROS 1 ends with any.
-    return !torn && (in_chunk || std::is_same_v<Next, decltype(&nextRos1)>);
+    // A whole file of MCAP has a last record; of ROS 1 the first says where its index is.
+    return in_chunk || std::is_same_v<Next, decltype(&nextRos1)>;
   }
 
   Next next_;
@@ -376,6 +373,7 @@ class ChunkedBag {
   std::size_t faults_ = 0, large_messages_ = 0, unnamed_ = 0;
   std::uint64_t first_fault_ = 0;
   std::string fault_, torn_;
+  bool unclosed_ = false;
 };
 
 // --- Compression -----------------------------------------------------------------------------------------------------

@@ -50,6 +50,7 @@ void expectScene(const std::string& path, int count) {
     EXPECT_TRUE(contains(errorOf([&] { listBag(path); }), package)) << errorOf([&] { listBag(path); });
     return;
   }
+  if (contains(path, "split") && !lacking("zstd").empty()) return;  // some of its messages
   const auto poses = static_cast<std::size_t>((count + 4) / 5), n = static_cast<std::size_t>(count);
   const BagContents bag = listBag(path);
   EXPECT_TRUE(bag.notes.empty()) << bag.notes[0];
@@ -134,8 +135,8 @@ TEST(Bag, freshBagsOfRos1) {
 TEST(Bag, freshBagsOfRos2) {
   const TemporaryDirectory directory;
   ASSERT_EQ(std::system((LIESTAT_ROS2_WRITER " " + directory.path().string()).c_str()), 0);
-  for (const char* name :
-       {"none.mcap", "lz4.mcap", "zstd.mcap", "unchunked.mcap", "unindexed.mcap", "run.db3", "run.db3.zstd"}) {
+  for (const char* name : {"none.mcap", "lz4.mcap", "zstd.mcap", "unchunked.mcap", "unindexed.mcap", "run.db3",
+                           "run.db3.zstd", "split_db3"}) {
     expectScene(directory / name, 200);
   }
 }

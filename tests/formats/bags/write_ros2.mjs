@@ -1,5 +1,5 @@
 // write_ros2.mjs NODE_MODULES DIRECTORY [COUNT]: the same scene in CDR: none.mcap, lz4.mcap, zstd.mcap, unindexed.mcap,
-// run.db3 and run.db3.zstd, by @mcap/core, @foxglove/rosmsg2-serialization, sqlite3, lz4 and zstd.
+// run.db3, run.db3.zstd and split_db3/, by @mcap/core, @foxglove/rosmsg2-serialization, sqlite3, lz4 and zstd.
 import { execFileSync } from "child_process";
 import fs from "fs";
 import { createRequire } from "module";
@@ -150,16 +150,24 @@ await writeMcap("unchunked", undefined, { useChunks: false });
 await writeMcap("unindexed", "zstd", { useMessageIndex: false, useChunkIndex: false, repeatSchemas: false,
                                        repeatChannels: false, useStatistics: false, useSummaryOffsets: false });
 
-// rosbag2's tables.
+// rosbag2's tables; a directory of two files, of which the second has odometry compressed message by message.
 const names = Object.keys(topics);
-const rows = names.map((t, k) => `INSERT INTO topics VALUES(${k + 1},'${t}','${topics[t]}','cdr','');`);
-for (const [topic, ns, data] of messages) {
-  const hex = Buffer.from(data).toString("hex");
-  rows.push(`INSERT INTO messages(topic_id,timestamp,data) VALUES(${names.indexOf(topic) + 1},${ns},x'${hex}');`);
+function writeDatabase(file, list, encode) {
+  const rows = names.map((t, k) => `INSERT INTO topics VALUES(${k + 1},'${t}','${topics[t]}','cdr','');`);
+  for (const [topic, ns, data] of list) {
+    const hex = Buffer.from(encode(topic, data)).toString("hex");
+    rows.push(`INSERT INTO messages(topic_id,timestamp,data) VALUES(${names.indexOf(topic) + 1},${ns},x'${hex}');`);
+  }
+  const tables = `CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format
+TEXT NOT NULL,offered_qos_profiles TEXT NOT NULL);CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT
+NULL,timestamp INTEGER NOT NULL,data BLOB NOT NULL);CREATE INDEX timestamp_idx ON messages(timestamp ASC);`;
+  fs.rmSync(file, { force: true });
+  execFileSync("sqlite3", [file], { input: `${tables}BEGIN;${rows.join("\n")}COMMIT;` });
 }
-const tables = `CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT
-NOT NULL,offered_qos_profiles TEXT NOT NULL);CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,
-timestamp INTEGER NOT NULL,data BLOB NOT NULL);CREATE INDEX timestamp_idx ON messages(timestamp ASC);`;
-fs.rmSync(`${directory}/run.db3`, { force: true });
-execFileSync("sqlite3", [`${directory}/run.db3`], { input: `${tables}BEGIN;${rows.join("\n")}COMMIT;` });
+writeDatabase(`${directory}/run.db3`, messages, (_, data) => data);
 fs.writeFileSync(`${directory}/run.db3.zstd`, compressed("zstd", fs.readFileSync(`${directory}/run.db3`)));
+fs.mkdirSync(`${directory}/split_db3`, { recursive: true });
+const half = messages.length / 2;
+writeDatabase(`${directory}/split_db3/run_9.db3`, messages.slice(0, half), (_, data) => data);
+writeDatabase(`${directory}/split_db3/run_10.db3`, messages.slice(half), (topic, data) =>
+  topic == "/odom" ? compressed("zstd", data) : data);
