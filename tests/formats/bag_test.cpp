@@ -1,6 +1,7 @@
 // Bags: those of ROS' own writers (tests/data/bags, and fresh ones where the writers are installed), and bags written here
 // that are cut off, damaged, hostile, or of rarer encodings.
 #include <formats/bag.hpp>
+#include <formats/features.hpp>
 #include <formats/imu.hpp>
 #include <formats/trajectory.hpp>
 
@@ -101,6 +102,11 @@ void expectScene(const std::string& path, int count) {
                   .norm(),
               1e-15);
   }
+  const FeatureFile features = readFeatureFile(path + ":/odom");
+  ASSERT_EQ(features.size(), poses);
+  EXPECT_EQ(featuresOf<Frame3d>(features)[3].params(), readTrajectory(path + ":/odom").poses[3].params());
+  ASSERT_EQ(features.notes.size(), 1U);
+  EXPECT_TRUE(contains(features.notes[0], "covariances are not used") && features.covariances.empty());
   // map -> odom comes with each fourth pose; its height grows evenly, so that interpolation is exact.
   TrajectoryOptions chain;
   chain.frames = "map:camera";
