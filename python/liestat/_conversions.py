@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from . import _core
-from ._files import _reader
+from ._files import _reader, read_imu
 from ._manifolds import SE3
 from ._operate import as_numbers
 from ._results import Result
