@@ -675,6 +675,17 @@ void BagPass::count(std::size_t topic, std::size_t n, std::int64_t first, std::i
   t.messages += n;
 }
 
+bool beginsAsBag(const std::string& path) {
+  try {
+    Bytes bytes(path, "file");
+    const std::string_view m = bytes.at(0, 16);
+    return m.starts_with("#ROSBAG") || m.starts_with(mcap_magic) || m.starts_with(sqlite_magic) ||
+           m.starts_with(zstd_magic);
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 void readBagFile(const std::string& path, double largest, BagPass& pass) {
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) return readOneFile(path, sourceName(path), largest, pass);
@@ -722,15 +733,7 @@ bool isBag(const std::string& path) {
     return false;
   }
   // A pipe can be read only once.
-  if (!S_ISREG(info.st_mode)) return false;
-  try {
-    detail::Bytes bytes(file, "file");
-    const std::string_view m = bytes.at(0, 16);
-    return m.starts_with("#ROSBAG") || m.starts_with(detail::mcap_magic) || m.starts_with(detail::sqlite_magic) ||
-           m.starts_with(detail::zstd_magic);
-  } catch (const InputError&) {
-    return false;
-  }
+  return S_ISREG(info.st_mode) && detail::beginsAsBag(file);
 }
 
 BagContents listBag(const std::string& path, double largest) {

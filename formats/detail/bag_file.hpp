@@ -39,6 +39,9 @@ class BagPass {
   std::vector<bool> taken_;
 };
 
+/// True if the first bytes of a file are a bag's.
+bool beginsAsBag(const std::string& path);
+
 /// Reads a bag, or the bags of a directory in the order of their names. Notes say what could not be read. Throws
 /// InputError where it is no bag, or of a kind that this build cannot read, and what `take` throws.
 void readBagFile(const std::string& path, double largest, BagPass& pass);

@@ -319,17 +319,18 @@ std::size_t readAll(const std::string& path) {
 
 TEST(Bag, damagedBags) {
   const TemporaryDirectory directory;
+  int n = 0;  // each file has a name of its own: writing one again waits for the disk
   for (const char* name : {"bz2.bag", "lz4.bag", "lz4.mcap", "unindexed.mcap", "run.db3.zstd"}) {
     SCOPED_TRACE(name);
     if (!lacking(name).empty()) continue;
     const std::string whole = contentOf(std::string(LIESTAT_SOURCE_DIR "/tests/data/bags/") + name);
     for (std::size_t k = 0; k < 60; ++k) {
       const std::size_t place = k * whole.size() / 60 + k % 3;
-      readAll(directory.write(name, whole.substr(0, place)));
+      readAll(directory.write(fmt::format("{}{}", ++n, name), whole.substr(0, place)));
       std::string damaged = whole;
       for (std::size_t i = place; i < std::min(place + 3, whole.size()); ++i)
         damaged[i] = static_cast<char>(damaged[i] ^ (k % 2 ? 0xFF : 0x10));
-      readAll(directory.write(name, damaged));
+      readAll(directory.write(fmt::format("{}{}", ++n, name), damaged));
     }
     // Of half of a file something is read, with a note.
     if (std::string(name).ends_with("db3.zstd") || std::string(name) == "unindexed.mcap") continue;
@@ -338,8 +339,8 @@ TEST(Bag, damagedBags) {
   // Wherever a bag ends before its index, a note says so.
   const std::string small = contentOf(LIESTAT_SOURCE_DIR "/fuzz/corpus/bag/small.bag");
   EXPECT_TRUE(listBag(directory.write("s.bag", small)).notes.empty());
-  for (std::size_t size = 14; size <= 4649; ++size) {
-    EXPECT_FALSE(listBag(directory.write("s.bag", small.substr(0, size))).notes.empty()) << size;
+  for (std::size_t size = 14; size <= 4649; size += size < 400 ? 1 : 7) {
+    EXPECT_FALSE(listBag(directory.write(fmt::format("{}.bag", ++n), small.substr(0, size))).notes.empty()) << size;
   }
   // A bag of a recorder that was killed: what is whole is read.
   const std::string whole = mcap("geometry_msgs/PoseStamped", true, std::vector<std::string>(10, poseOf({}, 1, 1)));
