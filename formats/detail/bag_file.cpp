@@ -1,6 +1,7 @@
 #include <formats/detail/bag_file.hpp>
 
 #include <formats/input_error.hpp>
+#include <formats/result_zip.hpp>
 #include <formats/text.hpp>
 
 #include <fmt/format.h>
@@ -102,6 +103,7 @@ struct Record {
   std::size_t count = 0;             ///< of an index
   std::uint64_t begin = 0, end = 0;  ///< the message, or the chunk's records
   std::uint64_t expanded = 0;        ///< the chunk's size, as it says
+  std::uint32_t checksum = 0;        ///< of the chunk expanded; 0: it has none
   bool unclosed = false;             ///< the file says that it has no index
   std::string compression = {};      ///< none: ""
   BagTopic topic = {};
@@ -228,7 +230,8 @@ class McapRecords {
         break;
       case 6:
         record.kind = RecordKind::chunk, number(8), number(8);
-        record.expanded = number(8), number(4), record.compression = text();
+        record.expanded = number(8), record.checksum = static_cast<std::uint32_t>(number(4));
+        record.compression = text();
         record.begin = std::min(record.begin + place + 8, record.end);
         break;
       case 7:
@@ -324,6 +327,10 @@ class ChunkedBag {
                           static_cast<std::size_t>(chunk.expanded), file_);
     if (e.fault.empty() && e.text.size() < chunk.expanded) {
       e.fault = fmt::format("{} bytes of {}", e.text.size(), chunk.expanded);
+    }
+    if (e.fault.empty() && chunk.checksum != 0 && crc32(e.text) != chunk.checksum) {
+      fault(chunk.begin, "its checksum is not that of its records, none of which is read");
+      return;
     }
     Bytes records(std::move(e.text));
     const bool whole = walk(records, 0, records.size(), true);

@@ -336,6 +336,13 @@ TEST(Bag, damagedBags) {
     if (std::string(name).ends_with("db3.zstd") || std::string(name) == "unindexed.mcap") continue;
     EXPECT_GT(readAll(directory.write(name, whole.substr(0, whole.size() * 3 / 4))), 1U);
   }
+  if (lacking("zstd").empty()) {
+    std::string mcap = contentOf(LIESTAT_SOURCE_DIR "/tests/data/bags/unindexed.mcap");
+    const std::size_t checksum = mcap.find(text4("zstd")) - 4;
+    mcap[checksum] = static_cast<char>(mcap[checksum] ^ 1);
+    const BagContents bag = listBag(directory.write("c.mcap", mcap));
+    EXPECT_TRUE(!bag.notes.empty() && contains(bag.notes[0], "its checksum is not that of its records"));
+  }
   // Wherever a bag ends before its index, a note says so.
   const std::string small = contentOf(LIESTAT_SOURCE_DIR "/fuzz/corpus/bag/small.bag");
   EXPECT_TRUE(listBag(directory.write("s.bag", small)).notes.empty());
